@@ -1,0 +1,32 @@
+# make demo: the whole story on the simulated rig.   make test: everything CI checks.
+PYTHON ?= python3
+BIN := .venv/bin
+
+.PHONY: demo test setup bench lint clean
+
+demo: setup
+	$(BIN)/rig demo
+
+test: setup lint
+	$(BIN)/pytest -n auto
+
+lint: setup
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports --no-cache
+
+bench: setup
+	$(BIN)/python -m tests.benchmark
+
+setup: .venv/ready
+
+# The stamp is newer than what it was made from, so that a second call starts at once.
+.venv/ready: pyproject.toml constraints.txt
+	test -x $(BIN)/python || $(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test]'
+	if [ "$$(id -u)" = 0 ] && ! command -v mbpoll >/dev/null; then apt-get -qq update && apt-get -qq install -y mbpoll || true; fi
+	$(BIN)/python -m rig.warm
+	touch $@
+
+clean:
+	rm -rf .venv

@@ -1,0 +1,94 @@
+"""The motor angle of a stage against time: a trapezoid of speed, cut short by a stop.
+
+The drive's twin plans it (speed and acceleration are the drive's), the world follows it
+(gear, play and tilt are the world's).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """A move from rest to rest. Times in s, angles in deg, speed in deg/s, acceleration in deg/s^2."""
+
+    start_s: float
+    start_deg: float
+    target_deg: float
+    speed_deg_s: float
+    acceleration_deg_s2: float
+    stop_s: float | None = None  # when a stop was commanded; the motor then decelerates to rest
+
+    @property
+    def direction(self) -> float:
+        return math.copysign(1.0, self.target_deg - self.start_deg) if self.target_deg != self.start_deg else 0.0
+
+    @property
+    def _ramp_s(self) -> float:
+        """Length of the acceleration ramp; a short move never reaches its speed."""
+        distance = abs(self.target_deg - self.start_deg)
+        return min(self.speed_deg_s / self.acceleration_deg_s2, math.sqrt(distance / self.acceleration_deg_s2))
+
+    @property
+    def _cruise_s(self) -> float:
+        distance = abs(self.target_deg - self.start_deg)
+        if distance == 0:
+            return 0.0
+        peak = self._ramp_s * self.acceleration_deg_s2
+        return max(0.0, (distance - peak * self._ramp_s) / peak)
+
+    @property
+    def end_s(self) -> float:
+        planned = self.start_s + 2 * self._ramp_s + self._cruise_s
+        if self.stop_s is None or self.stop_s >= planned:
+            return planned
+        return min(planned, self.stop_s + abs(self._planned_rate(self.stop_s)) / self.acceleration_deg_s2)
+
+    def _planned_rate(self, t_s: float) -> float:
+        t, ramp, cruise = t_s - self.start_s, self._ramp_s, self._cruise_s
+        if t <= 0 or t >= 2 * ramp + cruise:
+            return 0.0
+        return self.direction * self.acceleration_deg_s2 * min(t, ramp, 2 * ramp + cruise - t)
+
+    def _planned_angle(self, t_s: float) -> float:
+        t, ramp, cruise, a = t_s - self.start_s, self._ramp_s, self._cruise_s, self.acceleration_deg_s2
+        if t <= 0:
+            return self.start_deg
+        if t >= 2 * ramp + cruise:
+            return self.target_deg
+        if t < ramp:
+            travelled = a * t * t / 2
+        elif t < ramp + cruise:
+            travelled = a * ramp * (t - ramp / 2)
+        else:
+            left = 2 * ramp + cruise - t
+            travelled = abs(self.target_deg - self.start_deg) - a * left * left / 2
+        return self.start_deg + self.direction * travelled
+
+    def angle_deg(self, t_s: float) -> float:
+        """Motor angle in deg at time `t_s`."""
+        if self.stop_s is None or t_s <= self.stop_s:
+            return self._planned_angle(t_s)
+        rate = self._planned_rate(self.stop_s)
+        t = min(t_s - self.stop_s, abs(rate) / self.acceleration_deg_s2)
+        braking = math.copysign(self.acceleration_deg_s2, rate) * t * t / 2
+        return self._planned_angle(self.stop_s) + rate * t - braking
+
+    def rate_deg_s(self, t_s: float) -> float:
+        """Motor rate in deg/s at time `t_s`."""
+        if self.stop_s is None or t_s <= self.stop_s:
+            return self._planned_rate(t_s)
+        rate = self._planned_rate(self.stop_s)
+        left = abs(rate) - self.acceleration_deg_s2 * (t_s - self.stop_s)
+        return math.copysign(max(0.0, left), rate)
+
+    def stopped(self, t_s: float) -> Trajectory:
+        """The same move with a stop commanded at `t_s`."""
+        return self if self.stop_s is not None else replace(self, stop_s=t_s)
+
+
+def at_rest(angle_deg: float) -> Trajectory:
+    """A stage that stands at `angle_deg`."""
+    return Trajectory(0.0, angle_deg, angle_deg, 1.0, 1.0)
