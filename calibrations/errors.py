@@ -1,0 +1,47 @@
+"""What can be wrong with what this library is given.
+
+CalibrationError
+├── DataError            a table: its file, line and column
+│   ├── MissingColumn    a column that the question needs
+│   └── TooFewRows       fewer rows than parameters
+├── ModelError           a model file: its key
+└── UnknownName          a model or an effect that nobody here knows; names the nearest
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class CalibrationError(Exception):
+    """Bad input to the library; the message says what, where and what to do."""
+
+
+class DataError(CalibrationError):
+    """A table cannot be what it says it is."""
+
+
+class MissingColumn(DataError):  # noqa: N818
+    """A column that is needed is not there."""
+
+
+class TooFewRows(DataError):  # noqa: N818
+    """Fewer rows than the model has parameters."""
+
+
+class ModelError(CalibrationError):
+    """A model file cannot be read, or does not fit the data."""
+
+
+class UnknownName(CalibrationError):  # noqa: N818
+    """A name that is not in its list."""
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """A hint `; did you mean "..."?` with the nearest known name, or the known names if none is near."""
+    known = sorted(known)
+    close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+    if close:
+        return f'; did you mean "{close[0]}"?'
+    return f"; known: {', '.join(known)}" if known else ""

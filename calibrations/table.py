@@ -1,0 +1,197 @@
+"""A table of measurements: named columns, constants, and where they came from.
+
+The kinds and their columns are those of the data files: `poses` (the mean of one dwell at known stage
+angles), `positions` (the mean of one still position of unknown orientation), `motion`, `still`, `rates`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrations.errors import DataError, MissingColumn, nearest
+
+Array = NDArray[np.float64]
+Constant = str | float
+
+KINDS: Mapping[str, tuple[tuple[str, ...], ...]] = MappingProxyType(
+    {
+        # each entry: the column sets of which one must be complete
+        "poses": (("alpha_deg", "beta_deg", "vx_v"),),
+        "positions": (("ax", "ay", "az"), ("mx", "my", "mz")),
+        "motion": (("t_s", "vx_v", "displacement_m"),),
+        "still": (("t_s",), ()),
+        "rates": (("rate_deg_s", "gx", "gy", "gz"),),
+    }
+)
+OUTPUTS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {"poses": ("vx_v", "vy_v", "vz_v"), "positions": ("ax", "ay", "az"), "motion": ("vx_v", "vy_v")}
+)
+OPTIONAL = (
+    "vy_v vz_v path t_s direction temperature_c supply_v mount_deg flip vx_std_v vy_std_v vz_std_v n "
+    "ax_std ay_std az_std mx_std my_std mz_std gx gy gz mx my mz"
+).split()
+AXES = ("x", "y", "z")
+STANDARD_GRAVITY = 9.80665
+
+
+@dataclass(frozen=True)
+class Table:
+    """Columns of equal length (float64), text columns, and constants. Made by `from_columns` or `read_csv`."""
+
+    kind: str
+    columns: Mapping[str, Array]
+    constants: Mapping[str, Constant] = field(default_factory=dict)
+    source: str = ""
+    labels: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+    @staticmethod
+    def from_columns(
+        kind: str,
+        columns: Mapping[str, Iterable[float]],
+        constants: Mapping[str, Constant] | None = None,
+        source: str = "",
+        labels: Mapping[str, tuple[str, ...]] | None = None,
+    ) -> Table:
+        """A checked table. Raises DataError when it cannot be a table of this kind."""
+        arrays = {name: np.array(values, dtype=np.float64) for name, values in columns.items()}
+        for values in arrays.values():
+            values.flags.writeable = False
+        table = Table(kind, MappingProxyType(arrays), dict(constants or {}), source, dict(labels or {}))
+        _check(table)
+        return table
+
+    @property
+    def n(self) -> int:
+        """Number of rows."""
+        return len(next(iter(self.columns.values()), ()))
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.columns
+
+    def column(self, name: str) -> Array:
+        """One column, shape (n,). Raises MissingColumn with the nearest name."""
+        if name not in self.columns:
+            raise MissingColumn(f'{self.source}: column "{name}" is missing{nearest(name, self.columns)}')
+        return self.columns[name]
+
+    def optional(self, name: str, default: float) -> Array:
+        """One column, or a constant in its place, shape (n,)."""
+        return self.columns[name] if name in self.columns else np.full(self.n, default)
+
+    def number(self, name: str, default: float) -> float:
+        """One constant as a number."""
+        value = self.constants.get(name, default)
+        try:
+            return float(value)
+        except ValueError:
+            raise DataError(f'{self.source}: the constant "{name}" is {value!r}, not a number') from None
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """The sensing axes that were measured, of "x", "y", "z"."""
+        names = OUTPUTS.get(self.kind, ())
+        return tuple(axis for axis, name in zip(AXES, names, strict=False) if name in self.columns)
+
+    @cached_property
+    def outputs(self) -> Array:
+        """The measured outputs in the table's unit, shape (n, axes)."""
+        names = OUTPUTS.get(self.kind, ())
+        return np.column_stack([self.columns[name] for name in names if name in self.columns])
+
+    @property
+    def unit(self) -> str:
+        """Unit of the outputs."""
+        return "V" if self.kind in ("poses", "motion") else str(self.constants.get("unit", "count"))
+
+    @property
+    def gravity_m_s2(self) -> float:
+        """Local gravity, m/s^2."""
+        return self.number("gravity_m_s2", STANDARD_GRAVITY)
+
+    @cached_property
+    def order(self) -> NDArray[np.intp]:
+        """Row numbers in order of time (of the rows themselves where no time is given)."""
+        return np.argsort(self.columns["t_s"], kind="stable") if "t_s" in self else np.arange(self.n)
+
+    @cached_property
+    def time_s(self) -> Array:
+        """Time of each row, s; one second a row where no time is given."""
+        return self.columns["t_s"] if "t_s" in self else np.arange(float(self.n))
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 of names and values: the same for the same data, whatever file it came from."""
+        h = hashlib.sha256(self.kind.encode())
+        for name in sorted(self.columns):
+            h.update(name.encode())
+            h.update(np.ascontiguousarray(self.columns[name]).tobytes())
+        return h.hexdigest()
+
+    def rows(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> Table:
+        """The same table with some of its rows."""
+        where = np.flatnonzero(chosen) if chosen.dtype == np.bool_ else chosen
+        labels = {name: tuple(values[i] for i in where) for name, values in self.labels.items()}
+        columns = {name: values[where] for name, values in self.columns.items()}
+        return replace(self, columns=MappingProxyType(columns), labels=labels)
+
+
+def _check(table: Table) -> None:
+    if table.kind not in KINDS:
+        raise DataError(f'{table.source}: unknown kind of table "{table.kind}"{nearest(table.kind, KINDS)}')
+    lengths = {name: len(values) for name, values in table.columns.items()}
+    lengths |= {name: len(values) for name, values in table.labels.items()}
+    if len(set(lengths.values())) > 1:
+        raise DataError(f"{table.source}: columns of different length: {lengths}")
+    if not table.n:
+        raise DataError(f"{table.source}: the table has no rows")
+    _check_columns(table)
+    for name, values in table.columns.items():
+        bad = np.flatnonzero(~np.isfinite(values))
+        if len(bad):
+            raise DataError(
+                f'{table.source}: row {bad[0] + 1}, column "{name}" is {values[bad[0]]}, not a finite number'
+                f"{f' (and {len(bad) - 1} more)' if len(bad) > 1 else ''}; remove the row or the column"
+            )
+
+
+def _check_columns(table: Table) -> None:
+    sets = KINDS[table.kind]
+    if any(all(name in table.columns for name in names) for names in sets):
+        return
+    wanted = min(sets, key=lambda names: sum(name not in table.columns for name in names))
+    missing = [name for name in wanted if name not in table.columns]
+    given = [*table.columns, *table.labels]
+    others = [name for name in given if name not in wanted]
+    raise MissingColumn(
+        f'{table.source}: a table of {table.kind} needs the column "{missing[0]}"'
+        f"{_nearest_given(missing[0], others)}; it has: {', '.join(given)}"
+    )
+
+
+def _nearest_given(missing: str, others: list[str]) -> str:
+    hint = nearest(missing, others) if others else ""
+    return hint if hint.startswith("; did you mean") else ""
+
+
+def guess_kind(names: Iterable[str]) -> str:
+    """The kind of table that has these columns. Raises MissingColumn when none has."""
+    names = list(names)
+    for kind in ("poses", "motion", "rates", "positions"):
+        if any(all(name in names for name in wanted) for wanted in KINDS[kind]):
+            return kind
+    required = {name for sets in KINDS.values() for wanted in sets for name in wanted}
+    for name in names:
+        hint = nearest(name, required)
+        if name not in OPTIONAL and hint.startswith("; did you mean"):
+            raise MissingColumn(f'no kind of table has the column "{name}"{hint}')
+    raise MissingColumn(
+        f"columns {', '.join(names)} are of no known kind of table; "
+        "poses need alpha_deg, beta_deg, vx_v; positions need ax, ay, az"
+    )
