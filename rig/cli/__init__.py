@@ -1,1 +1,90 @@
+"""The command line. `rig COMMAND` is the module `rig/cli/COMMAND.py`, imported only when it is called.
 
+A command module holds a click command named `command`; the first line of its docstring is its line in
+`rig --help`. A hyphen in the name is an underscore in the file; `import` is `import_.py`. Adding a command
+is adding a file. A command returns nothing, or the exit status (1: done, and a limit or check was not met).
+"""
+
+from __future__ import annotations
+
+import ast
+import importlib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, cast
+
+import click
+
+from rig.cli.failure import exit_status
+
+FOLDER = Path(__file__).parent
+
+
+class Commands(click.Group):
+    """The commands found beside this file, by name."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 click calls it so
+        return sorted(
+            name for path in FOLDER.glob("*.py") if (name := _name(path)) and _defines_command(path)
+        )
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
+        path = _path(cmd_name)
+        if not path.is_file() or _name(path) != cmd_name or not _defines_command(path):
+            return None
+        return cast(click.Command, importlib.import_module(f"{__name__}.{path.stem}").command)
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        if not args[0].startswith("-") and self.get_command(ctx, args[0]) is None:
+            from rig.nearest import did_you_mean
+
+            known = self.list_commands(ctx)
+            raise click.UsageError(f"no command {args[0]!r}.{did_you_mean(args[0], known)}", ctx)
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, _short_help(_path(name))) for name in self.list_commands(ctx)])
+
+
+def _path(name: str) -> Path:
+    stem = name.replace("-", "_")
+    return FOLDER / f"{stem}_.py" if stem == "import" else FOLDER / f"{stem}.py"
+
+
+def _name(path: Path) -> str:
+    return path.stem.strip("_").replace("_", "-") if path.stem != "__init__" else ""
+
+
+def _defines_command(path: Path) -> bool:
+    return any(line.startswith("def command(") for line in path.read_text(encoding="utf-8").splitlines())
+
+
+def _short_help(path: Path) -> str:
+    """The first line of the module's docstring, without importing it; a leading `name: ` is dropped."""
+    doc = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
+    first = doc.partition("\n")[0].rstrip(".")
+    return first.removeprefix(f"{_name(path)}: ")
+
+
+@click.command(
+    cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100}
+)
+@click.version_option(package_name="inertial-rig", prog_name="rig")
+def rig() -> None:
+    """Calibrate inertial sensors on a rig, and find the physical effect that their model misses.
+
+    DATA is a file or a run of the record; MODEL a shipped model's name or a file. `rig demo` shows the whole
+    story on a simulated rig.
+    """
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run one command and leave the process with the contract's exit status; errors are one message."""
+
+    def call() -> Any:
+        return rig.main(args=arguments, prog_name="rig", standalone_mode=False)
+
+    raise SystemExit(exit_status(call))

@@ -1,0 +1,36 @@
+"""What commands print: text for people, or with `--json` exactly one document on standard output."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+
+json_option = click.option("--json", "as_json", is_flag=True, help="One JSON document on standard output.")
+bench_option = click.option(
+    "--bench",
+    "bench_file",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="The bench file; without it the simulated rig.",
+)
+
+
+def emit(document: dict[str, Any]) -> None:
+    """Print the one JSON document. Raises ValueError for NaN or infinity, which JSON does not have."""
+    click.echo(json.dumps(document, allow_nan=False, ensure_ascii=False))
+
+
+def note(text: str) -> None:
+    """Progress and remarks: to standard error, so that standard output stays the result's."""
+    click.echo(text, err=True)
+
+
+def columns(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """A table of text, columns aligned to the left and two spaces apart."""
+    cells = [tuple(head), *[tuple(str(cell) for cell in row) for row in rows]]
+    widths = [max(len(row[i]) for row in cells) for i in range(len(head))]
+    lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) for row in cells]
+    return "\n".join(line.rstrip() for line in lines)

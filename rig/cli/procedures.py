@@ -1,0 +1,8 @@
+"""procedures: list the procedures and what each is for."""
+
+import click
+
+
+@click.command("procedures")
+def command() -> None:
+    """List the procedures and what each is for."""
