@@ -1,6 +1,6 @@
 """Read and write a table as CSV: `# key: value` lines, a header, numbers; text only in columns of text.
 
-Fast path: numpy parses all rows at once. Only if that fails are rows read one by one, to say which cell is at fault.
+Fast path: numpy parses all rows at once. Only if that fails are rows read one by one, to name the cell at fault.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def read_csv(path: Path | str, kind: str | None = None) -> Table:
 def parse_csv(text: str, source: str, kind: str | None = None) -> Table:
     """The table in `text`. Raises DataError naming source, line and column."""
     lines = text.splitlines()
-    constants, first = _constants(lines, source)
+    constants, first = _constants(lines)
     if first == len(lines):
         raise DataError(f"{source}: the file is empty: a header line with column names is missing")
     header = [name.strip() for name in next(csv.reader([lines[first]]))]
@@ -54,7 +54,7 @@ def parse_csv(text: str, source: str, kind: str | None = None) -> Table:
     return Table.from_columns(kind, columns, constants, source, labels)
 
 
-def _constants(lines: list[str], source: str) -> tuple[dict[str, Constant], int]:
+def _constants(lines: list[str]) -> tuple[dict[str, Constant], int]:
     """The `# key: value` lines and the number of the header line."""
     constants: dict[str, Constant] = {}
     for number, line in enumerate(lines):

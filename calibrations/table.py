@@ -33,10 +33,13 @@ KINDS: Mapping[str, tuple[tuple[str, ...], ...]] = MappingProxyType(
 OUTPUTS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {"poses": ("vx_v", "vy_v", "vz_v"), "positions": ("ax", "ay", "az"), "motion": ("vx_v", "vy_v")}
 )
+# fmt: off
 OPTIONAL = (
-    "vy_v vz_v path t_s direction temperature_c supply_v mount_deg flip vx_std_v vy_std_v vz_std_v n "
-    "ax_std ay_std az_std mx_std my_std mz_std gx gy gz mx my mz"
-).split()
+    "vy_v", "vz_v", "path", "t_s", "direction", "temperature_c", "supply_v", "mount_deg", "flip",
+    "vx_std_v", "vy_std_v", "vz_std_v", "n", "ax_std", "ay_std", "az_std", "mx_std", "my_std", "mz_std",
+    "gx", "gy", "gz", "mx", "my", "mz",
+)
+# fmt: on
 AXES = ("x", "y", "z")
 STANDARD_GRAVITY = 9.80665
 

@@ -1,0 +1,43 @@
+"""The other axes, as seen from one axis, and rotations. IEEE Std 1293: input i, pendulous p, output o.
+
+input    in plane (p)    out of plane (o)
+x        y               z
+y        x               z
+z        x               y                  a third axis has no plane of its own: x and y in this order
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from calibrations.table import Array, Table
+
+APPROACH_DEG = 5.0  # how far before a pose its direction of approach is taken to hold
+
+
+def other_in_plane(a: Array) -> Array:
+    """For each axis the specific force along the other in-plane axis, shape (n, 3)."""
+    return a[:, [1, 0, 0]]
+
+
+def out_of_plane(a: Array) -> Array:
+    """For each axis the specific force along the out-of-plane axis, shape (n, 3)."""
+    return a[:, [2, 2, 1]]
+
+
+def rotation(vector: Array) -> Array:
+    """Rotation matrix of a rotation vector in rad (Rodrigues), shape (3, 3)."""
+    angle = float(np.linalg.norm(vector))
+    x, y, z = vector
+    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    if angle < 1e-8:
+        return np.eye(3) + K
+    return np.eye(3) + np.sin(angle) / angle * K + (1 - np.cos(angle)) / angle**2 * (K @ K)
+
+
+def turned_back(a: Array, table: Table) -> Array:
+    """Specific force shortly before each pose was reached: beta turned back by the approach, shape (n, 3)."""
+    side = np.where(table.optional("flip", 0.0) > 0, -1.0, 1.0)
+    back = -np.radians(APPROACH_DEG) * table.column("direction") * side
+    c, s = np.cos(back), np.sin(back)
+    return np.column_stack([c * a[:, 0] - s * a[:, 1], s * a[:, 0] + c * a[:, 1], a[:, 2]])

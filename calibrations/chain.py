@@ -1,0 +1,108 @@
+"""The signal chain: from stage angles to the output, and back from the output to the specific force.
+
+    pose -> force -> transduction -> output
+
+Forward for `poses`, where the orientation is known; backward for `positions`, where only the magnitude of gravity
+is. The backward way solves the same functions, so that an effect is written once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibrations.effect import Effect, Values
+from calibrations.table import Array, Table
+
+Step = tuple[Effect, Values]
+
+
+@dataclass(frozen=True)
+class Pose:
+    """True stage angles and the true vertical. Angles in rad, shape (n,); `up` a unit vector, shape (3,)."""
+
+    alpha: Array
+    beta: Array
+    mount: Array
+    flip: Array
+    up: Array
+
+
+def nominal_pose(table: Table) -> Pose:
+    """The pose that the stages report."""
+    return Pose(
+        np.radians(table.column("alpha_deg")),
+        np.radians(table.column("beta_deg")),
+        np.radians(table.optional("mount_deg", 0.0)),
+        table.optional("flip", 0.0),
+        np.array([0.0, 0.0, 1.0]),
+    )
+
+
+def specific_force(pose: Pose) -> Array:
+    """Static specific force in the sensor frame, g, shape (n, 3): a = F Rz(mount) Rz(beta) Ry(alpha) up."""
+    ca, sa = np.cos(pose.alpha), np.sin(pose.alpha)
+    turn = pose.beta + pose.mount
+    ux, uy, uz = pose.up
+    x, y, z = ca * ux + sa * uz, uy, -sa * ux + ca * uz
+    cb, sb = np.cos(turn), np.sin(turn)
+    side = np.where(pose.flip > 0, -1.0, 1.0)
+    return np.column_stack([cb * x - sb * y, side * (sb * x + cb * y), side * z])
+
+
+def force(table: Table, steps: Sequence[Step]) -> Array:
+    """Specific force along the sensing axes, g, shape (n, 3)."""
+    pose = nominal_pose(table)
+    for effect, p in steps:
+        if effect.pose is not None:
+            pose = effect.pose(pose, table, p)
+    return sensed(specific_force(pose), table, steps)
+
+
+def sensed(a: Array, table: Table, steps: Sequence[Step]) -> Array:
+    """Specific force along the sensing axes from that along the reference axes, g, shape (n, 3)."""
+    for effect, p in steps:
+        if effect.force is not None:
+            a = effect.force(a, table, p)
+    return a
+
+
+def respond(a: Array, table: Table, steps: Sequence[Step]) -> Array:
+    """Output of all three axes to the specific force `a` along the sensing axes, shape (n, 3)."""
+    v = np.zeros_like(a)
+    for effect, p in steps:
+        if effect.transduction is not None:
+            v += effect.transduction(a, table, p)
+    for effect, p in steps:
+        if effect.output is not None:
+            v = effect.output(v, table, p)
+    return v
+
+
+def forward(table: Table, steps: Sequence[Step]) -> Array:
+    """Predicted output of the measured axes, in the table's unit, shape (n, axes)."""
+    return respond(force(table, steps), table, steps)[:, : len(table.axes)]
+
+
+def backward(table: Table, steps: Sequence[Step], tolerance: float = 1e-12) -> Array:
+    """Specific force along the reference axes that gives the measured output, g, shape (n, 3): Newton's method."""
+
+    def output(a: Array) -> Array:
+        return respond(sensed(a, table, steps), table, steps)
+
+    a = np.zeros((table.n, 3))
+    for _ in range(20):
+        error = table.outputs - output(a)
+        step = np.linalg.solve(_slope(output, a), error[:, :, None])[:, :, 0]
+        a = a + step
+        if not np.max(np.abs(step)) > tolerance:
+            break
+    return a
+
+
+def _slope(output: Callable[[Array], Array], a: Array, h: float = 1e-4) -> Array:
+    """d output / d a at each row, shape (n, 3, 3)."""
+    columns = [(output(a + h * e) - output(a - h * e)) / (2 * h) for e in np.eye(3)]
+    return np.stack(columns, axis=2)

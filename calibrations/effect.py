@@ -1,0 +1,180 @@
+"""A physical effect: declared parameters, pure functions, and what a person should know about it.
+
+An effect is a module in `calibrations/effects/` (or in a user's folder), named as the effect with underscores.
+It has a docstring of the form
+
+    temperature-bias: one line that says what happens.
+
+        formula, with units
+
+    Symptom   what the residual looks like.
+    Excited by  what the data must contain.
+    Confused with  what else looks like it, and what tells them apart.
+    Source    where it is described.
+
+a tuple PARAMETERS, and at least one of four functions, named by where in the signal chain it acts:
+
+    pose(pose, table, p) -> Pose              the true stage angles and the true vertical
+    force(a, table, p) -> (n, 3)              the specific force along the sensing axes, g
+    transduction(a, table, p) -> (n, 3)       what the effect adds to the output, in the output's unit
+    output(v, table, p) -> (n, 3)             what becomes of the output
+
+`p` maps a parameter's name to its value: shape (3,) if per axis, else a float. Optional are
+NEEDS (columns), KINDS (of tables), and CONSTANTS: name -> function of the table, for reference values
+that are kept with the model and not fitted.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import inspect
+import re
+import sys
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from calibrations.errors import ModelError, UnknownName, nearest
+from calibrations.table import Array, Table
+
+SECTIONS = ("symptom", "excited_by", "confused_with", "source")
+HOOKS = ("pose", "force", "transduction", "output")
+Values = Mapping[str, Array]  # parameter name -> shape (3,) if per axis, else a scalar
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One declared parameter. `unit` may contain {out}, the unit of the output.
+
+    `typical` is the magnitude that a sensor may show (in g where the unit holds {out}, else in `unit`): the step
+    of numerical derivatives follows from it, and an estimate no better than this tells nothing new. `measured` names
+    an axis without which it does not exist.
+    """
+
+    name: str
+    unit: str
+    typical: float
+    per_axis: bool = True
+    starts: tuple[float, ...] = (0.0,)
+    low: float = -np.inf
+    high: float = np.inf
+    measured: str = ""
+    doc: str = ""
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One physical effect, as read from its module."""
+
+    name: str
+    parameters: tuple[Parameter, ...]
+    summary: str
+    formula: str
+    symptom: str
+    excited_by: str
+    confused_with: str
+    source: str
+    needs: tuple[str, ...] = ()
+    kinds: tuple[str, ...] = ("poses", "positions")
+    constants: Mapping[str, Callable[[Table], float]] = field(default_factory=dict)
+    pose: Callable[..., Any] | None = None
+    force: Callable[..., Array] | None = None
+    transduction: Callable[..., Array] | None = None
+    output: Callable[..., Array] | None = None
+
+    @property
+    def acts_on(self) -> str:
+        """Where in the signal chain it acts first."""
+        return next(hook for hook in HOOKS if getattr(self, hook) is not None)
+
+    def excluded(self, table: Table) -> str | None:
+        """Why this effect cannot be asked of `table`, or None."""
+        if table.kind not in self.kinds:
+            return f"is not defined for {table.kind}"
+        missing = [name for name in self.needs if name not in table]
+        return f"needs the column {', '.join(missing)}" if missing else None
+
+
+@cache
+def catalogue(folder: Path | None = None) -> Mapping[str, Effect]:
+    """Every effect by name: the shipped ones, and those of a user's `folder`.
+
+    Raises ModelError for a file that is not an effect, naming what it lacks.
+    """
+    shipped = Path(__file__).parent / "effects"
+    effects = {e.name: e for e in _read_folder(shipped, "calibrations.effects")}
+    if folder is not None:
+        if not folder.is_dir():
+            raise ModelError(f"{folder}: the folder of your own effects does not exist")
+        effects |= {e.name: e for e in _read_folder(folder, None)}
+    return effects
+
+
+def find(name: str, effects: Mapping[str, Effect]) -> Effect:
+    """The effect of that name. Raises UnknownName with the nearest."""
+    if name not in effects:
+        raise UnknownName(f'unknown effect "{name}"{nearest(name, effects)}')
+    return effects[name]
+
+
+def _read_folder(folder: Path, package: str | None) -> Iterable[Effect]:
+    for path in sorted(folder.glob("[a-z]*.py")):
+        yield _from_module(_load(path, package), path)
+
+
+def _load(path: Path, package: str | None) -> ModuleType:
+    if package is not None:
+        return importlib.import_module(f"{package}.{path.stem}")
+    spec = importlib.util.spec_from_file_location(f"user_effects_{path.stem}", path)
+    if spec is None or spec.loader is None:
+        raise ModelError(f"{path}: cannot be read as Python")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        raise ModelError(f"{path}: {type(error).__name__}: {error}") from error
+    return module
+
+
+def _from_module(module: ModuleType, path: Path) -> Effect:
+    hooks = {hook: getattr(module, hook) for hook in HOOKS if hasattr(module, hook)}
+    if not hooks:
+        raise ModelError(f"{path}: is not an effect: it defines none of the functions {', '.join(HOOKS)}")
+    parameters = getattr(module, "PARAMETERS", ())
+    if not parameters or not all(isinstance(p, Parameter) for p in parameters):
+        raise ModelError(f"{path}: is not an effect: PARAMETERS must be a tuple of Parameter(...)")
+    return Effect(
+        name=path.stem.replace("_", "-"),
+        parameters=tuple(parameters),
+        needs=tuple(getattr(module, "NEEDS", ())),
+        kinds=tuple(getattr(module, "KINDS", ("poses", "positions"))),
+        constants=dict(getattr(module, "CONSTANTS", {})),
+        **_sections(module.__doc__ or "", path),
+        **hooks,
+    )
+
+
+def _sections(doc: str, path: Path) -> dict[str, str]:
+    """The parts of an effect's docstring. Raises ModelError if one is missing."""
+    doc = inspect.cleandoc(doc)
+    head, _, rest = doc.partition("\n\n")
+    titles = {name: name.replace("_", " ").capitalize() for name in SECTIONS}
+    marks = "|".join(titles.values())
+    pieces = re.split(rf"^({marks})[ ]+", rest, flags=re.MULTILINE)
+    found = dict(zip(pieces[1::2], pieces[2::2], strict=True))
+    summary = head.partition(":")[2]
+    if not summary or "Symptom" not in found:
+        raise ModelError(f'{path}: its docstring must begin with "name: what happens." and have a line "Symptom ..."')
+    parts = {key: _one_line(found.get(title, "")) for key, title in titles.items()}
+    return {"summary": _one_line(summary), "formula": inspect.cleandoc(pieces[0]).strip(), **parts}
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())

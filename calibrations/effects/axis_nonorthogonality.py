@@ -1,0 +1,28 @@
+"""axis-nonorthogonality: the sensing axes are not at right angles to each other.
+
+    y = (sin xy, cos xy, 0)      z = (sin xz, sin yz, sqrt(1 - sin^2 xz - sin^2 yz))      x = (1, 0, 0)
+
+    the sensing axes as unit vectors; xy, xz, yz in deg: departures from 90 deg, positive where the angle is less
+
+Symptom   one axis feels part of the specific force along another, and not the other way round.
+Excited by  full turns of beta; for positions, orientations that spread over the sphere.
+Confused with  axis-misalignment, where only one axis was measured.
+Source    Ang IV; Book (17.3); Tedaldi et al., ICRA 2014 (triad).
+"""
+
+import numpy as np
+
+from calibrations.effect import Parameter, Values
+from calibrations.table import Array, Table
+
+PARAMETERS = (
+    Parameter("xy", "deg", typical=2.0, per_axis=False, measured="y", doc="x-y departure from 90 deg"),
+    Parameter("xz", "deg", typical=2.0, per_axis=False, measured="z", doc="x-z departure from 90 deg"),
+    Parameter("yz", "deg", typical=2.0, per_axis=False, measured="z", doc="y-z departure from 90 deg"),
+)
+
+
+def force(a: Array, table: Table, p: Values) -> Array:
+    xy, xz, yz = (np.sin(np.radians(p[name])) for name in ("xy", "xz", "yz"))
+    axes = np.array([[1.0, 0.0, 0.0], [xy, np.sqrt(1 - xy**2), 0.0], [xz, yz, np.sqrt(max(0.0, 1 - xz**2 - yz**2))]])
+    return a @ axes.T

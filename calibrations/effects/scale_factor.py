@@ -1,0 +1,18 @@
+"""scale-factor: the output per unit of specific force.
+
+    V += SF a                                         SF in {out}/g, one per axis; IEEE K1
+
+Symptom   the residual is proportional to the specific force along the axis itself.
+Excited by  inclinations that bring the axis near +1 g and -1 g.
+Confused with  nothing, where both signs of the specific force occur.
+Source    Ang (1); Book 17.3.7; IEEE Std 1293, K1.
+"""
+
+from calibrations.effect import Parameter, Values
+from calibrations.table import Array, Table
+
+PARAMETERS = (Parameter("scale", "{out}/g", typical=1.0, starts=(1.0,), doc="change of output per g"),)
+
+
+def transduction(a: Array, table: Table, p: Values) -> Array:
+    return a * p["scale"]

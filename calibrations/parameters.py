@@ -1,0 +1,125 @@
+"""The parameters of a model as one vector: which entry is which, and the way back to named values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+
+from calibrations.chain import Step
+from calibrations.effect import Parameter
+from calibrations.model import Model, Term
+from calibrations.table import AXES, Array, Table
+
+
+@dataclass(frozen=True)
+class Slot:
+    """One entry of the vector. `axis` is "" for a parameter that has none."""
+
+    term: int
+    parameter: Parameter
+    axis: str
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where each parameter of `model` stands in the vector, for the axes of a table."""
+
+    model: Model
+    axes: tuple[str, ...]
+    slots: tuple[Slot, ...]
+    unit: str
+    nominal: float  # output per g, to give parameters in the output's unit a size
+
+    @staticmethod
+    def of(model: Model, table: Table) -> Layout:
+        """The layout for `table`."""
+        slots = tuple(slot for i, term in enumerate(model.terms) for slot in _slots(i, term, table))
+        spread = float(np.median(np.ptp(table.outputs, axis=0))) / 2
+        return Layout(model, table.axes, slots, table.unit, spread or 1.0)
+
+    @cached_property
+    def typical(self) -> Array:
+        """Typical magnitude of each entry, in its own unit, shape (p,)."""
+        return np.array([self._size(s.parameter) * s.parameter.typical for s in self.slots])
+
+    @cached_property
+    def bounds(self) -> tuple[Array, Array]:
+        """Least and greatest value of each entry."""
+        return (
+            np.array([s.parameter.low for s in self.slots]),
+            np.array([s.parameter.high for s in self.slots]),
+        )
+
+    def _size(self, parameter: Parameter) -> float:
+        return self.nominal if "{out}" in parameter.unit else 1.0
+
+    def starts(self) -> list[Array]:
+        """Vectors to start from: the model's values, and every combination of declared starts where it has none."""
+        known = self._known()
+        choices = [
+            (known[k],) if k in known else tuple(v * self._size(s.parameter) for v in s.parameter.starts)
+            for k, s in enumerate(self.slots)
+        ]
+        return self._shared_choices(choices)
+
+    def _shared_choices(self, choices: Sequence[tuple[float, ...]]) -> list[Array]:
+        """One choice for all axes of a parameter, not one for each."""
+        groups: dict[tuple[int, str], list[int]] = {}
+        for k, s in enumerate(self.slots):
+            groups.setdefault((s.term, s.parameter.name), []).append(k)
+        vectors = []
+        lengths = [range(max(len(choices[k]) for k in members)) for members in groups.values()]
+        for picks in product(*lengths):
+            vector = np.empty(len(self.slots))
+            for pick, members in zip(picks, groups.values(), strict=True):
+                for k in members:
+                    vector[k] = choices[k][min(pick, len(choices[k]) - 1)]
+            vectors.append(vector)
+        return vectors
+
+    def _known(self) -> dict[int, float]:
+        values = {(i, e.name, e.axis): e.value for i, term in enumerate(self.model.terms) for e in term.estimates}
+        keys = [(s.term, s.parameter.name, s.axis) for s in self.slots]
+        return {k: values[key] for k, key in enumerate(keys) if key in values}
+
+    def known(self) -> Array | None:
+        """The model's own values, or None where one is missing."""
+        values = self._known()
+        return np.array([values[k] for k in range(len(self.slots))]) if len(values) == len(self.slots) else None
+
+    def steps(self, theta: Array) -> list[Step]:
+        """Effects with their named values, in the order of the signal chain."""
+        named: list[dict[str, Array]] = [
+            {name: np.float64(value) for name, value in term.constants.items()}
+            for term in self.model.terms  # type: ignore[misc]
+        ]
+        for i, term in enumerate(self.model.terms):
+            for p in term.effect.parameters:
+                named[i][p.name] = np.zeros(3) if p.per_axis else np.float64(0.0)  # type: ignore[assignment]
+        for value, slot in zip(theta, self.slots, strict=True):
+            values, name = named[slot.term], slot.parameter.name
+            if not slot.parameter.per_axis:
+                values[name] = value
+            elif slot.axis:
+                values[name][AXES.index(slot.axis)] = value
+            else:
+                values[name] = np.full(3, value)
+        return [(term.effect, values) for term, values in zip(self.model.terms, named, strict=True)]
+
+    def index(self, names: Mapping[str, object] | Sequence[str]) -> Array:
+        """Mask of the entries that belong to the effects `names`, shape (p,)."""
+        return np.array([self.model.terms[s.term].name in names for s in self.slots], dtype=bool)  # type: ignore[return-value]
+
+
+def _slots(i: int, term: Term, table: Table) -> list[Slot]:
+    slots = []
+    for p in term.effect.parameters:
+        if p.measured and p.measured not in table.axes:
+            continue
+        axes = table.axes if p.per_axis and not term.tied else ("",)
+        slots += [Slot(i, p, axis) for axis in axes]
+    return slots
