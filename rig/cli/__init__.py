@@ -24,9 +24,7 @@ class Commands(click.Group):
     """The commands found beside this file, by name."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 click calls it so
-        return sorted(
-            name for path in FOLDER.glob("*.py") if (name := _name(path)) and _defines_command(path)
-        )
+        return sorted(name for path in FOLDER.glob("*.py") if (name := _name(path)) and _defines_command(path))
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
         path = _path(cmd_name)
@@ -69,9 +67,7 @@ def _short_help(path: Path) -> str:
     return first.removeprefix(f"{_name(path)}: ")
 
 
-@click.command(
-    cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100}
-)
+@click.command(cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(package_name="inertial-rig", prog_name="rig")
 def rig() -> None:
     """Calibrate inertial sensors on a rig, and find the physical effect that their model misses.

@@ -14,10 +14,11 @@ from typing import Any
 
 import click
 
-# The rooms' error trees, by name, so that nothing is imported for this. The most special class comes first
-# along an error's bases; an error with an `exit_status` of its own needs no line here.
+# The rooms' error trees, by name, so that nothing is imported for this. The most special class along an
+# error's bases counts; an error with an `exit_status` of its own needs no line here.
 STATUS = {
     "calibrations.errors.CalibrationError": 2,
+    "procedures.errors.SafetyLimit": 4,
     "procedures.errors.ProcedureError": 2,
     "drivers.errors.LimitError": 4,
     "drivers.errors.DriverError": 3,

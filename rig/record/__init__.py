@@ -1,1 +1,6 @@
+"""The record: every run, pose and sample in one SQLite file that survives a kill at any moment."""
 
+from rig.record.store import Record
+from rig.record.values import Block, Event, Kept, Run
+
+__all__ = ["Block", "Event", "Kept", "Record", "Run"]

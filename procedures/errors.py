@@ -1,0 +1,40 @@
+"""What a procedure can refuse or stop for.
+
+ProcedureError
+├── UnknownProcedure    no file of this name; names the nearest
+├── SettingError        a setting that it does not have, of the wrong type, or out of range
+├── NoAnswer            a question to a person that nobody can answer
+└── SafetyLimit         a limit of the bench was passed; the procedure stops
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class ProcedureError(Exception):
+    """The message says what, where and what to do."""
+
+
+class UnknownProcedure(ProcedureError):  # noqa: N818
+    """No procedure of this name."""
+
+
+class SettingError(ProcedureError):
+    """A setting that the procedure does not have, or a value that it cannot have."""
+
+
+class NoAnswer(ProcedureError):  # noqa: N818
+    """A question to a person that nobody can answer."""
+
+
+class SafetyLimit(ProcedureError):  # noqa: N818
+    """A measured value is outside the limits of the bench."""
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """The tail of a message about an unknown `name`: the nearest known one, else all there are."""
+    known = list(known)
+    close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+    return f"; did you mean {close[0]!r}?" if close else f"; there are: {', '.join(known)}"

@@ -1,0 +1,68 @@
+"""A procedure's settings from text: the keywords of its function, typed by their annotations.
+
+Types: float, int, bool, str, a `Literal` of texts, and `tuple[float, ...]` written 90,30,150.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any, Literal, get_args, get_origin, get_type_hints
+
+from procedures.catalogue import Procedure
+from procedures.errors import SettingError, nearest
+
+Value = Any
+
+
+def parse(procedure: Procedure, given: Mapping[str, Value]) -> dict[str, Value]:
+    """All settings of `procedure`: `given` (texts, or values of a file) over its defaults.
+
+    Raises SettingError for a name that it does not have (naming the nearest), or a value of the wrong type.
+    """
+    defaults = procedure.defaults
+    types = get_type_hints(procedure.function)
+    for name in given:
+        if name not in defaults:
+            raise SettingError(f"{procedure.name} has no setting {name!r}{nearest(name, defaults)}")
+    return defaults | {
+        name: _value(f"{procedure.name}: the setting {name}", types.get(name, str), value)
+        for name, value in given.items()
+    }
+
+
+def _value(what: str, kind: Any, value: Value) -> Value:
+    choices = get_args(kind) if get_origin(kind) is Literal else ()
+    try:
+        if choices:
+            return choices[[str(choice) for choice in choices].index(str(value))]
+        if get_origin(kind) is tuple:
+            parts = value.split(",") if isinstance(value, str) else value
+            return tuple(_scalar(get_args(kind)[0], part) for part in parts)
+        return _scalar(kind, value)
+    except (ValueError, TypeError):
+        listed = f"one of {', '.join(map(str, choices))}"
+        wanted = listed if choices else _WANTED.get(kind, "numbers such as 90,30")
+        raise SettingError(f"{what} is {value!r}; it takes {wanted}") from None
+
+
+def _scalar(kind: Any, value: Value) -> Value:
+    return _READ.get(kind, kind)(value)
+
+
+def _number(value: Value) -> float:
+    number = float(value)
+    if not math.isfinite(number):
+        raise ValueError
+    return number
+
+
+def _yes_or_no(value: Value) -> bool:
+    known = {"true": True, "yes": True, "false": False, "no": False}
+    if (text := str(value).lower()) not in known:
+        raise ValueError
+    return known[text]
+
+
+_READ: Mapping[Any, Callable[[Value], Value]] = {float: _number, bool: _yes_or_no}
+_WANTED = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}

@@ -1,0 +1,63 @@
+"""sweep: hold the sensor at a grid of stage angles, each way round.
+
+Excites   scale factor, bias, cross-axis, misalignment, hysteresis, stage errors.
+Blind to  ageing apart from temperature; the output filter.
+Source    Ang III.A; inclinations out of order, so that height does not follow time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Literal
+
+from procedures.errors import SettingError
+from procedures.session import Pose, Session
+
+INCLINATIONS_DEG = (90.0, 30.0, 150.0, 60.0, 120.0, 45.0, 135.0)
+Paths = Literal["grid", "ang"]
+
+
+def sweep(
+    rig: Session,
+    *,
+    inclinations_deg: tuple[float, ...] = INCLINATIONS_DEG,
+    step_deg: float = 10.0,
+    dwell_s: float = 5.0,
+    settle_s: float = 0.5,
+    paths: Paths = "grid",
+) -> None:
+    """Record `dwell_s` seconds at every angle of the grid, clockwise then anticlockwise.
+
+    `paths="ang"` adds every inclination's negative, and the half turns to each side at 90 deg.
+    """
+    if dwell_s <= 0 or settle_s < 0:
+        raise SettingError(f"sweep: dwell_s is {dwell_s:g}, settle_s is {settle_s:g}: give times above 0")
+    poses = list(grid(inclinations_deg, step_deg, paths))
+    rig.ask("mounting", "Is the sensor mounted face up, and has the digital level been read?")
+    for pose in rig.missing(poses):
+        rig.move_to(pose)
+        rig.wait(settle_s)
+        rig.keep(pose, samples=rig.adc.acquire(dwell_s), temperature_c=rig.oven.temperature_c())
+
+
+def grid(inclinations_deg: Sequence[float], step_deg: float, paths: Paths = "grid") -> Iterator[Pose]:
+    """The poses of a sweep in order. Raises SettingError unless `step_deg` divides half a turn."""
+    if not 0 < step_deg <= 180 or abs(180 / step_deg - round(180 / step_deg)) > 1e-9:
+        raise SettingError(f"sweep: step_deg is {step_deg:g}; give a step that divides 180 deg, such as 10")
+    if not inclinations_deg:
+        raise SettingError("sweep: inclinations_deg is empty; give at least one angle, such as 90")
+    both = [(alpha, -alpha) if paths == "ang" else (alpha,) for alpha in inclinations_deg]
+    for alpha in [float(alpha) for pair in both for alpha in pair]:
+        yield from turn(alpha, 0, 360, step_deg, "A+ to B-")
+        yield from turn(alpha, 360, 0, step_deg, "B+ to A-")
+        if paths == "ang" and alpha == 90:
+            for side, path in ((180, "A+ to A-"), (-180, "B+ to B-")):
+                yield from turn(alpha, 0, side, step_deg, path)
+                yield from turn(alpha, side, 0, step_deg, path)
+
+
+def turn(alpha_deg: float, from_deg: float, to_deg: float, step_deg: float, path: str) -> Iterator[Pose]:
+    """Poses at one inclination from one angle of beta to another, both included."""
+    direction = 1 if to_deg > from_deg else -1
+    for k in range(round(abs(to_deg - from_deg) / step_deg) + 1):
+        yield Pose(alpha_deg, from_deg + direction * k * step_deg, direction, path)

@@ -1,0 +1,56 @@
+"""What can go wrong in the application itself; each error carries the exit status that the contract gives it.
+
+RigError (2)             bad usage or bad input
+├── BenchError           the bench file: file, key and nearest key
+├── RecordError          the record cannot be opened, or does not hold what is asked
+│   └── UnknownRun       no run of this name; names the nearest
+├── RunBusy              another process works on this run
+├── RunMismatch          the bench is not the one that the run was begun with
+└── ExportError          a format that is not there, or does not fit the run
+InstrumentFailed (3)     an instrument cannot be reached or fails; names role, address and remedy
+Stopped (4)              a person or a signal stopped the run, which `rig resume` finishes
+"""
+
+from __future__ import annotations
+
+
+class RigError(Exception):
+    """Bad usage or bad input; the message says what, where and what to do."""
+
+    exit_status = 2
+
+
+class BenchError(RigError):
+    """The bench file cannot be used as it is."""
+
+
+class RecordError(RigError):
+    """The record cannot be opened or does not hold what is asked."""
+
+
+class UnknownRun(RecordError):  # noqa: N818
+    """No run of this name is in the record."""
+
+
+class RunBusy(RigError):  # noqa: N818
+    """Another process works on this run."""
+
+
+class RunMismatch(RigError):  # noqa: N818
+    """The bench is not the one that the run was begun with."""
+
+
+class ExportError(RigError):
+    """The run cannot be written in this format."""
+
+
+class InstrumentFailed(RigError):  # noqa: N818
+    """An instrument cannot be reached, or fails its check."""
+
+    exit_status = 3
+
+
+class Stopped(RigError):  # noqa: N818
+    """A person or a signal stopped the run."""
+
+    exit_status = 4

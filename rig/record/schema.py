@@ -1,0 +1,81 @@
+"""The tables of the record. `SCHEMA` counts their versions; it is kept in the file's `user_version`."""
+
+from __future__ import annotations
+
+from sqlalchemy import JSON, Column, Float, ForeignKey, Index, Integer, LargeBinary, MetaData, String, Table
+
+SCHEMA = 1
+metadata = MetaData()
+
+runs = Table(
+    "runs",
+    metadata,
+    Column("run", String, primary_key=True),
+    Column("kind", String, nullable=False),  # of the table that its rows make: poses, positions, ...
+    Column("procedure", String, nullable=False),  # "import" where a file was read
+    Column("state", String, nullable=False),  # running, complete, stopped, failed
+    Column("settings", JSON, nullable=False),
+    Column("bench", JSON, nullable=False),  # the whole configuration, as it was
+    Column("configuration", String, nullable=False),  # hash of procedure, settings and bench
+    Column("constants", JSON, nullable=False),
+    Column("source", String, nullable=False),
+    Column("created", String, nullable=False),  # ISO 8601, UTC
+    Column("ended", String),
+    Column("message", String),  # why it stopped or failed
+    Column("results", JSON, nullable=False),
+)
+
+poses = Table(
+    "poses",
+    metadata,
+    Column("run", ForeignKey("runs.run"), primary_key=True),
+    Column("number", Integer, primary_key=True),  # in the order of keeping, from 0
+    Column("alpha_deg", Float, nullable=False),
+    Column("beta_deg", Float, nullable=False),
+    Column("direction", Integer, nullable=False),
+    Column("path", String, nullable=False),
+    Column("mount_deg", Float, nullable=False),
+    Column("flip", Integer, nullable=False),
+    Column("t_s", Float, nullable=False),  # middle of the dwell
+    Column("temperature_c", Float),
+)
+
+blocks = Table(
+    "blocks",
+    metadata,
+    Column("run", ForeignKey("runs.run"), primary_key=True),
+    Column("number", Integer, primary_key=True),  # of the pose
+    Column("rate_hz", Float, nullable=False),
+    Column("start_s", Float, nullable=False),
+    Column("channels", JSON, nullable=False),
+    Column("codec", String, nullable=False),
+    Column("samples", LargeBinary, nullable=False),
+)
+
+columns = Table(  # of imported tables
+    "columns",
+    metadata,
+    Column("run", ForeignKey("runs.run"), primary_key=True),
+    Column("name", String, primary_key=True),
+    Column("position", Integer, nullable=False),
+    Column("numbers", LargeBinary),  # float64, little-endian
+    Column("texts", JSON),
+)
+
+states = Table(  # of a simulated bench after the last kept pose: clock, world, twins
+    "states",
+    metadata,
+    Column("run", ForeignKey("runs.run"), primary_key=True),
+    Column("state", JSON, nullable=False),
+)
+
+events = Table(
+    "events",
+    metadata,
+    Column("event", Integer, primary_key=True),
+    Column("run", ForeignKey("runs.run"), nullable=False),
+    Column("at", String, nullable=False),  # ISO 8601, UTC
+    Column("what", String, nullable=False),
+    Column("text", String, nullable=False),
+    Index("events_of_run", "run"),
+)

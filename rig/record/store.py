@@ -1,0 +1,201 @@
+"""The record: what is written and read, one transaction at a time.
+
+A pose, its samples and the simulated bench's state are one transaction, so a kill loses the pose in flight and
+nothing else.
+"""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Iterator, Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from sqlalchemy import Connection, Row, Select, func, insert, select, text, update
+from sqlalchemy.dialects.sqlite import insert as insert_or
+
+from calibrations.table import Table
+from procedures.session import Pose
+from rig.errors import RecordError, UnknownRun
+from rig.home import home
+from rig.nearest import did_you_mean
+from rig.record import codec
+from rig.record.file import open_file
+from rig.record.schema import blocks, columns, events, poses, runs, states
+from rig.record.values import Block, Event, Kept, Run
+
+FILE = "record.db"
+_POSE = ("alpha_deg", "beta_deg", "direction", "path", "mount_deg", "flip")
+
+
+class Record:
+    """The runs in `folder` (default: the application's own). A context manager.
+
+    Raises RecordError where the file cannot be opened, is damaged, or was written by a newer program.
+    """
+
+    def __init__(self, folder: Path | None = None) -> None:
+        self.folder = folder or home()
+        self.path = self.folder / FILE
+        self._engine = open_file(self.path)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        self._engine.dispose()
+
+    # writing
+
+    def begin(
+        self,
+        procedure: str,
+        settings: Mapping[str, Any],
+        *,
+        bench: Mapping[str, Any],
+        configuration: str,
+        constants: Mapping[str, str | float],
+        source: str,
+    ) -> str:
+        """A new run of `procedure`, in the state "running"; its id."""
+        values = {"kind": "poses", "procedure": procedure, "state": "running", "settings": dict(settings)}
+        values |= {"bench": dict(bench), "configuration": configuration}
+        with self._engine.begin() as to:
+            return _new_run(to, values | {"constants": dict(constants), "source": source})
+
+    def keep(self, run: str, number: int, kept: Kept, state: Mapping[str, Any] | None) -> None:
+        """Pose, samples and the simulated bench's `state`, in one transaction."""
+        key = {"run": run, "number": number}
+        pose = {name: getattr(kept.pose, name) for name in _POSE}
+        samples = {name: getattr(kept.samples, name) for name in ("rate_hz", "start_s")}
+        samples |= {"channels": list(kept.samples.channels), "codec": codec.CODEC}
+        samples |= {"samples": codec.encode(kept.samples.volts)}
+        with self._engine.begin() as to:
+            to.execute(insert(poses), key | pose | {"t_s": kept.t_s, "temperature_c": kept.temperature_c})
+            to.execute(insert(blocks), key | samples)
+            if state is not None:
+                _put_state(to, run, state)
+
+    def keep_state(self, run: str, state: Mapping[str, Any]) -> None:
+        """The simulated bench's state before the first pose."""
+        with self._engine.begin() as to:
+            _put_state(to, run, state)
+
+    def set_state(
+        self, run: str, state: str, message: str | None = None, results: Mapping[str, Any] | None = None
+    ) -> None:
+        """running, complete, stopped or failed; the last three end the run."""
+        ended = None if state == "running" else _now()
+        values = {"state": state, "message": message, "ended": ended, "results": dict(results or {})}
+        with self._engine.begin() as to:
+            to.execute(update(runs).where(runs.c.run == run).values(values))
+
+    def note(self, run: str, what: str, text: str) -> None:
+        """Something that happened in a run."""
+        with self._engine.begin() as to:
+            to.execute(insert(events), {"run": run, "at": _now(), "what": what, "text": text})
+
+    def add_table(self, table: Table) -> str:
+        """An imported table as a run of its own; its id."""
+        values = {"kind": table.kind, "procedure": "import", "state": "complete", "settings": {}, "bench": {}}
+        values |= {"configuration": table.digest, "constants": dict(table.constants), "source": table.source}
+        numbers = [{"name": k, "numbers": v.astype("<f8").tobytes()} for k, v in table.columns.items()]
+        texts = [{"name": k, "texts": list(v)} for k, v in table.labels.items()]
+        with self._engine.begin() as to:
+            run = _new_run(to, values | {"ended": _now()})
+            for position, column in enumerate([*numbers, *texts]):
+                to.execute(insert(columns), {**column, "run": run, "position": position})
+        return run
+
+    # reading
+
+    def runs(self) -> list[Run]:
+        """Every run, newest first."""
+        with self._engine.connect() as at:
+            return [Run(**row._mapping) for row in at.execute(_select_runs().order_by(text("runs.rowid DESC")))]
+
+    def run(self, run: str) -> Run:
+        """One run. Raises UnknownRun with the nearest name."""
+        with self._engine.connect() as at:
+            row = at.execute(_select_runs().where(runs.c.run == run)).one_or_none()
+            if row is not None:
+                return Run(**row._mapping)
+            known = at.execute(select(runs.c.run)).scalars().all()
+        raise UnknownRun(f"no run {run!r} in {self.path}.{did_you_mean(run, known[-20:])}")
+
+    def poses(self, run: str) -> list[Pose]:
+        """The kept poses, in their order."""
+        query = select(*[poses.c[name] for name in _POSE]).where(poses.c.run == run).order_by(poses.c.number)
+        with self._engine.connect() as at:
+            return [Pose(**row._mapping) for row in at.execute(query)]
+
+    def kept(self, run: str) -> Iterator[Kept]:
+        """Every pose with its samples, in order; few in memory at a time."""
+        same = (poses.c.run == blocks.c.run) & (poses.c.number == blocks.c.number)
+        query = select(poses, blocks).join_from(poses, blocks, same).where(poses.c.run == run)
+        with self._engine.connect() as at:
+            options = at.execution_options(yield_per=32)
+            for row in options.execute(query.order_by(poses.c.number)):
+                yield _kept(row)
+
+    def state(self, run: str) -> dict[str, Any] | None:
+        """The simulated bench's state after the last kept pose; None on a real bench."""
+        with self._engine.connect() as at:
+            return at.execute(select(states.c.state).where(states.c.run == run)).scalar_one_or_none()
+
+    def events(self, run: str) -> list[Event]:
+        """What happened in a run, in order."""
+        query = select(events.c.at, events.c.what, events.c.text).where(events.c.run == run)
+        with self._engine.connect() as at:
+            return [Event(*row) for row in at.execute(query.order_by(events.c.event))]
+
+    def columns(self, run: str) -> tuple[dict[str, NDArray[np.float64]], dict[str, tuple[str, ...]]]:
+        """The columns of an imported table: numbers, and texts, by name."""
+        query = select(columns).where(columns.c.run == run).order_by(columns.c.position)
+        with self._engine.connect() as at:
+            rows = at.execute(query).all()
+        numbers = {row.name: np.frombuffer(row.numbers, "<f8") for row in rows if row.numbers is not None}
+        return numbers, {row.name: tuple(row.texts) for row in rows if row.numbers is None}
+
+
+def _now() -> str:
+    return datetime.now(UTC).isoformat(timespec="milliseconds")
+
+
+def _new_run(to: Connection, values: Mapping[str, Any]) -> str:
+    """Its id sorts by time and reads well: 20261121-093012-sweep-a1b."""
+    run = f"{datetime.now(UTC):%Y%m%d-%H%M%S}-{values['procedure']}-{secrets.token_hex(2)[:3]}"
+    to.execute(insert(runs), {"results": {}, **values, "run": run, "created": _now()})
+    return run
+
+
+def _put_state(to: Connection, run: str, state: Mapping[str, Any]) -> None:
+    values = {"run": run, "state": dict(state)}
+    to.execute(insert_or(states).values(values).on_conflict_do_update(index_elements=["run"], set_=values))
+
+
+def _select_runs() -> Select[Any]:
+    kept = select(func.count()).where(poses.c.run == runs.c.run).scalar_subquery()
+    imported = select(func.max(func.length(columns.c.numbers) / 8)).where(columns.c.run == runs.c.run)
+    return select(runs, func.coalesce(imported.scalar_subquery(), kept).label("rows"))
+
+
+def _kept(row: Row[Any]) -> Kept:
+    where = f"run {row.run}, pose {row.number}"
+    if row.codec != codec.CODEC:
+        raise RecordError(f"{where}: samples in the unknown format {row.codec!r}; update the program")
+    try:
+        volts = codec.decode(row.samples)
+    except ValueError as error:
+        raise RecordError(f"{where}: {error}; restore a copy of the record") from None
+    pose = Pose(**{name: row._mapping[name] for name in _POSE})
+    return Kept(pose, Block(volts, tuple(row.channels), row.rate_hz, row.start_s), row.t_s, row.temperature_c)
