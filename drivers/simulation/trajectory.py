@@ -84,6 +84,17 @@ class Trajectory:
         left = abs(rate) - self.acceleration_deg_s2 * (t_s - self.stop_s)
         return math.copysign(max(0.0, left), rate)
 
+    def pieces(self) -> list[tuple[float, float, float, float]]:
+        """The move as pieces of constant acceleration: (start in s, angle, rate, acceleration); the last is rest."""
+        ramp, cruise = self._ramp_s, self._cruise_s
+        turns = {self.start_s, self.start_s + ramp, self.start_s + ramp + cruise}
+        if self.stop_s is not None:
+            turns = {t for t in turns if t < self.stop_s} | {max(self.stop_s, self.start_s)}
+        times = [*sorted(t for t in turns if t < self.end_s), self.end_s]
+        rates = [self.rate_deg_s(t) for t in times[:-1]] + [0.0]
+        slopes = [(after - rate) / (end - t) for t, end, rate, after in zip(times, times[1:], rates, rates[1:])]
+        return list(zip(times, map(self.angle_deg, times), rates, [*slopes, 0.0]))
+
     def stopped(self, t_s: float) -> Trajectory:
         """The same move with a stop commanded at `t_s`."""
         return self if self.stop_s is not None else replace(self, stop_s=t_s)

@@ -1,0 +1,166 @@
+"""The world's settings: frozen dataclasses, one per mechanism, physical units in every name.
+
+    WorldConfig.adxl203()   the default: what Ang saw
+    WorldConfig.ideal()     a perfectly linear sensor with white noise only
+    WorldConfig.from_mapping({"preset": "ideal", "heat": {"ambient_c": 20.0}})
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from typing import Any, TypeVar
+
+from drivers.simulation.converter import Converter
+from drivers.simulation.errors import BadSetting, UnknownSetting, unknown
+from drivers.simulation.friction import Friction
+from drivers.simulation.gravity import Base, Package
+from drivers.simulation.heat import Heat, Oven
+from drivers.simulation.noise import Noise
+from drivers.simulation.oddities import Oddities
+from drivers.simulation.plates import Plates
+from drivers.simulation.scatter import Spread
+from drivers.simulation.springs import Springs
+from drivers.simulation.stage import Stage
+from drivers.simulation.supply import Supply
+
+Settings = TypeVar("Settings")
+
+
+@dataclass(frozen=True)
+class Stages:
+    """The two rotary stages."""
+
+    alpha: Stage = field(default_factory=Stage)
+    beta: Stage = field(default_factory=Stage)
+
+
+@dataclass(frozen=True)
+class SensingAxis:
+    """One sensing axis: its springs, its friction, its plates."""
+
+    springs: Springs = field(default_factory=Springs)
+    friction: Friction = field(default_factory=Friction)
+    plates: Plates = field(default_factory=Plates)
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """A proof mass with two sensing axes in a package."""
+
+    package: Package = field(default_factory=Package)
+    x: SensingAxis = field(default_factory=SensingAxis)
+    y: SensingAxis = field(default_factory=SensingAxis)
+    sag_resonance_hz: float = 4000.0  # out-of-plane resonance: fixes the sag per g (15.5 nm)
+
+
+@dataclass(frozen=True)
+class WorldConfig:
+    """Everything that can be set about a simulated rig. Plain construction gives ideal mechanisms."""
+
+    stages: Stages = field(default_factory=Stages)
+    base: Base = field(default_factory=Base)
+    sensor: Sensor = field(default_factory=Sensor)
+    heat: Heat = field(default_factory=Heat)
+    oven: Oven = field(default_factory=Oven)
+    supply: Supply = field(default_factory=Supply)
+    noise: Noise = field(default_factory=Noise)
+    converter: Converter = field(default_factory=Converter)
+    oddities: Oddities = field(default_factory=Oddities)
+    spread: Spread = field(default_factory=Spread)
+
+    @classmethod
+    def ideal(cls) -> WorldConfig:
+        """A perfectly linear sensor on perfect stages; its only noise is white."""
+        return cls()
+
+    @classmethod
+    def adxl203(cls) -> WorldConfig:
+        """The sensor and the rig of Ang: hysteresis, loads of the other axes, warm-up over hours."""
+        return cls().changed(ADXL203)
+
+    @classmethod
+    def from_mapping(cls, settings: Mapping[str, Any]) -> WorldConfig:
+        """A preset (key `preset`, default "adxl203") with changes, as a bench file gives them.
+
+        Raises:
+            UnknownSetting: a key that does not exist, with the nearest name.
+            BadSetting: a value that is not a number, or not a mapping where one is needed.
+        """
+        changes = dict(settings)
+        preset = changes.pop("preset", "adxl203")
+        if preset not in PRESETS:
+            raise UnknownSetting(unknown("preset of the simulated world", preset, PRESETS))
+        return (cls.ideal() if preset == "ideal" else cls.adxl203()).changed(changes)
+
+    def changed(self, changes: Mapping[str, Any]) -> WorldConfig:
+        """A copy with nested `changes`; raises as `from_mapping` does."""
+        return changed(self, changes)
+
+
+def changed(settings: Settings, changes: Mapping[str, Any], path: str = "") -> Settings:
+    """A copy of a (nested) dataclass with nested `changes`."""
+    names = [f.name for f in fields(settings)]  # type: ignore[arg-type]
+    new = {}
+    for name, value in changes.items():
+        where = f"{path}{name}"
+        if name not in names:
+            raise UnknownSetting(f"{where}: {unknown('setting of the simulated world', name, names)}")
+        new[name] = _value(getattr(settings, name), value, where)
+    return replace(settings, **new)  # type: ignore[type-var]
+
+
+def _value(present: Any, value: Any, where: str) -> Any:
+    if is_dataclass(present):
+        if not isinstance(value, Mapping):
+            raise BadSetting(f"{where}: {value!r} is not a mapping of settings")
+        return changed(present, value, f"{where}.")
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise BadSetting(f"{where}: {value!r} is not a number")
+    return float(value)
+
+
+PRESETS = ("adxl203", "ideal")
+
+ADXL203: dict[str, Any] = {
+    "stages": {
+        "alpha": {"zero_offset_deg": 0.05, "play_deg": 0.02},
+        "beta": {"zero_offset_deg": 0.05, "play_deg": 0.02, "wobble_deg": 0.03, "wobble_phase_deg": 40.0},
+    },
+    "base": {"tilt_x_deg": 0.04, "tilt_y_deg": -0.03},
+    "sensor": {
+        "package": {"turn_x_deg": -0.4, "turn_y_deg": 1.2, "turn_z_deg": 0.33, "beams_off_square_deg": 0.17},
+        "x": {
+            "springs": {
+                "hardening_per_um2": -15.0,
+                "foreshortening_per_um": -0.9,
+                "sag_foreshortening_per_um": 0.15,
+                "stress_pm_per_k": 4.0,
+                "stiffening_ppm_per_k": -200.0,
+            },
+            "friction": {"stiffness_fraction": 0.005, "slip_nm": 3.3, "pressing_per_g": 0.5},
+            "plates": {"gap_mismatch_fraction": 0.02, "overlap_loss_per_um2": 20.0, "height_step_nm": 3.0},
+        },
+        "y": {
+            "springs": {
+                "hardening_per_um2": -12.0,
+                "foreshortening_per_um": -0.7,
+                "sag_foreshortening_per_um": 0.12,
+                "stress_pm_per_k": -3.0,
+                "stiffening_ppm_per_k": -180.0,
+            },
+            "friction": {"stiffness_fraction": 0.006, "slip_nm": 3.0, "pressing_per_g": 0.4},
+            "plates": {"gap_mismatch_fraction": -0.015, "overlap_loss_per_um2": 18.0, "height_step_nm": -2.0},
+        },
+    },
+    "heat": {
+        "board_rise_k": 6.0,
+        "package_rise_k": 2.0,
+        "ambient_wander_k": 0.1,
+        "thermocouple_lag_s": 8.0,
+        "thermocouple_offset_k": 0.3,
+    },
+    "supply": {"wander_v": 0.0002},
+    "noise": {"flicker_v": 5e-6},
+    "converter": {"noise_v": 60e-6},
+}

@@ -1,0 +1,79 @@
+"""Gravity as the sensor's package feels it: base, stages, mount, package.
+
+    a = P F Rz(mount) Rz(beta) Ry(alpha) up        in g, with the true angles
+
+`up` is the vertical in the base (tilted by two angles), F turns the sensor face down, P is the
+package's own small rotation on its mount. At rest the specific force is 1 g upward.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.simulation.kernel import kernel
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Base:
+    """How the rig's base stands in the laboratory."""
+
+    tilt_x_deg: float = 0.0  # turn of the base about its x axis
+    tilt_y_deg: float = 0.0  # turn of the base about its y axis
+
+
+@dataclass(frozen=True)
+class Package:
+    """Small rotations of the package on its mount, applied about x, then y, then z; beams off square."""
+
+    turn_x_deg: float = 0.0
+    turn_y_deg: float = 0.0
+    turn_z_deg: float = 0.0
+    beams_off_square_deg: float = 0.0  # how far the y beam is turned from 90 deg toward the x beam
+
+
+def rotation(x_deg: float, y_deg: float, z_deg: float) -> Vector:
+    """Rz Ry Rx, shape (3, 3)."""
+    (a, b, c), (p, q, r) = np.cos(np.radians([x_deg, y_deg, z_deg])), np.sin(np.radians([x_deg, y_deg, z_deg]))
+    about_x = np.array([[1, 0, 0], [0, a, -p], [0, p, a]])
+    about_y = np.array([[b, 0, q], [0, 1, 0], [-q, 0, b]])
+    about_z = np.array([[c, -r, 0], [r, c, 0], [0, 0, 1]])
+    return np.asarray(about_z @ about_y @ about_x)
+
+
+def vertical(base: Base) -> Vector:
+    """The upward vertical in the frame of the base, shape (3,)."""
+    return rotation(base.tilt_x_deg, base.tilt_y_deg, 0.0) @ np.array([0.0, 0.0, 1.0])
+
+
+def mounting(package: Package, mount_deg: float, flip: int) -> Vector:
+    """Package from table, shape (3, 3): the mount's turn, face down if `flip`, the package's own rotation."""
+    face = np.diag([1.0, -1.0, -1.0]) if flip else np.eye(3)
+    return rotation(package.turn_x_deg, package.turn_y_deg, package.turn_z_deg) @ face @ rotation(0, 0, mount_deg)
+
+
+@kernel
+def along_y(package: Any, gx: float, gy: float) -> float:
+    """Load along the y beam, which need not be square to the x beam."""
+    off = math.radians(package.beams_off_square_deg)
+    return gy * math.cos(off) + gx * math.sin(off)
+
+
+@kernel
+def felt_g(up: Any, mount: Any, alpha_rad: float, beta_rad: float) -> tuple[float, float, float]:
+    """Specific force in the package's frame, in g, at true stage angles."""
+    ca, sa = math.cos(alpha_rad), math.sin(alpha_rad)
+    cb, sb = math.cos(beta_rad), math.sin(beta_rad)
+    x, y, z = ca * up[0] + sa * up[2], up[1], ca * up[2] - sa * up[0]
+    x, y = cb * x - sb * y, sb * x + cb * y
+    return (
+        mount[0, 0] * x + mount[0, 1] * y + mount[0, 2] * z,
+        mount[1, 0] * x + mount[1, 1] * y + mount[1, 2] * z,
+        mount[2, 0] * x + mount[2, 1] * y + mount[2, 2] * z,
+    )

@@ -1,0 +1,99 @@
+"""The mechanisms composed: what happens at an event, and which event comes next.
+
+Slow processes (heat, supply, flicker) advance in ticks of 0.1 s on an absolute grid of time; the
+mechanics are brought up to date at every tick and, while a stage turns, at finer steps. Between
+events nothing changes but the filter, which is exact. So no result depends on how time is cut.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from drivers.simulation import friction, gravity, heat, noise, oddities, plates, springs, stage, supply
+from drivers.simulation.kernel import kernel
+
+TICK_NS = 100_000_000
+TICK_S = 1e-9 * TICK_NS
+NORMALS = noise.NORMALS + 3  # random numbers of one tick
+REFERENCE_C = 25.0  # at which the factory trimmed the sensor
+
+
+@kernel
+def run_to(world: Any, config: Any, t_ns: int, step_ns: int, normals: Any) -> int:
+    """Let everything due up to `t_ns` happen; returns how many rows of `normals` (ticks) were used."""
+    used = 0
+    event_ns = next_event_ns(world, step_ns)
+    while event_ns <= t_ns:
+        noise.charge(world, config.noise, 0, event_ns)
+        noise.charge(world, config.noise, 1, event_ns)
+        if event_ns == (world.ticks + 1) * TICK_NS:
+            world.ticks += 1
+            tick(world, config, normals[used])
+            used += 1
+        update(world, config, event_ns)
+        event_ns = next_event_ns(world, step_ns)
+    world.now_ns = max(t_ns, world.now_ns)
+    return used
+
+
+@kernel
+def next_event_ns(world: Any, step_ns: int) -> int:
+    """The next tick, or the next step of a stage that turns, or the moment at which it stands."""
+    event = (world.ticks + 1) * TICK_NS
+    for axis in range(2):
+        rest = world.rest_ns[axis]
+        if world.mechanics_ns < rest:
+            event = min(event, rest, (world.mechanics_ns // step_ns + 1) * step_ns)
+    return event  # type: ignore[no-any-return]
+
+
+@kernel
+def tick(world: Any, config: Any, normals: Any) -> None:
+    """Advance the slow processes to the present tick."""
+    t_s = world.ticks * TICK_S
+    heat.tick(world, config.heat, config.oven, t_s, TICK_S, normals[0])
+    supply.tick(world, config.supply, t_s, TICK_S, normals[1])
+    oddities.tick(world, config.oddities, TICK_S, normals[2])
+    noise.tick(world, config.noise, TICK_S, normals[3:])
+
+
+@kernel
+def update(world: Any, config: Any, t_ns: int) -> None:
+    """From the motors' angles at `t_ns` to the volts in front of the filter."""
+    world.mechanics_ns = t_ns
+    gx, gy, gz = load_g(world, config, 1e-9 * t_ns)
+    oddities.rock(world, config.oddities, gx, gy)
+    x, y, sag = displaced_nm(world, config, gx, gy, gz, 1e-9 * t_ns)
+    on, sx, sy = world.powered, config.sensor.x, config.sensor.y
+    world.volts[0] = on * plates.read_v(sx.plates, sx.springs.resonance_hz, x, y, sag, world.supply_v)
+    world.volts[1] = on * plates.read_v(sy.plates, sy.springs.resonance_hz, y, x, sag, world.supply_v)
+
+
+@kernel
+def load_g(world: Any, config: Any, t_s: float) -> tuple[float, float, float]:
+    """Specific force along both sensing beams and out of their plane."""
+    a_motor = stage.motor_angle_deg(world.pieces[0], t_s)
+    b_motor = stage.motor_angle_deg(world.pieces[1], t_s)
+    world.table_deg[0] = stage.engaged_deg(config.stages.alpha, world.table_deg[0], a_motor)
+    world.table_deg[1] = stage.engaged_deg(config.stages.beta, world.table_deg[1], b_motor)
+    alpha = stage.true_angle_rad(config.stages.alpha, world.table_deg[0])
+    beta = stage.true_angle_rad(config.stages.beta, world.table_deg[1])
+    gx, gy, gz = gravity.felt_g(world.up, world.mount, alpha, beta)
+    return gx, gravity.along_y(config.sensor.package, gx, gy), gz
+
+
+@kernel
+def displaced_nm(
+    world: Any, config: Any, gx: float, gy: float, gz: float, t_s: float
+) -> tuple[float, float, float]:
+    """Displacements of the proof mass in x, y and z."""
+    sx, sy, odd = config.sensor.x, config.sensor.y, config.oddities
+    x, y = springs.balanced_nm(sx.springs, sy.springs, gx, gy, heat.die_c(world) - REFERENCE_C)
+    sag = gz * springs.per_g_nm(config.sensor.sag_resonance_hz)
+    fault = oddities.displacement_nm(world, odd, world.table_deg[1], t_s)
+    stress_k = world.glue_c - REFERENCE_C
+    moved_x = x - friction.drag_nm(sx.friction, world.seats_nm[0], x, gy) + oddities.stopped_nm(odd, x)
+    moved_y = y - friction.drag_nm(sy.friction, world.seats_nm[1], y, gx) + oddities.stopped_nm(odd, y)
+    moved_x += fault + springs.drawn_aside_nm(sx.springs, y, sag, stress_k)
+    moved_y += fault + springs.drawn_aside_nm(sy.springs, x, sag, stress_k)
+    return moved_x, moved_y, sag

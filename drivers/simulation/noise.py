@@ -1,0 +1,93 @@
+"""Noise and the output filter: a resistor and a capacitor per axis.
+
+White noise of the sensor reaches the output through the filter: there it is an Ornstein-Uhlenbeck
+process, stepped exactly over any interval. Flicker noise is a sum of such processes, one per decade
+of correlation time; with the random walk it advances in ticks. Hum is picked up behind the filter.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.simulation.heat import wandered
+from drivers.simulation.kernel import kernel
+
+DECADES = 5  # correlation times 1 s to 10 000 s
+NORMALS = 2 * (DECADES + 1)  # random numbers per tick, both axes
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Amplitudes at the output, in V."""
+
+    white_v: float = 0.775e-3  # rms behind the filter
+    flicker_v: float = 0.0  # rms of each decade of flicker noise
+    walk_v_per_sqrt_h: float = 0.0  # random walk of the output
+    hum_v: float = 0.0  # amplitude of a sinusoid picked up by the leads
+    hum_hz: float = 50.0
+    filter_ohm: float = 32e3
+    filter_farad: float = 0.33e-6
+
+
+@kernel
+def tick(world: Any, noise: Any, step_s: float, normals: Any) -> None:
+    """Advance flicker noise and random walk of both axes by one tick."""
+    for axis in range(2):
+        slow = 0.0
+        for k in range(DECADES):
+            time_s, normal = 10.0**k, normals[axis * DECADES + k]
+            world.flicker_v[axis, k] = wandered(world.flicker_v[axis, k], noise.flicker_v, time_s, step_s, normal)
+            slow += world.flicker_v[axis, k]
+        world.walk_v[axis] += noise.walk_v_per_sqrt_h * math.sqrt(step_s / 3600) * normals[2 * DECADES + axis]
+        world.slow_v[axis] = slow + world.walk_v[axis]
+
+
+@kernel
+def kept(world: Any, noise: Any, gap_ns: int) -> float:
+    """Share of an old value that the filter still holds after `gap_ns`; the last answer is remembered."""
+    if gap_ns <= 0:
+        return 1.0
+    if gap_ns != world.kept_ns:
+        world.kept_ns = gap_ns
+        world.kept = math.exp(-1e-9 * gap_ns / (noise.filter_ohm * noise.filter_farad))
+    return world.kept  # type: ignore[no-any-return]
+
+
+@kernel
+def charge(world: Any, noise: Any, axis: int, t_ns: int) -> None:
+    """Let the capacitor of one axis follow the voltage that has stood at its input until `t_ns`."""
+    target = world.volts[axis] + world.slow_v[axis]
+    share = kept(world, noise, t_ns - world.filtered_ns[axis])
+    world.filtered_v[axis] = target + share * (world.filtered_v[axis] - target)
+    world.filtered_ns[axis] = max(t_ns, world.filtered_ns[axis])
+
+
+@kernel
+def output_v(world: Any, noise: Any, axis: int, t_ns: int, normal: float) -> float:
+    """What the capacitor of one axis holds at `t_ns`, noise included."""
+    charge(world, noise, axis, t_ns)
+    share = kept(world, noise, t_ns - world.white_ns[axis])
+    world.white[axis] = share * world.white[axis] + math.sqrt(1 - share * share) * normal
+    world.white_ns[axis] = max(t_ns, world.white_ns[axis])
+    return world.filtered_v[axis] + noise.white_v * world.white[axis] + hum_v(noise, t_ns)  # type: ignore[no-any-return]
+
+
+@kernel
+def hum_v(noise: Any, t_ns: int) -> float:
+    """Pick-up of the leads."""
+    if noise.hum_v == 0:
+        return 0.0
+    return noise.hum_v * math.sin(2 * math.pi * noise.hum_hz * 1e-9 * t_ns)  # type: ignore[no-any-return]
+
+
+def hum_mean_v(noise: Noise, middle_s: NDArray[np.float64], interval_s: float, n: int) -> NDArray[np.float64]:
+    """Mean of the hum over `n` samples around each time of `middle_s`."""
+    phase = math.pi * noise.hum_hz * interval_s
+    share = 1.0 if math.sin(phase) == 0 else math.sin(n * phase) / (n * math.sin(phase))
+    mean: NDArray[np.float64] = noise.hum_v * share * np.sin(2 * math.pi * noise.hum_hz * middle_s)
+    return mean

@@ -1,0 +1,56 @@
+"""No two rigs are alike: an individual drawn around its settings."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields, is_dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from drivers.simulation.config import SensingAxis, WorldConfig
+
+# What a factory or a designer fixes: no imperfection, so no scatter.
+EXACT = {"resonance_hz", "sag_resonance_hz", "gap_um", "zero_g_v", "sensitivity_v_per_g", "worm_cycles", "slip_nm"}
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Standard deviations from rig to rig."""
+
+    zero_g_v: float = 0.02
+    sensitivity_fraction: float = 0.01
+    imperfection_fraction: float = 0.1  # of every imperfection of stages, base and sensor that is not 0
+
+
+def individual(config: WorldConfig, seed: int) -> WorldConfig:
+    """One rig drawn from `config.spread`; the same seed draws the same rig."""
+    random = np.random.default_rng([seed, 0])
+    zeros, gains = random.standard_normal(2), random.standard_normal(2)
+    fraction = config.spread.imperfection_fraction
+    sensor = _scattered(config.sensor, fraction, random)
+    x, y = (_trimmed(axis, config.spread, *z) for axis, z in zip((sensor.x, sensor.y), zip(zeros, gains, strict=True), strict=True))
+    stages, base = (_scattered(part, fraction, random) for part in (config.stages, config.base))
+    return replace(config, sensor=replace(sensor, x=x, y=y), stages=stages, base=base)
+
+
+def _trimmed(axis: SensingAxis, spread: Spread, zero: float, gain: float) -> SensingAxis:
+    plates = replace(
+        axis.plates,
+        zero_g_v=axis.plates.zero_g_v + spread.zero_g_v * zero,
+        sensitivity_v_per_g=axis.plates.sensitivity_v_per_g * (1 + spread.sensitivity_fraction * gain),
+    )
+    return replace(axis, plates=plates)
+
+
+def _scattered(settings: Any, fraction: float, random: np.random.Generator) -> Any:
+    """Every imperfection times a log-normal number; a number is drawn for absent ones too."""
+    new = {}
+    for f in fields(settings):
+        value = getattr(settings, f.name)
+        if is_dataclass(value):
+            new[f.name] = _scattered(value, fraction, random)
+        elif f.name not in EXACT:
+            new[f.name] = value * math.exp(fraction * random.standard_normal())
+    return replace(settings, **new)

@@ -1,0 +1,179 @@
+"""The world that the simulated instruments share: all that they know of physics.
+
+Deterministic by its seed; `state` and `restore` continue it sample for sample. Times are kept in whole
+nanoseconds, so that a long acquisition gives the same samples however it is cut into blocks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from drivers.simulation import dwell, mechanics, sampling, stage, state
+from drivers.simulation.beginning import beginning, mount
+from drivers.simulation.config import WorldConfig
+from drivers.simulation.errors import TimeReversal, UnknownInput, unknown
+from drivers.simulation.kernel import record
+from drivers.simulation.scatter import individual
+from drivers.simulation.trajectory import Trajectory
+
+STEP_NS = 2_000_000  # of the mechanics while a stage turns
+BLOCK_NS = 1000 * mechanics.TICK_NS  # of a long wait: bounds the memory for random numbers
+
+
+class World:
+    """A rig in simulated time, from `now_s` = 0 with both stages at motor angle 0."""
+
+    def __init__(self, config: WorldConfig, seed: int) -> None:
+        self.config = individual(config, seed)
+        self._numbers = record(self.config)
+        self._slow = np.random.Generator(np.random.PCG64([seed, 1]))
+        self._fast = np.random.Generator(np.random.PCG64([seed, 2]))
+        self._world = beginning(self.config, self._slow)
+        mechanics.update(self._world, self._numbers, 0)
+        self._world["filtered_v"] = self._world["volts"] + self._world["slow_v"]
+
+    @property
+    def now_s(self) -> float:
+        return float(1e-9 * self._world["now_ns"])
+
+    def advance(self, t_s: float) -> None:
+        """Let time pass until `t_s`. Raises TimeReversal."""
+        self._advance_ns(self._later_ns(t_s))
+
+    def move_stage(self, axis: str, trajectory: Trajectory) -> None:
+        """Let the motor of `axis` ("alpha" or "beta") follow `trajectory` from now on."""
+        number, pieces = _place(axis, stage.AXES, "stage"), trajectory.pieces()
+        self._world["pieces"][number] = (pieces + pieces[-1:] * stage.PIECES)[: stage.PIECES]
+        self._world["rest_ns"][number] = round(1e9 * pieces[-1][0])
+
+    def motor_angle_deg(self, axis: str) -> float:
+        """Where the motor of `axis` stands now."""
+        return float(stage.motor_angle_deg(self._world["pieces"][_place(axis, stage.AXES, "stage")], self.now_s))
+
+    def mount_sensor(self, mount_deg: float = 0.0, flip: int = 0) -> None:
+        """Put the sensor on the table turned by `mount_deg` about its z axis, face down if `flip`."""
+        mount(self._world, self.config, mount_deg, flip)
+
+    def power(self, on: bool) -> None:
+        """Switch the sensor's supply. Without it the outputs fall to 0 V and the sensor cools."""
+        if on and not self._world["powered"]:
+            self._world["powered_ns"] = self._world["now_ns"]
+        self._world["powered"] = int(on)
+
+    def powered_s(self) -> float:
+        """Seconds since the sensor was powered; 0 while it is not."""
+        return float(1e-9 * (self._world["now_ns"] - self._world["powered_ns"]) * self._world["powered"])
+
+    def oven_set(self, set_point_c: float, running: bool) -> None:
+        """Give the oven's controller a set point, and run it or not."""
+        self._world["oven_set_c"] = set_point_c
+        self._world["oven_running"] = int(running)
+
+    def thermometer_c(self) -> float:
+        """What the thermocouple on the sensor's package shows now."""
+        return float(self._world["thermocouple_c"])
+
+    def adc_volts(self, inputs: Sequence[str], start_s: float, interval_s: float, n: int) -> NDArray[np.float64]:
+        """Volts at the converter's inputs, shape (n, len(inputs)), before rounding to codes.
+
+        Scan i begins at `start_s + i * interval_s`; the k-th input follows k times the converter's skew later.
+        The world is at the last scan afterwards. Inputs: vx, vy, supply, thermistor, ground.
+
+        Raises:
+            UnknownInput: an input of another name.
+            TimeReversal: `start_s` has passed.
+        """
+        channels = np.array([_place(name, sampling.INPUTS, "converter input") for name in inputs], dtype=np.int64)
+        start_ns = self._later_ns(start_s)
+        times_ns = start_ns + np.rint(1e9 * interval_s * np.arange(n)).astype(np.int64)
+        volts = np.empty((n, len(channels)))
+        if n:
+            self._advance_ns(start_ns)
+            fast, slow = self._fast.standard_normal((*volts.shape, 2)), self._due(int(times_ns[-1]))
+            sampling.sample(self._world, self._numbers, channels, times_ns, STEP_NS, fast, slow, volts)
+        return volts
+
+    def dwell_mean(
+        self,
+        alpha_deg: ArrayLike,
+        beta_deg: ArrayLike,
+        *,
+        direction: ArrayLike | None = None,
+        mount_deg: ArrayLike = 0.0,
+        flip: ArrayLike = 0,
+        noise_free: bool = False,
+        **timing: float,
+    ) -> dict[str, NDArray[Any]]:
+        """Visit poses in order (arrays or scalars) and hold each: the columns of a table of poses.
+
+        `timing` are the fields of `dwell.Timing`: dwell_s, interval_s, settle_s, speed_deg_s, acceleration_deg_s2.
+        t_s is the middle of the dwell, in seconds since the sensor was powered. `noise_free` leaves out the
+        noise of sensor and converter, not the wander of room and supply. The world is at the end of the
+        last dwell afterwards.
+        """
+        visited = dwell.poses(alpha_deg, beta_deg, direction, mount_deg, flip)
+        pace = dwell.Timing(**timing)
+        means = np.empty((len(visited.alpha_deg), dwell.COLUMNS))
+        ends_s = np.array([self._hold(visited, i, pace, means[i]) for i in range(len(means))])
+        middle_s = ends_s - pace.samples * pace.interval_s / 2
+        powered_s = middle_s - 1e-9 * self._world["powered_ns"]
+        random = None if noise_free else self._fast
+        noise, converter = self.config.noise, self.config.converter
+        return dwell.columns(visited, means, middle_s, powered_s, noise, converter, pace, random)
+
+    def _hold(self, visited: dwell.Poses, i: int, pace: dwell.Timing, means: NDArray[np.float64]) -> float:
+        """Move to one pose and fill `means` there; returns when the dwell ended."""
+        if (visited.mount_deg[i], visited.flip[i]) != (self._world["mount_deg"], self._world["flip"]):
+            self.mount_sensor(float(visited.mount_deg[i]), int(visited.flip[i]))
+        arrival_s = self.now_s
+        for axis, target in (("alpha", visited.alpha_deg[i]), ("beta", visited.beta_deg[i])):
+            here = self.motor_angle_deg(axis)
+            if here != target:
+                move = Trajectory(arrival_s, here, float(target), pace.speed_deg_s, pace.acceleration_deg_s2)
+                self.move_stage(axis, move)
+                arrival_s = move.end_s
+        start_ns = round(1e9 * (arrival_s + pace.settle_s))
+        end_ns = start_ns + round(1e9 * pace.samples * pace.interval_s)
+        slow = self._due(end_ns)
+        dwell.hold(self._world, self._numbers, start_ns, end_ns, dwell.STEP_NS, slow, means)
+        return 1e-9 * end_ns
+
+    def state(self) -> dict[str, state.JSON]:
+        """All that the world remembers, as JSON: restored, it continues sample for sample."""
+        generators: Any = [self._slow.bit_generator.state, self._fast.bit_generator.state]
+        return {"world": state.to_json(self._world), "generators": generators}
+
+    def restore(self, kept: dict[str, Any]) -> None:
+        """Continue from what `state` gave, in a world of the same configuration and seed.
+
+        Raises:
+            BadSetting: the state is of another version.
+        """
+        self._world = state.from_json(kept["world"])
+        self._slow.bit_generator.state, self._fast.bit_generator.state = kept["generators"]
+
+    def _later_ns(self, t_s: float) -> int:
+        """`t_s` in ns; a nanosecond of rounding is forgiven."""
+        t_ns, now_ns = round(1e9 * t_s), int(self._world["now_ns"])
+        if t_ns < now_ns - 1:
+            raise TimeReversal(f"the world is at {self.now_s:.9f} s and cannot go back to {t_s:.9f} s")
+        return max(t_ns, now_ns)
+
+    def _advance_ns(self, t_ns: int) -> None:
+        for stop_ns in (*range(int(self._world["now_ns"]) + BLOCK_NS, t_ns, BLOCK_NS), t_ns):
+            mechanics.run_to(self._world, self._numbers, stop_ns, STEP_NS, self._due(stop_ns))
+
+    def _due(self, t_ns: int) -> NDArray[np.float64]:
+        """The random numbers of all ticks up to `t_ns`, one row each."""
+        ticks = max(0, t_ns // mechanics.TICK_NS - int(self._world["ticks"]))
+        return self._slow.standard_normal((ticks, mechanics.NORMALS))
+
+
+def _place(name: str, names: tuple[str, ...], what: str) -> int:
+    if name not in names:
+        raise UnknownInput(unknown(what, name, names))
+    return names.index(name)
