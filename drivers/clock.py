@@ -1,0 +1,190 @@
+"""The only source of time, and the only way to wait.
+
+`WallClock` is real. `SimulatedClock` moves only while the controller waits, and pumps the simulated
+instruments in the controller's own thread: no threads, no races, hours in seconds, every byte on a socket.
+
+Waiting is a rendezvous. Both ends of a wire count their bytes, so the clock knows what the kernel
+still holds: time never jumps past a byte in flight, and the same calls give the same instants on
+any machine. Only when all is quiet does time move, to the next thing that is due.
+"""
+
+from __future__ import annotations
+
+import math
+import select
+import time
+from collections.abc import Callable, Iterator, Sequence
+from typing import Protocol
+from weakref import WeakKeyDictionary
+
+from drivers.errors import ClockStuck
+
+STUCK_S = 10.0  # real seconds after which bytes in flight are taken for lost
+SLICE_S = 10.0  # longest simulated step while a stream runs: bounds what its server must hold
+TICK_S = 0.02  # how often `serve_forever` looks whether it shall end
+
+
+class Wire(Protocol):
+    """The controller's end of an open connection."""
+
+    key: str  # names the connection; its server knows the same name
+    sent: int  # bytes written so far
+    received: int  # bytes read so far
+
+    def fileno(self) -> int: ...
+
+
+class Peer(Protocol):
+    """A passive server: it acts only when it is told what time it is."""
+
+    def filenos(self) -> Sequence[int]:
+        """Descriptors to listen on."""
+
+    def advance(self, now_s: float) -> None:
+        """Compute all that happened up to `now_s`; comes before any exchange at that time."""
+
+    def receive(self, fileno: int, now_s: float) -> None:
+        """Accept, or read and act on, what has arrived."""
+
+    def emit(self, now_s: float) -> None:
+        """Write all that is due by `now_s`."""
+
+    def due_s(self) -> float:
+        """When it acts next by itself; infinity for never."""
+
+    def progress(self, key: str) -> tuple[int, int] | None:
+        """Bytes (received, emitted) on that connection; None if it has none of that name."""
+
+
+class Clock(Protocol):
+    """Seconds since an instant of the clock's own choice."""
+
+    def now(self) -> float: ...
+
+    def sleep(self, seconds: float) -> None: ...
+
+    def wait_readable(self, wire: Wire, timeout_s: float) -> bool:
+        """Wait until bytes (or the end of the connection) can be read; False when the time is over."""
+
+
+class WallClock:
+    """Real time, counted from `now_s` at construction."""
+
+    def __init__(self, now_s: float = 0.0) -> None:
+        self._origin_s = time.monotonic() - now_s
+
+    def now(self) -> float:
+        return time.monotonic() - self._origin_s
+
+    def sleep(self, seconds: float) -> None:
+        time.sleep(max(0.0, seconds))
+
+    def wait_readable(self, wire: Wire, timeout_s: float) -> bool:
+        return _readable([wire.fileno()], max(0.0, timeout_s)) != []
+
+
+class SimulatedClock:
+    """Time that moves only inside `sleep` and `wait_readable`."""
+
+    def __init__(self, now_s: float = 0.0) -> None:
+        self._now_s = now_s
+        self._peers: list[Peer] = []
+        self._bases: WeakKeyDictionary[Wire, tuple[int, int]] = WeakKeyDictionary()
+
+    def attach(self, peer: Peer) -> None:
+        """Pump `peer` from now on."""
+        self._peers.append(peer)
+
+    def restore(self, now_s: float) -> None:
+        """Continue an earlier run at `now_s`; called with its twins' states, while nothing is under way."""
+        self._now_s = now_s
+
+    def now(self) -> float:
+        return self._now_s
+
+    def sleep(self, seconds: float) -> None:
+        deadline = self._now_s + max(0.0, seconds)
+        while self._now_s < deadline:
+            idle = self._due_s() >= deadline
+            self._now_s = deadline if idle else min(deadline, self._now_s + SLICE_S)
+            step(self._peers, self._now_s)
+
+    def wait_readable(self, wire: Wire, timeout_s: float) -> bool:
+        deadline = self._now_s + max(0.0, timeout_s)
+        started = time.monotonic()
+        self._bases.setdefault(wire, self._progress(wire))
+        while True:
+            step(self._peers, self._now_s)
+            outbound, inbound = self._in_flight(wire)
+            if inbound or _readable([wire.fileno()], 0.0):
+                return self._arrived(wire)
+            if outbound:
+                self._wait_for_peers(wire, started)
+            elif self._now_s >= deadline:
+                return False
+            else:
+                self._now_s = min(deadline, max(self._now_s, self._due_s()))
+
+    def _due_s(self) -> float:
+        return min((peer.due_s() for peer in self._peers), default=math.inf)
+
+    def _progress(self, wire: Wire) -> tuple[int, int]:
+        for peer in self._peers:
+            if (progress := peer.progress(wire.key)) is not None:
+                return progress
+        return 0, 0
+
+    def _in_flight(self, wire: Wire) -> tuple[bool, bool]:
+        """Whether bytes are on their way to the server, and from it."""
+        received, emitted = self._progress(wire)
+        base_received, base_emitted = self._bases[wire]
+        return wire.sent > received - base_received, emitted - base_emitted > wire.received
+
+    def _arrived(self, wire: Wire) -> bool:
+        if not _readable([wire.fileno()], STUCK_S):
+            raise ClockStuck(f"{wire.key}: the simulated instrument's answer did not arrive", "Report this")
+        return True
+
+    def _wait_for_peers(self, wire: Wire, started: float) -> None:
+        _readable(list(_filenos(self._peers)), 0.1)
+        if time.monotonic() - started > STUCK_S:
+            raise ClockStuck(f"{wire.key}: no simulated instrument took the request", "Attach it to the clock")
+
+
+def step(peers: Sequence[Peer], now_s: float) -> None:
+    """One turn of all servers: what happened, what has arrived, what is due.
+
+    All advance before any acts, so that none sees a world that another has already changed.
+    """
+    ready = set(_readable(list(_filenos(peers)), 0.0))
+    for peer in peers:
+        peer.advance(now_s)
+    for peer in peers:
+        for fileno in ready.intersection(peer.filenos()):
+            peer.receive(fileno, now_s)
+        peer.emit(now_s)
+
+
+def serve_forever(peers: Sequence[Peer], until: Callable[[], bool] = lambda: False, clock: Clock | None = None) -> None:
+    """Serve any client in real time until `until()`; the same servers that a simulated clock pumps.
+
+    `clock` starts where the servers' world stands; by default at 0.
+    """
+    clock = clock or WallClock()
+    while not until():
+        due = min(peer.due_s() for peer in peers) - clock.now()
+        _readable(list(_filenos(peers)), min(max(0.0, due), TICK_S))
+        step(peers, clock.now())
+
+
+def _filenos(peers: Sequence[Peer]) -> Iterator[int]:
+    for peer in peers:
+        yield from peer.filenos()
+
+
+def _readable(filenos: list[int], timeout_s: float) -> list[int]:
+    """Those of `filenos` that can be read; poll, since select ends at descriptor 1023."""
+    poll = select.poll()
+    for fileno in filenos:
+        poll.register(fileno, select.POLLIN)
+    return [fileno for fileno, _ in poll.poll(timeout_s * 1000)]

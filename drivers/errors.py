@@ -1,0 +1,90 @@
+"""What can go wrong with an instrument.
+
+    DriverError
+    ├── LimitError         a value outside its limits was refused; nothing was sent
+    ├── LinkError          the wire
+    │   ├── LinkRefused    it cannot be opened, or the other side closed it
+    │   ├── LinkTimeout    silence
+    │   ├── BadFrame       bytes that are no answer: CRC, length, function code
+    │   ├── WrongUnit      another unit of the bus answered
+    │   └── Refused        an exception answer: the instrument understood and declined
+    ├── InstrumentError    the instrument
+    │   ├── StageAlarm     the drive stands still with an alarm
+    │   ├── NotSettled     the stage did not arrive
+    │   ├── StreamError    scans were lost, or packets are not what was asked for
+    │   └── SensorFault    the thermometer gives no temperature
+    └── ClockStuck         a simulated instrument's bytes never arrived: a bound in real time, a defect of ours
+
+Each says what happened, where (instrument and register), and what to do.
+"""
+
+from __future__ import annotations
+
+
+class DriverError(Exception):
+    """`what` happened, and the `remedy` as an instruction to a person."""
+
+    def __init__(self, what: str, remedy: str) -> None:
+        super().__init__(f"{what}. {remedy}.")
+        self.what = what
+        self.remedy = remedy
+
+
+class LimitError(DriverError):
+    """A value outside its limits; nothing was sent."""
+
+
+class LinkError(DriverError):
+    """The wire, not the instrument, is at fault."""
+
+
+class LinkRefused(LinkError):
+    """The link cannot be opened, or the other side closed it."""
+
+
+class LinkTimeout(LinkError):
+    """Nothing was heard in time."""
+
+
+class BadFrame(LinkError):
+    """Bytes came, but no valid answer."""
+
+
+class WrongUnit(LinkError):
+    """A valid answer of a unit that was not asked."""
+
+
+class Refused(LinkError):
+    """A Modbus exception answer; `code` is its number."""
+
+    def __init__(self, what: str, remedy: str, code: int) -> None:
+        super().__init__(what, remedy)
+        self.code = code
+
+
+class InstrumentError(DriverError):
+    """The instrument itself reports or shows a fault."""
+
+
+class StageAlarm(InstrumentError):
+    """The drive's alarm; `code` is its number."""
+
+    def __init__(self, what: str, remedy: str, code: int) -> None:
+        super().__init__(what, remedy)
+        self.code = code
+
+
+class NotSettled(InstrumentError):
+    """The stage is not in position."""
+
+
+class StreamError(InstrumentError):
+    """The record has a gap, or is not the record that was asked for."""
+
+
+class SensorFault(InstrumentError):
+    """A thermometer without a temperature."""
+
+
+class ClockStuck(DriverError):
+    """Bytes in flight to or from a simulated instrument did not arrive within a bound in real time."""

@@ -1,0 +1,195 @@
+"""LabJack T7: 16 bit converter, up to ten channels in turn, streamed. Modbus TCP and a raw stream port.
+
+A record comes as a stream, clocked by the device; never sample by sample. Every record is checked for
+lost scans and turned into volts with the calibration that the device carries.
+Source: T-series datasheet; see labjack_t7_table and labjack_t7_stream.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from urllib.parse import urlsplit
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers import labjack_t7_table as t7
+from drivers.errors import LimitError, LinkTimeout, Refused, StreamError
+from drivers.instrument import Check, Identity
+from drivers.labjack_t7_stream import Calibration, codes_of, packet_type
+from drivers.links import Address, Links
+from drivers.links.link import Link
+from drivers.links.modbus import Unit
+from drivers.links.register import Register
+
+GATHER_BYTES = 32768  # let this much arrive before it is read: well within any receive buffer
+PATIENCE_S = 1.0  # beyond the time at which the bytes were due
+QUIET_S = 0.01  # after a stop, no packet is late by more
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Channels as {name: AIN number}, in the order of the scan; one range for all."""
+
+    channels: Mapping[str, int] = field(default_factory=lambda: {"vx": 0, "vy": 1, "supply": 2})
+    rate_hz: float = 1000.0
+    range_v: float = 10.0
+    power_dio: int | None = None  # the digital line that switches the sensor's power
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """A record: `volts` of shape (n, channels), the first scan at `start_s` of the clock."""
+
+    volts: NDArray[np.float64]
+    channels: tuple[str, ...]
+    rate_hz: float
+    start_s: float
+
+
+class T7:
+    """The converter. Its calibration is read once, when it is connected."""
+
+    def __init__(self, unit: Unit, stream: Link, settings: Settings) -> None:
+        self.name = unit.name
+        self.settings = settings
+        self._unit, self._stream, self._clock = unit, stream, stream.clock
+        self._prepare_inputs()
+        self._calibration = self._read_calibration()
+        self._volts = self._calibration.table()
+
+    def identify(self) -> Identity:
+        """Product, serial number and firmware out of the device."""
+        product = self._unit.read(t7.PRODUCT_ID)
+        serial, firmware = self._unit.read(t7.SERIAL_NUMBER), self._unit.read(t7.FIRMWARE)
+        return Identity(f"LabJack T{product:.0f}", f"{serial:.0f}", f"{firmware:.4f}")
+
+    def self_test(self) -> list[Check]:
+        """The test register, the model, the calibration."""
+        test, product = int(self._unit.read(t7.TEST)), self._unit.read(t7.PRODUCT_ID)
+        c = self._calibration
+        return [
+            Check("registers", test == t7.TEST_VALUE, f"TEST reads 0x{test:08X}"),
+            Check("model", product == 7.0, f"product {product:g}"),
+            Check("calibration", c.plausible, f"{c.positive_slope * 1e6:.3f} uV a code, center {c.center:.1f}"),
+        ]
+
+    def close(self) -> None:
+        """Nothing to release: the wires belong to the bench."""
+
+    def read_volts(self, name: str) -> float:
+        """One reading of one channel, in V."""
+        return self._unit.read(t7.ain(self._input(name)))
+
+    def power(self, on: bool) -> None:
+        """Switch the sensor's power by the digital line of the settings."""
+        if self.settings.power_dio is None:
+            raise LimitError(f"{self.name}: no line switches the power", "Set power_dio in the bench file")
+        self._unit.write(t7.dio(self.settings.power_dio), int(on))
+
+    def acquire(self, duration_s: float) -> Samples:
+        """Record all channels for `duration_s`, rounded to whole scans.
+
+        Raises StreamError when scans were lost, Refused when the device declines the settings, LinkTimeout.
+        """
+        channels = len(self.settings.channels)
+        scans = max(1, round(duration_s * self.settings.rate_hz))
+        packets, per_packet = _even_packets(scans, channels)
+        self._configure(per_packet * channels)
+        start_s = self._clock.now()
+        self._write_block((t7.ENABLE, 1))
+        try:
+            rate_hz = self._unit.read(t7.ACTUAL_RATE)
+            data = self._collect(packets, per_packet * channels, channels * rate_hz)
+        finally:
+            self._stop()
+        codes = codes_of(data, per_packet * channels, self.name).reshape(-1, channels)[:scans]
+        return Samples(self._volts[codes], tuple(self.settings.channels), rate_hz, start_s)
+
+    def _collect(self, packets: int, samples: int, samples_per_s: float) -> bytearray:
+        """Read `packets` packets as they come."""
+        count = packets * packet_type(samples).itemsize
+        bytes_per_s = samples_per_s * packet_type(samples).itemsize / samples
+        data = bytearray()
+        while len(data) < count:
+            self._clock.sleep(min(count - len(data), GATHER_BYTES) / bytes_per_s)
+            if not (more := self._stream.read(PATIENCE_S)):
+                codes_of(data, samples, self.name)  # the status of what came may say why
+                raise LinkTimeout(
+                    f"{self.name}: the stream fell silent after {len(data)} of {count} bytes",
+                    "Check network and power of the device, and that no other program uses its stream",
+                )
+            data += more
+        return data[:count]
+
+    def _configure(self, samples_per_packet: int) -> None:
+        inputs = list(self.settings.channels.values())
+        self._write_block(
+            (t7.SCAN_RATE, self.settings.rate_hz),
+            (t7.NUM_ADDRESSES, len(inputs)),
+            (t7.SAMPLES_PER_PACKET, samples_per_packet),
+            (t7.SETTLING, 0),
+            (t7.RESOLUTION, 0),
+            (t7.BUFFER_SIZE, t7.LARGEST_BUFFER),
+            (t7.CLOCK_SOURCE, 0),
+            (t7.AUTO_TARGET, t7.TO_ETHERNET),
+            (t7.DATATYPE, 0),
+            (t7.NUM_SCANS, 0),
+        )
+        self._write_block(*((t7.scan_list(k), t7.ain(number).address) for k, number in enumerate(inputs)))
+
+    def _stop(self) -> None:
+        """Stop the stream and drop what was still on its way."""
+        with contextlib.suppress(Refused):  # it has stopped by itself
+            self._unit.write(t7.ENABLE, 0)
+        self._stream.discard(QUIET_S)
+
+    def _write_block(self, *values: tuple[Register, float]) -> None:
+        """As the unit's, but a refusal is explained in the device's own words."""
+        try:
+            self._unit.write_block(*values)
+        except Refused as refused:
+            detail = int(self._unit.read(t7.LAST_ERROR))
+            why = t7.ERRORS.get(detail, "see the list of error codes in its datasheet")
+            raise Refused(f"{refused.what}; device error {detail}: {why}", refused.remedy, refused.code) from refused
+
+    def _prepare_inputs(self) -> None:
+        """End a stream that a dead program left behind; ranges and ground of all channels."""
+        self._stop()
+        for number in self.settings.channels.values():
+            self._unit.write(t7.ain_range(number), self.settings.range_v)
+            self._unit.write(t7.ain_negative(number), t7.SINGLE_ENDED)
+
+    def _read_calibration(self) -> Calibration:
+        self._unit.write(t7.FLASH_POINTER, t7.CALIBRATION_ADDRESS)
+        words = self._unit.read_words(t7.FLASH, t7.CALIBRATION_WORDS, "the calibration in flash")
+        calibration = Calibration.from_flash(words, self.settings.range_v)
+        if not calibration.plausible:
+            raise StreamError(f"{self.name}: its calibration is {calibration}", "Have the device calibrated")
+        return calibration
+
+    def _input(self, name: str) -> int:
+        if name not in self.settings.channels:
+            known = ", ".join(self.settings.channels)
+            raise LimitError(f"{self.name}: no channel {name!r}; there are {known}", "Correct the name")
+        return self.settings.channels[name]
+
+
+def _even_packets(scans: int, channels: int) -> tuple[int, int]:
+    """(packets, scans in each): as few packets as possible, and of them the shortest that hold all scans."""
+    packets = -(-scans // (t7.MOST_SAMPLES_PER_PACKET // channels))
+    return packets, -(-scans // packets)
+
+
+def connect(address: Address, links: Links, settings: Settings, name: str) -> T7:
+    """The converter at `address`; its stream is on port 702 of the same host unless `stream_url` says else.
+
+    Raises LinkRefused when a port cannot be opened, LimitError for a range the device does not have.
+    """
+    if settings.range_v not in t7.RANGES_V:
+        ranges = ", ".join(f"{r:g}" for r in t7.RANGES_V)
+        raise LimitError(f"{name}: range {settings.range_v:g} V does not exist; {ranges} V do", "Correct range_v")
+    stream_url = address.stream_url or f"tcp://{urlsplit(address.url).hostname}:{t7.STREAM_PORT}"
+    return T7(links.unit(address, name), links.link(stream_url), settings)

@@ -1,0 +1,253 @@
+"""The simulated LabJack T7: registers, flash, and a stream that turns the world's volts into codes in blocks."""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers import labjack_t7_table as t7
+from drivers.labjack_t7 import Settings
+from drivers.labjack_t7_stream import FUNCTION, KIND, UNIT, Calibration, packet_type
+from drivers.links.address import Address
+from drivers.links.modbus_server import DEVICE_FAILURE, ILLEGAL_ADDRESS, ILLEGAL_VALUE, Refusal, modbus_port
+from drivers.links.register import Register
+from drivers.links.server import Port, Server
+
+LISTEN = "tcp://127.0.0.1:0"
+SERIAL, FIRMWARE = 470012345, 1.0312
+THINKING_S = 0.0005
+
+# An individual: the nominal constants of a T7, each a little off, as FLOAT32 like in its flash.
+_NOMINAL = [(10.0, 3.1580578e-4), (1.0, 3.1580578e-5), (0.1, 3.1580578e-6), (0.01, 3.1580578e-7)]
+_CONSTANTS = [
+    constant
+    for volts, slope in _NOMINAL
+    for constant in (slope * 1.00021, -slope * 1.00017, 33518.4, -1.0585324 * volts)
+]
+FLASH_BYTES = struct.pack(">41f", *_CONSTANTS, *_CONSTANTS, *(13200.0, 300.0) * 2, -92.6, 467.6, 1e-5, 2e-4, 0.0)
+FLASH_WORDS = struct.unpack(">82H", FLASH_BYTES)
+
+
+class World(Protocol):
+    """What a converter knows of physics."""
+
+    def advance(self, t_s: float) -> None: ...
+
+    def power(self, on: bool) -> None: ...
+
+    def adc_volts(self, inputs: Sequence[str], start_s: float, interval_s: float, n: int) -> NDArray[np.float64]: ...
+
+
+class Inputs:
+    """The analog inputs: which of them is wired to what in the world, and the converter behind them."""
+
+    def __init__(self, world: World, wiring: Mapping[int, str]) -> None:
+        self._world, self._wiring = world, wiring
+
+    def codes(
+        self, numbers: Sequence[int], ranges_v: Sequence[float], start_s: float, interval_s: float, n: int
+    ) -> NDArray[np.uint16]:
+        """Codes of `n` scans, shape (n, inputs). An open input reads 0 V."""
+        volts = np.zeros((n, len(numbers)))
+        wired = [k for k, number in enumerate(numbers) if number in self._wiring]
+        names = [self._wiring[numbers[k]] for k in wired]
+        volts[:, wired] = self._world.adc_volts(names, start_s, interval_s, n)
+        constants = [Calibration.from_flash(FLASH_WORDS, range_v) for range_v in ranges_v]
+        return codes_of_volts(volts, constants)
+
+
+def codes_of_volts(volts: NDArray[np.float64], ranges: Sequence[Calibration]) -> NDArray[np.uint16]:
+    """The converter: nearest code of each column, clipped at the ends of its range."""
+    positive = np.array([c.positive_slope for c in ranges])
+    negative = np.array([c.negative_slope for c in ranges])
+    center = np.array([c.center for c in ranges])
+    codes = center + np.where(volts < 0, -volts / negative, volts / positive)
+    nearest: NDArray[np.uint16] = np.clip(np.rint(codes), 0, 65535).astype(np.uint16)
+    return nearest
+
+
+class Stream:
+    """A running stream: scan i is taken at `start_s` + i / rate, a packet leaves when it is full."""
+
+    def __init__(
+        self, scan: Callable[[float, float, int], NDArray[np.uint16]], start_s: float, rate_hz: float,
+        channels: int, per_packet: int,
+    ) -> None:  # fmt: skip
+        self._scan, self._start_s, self._rate_hz = scan, start_s, rate_hz
+        self._channels, self._per_packet = channels, per_packet
+        self._scans = self._packets = 0
+        self._rest = np.empty(0, np.uint16)
+
+    def packets_until(self, now_s: float) -> bytes:
+        """Take all scans whose time is over; the packets that became full."""
+        new = math.floor((now_s - self._start_s) * self._rate_hz + 1e-6) - self._scans
+        if new <= 0:
+            return b""
+        codes = self._scan(self._start_s + self._scans / self._rate_hz, 1 / self._rate_hz, new)
+        self._scans += new
+        samples = np.concatenate([self._rest, codes.ravel()])
+        count = len(samples) // self._per_packet
+        self._rest = samples[count * self._per_packet :]
+        return self._pack(samples[: count * self._per_packet].reshape(count, self._per_packet))
+
+    def due_s(self) -> float:
+        """When the next packet is full."""
+        scans = -(-(self._packets + 1) * self._per_packet // self._channels)
+        return self._start_s + scans / self._rate_hz
+
+    def _pack(self, samples: NDArray[np.uint16]) -> bytes:
+        layout = packet_type(self._per_packet)
+        packets = np.zeros(len(samples), layout)
+        packets["transaction"] = (self._packets + np.arange(len(samples))) % 65536
+        packets["length"] = layout.itemsize - 6
+        packets["unit"], packets["function"], packets["kind"] = UNIT, FUNCTION, KIND
+        packets["samples"] = samples
+        self._packets += len(samples)
+        return packets.tobytes()
+
+
+class Converter:
+    """The device behind its registers."""
+
+    functions = frozenset({3, 4, 6, 16})
+    thinking_s = THINKING_S
+
+    def __init__(self, world: World, settings: Settings, stream_port: Port) -> None:
+        self._world, self._power_dio, self._port = world, settings.power_dio, stream_port
+        self._inputs = Inputs(world, {number: name for name, number in settings.channels.items()})
+        self._stream: Stream | None = None
+        self._words = _initial_words()
+
+    def advance(self, now_s: float) -> None:
+        if self._stream and (packets := self._stream.packets_until(now_s)):
+            for connection in self._port.connections.values():
+                connection.send(packets, now_s)
+
+    def due_s(self) -> float:
+        return self._stream.due_s() if self._stream else math.inf
+
+    def state(self) -> dict[str, Any]:
+        """Nothing: a driver that connects sets all that it relies on."""
+        return {}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """See `state`."""
+
+    def read_words(self, address: int, count: int, now_s: float) -> Sequence[int]:
+        if address < 2 * t7.INPUTS:
+            return self._read_inputs(address, count, now_s)
+        if address == t7.FLASH:
+            return self._read_flash(count)
+        self._set(t7.CORE_TIMER, round(now_s * t7.CORE_HZ) % 2**32)
+        return [self._known(a) for a in range(address, address + count)]
+
+    def write_words(self, address: int, values: Sequence[int], now_s: float) -> None:
+        for offset, value in enumerate(values):
+            self._known(address + offset)
+            self._words[address + offset] = value
+        if address <= t7.ENABLE.address + 1 < address + len(values):
+            self._enable(bool(self._value(t7.ENABLE)), now_s)
+        if self._power_dio is not None and address == t7.dio(self._power_dio).address:
+            self._world.advance(now_s)
+            self._world.power(bool(values[0]))
+
+    def _enable(self, on: bool, now_s: float) -> None:
+        if on and self._stream:
+            self._fail(t7.STREAM_ACTIVE)
+        if not on and not self._stream:
+            self._fail(t7.NOT_RUNNING)
+        self._stream = self._new_stream(now_s) if on else None
+
+    def _new_stream(self, now_s: float) -> Stream:
+        """A stream as the registers ask for. Only endless ones are simulated."""
+        channels, per_packet = int(self._value(t7.NUM_ADDRESSES)), int(self._value(t7.SAMPLES_PER_PACKET))
+        rate_hz, buffer = self._value(t7.SCAN_RATE), int(self._value(t7.BUFFER_SIZE))
+        if not 0 < channels <= t7.MOST_ADDRESSES or self._value(t7.NUM_SCANS):
+            self._forget_enable()
+            raise Refusal(ILLEGAL_VALUE)
+        if not 0 < rate_hz * channels <= t7.MOST_SAMPLES_PER_S:
+            self._fail(t7.BAD_RATE)
+        if not 0 < per_packet <= t7.MOST_SAMPLES_PER_PACKET:
+            self._fail(t7.BAD_PACKET)
+        if buffer > t7.LARGEST_BUFFER or buffer & (buffer - 1):
+            self._fail(t7.BAD_BUFFER)
+        rate_hz = t7.CORE_HZ / round(t7.CORE_HZ / rate_hz)
+        self._set(t7.ACTUAL_RATE, rate_hz)
+        return Stream(self._scanner(channels), now_s, rate_hz, channels, per_packet)
+
+    def _scanner(self, channels: int) -> Callable[[float, float, int], NDArray[np.uint16]]:
+        """Takes n scans of the scan list from a time on, at an interval."""
+        numbers = [int(self._value(t7.scan_list(k))) // 2 for k in range(channels)]
+        ranges_v = [self._range_v(number) for number in numbers]
+        return lambda start_s, interval_s, n: self._inputs.codes(numbers, ranges_v, start_s, interval_s, n)
+
+    def _read_inputs(self, address: int, count: int, now_s: float) -> list[int]:
+        if self._stream:
+            self._fail(t7.STREAM_ACTIVE)
+        if address % 2 or count % 2 or address + count > 2 * t7.INPUTS:
+            raise Refusal(ILLEGAL_ADDRESS)
+        words: list[int] = []
+        self._world.advance(now_s)
+        for number in range(address // 2, (address + count) // 2):
+            range_v = self._range_v(number)
+            code = self._inputs.codes([number], [range_v], now_s, 0.0, 1)[0, 0]
+            words += t7.ain(number).encode(Calibration.from_flash(FLASH_WORDS, range_v).table()[code])
+        return words
+
+    def _read_flash(self, count: int) -> Sequence[int]:
+        first = (int(self._value(t7.FLASH_POINTER)) - t7.CALIBRATION_ADDRESS) // 2
+        if first < 0 or first + count > len(FLASH_WORDS):
+            raise Refusal(ILLEGAL_VALUE)
+        return FLASH_WORDS[first : first + count]
+
+    def _range_v(self, number: int) -> float:
+        """The least range that holds the one asked for; 0 asks for the widest."""
+        asked = self._value(t7.ain_range(number))
+        return min((r for r in t7.RANGES_V if r >= round(asked, 6) > 0), default=t7.RANGES_V[0])
+
+    def _fail(self, detail: int) -> None:
+        """Decline, and leave the reason where a client looks for it."""
+        self._forget_enable()
+        self._set(t7.LAST_ERROR, detail)
+        raise Refusal(DEVICE_FAILURE)
+
+    def _forget_enable(self) -> None:
+        self._set(t7.ENABLE, int(self._stream is not None))
+
+    def _known(self, address: int) -> int:
+        if address not in self._words:
+            raise Refusal(ILLEGAL_ADDRESS)
+        return self._words[address]
+
+    def _value(self, register: Register) -> float:
+        return register.decode([self._words[register.address + i] for i in range(register.count)])
+
+    def _set(self, register: Register, value: float) -> None:
+        self._words.update(zip(range(register.address, register.address + 2), register.encode(value), strict=True))
+
+
+def _initial_words() -> dict[int, int]:
+    """All registers that exist, by address, as after power-on."""
+    values: dict[Register, float] = {t7.ain_range(n): 10.0 for n in range(t7.INPUTS)}
+    values |= {t7.ain_negative(n): t7.SINGLE_ENDED for n in range(t7.INPUTS)}
+    values |= {t7.dio(n): 1 for n in range(t7.LINES)}
+    values |= {t7.scan_list(k): 0 for k in range(t7.MOST_ADDRESSES)}
+    values |= {t7.TEST: t7.TEST_VALUE, t7.PRODUCT_ID: 7.0, t7.FIRMWARE: FIRMWARE, t7.SERIAL_NUMBER: SERIAL}
+    values |= {t7.FLASH_POINTER: 0, t7.CORE_TIMER: 0, t7.LAST_ERROR: 0, t7.ENABLE: 0, t7.ACTUAL_RATE: 0}
+    values |= {t7.SCAN_RATE: 0, t7.NUM_ADDRESSES: 0, t7.SAMPLES_PER_PACKET: 0, t7.SETTLING: 0, t7.RESOLUTION: 0}
+    values |= {t7.BUFFER_SIZE: 0, t7.CLOCK_SOURCE: 0, t7.AUTO_TARGET: 0, t7.DATATYPE: 0, t7.NUM_SCANS: 0}
+    return {r.address + i: word for r, value in values.items() for i, word in enumerate(r.encode(value))}
+
+
+def serve(world: World, roles: Mapping[str, tuple[int, Settings]], listen: str = LISTEN) -> Server:
+    """One device: role -> (unit id, settings). Its channels' names are the world's inputs that they are wired to."""
+    ((role, (unit, settings)),) = roles.items()
+    stream = Port(LISTEN)
+    converter = Converter(world, settings, stream)
+    port = modbus_port(listen, {unit: converter})
+    return Server([port, stream], {role: converter}, {role: Address(port.url, unit, stream.url)})

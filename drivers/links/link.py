@@ -1,0 +1,159 @@
+"""Byte links: TCP and serial, opened by url, read only by way of the clock.
+
+    tcp://host:port                           a socket
+    rtu+tcp://host:port                       a socket; the frames on it are RTU's
+    serial:/dev/ttyUSB0?baud=115200&parity=E  a serial line, 8 data bits; parity N, E or O; stop=1 or 2
+
+A link counts its bytes, so that a simulated clock knows what is still under way.
+"""
+
+from __future__ import annotations
+
+import socket
+import termios
+from typing import Protocol
+
+import serial
+
+from drivers.clock import Clock, Wire
+from drivers.errors import LinkRefused
+from drivers.links.url import Url
+
+CONNECT_TIMEOUT_S = 5.0
+CHUNK = 1 << 18
+
+
+class Port(Protocol):
+    """What a link needs of a socket or a serial line; a dead one raises OSError."""
+
+    def fileno(self) -> int: ...
+
+    def read(self) -> bytes:
+        """What is there now, at least one byte; empty at the end."""
+
+    def write(self, data: bytes) -> None: ...
+
+    def close(self) -> None: ...
+
+
+class Link(Wire):
+    """The controller's end of a wire. `key` names the connection, the same at both ends."""
+
+    def __init__(self, port: Port, key: str, url: str, clock: Clock) -> None:
+        self.key, self.url = key, url
+        self.sent = self.received = 0
+        self.clock = clock
+        self._port = port
+        clock.wait_readable(self, 0.0)  # a simulated clock takes its bearings before the first byte
+
+    def fileno(self) -> int:
+        return self._port.fileno()
+
+    def write(self, data: bytes) -> None:
+        """Send all of `data`; raises LinkRefused when the connection is gone."""
+        try:
+            self._port.write(data)
+        except (OSError, termios.error, serial.SerialException) as error:
+            raise self._lost(error) from error
+        self.sent += len(data)
+
+    def read(self, timeout_s: float) -> bytes:
+        """What arrives first, or nothing when `timeout_s` is over. Raises LinkRefused at the end."""
+        if not self.clock.wait_readable(self, timeout_s):
+            return b""
+        try:
+            data = self._port.read()
+        except (OSError, termios.error, serial.SerialException) as error:
+            raise self._lost(error) from error
+        if not data:
+            raise self._lost("the other side closed it")
+        self.received += len(data)
+        return data
+
+    def discard(self, quiet_s: float = 0.0) -> int:
+        """Throw away what arrives until it has been quiet for `quiet_s`; the number of bytes."""
+        count = 0
+        while data := self.read(quiet_s):
+            count += len(data)
+        return count
+
+    def close(self) -> None:
+        self._port.close()
+
+    def _lost(self, why: object) -> LinkRefused:
+        return LinkRefused(f"{self.url}: the connection is lost ({why})", "Check cable and power, then connect again")
+
+
+class SocketPort:
+    """A connected TCP socket, without Nagle's delay."""
+
+    def __init__(self, host: str, number: int) -> None:
+        self._socket = socket.create_connection((host, number), CONNECT_TIMEOUT_S)
+        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+    @property
+    def key(self) -> str:
+        return connection_key(self._socket.getsockname(), self._socket.getpeername())
+
+    def fileno(self) -> int:
+        return self._socket.fileno()
+
+    def read(self) -> bytes:
+        return self._socket.recv(CHUNK)
+
+    def write(self, data: bytes) -> None:
+        self._socket.sendall(data)
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+class SerialPort:
+    """A serial line, 8 data bits, opened for one program alone."""
+
+    def __init__(self, path: str, baud: int, parity: str, stop_bits: int) -> None:
+        self.key = path
+        self._serial = serial.Serial(
+            path, baud, parity=parity, stopbits=stop_bits, timeout=0, write_timeout=CONNECT_TIMEOUT_S, exclusive=True
+        )
+
+    def fileno(self) -> int:
+        return int(self._serial.fileno())
+
+    def read(self) -> bytes:
+        return bytes(self._serial.read(4096))
+
+    def write(self, data: bytes) -> None:
+        self._serial.write(data)
+
+    def close(self) -> None:
+        self._serial.close()
+
+
+def connection_key(client: tuple[str, int], server: tuple[str, int]) -> str:
+    """The name of a TCP connection, the same seen from both ends."""
+    return f"{client[0]}:{client[1]} > {server[0]}:{server[1]}"
+
+
+def open_link(url: str, clock: Clock) -> Link:
+    """Open a wire. Raises LinkRefused when nobody is there, or the url is not one."""
+    parsed = Url.parse(url)
+    try:
+        port = _open_port(parsed)
+    except (OSError, termios.error, serial.SerialException, ValueError) as error:
+        raise LinkRefused(f"{url}: cannot be opened ({error})", _remedy(parsed)) from error
+    return Link(port, port.key, url, clock)
+
+
+def _open_port(url: Url) -> SocketPort | SerialPort:
+    if url.scheme == "serial":
+        return SerialPort(url.path, url.baud, url.parity, url.stop_bits)
+    return SocketPort(url.host, url.port)
+
+
+def _remedy(url: Url) -> str:
+    if url.scheme != "serial":
+        return "Check the address, the network cable and that no other program holds the instrument"
+    if url.path.startswith("/dev/pts/") and url.parity != "N":
+        return "A pseudo-terminal has no parity: write parity=N"
+    return "Check the device's path, your right to open it and that no other program holds it"

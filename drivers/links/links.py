@@ -1,0 +1,35 @@
+"""The open wires of one bench."""
+
+from __future__ import annotations
+
+from drivers.clock import Clock
+from drivers.links.address import Address
+from drivers.links.link import Link, open_link
+from drivers.links.modbus import Bus, Unit
+
+
+class Links:
+    """Opens every wire once: instruments with the same url share it, as two drives share their RS-485 line."""
+
+    def __init__(self, clock: Clock) -> None:
+        self.clock = clock
+        self._buses: dict[str, Bus] = {}
+        self._links: list[Link] = []
+
+    def unit(self, address: Address, name: str) -> Unit:
+        """The Modbus instrument at `address`. Raises LinkRefused when its wire cannot be opened."""
+        if address.url not in self._buses:
+            self._buses[address.url] = Bus(self.link(address.url))
+        return Unit(self._buses[address.url], address.unit, name)
+
+    def link(self, url: str) -> Link:
+        """A wire of bytes that is not shared."""
+        self._links.append(open_link(url, self.clock))
+        return self._links[-1]
+
+    def close(self) -> None:
+        """Close every wire."""
+        for link in self._links:
+            link.close()
+        self._links.clear()
+        self._buses.clear()

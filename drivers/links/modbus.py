@@ -1,0 +1,187 @@
+"""Modbus master: one request, one answer, in bounded time. Frames and PDUs are pymodbus'; wire, time, retries ours.
+
+`Bus` is the wire, shared by the instruments on it; `Unit` is one instrument of a bus.
+Every failure is raised with the instrument, the register and a remedy (see drivers.errors).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from pymodbus.exceptions import ModbusException
+from pymodbus.framer import FramerRTU, FramerSocket
+from pymodbus.pdu import DecodePDU, ModbusPDU
+from pymodbus.pdu.bit_message import ReadCoilsRequest, ReadDiscreteInputsRequest, WriteSingleCoilRequest
+from pymodbus.pdu.register_message import (
+    ReadHoldingRegistersRequest,
+    WriteMultipleRegistersRequest,
+    WriteSingleRegisterRequest,
+)
+
+from drivers.errors import BadFrame, LinkError, LinkTimeout, Refused, WrongUnit
+from drivers.links.link import Link
+from drivers.links.register import Register
+from drivers.links.url import Url
+
+REFUSALS = {
+    1: ("it does not know the function", "Check that the model of the instrument is the one in the bench file"),
+    2: ("it has no such register", "Check that the model of the instrument is the one in the bench file"),
+    3: ("the value is not allowed", "Check the settings in the bench file against the instrument's manual"),
+    4: ("it failed to do so", "Look at the instrument's display or alarm, clear the cause, then try again"),
+    6: ("it is busy", "Wait until it has finished, then try again"),
+}
+
+
+@dataclass(frozen=True)
+class Patience:
+    """How long to wait for an answer in s, and how often to ask again after silence or a bad frame."""
+
+    timeout_s: float = 0.5
+    retries: int = 2
+
+
+class Bus:
+    """One wire with Modbus on it: RTU frames, or TCP frames with transaction numbers."""
+
+    def __init__(self, link: Link, patience: Patience | None = None) -> None:
+        self.link = link
+        self._url = Url.parse(link.url)
+        self._patience = patience or Patience()
+        decoder = DecodePDU(is_server=False)
+        self._framer = FramerRTU(decoder) if self._url.rtu else FramerSocket(decoder)
+        self._transaction = 0
+        self._quiet_until_s = 0.0
+
+    def ask(self, request: ModbusPDU, unit: int, what: str) -> ModbusPDU:
+        """The answer of `unit`; `what` begins every error, as in 'alpha: reading register 0x0080 (alarm)'.
+
+        Raises Refused, or after the retries LinkTimeout, BadFrame or WrongUnit.
+        """
+        request.dev_id = unit
+        for _ in range(self._patience.retries):
+            try:
+                return self._attempt(request, what)
+            except (LinkTimeout, BadFrame, WrongUnit):
+                self.link.discard(self._url.gap_s)
+        return self._attempt(request, what)
+
+    def _attempt(self, request: ModbusPDU, what: str) -> ModbusPDU:
+        self._transaction = request.transaction_id = self._transaction % 0xFFFF + 1
+        self._send(self._framer.buildFrame(request))
+        answer = self._receive(what)
+        if answer.dev_id != request.dev_id:
+            raise WrongUnit(
+                f"{what}: unit {answer.dev_id} answered instead of unit {request.dev_id}",
+                "Give every instrument on the bus a unit id of its own",
+            )
+        if answer.isError() and answer.function_code & 0x7F == request.function_code:
+            raise _refused(what, answer.exception_code)
+        if not _fits(request, answer):
+            raise _bad_frame(what, "the answer to another request came")
+        return answer
+
+    def _send(self, frame: bytes) -> None:
+        clock = self.link.clock
+        if self._url.scheme == "serial":
+            clock.sleep(self._quiet_until_s - clock.now())
+        self.link.discard()
+        self.link.write(frame)
+
+    def _receive(self, what: str) -> ModbusPDU:
+        clock = self.link.clock
+        deadline = clock.now() + self._patience.timeout_s
+        data = b""
+        while more := self.link.read(deadline - clock.now()):
+            data += more
+            self._quiet_until_s = clock.now() + self._url.gap_s
+            used, answer = self._decode(data, what)
+            if answer is not None:
+                return answer
+            data = data[used:]
+        if data:
+            raise _bad_frame(what, f"{len(data)} bytes came that are no answer ({data[:16].hex(' ')})")
+        raise LinkTimeout(
+            f"{what}: no answer within {self._patience.timeout_s:g} s on {self.link.url}",
+            "Check power, cable and unit id, and that baud rate and parity are the instrument's",
+        )
+
+    def _decode(self, data: bytes, what: str) -> tuple[int, ModbusPDU | None]:
+        """Bytes used up, and the answer if there is one; a TCP frame of an earlier request is passed over."""
+        expected = 0 if self._url.rtu else self._transaction
+        try:
+            used, answer = self._framer.handleFrame(data, 0, expected)
+        except ModbusException as error:
+            raise _bad_frame(what, str(error)) from error
+        if self._url.rtu and used and answer is None:
+            raise _bad_frame(what, f"the checksum of {data[:16].hex(' ')} is wrong")
+        return used, answer
+
+
+class Unit:
+    """One instrument on a bus: its registers read and written as values in their units."""
+
+    def __init__(self, bus: Bus, unit: int, name: str) -> None:
+        self._bus, self._unit, self.name = bus, unit, name
+
+    def read(self, register: Register) -> float:
+        """The value of one register."""
+        return self.read_block(register)[0]
+
+    def read_block(self, *registers: Register) -> list[float]:
+        """The values of neighbouring registers, lowest address first, in one exchange."""
+        first, last = registers[0], registers[-1]
+        words = self.read_words(first.address, last.address + last.count - first.address, str(first))
+        return [r.decode(words[r.address - first.address :][: r.count]) for r in registers]
+
+    def read_words(self, address: int, count: int, doc: str) -> Sequence[int]:
+        """`count` words as they are on the wire."""
+        request = ReadHoldingRegistersRequest(address=address, count=count)
+        return self._bus.ask(request, self._unit, f"{self.name}: reading {doc}").registers
+
+    def write(self, register: Register, value: float) -> None:
+        """Set one register; one word goes as function 06, two as 10h."""
+        words = register.encode(value)
+        if len(words) > 1:
+            self.write_words(register.address, words, str(register))
+        else:
+            request = WriteSingleRegisterRequest(address=register.address, registers=words)
+            self._bus.ask(request, self._unit, f"{self.name}: writing {register}")
+
+    def write_block(self, *values: tuple[Register, float]) -> None:
+        """Set registers that follow each other without a gap, in one exchange."""
+        words = [word for register, value in values for word in register.encode(value)]
+        self.write_words(values[0][0].address, words, str(values[0][0]))
+
+    def write_words(self, address: int, words: Sequence[int], doc: str) -> None:
+        """Set neighbouring words as they are on the wire."""
+        request = WriteMultipleRegistersRequest(address=address, registers=words)
+        self._bus.ask(request, self._unit, f"{self.name}: writing {doc}")
+
+    def read_bit(self, address: int, doc: str, coil: bool = False) -> bool:
+        """One discrete input (function 02), or one coil (01)."""
+        request = (ReadCoilsRequest if coil else ReadDiscreteInputsRequest)(address=address, count=1)
+        return bool(self._bus.ask(request, self._unit, f"{self.name}: reading bit 0x{address:04X} ({doc})").bits[0])
+
+    def write_bit(self, address: int, on: bool, doc: str) -> None:
+        """Set one coil (function 05)."""
+        request = WriteSingleCoilRequest(address=address, bits=[on])
+        self._bus.ask(request, self._unit, f"{self.name}: writing bit 0x{address:04X} ({doc})")
+
+
+def _fits(request: ModbusPDU, answer: ModbusPDU) -> bool:
+    """Whether the answer is that of this request: a late one of another may come first on a serial line."""
+    if answer.function_code != request.function_code:
+        return False
+    if isinstance(request, ReadHoldingRegistersRequest):
+        return len(answer.registers) == request.count
+    return isinstance(request, ReadCoilsRequest) or answer.address == request.address
+
+
+def _bad_frame(what: str, why: str) -> LinkError:
+    return BadFrame(f"{what}: {why}", "Check shielding, termination, baud rate and parity of the line")
+
+
+def _refused(what: str, code: int) -> Refused:
+    why, remedy = REFUSALS.get(code, ("it declined", "Look the code up in the instrument's manual"))
+    return Refused(f"{what}: exception {code}, {why}", remedy, code)

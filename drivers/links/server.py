@@ -1,0 +1,211 @@
+"""The servers of the simulated instruments: passive, without threads, on TCP ports and pseudo-terminals.
+
+A `Port` listens and holds its connections; a `Server` is one instrument's (or one bus') ports together with
+the twins behind them. It acts only when the clock tells it the time, so one and the same server is
+deterministic under a simulated clock and serves anybody's client in real time.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+import pty
+import socket
+import tty
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Protocol
+
+from drivers.links.address import Address
+from drivers.links.link import CHUNK, connection_key
+from drivers.links.url import Url
+
+
+class Twin(Protocol):
+    """What a server needs of a simulated instrument beside its answers."""
+
+    def advance(self, now_s: float) -> None:
+        """Compute what happened up to `now_s`."""
+
+    def due_s(self) -> float:
+        """When it has something to say unasked; infinity for never."""
+
+    def state(self) -> dict[str, Any]:
+        """What a resumed run needs, JSON-able."""
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Continue from `state`."""
+
+
+class Connection:
+    """One client: bytes that came, and bytes that go out when they are due."""
+
+    def __init__(self, fileno: int, key: str, close: Callable[[], None]) -> None:
+        self.fileno, self.key, self.close = fileno, key, close
+        self.inbox = bytearray()
+        self.received = self.emitted = 0
+        self._outbox: deque[tuple[float, bytes]] = deque()
+        self._full = False
+
+    def read(self) -> bool:
+        """Take in what is there; False at the end of the connection."""
+        try:
+            data = os.read(self.fileno, CHUNK)
+        except BlockingIOError:
+            return True
+        except OSError:
+            return False
+        self.inbox += data
+        self.received += len(data)
+        return bool(data)
+
+    def send(self, data: bytes, due_s: float) -> None:
+        """Send `data` at `due_s`, after all that was sent before."""
+        self._outbox.append((due_s, data))
+
+    def emit(self, now_s: float) -> None:
+        """Write what is due, as far as the kernel takes it."""
+        self._full = False
+        while self._outbox and not self._full and self._outbox[0][0] <= now_s:
+            due_s, data = self._outbox.popleft()
+            written = self._write(data)
+            self.emitted += written
+            if written < len(data):
+                self._full = True
+                self._outbox.appendleft((due_s, data[written:]))
+
+    def due_s(self) -> float:
+        """When it must write next; never while the client does not read."""
+        return self._outbox[0][0] if self._outbox and not self._full else math.inf
+
+    def _write(self, data: bytes) -> int:
+        try:
+            return os.write(self.fileno, data)
+        except BlockingIOError:
+            return 0
+        except OSError:  # the client is gone: what it does not read is lost
+            return len(data)
+
+
+class Port:
+    """A place to connect to. `answer` is called with a connection whenever bytes have come in on it."""
+
+    def __init__(self, listen: str, answer: Callable[[Connection, float], None] | None = None) -> None:
+        self.timing = Url.parse(listen)
+        self.connections: dict[int, Connection] = {}
+        self.answer = answer or _ignore
+        self._socket: socket.socket | None = None
+        if self.timing.scheme == "pty":
+            self.url = self._open_pty()
+        else:
+            self.url = self._listen()
+
+    def filenos(self) -> list[int]:
+        own = [self._socket.fileno()] if self._socket else []
+        return [*own, *self.connections]
+
+    def receive(self, fileno: int, now_s: float) -> None:
+        if self._socket and fileno == self._socket.fileno():
+            self._accept()
+            return
+        connection = self.connections[fileno]
+        if connection.read():
+            self.answer(connection, now_s)
+        else:
+            del self.connections[fileno]
+            connection.close()
+
+    def close(self) -> None:
+        for connection in self.connections.values():
+            connection.close()
+        self.connections.clear()
+        if self._socket:
+            self._socket.close()
+
+    def _listen(self) -> str:
+        self._socket = socket.create_server((self.timing.host, self.timing.port))
+        self._socket.setblocking(False)
+        return f"{self.timing.scheme}://{self.timing.host}:{self._socket.getsockname()[1]}"
+
+    def _accept(self) -> None:
+        assert self._socket  # noqa: S101 - only a listening port accepts
+        with contextlib.suppress(BlockingIOError):
+            client, peer = self._socket.accept()
+            client.setblocking(False)
+            client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            key = connection_key(peer, client.getsockname())
+            self.connections[client.fileno()] = Connection(client.fileno(), key, client.close)
+
+    def _open_pty(self) -> str:
+        """A raw pseudo-terminal; its far end is kept open, so that clients may come and go."""
+        near, far = pty.openpty()
+        tty.setraw(far)
+        os.set_blocking(near, False)
+        path = os.ttyname(far)
+
+        def close() -> None:
+            os.close(near)
+            os.close(far)
+
+        self.connections[near] = Connection(near, path, close)
+        return f"serial:{path}?baud={self.timing.baud}&parity=N"
+
+
+class Server:
+    """One wire's worth of simulated instruments, by role."""
+
+    def __init__(self, ports: Sequence[Port], twins: Mapping[str, Twin], addresses: Mapping[str, Address]) -> None:
+        self.addresses = dict(addresses)
+        self._ports, self._twins = list(ports), dict(twins)
+
+    @property
+    def url(self) -> str:
+        """Where its first port listens."""
+        return self._ports[0].url
+
+    def filenos(self) -> list[int]:
+        return [fileno for port in self._ports for fileno in port.filenos()]
+
+    def advance(self, now_s: float) -> None:
+        for twin in self._twins.values():
+            twin.advance(now_s)
+
+    def receive(self, fileno: int, now_s: float) -> None:
+        for port in self._ports:
+            if fileno in port.filenos():
+                port.receive(fileno, now_s)
+
+    def emit(self, now_s: float) -> None:
+        for port in self._ports:
+            for connection in port.connections.values():
+                connection.emit(now_s)
+
+    def due_s(self) -> float:
+        twins = [twin.due_s() for twin in self._twins.values()]
+        return min([c.due_s() for port in self._ports for c in port.connections.values()] + twins, default=math.inf)
+
+    def progress(self, key: str) -> tuple[int, int] | None:
+        for port in self._ports:
+            for connection in port.connections.values():
+                if connection.key == key:
+                    return connection.received, connection.emitted
+        return None
+
+    def state(self) -> dict[str, Any]:
+        """The twins' states by role, JSON-able; taken between exchanges."""
+        return {role: twin.state() for role, twin in self._twins.items()}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Put every twin back into the `state` it had."""
+        for role, twin in self._twins.items():
+            twin.restore(state[role])
+
+    def close(self) -> None:
+        """Close all ports; clients see the end of their connections."""
+        for port in self._ports:
+            port.close()
+
+
+def _ignore(connection: Connection, now_s: float) -> None:  # noqa: ARG001 - a port that only talks
+    connection.inbox.clear()

@@ -1,0 +1,73 @@
+"""The urls of wires, and how long a byte takes on each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from urllib.parse import parse_qs, urlsplit
+
+from drivers.errors import LinkRefused
+
+SCHEMES = ("tcp", "rtu+tcp", "serial", "pty")
+TCP_LATENCY_S = 150e-6  # one way through a switch and a small embedded stack
+REMEDY = "Write tcp://host:port, rtu+tcp://host:port or serial:/dev/ttyUSB0?baud=115200&parity=E"
+
+
+@dataclass(frozen=True)
+class Url:
+    """A wire's address, taken apart. `pty:` asks a server for a new pseudo-terminal."""
+
+    text: str
+    scheme: str
+    host: str = ""
+    port: int = 0
+    path: str = ""
+    baud: int = 115200
+    parity: str = "N"
+    stop_bits: int = 1
+
+    @classmethod
+    def parse(cls, text: str) -> Url:
+        """Take `text` apart; raises LinkRefused when it is not a wire's address."""
+        try:
+            parts = urlsplit(text)
+            options = {
+                key: values[-1] for key, values in parse_qs(parts.query, strict_parsing=bool(parts.query)).items()
+            }
+            url = cls(
+                text,
+                parts.scheme,
+                parts.hostname or "",
+                parts.port or 0,
+                parts.path,
+                int(options.pop("baud", "115200")),
+                options.pop("parity", "N"),
+                int(options.pop("stop", "1")),
+            )
+        except ValueError as error:
+            raise LinkRefused(f"{text!r} is not the address of a wire ({error})", REMEDY) from error
+        if options or not url._complete():
+            raise LinkRefused(f"{text!r} is not the address of a wire", REMEDY)
+        return url
+
+    def _complete(self) -> bool:
+        place = {"serial": bool(self.path), "pty": True}.get(self.scheme, bool(self.host))
+        return self.scheme in SCHEMES and place and self.parity in ("N", "E", "O") and self.baud > 0
+
+    @property
+    def rtu(self) -> bool:
+        """Whether the frames on the wire are those of Modbus RTU."""
+        return self.scheme != "tcp"
+
+    @property
+    def character_s(self) -> float:
+        """Time of one character on the serial line: start, 8 data, parity and stop bits."""
+        return (9 + (self.parity != "N") + self.stop_bits) / self.baud
+
+    @property
+    def gap_s(self) -> float:
+        """Silence that ends an RTU frame: 3.5 characters, and 1.75 ms above 19200 baud (Modbus over serial line)."""
+        return 1.75e-3 if self.baud > 19200 else 3.5 * self.character_s
+
+    def line_s(self, count: int) -> float:
+        """How long `count` bytes are under way."""
+        return count * self.character_s + self.gap_s if self.rtu else TCP_LATENCY_S

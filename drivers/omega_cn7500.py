@@ -1,0 +1,96 @@
+"""Omega CN7500: temperature controller of the oven, and the rig's thermometer. Modbus RTU.
+
+Source: CN7500 manual, communication registers. Temperatures are counts of 0.1 C.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from drivers.errors import LimitError, SensorFault
+from drivers.instrument import Check, Identity
+from drivers.links import Address, Links
+from drivers.links.modbus import Unit
+from drivers.links.register import Register
+
+PROCESS_VALUE = Register(0x1000, "int16", "process value", "C", 0.1)
+SET_POINT = Register(0x1001, "int16", "set point", "C", 0.1)
+CONTROL_METHOD = Register(0x1005, "uint16", "control method")
+METHODS = ("PID", "on/off", "manual", "ramp and soak")
+RUN_BIT = 0x0814
+NO_TEMPERATURE = {  # what the process value shows instead of a temperature [M]
+    0x8002: "it has no reading yet",
+    0x8003: "no thermocouple is connected",
+    0x8004: "the thermocouple's signal is out of range",
+    0x8006: "its converter failed",
+    0x8007: "its memory failed",
+}
+
+
+@dataclass(frozen=True)
+class Settings:
+    """The set points that the oven and what is in it can bear."""
+
+    limits_c: tuple[float, float] = (0.0, 85.0)
+
+
+class Oven:
+    """The controller: set point, run and stop, temperature."""
+
+    def __init__(self, unit: Unit, settings: Settings) -> None:
+        self.name = unit.name
+        self.settings = settings
+        self._unit = unit
+
+    def identify(self) -> Identity:
+        """The controller has no register that names it: that it answers is all there is to know."""
+        self._unit.read(CONTROL_METHOD)
+        return Identity("Omega CN7500")
+
+    def self_test(self) -> list[Check]:
+        """Thermometer and control method."""
+        method = int(self._unit.read(CONTROL_METHOD))
+        name = METHODS[method] if method < len(METHODS) else f"unknown ({method})"
+        try:
+            thermometer = Check("thermometer", True, f"{self.temperature_c():.1f} C")
+        except SensorFault as fault:
+            thermometer = Check("thermometer", False, fault.what)
+        return [thermometer, Check("control", method == 0, f"{name} control")]
+
+    def close(self) -> None:
+        """Nothing to release: the wire belongs to the bench."""
+
+    def temperature_c(self) -> float:
+        """What the thermocouple shows, in C. Raises SensorFault when it shows none."""
+        value = self._unit.read(PROCESS_VALUE)
+        (word,) = PROCESS_VALUE.encode(value)
+        if word in NO_TEMPERATURE:
+            raise SensorFault(f"{self.name}: {NO_TEMPERATURE[word]}", "Check the thermocouple and its terminals")
+        return value
+
+    def set_point_c(self) -> float:
+        """The set point, in C."""
+        return self._unit.read(SET_POINT)
+
+    def set_temperature(self, temperature_c: float) -> None:
+        """Give a new set point; raises LimitError before anything is sent."""
+        low, high = self.settings.limits_c
+        if not low <= temperature_c <= high:
+            raise LimitError(
+                f"{self.name}: {temperature_c:g} C is outside its limits {low:g} .. {high:g} C; nothing was sent",
+                "Ask for a temperature within the limits, or change them in the bench file",
+            )
+        self._unit.write(SET_POINT, temperature_c)
+
+    def run(self, on: bool) -> None:
+        """Let the controller heat, or stop it."""
+        self._unit.write_bit(RUN_BIT, on, "run")
+
+    def running(self) -> bool:
+        """Whether the controller heats."""
+        return self._unit.read_bit(RUN_BIT, "run")
+
+
+def connect(address: Address, links: Links, settings: Settings, name: str) -> Oven:
+    """The controller at `address`. Raises LinkRefused when its wire cannot be opened; sends nothing."""
+    return Oven(links.unit(address, name), settings)

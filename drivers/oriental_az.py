@@ -1,0 +1,183 @@
+"""Oriental Motor AZ drive (AZD) turning a hollow rotary stage (DGII), by Modbus RTU.
+
+Safe by design: limits are checked before anything is sent, arrival is measured and not assumed, an alarm
+is never cleared silently, and a stop can always be sent. Source: AZ function manual, see oriental_az_table.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from drivers import oriental_az_table as az
+from drivers.errors import LimitError, NotSettled, StageAlarm
+from drivers.instrument import Check, Identity
+from drivers.links import Address, Links
+from drivers.links.modbus import Unit
+from drivers.links.register import Register
+from drivers.oriental_az_table import Alarm
+
+POLL_S = 0.02
+PATIENCE_S = 2.0  # beyond the expected end of a move
+HOMING_S = 120.0  # a full turn at a drive's slowest usual homing speed
+STOPPING_S = 10.0
+WARM_C = 85.0  # the drive's own alarm limit [M]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """One stage: gear and resolution, limits of the motor angle, how it moves, when it counts as settled."""
+
+    steps_per_turn: int = 18000  # 1.2 arcmin a step [M]
+    limits_deg: tuple[float, float] = (-400.0, 400.0)
+    speed_deg_s: float = 30.0
+    acceleration_deg_s2: float = 60.0
+    settle_deg: float = 0.05
+    current_percent: float = 100.0
+
+
+class RotaryStage:
+    """A stage that is told angles in deg and stands at them."""
+
+    def __init__(self, unit: Unit, links: Links, settings: Settings) -> None:
+        self.name = unit.name
+        self.settings = settings
+        self._unit, self._clock = unit, links.clock
+        self._target_deg = math.nan
+        self._expected_end_s = 0.0
+
+    def identify(self) -> Identity:
+        """The drive has no register that names it: that it answers is all there is to know."""
+        self._unit.read(az.OUTPUTS)
+        return Identity("Oriental Motor AZ")
+
+    def self_test(self) -> list[Check]:
+        """Alarm, line, coordinates, temperatures."""
+        alarm, error = self.alarm(), int(self._unit.read(az.COMMUNICATION_ERROR))
+        driver_c, motor_c = self._unit.read_block(az.DRIVER_TEMPERATURE, az.MOTOR_TEMPERATURE)
+        referenced = self.referenced()
+        return [
+            Check("alarm", alarm is None, f"{alarm.code:02X} {alarm.text}" if alarm else "none"),
+            Check("communication", error == 0, f"error {error:02X}" if error else "no error"),
+            Check("coordinates", referenced, "set" if referenced else "not set: home the stage"),
+            Check("temperature", max(driver_c, motor_c) < WARM_C, f"drive {driver_c:.1f} C, motor {motor_c:.1f} C"),
+        ]
+
+    def close(self) -> None:
+        """Nothing to release: the wire belongs to the bench."""
+
+    def angle_deg(self) -> float:
+        """Motor angle measured by the drive, in deg."""
+        return self._unit.read(az.FEEDBACK_POSITION) / self.settings.steps_per_turn * 360
+
+    def referenced(self) -> bool:
+        """Whether the drive knows where zero is."""
+        return bool(self._outputs() & az.HOME_END)
+
+    def alarm(self) -> Alarm | None:
+        """The present alarm, in words."""
+        return az.alarm_of(int(self._unit.read(az.ALARM)))
+
+    def reset_alarm(self) -> None:
+        """Clear the alarm, once a person has removed its cause. Raises StageAlarm if it stays."""
+        self._unit.write(az.RESET_ALARM, 0)
+        self._unit.write(az.RESET_ALARM, 1)
+        self._require_no_alarm(self.alarm())
+
+    def move_to(self, angle_deg: float) -> None:
+        """Turn to `angle_deg` and return when it stands there.
+
+        Raises LimitError before anything is sent, StageAlarm, NotSettled, and the errors of the link.
+        """
+        self.start(angle_deg)
+        self.wait()
+
+    def start(self, angle_deg: float) -> None:
+        """Start turning to `angle_deg` and return at once; raises LimitError before anything is sent."""
+        self._require_within_limits(angle_deg)
+        self._require_no_alarm(self.alarm())
+        distance_deg = abs(angle_deg - self.angle_deg())
+        self._target_deg = angle_deg
+        self._unit.write_block(*self._direct_operation(angle_deg))
+        self._expected_end_s = self._clock.now() + self._duration_s(distance_deg)
+
+    def wait(self) -> None:
+        """Return when the move that was started has ended where it should. Raises StageAlarm, NotSettled."""
+        self._clock.sleep(self._expected_end_s - self._clock.now())
+        self._poll_until(az.IN_POSITION, PATIENCE_S, "is still moving, or not in position,")
+        angle = self.angle_deg()
+        if abs(angle - self._target_deg) > self.settings.settle_deg:
+            raise NotSettled(
+                f"{self.name}: stands at {angle:.3f} deg instead of {self._target_deg:.3f} deg, "
+                f"more than {self.settings.settle_deg:g} deg away",
+                "Free the stage of what holds it, check the load's balance, then repeat the move",
+            )
+
+    def stop(self) -> None:
+        """Brake to a standstill, whatever the stage is doing."""
+        self._unit.write(az.INPUTS, az.STOP)
+        try:
+            self._poll_until(0, STOPPING_S, "has not stopped")
+        finally:
+            self._unit.write(az.INPUTS, 0)
+
+    def home(self) -> None:
+        """Seek the zero of the angle; needed once after power-on. Raises StageAlarm, NotSettled."""
+        self._require_no_alarm(self.alarm())
+        self._unit.write(az.INPUTS, az.ZHOME)
+        self._unit.write(az.INPUTS, 0)
+        self._poll_until(az.HOME_END, HOMING_S, "has not found its home")
+
+    def _require_within_limits(self, angle_deg: float) -> None:
+        low, high = self.settings.limits_deg
+        if not low <= angle_deg <= high:  # NaN is outside as well
+            raise LimitError(
+                f"{self.name}: {angle_deg:g} deg is outside its limits {low:g} .. {high:g} deg; nothing was sent",
+                "Ask for an angle within the limits, or change them in the bench file after looking at the cables",
+            )
+
+    def _require_no_alarm(self, alarm: Alarm | None) -> None:
+        if alarm is not None:
+            how = "then reset the alarm" if alarm.resettable else "the alarm needs a power cycle"
+            raise StageAlarm(
+                f"{self.name}: stands still with alarm {alarm.code:02X}, {alarm.text}",
+                f"{alarm.remedy}; {how}",
+                alarm.code,
+            )
+
+    def _direct_operation(self, angle_deg: float) -> list[tuple[Register, float]]:
+        """The block that moves to an absolute angle; rates in steps per second, which are its counts."""
+        per_deg = self.settings.steps_per_turn / 360
+        rate = self.settings.acceleration_deg_s2 * per_deg
+        speed = self.settings.speed_deg_s * per_deg
+        percent = self.settings.current_percent
+        values = (0, az.ABSOLUTE, angle_deg * per_deg, speed, rate, rate, percent, az.TRIGGER_ALL)
+        return list(zip(az.DIRECT, values, strict=True))
+
+    def _duration_s(self, distance_deg: float) -> float:
+        """A trapezoid of speed, or a triangle when the way is short."""
+        speed, acceleration = self.settings.speed_deg_s, self.settings.acceleration_deg_s2
+        if distance_deg < speed**2 / acceleration:
+            return 2 * math.sqrt(distance_deg / acceleration)
+        return distance_deg / speed + speed / acceleration
+
+    def _outputs(self) -> int:
+        return int(self._unit.read(az.OUTPUTS))
+
+    def _poll_until(self, wanted: int, timeout_s: float, complaint: str) -> None:
+        """Wait for a standstill with the `wanted` outputs on; outputs and alarm come in one exchange."""
+        deadline = self._clock.now() + timeout_s
+        while True:
+            outputs, code = map(int, self._unit.read_block(az.OUTPUTS, az.ALARM))
+            self._require_no_alarm(az.alarm_of(code))
+            if not outputs & az.MOVE and outputs & wanted == wanted:
+                return
+            if self._clock.now() >= deadline:
+                remedy = "Look at the stage: is it blocked? Then home it and repeat"
+                raise NotSettled(f"{self.name}: {complaint} after {timeout_s:g} s", remedy)
+            self._clock.sleep(POLL_S)
+
+
+def connect(address: Address, links: Links, settings: Settings, name: str) -> RotaryStage:
+    """The stage at `address`. Raises LinkRefused when its wire cannot be opened; sends nothing."""
+    return RotaryStage(links.unit(address, name), links, settings)
