@@ -29,10 +29,10 @@ def rotation(vector: Array) -> Array:
     """Rotation matrix of a rotation vector in rad (Rodrigues), shape (3, 3)."""
     angle = float(np.linalg.norm(vector))
     x, y, z = vector
-    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    if angle < 1e-8:
-        return np.eye(3) + K
-    return np.eye(3) + np.sin(angle) / angle * K + (1 - np.cos(angle)) / angle**2 * (K @ K)
+    K: Array = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    first, second = (np.sin(angle) / angle, (1 - np.cos(angle)) / angle**2) if angle > 1e-8 else (1.0, 0.5)
+    R: Array = np.eye(3) + first * K + second * (K @ K)
+    return R
 
 
 def turned_back(a: Array, table: Table) -> Array:

@@ -20,8 +20,8 @@ a tuple PARAMETERS, and at least one of four functions, named by where in the si
     output(v, table, p) -> (n, 3)             what becomes of the output
 
 `p` maps a parameter's name to its value: shape (3,) if per axis, else a float. Optional are
-NEEDS (columns), KINDS (of tables), and CONSTANTS: name -> function of the table, for reference values
-that are kept with the model and not fitted.
+NEEDS (columns), KINDS (of tables), CONSTANTS: name -> function of the table, for reference values that are
+kept with the model and not fitted, and STARTS: name -> function of the table, for a start from the data, (axes,).
 """
 
 from __future__ import annotations
@@ -36,14 +36,13 @@ from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 
 from calibrations.errors import ModelError, UnknownName, nearest
 from calibrations.table import Array, Table
 
-SECTIONS = ("symptom", "excited_by", "confused_with", "source")
 HOOKS = ("pose", "force", "transduction", "output")
 Values = Mapping[str, Array]  # parameter name -> shape (3,) if per axis, else a scalar
 
@@ -68,6 +67,17 @@ class Parameter:
     doc: str = ""
 
 
+class Sections(TypedDict):
+    """The parts of an effect's docstring, each on one line but the formula."""
+
+    summary: str
+    formula: str
+    symptom: str
+    excited_by: str
+    confused_with: str
+    source: str
+
+
 @dataclass(frozen=True)
 class Effect:
     """One physical effect, as read from its module."""
@@ -83,6 +93,7 @@ class Effect:
     needs: tuple[str, ...] = ()
     kinds: tuple[str, ...] = ("poses", "positions")
     constants: Mapping[str, Callable[[Table], float]] = field(default_factory=dict)
+    starts: Mapping[str, Callable[[Table], Array]] = field(default_factory=dict)
     pose: Callable[..., Any] | None = None
     force: Callable[..., Array] | None = None
     transduction: Callable[..., Array] | None = None
@@ -156,24 +167,35 @@ def _from_module(module: ModuleType, path: Path) -> Effect:
         needs=tuple(getattr(module, "NEEDS", ())),
         kinds=tuple(getattr(module, "KINDS", ("poses", "positions"))),
         constants=dict(getattr(module, "CONSTANTS", {})),
+        starts=dict(getattr(module, "STARTS", {})),
+        pose=hooks.get("pose"),
+        force=hooks.get("force"),
+        transduction=hooks.get("transduction"),
+        output=hooks.get("output"),
         **_sections(module.__doc__ or "", path),
-        **hooks,
     )
 
 
-def _sections(doc: str, path: Path) -> dict[str, str]:
+def _sections(doc: str, path: Path) -> Sections:
     """The parts of an effect's docstring. Raises ModelError if one is missing."""
     doc = inspect.cleandoc(doc)
     head, _, rest = doc.partition("\n\n")
-    titles = {name: name.replace("_", " ").capitalize() for name in SECTIONS}
-    marks = "|".join(titles.values())
+    titles = ("Symptom", "Excited by", "Confused with", "Source")
+    marks = "|".join(titles)
     pieces = re.split(rf"^({marks})[ ]+", rest, flags=re.MULTILINE)
     found = dict(zip(pieces[1::2], pieces[2::2], strict=True))
     summary = head.partition(":")[2]
     if not summary or "Symptom" not in found:
         raise ModelError(f'{path}: its docstring must begin with "name: what happens." and have a line "Symptom ..."')
-    parts = {key: _one_line(found.get(title, "")) for key, title in titles.items()}
-    return {"summary": _one_line(summary), "formula": inspect.cleandoc(pieces[0]).strip(), **parts}
+    symptom, excited_by, confused_with, source = (_one_line(found.get(title, "")) for title in titles)
+    return Sections(
+        summary=_one_line(summary),
+        formula=inspect.cleandoc(pieces[0]).strip(),
+        symptom=symptom,
+        excited_by=excited_by,
+        confused_with=confused_with,
+        source=source,
+    )
 
 
 def _one_line(text: str) -> str:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from calibrations.table import Array
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def slip(a: Array, before: Array, order: NDArray[np.intp], reach: float) -> Array:
     """State -1..1 of an element that sticks and slips, at each row, shape (n, 3).
 
@@ -27,7 +27,7 @@ def slip(a: Array, before: Array, order: NDArray[np.intp], reach: float) -> Arra
     return state
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def whiten(columns: Array, gap_s: Array, white: Array, slow: float, tau_s: float) -> tuple[Array, float]:
     """Columns made white under white noise plus a Gauss-Markov process, and the log-determinant.
 

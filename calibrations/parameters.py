@@ -8,6 +8,7 @@ from functools import cached_property
 from itertools import product
 
 import numpy as np
+from numpy.typing import NDArray
 
 from calibrations.chain import Step
 from calibrations.effect import Parameter
@@ -33,13 +34,14 @@ class Layout:
     slots: tuple[Slot, ...]
     unit: str
     nominal: float  # output per g, to give parameters in the output's unit a size
+    from_data: Mapping[tuple[int, str, str], float]  # starts that effects take from the table
 
     @staticmethod
     def of(model: Model, table: Table) -> Layout:
         """The layout for `table`."""
         slots = tuple(slot for i, term in enumerate(model.terms) for slot in _slots(i, term, table))
         spread = float(np.median(np.ptp(table.outputs, axis=0))) / 2
-        return Layout(model, table.axes, slots, table.unit, spread or 1.0)
+        return Layout(model, table.axes, slots, table.unit, spread or 1.0, _from_data(model, table))
 
     @cached_property
     def typical(self) -> Array:
@@ -60,11 +62,14 @@ class Layout:
     def starts(self) -> list[Array]:
         """Vectors to start from: the model's values, and every combination of declared starts where it has none."""
         known = self._known()
-        choices = [
-            (known[k],) if k in known else tuple(v * self._size(s.parameter) for v in s.parameter.starts)
-            for k, s in enumerate(self.slots)
-        ]
+        choices = [(known[k],) if k in known else self._declared(s) for k, s in enumerate(self.slots)]
         return self._shared_choices(choices)
+
+    def _declared(self, slot: Slot) -> tuple[float, ...]:
+        key = (slot.term, slot.parameter.name, slot.axis)
+        if key in self.from_data:
+            return (self.from_data[key],)
+        return tuple(value * self._size(slot.parameter) for value in slot.parameter.starts)
 
     def _shared_choices(self, choices: Sequence[tuple[float, ...]]) -> list[Array]:
         """One choice for all axes of a parameter, not one for each."""
@@ -94,25 +99,33 @@ class Layout:
     def steps(self, theta: Array) -> list[Step]:
         """Effects with their named values, in the order of the signal chain."""
         named: list[dict[str, Array]] = [
-            {name: np.float64(value) for name, value in term.constants.items()}
-            for term in self.model.terms  # type: ignore[misc]
+            {name: np.asarray(value) for name, value in term.constants.items()} for term in self.model.terms
         ]
         for i, term in enumerate(self.model.terms):
-            for p in term.effect.parameters:
-                named[i][p.name] = np.zeros(3) if p.per_axis else np.float64(0.0)  # type: ignore[assignment]
+            named[i] |= {p.name: np.zeros(3 if p.per_axis else ()) for p in term.effect.parameters}
         for value, slot in zip(theta, self.slots, strict=True):
             values, name = named[slot.term], slot.parameter.name
             if not slot.parameter.per_axis:
-                values[name] = value
+                values[name] = np.asarray(value)
             elif slot.axis:
                 values[name][AXES.index(slot.axis)] = value
             else:
                 values[name] = np.full(3, value)
         return [(term.effect, values) for term, values in zip(self.model.terms, named, strict=True)]
 
-    def index(self, names: Mapping[str, object] | Sequence[str]) -> Array:
-        """Mask of the entries that belong to the effects `names`, shape (p,)."""
-        return np.array([self.model.terms[s.term].name in names for s in self.slots], dtype=bool)  # type: ignore[return-value]
+    def of_effect(self, name: str) -> NDArray[np.bool_]:
+        """Mask of the entries that belong to one effect, shape (p,)."""
+        return np.array([self.model.terms[s.term].name == name for s in self.slots], dtype=bool)
+
+
+def _from_data(model: Model, table: Table) -> dict[tuple[int, str, str], float]:
+    starts: dict[tuple[int, str, str], float] = {}
+    for i, term in enumerate(model.terms):
+        for name, start in term.effect.starts.items():
+            values = start(table)
+            starts |= {(i, name, axis): float(v) for axis, v in zip(table.axes, values, strict=True)}
+            starts[i, name, ""] = float(np.mean(values))
+    return starts
 
 
 def _slots(i: int, term: Term, table: Table) -> list[Slot]:

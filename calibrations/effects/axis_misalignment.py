@@ -2,7 +2,7 @@
 
     a <- R(theta)^T a                                 theta: rotation vector in deg, components x, y, z
 
-Symptom   the residual follows the specific force along the other axes; on x and y with opposite signs for a turn about z.
+Symptom   the residual follows the specific force along the other axes; a turn about z: opposite signs on x and y.
 Excited by  full turns of beta; the components x and y need inclinations away from alpha = 90 deg.
 Confused with  stage-zero-offset: a turn about z equals a beta offset. A face-down mount tells them apart.
 Source    Ang (18)-(21); Book 17.3.9.

@@ -24,5 +24,7 @@ PARAMETERS = (
 
 def force(a: Array, table: Table, p: Values) -> Array:
     xy, xz, yz = (np.sin(np.radians(p[name])) for name in ("xy", "xz", "yz"))
-    axes = np.array([[1.0, 0.0, 0.0], [xy, np.sqrt(1 - xy**2), 0.0], [xz, yz, np.sqrt(max(0.0, 1 - xz**2 - yz**2))]])
+    axes: Array = np.array(
+        [[1.0, 0.0, 0.0], [xy, np.sqrt(1 - xy**2), 0.0], [xz, yz, np.sqrt(max(0.0, 1 - xz**2 - yz**2))]]
+    )
     return a @ axes.T

@@ -14,6 +14,7 @@ from calibrations.effect import Parameter, Values
 from calibrations.table import Array, Table
 
 PARAMETERS = (Parameter("bias", "{out}", typical=5.0, doc="output at zero specific force"),)
+STARTS = {"bias": lambda table: (table.outputs.max(axis=0) + table.outputs.min(axis=0)) / 2}
 
 
 def transduction(a: Array, table: Table, p: Values) -> Array:

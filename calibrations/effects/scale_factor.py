@@ -8,10 +8,13 @@ Confused with  nothing, where both signs of the specific force occur.
 Source    Ang (1); Book 17.3.7; IEEE Std 1293, K1.
 """
 
+import numpy as np
+
 from calibrations.effect import Parameter, Values
 from calibrations.table import Array, Table
 
 PARAMETERS = (Parameter("scale", "{out}/g", typical=1.0, starts=(1.0,), doc="change of output per g"),)
+STARTS = {"scale": lambda table: np.ptp(table.outputs, axis=0) / 2}
 
 
 def transduction(a: Array, table: Table, p: Values) -> Array:

@@ -1,0 +1,122 @@
+"""Joint least-squares estimate of a model's parameters, with uncertainties that allow for slow noise.
+
+Parameters and noise are estimated in turn: least squares under the present noise, then the noise of greatest
+likelihood given the residual, until neither moves.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from calibrations.identify import estimates
+from calibrations.model import Model
+from calibrations.noise import Noise, estimate, rms, white_only
+from calibrations.problem import Problem
+from calibrations.table import Array, Table
+
+ROUNDS = 2
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A model fitted to a table. `residual` has shape (channels, n), rows in order of time."""
+
+    model: Model
+    problem: Problem
+    theta: Array
+    noise: Noise
+    residual: Array
+    jacobian: Array
+
+    @property
+    def table(self) -> Table:
+        """The table, rows in order of time."""
+        return self.problem.table
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the residual's blocks."""
+        return self.problem.channels
+
+    @property
+    def rmse(self) -> Array:
+        """Root mean square of the residual per channel."""
+        return rms(self.residual)
+
+    @property
+    def excess(self) -> Array:
+        """Normalised rms residual per channel: rmse over noise floor."""
+        return rms(self.residual) / self.noise.floor
+
+    @property
+    def pooled_excess(self) -> float:
+        """The excess over all channels together."""
+        return float(np.sqrt(np.mean(self.excess**2)))
+
+    @cached_property
+    def whitened(self) -> Array:
+        """[residual, jacobian] made white, shape (channels * n, 1 + p)."""
+        return self.noise.whiten(np.concatenate([self.residual[:, :, None], self.jacobian], axis=2))
+
+    @cached_property
+    def deviance(self) -> float:
+        """-2 log likelihood, up to a constant of the data."""
+        return float(np.sum(self.whitened[:, 0] ** 2)) + self.noise.logdet
+
+
+def fit(model: Model, table: Table) -> Fit:
+    """The model with parameters estimated from `table`. Raises TooFewRows, ModelError, DataError."""
+    problem = Problem.of(model, table)
+    noise = white_only(problem.white, problem.gap_s, len(problem.channels))
+    theta = min((_minimise(problem, noise, start) for start in problem.layout.starts()), key=lambda t: t[1])[0]
+    for _ in range(ROUNDS):
+        noise = estimate(noise, problem.residual(theta), problem.jacobian(theta))
+        theta, _ = _minimise(problem, noise, theta)
+    return _result(problem, theta, noise)
+
+
+def evaluate(model: Model, table: Table) -> Fit | None:
+    """The model with the values that it has, on `table`; None where it has none."""
+    problem = Problem.of(model, table)
+    theta = problem.layout.known()
+    if theta is None:
+        return None
+    noise = white_only(problem.white, problem.gap_s, len(problem.channels))
+    noise = estimate(noise, problem.residual(theta), np.zeros((*problem.residual(theta).shape, 0)))
+    return _result(problem, theta, noise, keep=True)
+
+
+def _minimise(problem: Problem, noise: Noise, start: Array) -> tuple[Array, float]:
+    """(parameters, cost) of least squares under `noise`."""
+    if not len(start):
+        return start, 0.0
+
+    def residual(theta: Array) -> Array:
+        return noise.whiten(problem.residual(theta)[:, :, None])[:, 0]
+
+    def jacobian(theta: Array) -> Array:
+        return noise.whiten(problem.jacobian(theta))
+
+    answer = least_squares(
+        residual,
+        start,
+        jac=jacobian,
+        bounds=problem.layout.bounds,
+        x_scale=problem.layout.typical,
+        ftol=1e-10,
+        xtol=1e-10,
+        gtol=1e-12,
+        max_nfev=60,
+    )
+    return answer.x, float(answer.cost)
+
+
+def _result(problem: Problem, theta: Array, noise: Noise, keep: bool = False) -> Fit:
+    residual, jacobian = problem.residual(theta), problem.jacobian(theta)
+    model = replace(problem.layout.model, unit=problem.table.unit)
+    found = Fit(model, problem, theta, noise, residual, jacobian)
+    return found if keep else replace(found, model=estimates(model, problem.layout, theta, found.whitened[:, 1:]))

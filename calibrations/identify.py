@@ -1,0 +1,74 @@
+"""Which parameters the data determine, and with what standard uncertainty.
+
+A direction of the parameter space that changes nothing in the data is not identified, nor is a parameter whose
+standard uncertainty is no smaller than what a sensor may typically show: the data then say nothing new about it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from calibrations.model import Estimate, Model
+from calibrations.parameters import Layout, Slot
+from calibrations.table import Array
+
+RELATIVE_RANK = 1e-8  # singular values below this, relative to the largest, are zero to rounding
+
+
+def covariance(jacobian: Array, typical: Array) -> tuple[Array, Array]:
+    """Covariance of the parameters from the whitened jacobian, and the undetermined directions.
+
+    Returns ((p, p), (k, p)): the second holds unit vectors, in units of `typical`, that change nothing.
+    """
+    scaled = jacobian * typical
+    norm = np.linalg.norm(scaled, axis=0)
+    norm = np.where(norm > 0, norm, 1.0)
+    _, s, Vt = np.linalg.svd(scaled / norm, full_matrices=False)
+    good = s > RELATIVE_RANK * s[0]
+    D = typical / norm
+    root = (Vt[good].T / s[good]) * D[:, None]
+    null = Vt[~good] / norm
+    lengths = np.linalg.norm(null, axis=1, keepdims=True)
+    return root @ root.T, null / np.where(lengths > 0, lengths, 1.0)
+
+
+def estimates(model: Model, layout: Layout, theta: Array, jacobian: Array) -> Model:
+    """`model` with a value and a standard uncertainty for every parameter."""
+    if not len(theta):
+        return model
+    cov, null = covariance(jacobian, layout.typical)
+    std = np.sqrt(np.diag(cov))
+    found: list[list[Estimate]] = [[] for _ in model.terms]
+    for k, slot in enumerate(layout.slots):
+        why = _why_not(k, layout, std, null, jacobian)
+        unit = slot.parameter.unit.replace("{out}", layout.unit)
+        undetermined = bool(len(null)) and bool(np.any(np.abs(null[:, k]) > 1e-3))
+        uncertainty = None if undetermined or not jacobian[:, k].any() else float(std[k])
+        found[slot.term].append(
+            Estimate(slot.parameter.name, slot.axis, float(theta[k]), uncertainty, unit, why is None, why)
+        )
+    terms = tuple(replace(term, estimates=tuple(e)) for term, e in zip(model.terms, found, strict=True))
+    return replace(model, terms=terms)
+
+
+def _why_not(k: int, layout: Layout, std: Array, null: Array, jacobian: Array) -> str | None:
+    """Why entry `k` is not identified, or None."""
+    if not jacobian[:, k].any():
+        return "it changes nothing in this data"
+    for direction in null:
+        if abs(direction[k]) > 1e-3:
+            partners = [_label(layout, s) for j, s in enumerate(layout.slots) if j != k and abs(direction[j]) > 1e-3]
+            return f"on this data it cannot be told from {', '.join(partners)}"
+    if std[k] >= layout.typical[k]:
+        return (
+            f"not identifiable from these positions: its standard uncertainty {std[k]:.2g} is no smaller than what a "
+            f"sensor may show ({layout.typical[k]:.2g}); measure at more orientations"
+        )
+    return None
+
+
+def _label(layout: Layout, slot: Slot) -> str:
+    name = layout.model.terms[slot.term].name
+    return f"{name} {slot.parameter.name}{f' {slot.axis}' if slot.axis else ''}"

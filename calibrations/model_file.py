@@ -1,0 +1,134 @@
+"""Models as YAML: the shipped ones by name, and files that keep values, uncertainties and provenance."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from calibrations.effect import Effect, catalogue, find
+from calibrations.errors import ModelError, UnknownName, nearest
+from calibrations.model import Estimate, Model, Term
+
+SHIPPED = Path(__file__).parent / "models"
+SCHEMA = "rig.model/1"
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", populate_by_name=True)
+
+
+class _Parameter(_Strict):
+    name: str
+    axis: str | None = None
+    value: float = Field(allow_inf_nan=False)
+    std: float | None = Field(default=None, allow_inf_nan=False)
+    unit: str = ""
+    identified: bool = True
+    why: str | None = None
+
+
+class _Effect(_Strict):
+    effect: str
+    tied: bool = False
+    constants: dict[str, float] = {}
+    parameters: list[_Parameter] = []
+
+
+class _File(_Strict):
+    schema_: Literal["rig.model/1"] = Field(alias="schema")
+    name: str
+    unit: str = ""
+    effects: list[_Effect] = Field(min_length=1)
+    provenance: dict[str, str | float] = {}
+
+
+def shipped_names() -> tuple[str, ...]:
+    """Names of the models that come with the program."""
+    return tuple(sorted(path.stem for path in SHIPPED.glob("*.yaml")))
+
+
+def read_model(name_or_path: str | Path, effects: Mapping[str, Effect] | None = None) -> Model:
+    """A shipped model by name, or a model file. Raises UnknownName or ModelError naming file and key."""
+    path = SHIPPED / f"{name_or_path}.yaml"
+    if str(name_or_path) not in shipped_names():
+        path = Path(name_or_path)
+        if path.suffix not in (".yaml", ".yml") and not path.exists():
+            raise UnknownName(
+                f'unknown model "{name_or_path}"{nearest(str(name_or_path), shipped_names())}; or give a YAML file'
+            )
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ModelError(f"{path}: the model file cannot be read: {error}") from None
+    return parse_model(text, str(path), effects)
+
+
+def parse_model(text: str, source: str, effects: Mapping[str, Effect] | None = None) -> Model:
+    """The model in YAML `text`. Raises ModelError or UnknownName."""
+    try:
+        content = _File.model_validate(yaml.safe_load(text))
+    except yaml.YAMLError as error:
+        raise ModelError(f"{source}: is not YAML: {' '.join(str(error).split())}") from None
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = ".".join(str(part) for part in first["loc"]) or "the file"
+        raise ModelError(f"{source}: {key}: {first['msg']}{_hint(first)}") from None
+    known = catalogue() if effects is None else effects
+    terms = tuple(_term(entry, source, known) for entry in content.effects)
+    names = [term.name for term in terms]
+    if len(set(names)) < len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise ModelError(f'{source}: the effect "{twice}" stands in the model twice')
+    return Model(content.name, terms, content.unit, content.provenance)
+
+
+def _hint(error: Any) -> str:
+    if error["type"] != "extra_forbidden":
+        return ""
+    fields = [*_File.model_fields, *_Effect.model_fields, *_Parameter.model_fields]
+    return nearest(str(error["loc"][-1]), [field.strip("_") for field in fields])
+
+
+def _term(entry: _Effect, source: str, known: Mapping[str, Effect]) -> Term:
+    try:
+        effect = find(entry.effect, known)
+    except UnknownName as error:
+        raise UnknownName(f"{source}: {error}") from None
+    declared = {p.name for p in effect.parameters}
+    for p in entry.parameters:
+        if p.name not in declared:
+            raise ModelError(f'{source}: {entry.effect} has no parameter "{p.name}"{nearest(p.name, declared)}')
+    given = tuple(Estimate(p.name, p.axis or "", p.value, p.std, p.unit, p.identified, p.why) for p in entry.parameters)
+    return Term(effect, entry.tied, given, entry.constants)
+
+
+def dump_model(model: Model) -> str:
+    """The model as YAML text; `parse_model` gives it back, to the last bit."""
+    content = {
+        "schema": SCHEMA,
+        "name": model.name,
+        "unit": model.unit,
+        "effects": [_dump_term(term) for term in model.terms],
+        "provenance": dict(model.provenance),
+    }
+    return yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=100)
+
+
+def _dump_term(term: Term) -> dict[str, Any]:
+    entry: dict[str, Any] = {"effect": term.name}
+    if term.tied:
+        entry["tied"] = True
+    if term.constants:
+        entry["constants"] = {name: float(value) for name, value in term.constants.items()}
+    if term.estimates:
+        entry["parameters"] = [_dump_estimate(e) for e in term.estimates]
+    return entry
+
+
+def _dump_estimate(e: Estimate) -> dict[str, Any]:
+    entry: dict[str, Any] = {"name": e.name, "axis": e.axis or None, "value": e.value, "std": e.std, "unit": e.unit}
+    return entry if e.identified else entry | {"identified": False, "why": e.why}

@@ -1,0 +1,83 @@
+"""A model and a table as a least-squares problem: residuals and their derivatives.
+
+For `poses` the residual is measured minus predicted output, one block of rows per axis, in the output's unit.
+For `positions` it is |a| - 1, where a is the specific force that the model makes of the output, in g.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrations.chain import backward, forward
+from calibrations.errors import ModelError, TooFewRows
+from calibrations.mean_noise import norm_std, white_std
+from calibrations.model import Model
+from calibrations.parameters import Layout
+from calibrations.table import Array, Table
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Residuals of a model on a table, as functions of the parameter vector. Rows stand in order of time."""
+
+    table: Table
+    layout: Layout
+
+    @staticmethod
+    def of(model: Model, table: Table) -> Problem:
+        """The problem. Raises ModelError and TooFewRows where there is none to solve."""
+        table = table.rows(table.order)
+        model = model.for_table(table)
+        if table.kind not in ("poses", "positions"):
+            raise ModelError(f"{table.source}: models are fitted to poses or positions, not to a table of {table.kind}")
+        layout = Layout.of(model, table)
+        rows = table.n * len(table.axes) if table.kind == "poses" else table.n
+        if rows <= len(layout.slots):
+            raise TooFewRows(
+                f"{table.source}: {table.n} rows cannot determine the {len(layout.slots)} parameters of {model.name}; "
+                "measure more poses, or take a smaller model"
+            )
+        return Problem(table, layout)
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the residual's blocks: the measured axes, or "norm" for positions."""
+        return self.table.axes if self.table.kind == "poses" else ("norm",)
+
+    def residual(self, theta: Array) -> Array:
+        """Shape (channels, n)."""
+        steps = self.layout.steps(theta)
+        if self.table.kind == "poses":
+            error = self.table.outputs - forward(self.table, steps)
+        else:
+            error = np.linalg.norm(backward(self.table, steps), axis=1)[:, None] - 1.0
+        return error.T
+
+    def jacobian(self, theta: Array, of: NDArray[np.bool_] | None = None) -> Array:
+        """d residual / d theta by central differences, shape (channels, n, p); only the entries `of` where given."""
+        steps = 1e-3 * self.layout.typical
+        low, high = self.layout.bounds
+        columns = []
+        for k in np.flatnonzero(np.ones(len(theta), dtype=bool) if of is None else of):
+            h = steps[k]
+            ahead, behind = theta.copy(), theta.copy()
+            ahead[k], behind[k] = min(theta[k] + h, high[k]), max(theta[k] - h, low[k])
+            columns.append((self.residual(ahead) - self.residual(behind)) / (ahead[k] - behind[k]))
+        return np.stack(columns, axis=2) if columns else np.zeros((len(self.channels), self.table.n, 0))
+
+    @cached_property
+    def white(self) -> Array | None:
+        """Each mean's standard deviation by white noise, in the residual's unit, (channels, n); None if not known."""
+        std = white_std(self.table)
+        if self.table.kind == "poses" or std is None:
+            return None if std is None else std.T
+        return norm_std(self.table, std).T / self.layout.nominal
+
+    @cached_property
+    def gap_s(self) -> Array:
+        """Time between each row and the one before it, s, shape (n,)."""
+        return np.diff(self.table.time_s, prepend=self.table.time_s[0])

@@ -1,0 +1,108 @@
+"""Score tests: how much of a residual a set of columns could take up, and how often noise alone would show as much.
+
+Columns are made white under the fitted noise and freed of what the model already explains (Frisch, Waugh and Lovell);
+the statistic is then a sum of squares, chi-squared under the null. The chance that the best of a whole search does as
+well on noise is estimated from noise sets drawn under the fitted null, not from a bound.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.special import chdtrc
+
+from calibrations.fit import Fit
+from calibrations.table import Array
+
+DRAWS = 300
+SMALLEST = 1e-7  # of a column's length: less is rounding
+
+
+@dataclass(frozen=True)
+class Screen:
+    """A fitted model's residual, ready to be searched."""
+
+    fit: Fit
+
+    @cached_property
+    def explained(self) -> Array:
+        """Orthonormal basis of what the model explains, whitened, shape (rows, rank)."""
+        return _basis(self.fit.whitened[:, 1:])
+
+    @cached_property
+    def residual(self) -> Array:
+        """The whitened residual, freed of the model, shape (rows,)."""
+        return _freed(self.fit.whitened[:, 0], self.explained)
+
+    def basis(self, columns: Array) -> Array:
+        """Orthonormal basis of what `columns` (channels, n, k) could add to the model, shape (rows, rank)."""
+        white = self.fit.noise.whiten(columns)
+        size = np.linalg.norm(white, axis=0)
+        free = _freed(white, self.explained)
+        left = np.linalg.norm(free, axis=0)
+        keep = left > SMALLEST * np.where(size > 0, size, 1.0)
+        return _basis(free[:, keep])
+
+    def statistic(self, basis: Array) -> float:
+        """Sum of squares of the residual along `basis`."""
+        return float(np.sum((basis.T @ self.residual) ** 2))
+
+
+@dataclass(frozen=True)
+class Search:
+    """Several bases searched together for the best one."""
+
+    screen: Screen
+    bases: Sequence[Array]
+
+    @cached_property
+    def statistics(self) -> Array:
+        """The statistic of each basis."""
+        return np.array([self.screen.statistic(b) for b in self.bases])
+
+    @cached_property
+    def ranks(self) -> Array:
+        """Degrees of freedom of each basis."""
+        return np.array([b.shape[1] for b in self.bases], dtype=float)
+
+    @cached_property
+    def trials(self) -> float:
+        """Effective number of independent tests: the least p-value of the search on noise is Beta(1, trials)."""
+        some = [k for k, b in enumerate(self.bases) if b.shape[1]]
+        if not some:
+            return 1.0
+        rng = np.random.default_rng(20031)
+        noise = rng.standard_normal((len(self.screen.residual), DRAWS))
+        squares = (np.hstack([self.bases[k] for k in some]).T @ noise) ** 2
+        edges = np.concatenate([[0], np.cumsum(self.ranks[some])]).astype(int)
+        sums = np.add.reduceat(squares, edges[:-1], axis=0)
+        least = np.min(chdtrc(self.ranks[some][:, None], sums), axis=0)
+        return max(1.0, -DRAWS / float(np.sum(np.log1p(-np.minimum(least, 1 - 1e-12)))))
+
+    @cached_property
+    def p_values(self) -> Array:
+        """Chance that the best of this search does as well as each basis, on noise alone."""
+        single = np.where(self.ranks > 0, chdtrc(np.maximum(self.ranks, 1), self.statistics), 1.0)
+        return of_search(single, self.trials)
+
+
+def of_search(p: Array | float, trials: float) -> Array:
+    """1 - (1 - p)^trials, exact for small p."""
+    return np.asarray(-np.expm1(trials * np.log1p(-np.minimum(p, 1 - 1e-16))))
+
+
+def _basis(columns: Array) -> Array:
+    if not columns.size:
+        return np.zeros((len(columns), 0))
+    norm = np.linalg.norm(columns, axis=0)
+    columns = columns[:, norm > 0] / norm[norm > 0]
+    U, s, _ = np.linalg.svd(columns, full_matrices=False)
+    return U[:, s > 1e-9 * (s[0] if len(s) else 1.0)]
+
+
+def _freed(columns: Array, basis: Array) -> Array:
+    free = columns - basis @ (basis.T @ columns)
+    return np.asarray(free - basis @ (basis.T @ free))  # twice is enough: Kahan and Parlett
