@@ -122,6 +122,7 @@ class Port:
         self.connections.clear()
         if self._socket:
             self._socket.close()
+            self._socket = None
 
     def _listen(self) -> str:
         self._socket = socket.create_server((self.timing.host, self.timing.port))

@@ -1,0 +1,123 @@
+"""The AZ driver's bytes, written out from the layout of the manual's register table; checksums included."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import pytest
+
+from drivers import oriental_az
+from drivers.clock import SimulatedClock
+from drivers.errors import LimitError, NotSettled, StageAlarm
+from drivers.links import Address, Links
+from drivers.oriental_az import RotaryStage, Settings
+
+SETTINGS = Settings(
+    steps_per_turn=36000, limits_deg=(-90.0, 100.0), speed_deg_s=20.0, acceleration_deg_s2=15.0, settle_deg=0.05
+)
+ASK_ALARM, NO_ALARM = "01 03 00 80 00 02 C5 E3", "01 03 04 00 00 00 00 FA 33"
+ASK_POSITION = "01 03 00 CC 00 02 04 34"
+AT_MINUS_4500, AT_8500, AT_8400 = (
+    "01 03 04 FF FF EE 6C B7 9A",
+    "01 03 04 00 00 21 34 E3 B4",
+    "01 03 04 00 00 20 D0 E2 6F",
+)
+MOVE_TO_8500 = (
+    "01 10 00 58 00 10 20 "  # 16 registers from 0058
+    "00 00 00 00 "  # data number 0
+    "00 00 00 01 "  # absolute positioning
+    "00 00 21 34 "  # 8500 steps
+    "00 00 07 D0 "  # 2000 Hz
+    "00 00 05 DC "  # 1.5 kHz/s
+    "00 00 05 DC "  # 1.5 kHz/s
+    "00 00 03 E8 "  # 100.0 %
+    "00 00 00 01 "  # trigger: all
+    "E3 43"
+)
+TAKEN = "01 10 00 58 00 10 40 16"
+ASK_STATUS = "01 03 00 7F 00 03 34 13"
+STANDING = "01 03 06 40 20 00 00 00 00 AE 72"  # IN-POS, READY, no alarm
+MOVING = "01 03 06 20 00 00 00 00 00 26 15"
+BLOCKED = "01 03 06 00 80 00 00 00 30 20 BF"  # ALM, alarm 30
+HOMED = "01 03 06 40 30 00 00 00 00 6F B1"  # IN-POS, READY, HOME-END
+START = [(ASK_ALARM, NO_ALARM), (ASK_POSITION, AT_MINUS_4500), (MOVE_TO_8500, TAKEN)]
+Stages = Callable[[list[tuple[str, str]]], RotaryStage]
+
+
+@pytest.fixture
+def stage(script: Callable[..., Address], links: Links) -> Stages:
+    return lambda exchanges: oriental_az.connect(script(exchanges), links, SETTINGS, "alpha")
+
+
+def test_angle_is_the_feedback_position(stage: Stages) -> None:
+    assert stage([(ASK_POSITION, AT_MINUS_4500)]).angle_deg() == -45.0
+
+
+def test_a_move_is_one_block_and_sleeps_through_its_duration(stage: Stages, clock: SimulatedClock) -> None:
+    stage([*START, (ASK_STATUS, STANDING), (ASK_POSITION, AT_8500)]).move_to(85.0)
+    assert clock.now() == pytest.approx(130 / 20 + 20 / 15, abs=0.01)  # 130 deg: a trapezoid of speed
+
+
+def test_a_move_that_lasts_longer_is_polled(stage: Stages) -> None:
+    stage([*START, (ASK_STATUS, MOVING), (ASK_STATUS, STANDING), (ASK_POSITION, AT_8500)]).move_to(85.0)
+
+
+@pytest.mark.parametrize("angle", [100.01, -90.01, math.inf, math.nan])
+def test_outside_its_limits_nothing_is_sent(stage: Stages, angle: float) -> None:
+    with pytest.raises(LimitError, match=r"alpha: .* outside its limits -90 .. 100 deg; nothing was sent"):
+        stage([]).move_to(angle)
+
+
+def test_arrival_is_measured_not_assumed(stage: Stages) -> None:
+    exchanges = [*START, (ASK_STATUS, STANDING), (ASK_POSITION, AT_8400)]
+    with pytest.raises(NotSettled, match=r"alpha: stands at 84.000 deg instead of 85.000 deg"):
+        stage(exchanges).move_to(85.0)
+
+
+def test_an_alarm_during_a_move_is_put_into_words(stage: Stages) -> None:
+    with pytest.raises(StageAlarm, match=r"alarm 30, overload. Free the stage .* then reset the alarm") as raised:
+        stage([*START, (ASK_STATUS, BLOCKED)]).move_to(85.0)
+    assert raised.value.code == 0x30
+
+
+def test_with_an_alarm_no_move_is_started(stage: Stages) -> None:
+    with pytest.raises(StageAlarm, match=r"alarm 4A, absolute move before the coordinates are set. Home"):
+        stage([(ASK_ALARM, "01 03 04 00 00 00 4A 7B C4")]).move_to(85.0)
+
+
+def test_a_stop_holds_the_input_until_the_motor_stands(stage: Stages) -> None:
+    on, off = "01 06 00 7D 00 20 18 0A", "01 06 00 7D 00 00 19 D2"
+    stage([(on, on), (ASK_STATUS, MOVING), (ASK_STATUS, STANDING), (off, off)]).stop()
+
+
+def test_homing_is_a_pulse_and_waits_for_home_end(stage: Stages) -> None:
+    on, off = "01 06 00 7D 00 10 18 1E", "01 06 00 7D 00 00 19 D2"
+    stage(
+        [
+            (ASK_ALARM, NO_ALARM),
+            (on, on),
+            (off, off),
+            (ASK_STATUS, MOVING),
+            (ASK_STATUS, STANDING),  # between its steps it stands without HOME-END
+            (ASK_STATUS, HOMED),
+        ]
+    ).home()
+
+
+def test_an_alarm_is_reset_by_0_then_1(stage: Stages) -> None:
+    done = "01 10 01 80 00 02 41 DC"
+    stage(
+        [
+            ("01 10 01 80 00 02 04 00 00 00 00 F6 5F", done),
+            ("01 10 01 80 00 02 04 00 00 00 01 37 9F", done),
+            (ASK_ALARM, NO_ALARM),
+        ]
+    ).reset_alarm()
+
+
+def test_whether_it_is_referenced(stage: Stages) -> None:
+    ask = "01 03 00 7F 00 01 B5 D2"
+    drive = stage([(ask, "01 03 02 40 30 89 90"), (ask, "01 03 02 00 20 B9 9C")])
+    assert drive.referenced()
+    assert not drive.referenced()
