@@ -1,8 +1,8 @@
 """The world's settings: frozen dataclasses, one per mechanism, physical units in every name.
 
-    WorldConfig.adxl203()   the default: what Ang saw
-    WorldConfig.ideal()     a perfectly linear sensor with white noise only
-    WorldConfig.from_mapping({"preset": "ideal", "heat": {"ambient_c": 20.0}})
+WorldConfig.adxl203()   the default: what Ang saw
+WorldConfig.ideal()     a perfectly linear sensor with white noise only
+WorldConfig.from_mapping({"preset": "ideal", "heat": {"ambient_c": 20.0}})
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Any, TypeVar
 
 from drivers.simulation.converter import Converter
-from drivers.simulation.errors import BadSetting, UnknownSetting, unknown
+from drivers.simulation.errors import BadSetting, UnknownSetting, nearest
 from drivers.simulation.friction import Friction
 from drivers.simulation.gravity import Base, Package
 from drivers.simulation.heat import Heat, Oven
@@ -90,7 +90,7 @@ class WorldConfig:
         changes = dict(settings)
         preset = changes.pop("preset", "adxl203")
         if preset not in PRESETS:
-            raise UnknownSetting(unknown("preset of the simulated world", preset, PRESETS))
+            raise UnknownSetting(f"unknown preset {preset!r} of the simulated world", nearest(preset, PRESETS))
         return (cls.ideal() if preset == "ideal" else cls.adxl203()).changed(changes)
 
     def changed(self, changes: Mapping[str, Any]) -> WorldConfig:
@@ -105,7 +105,7 @@ def changed(settings: Settings, changes: Mapping[str, Any], path: str = "") -> S
     for name, value in changes.items():
         where = f"{path}{name}"
         if name not in names:
-            raise UnknownSetting(f"{where}: {unknown('setting of the simulated world', name, names)}")
+            raise UnknownSetting(f"unknown setting {where!r} of the simulated world", nearest(name, names))
         new[name] = _value(getattr(settings, name), value, where)
     return replace(settings, **new)  # type: ignore[type-var]
 
@@ -113,11 +113,15 @@ def changed(settings: Settings, changes: Mapping[str, Any], path: str = "") -> S
 def _value(present: Any, value: Any, where: str) -> Any:
     if is_dataclass(present):
         if not isinstance(value, Mapping):
-            raise BadSetting(f"{where}: {value!r} is not a mapping of settings")
+            raise BadSetting(f"{where} of the simulated world is {value!r}", f"Give a mapping of {_names(present)}")
         return changed(present, value, f"{where}.")
     if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise BadSetting(f"{where}: {value!r} is not a number")
+        raise BadSetting(f"{where} of the simulated world is {value!r}", "Give a number")
     return float(value)
+
+
+def _names(settings: Any) -> str:
+    return ", ".join(f.name for f in fields(settings))
 
 
 PRESETS = ("adxl203", "ideal")

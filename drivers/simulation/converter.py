@@ -7,12 +7,8 @@ the spread of rounded samples can be told without rounding any.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from drivers.simulation.kernel import kernel
+from drivers.simulation.kernel import Floats, kernel
 
 
 @dataclass(frozen=True)
@@ -27,12 +23,12 @@ class Converter:
 
 
 @kernel
-def bowed_v(converter: Any, volts: float) -> float:
+def bowed_v(converter: Converter, volts: float) -> float:
     """What the converter's characteristic makes of `volts`: a parabola through both ends of the range."""
     ratio = volts / converter.range_v
     return volts + converter.bow_v * (1 - ratio * ratio)
 
 
-def bowed_mean_v(converter: Converter, mean_v: NDArray[np.float64], variance: float) -> NDArray[np.float64]:
+def bowed_mean_v(converter: Converter, mean_v: Floats, variance: float) -> Floats:
     """Mean of `bowed_v` over samples of this mean and variance (V^2)."""
     return mean_v + converter.bow_v * (1 - (mean_v**2 + variance) / converter.range_v**2)

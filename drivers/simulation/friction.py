@@ -8,9 +8,8 @@ The contact may be pressed harder by the load of the neighbouring axis.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
-from drivers.simulation.kernel import kernel
+from drivers.simulation.kernel import Floats, kernel
 
 ELEMENTS = 4
 
@@ -25,7 +24,7 @@ class Friction:
 
 
 @kernel
-def drag_nm(friction: Any, seats: Any, x_nm: float, neighbour_g: float) -> float:
+def drag_nm(friction: Friction, seats: Floats, x_nm: float, neighbour_g: float) -> float:
     """Displacement lost to friction at `x_nm`; moves the elements' `seats` (nm, shape (4,)) along."""
     limit = friction.slip_nm * (1 + friction.pressing_per_g * abs(neighbour_g)) / ELEMENTS
     drag = 0.0
@@ -33,4 +32,4 @@ def drag_nm(friction: Any, seats: Any, x_nm: float, neighbour_g: float) -> float
         reach = (k + 1) * limit
         seats[k] = min(max(seats[k], x_nm - reach), x_nm + reach)
         drag += x_nm - seats[k]
-    return friction.stiffness_fraction * drag  # type: ignore[no-any-return]
+    return friction.stiffness_fraction * drag

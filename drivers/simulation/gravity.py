@@ -10,14 +10,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from drivers.simulation.kernel import kernel
-
-Vector = NDArray[np.float64]
+from drivers.simulation.kernel import Floats, kernel
 
 
 @dataclass(frozen=True)
@@ -38,7 +34,7 @@ class Package:
     beams_off_square_deg: float = 0.0  # how far the y beam is turned from 90 deg toward the x beam
 
 
-def rotation(x_deg: float, y_deg: float, z_deg: float) -> Vector:
+def rotation(x_deg: float, y_deg: float, z_deg: float) -> Floats:
     """Rz Ry Rx, shape (3, 3)."""
     (a, b, c), (p, q, r) = np.cos(np.radians([x_deg, y_deg, z_deg])), np.sin(np.radians([x_deg, y_deg, z_deg]))
     about_x = np.array([[1, 0, 0], [0, a, -p], [0, p, a]])
@@ -47,26 +43,27 @@ def rotation(x_deg: float, y_deg: float, z_deg: float) -> Vector:
     return np.asarray(about_z @ about_y @ about_x)
 
 
-def vertical(base: Base) -> Vector:
+def vertical(base: Base) -> Floats:
     """The upward vertical in the frame of the base, shape (3,)."""
-    return rotation(base.tilt_x_deg, base.tilt_y_deg, 0.0) @ np.array([0.0, 0.0, 1.0])
+    return rotation(base.tilt_x_deg, base.tilt_y_deg, 0.0)[:, 2]
 
 
-def mounting(package: Package, mount_deg: float, flip: int) -> Vector:
+def mounting(package: Package, mount_deg: float, flip: int) -> Floats:
     """Package from table, shape (3, 3): the mount's turn, face down if `flip`, the package's own rotation."""
     face = np.diag([1.0, -1.0, -1.0]) if flip else np.eye(3)
-    return rotation(package.turn_x_deg, package.turn_y_deg, package.turn_z_deg) @ face @ rotation(0, 0, mount_deg)
+    turned = rotation(package.turn_x_deg, package.turn_y_deg, package.turn_z_deg)
+    return np.asarray(turned @ face @ rotation(0, 0, mount_deg))
 
 
 @kernel
-def along_y(package: Any, gx: float, gy: float) -> float:
+def along_y(package: Package, gx: float, gy: float) -> float:
     """Load along the y beam, which need not be square to the x beam."""
     off = math.radians(package.beams_off_square_deg)
     return gy * math.cos(off) + gx * math.sin(off)
 
 
 @kernel
-def felt_g(up: Any, mount: Any, alpha_rad: float, beta_rad: float) -> tuple[float, float, float]:
+def felt_g(up: Floats, mount: Floats, alpha_rad: float, beta_rad: float) -> tuple[float, float, float]:
     """Specific force in the package's frame, in g, at true stage angles."""
     ca, sa = math.cos(alpha_rad), math.sin(alpha_rad)
     cb, sb = math.cos(beta_rad), math.sin(beta_rad)

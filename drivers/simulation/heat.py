@@ -8,9 +8,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 from drivers.simulation.kernel import kernel
+
+if TYPE_CHECKING:
+    from drivers.simulation.state import State
 
 
 @dataclass(frozen=True)
@@ -51,14 +54,14 @@ def lagged(value: float, target: float, step_s: float, lag_s: float) -> float:
 
 
 @kernel
-def ambient_c(heat: Any, t_s: float, wander_k: float) -> float:
+def ambient_c(heat: Heat, t_s: float, wander_k: float) -> float:
     """Room temperature."""
     cycle = heat.ambient_cycle_k * math.sin(2 * math.pi * t_s / heat.ambient_cycle_s)
-    return heat.ambient_c + heat.ambient_ramp_k_per_h * t_s / 3600 + cycle + wander_k  # type: ignore[no-any-return]
+    return heat.ambient_c + heat.ambient_ramp_k_per_h * t_s / 3600 + cycle + wander_k
 
 
 @kernel
-def heater_power(world: Any, oven: Any, step_s: float) -> float:
+def heater_power(world: State, oven: Oven, step_s: float) -> float:
     """Power of the heater, 0 to 1; the integral waits while the heater is at a limit."""
     if world.oven_running == 0:
         world.oven_integral = 0.0
@@ -71,7 +74,7 @@ def heater_power(world: Any, oven: Any, step_s: float) -> float:
 
 
 @kernel
-def tick(world: Any, heat: Any, oven: Any, t_s: float, step_s: float, normal: float) -> None:
+def tick(world: State, heat: Heat, oven: Oven, t_s: float, step_s: float, normal: float) -> None:
     """Advance all temperatures by one tick that ends at `t_s`."""
     world.wander_k = wandered(world.wander_k, heat.ambient_wander_k, heat.ambient_wander_s, step_s, normal)
     heated = ambient_c(heat, t_s, world.wander_k) + oven.heater_k * heater_power(world, oven, step_s)
@@ -85,9 +88,9 @@ def tick(world: Any, heat: Any, oven: Any, t_s: float, step_s: float, normal: fl
 
 
 @kernel
-def die_c(world: Any) -> float:
+def die_c(world: State) -> float:
     """Temperature of the silicon."""
-    return world.body_c + world.board_k + world.package_k  # type: ignore[no-any-return]
+    return world.body_c + world.board_k + world.package_k
 
 
 @kernel

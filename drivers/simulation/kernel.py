@@ -7,7 +7,7 @@ the same names (`record`), so that a kernel reads `config.heat.ambient_c` as the
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import fields
+from dataclasses import fields, is_dataclass
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
@@ -15,9 +15,14 @@ from typing import Any, TypeVar, cast
 
 import numba
 import numpy as np
+from numba.core import config as settings
+from numpy.typing import NDArray
 from platformdirs import user_cache_path
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+Values = TypeVar("Values")
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 
 def kernel(function: Function) -> Function:
@@ -25,11 +30,11 @@ def kernel(function: Function) -> Function:
 
     The compiler alone would notice a change in the function's own file, but not in those it calls.
     """
-    kept, numba.config.CACHE_DIR = numba.config.CACHE_DIR, _cache_folder()
+    kept, settings.CACHE_DIR = settings.CACHE_DIR, _cache_folder()  # type: ignore[attr-defined]
     try:
         return cast(Function, numba.njit(cache=True, error_model="numpy")(function))
     finally:
-        numba.config.CACHE_DIR = kept
+        settings.CACHE_DIR = kept  # type: ignore[attr-defined]
 
 
 @cache
@@ -39,16 +44,21 @@ def _cache_folder() -> str:
     return str(user_cache_path("inertial-rig") / "kernels" / digest)
 
 
-def record(settings: Any) -> Any:
-    """A record with the names and numbers of a (nested) dataclass of floats."""
-    return np.array([_values(settings)], dtype=_layout(settings))[0]
+def record(values: Values) -> Values:
+    """A record with the names and values of a (nested) dataclass of numbers and arrays.
+
+    It stands in for the dataclass: the same names hold the same kinds of values, and can be set.
+    """
+    return cast(Values, np.array([_contents(values)], dtype=_layout(values))[0])
 
 
-def _layout(settings: Any) -> np.dtype[Any]:
-    items = [(f.name, getattr(settings, f.name)) for f in fields(settings)]
-    return np.dtype([(name, "f8" if isinstance(value, float) else _layout(value)) for name, value in items])
+def _layout(values: Any) -> Any:
+    """Record layout of a dataclass; of a number or an array, its type and shape."""
+    if not is_dataclass(values):
+        array = np.asarray(values)
+        return (array.dtype, array.shape)
+    return np.dtype((np.record, [(f.name, _layout(getattr(values, f.name))) for f in fields(values)]))
 
 
-def _values(settings: Any) -> tuple[Any, ...]:
-    values = (getattr(settings, f.name) for f in fields(settings))
-    return tuple(value if isinstance(value, float) else _values(value) for value in values)
+def _contents(values: Any) -> Any:
+    return tuple(_contents(getattr(values, f.name)) for f in fields(values)) if is_dataclass(values) else values

@@ -7,19 +7,20 @@ events nothing changes but the filter, which is exact. So no result depends on h
 
 from __future__ import annotations
 
-from typing import Any
-
 from drivers.simulation import friction, gravity, heat, noise, oddities, plates, springs, stage, supply
-from drivers.simulation.kernel import kernel
+from drivers.simulation.config import WorldConfig
+from drivers.simulation.kernel import Floats, kernel
+from drivers.simulation.state import State
 
 TICK_NS = 100_000_000
 TICK_S = 1e-9 * TICK_NS
+STEP_NS = 2_000_000  # of the mechanics while a stage turns
 NORMALS = noise.NORMALS + 3  # random numbers of one tick
 REFERENCE_C = 25.0  # at which the factory trimmed the sensor
 
 
 @kernel
-def run_to(world: Any, config: Any, t_ns: int, step_ns: int, normals: Any) -> int:
+def run_to(world: State, config: WorldConfig, t_ns: int, step_ns: int, normals: Floats) -> int:
     """Let everything due up to `t_ns` happen; returns how many rows of `normals` (ticks) were used."""
     used = 0
     event_ns = next_event_ns(world, step_ns)
@@ -37,18 +38,18 @@ def run_to(world: Any, config: Any, t_ns: int, step_ns: int, normals: Any) -> in
 
 
 @kernel
-def next_event_ns(world: Any, step_ns: int) -> int:
+def next_event_ns(world: State, step_ns: int) -> int:
     """The next tick, or the next step of a stage that turns, or the moment at which it stands."""
     event = (world.ticks + 1) * TICK_NS
     for axis in range(2):
         rest = world.rest_ns[axis]
         if world.mechanics_ns < rest:
             event = min(event, rest, (world.mechanics_ns // step_ns + 1) * step_ns)
-    return event  # type: ignore[no-any-return]
+    return event
 
 
 @kernel
-def tick(world: Any, config: Any, normals: Any) -> None:
+def tick(world: State, config: WorldConfig, normals: Floats) -> None:
     """Advance the slow processes to the present tick."""
     t_s = world.ticks * TICK_S
     heat.tick(world, config.heat, config.oven, t_s, TICK_S, normals[0])
@@ -58,7 +59,7 @@ def tick(world: Any, config: Any, normals: Any) -> None:
 
 
 @kernel
-def update(world: Any, config: Any, t_ns: int) -> None:
+def update(world: State, config: WorldConfig, t_ns: int) -> None:
     """From the motors' angles at `t_ns` to the volts in front of the filter."""
     world.mechanics_ns = t_ns
     gx, gy, gz = load_g(world, config, 1e-9 * t_ns)
@@ -70,7 +71,7 @@ def update(world: Any, config: Any, t_ns: int) -> None:
 
 
 @kernel
-def load_g(world: Any, config: Any, t_s: float) -> tuple[float, float, float]:
+def load_g(world: State, config: WorldConfig, t_s: float) -> tuple[float, float, float]:
     """Specific force along both sensing beams and out of their plane."""
     a_motor = stage.motor_angle_deg(world.pieces[0], t_s)
     b_motor = stage.motor_angle_deg(world.pieces[1], t_s)
@@ -84,7 +85,7 @@ def load_g(world: Any, config: Any, t_s: float) -> tuple[float, float, float]:
 
 @kernel
 def displaced_nm(
-    world: Any, config: Any, gx: float, gy: float, gz: float, t_s: float
+    world: State, config: WorldConfig, gx: float, gy: float, gz: float, t_s: float
 ) -> tuple[float, float, float]:
     """Displacements of the proof mass in x, y and z."""
     sx, sy, odd = config.sensor.x, config.sensor.y, config.oddities

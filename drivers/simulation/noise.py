@@ -9,13 +9,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drivers.simulation.heat import wandered
-from drivers.simulation.kernel import kernel
+from drivers.simulation.kernel import Floats, kernel
+
+if TYPE_CHECKING:
+    from drivers.simulation.state import State
 
 DECADES = 5  # correlation times 1 s to 10 000 s
 NORMALS = 2 * (DECADES + 1)  # random numbers per tick, both axes
@@ -35,7 +37,7 @@ class Noise:
 
 
 @kernel
-def tick(world: Any, noise: Any, step_s: float, normals: Any) -> None:
+def tick(world: State, noise: Noise, step_s: float, normals: Floats) -> None:
     """Advance flicker noise and random walk of both axes by one tick."""
     for axis in range(2):
         slow = 0.0
@@ -48,18 +50,18 @@ def tick(world: Any, noise: Any, step_s: float, normals: Any) -> None:
 
 
 @kernel
-def kept(world: Any, noise: Any, gap_ns: int) -> float:
+def kept(world: State, noise: Noise, gap_ns: int) -> float:
     """Share of an old value that the filter still holds after `gap_ns`; the last answer is remembered."""
     if gap_ns <= 0:
         return 1.0
     if gap_ns != world.kept_ns:
         world.kept_ns = gap_ns
         world.kept = math.exp(-1e-9 * gap_ns / (noise.filter_ohm * noise.filter_farad))
-    return world.kept  # type: ignore[no-any-return]
+    return world.kept
 
 
 @kernel
-def charge(world: Any, noise: Any, axis: int, t_ns: int) -> None:
+def charge(world: State, noise: Noise, axis: int, t_ns: int) -> None:
     """Let the capacitor of one axis follow the voltage that has stood at its input until `t_ns`."""
     target = world.volts[axis] + world.slow_v[axis]
     share = kept(world, noise, t_ns - world.filtered_ns[axis])
@@ -68,26 +70,27 @@ def charge(world: Any, noise: Any, axis: int, t_ns: int) -> None:
 
 
 @kernel
-def output_v(world: Any, noise: Any, axis: int, t_ns: int, normal: float) -> float:
+def output_v(world: State, noise: Noise, axis: int, t_ns: int, normal: float) -> float:
     """What the capacitor of one axis holds at `t_ns`, noise included."""
     charge(world, noise, axis, t_ns)
     share = kept(world, noise, t_ns - world.white_ns[axis])
     world.white[axis] = share * world.white[axis] + math.sqrt(1 - share * share) * normal
     world.white_ns[axis] = max(t_ns, world.white_ns[axis])
-    return world.filtered_v[axis] + noise.white_v * world.white[axis] + hum_v(noise, t_ns)  # type: ignore[no-any-return]
+    volts: float = world.filtered_v[axis] + noise.white_v * world.white[axis] + hum_v(noise, t_ns)
+    return volts
 
 
 @kernel
-def hum_v(noise: Any, t_ns: int) -> float:
+def hum_v(noise: Noise, t_ns: int) -> float:
     """Pick-up of the leads."""
     if noise.hum_v == 0:
         return 0.0
-    return noise.hum_v * math.sin(2 * math.pi * noise.hum_hz * 1e-9 * t_ns)  # type: ignore[no-any-return]
+    return noise.hum_v * math.sin(2 * math.pi * noise.hum_hz * 1e-9 * t_ns)
 
 
-def hum_mean_v(noise: Noise, middle_s: NDArray[np.float64], interval_s: float, n: int) -> NDArray[np.float64]:
+def hum_mean_v(noise: Noise, middle_s: Floats, interval_s: float, n: int) -> Floats:
     """Mean of the hum over `n` samples around each time of `middle_s`."""
     phase = math.pi * noise.hum_hz * interval_s
     share = 1.0 if math.sin(phase) == 0 else math.sin(n * phase) / (n * math.sin(phase))
-    mean: NDArray[np.float64] = noise.hum_v * share * np.sin(2 * math.pi * noise.hum_hz * middle_s)
+    mean: Floats = noise.hum_v * share * np.sin(2 * math.pi * noise.hum_hz * middle_s)
     return mean

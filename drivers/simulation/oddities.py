@@ -9,9 +9,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 from drivers.simulation.kernel import kernel
+
+if TYPE_CHECKING:
+    from drivers.simulation.state import State
 
 
 @dataclass(frozen=True)
@@ -33,7 +36,7 @@ class Oddities:
 
 
 @kernel
-def tick(world: Any, odd: Any, step_s: float, normal: float) -> None:
+def tick(world: State, odd: Oddities, step_s: float, normal: float) -> None:
     """Pop the lid, or not: the tail of a normal number against the chance of a pop in this tick."""
     chance = math.erfc(abs(normal) / math.sqrt(2.0))
     if chance < step_s / odd.lid_every_s:
@@ -41,7 +44,7 @@ def tick(world: Any, odd: Any, step_s: float, normal: float) -> None:
 
 
 @kernel
-def rock(world: Any, odd: Any, gx: float, gy: float) -> None:
+def rock(world: State, odd: Oddities, gx: float, gy: float) -> None:
     """Let gravity rock the mount between its seats."""
     toward = math.radians(odd.seat_toward_deg)
     load = gx * math.cos(toward) + gy * math.sin(toward)
@@ -50,7 +53,7 @@ def rock(world: Any, odd: Any, gx: float, gy: float) -> None:
 
 
 @kernel
-def displacement_nm(world: Any, odd: Any, beta_deg: float, t_s: float) -> float:
+def displacement_nm(world: State, odd: Oddities, beta_deg: float, t_s: float) -> float:
     """The faults' displacement, the same for both axes."""
     pm = odd.seat_pm * world.seat + odd.lid_pm * world.lid_in
     if t_s >= odd.charge_s:
@@ -58,10 +61,10 @@ def displacement_nm(world: Any, odd: Any, beta_deg: float, t_s: float) -> float:
     away = (beta_deg - odd.tug_middle_deg + 180) % 360 - 180
     if abs(away) < odd.tug_half_width_deg:
         pm += odd.tug_pm * math.cos(math.pi / 2 * away / odd.tug_half_width_deg) ** 2
-    return 1e-3 * pm  # type: ignore[no-any-return]
+    return 1e-3 * pm
 
 
 @kernel
-def stopped_nm(odd: Any, x_nm: float) -> float:
+def stopped_nm(odd: Oddities, x_nm: float) -> float:
     """Travel that a grain of dust takes away."""
-    return -odd.dust_fraction * max(0.0, x_nm - odd.dust_nm)  # type: ignore[no-any-return]
+    return -odd.dust_fraction * max(0.0, x_nm - odd.dust_nm)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 from drivers.simulation.kernel import kernel
 from drivers.simulation.springs import per_g_nm
@@ -39,7 +38,9 @@ def difference(mismatch: float, u: float) -> float:
 
 
 @kernel
-def read_v(plates: Any, resonance_hz: float, x_nm: float, neighbour_nm: float, sag_nm: float, supply_v: float) -> float:
+def read_v(
+    plates: Plates, resonance_hz: float, x_nm: float, neighbour_nm: float, sag_nm: float, supply_v: float
+) -> float:
     """Output in V for a displaced finger; clipped near the rails."""
     m, gap_nm = plates.gap_mismatch_fraction, 1e3 * plates.gap_um
     height = plates.height_step_nm + sag_nm

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from drivers.simulation.config import SensingAxis, WorldConfig
 
 # What a factory or a designer fixes: no imperfection, so no scatter.
-EXACT = {"resonance_hz", "sag_resonance_hz", "gap_um", "zero_g_v", "sensitivity_v_per_g", "worm_cycles", "slip_nm"}
+EXACT = {"resonance_hz", "sag_resonance_hz", "gap_um", "zero_g_v", "sensitivity_v_per_g", "worm_cycles"}
 
 
 @dataclass(frozen=True)
@@ -27,12 +27,11 @@ class Spread:
 def individual(config: WorldConfig, seed: int) -> WorldConfig:
     """One rig drawn from `config.spread`; the same seed draws the same rig."""
     random = np.random.default_rng([seed, 0])
-    zeros, gains = random.standard_normal(2), random.standard_normal(2)
+    trims = random.standard_normal((2, 2))
     fraction = config.spread.imperfection_fraction
-    sensor = _scattered(config.sensor, fraction, random)
-    x, y = (_trimmed(axis, config.spread, *z) for axis, z in zip((sensor.x, sensor.y), zip(zeros, gains, strict=True), strict=True))
-    stages, base = (_scattered(part, fraction, random) for part in (config.stages, config.base))
-    return replace(config, sensor=replace(sensor, x=x, y=y), stages=stages, base=base)
+    stages, base, sensor = (_scattered(part, fraction, random) for part in (config.stages, config.base, config.sensor))
+    x, y = (_trimmed(axis, config.spread, *trim) for axis, trim in zip((sensor.x, sensor.y), trims, strict=True))
+    return replace(config, stages=stages, base=base, sensor=replace(sensor, x=x, y=y))
 
 
 def _trimmed(axis: SensingAxis, spread: Spread, zero: float, gain: float) -> SensingAxis:

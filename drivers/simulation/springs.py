@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 from drivers.simulation.kernel import kernel
 
@@ -39,7 +38,7 @@ def per_g_nm(resonance_hz: float) -> float:
 
 
 @kernel
-def restoring_nm(springs: Any, x_nm: float, warmer_k: float) -> tuple[float, float]:
+def restoring_nm(springs: Springs, x_nm: float, warmer_k: float) -> tuple[float, float]:
     """Restoring force of one axis and its slope, in units of the nominal stiffness."""
     warm = 1 + 1e-6 * springs.stiffening_ppm_per_k * warmer_k
     hard = springs.hardening_per_um2 * 1e-6 * x_nm * x_nm
@@ -48,7 +47,7 @@ def restoring_nm(springs: Any, x_nm: float, warmer_k: float) -> tuple[float, flo
 
 
 @kernel
-def balanced_nm(x: Any, y: Any, gx: float, gy: float, warmer_k: float) -> tuple[float, float]:
+def balanced_nm(x: Springs, y: Springs, gx: float, gy: float, warmer_k: float) -> tuple[float, float]:
     """In-plane displacements that balance the loads (in g): three Newton steps, good to 1e-9 of full scale."""
     load_x, load_y = gx * per_g_nm(x.resonance_hz), gy * per_g_nm(y.resonance_hz)
     dx, dy = load_x, load_y
@@ -64,7 +63,7 @@ def balanced_nm(x: Any, y: Any, gx: float, gy: float, warmer_k: float) -> tuple[
 
 
 @kernel
-def drawn_aside_nm(springs: Any, neighbour_nm: float, sag_nm: float, stress_k: float) -> float:
+def drawn_aside_nm(springs: Springs, neighbour_nm: float, sag_nm: float, stress_k: float) -> float:
     """Displacement that is no balance of forces: foreshortened beams, tilt by sag, package stress."""
     shortened = springs.foreshortening_per_um * neighbour_nm**2 + springs.sag_foreshortening_per_um * sag_nm**2
-    return 1e-3 * (shortened + springs.stress_pm_per_k * stress_k) + springs.sag_tilt_fraction * sag_nm  # type: ignore[no-any-return]
+    return 1e-3 * (shortened + springs.stress_pm_per_k * stress_k) + springs.sag_tilt_fraction * sag_nm

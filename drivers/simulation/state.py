@@ -1,84 +1,87 @@
-"""Everything that the world remembers, as one record: a number or a small array per name."""
+"""Everything that the world remembers. The kernels see it as one record (see kernel)."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
 
 from drivers.simulation import friction, noise, stage
 from drivers.simulation.errors import BadSetting
+from drivers.simulation.kernel import Floats, Ints, record
 
 JSON = dict[str, "JSON"] | list["JSON"] | str | float | int | bool | None
 
-LAYOUT = np.dtype(
-    [
-        ("now_ns", "i8"),
-        ("ticks", "i8"),  # ticks of slow processes so far
-        ("mechanics_ns", "i8"),  # when the mechanics were last brought up to date
-        # stages, mount
-        ("pieces", "f8", (2, stage.PIECES, 4)),
-        ("rest_ns", "i8", (2,)),  # when each stage's move ends
-        ("table_deg", "f8", (2,)),  # behind the gear play
-        ("up", "f8", (3,)),
-        ("mount", "f8", (3, 3)),
-        ("mount_deg", "f8"),
-        ("flip", "i8"),
-        # sensor
-        ("seats_nm", "f8", (2, friction.ELEMENTS)),
-        ("volts", "f8", (2,)),  # in front of the filter, without noise
-        ("powered", "i8"),
-        ("powered_ns", "i8"),  # since when
-        # heat, supply
-        ("wander_k", "f8"),
-        ("chamber_c", "f8"),
-        ("body_c", "f8"),
-        ("board_k", "f8"),
-        ("package_k", "f8"),
-        ("glue_c", "f8"),
-        ("thermocouple_c", "f8"),
-        ("oven_set_c", "f8"),
-        ("oven_running", "i8"),
-        ("oven_integral", "f8"),
-        ("supply_v", "f8"),
-        ("supply_wander_v", "f8"),
-        # noise, filter
-        ("flicker_v", "f8", (2, noise.DECADES)),
-        ("walk_v", "f8", (2,)),
-        ("slow_v", "f8", (2,)),
-        ("filtered_v", "f8", (2,)),
-        ("filtered_ns", "i8", (2,)),
-        ("white", "f8", (2,)),  # in units of its rms
-        ("white_ns", "i8", (2,)),
-        ("kept_ns", "i8"),
-        ("kept", "f8"),
-        # oddities
-        ("seat", "f8"),
-        ("lid_in", "f8"),
-    ]
-)
+
+def zeros(*shape: int, dtype: type = float) -> Callable[[], Any]:
+    """What makes an array of zeros."""
+    return lambda: np.zeros(shape, dtype)
 
 
-def blank() -> Any:
-    """A record of zeros."""
-    return np.zeros(1, LAYOUT)[0]
+@dataclass
+class State:
+    """Times in ns of world time; axis 0 of an array is (alpha, beta) or (x, y)."""
+
+    now_ns: int = 0
+    ticks: int = 0  # of the slow processes, so far
+    mechanics_ns: int = 0  # when the mechanics were last brought up to date
+
+    pieces: Floats = field(default_factory=zeros(2, stage.PIECES, 4))  # the motors' moves, see stage
+    rest_ns: Ints = field(default_factory=zeros(2, dtype=int))  # when each motor's move ends
+    table_deg: Floats = field(default_factory=zeros(2))  # behind the gear play
+    up: Floats = field(default_factory=zeros(3))  # the vertical in the base
+    mount: Floats = field(default_factory=zeros(3, 3))  # package from table
+
+    seats_nm: Floats = field(default_factory=zeros(2, friction.ELEMENTS))  # of the slip elements
+    volts: Floats = field(default_factory=zeros(2))  # in front of the filter, without noise
+    powered: int = 1
+    powered_ns: int = 0  # since when
+
+    wander_k: float = 0.0  # of the room
+    chamber_c: float = 0.0
+    body_c: float = 0.0
+    board_k: float = 0.0  # self-heating
+    package_k: float = 0.0  # self-heating
+    glue_c: float = 0.0  # the temperature that the package stress follows
+    thermocouple_c: float = 0.0
+    oven_set_c: float = 0.0
+    oven_running: int = 0
+    oven_integral: float = 0.0
+    supply_v: float = 0.0
+    supply_wander_v: float = 0.0
+
+    flicker_v: Floats = field(default_factory=zeros(2, noise.DECADES))
+    walk_v: Floats = field(default_factory=zeros(2))
+    slow_v: Floats = field(default_factory=zeros(2))  # sum of both
+    filtered_v: Floats = field(default_factory=zeros(2))  # on the filter's capacitors, without white noise
+    filtered_ns: Ints = field(default_factory=zeros(2, dtype=int))
+    white: Floats = field(default_factory=zeros(2))  # behind the filter, in units of its rms
+    white_ns: Ints = field(default_factory=zeros(2, dtype=int))
+    kept_ns: int = 0  # the filter's last step, and its answer
+    kept: float = 1.0
+
+    seat: float = 0.5  # of a mount that rocks
+    lid_in: float = 0.0  # 1 while a lid is popped in
 
 
-def to_json(world: Any) -> dict[str, JSON]:
+def to_json(world: State) -> dict[str, JSON]:
     """The record as plain numbers and lists."""
-    return {name: world[name].tolist() for name in LAYOUT.names or ()}
+    return {f.name: np.asarray(getattr(world, f.name)).tolist() for f in fields(State)}
 
 
-def from_json(values: dict[str, Any]) -> Any:
+def from_json(values: dict[str, Any]) -> State:
     """The record that `to_json` described.
 
     Raises:
         BadSetting: names are missing or unknown, as in a state kept by another version.
     """
-    if values.keys() != set(LAYOUT.names or ()):
-        odd = ", ".join(sorted(values.keys() ^ set(LAYOUT.names or ())))
-        raise BadSetting(f"world state does not fit this version ({odd}); start the run anew")
-    world = blank()
+    names = {f.name for f in fields(State)}
+    if values.keys() != names:
+        odd = ", ".join(sorted(values.keys() ^ names))
+        raise BadSetting(f"The kept world does not fit this version ({odd})", "Start the run anew")
+    world = record(State())
     for name, value in values.items():
-        world[name] = value
+        setattr(world, name, value)
     return world

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 from drivers.simulation.heat import wandered
 from drivers.simulation.kernel import kernel
+
+if TYPE_CHECKING:
+    from drivers.simulation.state import State
 
 
 @dataclass(frozen=True)
@@ -23,7 +26,7 @@ class Supply:
 
 
 @kernel
-def tick(world: Any, supply: Any, t_s: float, step_s: float, normal: float) -> None:
+def tick(world: State, supply: Supply, t_s: float, step_s: float, normal: float) -> None:
     """Advance the supply by one tick that ends at `t_s`."""
     world.supply_wander_v = wandered(world.supply_wander_v, supply.wander_v, supply.wander_s, step_s, normal)
     cycle = supply.cycle_v * math.sin(2 * math.pi * t_s / supply.cycle_s)

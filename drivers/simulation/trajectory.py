@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
 
 
 @dataclass(frozen=True)
@@ -25,13 +27,13 @@ class Trajectory:
     def direction(self) -> float:
         return math.copysign(1.0, self.target_deg - self.start_deg) if self.target_deg != self.start_deg else 0.0
 
-    @property
+    @cached_property
     def _ramp_s(self) -> float:
         """Length of the acceleration ramp; a short move never reaches its speed."""
         distance = abs(self.target_deg - self.start_deg)
         return min(self.speed_deg_s / self.acceleration_deg_s2, math.sqrt(distance / self.acceleration_deg_s2))
 
-    @property
+    @cached_property
     def _cruise_s(self) -> float:
         distance = abs(self.target_deg - self.start_deg)
         if distance == 0:
@@ -91,9 +93,9 @@ class Trajectory:
         if self.stop_s is not None:
             turns = {t for t in turns if t < self.stop_s} | {max(self.stop_s, self.start_s)}
         times = [*sorted(t for t in turns if t < self.end_s), self.end_s]
-        rates = [self.rate_deg_s(t) for t in times[:-1]] + [0.0]
-        slopes = [(after - rate) / (end - t) for t, end, rate, after in zip(times, times[1:], rates, rates[1:])]
-        return list(zip(times, map(self.angle_deg, times), rates, [*slopes, 0.0]))
+        rates = [*map(self.rate_deg_s, times[:-1]), 0.0]
+        slopes = [(b - a) / (end - t) for (t, end), (a, b) in zip(pairwise(times), pairwise(rates), strict=True)]
+        return list(zip(times, map(self.angle_deg, times), rates, [*slopes, 0.0], strict=True))
 
     def stopped(self, t_s: float) -> Trajectory:
         """The same move with a stop commanded at `t_s`."""

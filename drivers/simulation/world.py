@@ -12,15 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from drivers.simulation import dwell, mechanics, sampling, stage, state
-from drivers.simulation.beginning import beginning, mount
+from drivers.simulation import dwell, gravity, mechanics, sampling, stage, state, visit
+from drivers.simulation.beginning import beginning
 from drivers.simulation.config import WorldConfig
-from drivers.simulation.errors import TimeReversal, UnknownInput, unknown
-from drivers.simulation.kernel import record
+from drivers.simulation.errors import TimeReversal, UnknownInput, nearest
+from drivers.simulation.kernel import Floats, record
 from drivers.simulation.scatter import individual
 from drivers.simulation.trajectory import Trajectory
 
-STEP_NS = 2_000_000  # of the mechanics while a stage turns
 BLOCK_NS = 1000 * mechanics.TICK_NS  # of a long wait: bounds the memory for random numbers
 
 
@@ -32,13 +31,11 @@ class World:
         self._numbers = record(self.config)
         self._slow = np.random.Generator(np.random.PCG64([seed, 1]))
         self._fast = np.random.Generator(np.random.PCG64([seed, 2]))
-        self._world = beginning(self.config, self._slow)
-        mechanics.update(self._world, self._numbers, 0)
-        self._world["filtered_v"] = self._world["volts"] + self._world["slow_v"]
+        self._world = beginning(self.config, self._numbers, self._slow)
 
     @property
     def now_s(self) -> float:
-        return float(1e-9 * self._world["now_ns"])
+        return float(1e-9 * self._world.now_ns)
 
     def advance(self, t_s: float) -> None:
         """Let time pass until `t_s`. Raises TimeReversal."""
@@ -46,38 +43,38 @@ class World:
 
     def move_stage(self, axis: str, trajectory: Trajectory) -> None:
         """Let the motor of `axis` ("alpha" or "beta") follow `trajectory` from now on."""
-        number, pieces = _place(axis, stage.AXES, "stage"), trajectory.pieces()
-        self._world["pieces"][number] = (pieces + pieces[-1:] * stage.PIECES)[: stage.PIECES]
-        self._world["rest_ns"][number] = round(1e9 * pieces[-1][0])
+        number = _place(axis, stage.AXES, "stage")
+        self._world.pieces[number] = stage.motion(trajectory)
+        self._world.rest_ns[number] = round(1e9 * trajectory.end_s)
 
     def motor_angle_deg(self, axis: str) -> float:
         """Where the motor of `axis` stands now."""
-        return float(stage.motor_angle_deg(self._world["pieces"][_place(axis, stage.AXES, "stage")], self.now_s))
+        return float(stage.motor_angle_deg(self._world.pieces[_place(axis, stage.AXES, "stage")], self.now_s))
 
     def mount_sensor(self, mount_deg: float = 0.0, flip: int = 0) -> None:
         """Put the sensor on the table turned by `mount_deg` about its z axis, face down if `flip`."""
-        mount(self._world, self.config, mount_deg, flip)
+        self._world.mount = gravity.mounting(self.config.sensor.package, mount_deg, flip)
 
     def power(self, on: bool) -> None:
         """Switch the sensor's supply. Without it the outputs fall to 0 V and the sensor cools."""
-        if on and not self._world["powered"]:
-            self._world["powered_ns"] = self._world["now_ns"]
-        self._world["powered"] = int(on)
+        if on and not self._world.powered:
+            self._world.powered_ns = self._world.now_ns
+        self._world.powered = int(on)
 
     def powered_s(self) -> float:
         """Seconds since the sensor was powered; 0 while it is not."""
-        return float(1e-9 * (self._world["now_ns"] - self._world["powered_ns"]) * self._world["powered"])
+        return float(1e-9 * (self._world.now_ns - self._world.powered_ns) * self._world.powered)
 
     def oven_set(self, set_point_c: float, running: bool) -> None:
         """Give the oven's controller a set point, and run it or not."""
-        self._world["oven_set_c"] = set_point_c
-        self._world["oven_running"] = int(running)
+        self._world.oven_set_c = set_point_c
+        self._world.oven_running = int(running)
 
     def thermometer_c(self) -> float:
         """What the thermocouple on the sensor's package shows now."""
-        return float(self._world["thermocouple_c"])
+        return float(self._world.thermocouple_c)
 
-    def adc_volts(self, inputs: Sequence[str], start_s: float, interval_s: float, n: int) -> NDArray[np.float64]:
+    def adc_volts(self, inputs: Sequence[str], start_s: float, interval_s: float, n: int) -> Floats:
         """Volts at the converter's inputs, shape (n, len(inputs)), before rounding to codes.
 
         Scan i begins at `start_s + i * interval_s`; the k-th input follows k times the converter's skew later.
@@ -94,7 +91,7 @@ class World:
         if n:
             self._advance_ns(start_ns)
             fast, slow = self._fast.standard_normal((*volts.shape, 2)), self._due(int(times_ns[-1]))
-            sampling.sample(self._world, self._numbers, channels, times_ns, STEP_NS, fast, slow, volts)
+            sampling.sample(self._world, self._numbers, channels, times_ns, fast, slow, volts)
         return volts
 
     def dwell_mean(
@@ -110,37 +107,20 @@ class World:
     ) -> dict[str, NDArray[Any]]:
         """Visit poses in order (arrays or scalars) and hold each: the columns of a table of poses.
 
-        `timing` are the fields of `dwell.Timing`: dwell_s, interval_s, settle_s, speed_deg_s, acceleration_deg_s2.
+        `timing` are the fields of `visit.Timing`: dwell_s, interval_s, settle_s, speed_deg_s, acceleration_deg_s2.
         t_s is the middle of the dwell, in seconds since the sensor was powered. `noise_free` leaves out the
         noise of sensor and converter, not the wander of room and supply. The world is at the end of the
         last dwell afterwards.
         """
-        visited = dwell.poses(alpha_deg, beta_deg, direction, mount_deg, flip)
-        pace = dwell.Timing(**timing)
-        means = np.empty((len(visited.alpha_deg), dwell.COLUMNS))
-        ends_s = np.array([self._hold(visited, i, pace, means[i]) for i in range(len(means))])
-        middle_s = ends_s - pace.samples * pace.interval_s / 2
-        powered_s = middle_s - 1e-9 * self._world["powered_ns"]
+        visited, pace = visit.poses(alpha_deg, beta_deg, direction, mount_deg, flip), visit.Timing(**timing)
+        motors = self.motor_angle_deg("alpha"), self.motor_angle_deg("beta")
+        plan = visit.plan(visited, pace, self.config.sensor.package, self.now_s, motors)
+        slow, numbers = self._due(int(plan.dwell_ns[-1, 1])), self._numbers
+        means = visit.visit(self._world, numbers, plan.motions, plan.rest_ns, plan.dwell_ns, plan.mounts, slow)
+        middle_s = 1e-9 * plan.dwell_ns.mean(axis=1)
         random = None if noise_free else self._fast
-        noise, converter = self.config.noise, self.config.converter
-        return dwell.columns(visited, means, middle_s, powered_s, noise, converter, pace, random)
-
-    def _hold(self, visited: dwell.Poses, i: int, pace: dwell.Timing, means: NDArray[np.float64]) -> float:
-        """Move to one pose and fill `means` there; returns when the dwell ended."""
-        if (visited.mount_deg[i], visited.flip[i]) != (self._world["mount_deg"], self._world["flip"]):
-            self.mount_sensor(float(visited.mount_deg[i]), int(visited.flip[i]))
-        arrival_s = self.now_s
-        for axis, target in (("alpha", visited.alpha_deg[i]), ("beta", visited.beta_deg[i])):
-            here = self.motor_angle_deg(axis)
-            if here != target:
-                move = Trajectory(arrival_s, here, float(target), pace.speed_deg_s, pace.acceleration_deg_s2)
-                self.move_stage(axis, move)
-                arrival_s = move.end_s
-        start_ns = round(1e9 * (arrival_s + pace.settle_s))
-        end_ns = start_ns + round(1e9 * pace.samples * pace.interval_s)
-        slow = self._due(end_ns)
-        dwell.hold(self._world, self._numbers, start_ns, end_ns, dwell.STEP_NS, slow, means)
-        return 1e-9 * end_ns
+        measured = dwell.columns(means, middle_s, self.config.noise, self.config.converter, pace, random)
+        return vars(visited) | measured | {"t_s": middle_s - 1e-9 * self._world.powered_ns}
 
     def state(self) -> dict[str, state.JSON]:
         """All that the world remembers, as JSON: restored, it continues sample for sample."""
@@ -158,22 +138,24 @@ class World:
 
     def _later_ns(self, t_s: float) -> int:
         """`t_s` in ns; a nanosecond of rounding is forgiven."""
-        t_ns, now_ns = round(1e9 * t_s), int(self._world["now_ns"])
+        t_ns, now_ns = round(1e9 * t_s), int(self._world.now_ns)
         if t_ns < now_ns - 1:
-            raise TimeReversal(f"the world is at {self.now_s:.9f} s and cannot go back to {t_s:.9f} s")
+            raise TimeReversal(
+                f"The world is at {self.now_s:.9f} s, past {t_s:.9f} s", "Ask for a later time"
+            )
         return max(t_ns, now_ns)
 
     def _advance_ns(self, t_ns: int) -> None:
-        for stop_ns in (*range(int(self._world["now_ns"]) + BLOCK_NS, t_ns, BLOCK_NS), t_ns):
-            mechanics.run_to(self._world, self._numbers, stop_ns, STEP_NS, self._due(stop_ns))
+        for stop_ns in (*range(int(self._world.now_ns) + BLOCK_NS, t_ns, BLOCK_NS), t_ns):
+            mechanics.run_to(self._world, self._numbers, stop_ns, mechanics.STEP_NS, self._due(stop_ns))
 
-    def _due(self, t_ns: int) -> NDArray[np.float64]:
+    def _due(self, t_ns: int) -> Floats:
         """The random numbers of all ticks up to `t_ns`, one row each."""
-        ticks = max(0, t_ns // mechanics.TICK_NS - int(self._world["ticks"]))
+        ticks = max(0, t_ns // mechanics.TICK_NS - int(self._world.ticks))
         return self._slow.standard_normal((ticks, mechanics.NORMALS))
 
 
 def _place(name: str, names: tuple[str, ...], what: str) -> int:
     if name not in names:
-        raise UnknownInput(unknown(what, name, names))
+        raise UnknownInput(f"The simulated world has no {what} {name!r}", nearest(name, names))
     return names.index(name)

@@ -1,0 +1,131 @@
+"""A visit of poses: planned as motions and dwells, then run through in one go by the same mechanics."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from drivers.simulation.config import WorldConfig
+from drivers.simulation.gravity import Package, mounting
+from drivers.simulation.kernel import Floats, Ints, kernel
+from drivers.simulation.mechanics import next_event_ns, run_to
+from drivers.simulation.stage import motion
+from drivers.simulation.state import State
+from drivers.simulation.trajectory import Trajectory, at_rest
+
+STEP_NS = 25_000_000  # of the mechanics while a stage turns: half a degree at 20 deg/s
+MEANS = 6  # of a dwell: x, y without noise; slow noise of x, y; thermocouple; supply
+
+
+@dataclass(frozen=True)
+class Poses:
+    """Poses in the order of the visit: motor angles, direction of beta, mount; arrays of one length."""
+
+    alpha_deg: Floats
+    beta_deg: Floats
+    direction: Ints
+    mount_deg: Floats
+    flip: Ints
+
+
+@dataclass(frozen=True)
+class Timing:
+    """How poses are visited: alpha moves, then beta, then the rig settles, then it dwells."""
+
+    dwell_s: float = 5.0
+    interval_s: float = 1e-3  # between samples
+    settle_s: float = 0.5
+    speed_deg_s: float = 20.0
+    acceleration_deg_s2: float = 40.0
+
+    @property
+    def samples(self) -> int:
+        return max(1, round(self.dwell_s / self.interval_s))
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What the rig does at each of n poses."""
+
+    motions: Floats  # (n, 2, pieces, 4) of alpha and beta, see stage
+    rest_ns: Ints  # (n, 2) when each stage stands
+    dwell_ns: Ints  # (n, 2) start and end of the dwell
+    mounts: Floats  # (n, 3, 3) package from table
+
+
+def poses(
+    alpha_deg: ArrayLike, beta_deg: ArrayLike, direction: ArrayLike | None, mount_deg: ArrayLike, flip: ArrayLike
+) -> Poses:
+    """Poses from arrays or scalars; the direction follows from the path unless it is given."""
+    alpha, beta, mount = (np.asarray(v, dtype=np.float64) for v in (alpha_deg, beta_deg, mount_deg))
+    alpha, beta, mount, face = np.broadcast_arrays(np.atleast_1d(alpha), beta, mount, np.asarray(flip, dtype=np.int64))
+    way = path_direction(beta) if direction is None else np.asarray(direction, dtype=np.int64)
+    return Poses(alpha, beta, np.broadcast_to(way, alpha.shape), mount, face)
+
+
+def path_direction(beta_deg: Floats) -> Ints:
+    """Sign of the move of beta to each pose; where beta stood, that of the move after it."""
+    way = np.sign(np.diff(beta_deg, prepend=beta_deg[:1])).astype(np.int64)
+    return np.where(way == 0, np.append(way[1:], 0), way)
+
+
+def plan(visited: Poses, timing: Timing, package: Package, now_s: float, motors_deg: tuple[float, float]) -> Plan:
+    """The visit of all poses from `now_s` on, with the motors at `motors_deg` (alpha, beta)."""
+    moves = [at_rest(angle) for angle in motors_deg]
+    tables = [motion(move) for move in moves]
+    motions, rests, dwells = [], [], []
+    for target in zip(visited.alpha_deg.tolist(), visited.beta_deg.tolist(), strict=True):
+        for axis, angle in enumerate(target):
+            here = moves[axis].target_deg
+            if angle != here:
+                moves[axis] = Trajectory(now_s, here, angle, timing.speed_deg_s, timing.acceleration_deg_s2)
+                tables[axis] = motion(moves[axis])
+                now_s = moves[axis].end_s
+        start_s = now_s + timing.settle_s
+        now_s = start_s + timing.samples * timing.interval_s
+        motions.append(tuple(tables))
+        rests.append([move.end_s for move in moves])
+        dwells.append([start_s, now_s])
+    mount = cache(lambda mount_deg, flip: mounting(package, mount_deg, flip))
+    mounts = np.array(list(map(mount, visited.mount_deg, visited.flip)))
+    return Plan(np.array(motions), _nanoseconds(rests), _nanoseconds(dwells), mounts)
+
+
+def _nanoseconds(seconds: list[list[float]]) -> Ints:
+    return np.rint(1e9 * np.array(seconds)).astype(np.int64)
+
+
+@kernel
+def visit(
+    world: State, config: WorldConfig, motions: Floats, rest_ns: Ints, dwell_ns: Ints, mounts: Floats, normals: Floats
+) -> Floats:
+    """Run through a plan; `normals` holds a row per tick. Means over the dwells, shape (n, MEANS)."""
+    means = np.zeros((len(motions), MEANS))
+    used = 0
+    for i in range(len(means)):
+        world.pieces[:] = motions[i]
+        world.rest_ns[:] = rest_ns[i]
+        world.mount[:] = mounts[i]
+        used += hold(world, config, dwell_ns[i, 0], dwell_ns[i, 1], normals[used:], means[i])
+    return means
+
+
+@kernel
+def hold(world: State, config: WorldConfig, start_ns: int, end_ns: int, normals: Floats, means: Floats) -> int:
+    """Run to a dwell and through it, add up its `means` (MEANS,); returns how many rows of `normals` were used."""
+    used = run_to(world, config, start_ns, STEP_NS, normals)
+    t_ns = start_ns
+    while t_ns < end_ns:
+        after_ns = min(next_event_ns(world, STEP_NS), end_ns)
+        share = (after_ns - t_ns) / (end_ns - start_ns)
+        for axis in range(2):
+            means[axis] += share * world.volts[axis]
+            means[2 + axis] += share * world.slow_v[axis]
+        means[4] += share * world.thermocouple_c
+        means[5] += share * world.supply_v * world.powered
+        used += run_to(world, config, after_ns, STEP_NS, normals[used:])
+        t_ns = after_ns
+    return used
