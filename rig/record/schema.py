@@ -16,6 +16,7 @@ runs = Table(
     Column("state", String, nullable=False),  # running, complete, stopped, failed
     Column("settings", JSON, nullable=False),
     Column("bench", JSON, nullable=False),  # the whole configuration, as it was
+    Column("identities", JSON, nullable=False),  # of the instruments, by role
     Column("configuration", String, nullable=False),  # hash of procedure, settings and bench
     Column("constants", JSON, nullable=False),
     Column("source", String, nullable=False),

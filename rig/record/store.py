@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import secrets
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
@@ -25,6 +26,7 @@ from rig.home import home
 from rig.nearest import did_you_mean
 from rig.record import codec
 from rig.record.file import open_file
+from rig.record.lease import is_held
 from rig.record.schema import blocks, columns, events, poses, runs, states
 from rig.record.values import Block, Event, Kept, Run
 
@@ -62,13 +64,14 @@ class Record:
         settings: Mapping[str, Any],
         *,
         bench: Mapping[str, Any],
+        identities: Mapping[str, Any],
         configuration: str,
         constants: Mapping[str, str | float],
         source: str,
     ) -> str:
         """A new run of `procedure`, in the state "running"; its id."""
         values = {"kind": "poses", "procedure": procedure, "state": "running", "settings": dict(settings)}
-        values |= {"bench": dict(bench), "configuration": configuration}
+        values |= {"bench": dict(bench), "identities": dict(identities), "configuration": configuration}
         with self._engine.begin() as to:
             return _new_run(to, values | {"constants": dict(constants), "source": source})
 
@@ -108,12 +111,14 @@ class Record:
         """An imported table as a run of its own; its id."""
         values = {"kind": table.kind, "procedure": "import", "state": "complete", "settings": {}, "bench": {}}
         values |= {"configuration": table.digest, "constants": dict(table.constants), "source": table.source}
-        numbers = [{"name": k, "numbers": v.astype("<f8").tobytes()} for k, v in table.columns.items()]
-        texts = [{"name": k, "texts": list(v)} for k, v in table.labels.items()]
+        cells: list[dict[str, Any]] = [
+            *({"name": name, "numbers": column.astype("<f8").tobytes()} for name, column in table.columns.items()),
+            *({"name": name, "texts": list(column)} for name, column in table.labels.items()),
+        ]
         with self._engine.begin() as to:
             run = _new_run(to, values | {"ended": _now()})
-            for position, column in enumerate([*numbers, *texts]):
-                to.execute(insert(columns), {**column, "run": run, "position": position})
+            for position, cell in enumerate(cells):
+                to.execute(insert(columns), {**cell, "run": run, "position": position})
         return run
 
     # reading
@@ -121,14 +126,15 @@ class Record:
     def runs(self) -> list[Run]:
         """Every run, newest first."""
         with self._engine.connect() as at:
-            return [Run(**row._mapping) for row in at.execute(_select_runs().order_by(text("runs.rowid DESC")))]
+            rows = at.execute(_select_runs().order_by(text("runs.rowid DESC")))
+            return [self._seen(Run(**row._mapping)) for row in rows]
 
     def run(self, run: str) -> Run:
         """One run. Raises UnknownRun with the nearest name."""
         with self._engine.connect() as at:
             row = at.execute(_select_runs().where(runs.c.run == run)).one_or_none()
             if row is not None:
-                return Run(**row._mapping)
+                return self._seen(Run(**row._mapping))
             known = at.execute(select(runs.c.run)).scalars().all()
         raise UnknownRun(f"no run {run!r} in {self.path}.{did_you_mean(run, known[-20:])}")
 
@@ -166,6 +172,12 @@ class Record:
         numbers = {row.name: np.frombuffer(row.numbers, "<f8") for row in rows if row.numbers is not None}
         return numbers, {row.name: tuple(row.texts) for row in rows if row.numbers is None}
 
+    def _seen(self, run: Run) -> Run:
+        """A run that says "running" though no process holds it was killed: it is stopped, and can be resumed."""
+        if run.state != "running" or is_held(self.folder, run.run):
+            return run
+        return replace(run, state="stopped", message="its process was killed")
+
 
 def _now() -> str:
     return datetime.now(UTC).isoformat(timespec="milliseconds")
@@ -174,7 +186,7 @@ def _now() -> str:
 def _new_run(to: Connection, values: Mapping[str, Any]) -> str:
     """Its id sorts by time and reads well: 20261121-093012-sweep-a1b."""
     run = f"{datetime.now(UTC):%Y%m%d-%H%M%S}-{values['procedure']}-{secrets.token_hex(2)[:3]}"
-    to.execute(insert(runs), {"results": {}, **values, "run": run, "created": _now()})
+    to.execute(insert(runs), {"results": {}, "identities": {}, **values, "run": run, "created": _now()})
     return run
 
 

@@ -25,6 +25,7 @@ class Run:
     state: str
     settings: Mapping[str, Any]
     bench: Mapping[str, Any]
+    identities: Mapping[str, Any]
     configuration: str
     constants: Mapping[str, str | float]
     source: str

@@ -1,0 +1,199 @@
+"""The bench file: which instrument plays which role, where it is, and what must not be exceeded.
+
+Unknown keys are refused with file, key and nearest key. An instrument whose url is `simulated` is served in this
+process by the twin of its driver, in the world that the file describes; `simulated:ADDRESS` says where it listens.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import importlib
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
+
+from drivers.links.address import Address
+from drivers.simulation.config import WorldConfig
+from drivers.simulation.errors import SimulationError
+from procedures.session import Limits
+from rig.errors import BenchError
+from rig.nearest import did_you_mean
+
+DEFAULT = Path(__file__).with_name("bench_default.yaml")
+SIMULATED = "simulated"
+ROLES = ("alpha", "beta", "adc", "oven")
+
+
+class Strict(BaseModel):
+    """A part of the file: its keys are these and no others."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Instrument(Strict):
+    """One instrument: a driver's name, an address, and settings that the driver declares."""
+
+    driver: str
+    url: str
+    unit: int = 1
+    stream_url: str | None = None
+    settings: dict[str, Any] = {}
+
+    @property
+    def simulated(self) -> bool:
+        return self.url.partition(":")[0] == SIMULATED
+
+    @property
+    def listen(self) -> str | None:
+        """Where its twin listens, if the file says so."""
+        return self.url.partition(":")[2] or None
+
+    @property
+    def address(self) -> Address:
+        return Address(self.url, self.unit, self.stream_url)
+
+    def typed_settings(self) -> Any:
+        """The driver's frozen Settings. Raises ValidationError."""
+        kind = importlib.import_module(f"drivers.{self.driver}").Settings
+        checker = create_model("Checked", settings=(kind, ...), __config__=ConfigDict(extra="forbid"))
+        return checker(settings=self.settings).settings  # type: ignore[attr-defined]
+
+
+class Sensor(Strict):
+    """The sensor under test; these become constants of every table."""
+
+    name: str = "sensor"
+    serial: str = ""
+    gravity_m_s2: float = 9.80665
+    filter_corner_hz: float | None = None
+
+
+class Folders(Strict):
+    """The user's own effects and procedures."""
+
+    effects: Path | None = None
+    procedures: Path | None = None
+
+
+class Bench(Strict):
+    """A checked bench file. `read_bench` makes it."""
+
+    name: str = "bench"
+    seed: int = Field(default=1, ge=0)
+    instruments: dict[str, Instrument]
+    sensor: Sensor = Sensor()
+    limits: Limits = Limits()
+    world: dict[str, Any] = {}
+    folders: Folders = Folders()
+
+    @property
+    def simulated(self) -> bool:
+        """Whether every instrument is a twin; then time is simulated too."""
+        return all(instrument.simulated for instrument in self.instruments.values())
+
+    @property
+    def constants(self) -> dict[str, str | float]:
+        """What every table from this bench says of the sensor."""
+        sensor = self.sensor.model_dump(exclude_none=True)
+        return {"sensor": sensor.pop("name"), **{key: value for key, value in sensor.items() if value != ""}}
+
+    def document(self) -> dict[str, Any]:
+        """The whole configuration as JSON; `Bench.model_validate` reads it back."""
+        return self.model_dump(mode="json")
+
+    def configuration(self, procedure: str, settings: Mapping[str, Any]) -> str:
+        """Hash of all that a run depends on: procedure, settings, bench."""
+        text = json.dumps([procedure, settings, self.document()])
+        return hashlib.sha256(text.encode()).hexdigest()
+
+
+def read_bench(path: Path | None = None) -> Bench:
+    """The bench in the file `path`; without one, the simulated rig.
+
+    Raises BenchError with file, key and nearest key.
+    """
+    path = path or DEFAULT
+    try:
+        document = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise BenchError(f"{path}: the bench file cannot be read: {error.strerror}") from None
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise BenchError(f"{path}: is not a YAML file: {error}") from None
+    if not isinstance(document, dict):
+        raise BenchError(f"{path}: a bench file is a mapping that begins with `instruments:`")
+    return _checked(document, path)
+
+
+def _checked(document: dict[str, Any], path: Path) -> Bench:
+    try:
+        bench = Bench.model_validate(document)
+    except ValidationError as error:
+        raise BenchError(_told(error, path, Bench)) from None
+    for role, instrument in bench.instruments.items():
+        _check_instrument(role, instrument, path)
+    try:
+        WorldConfig.from_mapping(bench.world)
+    except SimulationError as error:
+        raise BenchError(f"{path}, key world: {error}") from None
+    return bench.model_copy(update={"folders": _beside(bench.folders, path)})
+
+
+def _check_instrument(role: str, instrument: Instrument, path: Path) -> None:
+    key = f"{path}, key instruments.{role}"
+    if role not in ROLES:
+        raise BenchError(f"{key}: no such role.{did_you_mean(role, ROLES)}")
+    if instrument.driver not in drivers():
+        raise BenchError(f"{key}.driver: no driver {instrument.driver!r}.{did_you_mean(instrument.driver, drivers())}")
+    try:
+        instrument.typed_settings()
+    except ValidationError as error:
+        kind = importlib.import_module(f"drivers.{instrument.driver}").Settings
+        fault = error.errors()[0]
+        where = ".".join(str(part) for part in fault["loc"])
+        names = [field.name for field in dataclasses.fields(kind)]
+        raise BenchError(f"{key}.{where}: {_fault(fault, names)}") from None
+
+
+def drivers() -> list[str]:
+    """The names of all drivers: the modules that have a `connect`."""
+    folder = Path(importlib.import_module("drivers").__file__ or "").parent
+    return sorted(p.stem for p in folder.glob("*.py") if "\ndef connect(" in p.read_text(encoding="utf-8"))
+
+
+def _beside(folders: Folders, path: Path) -> Folders:
+    """Folders as the file means them: relative to itself. Raises BenchError where there is none."""
+    given = {name: place for name, place in folders if place is not None}
+    found = {name: (path.parent / place.expanduser()).resolve() for name, place in given.items()}
+    for name, place in found.items():
+        if not place.is_dir():
+            raise BenchError(f"{path}, key folders.{name}: there is no folder {place}")
+    return Folders(**found)
+
+
+def _told(error: ValidationError, path: Path, model: type[BaseModel]) -> str:
+    """The first fault, with the key's place in the file."""
+    fault = error.errors()[0]
+    where = [str(part) for part in fault["loc"]]
+    return f"{path}, key {'.'.join(where)}: {_fault(fault, _keys(model, where[:-1]))}"
+
+
+def _fault(fault: Any, keys: list[str]) -> str:
+    if fault["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
+        return f"no such key.{did_you_mean(str(fault['loc'][-1]), keys)}"
+    if fault["type"] == "missing":
+        return "is missing"
+    return f"{fault['msg']}, is {fault['input']!r}"
+
+
+def _keys(model: Any, where: list[str]) -> list[str]:
+    """The keys that are known at a place of the file."""
+    parts = {"instruments": Instrument, "sensor": Sensor, "folders": Folders, "limits": Limits}
+    part = parts.get(where[0], model) if where else model
+    if dataclasses.is_dataclass(part):
+        return [field.name for field in dataclasses.fields(part)]
+    return list(part.model_fields)

@@ -1,0 +1,85 @@
+"""A dry run: the procedure itself on instruments that only count what they are told. Nothing is touched.
+
+Each move, the limits that it stays within, how long all of it takes, the room that it needs on the disk.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from procedures.catalogue import Procedure
+from procedures.session import Pose, Samples, Session
+from rig.bench import ROLES, Bench
+from rig.instruments import Absent
+from rig.planned import Ledger, PlannedAdc, PlannedOven, PlannedStage, Step
+
+BYTES_PER_SAMPLE = 0.4  # in the record, measured on a sweep; an estimate for other noise
+BYTES_PER_POSE = 512  # the rest of a pose in the record
+PLANNED = {"alpha": PlannedStage, "beta": PlannedStage, "adc": PlannedAdc, "oven": PlannedOven}
+
+
+@dataclass(frozen=True)
+class Plan:
+    """All that a procedure would do. `reach`: for each stage (lowest, highest) angle and its limits, in deg."""
+
+    procedure: str
+    settings: Mapping[str, Any]
+    steps: tuple[Step, ...]
+    reach: Mapping[str, tuple[tuple[float, float], tuple[float, float]]]
+    questions: tuple[str, ...]
+    poses: int
+    duration_s: float
+    bytes: int
+
+
+@dataclass
+class PlanHost:
+    """The session's host that keeps nothing."""
+
+    ledger: Ledger
+
+    def kept(self) -> Sequence[Pose]:
+        return ()
+
+    def expect(self, missing: int) -> None:
+        """A plan has no progress."""
+
+    def keep(self, pose: Pose, samples: Samples, temperature_c: float | None) -> None:  # noqa: ARG002
+        self.ledger.poses += 1
+
+    def ask(self, name: str, question: str, default: str) -> str:
+        self.ledger.questions.append(f"{name}: {question}")
+        return default
+
+    def doing(self, text: str) -> None:
+        """Its steps say what it does."""
+
+
+def plan(bench: Bench, procedure: Procedure, settings: Mapping[str, Any]) -> Plan:
+    """What `procedure` would do on `bench`. Raises what the run would: LimitError, SettingError, ProcedureError."""
+    ledger = Ledger()
+    parts = _parts(bench, ledger)
+    session = Session(**parts, clock=ledger, host=PlanHost(ledger), limits=bench.limits)
+    session.reference()
+    procedure.function(session, **settings)
+    stages = {role: part for role, part in parts.items() if isinstance(part, PlannedStage)}
+    return Plan(
+        procedure=procedure.name,
+        settings=settings,
+        steps=tuple(ledger.steps),
+        reach={role: (stage.reach, stage.limits) for role, stage in stages.items()},
+        questions=tuple(ledger.questions),
+        poses=ledger.poses,
+        duration_s=ledger.now_s,
+        bytes=round(ledger.samples * BYTES_PER_SAMPLE + ledger.poses * BYTES_PER_POSE),
+    )
+
+
+def _parts(bench: Bench, ledger: Ledger) -> dict[str, Any]:
+    """The planned instruments by role, with the settings of the real ones."""
+    made: dict[str, Any] = {role: Absent(role) for role in ROLES}
+    for role, instrument in bench.instruments.items():
+        made[role] = PLANNED[role](role, instrument.typed_settings(), ledger)
+    return made

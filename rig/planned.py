@@ -1,0 +1,125 @@
+"""Instruments that only count what they are told: a plan's stages, converter and oven, on a plan's clock."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from drivers.errors import LimitError
+from drivers.labjack_t7 import Settings as AdcSettings
+from drivers.omega_cn7500 import Settings as OvenSettings
+from drivers.oriental_az import Settings as StageSettings
+from drivers.simulation.trajectory import Trajectory
+from procedures.session import Samples
+from rig.record.values import Block
+
+EXCHANGE_S = 0.05  # what commands and polls add to a move or a record
+
+
+@dataclass(frozen=True)
+class Step:
+    """One thing that is done: from `start_s` for `duration_s`."""
+
+    start_s: float
+    duration_s: float
+    what: str
+
+
+@dataclass
+class Ledger:
+    """The planned clock, and the steps so far."""
+
+    now_s: float = 0.0
+    steps: list[Step] = field(default_factory=list)
+    questions: list[str] = field(default_factory=list)
+    poses: int = 0
+    samples: int = 0
+
+    def now(self) -> float:
+        return self.now_s
+
+    def sleep(self, seconds: float) -> None:
+        self.add(f"wait {seconds:g} s", seconds)
+
+    def add(self, what: str, duration_s: float) -> None:
+        self.steps.append(Step(self.now_s, duration_s, what))
+        self.now_s += duration_s
+
+
+class PlannedStage:
+    """A stage that counts: it stands where it was told, and refuses what its driver would refuse."""
+
+    def __init__(self, name: str, settings: StageSettings, ledger: Ledger) -> None:
+        self._name, self._settings, self._ledger = name, settings, ledger
+        self._at_deg = 0.0
+        self._homed = False
+        self.reach = (0.0, 0.0)
+
+    def move_to(self, deg: float) -> None:
+        s = self._settings
+        low, high = s.limits_deg
+        if not low <= deg <= high:
+            raise LimitError(
+                f"{self._name}: {deg:g} deg is outside its limits {low:g} .. {high:g} deg; nothing was moved",
+                "Choose other settings, or change limits_deg in the bench file after looking at the cables",
+            )
+        if deg != self._at_deg:
+            move = Trajectory(0.0, self._at_deg, deg, s.speed_deg_s, s.acceleration_deg_s2)
+            self._ledger.add(f"{self._name} from {self._at_deg:g} to {deg:g} deg", move.end_s + EXCHANGE_S)
+        self._at_deg = deg
+        self.reach = (min(self.reach[0], deg), max(self.reach[1], deg))
+
+    def angle_deg(self) -> float:
+        return self._at_deg
+
+    def home(self) -> None:
+        self._ledger.add(f"{self._name} seeks its home", EXCHANGE_S)
+        self._homed = True
+
+    def referenced(self) -> bool:
+        return self._homed
+
+    def stop(self) -> None:
+        """It never moves."""
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        return self._settings.limits_deg
+
+
+class PlannedAdc:
+    """A converter that counts samples."""
+
+    def __init__(self, name: str, settings: AdcSettings, ledger: Ledger) -> None:
+        self._name, self._settings, self._ledger = name, settings, ledger
+
+    def acquire(self, duration_s: float) -> Samples:
+        n = max(1, round(duration_s * self._settings.rate_hz))
+        names = tuple(self._settings.channels)
+        start_s = self._ledger.now()
+        self._ledger.add(f"{self._name} records {', '.join(names)} for {duration_s:g} s", duration_s + EXCHANGE_S)
+        self._ledger.samples += n * len(names)
+        return Block(np.zeros((1, len(names))), names, self._settings.rate_hz, start_s)
+
+
+class PlannedOven:
+    """An oven that is at the temperature it was set to."""
+
+    def __init__(self, name: str, settings: OvenSettings, ledger: Ledger) -> None:
+        self._name, self._settings, self._ledger = name, settings, ledger
+        self._c = 25.0
+
+    def temperature_c(self) -> float:
+        return self._c
+
+    def set_temperature(self, c: float) -> None:
+        low, high = self._settings.limits_c
+        if not low <= c <= high:
+            outside = f"{self._name}: {c:g} C is outside its limits {low:g} .. {high:g} C"
+            raise LimitError(outside, "Choose another temperature, or change limits_c in the bench file")
+        self._ledger.add(f"{self._name} to {c:g} C", EXCHANGE_S)
+        self._c = c
+
+    def run(self, on: bool) -> None:
+        self._ledger.add(f"{self._name} {'on' if on else 'off'}", EXCHANGE_S)

@@ -1,0 +1,201 @@
+"""Runs a procedure on a bench into the record, and goes on with one that was interrupted.
+
+A procedure is a function of its settings and of what the record holds, so there is one way to resume whatever the
+interruption was: run it again over the poses that are missing. On a simulated bench the state after each pose is
+committed with it, so that a resumed run equals an undisturbed one bit for bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from typing import Any, Protocol
+
+from drivers.errors import DriverError
+from procedures.catalogue import Procedure, find
+from procedures.errors import ProcedureError, SafetyLimit
+from procedures.session import Pose, Samples
+from procedures.settings import parse
+from rig.bench import Bench
+from rig.errors import RigError, RunMismatch, Stopped
+from rig.instruments import Rig, connected
+from rig.plan import plan
+from rig.record import Kept, Record, Run
+from rig.record.lease import lease
+from rig.signals import stoppable
+
+
+class Watch(Protocol):
+    """Who looks on: a terminal, a test, nobody."""
+
+    def begun(self, run: str) -> None: ...
+    def doing(self, text: str) -> None: ...
+    def expect(self, total: int, done: int) -> None: ...
+    def kept(self, kept: Kept) -> None: ...
+
+    def ask(self, name: str, question: str, default: str) -> str:
+        """A person's answer. Raises NoAnswer where there is none."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a run ended: complete, stopped or failed; `error` says why it is not complete."""
+
+    run: Run
+    error: Exception | None = None
+
+
+def start(record: Record, bench: Bench, procedure: Procedure, settings: Mapping[str, Any], watch: Watch) -> Outcome:
+    """Run `procedure` from the beginning. Whatever is wrong before its first move leaves the record untouched.
+
+    Raises the errors of settings, plan and connection; an error of the run itself is in the outcome.
+    """
+    plan(bench, procedure, settings)  # every move within its limits, or an error here
+    with stoppable(), connected(bench) as rig:
+        identities = {role: asdict(identity) for role, identity in rig.identities().items()}
+        run = record.begin(
+            procedure.name,
+            _plain(settings),
+            bench=bench.document(),
+            configuration=bench.configuration(procedure.name, _plain(settings)),
+            constants=bench.constants,
+            source=bench.name,
+            identities=identities,
+        )
+        return _carry_out(record, rig, record.run(run), procedure, watch)
+
+
+def resume(record: Record, run_id: str, watch: Watch, bench: Bench | None = None) -> Outcome:
+    """Go on with a run at its first missing pose, on the bench that it was begun with.
+
+    Raises RunBusy, RunMismatch where `bench` or an instrument is another one, and the errors of connection.
+    """
+    run = record.run(run_id)
+    if run.state == "complete":
+        return Outcome(run)
+    own = Bench.model_validate(run.bench)
+    if bench is not None and bench.configuration(run.procedure, run.settings) != run.configuration:
+        raise RunMismatch(f"run {run_id} was begun with another bench; resume it without --bench, or with that file")
+    procedure = find(run.procedure, own.folders.procedures)
+    with stoppable(), connected(own) as rig:
+        _same_instruments(run, rig)
+        return _carry_out(record, rig, run, procedure, watch)
+
+
+def _carry_out(record: Record, rig: Rig, run: Run, procedure: Procedure, watch: Watch) -> Outcome:
+    """The run itself, under its lease; every way that it can end is written down."""
+    with lease(record.folder, run.run):
+        record.set_state(run.run, "running")
+        watch.begun(run.run)
+        error: Exception | None = None
+        results: Mapping[str, Any] = {}
+        try:
+            results = _perform(record, rig, run, procedure, watch) or {}
+        except KeyboardInterrupt as interrupt:
+            error = Stopped(f"stopped by {interrupt or 'SIGINT'}; `rig resume {run.run}` goes on where it was")
+        except (DriverError, ProcedureError, RigError) as failure:
+            error = failure
+        except Exception as fault:
+            record.set_state(run.run, "failed", f"{type(fault).__name__}: {fault}")
+            _stop(record, rig, run)
+            raise
+        if error is not None:
+            _stop(record, rig, run)
+        record.set_state(run.run, _state(error), str(error) if error else None, results)
+        return Outcome(record.run(run.run), error)
+
+
+def _perform(record: Record, rig: Rig, run: Run, procedure: Procedure, watch: Watch) -> Mapping[str, Any] | None:
+    state = record.state(run.run)
+    host = RunHost(record, rig, run, watch, state)
+    session = rig.session(host)
+    if state is None:
+        session.reference()
+        host.keep_state()
+    else:
+        rig.restore(state["rig"])
+    settings = parse(procedure, run.settings)
+    result: Mapping[str, Any] | None = procedure.function(session, **settings)
+    return result
+
+
+class RunHost:
+    """The session's host that keeps what the procedure measures in the record."""
+
+    def __init__(self, record: Record, rig: Rig, run: Run, watch: Watch, state: Mapping[str, Any] | None) -> None:
+        self._record, self._rig, self._run, self._watch = record, rig, run.run, watch
+        self._poses = record.poses(run.run)
+        self._answers = {e.what: e.text for e in record.events(run.run) if e.what.startswith("answer ")}
+        self._zero_s = state["zero_s"] if state else _zero_s(rig, run)
+
+    def kept(self) -> Sequence[Pose]:
+        return self._poses
+
+    def expect(self, missing: int) -> None:
+        self._watch.expect(missing + len(self._poses), len(self._poses))
+
+    def keep(self, pose: Pose, samples: Samples, temperature_c: float | None) -> None:
+        middle_s = samples.start_s + len(samples.volts) / samples.rate_hz / 2
+        kept = Kept(pose, samples, middle_s - self._zero_s, temperature_c)
+        self._record.keep(self._run, len(self._poses), kept, self._state())
+        self._poses.append(pose)
+        self._watch.kept(kept)
+
+    def keep_state(self) -> None:
+        """The bench is ready and nothing is measured yet."""
+        if (state := self._state()) is not None:
+            self._record.keep_state(self._run, state)
+
+    def ask(self, name: str, question: str, default: str) -> str:
+        key = f"answer {name}"
+        if key not in self._answers:
+            self._answers[key] = self._watch.ask(name, question, default)
+            self._record.note(self._run, key, self._answers[key])
+        return self._answers[key]
+
+    def doing(self, text: str) -> None:
+        self._watch.doing(text)
+
+    def _state(self) -> dict[str, Any] | None:
+        rig = self._rig.state()
+        return None if rig is None else {"rig": rig, "zero_s": self._zero_s}
+
+
+def _zero_s(rig: Rig, run: Run) -> float:
+    """The clock's reading at t = 0: when the sensor was powered or, where nobody knows, when the run began."""
+    powered_s = rig.power_on_s()
+    if powered_s is not None:
+        return powered_s
+    age = datetime.now(UTC) - datetime.fromisoformat(run.created)
+    return rig.clock.now() - age.total_seconds()
+
+
+def _same_instruments(run: Run, rig: Rig) -> None:
+    """Raises RunMismatch for a real instrument that is not the one of the run's beginning."""
+    if rig.bench.simulated:
+        return
+    for role, identity in rig.identities().items():
+        if asdict(identity) != run.identities.get(role):
+            raise RunMismatch(
+                f"{role} is now {identity}, the run began with {run.identities.get(role)}; exchange it back"
+            )
+
+
+def _stop(record: Record, rig: Rig, run: Run) -> None:
+    """Bring the stages to rest; what does not obey is written down."""
+    with suppress(KeyboardInterrupt):
+        for complaint in rig.stop():
+            record.note(run.run, "not stopped", complaint)
+
+
+def _state(error: Exception | None) -> str:
+    if error is None:
+        return "complete"
+    return "stopped" if isinstance(error, (Stopped, SafetyLimit)) else "failed"
+
+
+def _plain(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings as JSON has them, so that those of a resumed run have the same hash."""
+    return {name: list(value) if isinstance(value, tuple) else value for name, value in settings.items()}
