@@ -55,8 +55,9 @@ class Inputs:
         """Codes of `n` scans, shape (n, inputs). An open input reads 0 V."""
         volts = np.zeros((n, len(numbers)))
         wired = [k for k, number in enumerate(numbers) if number in self._wiring]
-        names = [self._wiring[numbers[k]] for k in wired]
-        volts[:, wired] = self._world.adc_volts(names, start_s, interval_s, n)
+        if wired:
+            names = [self._wiring[numbers[k]] for k in wired]
+            volts[:, wired] = self._world.adc_volts(names, start_s, interval_s, n)
         constants = [Calibration.from_flash(FLASH_WORDS, range_v) for range_v in ranges_v]
         return codes_of_volts(volts, constants)
 
@@ -84,8 +85,8 @@ class Stream:
         self._rest = np.empty(0, np.uint16)
 
     def packets_until(self, now_s: float) -> bytes:
-        """Take all scans whose time is over; the packets that became full."""
-        new = math.floor((now_s - self._start_s) * self._rate_hz + 1e-6) - self._scans
+        """Take all scans that have begun; the packets that became full."""
+        new = math.floor((now_s - self._start_s) * self._rate_hz + 1e-7) + 1 - self._scans
         if new <= 0:
             return b""
         codes = self._scan(self._start_s + self._scans / self._rate_hz, 1 / self._rate_hz, new)
@@ -96,9 +97,9 @@ class Stream:
         return self._pack(samples[: count * self._per_packet].reshape(count, self._per_packet))
 
     def due_s(self) -> float:
-        """When the next packet is full."""
+        """When the next packet is full: at its last scan."""
         scans = -(-(self._packets + 1) * self._per_packet // self._channels)
-        return self._start_s + scans / self._rate_hz
+        return self._start_s + (scans - 1) / self._rate_hz
 
     def _pack(self, samples: NDArray[np.uint16]) -> bytes:
         layout = packet_type(self._per_packet)

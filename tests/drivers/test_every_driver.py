@@ -1,0 +1,61 @@
+"""What holds for every driver and its twin: found by name, built alike, the same on every kind of wire."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Iterator
+from dataclasses import is_dataclass
+from importlib import import_module
+from pkgutil import iter_modules
+from typing import Any
+
+import pytest
+
+import drivers
+from drivers.clock import SimulatedClock
+from drivers.instrument import Check, Identity
+from drivers.links import Links
+
+MODULES = [m.name for m in iter_modules(drivers.__path__) if not m.ispkg]
+NAMES = [name for name in MODULES if hasattr(import_module(f"drivers.{name}"), "connect")]
+SERIAL = [name for name in NAMES if not import_module(f"drivers.{name}_twin").LISTEN.startswith("tcp")]
+WIRES = (
+    [(name, None) for name in NAMES] + [(name, "pty:") for name in SERIAL] + [(n, "tcp://127.0.0.1:0") for n in SERIAL]
+)
+
+
+@pytest.fixture(params=WIRES, ids=lambda wire: f"{wire[0]}-{wire[1] or 'usual'}")
+def instrument(request: pytest.FixtureRequest, small_world: Any) -> Iterator[Any]:
+    name, listen = request.param
+    driver, twin = import_module(f"drivers.{name}"), import_module(f"drivers.{name}_twin")
+    settings = driver.Settings() if name != "labjack_t7" else driver.Settings(channels={"supply": 0})
+    server = twin.serve(small_world, {"alpha": (1, settings)}, listen or twin.LISTEN)
+    clock = SimulatedClock()
+    clock.attach(server)
+    links = Links(clock)
+    yield driver.connect(server.addresses["alpha"], links, settings, "alpha")
+    links.close()
+    server.close()
+
+
+def test_there_are_the_three_of_the_bench() -> None:
+    assert {"oriental_az", "labjack_t7", "omega_cn7500"} <= set(NAMES)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_driver_has_settings_connect_and_a_twin(name: str) -> None:
+    driver, twin = import_module(f"drivers.{name}"), import_module(f"drivers.{name}_twin")
+    assert is_dataclass(driver.Settings)
+    assert driver.Settings.__dataclass_params__.frozen
+    assert driver.Settings() is not None
+    assert list(inspect.signature(driver.connect).parameters) == ["address", "links", "settings", "name"]
+    assert list(inspect.signature(twin.serve).parameters) == ["world", "roles", "listen"]
+
+
+def test_it_says_who_it_is_and_how_it_is(instrument: Any) -> None:
+    assert instrument.name == "alpha"
+    assert isinstance(instrument.identify(), Identity)
+    assert instrument.identify().model
+    checks = instrument.self_test()
+    assert all(isinstance(check, Check) and check.detail for check in checks)
+    instrument.close()
