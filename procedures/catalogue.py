@@ -53,7 +53,7 @@ def name(path: Path) -> str:
 
 def summary(path: Path) -> str:
     """The first line of the file's docstring, without the name."""
-    return _doc(path).partition("\n")[0].removeprefix(f"{name(path)}: ")
+    return _doc(path).partition("\n")[0].removeprefix(f"{name(path)}: ").rstrip(".")
 
 
 def find(wanted: str, folder: Path | None = None) -> Procedure:

@@ -1,0 +1,29 @@
+"""resume: go on with a run that was interrupted, at its first missing pose."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from rig.bench import read_bench
+from rig.cli.output import bench_option, json_option
+from rig.cli.watch import tell, watch_options, watching
+from rig.record import Record
+from rig.runner import resume
+
+
+@click.command("resume")
+@click.argument("run")
+@watch_options
+@bench_option
+@json_option
+def command(run: str, unattended: bool, answers: Path | None, bench_file: Path | None, as_json: bool) -> None:
+    """Go on with RUN at its first missing pose, on the bench that it was begun with.
+
+    With --bench the run goes on only if that file is still the same.
+    """
+    bench = read_bench(bench_file) if bench_file else None
+    with Record() as record, watching(record.run(run).procedure, unattended, answers) as watch:
+        outcome = resume(record, run, watch, bench)
+    tell(outcome, as_json)

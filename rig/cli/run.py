@@ -1,0 +1,44 @@
+"""run: run a procedure on the bench into the record, guided or --unattended."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from procedures.catalogue import find
+from procedures.settings import parse
+from rig.bench import read_bench
+from rig.cli.output import bench_option, json_option
+from rig.cli.settings import PASS_ON, read_settings, settings_arguments
+from rig.cli.watch import tell, watch_options, watching
+from rig.record import Record
+from rig.runner import start
+
+
+@click.command("run", context_settings=PASS_ON)
+@click.argument("procedure")
+@settings_arguments
+@watch_options
+@bench_option
+@json_option
+def command(
+    procedure: str,
+    given: tuple[str, ...],
+    pairs: tuple[str, ...],
+    unattended: bool,
+    answers: Path | None,
+    bench_file: Path | None,
+    as_json: bool,
+) -> None:
+    """Run PROCEDURE on the bench into the record.
+
+    Settings of the procedure are options: `rig run sweep --step-deg 30`. Ctrl-C stops the stages at once;
+    `rig resume` then goes on where the run was.
+    """
+    bench = read_bench(bench_file)
+    found = find(procedure, bench.folders.procedures)
+    settings = parse(found, read_settings(given, pairs))
+    with watching(found.name, unattended, answers) as watch, Record() as record:
+        outcome = start(record, bench, found, settings, watch)
+    tell(outcome, as_json)

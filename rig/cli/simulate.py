@@ -1,0 +1,65 @@
+"""simulate: serve the simulated instruments in real time for any client."""
+
+from __future__ import annotations
+
+import json
+import signal
+from dataclasses import asdict
+from pathlib import Path
+from types import FrameType
+
+import click
+
+from drivers.clock import serve_forever
+from drivers.simulation.config import WorldConfig
+from drivers.simulation.world import World
+from rig.bench import Bench, read_bench
+from rig.cli.output import bench_option, columns, json_option, note
+from rig.errors import BenchError
+from rig.instruments import SinceStart, serve
+
+
+@click.command("simulate")
+@bench_option
+@json_option
+def command(bench_file: Path | None, as_json: bool) -> None:
+    """Serve the simulated instruments of the bench in real time until Ctrl-C; print their addresses.
+
+    `url: simulated:rtu+tcp://127.0.0.1:5021` in the bench file fixes a port, `simulated:pty:` asks for a
+    pseudo-terminal.
+    """
+    bench = read_bench(bench_file)
+    ended: list[int] = []
+
+    def end(number: int, frame: FrameType | None) -> None:  # noqa: ARG001
+        ended.append(number)
+
+    for each in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(each, end)
+    clock = SinceStart()
+    servers = serve(bench, World(WorldConfig.from_mapping(bench.world), bench.seed))
+    if not servers:
+        raise BenchError(f"no instrument of {bench.name!r} is simulated; write `url: simulated` for one")
+    try:
+        addresses = {role: address for server in servers.values() for role, address in server.addresses.items()}
+        documents = {role: _document(bench, role, asdict(address)) for role, address in addresses.items()}
+        _tell(documents, as_json)
+        serve_forever(list(servers.values()), lambda: bool(ended), clock)
+    finally:
+        for server in servers.values():
+            server.close()
+
+
+def _document(bench: Bench, role: str, address: dict[str, object]) -> dict[str, object]:
+    given = {key: value for key, value in address.items() if value is not None}
+    return {"driver": bench.instruments[role].driver, **given}
+
+
+def _tell(instruments: dict[str, dict[str, object]], as_json: bool) -> None:
+    if as_json:
+        click.echo(json.dumps({"schema": "rig.addresses/1", "instruments": instruments}))
+    else:
+        rows = [(role, i["driver"], i["url"], i["unit"], i.get("stream_url", "")) for role, i in instruments.items()]
+        click.echo(columns(("role", "driver", "url", "unit", "stream"), rows))
+        note("serving until Ctrl-C")
+    click.get_text_stream("stdout").flush()

@@ -1,0 +1,85 @@
+"""Looking on while a procedure runs, guided in a terminal or quietly; and telling how it ended."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import click
+import yaml
+
+from procedures.errors import NoAnswer
+from rig.cli.output import emit, note
+from rig.record import Kept
+from rig.runner import Outcome, Watch
+
+
+def watch_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """--unattended and --answers."""
+    function = click.option("--unattended", is_flag=True, help="Ask nobody, show only the end.")(function)
+    path = click.Path(dir_okay=False, path_type=Path)
+    return click.option("--answers", type=path, help="A YAML file that answers the questions to a person.")(function)
+
+
+class Quiet:
+    """Nobody looks on. A question takes its answer from the file, else its default."""
+
+    def __init__(self, answers: Mapping[str, str]) -> None:
+        self._answers = answers
+
+    def begun(self, run: str) -> None:
+        note(f"run {run}")
+
+    def doing(self, text: str) -> None:
+        """Nobody reads it."""
+
+    def expect(self, total: int, done: int) -> None:
+        note(f"{total - done} of {total} poses to come")
+
+    def kept(self, kept: Kept) -> None:
+        """The record has it."""
+
+    def ask(self, name: str, question: str, default: str) -> str:  # noqa: ARG002
+        return self._answers.get(name, default)
+
+
+@contextmanager
+def watching(procedure: str, unattended: bool, answers: Path | None) -> Iterator[Watch]:
+    """Who looks on: a person in a terminal, unless the run is unattended or nobody is there."""
+    given = _answers(answers)
+    if unattended or not (sys.stdin.isatty() and sys.stderr.isatty()):
+        yield Quiet(given)
+        return
+    from rig.cli.guide import Guide  # rich is only imported where somebody sees it
+
+    with Guide(procedure, given) as guide:
+        yield guide
+
+
+def _answers(path: Path | None) -> dict[str, str]:
+    if path is None:
+        return {}
+    try:
+        document = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise NoAnswer(f"{path}: the file of answers cannot be read: {error.strerror}") from None
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise NoAnswer(f"{path}: is not a YAML file: {error}") from None
+    if not isinstance(document, dict):
+        raise NoAnswer(f"{path}: a file of answers is a mapping, such as `mounting: yes`")
+    return {str(name): "yes" if answer is True else str(answer) for name, answer in document.items()}
+
+
+def tell(outcome: Outcome, as_json: bool) -> None:
+    """The end of a run; raises what stopped it, for the exit status."""
+    run = outcome.run
+    if as_json:
+        head = {"schema": "rig.run/1", "run": run.run, "procedure": run.procedure, "state": run.state}
+        emit({**head, "poses": run.rows, "results": run.results})
+    else:
+        click.echo(f"{run.run}: {run.state}, {run.rows} poses")
+    if outcome.error is not None:
+        raise outcome.error

@@ -1,0 +1,108 @@
+"""Runs in other formats.
+
+csv           the table that analysis takes, one row a pose
+event-model   documents as data-acquisition systems of large facilities exchange them: start, descriptor, events, stop;
+              one JSON object a line, {"name": .., "doc": ..}; raw samples stay in the record
+
+Parquet and HDF5 would each bring a large dependency for one table that every reader of them reads as CSV too.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+from uuid import NAMESPACE_URL, uuid5
+
+from calibrations.read_csv import write_csv
+from calibrations.table import Table
+from rig.data import load
+from rig.errors import ExportError
+from rig.record import Record, Run
+from rig.record.tables import table_of
+
+FORMATS = ("csv", "parquet", "hdf5", "event-model")
+UNITS = {"deg": "deg", "v": "V", "s": "s", "c": "degC"}
+
+
+def export(data: str, kind: str, path: Path) -> int:
+    """Write `data` (a run or a file) to `path`, whole or not at all; the number of rows.
+
+    Raises ExportError for a format that is not there, or that needs a run.
+    """
+    if kind in ("parquet", "hdf5"):
+        raise ExportError(
+            f"{kind} is not written by this version; take --format csv, which every reader of {kind} reads"
+        )
+    if not path.parent.is_dir():
+        raise ExportError(f"{path}: there is no folder {path.parent}; make it, or name another file")
+    draft = path.with_name(f".{path.name}.part")
+    rows = _write_events(data, draft) if kind == "event-model" else _write_csv(data, draft)
+    os.replace(draft, path)  # noqa: PTH105
+    return rows
+
+
+def _write_csv(data: str, path: Path) -> int:
+    table = load(data)
+    write_csv(table, path)
+    return table.n
+
+
+def _write_events(data: str, path: Path) -> int:
+    if Path(data).is_file():
+        raise ExportError(f"{data} is a file; event-model documents tell of a run of the record")
+    with Record() as record:
+        run, table = record.run(data), table_of(record, data)
+    lines = [json.dumps({"name": name, "doc": document}) for name, document in documents(run, table)]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return table.n
+
+
+def documents(run: Run, table: Table) -> Iterator[tuple[str, dict[str, Any]]]:
+    """The run as event-model documents, (name, document). Their ids follow from the run's."""
+    start, descriptor = _uid(run.run, "start"), _uid(run.run, "descriptor")
+    began = datetime.fromisoformat(run.created).timestamp()
+    ended = datetime.fromisoformat(run.ended).timestamp() if run.ended else began
+    yield (
+        "start",
+        {
+            "uid": start,
+            "time": began,
+            "scan_id": 1,
+            "run": run.run,
+            "plan_name": run.procedure,
+            "plan_args": dict(run.settings),
+            "constants": dict(run.constants),
+        },
+    )
+    keys = {name: _key(name, run) for name in table.columns}
+    yield "descriptor", {"uid": descriptor, "run_start": start, "time": began, "name": "primary", "data_keys": keys}
+    times = table.time_s - table.time_s[0] + began
+    for number, time in enumerate(times):
+        yield (
+            "event",
+            {
+                "uid": _uid(run.run, str(number)),
+                "descriptor": descriptor,
+                "seq_num": number + 1,
+                "time": float(time),
+                "data": {name: float(column[number]) for name, column in table.columns.items()},
+                "timestamps": dict.fromkeys(table.columns, float(time)),
+            },
+        )
+    status = {"complete": "success", "stopped": "abort", "running": "abort"}.get(run.state, "fail")
+    end = {"uid": _uid(run.run, "stop"), "run_start": start, "time": ended, "exit_status": status}
+    yield "stop", {**end, "reason": run.message or "", "num_events": {"primary": table.n}}
+
+
+def _key(name: str, run: Run) -> dict[str, Any]:
+    key: dict[str, Any] = {"source": run.source, "dtype": "number", "shape": []}
+    unit = UNITS.get(name.rpartition("_")[2])
+    return {**key, "units": unit} if unit else key
+
+
+def _uid(run: str, what: str) -> str:
+    return str(uuid5(NAMESPACE_URL, f"{run}/{what}"))
