@@ -62,4 +62,3 @@ def _tell(instruments: dict[str, dict[str, object]], as_json: bool) -> None:
         rows = [(role, i["driver"], i["url"], i["unit"], i.get("stream_url", "")) for role, i in instruments.items()]
         click.echo(columns(("role", "driver", "url", "unit", "stream"), rows))
         note("serving until Ctrl-C")
-    click.get_text_stream("stdout").flush()

@@ -1,0 +1,23 @@
+"""For every test: a record of its own; and where RIG_NO_SKIP is set, a skipped test fails the session."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+
+@pytest.fixture(autouse=True)
+def rig_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The record's folder; nothing is written outside the test's own."""
+    home = tmp_path / "home"
+    monkeypatch.setenv("RIG_HOME", str(home))
+    return home
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    reporter = session.config.pluginmanager.get_plugin("terminalreporter")
+    if os.environ.get("RIG_NO_SKIP") and reporter and reporter.stats.get("skipped") and not session.exitstatus:
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+        reporter.write_line("RIG_NO_SKIP: a skipped test counts as failed", red=True)

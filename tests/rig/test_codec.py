@@ -1,0 +1,44 @@
+"""Sample blocks come back bit for bit, whatever they hold."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import array_shapes, arrays
+
+from rig.record.codec import decode, encode
+
+
+@given(arrays(np.float64, array_shapes(min_dims=2, max_dims=2, max_side=40), elements=st.floats(width=64)))
+def test_any_block_comes_back_bit_for_bit(samples: np.ndarray) -> None:
+    assert decode(encode(samples)).tobytes() == np.ascontiguousarray(samples).tobytes()
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from([1, 256, 257, 1 << 16]))
+def test_a_converters_codes_come_back(seed: int, codes: int) -> None:
+    rng = np.random.default_rng(seed)
+    samples = 315.9e-6 * rng.integers(0, codes, (300, 3)) - 10
+    assert np.array_equal(decode(encode(samples)), samples)
+
+
+def test_more_values_than_a_converter_has_come_back_too() -> None:
+    samples = np.random.default_rng(1).standard_normal((70_000, 1))
+    assert np.array_equal(decode(encode(samples)), samples)
+
+
+def test_negative_zero_stays_negative() -> None:
+    assert np.signbit(decode(encode(np.array([[-0.0], [0.0]])))).ravel().tolist() == [True, False]
+
+
+def test_no_samples_are_no_samples() -> None:
+    assert decode(encode(np.empty((0, 3)))).shape == (0, 3)
+
+
+def test_a_dwell_takes_less_than_a_byte_a_sample() -> None:
+    codes = np.random.default_rng(1).normal(33518, 2.5, (5000, 3)).round()
+    assert len(encode(315.872e-6 * codes)) < codes.size
+
+
+def test_damage_is_said_and_not_guessed_over() -> None:
+    with pytest.raises(ValueError, match="damaged sample block"):
+        decode(b"\0" + encode(np.ones((3, 1))))

@@ -1,0 +1,153 @@
+"""The record keeps what it was given, in order, and says clearly what it cannot do."""
+
+import sqlite3
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from calibrations.table import Table
+from procedures.session import Pose
+from rig.errors import RecordError, UnknownRun
+from rig.record import Block, Kept, Record
+from rig.record.tables import table_of
+
+ANGLES = st.floats(-400, 400)
+POSES = st.builds(
+    Pose, ANGLES, ANGLES, st.sampled_from([-1, 0, 1]), st.text(max_size=8), st.sampled_from([0.0, 90.0]), st.integers(0, 1)
+)
+
+
+def begin(record: Record) -> str:
+    parts = {"bench": {"seed": 1}, "identities": {}, "configuration": "abc", "source": "a test"}
+    return record.begin("sweep", {"step_deg": 10.0}, constants={"sensor": "ADXL203"}, **parts)
+
+
+def block(values: object) -> Block:
+    return Block(np.array(values, dtype=np.float64), ("vx", "vy"), 1000.0, 2.5)
+
+
+@given(st.lists(POSES, max_size=4))
+def test_poses_come_back_as_they_were_kept(tmp_path_factory: pytest.TempPathFactory, poses: list[Pose]) -> None:
+    with Record(tmp_path_factory.mktemp("record")) as record:
+        run = begin(record)
+        for number, pose in enumerate(poses):
+            record.keep(run, number, Kept(pose, block([[number, 1.0]]), 3.5, 21.5), {"number": number})
+        kept = list(record.kept(run))
+        assert [each.pose for each in kept] == record.poses(run) == poses
+        assert [float(each.samples.volts[0, 0]) for each in kept] == list(range(len(poses)))
+        assert record.state(run) == ({"number": len(poses) - 1} if poses else None)
+        assert record.run(run).rows == len(poses)
+
+
+def test_a_run_becomes_the_table_of_its_poses() -> None:
+    with Record() as record:
+        run = begin(record)
+        samples = block([[2.0, 1.0], [4.0, 1.0], [6.0, 1.0]])
+        record.keep(run, 0, Kept(Pose(90, 0, 1, "A+ to B-"), samples, 3.5, 21.5), None)
+        record.keep(run, 1, Kept(Pose(90, 10, 1, "A+ to B-"), samples, 9.5, None), None)
+        table = table_of(record, run)
+    assert table.kind == "poses"
+    assert {name: list(column) for name, column in table.columns.items()} == {
+        "alpha_deg": [90, 90],
+        "beta_deg": [0, 10],
+        "direction": [1, 1],
+        "t_s": [3.5, 9.5],
+        "vx_v": [4, 4],
+        "vy_v": [1, 1],
+        "vx_std_v": [2, 2],
+        "vy_std_v": [0, 0],
+        "n": [3, 3],
+    }
+    assert table.labels == {"path": ("A+ to B-",) * 2}
+    assert table.constants == {"sensor": "ADXL203", "sample_rate_hz": 1000.0}
+
+
+def test_how_the_sensor_is_mounted_is_a_column_once_it_was_changed() -> None:
+    with Record() as record:
+        run = begin(record)
+        record.keep(run, 0, Kept(Pose(90, 0, mount_deg=90.0, flip=1), block([[2.0, 1.0]]), 3.5, 21.5), None)
+        table = table_of(record, run)
+    assert (table.column("mount_deg")[0], table.column("flip")[0]) == (90, 1)
+    assert "vx_std_v" not in table
+
+
+def test_an_imported_table_comes_back_to_the_last_bit() -> None:
+    columns = {"ax": [0.1, 1 / 3], "ay": [1e-300, 2.0], "az": [-0.0, 3.0]}
+    table = Table.from_columns("positions", columns, {"unit": "count", "g": 9.81}, "their.csv", {"path": ("a", "b")})
+    with Record() as record:
+        run = record.add_table(table)
+        back = table_of(record, run)
+        shown = record.run(run)
+    assert (back.digest, back.constants, back.labels, back.source) == (table.digest, table.constants, table.labels, run)
+    assert (shown.state, shown.procedure, shown.rows, shown.source) == ("complete", "import", 2, "their.csv")
+
+
+def test_ids_sort_by_time_and_runs_are_listed_newest_first() -> None:
+    with Record() as record:
+        first, second = begin(record), begin(record)
+        assert [run.run for run in record.runs()] == [second, first]
+        assert first.split("-")[2] == "sweep"
+
+
+def test_an_unknown_run_names_the_nearest() -> None:
+    with Record() as record:
+        run = begin(record)
+        with pytest.raises(UnknownRun, match=f"Did you mean '{run}'"):
+            record.run(run[:-1])
+
+
+def test_a_run_without_poses_is_no_table_yet() -> None:
+    with Record() as record, pytest.raises(RecordError, match="holds no pose yet"):
+        table_of(record, begin(record))
+
+
+def test_events_are_told_in_order() -> None:
+    with Record() as record:
+        run = begin(record)
+        record.note(run, "answer mounting", "yes")
+        record.note(run, "not stopped", "alpha")
+        assert [(event.what, event.text) for event in record.events(run)] == [
+            ("answer mounting", "yes"),
+            ("not stopped", "alpha"),
+        ]
+
+
+def test_a_commit_is_on_the_disk_when_it_returns() -> None:
+    with Record() as record, record._engine.connect() as connection:
+        assert connection.exec_driver_sql("PRAGMA journal_mode").scalar() == "wal"
+        assert connection.exec_driver_sql("PRAGMA synchronous").scalar() == 2  # FULL
+
+
+def test_a_record_of_a_newer_program_is_left_alone(tmp_path: Path) -> None:
+    with Record(tmp_path) as record:
+        path = record.path
+    with sqlite3.connect(path) as connection:
+        connection.execute("PRAGMA user_version = 99")
+    connection.close()
+    with pytest.raises(RecordError, match="newer version"):
+        Record(tmp_path)
+
+
+def test_a_file_that_is_no_record_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "record.db").write_text("my letters, not a database" * 50)
+    with pytest.raises(RecordError, match="damaged"):
+        Record(tmp_path)
+
+
+def test_a_folder_that_cannot_be_made_is_said(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(RecordError, match="check RIG_HOME"):
+        Record(tmp_path / "file" / "home")
+
+
+def test_a_damaged_block_names_its_pose() -> None:
+    with Record() as record:
+        run = begin(record)
+        record.keep(run, 0, Kept(Pose(90, 0), block([[2.0, 1.0]]), 3.5, 21.5), None)
+        with record._engine.begin() as connection:
+            connection.exec_driver_sql("UPDATE blocks SET samples = x'00'")
+        with pytest.raises(RecordError, match="pose 0: damaged sample block"):
+            list(record.kept(run))
