@@ -25,6 +25,7 @@ def beginning(config: WorldConfig, numbers: WorldConfig, random: np.random.Gener
     world.supply_wander_v = config.supply.wander_v * random.standard_normal()
     world.supply_v = config.supply.nominal_v + world.supply_wander_v
     world.wander_k = config.heat.ambient_wander_k * random.standard_normal()
+    world.charged = 1 - math.exp(-config.heat.powered_for_s / config.sensor.charging_s)
     _warm_up(world, config.heat)
     mechanics.update(world, numbers, 0)
     world.filtered_v = world.volts + world.slow_v

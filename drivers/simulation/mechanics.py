@@ -8,7 +8,7 @@ events nothing changes but the filter, which is exact. So no result depends on h
 from __future__ import annotations
 
 from drivers.simulation import friction, gravity, heat, noise, oddities, plates, springs, stage, supply
-from drivers.simulation.config import WorldConfig
+from drivers.simulation.config import SensingAxis, WorldConfig
 from drivers.simulation.kernel import Floats, kernel
 from drivers.simulation.state import State
 
@@ -54,6 +54,7 @@ def tick(world: State, config: WorldConfig, normals: Floats) -> None:
     t_s = world.ticks * TICK_S
     heat.tick(world, config.heat, config.oven, t_s, TICK_S, normals[0])
     supply.tick(world, config.supply, t_s, TICK_S, normals[1])
+    world.charged = heat.lagged(world.charged, world.powered, TICK_S, config.sensor.charging_s)
     oddities.tick(world, config.oddities, TICK_S, normals[2])
     noise.tick(world, config.noise, TICK_S, normals[3:])
 
@@ -92,9 +93,24 @@ def displaced_nm(
     x, y = springs.balanced_nm(sx.springs, sy.springs, gx, gy, heat.die_c(world) - REFERENCE_C)
     sag = gz * springs.per_g_nm(config.sensor.sag_resonance_hz)
     fault = oddities.displacement_nm(world, odd, world.table_deg[1], t_s)
-    stress_k = world.glue_c - REFERENCE_C
-    moved_x = x - friction.drag_nm(sx.friction, world.seats_nm[0], x, gy) + oddities.stopped_nm(odd, x)
-    moved_y = y - friction.drag_nm(sy.friction, world.seats_nm[1], y, gx) + oddities.stopped_nm(odd, y)
-    moved_x += fault + springs.drawn_aside_nm(sx.springs, y, sag, stress_k)
-    moved_y += fault + springs.drawn_aside_nm(sy.springs, x, sag, stress_k)
+    moved_x = fault + moved_nm(world, sx, odd, world.seats_nm[0], x, y, gy, sag)
+    moved_y = fault + moved_nm(world, sy, odd, world.seats_nm[1], y, x, gx, sag)
     return moved_x, moved_y, sag
+
+
+@kernel
+def moved_nm(
+    world: State,
+    axis: SensingAxis,
+    odd: oddities.Oddities,
+    seats_nm: Floats,
+    own_nm: float,
+    neighbour_nm: float,
+    neighbour_g: float,
+    sag_nm: float,
+) -> float:
+    """Where a finger ends up, given where the springs alone would balance the loads."""
+    stuck = friction.drag_nm(axis.friction, seats_nm, own_nm, neighbour_g)
+    drawn = springs.drawn_aside_nm(axis.springs, neighbour_nm, sag_nm, world.glue_c - REFERENCE_C)
+    charged = 1e-3 * axis.plates.charging_pm * world.charged
+    return own_nm - stuck + drawn + charged + oddities.stopped_nm(odd, own_nm)

@@ -1,8 +1,9 @@
 """The differential capacitor and its amplifier: from displacement to volts.
 
 A finger moves between two fixed ones, gaps d (1 + m) and d (1 - m): the capacitances' difference is linear
-for small displacements of a centred finger only. Sag and the neighbour's displacement change the overlap.
-The factory trims offset and gain at zero load and 25 C; the output is a fraction of the supply.
+for small displacements of a centred finger only. Sag and the neighbour's displacement change the overlap;
+charge that creeps into the oxide pulls the finger aside. The factory trims offset and gain at zero load
+and 25 C; the output is a fraction of the supply.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ class Plates:
     overlap_loss_per_um2: float = 0.0  # relative overlap lost per square of the height difference
     height_step_nm: float = 0.0  # height difference of moving and fixed fingers at zero load
     overlap_slide_per_um: float = 0.0  # relative overlap gained per displacement of the neighbouring axis
+    charging_pm: float = 0.0  # displacement by charge that creeps into the plates' oxide while powered
     dead_band_nm: float = 0.0  # half width around the trimmed zero in which the amplifier is blind
 
 

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from drivers.simulation.config import SensingAxis, WorldConfig
 
 # What a factory or a designer fixes: no imperfection, so no scatter.
-EXACT = {"resonance_hz", "sag_resonance_hz", "gap_um", "zero_g_v", "sensitivity_v_per_g", "worm_cycles"}
+EXACT = {"resonance_hz", "sag_resonance_hz", "charging_s", "gap_um", "zero_g_v", "sensitivity_v_per_g", "worm_cycles"}
 
 
 @dataclass(frozen=True)

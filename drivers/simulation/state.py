@@ -38,6 +38,7 @@ class State:
     volts: Floats = field(default_factory=zeros(2))  # in front of the filter, without noise
     powered: int = 1
     powered_ns: int = 0  # since when
+    charged: float = 0.0  # share of the charge that has crept into the plates' oxide
 
     wander_k: float = 0.0  # of the room
     chamber_c: float = 0.0

@@ -140,9 +140,7 @@ class World:
         """`t_s` in ns; a nanosecond of rounding is forgiven."""
         t_ns, now_ns = round(1e9 * t_s), int(self._world.now_ns)
         if t_ns < now_ns - 1:
-            raise TimeReversal(
-                f"The world is at {self.now_s:.9f} s, past {t_s:.9f} s", "Ask for a later time"
-            )
+            raise TimeReversal(f"The world is at {self.now_s:.9f} s, past {t_s:.9f} s", "Ask for a later time")
         return max(t_ns, now_ns)
 
     def _advance_ns(self, t_ns: int) -> None:
