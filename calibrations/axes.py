@@ -12,8 +12,6 @@ import numpy as np
 
 from calibrations.table import Array, Table
 
-APPROACH_DEG = 5.0  # how far before a pose its direction of approach is taken to hold
-
 
 def other_in_plane(a: Array) -> Array:
     """For each axis the specific force along the other in-plane axis, shape (n, 3)."""
@@ -35,9 +33,14 @@ def rotation(vector: Array) -> Array:
     return R
 
 
-def turned_back(a: Array, table: Table) -> Array:
-    """Specific force shortly before each pose was reached: beta turned back by the approach, shape (n, 3)."""
+def approached_from(a: Array, table: Table) -> Array:
+    """Specific force a little before each pose was reached: beta turned back by the approach, shape (n, 3).
+
+    The approach is the table's constant `approach_deg`. Where it is not given, rows with a time were reached straight
+    from the row before; without a time, the direction is all that is known, and a step of 10 deg is assumed.
+    """
+    approach = table.number("approach_deg", 0.0 if "t_s" in table else 10.0)
     side = np.where(table.optional("flip", 0.0) > 0, -1.0, 1.0)
-    back = -np.radians(APPROACH_DEG) * table.column("direction") * side
+    back = -np.radians(approach) * table.column("direction") * side
     c, s = np.cos(back), np.sin(back)
     return np.column_stack([c * a[:, 0] - s * a[:, 1], s * a[:, 0] + c * a[:, 1], a[:, 2]])

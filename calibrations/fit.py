@@ -1,7 +1,8 @@
 """Joint least-squares estimate of a model's parameters, with uncertainties that allow for slow noise.
 
 Parameters and noise are estimated in turn: least squares under the present noise, then the noise of greatest
-likelihood given the residual, until neither moves.
+likelihood given the residual, until neither moves. Where the model does not describe the data, its parameters are less
+certain than the noise alone makes them: standard uncertainties are widened by the Birge ratio.
 """
 
 from __future__ import annotations
@@ -14,7 +15,8 @@ from scipy.optimize import least_squares
 
 from calibrations.identify import estimates
 from calibrations.model import Model
-from calibrations.noise import Noise, estimate, rms, white_only
+from calibrations.noise import Noise, rms, white_only
+from calibrations.noise_fit import estimate
 from calibrations.problem import Problem
 from calibrations.table import Array, Table
 
@@ -63,9 +65,10 @@ class Fit:
         return self.noise.whiten(np.concatenate([self.residual[:, :, None], self.jacobian], axis=2))
 
     @cached_property
-    def deviance(self) -> float:
-        """-2 log likelihood, up to a constant of the data."""
-        return float(np.sum(self.whitened[:, 0] ** 2)) + self.noise.logdet
+    def birge(self) -> float:
+        """Birge ratio: rms of the whitened residual, at least 1. Above 1, the model misses more than noise."""
+        rows, p = self.residual.size, len(self.theta)
+        return max(1.0, float(np.sqrt(np.sum(self.whitened[:, 0] ** 2) / max(rows - p, 1))))
 
 
 def fit(model: Model, table: Table) -> Fit:
@@ -73,8 +76,9 @@ def fit(model: Model, table: Table) -> Fit:
     problem = Problem.of(model, table)
     noise = white_only(problem.white, problem.gap_s, len(problem.channels))
     theta = min((_minimise(problem, noise, start) for start in problem.layout.starts()), key=lambda t: t[1])[0]
-    for _ in range(ROUNDS):
-        noise = estimate(noise, problem.residual(theta), problem.jacobian(theta))
+    # with smooth columns set aside the noise hardly depends on the parameters, and one round is enough
+    for _ in range(1 if problem.smooth.size else ROUNDS):
+        noise = estimate(noise, problem.residual(theta), problem.jacobian(theta), problem.smooth)
         theta, _ = _minimise(problem, noise, theta)
     return _result(problem, theta, noise)
 
@@ -85,9 +89,10 @@ def evaluate(model: Model, table: Table) -> Fit | None:
     theta = problem.layout.known()
     if theta is None:
         return None
+    residual, jacobian = problem.residual(theta), problem.jacobian(theta)
     noise = white_only(problem.white, problem.gap_s, len(problem.channels))
-    noise = estimate(noise, problem.residual(theta), np.zeros((*problem.residual(theta).shape, 0)))
-    return _result(problem, theta, noise, keep=True)
+    noise = estimate(noise, residual, jacobian, problem.smooth)
+    return Fit(replace(model, unit=table.unit), problem, theta, noise, residual, jacobian)
 
 
 def _minimise(problem: Problem, noise: Noise, start: Array) -> tuple[Array, float]:
@@ -115,8 +120,9 @@ def _minimise(problem: Problem, noise: Noise, start: Array) -> tuple[Array, floa
     return answer.x, float(answer.cost)
 
 
-def _result(problem: Problem, theta: Array, noise: Noise, keep: bool = False) -> Fit:
+def _result(problem: Problem, theta: Array, noise: Noise) -> Fit:
     residual, jacobian = problem.residual(theta), problem.jacobian(theta)
     model = replace(problem.layout.model, unit=problem.table.unit)
     found = Fit(model, problem, theta, noise, residual, jacobian)
-    return found if keep else replace(found, model=estimates(model, problem.layout, theta, found.whitened[:, 1:]))
+    widened = found.whitened[:, 1:] / found.birge
+    return replace(found, model=estimates(model, problem.layout, theta, widened))

@@ -4,24 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from calibrations.table import Array
 
 
 @njit(cache=True)
-def slip(a: Array, before: Array, order: NDArray[np.intp], reach: float) -> Array:
-    """State -1..1 of an element that sticks and slips, at each row, shape (n, 3).
+def slip(a: Array, before: Array, limit: Array, reach: float) -> Array:
+    """State of an element that sticks and slips at +-limit, at each row, shape (n, 3); rows in order of time.
 
-    Rows are visited in `order`, each by way of `before`, the specific force just before it was reached.
+    Each row is reached by way of `before`, the specific force a little earlier.
     """
     state = np.zeros_like(a)
     for k in range(a.shape[1]):
         s = 0.0
-        last = before[order[0], k]
-        for i in order:
-            s = min(1.0, max(-1.0, s + (before[i, k] - last) / reach))
-            s = min(1.0, max(-1.0, s + (a[i, k] - before[i, k]) / reach))
+        last = before[0, k]
+        for i in range(a.shape[0]):
+            s = min(limit[i, k], max(-limit[i, k], s + (before[i, k] - last) / reach))
+            s = min(limit[i, k], max(-limit[i, k], s + (a[i, k] - before[i, k]) / reach))
             last = a[i, k]
             state[i, k] = s
     return state

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from calibrations.chain import backward, forward
 from calibrations.errors import ModelError, TooFewRows
+from calibrations.lack_of_fit import smooth_columns
 from calibrations.mean_noise import norm_std, white_std
 from calibrations.model import Model
 from calibrations.parameters import Layout
@@ -81,3 +82,8 @@ class Problem:
     def gap_s(self) -> Array:
         """Time between each row and the one before it, s, shape (n,)."""
         return np.diff(self.table.time_s, prepend=self.table.time_s[0])
+
+    @cached_property
+    def smooth(self) -> Array:
+        """Columns set aside when noise is estimated, shape (n, k)."""
+        return smooth_columns(self.table)

@@ -1,0 +1,149 @@
+"""Every effect of the catalogue that a table can excite, tried on top of a fitted model.
+
+Each is judged jointly with the model and with the noise fitted anew: a candidate may win only what slow noise does not
+already take up. First order about the present fit; the best are then refitted in full.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import fdtrc
+
+from calibrations.effect import Effect
+from calibrations.fit import Fit, fit
+from calibrations.held_out import held_out_excess
+from calibrations.noise import rms
+from calibrations.noise_fit import gain
+from calibrations.parameters import Layout
+from calibrations.problem import Problem
+from calibrations.screen import Screen, Search, of_search
+from calibrations.table import Array
+
+NOT_TOLD_APART = 6.0  # a loss of twice the log-likelihood below this: odds of less than 20 to 1
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One effect on top of a model. `gain` is twice the gain in log-likelihood, `rank` the parameters that it adds."""
+
+    effect: Effect
+    rank: int
+    gain: float
+    p_value: float
+    excess_after: float
+    held_out_after: float
+    probability: float
+    basis: Array
+    indistinguishable_from: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """The effect's name."""
+        return self.effect.name
+
+
+def candidates(before: Fit, effects: Mapping[str, Effect]) -> list[Candidate]:
+    """All candidates, best first: by likelihood, a parameter costing log(rows) (Schwarz); those that do not lower
+    the error on unseen poses come last."""
+    screen = Screen(before)
+    tried = [
+        (effect, *_columns(screen, effect))
+        for effect in effects.values()
+        if not before.model.holds(effect.name) and effect.excluded(before.table) is None and _fits(before, effect)
+    ]
+    tried = [(effect, columns, basis) for effect, columns, basis in tried if basis.shape[1]]
+    search = Search(screen, [basis for _, _, basis in tried])
+    found = [_judge(screen, effect, columns, basis, search.trials) for effect, columns, basis in tried]
+    unseen = held_out_excess(before)
+    found = _with_probabilities(found, before.residual.size, unseen)
+    found.sort(key=lambda c: (c.held_out_after < unseen, schwarz(c, before.residual.size)), reverse=True)
+    return [replace(c, indistinguishable_from=_like(c, found, screen)) for c in found]
+
+
+def schwarz(c: Candidate, rows: int) -> float:
+    """Gain less the price of the parameters, log(rows) each."""
+    return c.gain - c.rank * float(np.log(rows))
+
+
+def refit(before: Fit, c: Candidate) -> Fit:
+    """The model with the candidate added, all parameters fitted jointly."""
+    return fit(before.model.with_effect(c.effect), before.table)
+
+
+def _fits(before: Fit, effect: Effect) -> bool:
+    """Whether there are more rows than parameters with this effect."""
+    return before.residual.size > len(Layout.of(before.model.with_effect(effect), before.table).slots)
+
+
+def _columns(screen: Screen, effect: Effect) -> tuple[Array, Array]:
+    """Derivatives of the residual with respect to the effect's parameters, at its best start, and their basis."""
+    before = screen.fit
+    model = before.model.with_effect(effect)
+    problem = Problem.of(model, before.table)
+    mine = problem.layout.of_effect(effect.name)
+    best = (np.zeros((*before.residual.shape, 0)), np.zeros((before.residual.size, 0)))
+    for theta in problem.layout.starts():
+        columns = problem.jacobian(theta, mine)
+        basis = screen.basis(columns)
+        if not best[1].shape[1] or screen.statistic(basis) > screen.statistic(best[1]):
+            best = (columns, basis)
+    return best
+
+
+def _judge(screen: Screen, effect: Effect, columns: Array, basis: Array, trials: float) -> Candidate:
+    before, rank = screen.fit, basis.shape[1]
+    smooth = before.problem.smooth.shape[1]
+    score = screen.statistic(basis)
+    refitted = gain(before.noise, before.residual, before.jacobian, columns, before.problem.smooth)
+    free = before.residual.size - before.jacobian.shape[2] - rank - smooth * len(before.channels)
+    # F rather than chi-squared: the level of the noise is itself estimated from these rows
+    p_score = fdtrc(rank, free, score / rank) if smooth else 1.0
+    p_refitted = fdtrc(rank, free, np.expm1(min(refitted / before.residual.size, 500.0)) * free / rank)
+    tests = 2 if smooth else 1
+    after = before.residual - np.concatenate([before.jacobian, columns], axis=2) @ _change(before, columns)
+    return Candidate(
+        effect=effect,
+        rank=rank,
+        gain=max(score if smooth else 0.0, refitted),
+        p_value=float(of_search(min(p_score, p_refitted), tests * trials)),
+        excess_after=float(np.sqrt(np.mean((rms(after) / before.noise.floor) ** 2))),
+        held_out_after=held_out_excess(before, columns),
+        probability=0.0,
+        basis=basis,
+    )
+
+
+def _change(before: Fit, columns: Array) -> Array:
+    """Least-squares change of all parameters, the candidate's at the end, to first order."""
+    white = np.hstack([before.whitened[:, 1:], before.noise.whiten(columns)])
+    size = np.linalg.norm(white, axis=0)
+    size = np.where(size > 0, size, 1.0)
+    return np.asarray(np.linalg.lstsq(white / size, before.whitened[:, 0], rcond=1e-9)[0] / size)
+
+
+def _with_probabilities(found: list[Candidate], rows: int, unseen: float) -> list[Candidate]:
+    """Posterior probability of each, against the others and against nothing missing, all equally likely before.
+
+    A candidate that does not lower the error on unseen poses has none.
+    """
+    half = np.array([schwarz(c, rows) / 2 if c.held_out_after < unseen else -np.inf for c in found] + [0.0])
+    weight = np.exp(half - half.max())
+    return [replace(c, probability=float(w / weight.sum())) for c, w in zip(found, weight[:-1], strict=True)]
+
+
+def _like(c: Candidate, others: list[Candidate], screen: Screen) -> tuple[str, ...]:
+    """Candidates that would take up nearly all that `c` takes up, at no greater price."""
+    signal = c.basis @ (c.basis.T @ screen.residual)
+    strength = float(signal @ signal)
+    if strength < 2 * NOT_TOLD_APART:
+        return ()
+    price = float(np.log(len(signal)))
+    same = []
+    for other in others:
+        lost = strength - float(np.sum((other.basis.T @ signal) ** 2)) + price * (other.rank - c.rank)
+        if other is not c and lost < NOT_TOLD_APART:
+            same.append(other.name)
+    return tuple(same)

@@ -1,0 +1,100 @@
+"""Which physical effect is a model missing on this data?
+
+The answer is one of four. `adequate`: nothing that the catalogue or a pattern could describe is left beyond noise.
+`effect-missing`: one effect, or several, explain what is left. `ambiguous`: the best has a rival that this data cannot
+tell from it. `unexplained`: something is left, and the catalogue does not explain most of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibrations.candidates import Candidate
+from calibrations.effect import Effect, catalogue
+from calibrations.experiment import Experiment, separating
+from calibrations.fit import Fit
+from calibrations.held_out import held_out_excess
+from calibrations.model import Model
+from calibrations.path import SIGNIFICANT, Path, find_path
+from calibrations.patterns import patterns
+from calibrations.screen import Screen, Search
+from calibrations.table import Table
+
+MATERIAL = 1.15  # times the noise floor: a residual below is as good as noise
+MOST_LEFT = 1 / 3  # of the excess variance: more left than this, and the catalogue has not explained it
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The verdict, the candidates behind it (best first), and what is left when they are added."""
+
+    fit: Fit
+    verdict: str
+    candidates: tuple[Candidate, ...]
+    held_out_before: float
+    residual_structure: str | None
+    next_experiment: Experiment | None
+    path: Path
+
+    @property
+    def excess_before(self) -> float:
+        """Pooled excess of the model as it is."""
+        return self.fit.pooled_excess
+
+
+def diagnose(table: Table, model: Model, effects: Mapping[str, Effect] | None = None) -> Diagnosis:
+    """Fit `model` to `table` and find what it misses. Raises what `fit` raises."""
+    path = find_path(model, table, catalogue() if effects is None else effects)
+    structure = structure_of(path.end)
+    left = path.left
+    verdict = verdict_of(path, structure)
+    return Diagnosis(
+        fit=path.start,
+        verdict=verdict,
+        candidates=path.first or left,
+        held_out_before=held_out_excess(path.start),
+        residual_structure=structure if verdict == "unexplained" else None,
+        next_experiment=separating(path.first[0]) if verdict == "ambiguous" else None,
+        path=path,
+    )
+
+
+def verdict_of(path: Path, structure: str | None) -> str:
+    """The verdict on the model at the start of `path`, given what is left at its end."""
+    if structure is not None and share_left(path) > MOST_LEFT and path.end.pooled_excess > MATERIAL:
+        return "unexplained"
+    if not path.steps:
+        return "adequate"
+    return "ambiguous" if path.steps[0].taken.indistinguishable_from else "effect-missing"
+
+
+def share_left(path: Path) -> float:
+    """Part of the excess variance that the path has not explained; 1 where it has not begun."""
+    if not path.steps:
+        return 1.0
+    return max(path.end.pooled_excess**2 - 1, 0.0) / max(path.start.pooled_excess**2 - 1, 1e-9)
+
+
+def structure_of(fit: Fit) -> str | None:
+    """The plainest pattern in a fit's residual, in words; None where there is none beyond noise."""
+    screen = Screen(fit)
+    tried = [(p, screen.basis(p.columns)) for p in patterns(fit.table, fit.channels)]
+    tried = [(p, basis) for p, basis in tried if basis.shape[1]]
+    search = Search(screen, [basis for _, basis in tried])
+    price = np.log(fit.residual.size)
+    worth = search.statistics - price * search.ranks
+    if len(tried) and np.min(search.p_values) < SIGNIFICANT:
+        significant = np.where(search.p_values < SIGNIFICANT, worth, -np.inf)
+        return tried[int(np.argmax(significant))][0].text
+    return _scatter(fit)
+
+
+def _scatter(fit: Fit) -> str | None:
+    """Scatter without a pattern. On positions it is how well a hand repeats them, and no effect of the sensor."""
+    if fit.table.kind != "poses" or not fit.noise.known or fit.pooled_excess <= MATERIAL:
+        return None
+    beyond = float(np.max(fit.noise.scatter / fit.noise.floor))
+    return f"scatter without a pattern, {beyond:.1f} x the noise floor" if beyond > np.sqrt(MATERIAL**2 - 1) else None

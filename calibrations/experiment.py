@@ -1,0 +1,34 @@
+"""The experiment that tells apart two effects that the data at hand cannot."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from calibrations.candidates import Candidate
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """A procedure with settings, what it separates, and why it can."""
+
+    procedure: str
+    settings: Mapping[str, object]
+    separates: tuple[tuple[str, str], ...]
+    why: str
+
+
+def separating(best: Candidate) -> Experiment | None:
+    """An experiment for the best candidate and the rivals that this data cannot tell from it."""
+    rivals = best.indistinguishable_from
+    if not rivals:
+        return None
+    pairs = tuple((best.name, rival) for rival in rivals)
+    names = {best.name, *rivals}
+    if names & {"axis-misalignment"} and names & {"stage-zero-offset", "base-tilt"}:
+        why = "mounted face down, an error of the sensor's axes turns with the sensor and one of the stage does not"
+        return Experiment("sweep", {"flip": 1}, pairs, why)
+    why = "full turns both ways at finely spaced inclinations, out of order, excite each of them differently"
+    return Experiment(
+        "sweep", {"step_deg": 10.0, "inclinations_deg": [90, 30, 150, 60, 120, 45, 135, 75, 105]}, pairs, why
+    )

@@ -1,0 +1,189 @@
+"""The noise of greatest restricted likelihood (Patterson and Thompson, 1971).
+
+What the model, and any smooth function of the angles, could explain is set aside first: a misfit that returns with the
+angles is then not taken for slow noise, which does not. The time constant is at most a third of the record, so that slow
+noise cannot take the place of a trend.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from calibrations.kernels import whiten
+from calibrations.noise import Noise, rms
+from calibrations.table import Array
+
+RATIOS = 0.2 * 1.7 ** np.arange(12)  # slow noise over white and scatter
+TIME_CONSTANTS = 4
+FEWEST_FOR_SLOW = 20  # rows below which slow noise cannot be told from white
+ROUNDS = 3
+NEARLY_SMOOTH = 1e-2  # of a column's length: less beside the smooth columns is taken as none
+
+
+def estimate(start: Noise, residual: Array, jacobian: Array, smooth: Array) -> Noise:
+    """The noise, given residual (channels, n), jacobian (channels, n, p) and smooth columns (n, k).
+
+    Scatter adds to the white noise of each row, so that rows of unequal white noise change their weights: the factor
+    found is turned into scatter, and the search repeated.
+    """
+    noise = start
+    for _ in range(ROUNDS):
+        best = _Search(noise, residual, jacobian, smooth).best(jacobian.shape[2])
+        variance = best.scale**2 * np.mean(noise.fast**2, axis=1) - np.mean(noise.white**2, axis=1)
+        scatter = np.sqrt(np.maximum(variance, 0.0))
+        noise = replace(noise, scatter=scatter, ratio=best.ratio, tau_s=best.tau_s)
+        if np.all(np.abs(best.scale - 1) < 1e-2):
+            break
+    return noise
+
+
+def gain(noise: Noise, residual: Array, jacobian: Array, extra: Array, smooth: Array) -> float:
+    """Twice the gain in log-likelihood by `extra` columns (channels, n, k), the noise fitted anew with them.
+
+    Smooth columns are set aside: this is what the extra columns explain beside them.
+    """
+    search = _Search(noise, residual, np.concatenate([jacobian, extra], axis=2), smooth)
+    if not extra.shape[2] or search.rank(jacobian.shape[2]) == search.rank(search.columns):
+        return 0.0
+    return max(0.0, search.best(jacobian.shape[2]).deviance - search.best(search.columns).deviance)
+
+
+@dataclass(frozen=True)
+class _Best:
+    """The point of greatest likelihood: per channel ratio, tau and the factor on all noise."""
+
+    ratio: Array
+    tau_s: Array
+    scale: Array
+    deviance: float
+
+
+@dataclass(frozen=True)
+class _Search:
+    """Likelihood over a grid of (ratio, tau); gram matrices are made once and serve every leading set of columns."""
+
+    noise: Noise
+    residual: Array
+    jacobian: Array
+    smooth: Array
+
+    @property
+    def columns(self) -> int:
+        """Number of all columns."""
+        return self.jacobian.shape[2]
+
+    @cached_property
+    def grid(self) -> list[tuple[float, float]]:
+        """(ratio, tau) to try."""
+        gap_s = self.noise.gap_s
+        n, span, gap = len(gap_s), float(np.sum(gap_s)), float(np.median(gap_s[1:]))
+        if n < FEWEST_FOR_SLOW or gap <= 0 or span < 20 * gap:
+            return [(0.0, 1.0)]
+        taus = np.geomspace(3 * gap, span / 3, TIME_CONSTANTS)
+        return [(0.0, 1.0), *((float(r), float(t)) for t in taus for r in RATIOS)]
+
+    @cached_property
+    def beside(self) -> tuple[Array, tuple[int, ...]]:
+        """Orthonormal columns (channels, n, rank) for what each column adds beside the smooth ones and those before it.
+
+        Also the number of the column that each comes from.
+        """
+        channels, n, p = self.jacobian.shape
+        fast = self.noise.fast[:, :, None]
+        free = self.jacobian / fast
+        size = np.linalg.norm(free.reshape(-1, p), axis=0)
+        Q = [np.linalg.qr(self.smooth / fast[c])[0] for c in range(channels)]
+        free = np.stack([free[c] - Q[c] @ (Q[c].T @ free[c]) for c in range(channels)]).reshape(-1, p)
+        kept, found = np.zeros((len(free), 0)), []
+        for k in range(p):
+            column = free[:, k] - kept @ (kept.T @ free[:, k])
+            column -= kept @ (kept.T @ column)
+            if np.linalg.norm(column) > NEARLY_SMOOTH * size[k] > 0:
+                kept = np.column_stack([kept, column / np.linalg.norm(column)])
+                found.append(k)
+        return kept.reshape(channels, n, -1) * fast, tuple(found)
+
+    def rank(self, columns: int) -> int:
+        """How many of the first `columns` add something beside the smooth ones."""
+        return sum(k < columns for k in self.beside[1])
+
+    @cached_property
+    def grams(self) -> list[_Grams]:
+        """Per channel, over the grid."""
+        basis, _ = self.beside
+        smooth = np.broadcast_to(self.smooth, (len(basis), *self.smooth.shape))
+        columns = np.concatenate([smooth, basis, self.residual[:, :, None]], axis=2)
+        fast, gap_s, k = self.noise.fast, self.noise.gap_s, self.smooth.shape[1]
+        return [_grams(gap_s, fast[c], columns[c], self.grid, k) for c in range(len(basis))]
+
+    def best(self, columns: int) -> _Best:
+        """The noise of greatest likelihood with the first `columns` in the model; channels in turn."""
+        channels, n = self.residual.shape
+        rank = self.rank(columns)
+        grams = [g.leading(rank) for g in self.grams]
+        least = rms(self.noise.white) / rms(self.noise.fast)
+        free = n - self.smooth.shape[1] - (rank if channels == 1 else 0)
+        pick, scale = [0] * channels, np.ones(channels)
+        for _ in range(4 if channels > 1 else 1):
+            before = list(pick)
+            for c in range(channels):
+                others = (grams[d].gram[pick[d]] / scale[d] ** 2 for d in range(channels) if d != c)
+                score, scales = _scores(grams[c], sum(others, np.zeros((rank + 1, rank + 1))), free, float(least[c]))
+                pick[c] = int(np.argmin(score))
+                scale[c] = scales[pick[c]]
+            if pick == before:
+                break
+        deviance = sum(float(grams[c].logdet[pick[c]] + 2 * n * np.log(scale[c])) for c in range(channels))
+        total = sum((grams[c].gram[pick[c]] / scale[c] ** 2 for c in range(channels)), np.zeros((rank + 1, rank + 1)))
+        theta = np.linalg.lstsq(total[:-1, :-1], total[:-1, -1], rcond=1e-10)[0]
+        ratio, tau_s = (np.array([self.grid[k][i] for k in pick]) for i in (0, 1))
+        return _Best(ratio, tau_s, scale, deviance + float(total[-1, -1] - total[:-1, -1] @ theta))
+
+
+@dataclass(frozen=True)
+class _Grams:
+    """One channel's [J r]^T Sigma^-1 [J r], (grid, p + 1, p + 1), smooth columns set aside, and determinants."""
+
+    gram: Array
+    logdet: Array  # of Sigma, (grid,)
+    information: Array  # log det S^T Sigma^-1 S of the smooth columns, (grid,)
+
+    def leading(self, p: int) -> _Grams:
+        """The same with the first `p` columns and the residual."""
+        keep = np.append(np.arange(p), self.gram.shape[1] - 1)
+        return replace(self, gram=self.gram[:, keep[:, None], keep])
+
+
+def _grams(gap_s: Array, fast: Array, columns: Array, grid: list[tuple[float, float]], k: int) -> _Grams:
+    """Gram matrices over the grid; the first `k` columns are set aside (Schur complement)."""
+    w = float(rms(fast))
+    columns = np.ascontiguousarray(columns)
+    made = [whiten(columns, gap_s, fast, ratio * w, tau) for ratio, tau in grid]
+    gram = np.stack([out.T @ out for out, _ in made])
+    logdet = np.array([logdet for _, logdet in made])
+    if not k:
+        return _Grams(gram, logdet, np.zeros(len(grid)))
+    S, cross = gram[:, :k, :k], gram[:, :k, k:]
+    reduced = gram[:, k:, k:] - np.swapaxes(cross, 1, 2) @ np.linalg.solve(S, cross)
+    return _Grams(reduced, logdet, np.linalg.slogdet(S)[1])
+
+
+def _scores(g: _Grams, rest: Array, free: int, least: float) -> tuple[Array, Array]:
+    """-2 log restricted likelihood up to a constant, and the factor on all noise (profiled), along the grid."""
+    p = len(rest) - 1
+    scale = np.ones(len(g.gram))
+    ridge = 1e-13 * np.eye(p)
+    for _ in range(3):
+        total = g.gram / scale[:, None, None] ** 2 + rest
+        size = np.trace(total[:, :p, :p], axis1=1, axis2=2)[:, None, None]
+        normal = total[:, :p, :p] + ridge * size
+        theta = np.linalg.solve(normal, total[:, :p, p:])[:, :, 0]
+        extended = np.concatenate([-theta, np.ones((len(theta), 1))], axis=1)
+        rss = np.einsum("gi,gij,gj->g", extended, g.gram, extended)
+        scale = np.maximum(np.sqrt(np.maximum(rss, 0.0) / free), max(least, 1e-300))
+    other = np.einsum("gi,ij,gj->g", extended, rest, extended)
+    information = g.information + np.linalg.slogdet(normal)[1]
+    return rss / scale**2 + other + g.logdet + information + 2 * free * np.log(scale), scale
