@@ -142,7 +142,7 @@ class SimulatedClock:
 
     def _arrived(self, wire: Wire) -> bool:
         if not _readable([wire.fileno()], STUCK_S):
-            raise ClockStuck(f"{wire.key}: the simulated instrument's answer did not arrive", "Report this")
+            raise ClockStuck(f"{wire.key}: the simulated instrument's answer did not arrive", "Report this defect")
         return True
 
     def _wait_for_peers(self, wire: Wire, started: float) -> None:

@@ -20,6 +20,7 @@ from drivers.errors import LinkRefused
 from drivers.links.url import Url
 
 CONNECT_TIMEOUT_S = 5.0
+DISCARD_S = 1.0
 CHUNK = 1 << 18
 
 
@@ -71,9 +72,12 @@ class Link(Wire):
         return data
 
     def discard(self, quiet_s: float = 0.0) -> int:
-        """Throw away what arrives until it has been quiet for `quiet_s`; the number of bytes."""
-        count = 0
-        while data := self.read(quiet_s):
+        """Throw away what arrives until it has been quiet for `quiet_s`; the number of bytes.
+
+        Gives up on a line that babbles for DISCARD_S: the next answer will tell.
+        """
+        count, deadline = 0, self.clock.now() + DISCARD_S
+        while self.clock.now() <= deadline and (data := self.read(quiet_s)):
             count += len(data)
         return count
 

@@ -7,7 +7,6 @@ Every failure is raised with the instrument, the register and a remedy (see driv
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from pymodbus.exceptions import ModbusException
 from pymodbus.framer import FramerRTU, FramerSocket
@@ -24,6 +23,8 @@ from drivers.links.link import Link
 from drivers.links.register import Register
 from drivers.links.url import Url
 
+TIMEOUT_S = 0.5  # for one answer; the slowest instrument needs a tenth of it
+RETRIES = 2  # after silence, a bad frame or a wrong unit; every request of ours may be repeated
 REFUSALS = {
     1: ("it does not know the function", "Check that the model of the instrument is the one in the bench file"),
     2: ("it has no such register", "Check that the model of the instrument is the one in the bench file"),
@@ -33,21 +34,12 @@ REFUSALS = {
 }
 
 
-@dataclass(frozen=True)
-class Patience:
-    """How long to wait for an answer in s, and how often to ask again after silence or a bad frame."""
-
-    timeout_s: float = 0.5
-    retries: int = 2
-
-
 class Bus:
     """One wire with Modbus on it: RTU frames, or TCP frames with transaction numbers."""
 
-    def __init__(self, link: Link, patience: Patience | None = None) -> None:
+    def __init__(self, link: Link) -> None:
         self.link = link
         self._url = Url.parse(link.url)
-        self._patience = patience or Patience()
         decoder = DecodePDU(is_server=False)
         self._framer = FramerRTU(decoder) if self._url.rtu else FramerSocket(decoder)
         self._transaction = 0
@@ -59,7 +51,7 @@ class Bus:
         Raises Refused, or after the retries LinkTimeout, BadFrame or WrongUnit.
         """
         request.dev_id = unit
-        for _ in range(self._patience.retries):
+        for _ in range(RETRIES):
             try:
                 return self._attempt(request, what)
             except (LinkTimeout, BadFrame, WrongUnit):
@@ -90,7 +82,7 @@ class Bus:
 
     def _receive(self, what: str) -> ModbusPDU:
         clock = self.link.clock
-        deadline = clock.now() + self._patience.timeout_s
+        deadline = clock.now() + TIMEOUT_S
         data = b""
         while more := self.link.read(deadline - clock.now()):
             data += more
@@ -102,7 +94,7 @@ class Bus:
         if data:
             raise _bad_frame(what, f"{len(data)} bytes came that are no answer ({data[:16].hex(' ')})")
         raise LinkTimeout(
-            f"{what}: no answer within {self._patience.timeout_s:g} s on {self.link.url}",
+            f"{what}: no answer within {TIMEOUT_S:g} s on {self.link.url}",
             "Check power, cable and unit id, and that baud rate and parity are the instrument's",
         )
 

@@ -150,7 +150,7 @@ class Port:
             os.close(far)
 
         self.connections[near] = Connection(near, path, close)
-        return f"serial:{path}?baud={self.timing.baud}&parity=N"
+        return f"serial:{path}"
 
 
 class Server:

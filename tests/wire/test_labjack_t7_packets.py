@@ -6,7 +6,7 @@ import struct
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivers.errors import StreamError
@@ -71,6 +71,7 @@ def test_the_end_of_a_burst_is_no_loss() -> None:
     assert codes_of(packet(0, [1], 2944), 1, "adc").tolist() == [1]
 
 
+@settings(derandomize=True, deadline=None)
 @given(st.lists(st.lists(st.integers(0, 65535), min_size=3, max_size=3), max_size=20), st.integers(0, 65535))
 def test_every_record_survives(blocks: list[list[int]], first: int) -> None:
     data = b"".join(packet((first + k) % 65536, block) for k, block in enumerate(blocks))
@@ -85,6 +86,7 @@ def test_volts_of_known_codes() -> None:
     assert volts[0] == pytest.approx(NOMINAL.offset, abs=1e-3)
 
 
+@settings(derandomize=True, deadline=None)
 @given(st.integers(0, 65535), st.floats(0.99, 1.01), st.floats(0.99, 1.01))
 def test_the_twins_converter_undoes_the_calibration(code: int, up: float, down: float) -> None:
     constants = Calibration(NOMINAL.positive_slope * up, NOMINAL.negative_slope * down, 33500.25, 0.0)

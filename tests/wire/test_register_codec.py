@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivers.links.register import CODES, Kind, Register
@@ -30,6 +30,7 @@ def test_words_of_known_values(kind: Kind, scale: float, words: list[int], value
     assert register.encode(value) == words
 
 
+@settings(derandomize=True, deadline=None)
 @given(st.sampled_from(list(CODES)), st.data())
 def test_every_word_survives(kind: Kind, data: st.DataObject) -> None:
     register = Register(0, kind, "")
@@ -39,6 +40,7 @@ def test_every_word_survives(kind: Kind, data: st.DataObject) -> None:
         assert register.encode(value) == words
 
 
+@settings(derandomize=True, deadline=None)
 @given(st.integers(-32768, 32767))
 def test_a_scaled_count_survives(count: int) -> None:
     register = Register(0, "int16", "", scale=0.1)

@@ -122,6 +122,13 @@ def test_a_wait_for_one_wire_keeps_the_others_going() -> None:
     assert (ticks.read(0.0), clock.now()) == (b"1;2;", 2.5)
 
 
+def test_a_line_that_never_falls_silent_is_given_up() -> None:
+    clock = SimulatedClock()
+    link = ticking(clock)
+    assert link.discard(quiet_s=10.0) > 0
+    assert clock.now() <= 2.0
+
+
 def test_a_server_holds_what_the_kernel_does_not_take() -> None:
     clock = SimulatedClock()
     block = bytes(range(256)) * (1 << 16)  # 16 MB, far more than a socket buffer
