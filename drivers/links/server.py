@@ -22,6 +22,9 @@ from drivers.links.link import CHUNK, connection_key
 from drivers.links.url import Url
 
 
+SILENCE_S = 0.05  # ends an RTU frame: generous, since a computer sends a frame in pieces
+
+
 class Twin(Protocol):
     """What a server needs of a simulated instrument beside its answers."""
 
@@ -47,9 +50,16 @@ class Connection:
         self.received = self.emitted = 0
         self._outbox: deque[tuple[float, bytes]] = deque()
         self._full = False
+        self._heard_s = -math.inf
 
-    def read(self) -> bool:
-        """Take in what is there; False at the end of the connection."""
+    def read(self, now_s: float, patience_s: float) -> bool:
+        """Take in what is there; False at the end of the connection.
+
+        What came more than `patience_s` before it is half a request that nobody will complete.
+        """
+        if now_s - self._heard_s > patience_s:
+            self.inbox.clear()
+        self._heard_s = now_s
         try:
             data = os.read(self.fileno, CHUNK)
         except BlockingIOError:
@@ -110,7 +120,7 @@ class Port:
             self._accept()
             return
         connection = self.connections[fileno]
-        if connection.read():
+        if connection.read(now_s, SILENCE_S if self.timing.rtu else math.inf):
             self.answer(connection, now_s)
         else:
             del self.connections[fileno]

@@ -107,6 +107,11 @@ def test_a_request_may_come_in_pieces(small_world: Any, clock: SimulatedClock) -
     server.close()
 
 
+def test_half_a_request_is_forgotten(ask: Ask) -> None:
+    assert ask("01 03 00") == ""
+    assert ask(ASK_ALARM) == "01 03 04 00 00 00 00 FA 33"
+
+
 def test_an_exchange_costs_its_line_time(ask: Ask, clock: SimulatedClock) -> None:
     ask(ASK_ALARM)
     characters = 17 * 10 / 115200
