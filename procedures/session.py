@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from procedures.errors import SafetyLimit
 
+SHORTEST_APPROACH_DEG = 0.5  # a stage that is nearer to a pose has not come from its side
 
 @dataclass(frozen=True)
 class Pose:
@@ -102,7 +103,7 @@ class Host(Protocol):
         """What happens now, for people."""
 
 
-@dataclass
+@dataclass(frozen=True)
 class Session:
     """The bench as a procedure sees it."""
 
@@ -113,8 +114,6 @@ class Session:
     clock: Clock
     host: Host
     limits: Limits = Limits()
-    # Where the last move went, so that a pose is approached from its side without asking the stage again.
-    _beta_deg: float | None = None
 
     def missing(self, poses: Iterable[Pose]) -> Iterator[Pose]:
         """Those of `poses` that the record does not hold yet, in order; a pose named twice is kept twice."""
@@ -132,11 +131,10 @@ class Session:
         """Turn both stages to `pose`; beta arrives from below for direction +1, from above for -1."""
         self.host.doing(f"moving to alpha {pose.alpha_deg:g}, beta {pose.beta_deg:g} deg")
         self.alpha.move_to(pose.alpha_deg)
-        here = self.beta.angle_deg() if self._beta_deg is None else self._beta_deg
-        if pose.direction and (pose.beta_deg - here) * pose.direction <= 0:
+        way_deg = (pose.beta_deg - self.beta.angle_deg()) * pose.direction
+        if pose.direction and way_deg < SHORTEST_APPROACH_DEG:
             self.beta.move_to(pose.beta_deg - pose.direction * self.limits.overrun_deg)
         self.beta.move_to(pose.beta_deg)
-        self._beta_deg = pose.beta_deg
 
     def keep(self, pose: Pose, *, samples: Samples, temperature_c: float | None = None) -> None:
         """Put `pose` into the record. Raises SafetyLimit for a temperature outside the bench's limits."""

@@ -26,6 +26,7 @@ from rig.nearest import did_you_mean
 
 DEFAULT = Path(__file__).with_name("bench_default.yaml")
 SIMULATED = "simulated"
+UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
 ROLES = ("alpha", "beta", "adc", "oven")
 
 
@@ -176,14 +177,15 @@ def _beside(folders: Folders, path: Path) -> Folders:
 
 
 def _told(error: ValidationError, path: Path, model: type[BaseModel]) -> str:
-    """The first fault, with the key's place in the file."""
-    fault = error.errors()[0]
+    """The first fault, with the key's place in the file; a misspelt key comes before the one that it was meant for."""
+    faults = error.errors()
+    fault = min(faults, key=lambda fault: fault["type"] not in UNKNOWN)
     where = [str(part) for part in fault["loc"]]
     return f"{path}, key {'.'.join(where)}: {_fault(fault, _keys(model, where[:-1]))}"
 
 
 def _fault(fault: Any, keys: list[str]) -> str:
-    if fault["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
+    if fault["type"] in UNKNOWN:
         return f"no such key.{did_you_mean(str(fault['loc'][-1]), keys)}"
     if fault["type"] == "missing":
         return "is missing"

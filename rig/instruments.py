@@ -28,13 +28,6 @@ from rig.bench import ROLES, Bench
 from rig.errors import InstrumentFailed
 
 
-class RunClock(SimulatedClock):
-    """A simulated clock that can be put where an earlier process left it."""
-
-    def set(self, now_s: float) -> None:
-        self._now_s = now_s
-
-
 class SinceStart:
     """Real time from 0, as the world counts it."""
 
@@ -94,12 +87,12 @@ class Rig:
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Put a simulated bench back to where `state` was taken."""
-        if self.world is None or not isinstance(self.clock, RunClock):
+        if self.world is None or not isinstance(self.clock, SimulatedClock):
             return
         self.world.restore(state["world"])
         for server, kept in zip(self.servers, state["servers"], strict=True):
             server.restore(kept)
-        self.clock.set(state["clock_s"])
+        self.clock.restore(state["clock_s"])
 
     def stop(self) -> list[str]:
         """Stop both stages at once, whatever else is wrong; what could not be stopped."""
@@ -125,7 +118,7 @@ def connected(bench: Bench) -> Iterator[Rig]:
         servers = serve(bench, world)
         for server in servers.values():
             stack.callback(server.close)
-        clock: Clock = RunClock() if bench.simulated else SinceStart()
+        clock: Clock = SimulatedClock() if bench.simulated else SinceStart()
         stack.enter_context(_pumped(list(servers.values()), clock))
         links = Links(clock)
         stack.callback(links.close)

@@ -5,8 +5,9 @@ Each move, the limits that it stays within, how long all of it takes, the room t
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from procedures.catalogue import Procedure
@@ -61,7 +62,8 @@ def plan(bench: Bench, procedure: Procedure, settings: Mapping[str, Any]) -> Pla
     """What `procedure` would do on `bench`. Raises what the run would: LimitError, SettingError, ProcedureError."""
     ledger = Ledger()
     parts = _parts(bench, ledger)
-    session = Session(**parts, clock=ledger, host=PlanHost(ledger), limits=bench.limits)
+    limits = replace(bench.limits, temperature_c=(-math.inf, math.inf))  # nobody knows it yet
+    session = Session(**parts, clock=ledger, host=PlanHost(ledger), limits=limits)
     session.reference()
     procedure.function(session, **settings)
     stages = {role: part for role, part in parts.items() if isinstance(part, PlannedStage)}

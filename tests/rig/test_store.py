@@ -16,7 +16,13 @@ from rig.record.tables import table_of
 
 ANGLES = st.floats(-400, 400)
 POSES = st.builds(
-    Pose, ANGLES, ANGLES, st.sampled_from([-1, 0, 1]), st.text(max_size=8), st.sampled_from([0.0, 90.0]), st.integers(0, 1)
+    Pose,
+    ANGLES,
+    ANGLES,
+    st.sampled_from([-1, 0, 1]),
+    st.text(max_size=8),
+    st.sampled_from([0.0, 90.0]),
+    st.integers(0, 1),
 )
 
 

@@ -1,0 +1,67 @@
+"""A small sweep, somebody who looks on, and a command in a process of its own that comes to harm."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import dataclass, field
+from typing import Any
+
+from procedures.catalogue import find
+from procedures.settings import parse
+from rig.record import Kept
+
+SMALL = {"step_deg": "90", "dwell_s": "0.2", "inclinations_deg": "90,45"}
+SMALL_ARGUMENTS = ("--step-deg", "90", "--dwell-s", "0.2", "--inclinations-deg", "90,45")
+POSES = 20  # of the small sweep
+
+
+def small_sweep() -> tuple[Any, dict[str, Any]]:
+    """The procedure and its settings."""
+    sweep = find("sweep")
+    return sweep, parse(sweep, SMALL)
+
+
+@dataclass
+class Onlooker:
+    """Remembers what it was shown; answers every question by its default."""
+
+    run: str = ""
+    said: list[str] = field(default_factory=list)
+    expected: list[tuple[int, int]] = field(default_factory=list)
+    seen: list[Kept] = field(default_factory=list)
+
+    def begun(self, run: str) -> None:
+        self.run = run
+
+    def doing(self, text: str) -> None:
+        self.said.append(text)
+
+    def expect(self, total: int, done: int) -> None:
+        self.expected.append((total, done))
+
+    def kept(self, kept: Kept) -> None:
+        self.seen.append(kept)
+
+    def ask(self, name: str, question: str, default: str) -> str:
+        self.said.append(f"{name}: {question}")
+        return default
+
+
+def in_own_process(*arguments: str, harm: str = "") -> subprocess.CompletedProcess[str]:
+    """Call a command in a process of its own, after the Python statements `harm`."""
+    program = f"{harm}\nfrom rig.cli import main\nmain({list(arguments)!r})"
+    return subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=False)
+
+
+def signal_at_commit(number: int, name: str) -> str:
+    """Statements that send the own process a signal inside its transaction `number`, just before the commit."""
+    return f"""
+import itertools, os, signal
+from sqlalchemy import Engine, event
+commits = itertools.count(1)
+@event.listens_for(Engine, "commit")
+def harm(connection):
+    if next(commits) == {number}:
+        os.kill(os.getpid(), signal.{name})
+"""

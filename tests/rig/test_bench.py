@@ -1,0 +1,110 @@
+"""The bench file: what is refused, and how the message helps."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+import yaml
+
+from drivers.links import Address
+from rig.bench import DEFAULT, Bench, drivers, read_bench
+from rig.errors import BenchError
+
+ALPHA = {"driver": "oriental_az", "url": "simulated"}
+
+
+def test_the_simulated_rig_is_the_default() -> None:
+    bench = read_bench()
+    assert bench.simulated
+    assert set(bench.instruments) == {"alpha", "beta", "adc", "oven"}
+    assert bench.constants["sensor"] == "ADXL203"
+    assert bench.constants["filter_corner_hz"] == 15.07
+
+
+def test_a_bench_comes_back_from_its_document() -> None:
+    bench = read_bench()
+    assert Bench.model_validate(bench.document()) == bench
+
+
+def test_every_driver_is_found_by_its_file() -> None:
+    assert {"oriental_az", "labjack_t7", "omega_cn7500"} <= set(drivers())
+    assert not {"clock", "oriental_az_twin", "oriental_az_table"} & set(drivers())
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"sensr": {}}, "key sensr: no such key. Did you mean 'sensor'?"),
+        ({"sensor": {"gravity": 9.8}}, "key sensor.gravity: no such key. Did you mean 'gravity_m_s2'?"),
+        ({"limits": {"temprature_c": [0, 1]}}, "key limits.temprature_c: no such key. Did you mean 'temperature_c'?"),
+        ({"limits": {"temperature_c": [0]}}, "key limits.temperature_c.1: is missing"),
+        ({"seed": "x"}, "key seed: Input should be a valid integer"),
+        ({"instruments": {"alhpa": ALPHA}}, "key instruments.alhpa: no such role. Did you mean 'alpha'?"),
+        ({"instruments": {"alpha": {"driver": "x"}}}, "key instruments.alpha.url: is missing"),
+        (
+            {"instruments": {"alpha": ALPHA | {"drivr": 1}}},
+            "key instruments.alpha.drivr: no such key. Did you mean 'driver'?",
+        ),
+        (
+            {"instruments": {"alpha": ALPHA | {"driver": "oriental"}}},
+            "no driver 'oriental'. Did you mean 'oriental_az'?",
+        ),
+        (
+            {"instruments": {"alpha": ALPHA | {"settings": {"sped_deg_s": 1}}}},
+            "key instruments.alpha.settings.sped_deg_s: no such key. Did you mean 'speed_deg_s'?",
+        ),
+        (
+            {"instruments": {"alpha": ALPHA | {"settings": {"speed_deg_s": "fast"}}}},
+            "key instruments.alpha.settings.speed_deg_s: Input should be a valid number",
+        ),
+        ({"world": {"sensr": {}}}, "'sensr' of the simulated world. Did you mean 'sensor'?"),
+        ({"folders": {"effects": "nowhere"}}, "key folders.effects: there is no folder"),
+        ("- a list", "a bench file is a mapping"),
+        ("seed: [", "is not a YAML file"),
+    ],
+)
+def test_what_is_wrong_is_said_with_its_place(
+    bench_file: Callable[..., Path], changes: dict[str, object] | str, said: str
+) -> None:
+    path = bench_file(changes)
+    with pytest.raises(BenchError) as error:
+        read_bench(path)
+    assert str(error.value).startswith(str(path))
+    assert said in str(error.value)
+
+
+def test_a_misspelt_key_is_named_before_what_is_missing_for_it(bench_file: Callable[..., Path]) -> None:
+    with pytest.raises(BenchError, match=r"key intruments: no such key\. Did you mean 'instruments'"):
+        read_bench(bench_file("intruments: {}"))
+
+
+def test_a_file_that_is_not_there_is_said(tmp_path: Path) -> None:
+    with pytest.raises(BenchError, match="cannot be read: No such file"):
+        read_bench(tmp_path / "bench.yaml")
+
+
+def test_folders_are_relative_to_the_file(bench_file: Callable[..., Path], tmp_path: Path) -> None:
+    (tmp_path / "mine").mkdir()
+    assert read_bench(bench_file({"folders": {"procedures": "mine"}})).folders.procedures == tmp_path / "mine"
+
+
+def test_a_real_address_is_passed_on_and_a_simulated_one_may_say_where_it_listens(
+    bench_file: Callable[..., Path],
+) -> None:
+    instruments = yaml.safe_load(DEFAULT.read_text())["instruments"]
+    instruments["alpha"] |= {"url": "serial:/dev/ttyUSB0?parity=E", "unit": 3}
+    instruments["adc"] |= {"url": "simulated:tcp://127.0.0.1:5022"}
+    bench = read_bench(bench_file({"instruments": instruments}))
+    assert bench.instruments["alpha"].address == Address("serial:/dev/ttyUSB0?parity=E", 3)
+    assert bench.instruments["adc"].listen == "tcp://127.0.0.1:5022"
+    assert bench.instruments["oven"].listen is None
+    assert not bench.simulated
+
+
+def test_the_configuration_is_that_of_procedure_settings_and_bench() -> None:
+    bench = read_bench()
+    same = bench.configuration("sweep", {"step_deg": 10.0})
+    assert same == read_bench().configuration("sweep", {"step_deg": 10.0})
+    others = [("sweep", {"step_deg": 5.0}), ("soak", {"step_deg": 10.0})]
+    assert same not in [bench.configuration(name, settings) for name, settings in others]
+    assert same != bench.model_copy(update={"seed": 2}).configuration("sweep", {"step_deg": 10.0})

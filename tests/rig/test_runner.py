@@ -1,0 +1,223 @@
+"""A procedure through the simulated instruments' sockets into the record, disturbed and undisturbed."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rigging import POSES, Onlooker, small_sweep
+
+from drivers.errors import LimitError, StageAlarm
+from procedures.errors import SettingError
+from procedures.session import Limits
+from procedures.sweep import grid
+from rig.bench import Bench, read_bench
+from rig.errors import InstrumentFailed, RunBusy, RunMismatch
+from rig.record import Kept, Record
+from rig.record.lease import lease
+from rig.record.tables import table_of
+from rig.runner import Outcome, resume, start
+
+pytestmark = pytest.mark.sockets
+
+
+def run_small(record: Record, bench: Bench | None = None, watch: Onlooker | None = None) -> Outcome:
+    return start(record, bench or read_bench(), *small_sweep(), watch or Onlooker())
+
+
+def samples(record: Record, run: str) -> list[Any]:
+    """All that was measured, comparable bit for bit."""
+    return [
+        (kept.pose, kept.samples.volts.tobytes(), kept.samples.start_s, kept.t_s, kept.temperature_c)
+        for kept in record.kept(run)
+    ]
+
+
+class Interrupting(Onlooker):
+    """Does something when the pose `at` has been kept."""
+
+    def __init__(self, at: int, then: Callable[[], None]) -> None:
+        super().__init__()
+        self._at, self._then = at, then
+
+    def kept(self, kept: Kept) -> None:
+        super().kept(kept)
+        if len(self.seen) == self._at:
+            self._then()
+
+
+def raising(error: BaseException) -> Callable[[], None]:
+    def then() -> None:
+        raise error
+
+    return then
+
+
+def test_a_sweep_keeps_every_pose_once_in_order() -> None:
+    watch = Onlooker()
+    with Record() as record:
+        outcome = run_small(record, watch=watch)
+        table = table_of(record, outcome.run.run)
+        poses = record.poses(outcome.run.run)
+    assert outcome.error is None
+    assert (outcome.run.state, outcome.run.rows, watch.expected) == ("complete", POSES, [(POSES, 0)])
+    assert poses == list(grid((90.0, 45.0), 90.0)) == [kept.pose for kept in watch.seen]
+    assert watch.said[:2] == ["homing alpha", "homing beta"]
+    assert set(table.column("n")) == {200}
+    assert np.all(np.diff(table.column("t_s")) > 0)
+
+
+def test_the_sensor_feels_gravity_through_all_the_wires() -> None:
+    with Record() as record:
+        table = table_of(record, run_small(record).run.run)
+    alpha, beta = np.radians(table.column("alpha_deg")), np.radians(table.column("beta_deg"))
+    assert np.allclose(table.column("vx_v"), 2.5 + np.sin(alpha) * np.cos(beta), atol=0.06)
+    assert np.allclose(table.column("vy_v"), 2.5 + np.sin(alpha) * np.sin(beta), atol=0.06)
+
+
+def test_time_counts_from_the_sensors_power() -> None:
+    with Record() as record:
+        warm = table_of(record, run_small(record).run.run)
+        cold = run_small(record, read_bench().model_copy(update={"world": {"heat": {"powered_for_s": 0.0}}}))
+        assert table_of(record, cold.run.run).column("t_s")[0] < 60
+    assert warm.column("t_s")[0] > 12 * 3600
+
+
+def test_the_same_seed_gives_the_same_run_sample_for_sample() -> None:
+    with Record() as record:
+        one, same = (run_small(record).run.run for _ in range(2))
+        other = run_small(record, read_bench().model_copy(update={"seed": 2})).run.run
+        assert samples(record, one) == samples(record, same)
+        assert samples(record, one) != samples(record, other)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_stops_and_resume_makes_the_same_run(number: signal.Signals) -> None:
+    with Record() as record:
+        whole = run_small(record).run.run
+        broken = run_small(record, watch=Interrupting(7, lambda: signal.raise_signal(number)))
+        assert broken.run.state == "stopped"
+        assert broken.run.rows == 7
+        assert f"stopped by {number.name}" in str(broken.error)
+        watch = Onlooker()
+        done = resume(record, broken.run.run, watch)
+        assert (done.run.state, watch.expected) == ("complete", [(POSES, 7)])
+        assert samples(record, done.run.run) == samples(record, whole)
+
+
+def test_a_run_may_be_interrupted_again_and_again() -> None:
+    with Record() as record:
+        whole = run_small(record).run.run
+        run = run_small(record, watch=Interrupting(1, raising(KeyboardInterrupt()))).run.run
+        for step in (3, 5):
+            resume(record, run, Interrupting(step, raising(KeyboardInterrupt())))
+        assert record.run(run).rows == 9
+        resume(record, run, Onlooker())
+        assert samples(record, run) == samples(record, whole)
+
+
+def test_a_failing_instrument_leaves_a_run_that_can_be_resumed() -> None:
+    with Record() as record:
+        whole = run_small(record).run.run
+        alarm = StageAlarm("beta: stands still with alarm 30", "Look at the stage", 0x30)
+        failed = run_small(record, watch=Interrupting(4, raising(alarm)))
+        assert (failed.run.state, failed.error) == ("failed", alarm)
+        assert "alarm 30" in (failed.run.message or "")
+        resume(record, failed.run.run, Onlooker())
+        assert samples(record, failed.run.run) == samples(record, whole)
+
+
+def test_a_fault_of_the_program_is_written_down_and_not_hidden() -> None:
+    with Record() as record:
+        with pytest.raises(ZeroDivisionError):
+            run_small(record, watch=Interrupting(2, raising(ZeroDivisionError("x"))))
+        (run,) = record.runs()
+        assert (run.state, run.message, run.rows) == ("failed", "ZeroDivisionError: x", 2)
+
+
+def test_a_temperature_outside_the_limits_stops_the_run() -> None:
+    bench = read_bench().model_copy(update={"limits": Limits(temperature_c=(0.0, 10.0))})
+    with Record() as record:
+        outcome = run_small(record, bench)
+    assert (outcome.run.state, outcome.run.rows) == ("stopped", 0)
+    assert "outside the bench's limits of 0 to 10 C" in str(outcome.error)
+
+
+def test_a_complete_run_is_not_begun_again() -> None:
+    with Record() as record:
+        run = run_small(record).run
+        watch = Onlooker()
+        assert resume(record, run.run, watch).run == run
+        assert not watch.seen
+
+
+def test_a_question_is_asked_once_even_if_the_run_is_resumed() -> None:
+    with Record() as record:
+        run = run_small(record, watch=Interrupting(2, raising(KeyboardInterrupt()))).run.run
+        watch = Onlooker()
+        resume(record, run, watch)
+        assert not any(said.startswith("mounting") for said in watch.said)
+        assert [(event.what, event.text) for event in record.events(run)] == [("answer mounting", "yes")]
+
+
+def test_another_bench_is_refused() -> None:
+    with Record() as record:
+        run = run_small(record, watch=Interrupting(2, raising(KeyboardInterrupt()))).run.run
+        with pytest.raises(RunMismatch, match="begun with another bench"):
+            resume(record, run, Onlooker(), read_bench().model_copy(update={"seed": 2}))
+        assert resume(record, run, Onlooker(), read_bench()).run.state == "complete"
+
+
+def test_two_processes_do_not_work_on_one_run() -> None:
+    with Record() as record:
+        run = run_small(record, watch=Interrupting(2, raising(KeyboardInterrupt()))).run.run
+        with lease(record.folder, run):
+            record.set_state(run, "running")
+            assert record.run(run).state == "running"
+            with pytest.raises(RunBusy, match="another process"):
+                resume(record, run, Onlooker())
+        assert record.run(run).state == "stopped"  # nobody holds it
+
+
+def test_limits_hold_before_anything_is_written() -> None:
+    document = read_bench().document()
+    document["instruments"]["beta"]["settings"]["limits_deg"] = [-360, 360]
+    with Record() as record:
+        with pytest.raises(LimitError, match=r"beta: 365 deg is outside its limits -360 \.\. 360"):
+            run_small(record, Bench.model_validate(document))
+        assert record.runs() == []
+
+
+def test_settings_are_refused_before_anything_is_written() -> None:
+    sweep, settings = small_sweep()
+    with Record() as record:
+        with pytest.raises(SettingError, match="step_deg is 7"):
+            start(record, read_bench(), sweep, settings | {"step_deg": 7.0}, Onlooker())
+        assert record.runs() == []
+
+
+@pytest.mark.parametrize("url", ["tcp://127.0.0.1:1", "serial:/dev/there-is-none?baud=9600&parity=N"])
+def test_an_unreachable_instrument_is_named_and_nothing_is_written(url: str) -> None:
+    document = read_bench().document()
+    document["instruments"]["oven"]["url"] = url
+    with Record() as record:
+        with pytest.raises(InstrumentFailed, match=r"oven \(omega_cn7500\) at .* Check") as error:
+            run_small(record, Bench.model_validate(document))
+        assert record.runs() == []
+    assert url in str(error.value)
+
+
+def test_results_of_a_procedure_are_kept(tmp_path: Path) -> None:
+    from procedures.catalogue import find
+
+    (tmp_path / "weigh.py").write_text(
+        '"""weigh: a result."""\n\ndef weigh(rig, *, grams: float = 1.0):\n'
+        '    return {"mass": {"value": grams, "std": 0.1, "unit": "g", "limit": None, "verdict": None}}\n'
+    )
+    with Record() as record:
+        outcome = start(record, read_bench(), find("weigh", tmp_path), {"grams": 2.0}, Onlooker())
+    assert outcome.run.results["mass"]["value"] == 2.0
