@@ -7,6 +7,7 @@ WorldConfig.from_mapping({"preset": "ideal", "heat": {"ambient_c": 20.0}})
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Any, TypeVar
@@ -116,8 +117,8 @@ def _value(present: Any, value: Any, where: str) -> Any:
         if not isinstance(value, Mapping):
             raise BadSetting(f"{where} of the simulated world is {value!r}", f"Give a mapping of {_names(present)}")
         return changed(present, value, f"{where}.")
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise BadSetting(f"{where} of the simulated world is {value!r}", "Give a number")
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        raise BadSetting(f"{where} of the simulated world is {value!r}", "Give a finite number")
     return float(value)
 
 
@@ -143,8 +144,13 @@ ADXL203: dict[str, Any] = {
                 "stress_pm_per_k": 4.0,
                 "stiffening_ppm_per_k": -200.0,
             },
-            "friction": {"stiffness_fraction": 0.0035, "slip_nm": 3.3, "pressing_per_g": 0.5},
-            "plates": {"gap_mismatch_fraction": 0.02, "overlap_loss_per_um2": 20.0, "height_step_nm": 3.0},
+            "friction": {"stiffness_fraction": 0.0035, "slip_nm": 3.3, "pressing_per_g2": 0.5},
+            "plates": {
+                "plate_mismatch_fraction": 0.02,
+                "stray_fraction": 1.0,
+                "overlap_loss_per_um2": 60.0,
+                "height_step_nm": 3.0,
+            },
         },
         "y": {
             "springs": {
@@ -154,8 +160,13 @@ ADXL203: dict[str, Any] = {
                 "stress_pm_per_k": -3.0,
                 "stiffening_ppm_per_k": -180.0,
             },
-            "friction": {"stiffness_fraction": 0.004, "slip_nm": 3.0, "pressing_per_g": 0.4},
-            "plates": {"gap_mismatch_fraction": -0.015, "overlap_loss_per_um2": 18.0, "height_step_nm": -2.0},
+            "friction": {"stiffness_fraction": 0.004, "slip_nm": 3.0, "pressing_per_g2": 0.4},
+            "plates": {
+                "plate_mismatch_fraction": -0.015,
+                "stray_fraction": 1.0,
+                "overlap_loss_per_um2": 54.0,
+                "height_step_nm": -2.0,
+            },
         },
     },
     "heat": {

@@ -50,8 +50,8 @@ def _put(changes: dict[str, Any], path: str, value: float) -> None:
 
 DEFECTS: dict[str, Defect] = {
     "plate mismatch": Defect(
-        "fingers rest off the middle of their gaps",
-        {"sensor.*.plates.gap_mismatch_fraction": 0.05},
+        "a finger's two fixed plates differ in area",
+        {"sensor.*.plates.plate_mismatch_fraction": 0.1},
     ),
     "hardening springs": Defect(
         "beams grow stiffer as they bend",
@@ -71,7 +71,8 @@ DEFECTS: dict[str, Defect] = {
     ),
     "sliding overlap": Defect(
         "the neighbouring axis's load changes the overlap of the plates",
-        {"sensor.*.plates.overlap_slide_per_um": 0.2},
+        {"sensor.*.plates.overlap_slide_per_um": 0.6},
+        {"sensor.*.plates.stray_fraction": 1.0},
     ),
     "foreshortened by sag": Defect(
         "beams that sag draw the mass aside",
@@ -79,7 +80,8 @@ DEFECTS: dict[str, Defect] = {
     ),
     "overlap lost by sag": Defect(
         "plates that sag overlap less",
-        {"sensor.*.plates.overlap_loss_per_um2": 8.0},
+        {"sensor.*.plates.overlap_loss_per_um2": 24.0},
+        {"sensor.*.plates.stray_fraction": 1.0},
     ),
     "package turned": Defect(
         "the package was soldered askew",

@@ -3,7 +3,7 @@
 DriverError
 └── SimulationError
     ├── UnknownSetting   a configuration names something that does not exist
-    ├── BadSetting       a configuration value has the wrong type or no physical meaning
+    ├── BadSetting       a configuration value is no finite number, or a kept state does not fit
     ├── UnknownInput     a converter input or a stage axis that the world does not have
     └── TimeReversal     the world was asked about a time that has passed
 """
@@ -25,7 +25,7 @@ class UnknownSetting(SimulationError):
 
 
 class BadSetting(SimulationError):
-    """A configuration value has the wrong type or no physical meaning."""
+    """A configuration value is no finite number, or a kept state does not fit."""
 
 
 class UnknownInput(SimulationError):

@@ -20,13 +20,13 @@ class Friction:
 
     stiffness_fraction: float = 0.0  # of one element, relative to the spring
     slip_nm: float = 3.0  # stretch at which the last element slips
-    pressing_per_g: float = 0.0  # relative growth of all limits per g on the neighbouring axis
+    pressing_per_g2: float = 0.0  # relative growth of all limits per square of the neighbouring axis's load
 
 
 @kernel
 def drag_nm(friction: Friction, seats: Floats, x_nm: float, neighbour_g: float) -> float:
     """Displacement lost to friction at `x_nm`; moves the elements' `seats` (nm, shape (4,)) along."""
-    limit = friction.slip_nm * (1 + friction.pressing_per_g * abs(neighbour_g)) / ELEMENTS
+    limit = friction.slip_nm * (1 + friction.pressing_per_g2 * neighbour_g**2) / ELEMENTS
     drag = 0.0
     for k in range(ELEMENTS):
         reach = (k + 1) * limit

@@ -37,5 +37,5 @@ def test_the_loop_does_not_depend_on_the_step() -> None:
 
 
 def test_the_neighbours_load_presses_the_contacts() -> None:
-    friction = Friction(stiffness_fraction=0.01, slip_nm=3.0, pressing_per_g=0.5)
+    friction = Friction(stiffness_fraction=0.01, slip_nm=3.0, pressing_per_g2=0.5)
     assert drags(friction, CYCLE, 1.0)[80] == pytest.approx(1.5 * drags(friction, CYCLE, 0.0)[80])

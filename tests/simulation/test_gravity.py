@@ -10,10 +10,11 @@ from hypothesis import strategies as st
 from drivers.simulation.gravity import Base, Package, along_y, felt_g, mounting, rotation, vertical
 from drivers.simulation.kernel import record
 
+LEVEL, SQUARE = Base(), Package()
 angle = st.floats(-360, 360)
 
 
-def felt(alpha: float, beta: float, base: Base = Base(), package: Package = Package(), mount=0.0, flip=0):
+def felt(alpha: float, beta: float, base: Base = LEVEL, package: Package = SQUARE, mount=0.0, flip=0):
     up, mounted = vertical(base), mounting(package, mount, flip)
     return np.array(felt_g(up, mounted, radians(alpha), radians(beta)))
 

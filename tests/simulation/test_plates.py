@@ -19,38 +19,48 @@ def square(plates: Plates) -> float:
 
 
 def test_the_trim_holds_whatever_the_mismatch() -> None:
-    plates = Plates(zero_g_v=2.4, sensitivity_v_per_g=0.9, gap_mismatch_fraction=0.1)
+    plates = Plates(zero_g_v=2.4, sensitivity_v_per_g=0.9, plate_mismatch_fraction=0.1)
     assert read(plates, 0.0) == pytest.approx(2.4)
     assert (read(plates, 1e-4) - read(plates, -1e-4)) / 2e-4 == pytest.approx(0.9, rel=1e-6)
 
 
-def test_centred_plates_are_linear_but_for_their_finite_gap() -> None:
-    assert square(Plates()) == pytest.approx(0.0, abs=1e-12)
-    relative = (read(Plates(), 1.0) - 2.5) - 1.0
-    assert relative == pytest.approx((G_NM / 1000) ** 2, rel=1e-3)  # 67 uV: u + u^3
+def test_equal_plates_are_linear_whatever_the_gap() -> None:
+    for g in (-1.5, -0.3, 0.7, 1.5):
+        assert read(Plates(gap_um=0.1), g) == pytest.approx(2.5 + g, abs=1e-12)
 
 
-def test_a_finger_off_the_middle_bends_the_characteristic() -> None:
-    # 1/(1-m-u) - 1/(1+m+u): the square's share of the slope is 3 m u to first order in m
-    assert square(Plates(gap_mismatch_fraction=0.01)) == pytest.approx(3 * 0.01 * G_NM / 1000, rel=0.01)
+def test_unequal_plates_bend_the_characteristic() -> None:
+    # (u + m) / (1 + m u): the square's share of the slope is -m u
+    assert square(Plates(plate_mismatch_fraction=0.05)) == pytest.approx(-0.05 * G_NM / 1000, rel=0.01)
+
+
+def test_stray_capacitance_bends_it_symmetrically() -> None:
+    plates = Plates(stray_fraction=1.0)
+    assert square(plates) == pytest.approx(0.0, abs=1e-12)
+    # 2 u / (2 + s (1 - u^2)): a cubic's share of s / (2 + s) u^2
+    assert read(plates, 1.0) - 3.5 == pytest.approx((G_NM / 1000) ** 2 / 3, rel=1e-3)
+
+
+def test_without_stray_capacitance_the_overlap_does_not_matter() -> None:
+    assert read(Plates(overlap_loss_per_um2=40.0), 1.0, sag_nm=10.0) == pytest.approx(3.5)
 
 
 def test_sag_loses_overlap_and_moves_the_trimmed_offset() -> None:
-    plates = Plates(overlap_loss_per_um2=40.0)
-    assert read(plates, 1.0, sag_nm=10.0) - 2.5 == pytest.approx((read(plates, 1.0) - 2.5) * (1 - 0.004))
-    shifted = Plates(overlap_loss_per_um2=40.0, gap_mismatch_fraction=0.01)
+    plates = Plates(stray_fraction=1.0, overlap_loss_per_um2=40.0)
+    assert read(plates, 1.0, sag_nm=10.0) - 2.5 == pytest.approx(1 - 0.004 / 3, abs=5e-5)
+    shifted = Plates(stray_fraction=1.0, overlap_loss_per_um2=40.0, plate_mismatch_fraction=0.01)
     assert read(shifted, 0.0, sag_nm=10.0) != pytest.approx(2.5, abs=1e-3)
 
 
 def test_a_height_step_makes_the_loss_uneven() -> None:
-    plates = Plates(overlap_loss_per_um2=40.0, height_step_nm=3.0)
+    plates = Plates(stray_fraction=1.0, overlap_loss_per_um2=40.0, height_step_nm=3.0)
     assert read(plates, 1.0, sag_nm=10.0) < read(plates, 1.0, sag_nm=-10.0)
 
 
 def test_the_neighbour_slides_the_overlap() -> None:
-    plates = Plates(overlap_slide_per_um=1.0)
+    plates = Plates(stray_fraction=1.0, overlap_slide_per_um=1.0)
     gain = (read(plates, 1.0, 1.0) - 2.5) / (read(plates, 1.0, 0.0) - 2.5)
-    assert gain == pytest.approx(1 + G_NM / 1000)
+    assert gain == pytest.approx(1 + G_NM / 1000 / 3, rel=1e-4)
 
 
 def test_the_output_is_a_fraction_of_the_supply() -> None:

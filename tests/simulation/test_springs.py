@@ -7,10 +7,11 @@ from hypothesis import strategies as st
 from drivers.simulation.kernel import record
 from drivers.simulation.springs import Springs, balanced_nm, drawn_aside_nm, per_g_nm, restoring_nm
 
+PLAIN = Springs()
 load = st.floats(-1.5, 1.5)
 
 
-def balanced(x: Springs, gx: float, gy: float = 0.0, y: Springs = Springs(), warmer_k: float = 0.0):
+def balanced(x: Springs, gx: float, gy: float = 0.0, y: Springs = PLAIN, warmer_k: float = 0.0):
     return balanced_nm(record(x), record(y), gx, gy, warmer_k)
 
 
