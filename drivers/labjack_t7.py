@@ -31,12 +31,25 @@ QUIET_S = 0.01  # after a stop, no packet is late by more
 
 @dataclass(frozen=True)
 class Settings:
-    """Channels as {name: AIN number}, in the order of the scan; one range for all."""
+    """Channels as {name: AIN number}, in the order of the scan; one range for all.
+
+    Raises ValueError for what no T7 has or can do.
+    """
 
     channels: Mapping[str, int] = field(default_factory=lambda: {"vx": 0, "vy": 1, "supply": 2})
     rate_hz: float = 1000.0
     range_v: float = 10.0
     power_dio: int | None = None  # the digital line that switches the sensor's power
+
+    def __post_init__(self) -> None:
+        if not self.channels or not set(self.channels.values()) <= set(range(t7.INPUTS)):
+            raise ValueError(f"channels must name analog inputs, 0 to {t7.INPUTS - 1}, and at least one")
+        if not 0 < self.rate_hz * len(self.channels) <= t7.MOST_SAMPLES_PER_S:
+            raise ValueError(f"rate_hz must give at most {t7.MOST_SAMPLES_PER_S} samples a second in all")
+        if self.range_v not in t7.RANGES_V:
+            raise ValueError(f"range_v must be one of {', '.join(f'{r:g}' for r in t7.RANGES_V)} V")
+        if self.power_dio is not None and self.power_dio not in range(t7.LINES):
+            raise ValueError(f"power_dio must be a digital line, 0 to {t7.LINES - 1}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,10 +199,7 @@ def _even_packets(scans: int, channels: int) -> tuple[int, int]:
 def connect(address: Address, links: Links, settings: Settings, name: str) -> T7:
     """The converter at `address`; its stream is on port 702 of the same host unless `stream_url` says else.
 
-    Raises LinkRefused when a port cannot be opened, LimitError for a range the device does not have.
+    Raises LinkRefused when a port cannot be opened, and the errors of a first exchange.
     """
-    if settings.range_v not in t7.RANGES_V:
-        ranges = ", ".join(f"{r:g}" for r in t7.RANGES_V)
-        raise LimitError(f"{name}: range {settings.range_v:g} V does not exist; {ranges} V do", "Correct range_v")
     stream_url = address.stream_url or f"tcp://{urlsplit(address.url).hostname}:{t7.STREAM_PORT}"
     return T7(links.unit(address, name), links.link(stream_url), settings)

@@ -29,9 +29,13 @@ NO_TEMPERATURE = {  # what the process value shows instead of a temperature [M]
 
 @dataclass(frozen=True)
 class Settings:
-    """The set points that the oven and what is in it can bear."""
+    """The set points that the oven and what is in it can bear. Raises ValueError when they are exchanged."""
 
     limits_c: tuple[float, float] = (0.0, 85.0)
+
+    def __post_init__(self) -> None:
+        if not self.limits_c[0] < self.limits_c[1]:
+            raise ValueError("limits_c must be the lower limit, then the upper one")
 
 
 class Oven:

@@ -11,7 +11,7 @@ from drivers.links.modbus_server import ILLEGAL_ADDRESS, Refusal, modbus_port
 from drivers.links.server import Server
 from drivers.omega_cn7500 import CONTROL_METHOD, PROCESS_VALUE, RUN_BIT, SET_POINT, Settings
 
-LISTEN = "rtu+tcp://127.0.0.1:0?baud=9600"
+LISTEN = "pty:?baud=9600"
 THINKING_S = 0.005
 
 

@@ -26,7 +26,10 @@ WARM_C = 85.0  # the drive's own alarm limit [M]
 
 @dataclass(frozen=True)
 class Settings:
-    """One stage: gear and resolution, limits of the motor angle, how it moves, when it counts as settled."""
+    """One stage: gear and resolution, limits of the motor angle, how it moves, when it counts as settled.
+
+    Raises ValueError for what no stage can be.
+    """
 
     steps_per_turn: int = 18000  # 1.2 arcmin a step [M]
     limits_deg: tuple[float, float] = (-400.0, 400.0)
@@ -34,6 +37,13 @@ class Settings:
     acceleration_deg_s2: float = 60.0
     settle_deg: float = 0.05
     current_percent: float = 100.0
+
+    def __post_init__(self) -> None:
+        positive = ("steps_per_turn", "speed_deg_s", "acceleration_deg_s2", "settle_deg", "current_percent")
+        if wrong := [name for name in positive if not getattr(self, name) > 0]:
+            raise ValueError(f"{', '.join(wrong)} must be positive")
+        if not self.limits_deg[0] < self.limits_deg[1]:
+            raise ValueError("limits_deg must be the lower limit, then the upper one")
 
 
 class RotaryStage:

@@ -15,7 +15,7 @@ from drivers.links.server import Server
 from drivers.oriental_az import Settings
 from drivers.simulation.trajectory import Trajectory, at_rest
 
-LISTEN = "rtu+tcp://127.0.0.1:0"
+LISTEN = "pty:"
 HOMING_DEG_S = 20.0
 HOMING_DEG_S2 = 40.0
 IN_POSITION_DEG = 0.018  # the width of IN-POS around the command, +-

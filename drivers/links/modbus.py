@@ -43,7 +43,6 @@ class Bus:
         decoder = DecodePDU(is_server=False)
         self._framer = FramerRTU(decoder) if self._url.rtu else FramerSocket(decoder)
         self._transaction = 0
-        self._quiet_until_s = 0.0
 
     def ask(self, request: ModbusPDU, unit: int, what: str) -> ModbusPDU:
         """The answer of `unit`; `what` begins every error, as in 'alpha: reading register 0x0080 (alarm)'.
@@ -60,8 +59,11 @@ class Bus:
 
     def _attempt(self, request: ModbusPDU, what: str) -> ModbusPDU:
         self._transaction = request.transaction_id = self._transaction % 0xFFFF + 1
-        self._send(self._framer.buildFrame(request))
+        self.link.discard()
+        self.link.write(self._framer.buildFrame(request))
         answer = self._receive(what)
+        if self._url.scheme == "serial":  # a converter keeps the silence between frames itself
+            self.link.clock.sleep(self._url.gap_s)
         if answer.dev_id != request.dev_id:
             raise WrongUnit(
                 f"{what}: unit {answer.dev_id} answered instead of unit {request.dev_id}",
@@ -73,20 +75,12 @@ class Bus:
             raise _bad_frame(what, "the answer to another request came")
         return answer
 
-    def _send(self, frame: bytes) -> None:
-        clock = self.link.clock
-        if self._url.scheme == "serial":
-            clock.sleep(self._quiet_until_s - clock.now())
-        self.link.discard()
-        self.link.write(frame)
-
     def _receive(self, what: str) -> ModbusPDU:
         clock = self.link.clock
         deadline = clock.now() + TIMEOUT_S
         data = b""
         while more := self.link.read(deadline - clock.now()):
             data += more
-            self._quiet_until_s = clock.now() + self._url.gap_s
             used, answer = self._decode(data, what)
             if answer is not None:
                 return answer

@@ -21,7 +21,6 @@ from drivers.links.address import Address
 from drivers.links.link import CHUNK, connection_key
 from drivers.links.url import Url
 
-
 SILENCE_S = 0.05  # ends an RTU frame: generous, since a computer sends a frame in pieces
 
 

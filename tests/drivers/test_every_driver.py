@@ -19,9 +19,8 @@ from drivers.links import Links
 MODULES = sorted(file.stem for file in Path(clock_module.__file__).parent.glob("[a-z]*.py"))
 NAMES = [name for name in MODULES if hasattr(import_module(f"drivers.{name}"), "connect")]
 SERIAL = [name for name in NAMES if not import_module(f"drivers.{name}_twin").LISTEN.startswith("tcp")]
-WIRES = (
-    [(name, None) for name in NAMES] + [(name, "pty:") for name in SERIAL] + [(n, "tcp://127.0.0.1:0") for n in SERIAL]
-)
+OTHERS = ("rtu+tcp://127.0.0.1:0", "tcp://127.0.0.1:0")
+WIRES = [(name, None) for name in NAMES] + [(name, listen) for name in SERIAL for listen in OTHERS]
 
 
 @pytest.fixture(params=WIRES, ids=lambda wire: f"{wire[0]}-{wire[1] or 'usual'}")

@@ -135,8 +135,3 @@ def test_identity(converter: Converters) -> None:
     ]
     identity = converter(exchanges).identify()
     assert (identity.model, identity.serial, identity.firmware) == ("LabJack T7", "470000000", "1.0000")
-
-
-def test_a_range_that_does_not_exist_is_refused_before_anything_is_sent(links: Links) -> None:
-    with pytest.raises(LimitError, match=r"adc: range 5 V does not exist; 10, 1, 0.1, 0.01 V do"):
-        labjack_t7.connect(Address("tcp://127.0.0.1:1"), links, Settings(range_v=5.0), "adc")

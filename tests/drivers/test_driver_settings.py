@@ -1,0 +1,30 @@
+"""Settings that no instrument can have are refused when they are written, not when they are used."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from drivers import labjack_t7, omega_cn7500, oriental_az
+
+
+@pytest.mark.parametrize(
+    ("driver", "settings", "words"),
+    [
+        (oriental_az, {"speed_deg_s": 0.0, "settle_deg": -1.0}, "speed_deg_s, settle_deg must be positive"),
+        (oriental_az, {"steps_per_turn": 0}, "steps_per_turn must be positive"),
+        (oriental_az, {"acceleration_deg_s2": float("nan")}, "acceleration_deg_s2 must be positive"),
+        (oriental_az, {"limits_deg": (10.0, -10.0)}, "limits_deg must be the lower limit, then the upper one"),
+        (omega_cn7500, {"limits_c": (50.0, 50.0)}, "limits_c must be the lower limit, then the upper one"),
+        (labjack_t7, {"channels": {}}, "and at least one"),
+        (labjack_t7, {"channels": {"vx": 14}}, "channels must name analog inputs, 0 to 13"),
+        (labjack_t7, {"rate_hz": 40e3}, "at most 100000 samples a second"),
+        (labjack_t7, {"rate_hz": 0.0}, "rate_hz"),
+        (labjack_t7, {"range_v": 5.0}, "range_v must be one of 10, 1, 0.1, 0.01 V"),
+        (labjack_t7, {"power_dio": 23}, "power_dio must be a digital line, 0 to 22"),
+    ],
+)
+def test_refused_with_the_name_of_the_setting(driver: Any, settings: dict[str, Any], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        driver.Settings(**settings)
