@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from calibrations.table import Array, Table
+from calibrations.table import Array
 
 
 def other_in_plane(a: Array) -> Array:
@@ -31,16 +31,3 @@ def rotation(vector: Array) -> Array:
     first, second = (np.sin(angle) / angle, (1 - np.cos(angle)) / angle**2) if angle > 1e-8 else (1.0, 0.5)
     R: Array = np.eye(3) + first * K + second * (K @ K)
     return R
-
-
-def approached_from(a: Array, table: Table) -> Array:
-    """Specific force a little before each pose was reached: beta turned back by the approach, shape (n, 3).
-
-    The approach is the table's constant `approach_deg`. Where it is not given, rows with a time were reached straight
-    from the row before; without a time, the direction is all that is known, and a step of 10 deg is assumed.
-    """
-    approach = table.number("approach_deg", 0.0 if "t_s" in table else 10.0)
-    side = np.where(table.optional("flip", 0.0) > 0, -1.0, 1.0)
-    back = -np.radians(approach) * table.column("direction") * side
-    c, s = np.cos(back), np.sin(back)
-    return np.column_stack([c * a[:, 0] - s * a[:, 1], s * a[:, 0] + c * a[:, 1], a[:, 2]])

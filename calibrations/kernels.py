@@ -9,20 +9,27 @@ from calibrations.table import Array
 
 
 @njit(cache=True)
-def slip(a: Array, before: Array, limit: Array, reach: float) -> Array:
-    """State of an element that sticks and slips at +-limit, at each row, shape (n, 3); rows in order of time.
+def slip(a: Array, on_the_way: Array, pressed: Array, limits: Array) -> Array:
+    """Force held by elements of equal stiffness that stick and slip, at each row, shape (n, 3), 1 where all slip.
 
-    Each row is reached by way of `before`, the specific force a little earlier.
+    a            (n, 3) specific force, g
+    on_the_way   (n, turns, 3) points where it turned round before each row
+    pressed      (n, 3) factor on the limits
+    limits       (elements,) g; an element follows the force and slips at its limit; rows in order of time
     """
+    n, axes = a.shape
     state = np.zeros_like(a)
-    for k in range(a.shape[1]):
-        s = 0.0
-        last = before[0, k]
-        for i in range(a.shape[0]):
-            s = min(limit[i, k], max(-limit[i, k], s + (before[i, k] - last) / reach))
-            s = min(limit[i, k], max(-limit[i, k], s + (a[i, k] - before[i, k]) / reach))
-            last = a[i, k]
-            state[i, k] = s
+    for k in range(axes):
+        held = np.zeros(len(limits))
+        last = 0.0
+        for i in range(n):
+            for j in range(on_the_way.shape[1] + 1):
+                here = on_the_way[i, j, k] if j < on_the_way.shape[1] else a[i, k]
+                for e in range(len(limits)):
+                    limit = limits[e] * pressed[i, k]
+                    held[e] = min(limit, max(-limit, held[e] + here - last))
+                last = here
+            state[i, k] = np.sum(held) / np.sum(limits)
     return state
 
 

@@ -1,8 +1,8 @@
 """The noise of greatest restricted likelihood (Patterson and Thompson, 1971).
 
 What the model, and any smooth function of the angles, could explain is set aside first: a misfit that returns with the
-angles is then not taken for slow noise, which does not. The time constant is at most a third of the record, so that slow
-noise cannot take the place of a trend.
+angles is then not taken for slow noise, which does not. The time constant is at most a third of the record, and the
+slow noise at most twice the white, so that it cannot take the place of a trend.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from calibrations.kernels import whiten
 from calibrations.noise import Noise, rms
 from calibrations.table import Array
 
-RATIOS = 0.2 * 1.7 ** np.arange(12)  # slow noise over white and scatter
+RATIOS = np.array([0.2, 0.3, 0.45, 0.7, 1.0, 1.4, 2.0])  # slow noise over white and scatter; more is a drift
 TIME_CONSTANTS = 4
 FEWEST_FOR_SLOW = 20  # rows below which slow noise cannot be told from white
 ROUNDS = 3
@@ -108,7 +108,7 @@ class _Search:
 
     def rank(self, columns: int) -> int:
         """How many of the first `columns` add something beside the smooth ones."""
-        return sum(k < columns for k in self.beside[1])
+        return [*(k < columns for k in self.beside[1])].count(True)
 
     @cached_property
     def grams(self) -> list[_Grams]:

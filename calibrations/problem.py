@@ -6,13 +6,14 @@ For `positions` it is |a| - 1, where a is the specific force that the model make
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrations.chain import backward, forward
+from calibrations.chain import backward, force, forward
 from calibrations.errors import ModelError, TooFewRows
 from calibrations.lack_of_fit import smooth_columns
 from calibrations.mean_noise import norm_std, white_std
@@ -60,15 +61,37 @@ class Problem:
 
     def jacobian(self, theta: Array, of: NDArray[np.bool_] | None = None) -> Array:
         """d residual / d theta by central differences, shape (channels, n, p); only the entries `of` where given."""
-        steps = 1e-3 * self.layout.typical
         low, high = self.layout.bounds
+        steps = 1e-3 * self.layout.typical
+        chosen = np.flatnonzero(np.ones(len(theta), dtype=bool) if of is None else of)
+        error = self._errors_near(theta)
         columns = []
-        for k in np.flatnonzero(np.ones(len(theta), dtype=bool) if of is None else of):
-            h = steps[k]
+        for k in map(int, chosen):
             ahead, behind = theta.copy(), theta.copy()
-            ahead[k], behind[k] = min(theta[k] + h, high[k]), max(theta[k] - h, low[k])
-            columns.append((self.residual(ahead) - self.residual(behind)) / (ahead[k] - behind[k]))
+            ahead[k], behind[k] = min(theta[k] + steps[k], high[k]), max(theta[k] - steps[k], low[k])
+            columns.append((error(k, ahead) - error(k, behind)) / (ahead[k] - behind[k]))
         return np.stack(columns, axis=2) if columns else np.zeros((len(self.channels), self.table.n, 0))
+
+    def _errors_near(self, theta: Array) -> Callable[[int, Array], Array]:
+        """The residual, up to a constant, as a function of (entry changed, vector).
+
+        An entry of an effect that only adds to the output changes that effect's contribution and nothing else.
+        """
+        terms = self.layout.model.terms
+        if self.table.kind != "poses" or any(term.effect.output for term in terms):
+            return lambda _, vector: self.residual(vector)
+        a = force(self.table, self.layout.steps(theta))
+
+        def error(k: int, vector: Array) -> Array:
+            term = self.layout.slots[k].term
+            effect = terms[term].effect
+            if effect.pose or effect.force or effect.transduction is None:
+                return self.residual(vector)
+            _, values = self.layout.steps(vector)[term]
+            added: Array = effect.transduction(a, self.table, values)
+            return -added[:, : len(self.channels)].T
+
+        return error
 
     @cached_property
     def white(self) -> Array | None:

@@ -44,7 +44,7 @@ AXES = ("x", "y", "z")
 STANDARD_GRAVITY = 9.80665
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Table:
     """Columns of equal length (float64), text columns, and constants. Made by `from_columns` or `read_csv`."""
 
