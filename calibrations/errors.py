@@ -22,11 +22,11 @@ class DataError(CalibrationError):
     """A table cannot be what it says it is."""
 
 
-class MissingColumn(DataError):  # noqa: N818
+class MissingColumn(DataError):
     """A column that is needed is not there."""
 
 
-class TooFewRows(DataError):  # noqa: N818
+class TooFewRows(DataError):
     """Fewer rows than the model has parameters."""
 
 
@@ -34,7 +34,7 @@ class ModelError(CalibrationError):
     """A model file cannot be read, or does not fit the data."""
 
 
-class UnknownName(CalibrationError):  # noqa: N818
+class UnknownName(CalibrationError):
     """A name that is not in its list."""
 
 

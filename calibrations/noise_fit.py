@@ -108,7 +108,8 @@ class _Search:
 
     def rank(self, columns: int) -> int:
         """How many of the first `columns` add something beside the smooth ones."""
-        return [*(k < columns for k in self.beside[1])].count(True)
+        found: tuple[int, ...] = self.beside[1]
+        return len([k for k in found if k < columns])
 
     @cached_property
     def grams(self) -> list[_Grams]:

@@ -1,0 +1,131 @@
+"""Where a model fails: its residual against the noise floor, and the places where it stands out.
+
+A place is a stretch of a column (an angle, time, temperature, direction) of one axis whose residual has a mean too far
+from zero to be noise, or a scatter too large. Places are ranked by the excess there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtrc
+
+from calibrations.fit import Fit, evaluate, fit
+from calibrations.model import Model
+from calibrations.noise import rms
+from calibrations.table import Array, Table
+
+SIGNIFICANT = 0.003  # chance of naming any place at all where the model is right
+MATERIAL = 1.15  # times the noise floor
+MOST_PLACES = 8
+PARTS = 8  # of a column without a natural grid
+
+WORDS: Mapping[str, tuple[str, str]] = {
+    "alpha": ("alpha_deg", "deg"),
+    "beta": ("beta_deg", "deg"),
+    "direction": ("direction", ""),
+    "time": ("t_s", "s"),
+    "temperature": ("temperature_c", "degC"),
+}
+
+
+@dataclass(frozen=True)
+class Place:
+    """A stretch `low`..`high` of a column where one channel's residual is `excess` times the noise floor."""
+
+    where: str
+    low: float
+    high: float
+    axis: str
+    excess: float
+    mean: float
+    unit: str
+    scale: float  # output per g of that channel; 1 for a residual in g
+
+    @property
+    def text(self) -> str:
+        """The place in words, with the mean residual there in the output's unit and in mg."""
+        if self.where == "direction":
+            place = {1: "turning clockwise", -1: "turning anticlockwise", 0: "direction unknown"}[round(self.low)]
+        else:
+            unit = WORDS[self.where][1]
+            place = f"{self.where} {self.low:g} {unit}" if self.low == self.high else (
+                f"{self.where} {self.low:.4g} to {self.high:.4g} {unit}"
+            )  # fmt: skip
+        mg = 1e3 * self.mean / self.scale
+        value = f"{mg:+.3g} mg" if self.unit == "g" else f"{self.mean:+.3g} {self.unit} ({mg:+.3g} mg)"
+        return f"{place}: {self.axis} is off by {value} on average, rms {self.excess:.3g} x the noise floor"
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A model beside a measurement. Arrays are per channel, in the residual's unit."""
+
+    fit: Fit
+    fails: tuple[Place, ...]
+
+    @property
+    def adequate(self) -> bool:
+        """Whether the model fails nowhere."""
+        return not self.fails
+
+
+def compare(table: Table, model: Model) -> Comparison:
+    """The model as it is, or fitted first where it has no values yet. Raises what `fit` raises."""
+    found = evaluate(model, table) or fit(model, table)
+    return Comparison(found, tuple(_fails(found)[:MOST_PLACES]))
+
+
+def scales(found: Fit) -> Array:
+    """Output per g of each channel; 1 for a residual in g."""
+    if found.table.kind != "poses":
+        return np.ones(1)
+    terms = [term for term in found.model.terms if term.name == "scale-factor"]
+    values = {e.axis: abs(e.value) for term in terms for e in term.estimates}
+    return np.array([values.get(axis, values.get("", found.problem.layout.nominal)) for axis in found.channels])
+
+
+def _fails(found: Fit) -> list[Place]:
+    """Places where the residual is more than noise, worst first; at most one for each column and channel."""
+    places, chances, each = [], [], []
+    scale = scales(found)
+    unit = found.table.unit if found.table.kind == "poses" else "g"
+    floor = found.noise.floor
+    own = np.hypot(found.noise.floor, found.noise.slow) if found.noise.known else found.noise.floor
+    for where, low, high, rows in _parts(found.table):
+        for c, axis in enumerate(found.channels):
+            r = found.residual[c, rows]
+            excess = float(rms(r) / floor[c])
+            places.append(Place(where, low, high, axis, excess, float(r.mean()), unit, float(scale[c])))
+            chances.append(float(chdtrc(len(r), np.sum((r / own[c]) ** 2))))
+            each.append((where, axis))
+    if not places:
+        return []
+    limit = SIGNIFICANT / len(places)
+    bad = [k for k, p in enumerate(places) if chances[k] < limit and p.excess > MATERIAL]
+    bad.sort(key=lambda k: places[k].excess, reverse=True)
+    first = {each[k]: k for k in reversed(bad)}
+    return [places[k] for k in bad if first[each[k]] == k]
+
+
+def _parts(table: Table) -> Iterator[tuple[str, float, float, NDArray[np.intp]]]:
+    """Stretches of each column: its own values where they are few, else parts with equal numbers of rows."""
+    for where, (name, _) in WORDS.items():
+        if name not in table:
+            continue
+        values = table.column(name)
+        grid = np.unique(values)
+        if len(grid) < 2:
+            continue
+        if len(grid) <= PARTS + 4:
+            yield from ((where, float(v), float(v), np.flatnonzero(values == v)) for v in grid)
+            continue
+        edges = np.quantile(values, np.linspace(0, 1, PARTS + 1))
+        part = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, PARTS - 1)
+        for k in range(PARTS):
+            rows = np.flatnonzero(part == k)
+            if len(rows):
+                yield where, float(values[rows].min()), float(values[rows].max()), rows
