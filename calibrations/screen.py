@@ -106,3 +106,8 @@ def _basis(columns: Array) -> Array:
 def _freed(columns: Array, basis: Array) -> Array:
     free = columns - basis @ (basis.T @ columns)
     return np.asarray(free - basis @ (basis.T @ free))  # twice is enough: Kahan and Parlett
+
+
+def chance(statistic: float, rank: int) -> float:
+    """Chance that noise alone gives a sum of squares as large, with `rank` degrees of freedom."""
+    return float(chdtrc(max(rank, 1), statistic))

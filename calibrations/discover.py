@@ -1,0 +1,145 @@
+"""Add missing effects until none is missing; drop what later effects have made needless; say what caused the error.
+
+An effect whose loss would cost little beside the loss of the greatest is a refinement: it corrects the form in which
+another acts, and is kept in the model without being named as a cause.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from calibrations.diagnose import MATERIAL, MOST_LEFT, share_left, structure_of
+from calibrations.effect import Effect, catalogue
+from calibrations.experiment import Experiment, separating
+from calibrations.fit import Fit, fit
+from calibrations.held_out import held_out_excess
+from calibrations.model import Model
+from calibrations.path import SIGNIFICANT, Path, find_path
+from calibrations.screen import chance
+from calibrations.table import Table
+
+REFINEMENT = 0.05  # of the greatest cost: an effect that costs less to lose refines the form of another
+
+
+@dataclass(frozen=True)
+class Added:
+    """One effect added: the fits without and with it."""
+
+    name: str
+    before: Fit
+    after: Fit
+
+    @cached_property
+    def held_out_before(self) -> float:
+        """Pooled excess on unseen poses without it."""
+        return held_out_excess(self.before)
+
+    @cached_property
+    def held_out_after(self) -> float:
+        """Pooled excess on unseen poses with it."""
+        return held_out_excess(self.after)
+
+
+@dataclass(frozen=True)
+class Discovery:
+    """What was missing: the effects in the order added, and what this data cannot tell from each."""
+
+    start: Fit
+    steps: tuple[Added, ...]
+    verdict: str
+    causes: tuple[str, ...]
+    refinements: tuple[str, ...]
+    alternatives: Mapping[str, tuple[str, ...]]
+    residual_structure: str | None
+    next_experiment: Experiment | None
+    path: Path
+
+    @property
+    def end(self) -> Fit:
+        """The fit of the final model."""
+        return self.steps[-1].after if self.steps else self.start
+
+
+def add(effect: Effect, model: Model, table: Table) -> Added:
+    """`model` with one effect more, both fitted to `table`. Raises what `fit` raises."""
+    before = fit(model, table)
+    return Added(effect.name, before, fit(before.model.with_effect(effect), table))
+
+
+def discover(table: Table, model: Model, effects: Mapping[str, Effect] | None = None) -> Discovery:
+    """All effects that `model` misses on `table`. Raises what `fit` raises."""
+    effects = catalogue() if effects is None else effects
+    path = find_path(model, table, effects)
+    structure = structure_of(path.end)
+    left = path.end.pooled_excess > MATERIAL and structure is not None
+    if left and share_left(path) > MOST_LEFT:
+        return Discovery(path.start, (), "unexplained", (), (), {}, structure, None, path)
+    kept = _needed(path)
+    steps = _in_order(path, kept, effects)
+    rivals = {s.taken.name: s.taken.indistinguishable_from for s in path.steps if s.taken.name in kept}
+    alternatives = {name: names for name, names in rivals.items() if names}
+    causes = _causes(steps)
+    ambiguous = next((s.taken for s in path.steps if s.taken.name in alternatives and s.taken.name in causes), None)
+    return Discovery(
+        start=path.start,
+        steps=steps,
+        verdict="unexplained" if left else "ambiguous" if ambiguous else "adequate",
+        causes=causes,
+        refinements=tuple(s.name for s in steps if s.name not in causes),
+        alternatives=alternatives,
+        residual_structure=structure if left else None,
+        next_experiment=separating(ambiguous) if ambiguous else None,
+        path=path,
+    )
+
+
+def _needed(path: Path) -> list[str]:
+    """Names of the added effects that the final model cannot do without, in the order of the path."""
+    names = [step.taken.name for step in path.steps]
+    present = path.end
+    while len(names) > 1:
+        costs = {name: _cost(present, name) for name in names}
+        name = min(names, key=lambda n: costs[n][0] / max(costs[n][1], 1))
+        smaller = fit(present.model.without(name), present.table)
+        if chance(*costs[name]) < SIGNIFICANT and held_out_excess(smaller) > held_out_excess(present):
+            return names
+        names.remove(name)
+        present = smaller
+    return names
+
+
+def _cost(found: Fit, name: str) -> tuple[float, int]:
+    """Sum of squares that losing the effect would cost, to first order, and the parameters that it has."""
+    white, mine = found.whitened[:, 1:], found.problem.layout.of_effect(name)
+    size = np.linalg.norm(white, axis=0)
+    white = white / np.where(size > 0, size, 1.0)
+    signal = white[:, mine] @ (found.theta[mine] * size[mine])
+    others = white[:, ~mine]
+    lost = signal - others @ np.linalg.lstsq(others, signal, rcond=1e-9)[0]
+    return float(lost @ lost), int(mine.sum())
+
+
+def _in_order(path: Path, kept: list[str], effects: Mapping[str, Effect]) -> tuple[Added, ...]:
+    """The kept effects one after another: first those that free a value that the model already has, then new ones."""
+    first = [name for name in kept if any(term.name == name for term in path.start.model.terms)]
+    order = first + [name for name in kept if name not in first]
+    if order == [step.taken.name for step in path.steps]:
+        return tuple(Added(step.taken.name, step.before, step.after) for step in path.steps)
+    steps: list[Added] = []
+    present = path.start
+    for name in order:
+        after = fit(present.model.with_effect(effects[name]), present.table)
+        steps.append(Added(name, present, after))
+        present = after
+    return tuple(steps)
+
+
+def _causes(steps: tuple[Added, ...]) -> tuple[str, ...]:
+    if not steps:
+        return ()
+    costs = {s.name: _cost(steps[-1].after, s.name)[0] for s in steps}
+    return tuple(name for name, cost in costs.items() if cost >= REFINEMENT * max(costs.values()))

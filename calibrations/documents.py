@@ -1,0 +1,145 @@
+"""Results as documents: plain mappings of the schemas that other people's programs read. JSON numbers, never NaN."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from calibrations.candidates import Candidate
+from calibrations.compare import Comparison
+from calibrations.diagnose import Diagnosis
+from calibrations.discover import Added, Discovery
+from calibrations.experiment import Experiment
+from calibrations.fit import Fit
+from calibrations.table import Array
+
+Document = dict[str, Any]
+
+
+def fit_document(found: Fit, path: str | None) -> Document:
+    """`rig.fit/1`."""
+    return {
+        "schema": "rig.fit/1",
+        "data": found.table.source,
+        "parameters": [
+            {
+                "effect": term.name,
+                "axis": e.axis or None,
+                "name": e.name,
+                "value": e.value,
+                "std": e.std,
+                "unit": e.unit,
+                "identified": e.identified,
+                "why": e.why,
+            }
+            for term in found.model.terms
+            for e in term.estimates
+        ],
+        "n": found.table.n,
+        "rmse": _by_channel(found, found.rmse),
+        **_noise(found),
+        "excess": _by_channel(found, found.excess),
+        "model": path,
+    }
+
+
+def comparison_document(result: Comparison, model: str) -> Document:
+    """`rig.comparison/1`."""
+    found = result.fit
+    return {
+        "schema": "rig.comparison/1",
+        "data": found.table.source,
+        "model": model,
+        "n": found.table.n,
+        "rmse": _by_channel(found, found.rmse),
+        **_noise(found),
+        "excess": _by_channel(found, found.excess),
+        "fails": [
+            {"where": p.where, "from": p.low, "to": p.high, "axis": p.axis, "excess": p.excess, "text": p.text}
+            for p in result.fails
+        ],
+    }
+
+
+def diagnosis_document(result: Diagnosis, model: str) -> Document:
+    """`rig.diagnosis/1`."""
+    return {
+        "schema": "rig.diagnosis/1",
+        "data": result.fit.table.source,
+        "model": model,
+        "verdict": result.verdict,
+        "candidates": [_candidate(c, result) for c in result.candidates],
+        "residual_structure": result.residual_structure,
+        "next_experiment": _experiment(result.next_experiment),
+    }
+
+
+def discovery_document(result: Discovery, path: str | None) -> Document:
+    """`rig.discovery/1`."""
+    return {
+        "schema": "rig.discovery/1",
+        "data": result.start.table.source,
+        "verdict": result.verdict,
+        "steps": [added_document(step) for step in result.steps],
+        "causes": list(result.causes),
+        "refinements": list(result.refinements),
+        "alternatives": {name: list(names) for name, names in result.alternatives.items()},
+        "residual_structure": result.residual_structure,
+        "next_experiment": _experiment(result.next_experiment),
+        "model": path,
+    }
+
+
+def added_document(step: Added) -> Document:
+    """One step of a discovery."""
+    return {
+        "added": step.name,
+        "excess_before": step.before.pooled_excess,
+        "excess_after": step.after.pooled_excess,
+        "held_out_before": step.held_out_before,
+        "held_out_after": step.held_out_after,
+    }
+
+
+def _noise(found: Fit) -> Document:
+    return {
+        "noise_floor": _by_channel(found, found.noise.floor),
+        "slow_noise": _by_channel(found, found.noise.slow),
+    }
+
+
+def _by_channel(found: Fit, values: Array) -> dict[str, float]:
+    return {channel: float(v) for channel, v in zip(found.channels, np.asarray(values), strict=True)}
+
+
+def _candidate(c: Candidate, result: Diagnosis) -> Document:
+    return {
+        "effect": c.name,
+        "axes": list(result.fit.table.axes),
+        "excess_before": result.excess_before,
+        "excess_after": c.excess_after,
+        "held_out_before": result.held_out_before,
+        "held_out_after": c.held_out_after,
+        "p_value": c.p_value,
+        "probability": c.probability,
+        "indistinguishable_from": list(c.indistinguishable_from),
+        "why": why(c, result),
+    }
+
+
+def why(c: Candidate, result: Diagnosis) -> str:
+    """The candidate in words: what it is, what it would look like, and what adding it does here."""
+    fall = f"adding it lowers the error on unseen poses from {result.held_out_before:.3g} to {c.held_out_after:.3g}"
+    if c.held_out_after >= result.held_out_before:
+        fall = f"adding it does not lower the error on unseen poses ({result.held_out_before:.3g} x the noise floor)"
+    else:
+        fall += " x the noise floor"
+    return f"{c.effect.summary} Symptom: {c.effect.symptom} Here {fall}."
+
+
+def _experiment(e: Experiment | None) -> Document | None:
+    if e is None:
+        return None
+    pairs = [list(pair) for pair in e.separates]
+    return {"procedure": e.procedure, "settings": dict(e.settings), "separates": pairs, "why": e.why}
