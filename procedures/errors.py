@@ -17,7 +17,7 @@ class ProcedureError(Exception):
     """The message says what, where and what to do."""
 
 
-class UnknownProcedure(ProcedureError):  # noqa: N818
+class UnknownProcedure(ProcedureError):
     """No procedure of this name."""
 
 
@@ -25,11 +25,11 @@ class SettingError(ProcedureError):
     """A setting that the procedure does not have, or a value that it cannot have."""
 
 
-class NoAnswer(ProcedureError):  # noqa: N818
+class NoAnswer(ProcedureError):
     """A question to a person that nobody can answer."""
 
 
-class SafetyLimit(ProcedureError):  # noqa: N818
+class SafetyLimit(ProcedureError):
     """A measured value is outside the limits of the bench."""
 
 

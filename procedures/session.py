@@ -18,6 +18,7 @@ from procedures.errors import SafetyLimit
 
 SHORTEST_APPROACH_DEG = 0.5  # a stage that is nearer to a pose has not come from its side
 
+
 @dataclass(frozen=True)
 class Pose:
     """A position of the sensor to hold. Angles in deg; `direction` +1 while beta grows, -1 while it falls.

@@ -47,7 +47,7 @@ def grid(inclinations_deg: Sequence[float], step_deg: float, paths: Paths = "gri
     if not inclinations_deg:
         raise SettingError("sweep: inclinations_deg is empty; give at least one angle, such as 90")
     both = [(alpha, -alpha) if paths == "ang" else (alpha,) for alpha in inclinations_deg]
-    for alpha in [float(alpha) for pair in both for alpha in pair]:
+    for alpha in dict.fromkeys(float(alpha) for pair in both for alpha in pair):  # -0 is 0
         yield from turn(alpha, 0, 360, step_deg, "A+ to B-")
         yield from turn(alpha, 360, 0, step_deg, "B+ to A-")
         if paths == "ang" and alpha == 90:

@@ -28,15 +28,15 @@ class RecordError(RigError):
     """The record cannot be opened or does not hold what is asked."""
 
 
-class UnknownRun(RecordError):  # noqa: N818
+class UnknownRun(RecordError):
     """No run of this name is in the record."""
 
 
-class RunBusy(RigError):  # noqa: N818
+class RunBusy(RigError):
     """Another process works on this run."""
 
 
-class RunMismatch(RigError):  # noqa: N818
+class RunMismatch(RigError):
     """The bench is not the one that the run was begun with."""
 
 
@@ -44,13 +44,13 @@ class ExportError(RigError):
     """The run cannot be written in this format."""
 
 
-class InstrumentFailed(RigError):  # noqa: N818
+class InstrumentFailed(RigError):
     """An instrument cannot be reached, or fails its check."""
 
     exit_status = 3
 
 
-class Stopped(RigError):  # noqa: N818
+class Stopped(RigError):
     """A person or a signal stopped the run."""
 
     exit_status = 4

@@ -173,9 +173,7 @@ def _zero_s(rig: Rig, run: Run) -> float:
 
 
 def _same_instruments(run: Run, rig: Rig) -> None:
-    """Raises RunMismatch for a real instrument that is not the one of the run's beginning."""
-    if rig.bench.simulated:
-        return
+    """Raises RunMismatch for an instrument that is not the one of the run's beginning."""
     for role, identity in rig.identities().items():
         if asdict(identity) != run.identities.get(role):
             raise RunMismatch(

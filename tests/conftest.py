@@ -6,10 +6,16 @@ import os
 import sys
 from pathlib import Path
 
+import hypothesis
 import pytest
 
 # pytest puts this folder on the path, and `rig`, `drivers` ... in it are no packages: the real ones come first.
 sys.path.insert(0, str(Path(__file__).parents[1]))
+
+
+# The same examples in every run, however slow the machine.
+hypothesis.settings.register_profile("steady", derandomize=True, deadline=None, database=None)
+hypothesis.settings.load_profile("steady")
 
 
 @pytest.fixture(autouse=True)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ast
 import importlib
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, cast
@@ -81,6 +82,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run one command and leave the process with the contract's exit status; errors are one message."""
 
     def call() -> Any:
-        return rig.main(args=arguments, prog_name="rig", standalone_mode=False)
+        words = list(sys.argv[1:] if arguments is None else arguments)
+        with rig.make_context("rig", words) as context:
+            return rig.invoke(context)
 
     raise SystemExit(exit_status(call))

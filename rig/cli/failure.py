@@ -35,6 +35,8 @@ def exit_status(call: Callable[[], Any]) -> int:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nothing more to flush to
         return BROKEN_PIPE
+    except click.exceptions.Exit as end:  # such as after --help
+        return end.exit_code
     except click.ClickException as error:
         error.show()
         return error.exit_code

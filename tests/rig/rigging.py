@@ -54,14 +54,14 @@ def in_own_process(*arguments: str, harm: str = "") -> subprocess.CompletedProce
     return subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=False)
 
 
-def signal_at_commit(number: int, name: str) -> str:
-    """Statements that send the own process a signal inside its transaction `number`, just before the commit."""
+def signal_at(table: str, number: int, name: str) -> str:
+    """Statements that send the own process a signal inside a transaction: at its insert `number` into `table`."""
     return f"""
 import itertools, os, signal
 from sqlalchemy import Engine, event
-commits = itertools.count(1)
-@event.listens_for(Engine, "commit")
-def harm(connection):
-    if next(commits) == {number}:
+inserts = itertools.count(1)
+@event.listens_for(Engine, "before_cursor_execute")
+def harm(connection, cursor, statement, *more):
+    if statement.startswith("INSERT INTO {table} ") and next(inserts) == {number}:
         os.kill(os.getpid(), signal.{name})
 """

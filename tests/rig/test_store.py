@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from calibrations.table import Table
@@ -35,6 +35,7 @@ def block(values: object) -> Block:
     return Block(np.array(values, dtype=np.float64), ("vx", "vy"), 1000.0, 2.5)
 
 
+@settings(max_examples=25)
 @given(st.lists(POSES, max_size=4))
 def test_poses_come_back_as_they_were_kept(tmp_path_factory: pytest.TempPathFactory, poses: list[Pose]) -> None:
     with Record(tmp_path_factory.mktemp("record")) as record:

@@ -1,0 +1,107 @@
+"""The command line itself: lazy commands, help, exit statuses, one message and no traceback."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import click
+import pytest
+
+from calibrations.errors import DataError
+from drivers.errors import LimitError, LinkTimeout
+from procedures.errors import SafetyLimit, UnknownProcedure
+from rig.cli import FOLDER, Commands
+from rig.cli import rig as group
+from rig.cli.failure import BROKEN_PIPE, PROGRAM_FAULT, exit_status, status_of
+from rig.errors import BenchError, InstrumentFailed, Stopped
+
+COMMANDS = Commands().list_commands(click.Context(group))
+
+
+def test_help_lists_every_command_and_imports_none() -> None:
+    program = (
+        "import sys\nfrom rig.cli import main\ntry: main(['--help'])\nfinally: print(*sys.modules, file=sys.stderr)"
+    )
+    ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=30, check=True)
+    assert all(f"  {name} " in ended.stdout for name in COMMANDS)
+    assert not {"numpy", "sqlalchemy", "rich", "yaml", "rig.cli.run"} & set(ended.stderr.split())
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_explains_itself(name: str, rig: Callable[..., Any]) -> None:
+    ended = rig(name, "--help")
+    assert ended.status == 0
+    assert f"Usage: rig {name}" in ended.out
+
+
+def test_modules_that_define_no_command_are_none() -> None:
+    assert not {"output", "failure", "watch", "guide", "settings"} & set(COMMANDS)
+    assert (FOLDER / "output.py").exists()
+
+
+@pytest.mark.parametrize(
+    ("error", "status"),
+    [
+        (BenchError("x"), 2),
+        (DataError("x"), 2),
+        (UnknownProcedure("x"), 2),
+        (FileNotFoundError("x"), 2),
+        (InstrumentFailed("x"), 3),
+        (LinkTimeout("x", "y"), 3),
+        (LimitError("x", "y"), 4),
+        (SafetyLimit("x"), 4),
+        (Stopped("x"), 4),
+        (KeyError("x"), PROGRAM_FAULT),
+    ],
+)
+def test_every_error_has_its_exit_status(error: Exception, status: int) -> None:
+    assert status_of(error) == status
+
+
+def raising(error: BaseException) -> Callable[[], None]:
+    def call() -> None:
+        raise error
+
+    return call
+
+
+def test_an_error_is_one_message(capsys: pytest.CaptureFixture[str]) -> None:
+    assert exit_status(raising(BenchError("bench.yaml, key x: no such key"))) == 2
+    assert capsys.readouterr().err == "rig: bench.yaml, key x: no such key\n"
+
+
+def test_a_fault_of_the_program_says_so(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    assert exit_status(raising(KeyError("x"))) == PROGRAM_FAULT
+    assert capsys.readouterr().err == "rig: a fault of this program: KeyError: 'x'. RIG_DEBUG=1 shows where.\n"
+    monkeypatch.setenv("RIG_DEBUG", "1")
+    exit_status(raising(KeyError("x")))
+    assert "Traceback" in capsys.readouterr().err
+
+
+def test_a_command_may_return_its_status() -> None:
+    assert exit_status(lambda: 1) == 1
+    assert exit_status(lambda: None) == 0
+
+
+def test_ctrl_c_is_status_4(capsys: pytest.CaptureFixture[str]) -> None:
+    assert exit_status(raising(KeyboardInterrupt())) == 4
+    assert exit_status(raising(click.Abort())) == 4
+    assert "stopped" in capsys.readouterr().err
+
+
+def test_a_reader_that_goes_away_is_no_fault() -> None:
+    program = "import sys\nfrom rig.cli import main\nsys.stdin.read()\nmain(['--help'])"
+    child = subprocess.Popen(
+        [sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+    assert child.stdin
+    assert child.stdout
+    assert child.stderr
+    child.stdout.close()
+    child.stdin.close()  # now it goes on, and nobody reads
+    with child.stderr as err:
+        assert err.read() == b""
+    assert child.wait(timeout=30) == BROKEN_PIPE

@@ -1,0 +1,189 @@
+"""The commands of running and keeping, as a shell sees them: what they print, and their exit status."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from rigging import POSES, SMALL_ARGUMENTS
+
+from calibrations.read_csv import read_csv
+from rig.bench import DEFAULT
+from rig.record import Record
+
+Rig = Callable[..., Any]
+RUN = ("run", "sweep", "--unattended", *SMALL_ARGUMENTS)
+
+
+def the_run(rig: Rig) -> str:
+    return str(json.loads(rig(*RUN, "--json").out)["run"])
+
+
+@pytest.mark.sockets
+def test_run_then_runs_then_show(rig: Rig) -> None:
+    ended = rig(*RUN, "--json")
+    document = json.loads(ended.out)
+    assert ended.status == 0
+    assert {key: document[key] for key in ("schema", "procedure", "state", "poses", "results")} == {
+        "schema": "rig.run/1",
+        "procedure": "sweep",
+        "state": "complete",
+        "poses": POSES,
+        "results": {},
+    }
+    (listed,) = json.loads(rig("runs", "--json").out)["runs"]
+    assert (listed["run"], listed["state"], listed["poses"]) == (document["run"], "complete", POSES)
+    shown = json.loads(rig("show", document["run"], "--json").out)
+    assert shown["settings"]["step_deg"] == 90
+    assert shown["columns"]["alpha_deg"] == {"min": 45, "max": 90}
+    assert shown["identities"]["adc"]["model"] == "LabJack T7"
+    text = rig("show", document["run"]).out
+    assert "complete" in text
+    assert "answer mounting: yes" in text
+    assert document["run"] in rig("runs").out
+
+
+def test_an_empty_record_says_how_to_begin(rig: Rig) -> None:
+    assert json.loads(rig("runs", "--json").out) == {"schema": "rig.runs/1", "runs": []}
+    assert "rig run sweep" in rig("runs").out
+
+
+def test_settings_are_given_in_three_ways(rig: Rig) -> None:
+    ways = (("--step-deg", "45"), ("--step-deg=45",), ("--set", "step_deg=45"))
+    plans = [json.loads(rig("plan", "sweep", *way, "--json").out) for way in ways]
+    assert [plan["poses"] for plan in plans] == [7 * 9 * 2] * 3
+
+
+def test_plan_prints_moves_limits_and_time(rig: Rig, rig_home: Path) -> None:
+    ended = rig("plan", "sweep", *SMALL_ARGUMENTS)
+    assert ended.status == 0
+    assert "alpha from 0 to 90 deg\n" in ended.out
+    assert "beta from -5 to 365 deg, within its limits -400 to 400 deg" in ended.out
+    assert f"{POSES} poses in " in ended.out
+    assert not rig_home.exists()
+
+
+def test_procedures_are_listed(rig: Rig) -> None:
+    assert "sweep" in rig("procedures").out
+    document = json.loads(rig("procedures", "--json").out)
+    (sweep,) = [each for each in document["procedures"] if each["name"] == "sweep"]
+    assert sweep["settings"]["step_deg"] == 10
+    assert "Source" in sweep["doc"]
+
+
+@pytest.mark.sockets
+def test_check_identifies_and_tests_every_instrument(rig: Rig) -> None:
+    ended = rig("check", "--json")
+    instruments = json.loads(ended.out)["instruments"]
+    assert ended.status == 0
+    assert set(instruments) == {"alpha", "beta", "adc", "oven"}
+    assert instruments["adc"]["identity"]["model"] == "LabJack T7"
+    assert "FAILED" not in rig("check").out
+
+
+@pytest.mark.sockets
+def test_check_fails_for_an_instrument_that_does_not_answer(rig: Rig, bench_file: Callable[..., Path]) -> None:
+    instruments = yaml.safe_load(DEFAULT.read_text())["instruments"]
+    instruments["oven"]["url"] = "tcp://127.0.0.1:1"
+    ended = rig("check", "--bench", str(bench_file({"instruments": instruments})))
+    assert ended.status == 3
+    assert "oven (omega_cn7500) at tcp://127.0.0.1:1" in ended.err
+    assert "Check the address" in ended.err
+
+
+def test_the_example_bench_is_a_bench(rig: Rig, bench_file: Callable[..., Path]) -> None:
+    assert bench_file(rig("check", "--example").out).read_text() == DEFAULT.read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("run", "swep"), "no procedure 'swep'; did you mean 'sweep'?"),
+        (("run", "sweep", "--stp-deg", "3"), "sweep has no setting 'stp_deg'; did you mean 'step_deg'?"),
+        (("run", "sweep", "--step-deg", "x"), "the setting step_deg is 'x'; it takes a number"),
+        (("run", "sweep", "--step-deg", "7"), "give a step that divides 180 deg"),
+        (("run", "sweep", "--step-deg"), "--step-deg needs a value"),
+        (("run", "sweep", "--set", "step_deg"), "a setting is NAME=VALUE"),
+        (("run", "sweep", "extra"), "'extra' is not expected here"),
+        (("run", "sweep", "--paths", "and"), "it takes one of grid, ang"),
+        (("run", "sweep", "--answers", "nowhere.yaml"), "nowhere.yaml: the file of answers cannot be read"),
+        (("run", "sweep", "--bench", "nowhere.yaml"), "nowhere.yaml: the bench file cannot be read"),
+        (("resume", "sweep-1"), "no run 'sweep-1'"),
+        (("show", "sweep-1"), "no run 'sweep-1'"),
+        (("export", "sweep-1", "--out", "x.csv"), "sweep-1: there is no such file, and no run"),
+        (("exprt",), "no command 'exprt'. Did you mean 'export'?"),
+        (("plan",), "Missing argument 'PROCEDURE'"),
+    ],
+)
+def test_bad_usage_is_one_message_with_status_2_and_writes_nothing(
+    rig: Rig, arguments: tuple[str, ...], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    ended = rig(*arguments)
+    assert ended.status == 2
+    assert said in ended.err
+    assert ended.out == ""
+    assert "Traceback" not in ended.err
+    with Record() as record:
+        assert record.runs() == []
+    assert not list(tmp_path.glob("*.csv"))
+
+
+@pytest.mark.sockets
+def test_answers_come_from_a_file(rig: Rig, tmp_path: Path) -> None:
+    answers = tmp_path / "answers.yaml"
+    answers.write_text("mounting: checked by hand")
+    run = json.loads(rig(*RUN, "--answers", str(answers), "--json").out)["run"]
+    assert "checked by hand" in rig("show", run).out
+
+
+@pytest.mark.parametrize("text", ["- a list", "a: ["])
+def test_a_file_that_answers_nothing_is_refused(rig: Rig, tmp_path: Path, text: str) -> None:
+    (tmp_path / "answers.yaml").write_text(text)
+    ended = rig("run", "sweep", "--answers", str(tmp_path / "answers.yaml"))
+    assert ended.status == 2
+    assert "answers.yaml" in ended.err
+
+
+@pytest.mark.sockets
+def test_a_run_is_exported_as_the_table_that_analysis_reads(rig: Rig, tmp_path: Path) -> None:
+    run = the_run(rig)
+    ended = rig("export", run, "--out", str(tmp_path / "sweep.csv"), "--json")
+    assert json.loads(ended.out)["rows"] == POSES
+    table = read_csv(tmp_path / "sweep.csv")
+    assert table.kind == "poses"
+    assert table.labels["path"][0] == "A+ to B-"
+
+
+@pytest.mark.sockets
+def test_a_run_is_exported_as_events(rig: Rig, tmp_path: Path) -> None:
+    run, path = the_run(rig), tmp_path / "sweep.jsonl"
+    assert rig("export", run, "--format", "event-model", "--out", str(path)).status == 0
+    documents = [json.loads(line) for line in path.read_text().splitlines()]
+    assert [each["name"] for each in documents] == ["start", "descriptor", *["event"] * POSES, "stop"]
+    start, descriptor, first, stop = (documents[k]["doc"] for k in (0, 1, 2, -1))
+    assert start["uid"] == descriptor["run_start"] == stop["run_start"]
+    assert first["descriptor"] == descriptor["uid"]
+    assert set(first["data"]) == set(descriptor["data_keys"]) == set(first["timestamps"])
+    assert descriptor["data_keys"]["vx_v"]["units"] == "V"
+    assert (stop["exit_status"], stop["num_events"]) == ("success", {"primary": POSES})
+
+
+@pytest.mark.sockets
+@pytest.mark.parametrize(("kind", "said"), [("parquet", "take --format csv"), ("hdf5", "take --format csv")])
+def test_a_format_that_is_not_there_is_said_and_nothing_is_written(
+    rig: Rig, tmp_path: Path, kind: str, said: str
+) -> None:
+    ended = rig("export", "anything", "--format", kind, "--out", str(tmp_path / "x"))
+    assert (ended.status, list(tmp_path.glob("*x*"))) == (2, [])
+    assert said in ended.err
+
+
+def test_an_export_into_no_folder_is_said(rig: Rig, tmp_path: Path) -> None:
+    ended = rig("export", "anything", "--out", str(tmp_path / "no" / "x.csv"))
+    assert ended.status == 2
+    assert "there is no folder" in ended.err

@@ -1,0 +1,85 @@
+"""A plan says what a run would do, and touches nothing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from rigging import Onlooker, small_sweep
+
+from drivers.errors import LimitError
+from procedures.catalogue import find
+from procedures.errors import ProcedureError
+from procedures.settings import parse
+from rig.bench import Bench, read_bench
+from rig.plan import plan
+from rig.record import Record
+from rig.runner import start
+
+
+def test_a_sweep_is_518_poses_within_the_limits() -> None:
+    sweep = find("sweep")
+    planned = plan(read_bench(), sweep, parse(sweep, {}))
+    assert planned.poses == 518
+    assert planned.reach["alpha"] == ((0, 150), (-400, 400))
+    assert planned.reach["beta"] == ((-5, 365), (-400, 400))
+    assert 518 * 5.5 < planned.duration_s < 2 * 518 * 5.5
+    assert planned.questions[0].startswith("mounting: ")
+
+
+def test_every_move_is_listed_once_and_in_time() -> None:
+    planned = plan(read_bench(), *small_sweep())
+    ends = [step.start_s + step.duration_s for step in planned.steps]
+    assert [step.start_s for step in planned.steps[1:]] == ends[:-1]
+    assert planned.duration_s == ends[-1]
+    moves = [step.what for step in planned.steps if step.what.startswith("beta from")]
+    assert moves[:3] == ["beta from 0 to -5 deg", "beta from -5 to 0 deg", "beta from 0 to 90 deg"]
+
+
+@pytest.mark.sockets
+def test_duration_and_room_are_those_of_the_run() -> None:
+    planned = plan(read_bench(), *small_sweep())
+    with Record() as record:
+        run = start(record, read_bench(), *small_sweep(), Onlooker()).run.run
+        state: Any = record.state(run)
+        with record._engine.connect() as at:
+            stored = at.exec_driver_sql("SELECT sum(length(samples)) FROM blocks").scalar()
+    assert state["rig"]["clock_s"] == pytest.approx(planned.duration_s, rel=0.05)
+    assert stored < planned.bytes < 3 * stored
+
+
+def test_nothing_is_touched(rig_home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*arguments: object) -> None:
+        raise AssertionError("a plan connected to something")
+
+    monkeypatch.setattr("socket.socket.connect", refuse)
+    monkeypatch.setattr("rig.instruments.connected", refuse)
+    plan(read_bench(), *small_sweep())
+    assert not rig_home.exists()
+
+
+def test_a_move_beyond_its_limits_is_refused_as_the_stage_would() -> None:
+    document = read_bench().document()
+    document["instruments"]["alpha"]["settings"]["limits_deg"] = [-10, 80]
+    with pytest.raises(LimitError, match="alpha: 90 deg is outside its limits -10"):
+        plan(Bench.model_validate(document), *small_sweep())
+
+
+def test_an_instrument_that_the_bench_lacks_is_named() -> None:
+    document = read_bench().document()
+    del document["instruments"]["adc"]
+    with pytest.raises(ProcedureError, match="the bench has no adc"):
+        plan(Bench.model_validate(document), *small_sweep())
+
+
+def test_an_oven_is_planned_too(tmp_path: Path) -> None:
+    (tmp_path / "bake.py").write_text(
+        '"""bake: warm."""\n\ndef bake(rig, *, to_c: float = 40.0):\n'
+        "    rig.oven.set_temperature(to_c)\n    rig.oven.run(True)\n    rig.wait(60)\n    rig.oven.temperature_c()\n"
+    )
+    bake = find("bake", tmp_path)
+    whats = [step.what for step in plan(read_bench(), bake, {"to_c": 40.0}).steps]
+    assert whats[-3:] == ["oven to 40 C", "oven on", "wait 60 s"]
+    with pytest.raises(LimitError, match=r"oven: 90 C is outside its limits 0 \.\. 85 C"):
+        plan(read_bench(), bake, {"to_c": 90.0})

@@ -1,0 +1,97 @@
+"""The simulated instruments in real time, for any client; and a bench of which a part is real."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from drivers import labjack_t7, oriental_az
+from drivers.clock import WallClock
+from drivers.links import Address, Links
+from rig.bench import DEFAULT, read_bench
+from rig.instruments import checked, connected
+
+pytestmark = pytest.mark.sockets
+
+
+@pytest.fixture
+def served() -> Iterator[tuple[subprocess.Popen[str], dict[str, Any]]]:
+    """`rig simulate --json` in a process of its own, and the document that it prints."""
+    command = [sys.executable, "-m", "rig", "simulate", "--json"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as child:
+        assert child.stdout
+        try:
+            yield child, json.loads(child.stdout.readline())
+        finally:
+            child.kill()
+
+
+def test_drivers_find_the_instruments_at_the_printed_addresses(served: Any) -> None:
+    _, document = served
+    assert document["schema"] == "rig.addresses/1"
+    instruments = document["instruments"]
+    assert {role: each["driver"] for role, each in instruments.items()} == {
+        "alpha": "oriental_az",
+        "beta": "oriental_az",
+        "adc": "labjack_t7",
+        "oven": "omega_cn7500",
+    }
+    links = Links(WallClock())
+    alpha, adc = ({k: v for k, v in instruments[role].items() if k != "driver"} for role in ("alpha", "adc"))
+    stage = oriental_az.connect(Address(**alpha), links, oriental_az.Settings(), "alpha")
+    converter = labjack_t7.connect(Address(**adc), links, labjack_t7.Settings(), "adc")
+    assert stage.angle_deg() == pytest.approx(0, abs=0.1)
+    assert converter.identify().model == "LabJack T7"
+    assert converter.acquire(0.02).volts.shape == (20, 3)
+    links.close()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_in_good_order(served: Any, number: signal.Signals) -> None:
+    child, _ = served
+    child.send_signal(number)
+    assert child.wait(timeout=30) == 0
+    assert child.stderr.read() == ""
+
+
+def test_a_bench_of_which_a_part_is_real_runs_in_real_time(
+    served: Any, bench_file: Callable[..., Path], rig: Callable[..., Any]
+) -> None:
+    _, document = served
+    instruments = yaml.safe_load(DEFAULT.read_text())["instruments"]
+    for role in ("alpha", "beta"):
+        instruments[role]["settings"] |= {"speed_deg_s": 3600, "acceleration_deg_s2": 36000}
+    instruments["oven"]["url"] = document["instruments"]["oven"]["url"]  # elsewhere, so real for this bench
+    path = bench_file({"instruments": instruments})
+    with connected(read_bench(path)) as mixed:
+        assert mixed.state() is None
+        assert mixed.power_on_s() is None
+        assert mixed.clock.now() < 60
+        assert all(identity is not None for identity, _ in checked(mixed).values())
+    settings = ("--step-deg", "180", "--inclinations-deg", "0", "--dwell-s", "0.01", "--settle-s", "0")
+    ended = rig("run", "sweep", *settings, "--bench", str(path), "--json")
+    assert ended.status == 0, ended.err
+
+
+def test_a_bench_without_twins_serves_nothing(rig: Callable[..., Any], bench_file: Callable[..., Path]) -> None:
+    alpha = {"driver": "oriental_az", "url": "serial:/dev/ttyUSB0"}
+    ended = rig("simulate", "--bench", str(bench_file({"instruments": {"alpha": alpha}})))
+    assert ended.status == 2
+    assert "url: simulated" in ended.err
+
+
+def test_pseudo_terminals_are_served_where_the_bench_asks(bench_file: Callable[..., Path]) -> None:
+    instruments = yaml.safe_load(DEFAULT.read_text())["instruments"]
+    for role in ("alpha", "beta", "oven"):
+        instruments[role]["url"] = "simulated:pty:"
+    with connected(read_bench(bench_file({"instruments": instruments}))) as rig:
+        assert sorted(server.url.partition(":")[0] for server in rig.servers) == ["serial", "serial", "tcp"]
+        assert all(identity is not None for identity, _ in checked(rig).values())
