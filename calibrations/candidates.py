@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 from scipy.special import fdtrc
@@ -22,6 +23,7 @@ from calibrations.problem import Problem
 from calibrations.screen import Screen, Search, of_search
 from calibrations.table import Array
 
+SIGNIFICANT = 0.003  # chance of naming anything at all where nothing is missing, over the whole search
 NOT_TOLD_APART = 6.0  # a loss of twice the log-likelihood below this: odds of less than 20 to 1
 
 
@@ -36,6 +38,7 @@ class Candidate:
     excess_after: float
     held_out_after: float
     probability: float
+    columns: Array
     basis: Array
     indistinguishable_from: tuple[str, ...] = ()
 
@@ -63,6 +66,29 @@ def candidates(before: Fit, effects: Mapping[str, Effect]) -> list[Candidate]:
     return [replace(c, indistinguishable_from=_like(c, found, screen)) for c in found]
 
 
+def best_pair(before: Fit, found: list[Candidate]) -> tuple[Candidate, Candidate] | None:
+    """The two candidates that gain most together, where together they are significant; the stronger first.
+
+    A sensor may miss two effects of which neither is seen while the other is missing.
+    """
+    pairs = [(a, b) for a, b in combinations(found, 2) if _fits(before, a.effect, b.effect)]
+    best, least = None, 1.0
+    for a, b in pairs:
+        rank = a.rank + b.rank
+        free = before.residual.size - before.jacobian.shape[2] - rank - before.problem.smooth.size
+        columns = np.concatenate([a.columns, b.columns], axis=2)
+        joint = gain(before.noise, before.residual, before.jacobian, columns, before.problem.smooth)
+        p = _tail(joint, before.residual.size, rank, max(free, 1)) * len(pairs)
+        if p < least:
+            best, least = (a, b), p
+    return best if least < SIGNIFICANT else None
+
+
+def _tail(twice_gain: float, rows: int, rank: int, free: int) -> float:
+    """Chance of such a gain on noise. F rather than chi-squared: the noise's level is estimated from these rows."""
+    return float(fdtrc(rank, free, np.expm1(min(twice_gain / rows, 500.0)) * free / rank))
+
+
 def schwarz(c: Candidate, rows: int) -> float:
     """Gain less the price of the parameters, log(rows) each."""
     return c.gain - c.rank * float(np.log(rows))
@@ -73,9 +99,12 @@ def refit(before: Fit, c: Candidate) -> Fit:
     return fit(before.model.with_effect(c.effect), before.table)
 
 
-def _fits(before: Fit, effect: Effect) -> bool:
-    """Whether there are more rows than parameters with this effect."""
-    return before.residual.size > len(Layout.of(before.model.with_effect(effect), before.table).slots)
+def _fits(before: Fit, *added: Effect) -> bool:
+    """Whether there are more rows than parameters with these effects."""
+    model = before.model
+    for effect in added:
+        model = model.with_effect(effect)
+    return before.residual.size > len(Layout.of(model, before.table).slots)
 
 
 def _columns(screen: Screen, effect: Effect) -> tuple[Array, Array]:
@@ -99,9 +128,8 @@ def _judge(screen: Screen, effect: Effect, columns: Array, basis: Array, trials:
     score = screen.statistic(basis)
     refitted = gain(before.noise, before.residual, before.jacobian, columns, before.problem.smooth)
     free = before.residual.size - before.jacobian.shape[2] - rank - smooth * len(before.channels)
-    # F rather than chi-squared: the level of the noise is itself estimated from these rows
-    p_score = fdtrc(rank, free, score / rank) if smooth else 1.0
-    p_refitted = fdtrc(rank, free, np.expm1(min(refitted / before.residual.size, 500.0)) * free / rank)
+    p_score = float(fdtrc(rank, free, score / rank)) if smooth else 1.0
+    p_refitted = _tail(refitted, before.residual.size, rank, free)
     tests = 2 if smooth else 1
     after = before.residual - np.concatenate([before.jacobian, columns], axis=2) @ _change(before, columns)
     return Candidate(
@@ -112,6 +140,7 @@ def _judge(screen: Screen, effect: Effect, columns: Array, basis: Array, trials:
         excess_after=float(np.sqrt(np.mean((rms(after) / before.noise.floor) ** 2))),
         held_out_after=held_out_excess(before, columns),
         probability=0.0,
+        columns=columns,
         basis=basis,
     )
 

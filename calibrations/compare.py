@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
+from calibrations.candidates import SIGNIFICANT
 from calibrations.fit import Fit, evaluate, fit
 from calibrations.model import Model
 from calibrations.noise import rms
+from calibrations.path import MATERIAL
 from calibrations.table import Array, Table
 
-SIGNIFICANT = 0.003  # chance of naming any place at all where the model is right
-MATERIAL = 1.15  # times the noise floor
 MOST_PLACES = 8
 PARTS = 8  # of a column without a natural grid
 

@@ -12,18 +12,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calibrations.candidates import Candidate
+from calibrations.candidates import SIGNIFICANT, Candidate
 from calibrations.effect import Effect, catalogue
 from calibrations.experiment import Experiment, separating
 from calibrations.fit import Fit
 from calibrations.held_out import held_out_excess
 from calibrations.model import Model
-from calibrations.path import SIGNIFICANT, Path, find_path
+from calibrations.path import MATERIAL, Path, find_path
 from calibrations.patterns import patterns
 from calibrations.screen import Screen, Search
 from calibrations.table import Table
 
-MATERIAL = 1.15  # times the noise floor: a residual below is as good as noise
 MOST_LEFT = 1 / 3  # of the excess variance: more left than this, and the catalogue has not explained it
 
 

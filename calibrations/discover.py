@@ -12,13 +12,14 @@ from functools import cached_property
 
 import numpy as np
 
-from calibrations.diagnose import MATERIAL, MOST_LEFT, share_left, structure_of
+from calibrations.candidates import SIGNIFICANT
+from calibrations.diagnose import MOST_LEFT, share_left, structure_of
 from calibrations.effect import Effect, catalogue
 from calibrations.experiment import Experiment, separating
 from calibrations.fit import Fit, fit
 from calibrations.held_out import held_out_excess
 from calibrations.model import Model
-from calibrations.path import SIGNIFICANT, Path, find_path
+from calibrations.path import MATERIAL, Path, find_path
 from calibrations.screen import chance
 from calibrations.table import Table
 
@@ -100,10 +101,11 @@ def discover(table: Table, model: Model, effects: Mapping[str, Effect] | None = 
 def _needed(path: Path) -> list[str]:
     """Names of the added effects that the final model cannot do without, in the order of the path."""
     names = [step.taken.name for step in path.steps]
+    freed = {term.name for term in path.start.model.terms}
     present = path.end
-    while len(names) > 1:
-        costs = {name: _cost(present, name) for name in names}
-        name = min(names, key=lambda n: costs[n][0] / max(costs[n][1], 1))
+    while len([name for name in names if name not in freed]) > 1:
+        costs = {name: _cost(present, name) for name in names if name not in freed}
+        name = min(costs, key=lambda n: costs[n][0] / max(costs[n][1], 1))
         smaller = fit(present.model.without(name), present.table)
         if chance(*costs[name]) < SIGNIFICANT and held_out_excess(smaller) > held_out_excess(present):
             return names
@@ -112,12 +114,18 @@ def _needed(path: Path) -> list[str]:
     return names
 
 
-def _cost(found: Fit, name: str) -> tuple[float, int]:
-    """Sum of squares that losing the effect would cost, to first order, and the parameters that it has."""
+def _cost(found: Fit, name: str, tied: bool = False) -> tuple[float, int]:
+    """Sum of squares that losing the effect would cost, to first order, and the parameters that it has.
+
+    `tied`: losing it means that its axes share one value again.
+    """
     white, mine = found.whitened[:, 1:], found.problem.layout.of_effect(name)
     size = np.linalg.norm(white, axis=0)
     white = white / np.where(size > 0, size, 1.0)
-    signal = white[:, mine] @ (found.theta[mine] * size[mine])
+    value = found.theta[mine]
+    if tied:
+        value = value - value.mean()
+    signal = white[:, mine] @ (value * size[mine])
     others = white[:, ~mine]
     lost = signal - others @ np.linalg.lstsq(others, signal, rcond=1e-9)[0]
     return float(lost @ lost), int(mine.sum())
@@ -141,5 +149,6 @@ def _in_order(path: Path, kept: list[str], effects: Mapping[str, Effect]) -> tup
 def _causes(steps: tuple[Added, ...]) -> tuple[str, ...]:
     if not steps:
         return ()
-    costs = {s.name: _cost(steps[-1].after, s.name)[0] for s in steps}
+    tied = {term.name for term in steps[0].before.model.terms if term.tied}
+    costs = {s.name: _cost(steps[-1].after, s.name, s.name in tied)[0] for s in steps}
     return tuple(name for name, cost in costs.items() if cost >= REFINEMENT * max(costs.values()))

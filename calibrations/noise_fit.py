@@ -73,7 +73,7 @@ class _Search:
     @property
     def columns(self) -> int:
         """Number of all columns."""
-        return self.jacobian.shape[2]
+        return int(self.jacobian.shape[2])
 
     @cached_property
     def grid(self) -> list[tuple[float, float]]:
@@ -108,8 +108,8 @@ class _Search:
 
     def rank(self, columns: int) -> int:
         """How many of the first `columns` add something beside the smooth ones."""
-        found: tuple[int, ...] = self.beside[1]
-        return len([k for k in found if k < columns])
+        origin: tuple[int, ...] = self.beside[1]
+        return len([k for k in origin if k < columns])
 
     @cached_property
     def grams(self) -> list[_Grams]:

@@ -6,15 +6,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from calibrations.candidates import Candidate, candidates, refit
+from calibrations.candidates import SIGNIFICANT, Candidate, best_pair, candidates, refit
 from calibrations.effect import Effect
 from calibrations.fit import Fit, fit
 from calibrations.held_out import held_out_excess
 from calibrations.model import Model
 from calibrations.table import Table
 
-SIGNIFICANT = 0.003  # chance of naming anything at all where nothing is missing, over the whole search
 MOST_EFFECTS = 8
+MATERIAL = 1.15  # times the noise floor: a residual below is as good as noise
 
 
 @dataclass(frozen=True)
@@ -72,11 +72,17 @@ def find_path(model: Model, table: Table, effects: Mapping[str, Effect]) -> Path
 
 
 def _next(present: Fit, found: list[Candidate]) -> Step | None:
-    """The best candidate that is significant and still helps on unseen poses once refitted."""
+    """The best candidate that is significant and still helps on unseen poses once refitted.
+
+    Where there is none though much is left, the stronger of the best pair: the other then follows by itself.
+    """
     for c in found[:3]:
         if c.p_value >= SIGNIFICANT:
             continue
         step = Step(present, refit(present, c), tuple(found), c)
         if step.held_out_after < step.held_out_before:
             return step
-    return None
+    if present.table.kind == "poses" or present.pooled_excess <= MATERIAL:
+        return None  # with known orientation an effect is seen beside others
+    pair = best_pair(present, found)
+    return Step(present, refit(present, pair[0]), tuple(found), pair[0]) if pair else None
