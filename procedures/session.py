@@ -136,6 +136,7 @@ class Session:
         if pose.direction and way_deg < SHORTEST_APPROACH_DEG:
             self.beta.move_to(pose.beta_deg - pose.direction * self.limits.overrun_deg)
         self.beta.move_to(pose.beta_deg)
+        self.host.doing(f"holding alpha {pose.alpha_deg:g}, beta {pose.beta_deg:g} deg")
 
     def keep(self, pose: Pose, *, samples: Samples, temperature_c: float | None = None) -> None:
         """Put `pose` into the record. Raises SafetyLimit for a temperature outside the bench's limits."""

@@ -18,7 +18,7 @@ from rig.runner import resume
 @watch_options
 @bench_option
 @json_option
-def command(run: str, unattended: bool, answers: Path | None, bench_file: Path | None, as_json: bool) -> None:
+def command(run: str, unattended: bool, answers: Path | None, bench_file: Path | None, as_json: bool) -> int:
     """Go on with RUN at its first missing pose, on the bench that it was begun with.
 
     With --bench the run goes on only if that file is still the same.
@@ -26,4 +26,4 @@ def command(run: str, unattended: bool, answers: Path | None, bench_file: Path |
     bench = read_bench(bench_file) if bench_file else None
     with Record() as record, watching(record.run(run).procedure, unattended, answers) as watch:
         outcome = resume(record, run, watch, bench)
-    tell(outcome, as_json)
+    return tell(outcome, as_json)

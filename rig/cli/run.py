@@ -30,7 +30,7 @@ def command(
     answers: Path | None,
     bench_file: Path | None,
     as_json: bool,
-) -> None:
+) -> int:
     """Run PROCEDURE on the bench into the record.
 
     Settings of the procedure are options: `rig run sweep --step-deg 30`. Ctrl-C stops the stages at once;
@@ -41,4 +41,4 @@ def command(
     settings = parse(found, read_settings(given, pairs))
     with watching(found.name, unattended, answers) as watch, Record() as record:
         outcome = start(record, bench, found, settings, watch)
-    tell(outcome, as_json)
+    return tell(outcome, as_json)

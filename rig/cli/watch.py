@@ -73,13 +73,15 @@ def _answers(path: Path | None) -> dict[str, str]:
     return {str(name): "yes" if answer is True else str(answer) for name, answer in document.items()}
 
 
-def tell(outcome: Outcome, as_json: bool) -> None:
-    """The end of a run; raises what stopped it, for the exit status."""
+def tell(outcome: Outcome, as_json: bool) -> int:
+    """The end of a run, and its exit status: 1 where a result is beyond its limit. Raises what stopped the run."""
     run = outcome.run
     if as_json:
         head = {"schema": "rig.run/1", "run": run.run, "procedure": run.procedure, "state": run.state}
         emit({**head, "poses": run.rows, "results": run.results})
     else:
-        click.echo(f"{run.run}: {run.state}, {run.rows} poses")
+        lines = [f"  {name} = {r['value']:g} {r['unit']}  {r['verdict'] or ''}" for name, r in run.results.items()]
+        click.echo("\n".join([f"{run.run}: {run.state}, {run.rows} poses", *lines]))
     if outcome.error is not None:
         raise outcome.error
+    return int(any(result["verdict"] == "fail" for result in run.results.values()))

@@ -21,10 +21,7 @@ def lease(folder: Path, run: str) -> Iterator[None]:
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("w") as file:
         _lock(file.fileno(), run)
-        try:
-            yield
-        finally:
-            path.unlink(missing_ok=True)
+        yield  # the file stays: were it removed, two could hold a lock of its name
 
 
 def is_held(folder: Path, run: str) -> bool:
