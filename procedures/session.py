@@ -74,7 +74,9 @@ class Adc(Protocol):
 class Oven(Protocol):
     """Oven and thermometer."""
 
-    def temperature_c(self) -> float: ...
+    def temperature_c(self) -> float | None:
+        """Of the sensor, in C; None on a bench without a thermometer."""
+
     def set_temperature(self, c: float) -> None: ...
     def run(self, on: bool) -> None: ...
 

@@ -59,6 +59,18 @@ class Absent:
         raise ProcedureError(f"the bench has no {self._role}, which this procedure needs; name it in the bench file")
 
 
+class NoOven(Absent):
+    """A bench without oven and thermometer: the temperature is unknown, and nothing else can be asked."""
+
+    def temperature_c(self) -> None:
+        return None
+
+
+def absent(role: str) -> Absent:
+    """What stands in a role that the bench does not fill."""
+    return NoOven(role) if role == "oven" else Absent(role)
+
+
 @dataclass(frozen=True)
 class Rig:
     """A connected bench."""
@@ -71,7 +83,7 @@ class Rig:
 
     def session(self, host: Host) -> Session:
         """What a procedure is given."""
-        parts: dict[str, Any] = {role: self.drivers.get(role, Absent(role)) for role in ROLES}
+        parts: dict[str, Any] = {role: self.drivers.get(role) or absent(role) for role in ROLES}
         return Session(**parts, clock=self.clock, host=host, limits=self.bench.limits)
 
     def power_on_s(self) -> float | None:

@@ -13,7 +13,7 @@ from typing import Any
 from procedures.catalogue import Procedure
 from procedures.session import Pose, Samples, Session
 from rig.bench import ROLES, Bench
-from rig.instruments import Absent
+from rig.instruments import absent
 from rig.planned import Ledger, PlannedAdc, PlannedOven, PlannedStage, Step
 
 BYTES_PER_SAMPLE = 0.4  # in the record, measured on a sweep; an estimate for other noise
@@ -81,7 +81,7 @@ def plan(bench: Bench, procedure: Procedure, settings: Mapping[str, Any]) -> Pla
 
 def _parts(bench: Bench, ledger: Ledger) -> dict[str, Any]:
     """The planned instruments by role, with the settings of the real ones."""
-    made: dict[str, Any] = {role: Absent(role) for role in ROLES}
+    made: dict[str, Any] = {role: absent(role) for role in ROLES}
     for role, instrument in bench.instruments.items():
         made[role] = PLANNED[role](role, instrument.typed_settings(), ledger)
     return made

@@ -1,25 +1,42 @@
-"""procedures: list the procedures and what each is for."""
+"""procedures: list the procedures, what each is for, and its settings."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
-from procedures.catalogue import find, paths, summary
+from procedures.catalogue import Procedure, find, paths
 from rig.bench import read_bench
-from rig.cli.output import bench_option, columns, emit, json_option
+from rig.cli.output import bench_option, emit, json_option
 
 
 @click.command("procedures")
 @bench_option
 @json_option
 def command(bench_file: Path | None, as_json: bool) -> None:
-    """List the procedures, shipped and your own, and what each is for."""
+    """List the procedures, shipped and your own: what each is for, and its settings with their defaults."""
     folder = read_bench(bench_file).folders.procedures
-    if not as_json:
-        click.echo(columns(("procedure", "for"), [(name, summary(path)) for name, path in paths(folder).items()]))
-        return
     found = [find(name, folder) for name in paths(folder)]
-    listed = [{"name": p.name, "summary": p.summary, "doc": p.doc, "settings": p.defaults} for p in found]
-    emit({"schema": "rig.procedures/1", "procedures": listed})
+    if as_json:
+        emit({"schema": "rig.procedures/1", "procedures": [_document(procedure) for procedure in found]})
+    else:
+        click.echo("\n\n".join(_text(procedure) for procedure in found))
+
+
+def _document(procedure: Procedure) -> dict[str, Any]:
+    head = {"name": procedure.name, "summary": procedure.summary, "doc": procedure.doc}
+    return {**head, "settings": procedure.defaults}
+
+
+def _text(procedure: Procedure) -> str:
+    settings = [f"  --{name.replace('_', '-')} {_written(value)}" for name, value in procedure.defaults.items()]
+    return "\n".join([procedure.doc, "", *settings])
+
+
+def _written(value: Any) -> str:
+    """A default as it would be written on the command line."""
+    if isinstance(value, tuple):
+        return ",".join(f"{part:g}" for part in value)
+    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -183,6 +183,15 @@ def test_two_processes_do_not_work_on_one_run() -> None:
         assert record.run(run).state == "stopped"  # nobody holds it
 
 
+def test_a_bench_without_a_thermometer_measures_without_temperature() -> None:
+    document = read_bench().document()
+    del document["instruments"]["oven"]
+    with Record() as record:
+        table = table_of(record, run_small(record, Bench.model_validate(document)).run.run)
+    assert table.n == POSES
+    assert "temperature_c" not in table
+
+
 def test_limits_hold_before_anything_is_written() -> None:
     document = read_bench().document()
     document["instruments"]["beta"]["settings"]["limits_deg"] = [-360, 360]
