@@ -21,6 +21,7 @@ from calibrations.path import MATERIAL
 from calibrations.table import Array, Table
 
 MOST_PLACES = 8
+STANDS_OUT = 1.1  # times the excess of the whole axis
 PARTS = 8  # of a column without a natural grid
 
 WORDS: Mapping[str, tuple[str, str]] = {
@@ -53,7 +54,7 @@ class Place:
         else:
             unit = WORDS[self.where][1]
             place = f"{self.where} {self.low:g} {unit}" if self.low == self.high else (
-                f"{self.where} {self.low:.4g} to {self.high:.4g} {unit}"
+                f"{self.where} {self.low:.6g} to {self.high:.6g} {unit}"
             )  # fmt: skip
         mg = 1e3 * self.mean / self.scale
         value = f"{mg:+.3g} mg" if self.unit == "g" else f"{self.mean:+.3g} {self.unit} ({mg:+.3g} mg)"
@@ -106,6 +107,8 @@ def _fails(found: Fit) -> list[Place]:
         return []
     limit = SIGNIFICANT / len(places)
     bad = [k for k, p in enumerate(places) if chances[k] < limit and p.excess > MATERIAL]
+    overall = dict(zip(found.channels, found.excess, strict=True))
+    bad = [k for k in bad if places[k].excess > STANDS_OUT * overall[places[k].axis]] or bad[:1]
     bad.sort(key=lambda k: places[k].excess, reverse=True)
     first = {each[k]: k for k in reversed(bad)}
     return [places[k] for k in bad if first[each[k]] == k]

@@ -1,7 +1,8 @@
 """Add missing effects until none is missing; drop what later effects have made needless; say what caused the error.
 
-An effect whose loss would cost little beside the loss of the greatest is a refinement: it corrects the form in which
-another acts, and is kept in the model without being named as a cause.
+An effect whose loss would cost little beside the loss of the greatest transduction is a refinement: it corrects the
+form in which another acts, known only approximately, and is kept without being named as a cause. Geometry is exact: a
+strong misalignment makes nothing else a refinement.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from calibrations.candidates import SIGNIFICANT
+from calibrations.candidates import SIGNIFICANT, candidates
 from calibrations.diagnose import MOST_LEFT, share_left, structure_of
 from calibrations.effect import Effect, catalogue
 from calibrations.experiment import Experiment, separating
@@ -23,7 +24,7 @@ from calibrations.path import MATERIAL, Path, find_path
 from calibrations.screen import chance
 from calibrations.table import Table
 
-REFINEMENT = 0.05  # of the greatest cost: an effect that costs less to lose refines the form of another
+REFINEMENT = 0.02  # of the greatest cost: an effect that costs less to lose refines the form of another
 
 
 @dataclass(frozen=True)
@@ -65,10 +66,28 @@ class Discovery:
         return self.steps[-1].after if self.steps else self.start
 
 
-def add(effect: Effect, model: Model, table: Table) -> Added:
-    """`model` with one effect more, both fitted to `table`. Raises what `fit` raises."""
+def add(effect: Effect, model: Model, table: Table, effects: Mapping[str, Effect] | None = None) -> Discovery:
+    """`model` with one effect more, both fitted to `table`. Raises what `fit` raises.
+
+    The verdict is on the model with the effect: `unexplained` where a pattern is left beyond noise.
+    """
     before = fit(model, table)
-    return Added(effect.name, before, fit(before.model.with_effect(effect), table))
+    found = candidates(before, catalogue() if effects is None else effects)
+    rivals = next((c.indistinguishable_from for c in found if c.name == effect.name), ())
+    step = Added(effect.name, before, fit(before.model.with_effect(effect), table))
+    structure = structure_of(step.after)
+    left = step.after.pooled_excess > MATERIAL and structure is not None
+    return Discovery(
+        start=before,
+        steps=(step,),
+        verdict="unexplained" if left else "ambiguous" if rivals else "adequate",
+        causes=(effect.name,),
+        refinements=(),
+        alternatives={effect.name: rivals} if rivals else {},
+        residual_structure=structure if left else None,
+        next_experiment=None,
+        path=Path(before, (), tuple(found)),
+    )
 
 
 def discover(table: Table, model: Model, effects: Mapping[str, Effect] | None = None) -> Discovery:
@@ -151,4 +170,6 @@ def _causes(steps: tuple[Added, ...]) -> tuple[str, ...]:
         return ()
     tied = {term.name for term in steps[0].before.model.terms if term.tied}
     costs = {s.name: _cost(steps[-1].after, s.name, s.name in tied)[0] for s in steps}
-    return tuple(name for name, cost in costs.items() if cost >= REFINEMENT * max(costs.values()))
+    approximate = [s.name for s in steps if s.after.model.terms[-1].effect.acts_on in ("transduction", "output")]
+    greatest = max((costs[name] for name in approximate), default=0.0)
+    return tuple(name for name, cost in costs.items() if name not in approximate or cost >= REFINEMENT * greatest)

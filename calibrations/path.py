@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 from calibrations.candidates import SIGNIFICANT, Candidate, best_pair, candidates, refit
@@ -31,10 +31,10 @@ class Step:
         """Pooled excess on unseen poses without the effect."""
         return held_out_excess(self.before)
 
-    @cached_property
+    @property
     def held_out_after(self) -> float:
         """Pooled excess on unseen poses with it."""
-        return held_out_excess(self.after)
+        return self.taken.held_out_after
 
 
 @dataclass(frozen=True)
@@ -79,10 +79,17 @@ def _next(present: Fit, found: list[Candidate]) -> Step | None:
     for c in found[:3]:
         if c.p_value >= SIGNIFICANT:
             continue
-        step = Step(present, refit(present, c), tuple(found), c)
+        step = _taken(present, found, c)
         if step.held_out_after < step.held_out_before:
             return step
     if present.table.kind == "poses" or present.pooled_excess <= MATERIAL:
         return None  # with known orientation an effect is seen beside others
     pair = best_pair(present, found)
-    return Step(present, refit(present, pair[0]), tuple(found), pair[0]) if pair else None
+    return _taken(present, found, pair[0]) if pair else None
+
+
+def _taken(present: Fit, found: list[Candidate], c: Candidate) -> Step:
+    """The step that adds `c`; its errors are then those of the full fit."""
+    after = refit(present, c)
+    full = replace(c, excess_after=after.pooled_excess, held_out_after=held_out_excess(after))
+    return Step(present, after, tuple(full if other is c else other for other in found), full)

@@ -18,7 +18,7 @@ from calibrations.fit import Fit
 from calibrations.table import Array
 
 DRAWS = 300
-SMALLEST = 1e-7  # of a column's length: less is rounding
+SMALLEST = 1e-2  # of a column's length: what the model leaves less of, this data cannot show beside it
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,36 @@
+"""compare: the model beside the measurement, and where it fails."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from rig.cli.output import bench_option, emit, json_option
+
+
+@click.command("compare")
+@click.argument("data")
+@click.option("--model", default=None, help="A shipped model by name, or a model file. Default: by kind of data.")
+@click.option("--check", is_flag=True, help="Exit with 1 unless the model is adequate.")
+@bench_option
+@json_option
+def command(data: str, model: str | None, check: bool, bench_file: Path | None, as_json: bool) -> int:
+    """Set a model beside DATA (a file or a run) and say where it fails. A model without values is fitted first."""
+    from calibrations.compare import compare
+    from calibrations.documents import comparison_document
+    from rig.cli.asked import asked
+    from rig.cli.words import errors
+
+    table, start, _ = asked(data, model, bench_file)
+    result = compare(table, start)
+    if as_json:
+        emit(comparison_document(result, model or start.name))
+    else:
+        click.echo(f"{start.name} beside {table.n} rows of {table.source}\n\n{errors(result.fit)}\n")
+        if result.adequate:
+            click.echo("The model fails nowhere: what is left is noise.")
+        else:
+            click.echo("It fails, worst first:\n" + "\n".join(f"  {place.text}" for place in result.fails))
+            click.echo(f"\nWhich effect is missing: rig diagnose {data} --model {model or start.name}")
+    return 1 if check and not result.adequate else 0

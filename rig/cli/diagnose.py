@@ -1,0 +1,80 @@
+"""diagnose: which physical effect the model is missing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from rig.cli.output import bench_option, columns, emit, json_option
+
+if TYPE_CHECKING:
+    from calibrations.diagnose import Diagnosis
+
+SHOWN = 6
+
+
+@click.command("diagnose")
+@click.argument("data")
+@click.option("--model", default=None, help="A shipped model by name, or a model file. Default: by kind of data.")
+@click.option("--check", is_flag=True, help="Exit with 1 unless the model is adequate.")
+@bench_option
+@json_option
+def command(data: str, model: str | None, check: bool, bench_file: Path | None, as_json: bool) -> int:
+    """Find the physical effect that a model misses on DATA (a file or a run)."""
+    from calibrations.diagnose import diagnose
+    from calibrations.documents import diagnosis_document
+    from rig.cli.asked import asked
+
+    table, start, effects = asked(data, model, bench_file)
+    result = diagnose(table, start, effects)
+    name = model or start.name
+    if as_json:
+        emit(diagnosis_document(result, name))
+    else:
+        click.echo(_told(result, data, name))
+    return 1 if check and result.verdict != "adequate" else 0
+
+
+def _told(result: Diagnosis, data: str, model: str) -> str:
+    from calibrations.documents import why
+
+    lines = [f"{model} on {result.fit.table.n} rows of {result.fit.table.source}: {headline(result)}", ""]
+    rows = [
+        (
+            c.name,
+            f"{result.held_out_before:.3g} -> {c.held_out_after:.3g}",
+            f"{c.p_value:.1g}",
+            f"{c.probability:.3f}",
+            ", ".join(c.indistinguishable_from) or "-",
+        )
+        for c in result.candidates[:SHOWN]
+    ]
+    if rows:
+        head = ("candidate", "error on unseen poses / floor", "p-value", "probability", "not told apart from")
+        lines += [columns(head, rows), ""]
+    if result.verdict in ("effect-missing", "ambiguous"):
+        best = result.path.steps[0].taken
+        lines += [f"{best.name}: {why(best, result)}", "", f"    {best.effect.formula.splitlines()[0]}", ""]
+        lines.append(f"Add it: rig add {best.name} --model {model} --data {data} --out model.yaml")
+    if result.next_experiment:
+        lines.append(f"To tell them apart: {result.next_experiment.why}.")
+    return "\n".join(lines).rstrip()
+
+
+def headline(result: Diagnosis) -> str:
+    """The verdict in a sentence."""
+    if result.verdict == "adequate":
+        scatter = float(max(result.fit.noise.scatter / result.fit.noise.floor)) if result.fit.noise.known else 0.0
+        rest = f" Scatter of {scatter:.1f} x the noise floor has no pattern." if scatter > 1 else ""
+        return f"nothing is missing; what is left is noise.{rest}"
+    if result.verdict == "unexplained":
+        return f"nothing in the catalogue explains this. Left over: {result.residual_structure}."
+    best = result.path.steps[0].taken
+    if result.verdict == "ambiguous":
+        rivals = " or ".join((best.name, *best.indistinguishable_from))
+        return f"an effect is missing: {rivals}; this data cannot tell which."
+    more = len(result.path.steps) - 1
+    after = f", and {more} more after it" if more else ""
+    return f"an effect is missing: {best.name}{after}."

@@ -1,0 +1,41 @@
+"""fit: estimate a model's parameters from data, with uncertainties."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from rig.cli.output import bench_option, emit, json_option
+
+
+@click.command("fit")
+@click.argument("data")
+@click.option("--model", default=None, help="A shipped model by name, or a model file. Default: by kind of data.")
+@click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="Write the fitted model to this file.")
+@click.option("--check", is_flag=True, help="Exit with 1 unless the model is adequate.")
+@bench_option
+@json_option
+def command(data: str, model: str | None, out: Path | None, check: bool, bench_file: Path | None, as_json: bool) -> int:
+    """Estimate the parameters of a model from DATA (a file or a run), with standard uncertainties."""
+    from calibrations.compare import compare
+    from calibrations.documents import fit_document
+    from calibrations.fit import fit
+    from rig.cli.asked import asked, write_model
+    from rig.cli.words import errors, parameters
+
+    table, start, _ = asked(data, model, bench_file)
+    found = fit(start, table)
+    if out is not None:
+        write_model(found, start, out)
+    if as_json:
+        emit(fit_document(found, str(out) if out else None))
+    else:
+        click.echo(f"{found.model.name} fitted to {table.n} rows of {table.source}\n\n{parameters(found.model)}\n")
+        click.echo(errors(found))
+        click.echo(_stepwise(found) + (f"\nwritten to {out}" if out else ""))
+    return 1 if check and not compare(table, found.model).adequate else 0
+
+
+def _stepwise(found: object) -> str:
+    return ""

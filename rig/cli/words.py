@@ -1,0 +1,99 @@
+"""Results in words, for a terminal: numbers to the digits that their uncertainty leaves them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from calibrations.discover import Discovery
+from calibrations.fit import Fit
+from calibrations.held_out import held_out_excess
+from calibrations.model import Estimate, Model
+from rig.cli.output import columns
+
+
+def with_uncertainty(e: Estimate) -> str:
+    """`2.500123(45) V`: the digits in brackets are the standard uncertainty of the last digits (GUM 7.2.2)."""
+    if e.std is None or not e.std > 0:
+        return f"{e.value:.6g} {e.unit}"
+    digits = max(0, 1 - math.floor(math.log10(e.std)))
+    if digits > 12 or e.std >= 100:
+        return f"{e.value:.6g} +- {e.std:.2g} {e.unit}"
+    return f"{e.value:.{digits}f}({round(e.std * 10**digits)}) {e.unit}"
+
+
+def parameters(model: Model) -> str:
+    """The model's parameters as a table."""
+    rows = [
+        (term.name, e.name, e.axis or "-", with_uncertainty(e) if e.identified else f"not identified: {e.why}")
+        for term in model.terms
+        for e in term.estimates
+    ]
+    return columns(("effect", "parameter", "axis", "value"), rows)
+
+
+def errors(found: Fit) -> str:
+    """Residual, noise floor and slow noise of each channel."""
+    unit = found.table.unit if found.table.kind == "poses" else "g"
+    rows = [
+        (
+            channel,
+            quantity(found.rmse[c], unit),
+            quantity(found.noise.floor[c], unit),
+            quantity(found.noise.slow[c], unit),
+            f"{found.excess[c]:.2f}",
+        )
+        for c, channel in enumerate(found.channels)
+    ]
+    floor = "noise floor" if found.noise.known else "scatter (noise floor not known)"
+    return columns(("axis", "rms error", floor, "slow noise", "error / floor"), rows)
+
+
+def quantity(value: float, unit: str) -> str:
+    """A value with the prefix that reads best: 51.2 uV, 0.10 mg."""
+    if unit not in ("V", "g") or value == 0:
+        return f"{value:.3g} {unit}"
+    for factor, prefix in ((1.0, ""), (1e3, "m"), (1e6, "u")):
+        if abs(value) * factor >= 0.1:
+            break
+    return f"{value * factor:.3g} {prefix}{unit}"
+
+
+def discovery(result: Discovery) -> str:
+    """The falling error, step by step, and the verdict."""
+    first = result.start
+    rows = [(first.model.name, f"{first.pooled_excess:.2f}", f"{held_out_excess(first):.2f}", _bar(first, first))]
+    rows += [
+        (f"+ {s.name}", f"{s.after.pooled_excess:.2f}", f"{s.held_out_after:.2f}", _bar(s.after, first))
+        for s in result.steps
+    ]
+    lines = [columns(("model", "error / floor", "unseen poses", ""), rows), "", _verdict(result)]
+    for name, rivals in result.alternatives.items():
+        lines.append(f"This data cannot tell {name} from {joined(rivals)}.")
+    if result.next_experiment:
+        lines.append(f"To tell them apart: {result.next_experiment.why}.")
+    return "\n".join(lines)
+
+
+def _bar(found: Fit, first: Fit) -> str:
+    """A bar as long as the logarithm of the error over the noise floor."""
+    longest = math.log(max(first.pooled_excess, 1.1))
+    return "#" * max(1, round(40 * math.log(max(found.pooled_excess, 1.0)) / longest)) if longest > 0 else "#"
+
+
+def _verdict(result: Discovery) -> str:
+    end = result.end.pooled_excess
+    if result.verdict == "unexplained":
+        named = f" beside {joined(result.causes)}" if result.causes else ""
+        return f"Unexplained: no effect of the catalogue describes what is left{named}: {result.residual_structure}."
+    if not result.steps:
+        return "Nothing is missing: what is left is noise."
+    what = f"Missing {'was' if len(result.causes) == 1 else 'were'} {joined(result.causes)}"
+    extra = f"; {joined(result.refinements)} refines the form" if result.refinements else ""
+    return f"{what}{extra}. What is left, {end:.2f} x the noise floor, has no pattern."
+
+
+def joined(names: Iterable[str]) -> str:
+    """`a`, `a and b`, `a, b and c`."""
+    names = list(names)
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
