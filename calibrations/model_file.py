@@ -74,7 +74,8 @@ def parse_model(text: str, source: str, effects: Mapping[str, Effect] | None = N
     except yaml.YAMLError as error:
         raise ModelError(f"{source}: is not YAML: {' '.join(str(error).split())}") from None
     except ValidationError as error:
-        first = error.errors()[0]
+        # a misspelt key is also a missing one: the key that is there is what the person can find
+        first = min(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
         key = ".".join(str(part) for part in first["loc"]) or "the file"
         raise ModelError(f"{source}: {key}: {first['msg']}{_hint(first)}") from None
     known = catalogue() if effects is None else effects

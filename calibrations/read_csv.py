@@ -89,11 +89,13 @@ def _check_header(header: list[str], where: str) -> None:
 def _parse(
     header: list[str], body: list[str], source: str, first_line: int
 ) -> tuple[dict[str, np.ndarray], dict[str, tuple[str, ...]]]:
+    if any(name in TEXT for name in header):
+        return _parse_cells(header, body, source, first_line)
     try:
         numbers = np.loadtxt(io.StringIO("\n".join(body)), delimiter=",", ndmin=2, comments=None)
     except ValueError:
         return _parse_cells(header, body, source, first_line)
-    if numbers.shape[1] != len(header):
+    if numbers.shape[1] != len(header) or not np.isfinite(numbers).all():
         return _parse_cells(header, body, source, first_line)
     return {name: numbers[:, k] for k, name in enumerate(header)}, {}
 

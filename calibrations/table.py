@@ -192,7 +192,7 @@ def guess_kind(names: Iterable[str]) -> str:
     required = {name for sets in KINDS.values() for wanted in sets for name in wanted}
     for name in names:
         hint = nearest(name, required)
-        if name not in OPTIONAL and hint.startswith("; did you mean"):
+        if name not in required and name not in OPTIONAL and hint.startswith("; did you mean"):
             raise MissingColumn(f'no kind of table has the column "{name}"{hint}')
     raise MissingColumn(
         f"columns {', '.join(names)} are of no known kind of table; "
