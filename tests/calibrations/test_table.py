@@ -1,0 +1,96 @@
+"""Tables: what they refuse, what they give, and what makes two of them the same."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from calibrations.errors import DataError, MissingColumn
+from calibrations.table import Table, guess_kind
+
+POSES = {"alpha_deg": [90.0, 90.0, 30.0], "beta_deg": [0.0, 90.0, 0.0], "vx_v": [3.5, 2.5, 3.0]}
+
+
+def poses(**more: list[float]) -> Table:
+    return Table.from_columns("poses", {**POSES, **more}, source="made.csv")
+
+
+@pytest.mark.parametrize(
+    ("kind", "columns", "says"),
+    [
+        ("pose", POSES, 'unknown kind of table "pose"; did you mean "poses"?'),
+        ("poses", {"alpha_deg": [1.0], "beta_deg": [1.0, 2.0], "vx_v": [1.0]}, "columns of different length"),
+        ("poses", {"alpha_deg": [], "beta_deg": [], "vx_v": []}, "the table has no rows"),
+        ("poses", {}, "the table has no rows"),
+        ("poses", {**POSES, "vx_v": [1.0, np.nan, 2.0]}, 'row 2, column "vx_v" is nan, not a finite number'),
+        ("poses", {**POSES, "vx_v": [np.inf, np.nan, 2.0]}, 'row 1, column "vx_v" is inf, not a finite number (and 1'),
+        ("poses", {"alpha": [1.0], "beta_deg": [1.0], "vx_v": [1.0]}, 'the column "alpha_deg"; did you mean "alpha"?'),
+        ("poses", {"alpha_deg": [1.0], "beta_deg": [1.0]}, 'a table of poses needs the column "vx_v"; it has:'),
+        ("positions", {"mx": [1.0], "my": [1.0], "m_z": [1.0]}, 'the column "mz"; did you mean "m_z"?'),
+    ],
+)
+def test_refuses(kind: str, columns: dict[str, list[float]], says: str) -> None:
+    with pytest.raises(DataError, match=re.escape(says)):
+        Table.from_columns(kind, columns, source="made.csv")
+
+
+def test_missing_column_names_the_nearest() -> None:
+    with pytest.raises(MissingColumn, match=r'made\.csv: column "beta_dg" is missing; did you mean "beta_deg"\?'):
+        poses().column("beta_dg")
+    with pytest.raises(MissingColumn, match="known: alpha_deg, beta_deg, vx_v"):
+        poses().column("temperature_c")
+
+
+def test_a_constant_must_be_a_number() -> None:
+    table = Table.from_columns("poses", POSES, {"gravity_m_s2": "about ten", "approach_deg": "5"}, "made.csv")
+    assert table.number("approach_deg", 0.0) == 5.0
+    with pytest.raises(DataError, match="the constant \"gravity_m_s2\" is 'about ten', not a number"):
+        _ = table.gravity_m_s2
+
+
+def test_columns_cannot_be_changed() -> None:
+    table = poses()
+    with pytest.raises(ValueError, match="read-only"):
+        table.column("vx_v")[0] = 1.0
+    with pytest.raises(TypeError):
+        table.columns["vx_v"] = np.zeros(3)  # type: ignore[index]
+
+
+def test_axes_unit_and_outputs() -> None:
+    table = poses(vy_v=[1.0, 2.0, 3.0])
+    assert (table.axes, table.unit, table.outputs.shape) == (("x", "y"), "V", (3, 2))
+    raw = Table.from_columns("positions", {"ax": [1.0], "ay": [2.0], "az": [3.0]}, {"unit": "m/s^2"})
+    assert (raw.axes, raw.unit) == (("x", "y", "z"), "m/s^2")
+    assert poses().optional("flip", 0.0).tolist() == [0.0, 0.0, 0.0]
+
+
+def test_order_is_that_of_time_and_rows_keep_their_labels() -> None:
+    table = Table.from_columns(
+        "poses", {**POSES, "t_s": [20.0, 0.0, 10.0]}, source="made.csv", labels={"path": ("a", "b", "c")}
+    )
+    sorted_rows = table.rows(table.order)
+    assert sorted_rows.time_s.tolist() == [0.0, 10.0, 20.0]
+    assert sorted_rows.labels["path"] == ("b", "c", "a")
+    assert table.rows(np.array([True, False, True])).labels["path"] == ("a", "c")
+    assert poses().order.tolist() == [0, 1, 2]
+    assert poses().time_s.tolist() == [0.0, 1.0, 2.0]
+
+
+def test_digest_is_that_of_names_and_values() -> None:
+    turned = Table.from_columns("poses", dict(reversed(POSES.items())), source="elsewhere.csv")
+    assert poses().digest == turned.digest
+    assert poses().digest != poses(vy_v=[0.0, 0.0, 0.0]).digest
+    assert poses().digest != Table.from_columns("poses", {**POSES, "vx_v": [3.5, 2.5, 3.1]}).digest
+
+
+def test_guesses_the_kind() -> None:
+    assert guess_kind(POSES) == "poses"
+    assert guess_kind(["t_s", "vx_v", "displacement_m", "vy_v"]) == "motion"
+    assert guess_kind(["ax", "ay", "az", "gx", "gy", "gz"]) == "positions"
+    assert guess_kind(["rate_deg_s", "gx", "gy", "gz"]) == "rates"
+    with pytest.raises(MissingColumn, match='has the column "bta_deg"; did you mean "beta_deg"'):
+        guess_kind(["alpha_deg", "bta_deg", "vx_v"])
+    with pytest.raises(MissingColumn, match="are of no known kind of table; poses need"):
+        guess_kind(["when", "humidity"])
