@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 from calibrations.candidates import Candidate
 
+SQUARES = {"bias", "quadratic-nonlinearity", "cross-axis-bias", "z-axis-bias"}
+
 
 @dataclass(frozen=True)
 class Experiment:
@@ -25,6 +27,9 @@ def separating(best: Candidate) -> Experiment | None:
         return None
     pairs = tuple((best.name, rival) for rival in rivals)
     names = {best.name, *rivals}
+    if names <= SQUARES:
+        why = "in a field of 1 g the squares of the three axes add up to a constant; motion along one axis does not"
+        return Experiment("motion", {}, pairs, why)
     if names & {"axis-misalignment"} and names & {"stage-zero-offset", "base-tilt"}:
         why = "mounted face down, an error of the sensor's axes turns with the sensor and one of the stage does not"
         return Experiment("sweep", {"flip": 1}, pairs, why)

@@ -22,7 +22,7 @@ def command(data: str, model: str | None, out: Path | None, check: bool, bench_f
     from calibrations.documents import fit_document
     from calibrations.fit import fit
     from rig.cli.asked import asked, write_model
-    from rig.cli.words import errors, parameters
+    from rig.cli.words import errors, paper, parameters
 
     table, start, _ = asked(data, model, bench_file)
     found = fit(start, table)
@@ -33,9 +33,8 @@ def command(data: str, model: str | None, out: Path | None, check: bool, bench_f
     else:
         click.echo(f"{found.model.name} fitted to {table.n} rows of {table.source}\n\n{parameters(found.model)}\n")
         click.echo(errors(found))
-        click.echo(_stepwise(found) + (f"\nwritten to {out}" if out else ""))
+        if "cross-axis-bias" in start.effects and table.kind == "poses":
+            click.echo(f"\n{paper(table)}")
+        if out is not None:
+            click.echo(f"\nwritten to {out}")
     return 1 if check and not compare(table, found.model).adequate else 0
-
-
-def _stepwise(found: object) -> str:
-    return ""

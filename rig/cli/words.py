@@ -6,10 +6,15 @@ import math
 from collections.abc import Iterable
 
 from calibrations.discover import Discovery
+from calibrations.errors import DataError
 from calibrations.fit import Fit
 from calibrations.held_out import held_out_excess
 from calibrations.model import Estimate, Model
+from calibrations.stepwise import stepwise
+from calibrations.table import Table
 from rig.cli.output import columns
+
+PREFIXES = ((1.0, ""), (1e3, "m"), (1e6, "u"))
 
 
 def with_uncertainty(e: Estimate) -> str:
@@ -53,9 +58,7 @@ def quantity(value: float, unit: str) -> str:
     """A value with the prefix that reads best: 51.2 uV, 0.10 mg."""
     if unit not in ("V", "g") or value == 0:
         return f"{value:.3g} {unit}"
-    for factor, prefix in ((1.0, ""), (1e3, "m"), (1e6, "u")):
-        if abs(value) * factor >= 0.1:
-            break
+    factor, prefix = next((f, p) for f, p in PREFIXES if abs(value) * f >= 0.1 or p == "u")
     return f"{value * factor:.3g} {prefix}{unit}"
 
 
@@ -91,6 +94,20 @@ def _verdict(result: Discovery) -> str:
     what = f"Missing {'was' if len(result.causes) == 1 else 'were'} {joined(result.causes)}"
     extra = f"; {joined(result.refinements)} refines the form" if result.refinements else ""
     return f"{what}{extra}. What is left, {end:.2f} x the noise floor, has no pattern."
+
+
+def paper(table: Table) -> str:
+    """The paper's stepwise estimate on the same data, or why there is none."""
+    try:
+        result = stepwise(table)
+    except DataError as error:
+        return f"The paper's stepwise estimate cannot be made: {error}"
+    rows = [
+        (axis, quantity(result.linear_rmse_v[k], "V"), quantity(result.rmse_v[k], "V"), f"{tilt.twice_mg:.3g} mg")
+        for k, (axis, tilt) in enumerate(zip("xy", result.tilts, strict=True))
+    ]
+    head = ("axis", "manufacturer (1)-(3)", "paper (4)-(17)", "tilt that (20)-(21) would correct twice")
+    return "The paper's stepwise estimate on the same data, rms error:\n" + columns(head, rows)
 
 
 def joined(names: Iterable[str]) -> str:

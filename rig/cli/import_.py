@@ -1,0 +1,50 @@
+"""import: take a file into the record as a run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from rig.cli.output import emit, json_option
+
+
+@click.command("import")
+@click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.option("--kind", type=click.Choice(["poses", "positions", "motion", "still", "rates"]), help="Kind of table.")
+@click.option(
+    "--column", "mapped", multiple=True, metavar="NAME=THEIRS:UNIT", help="Our name for one of their columns."
+)
+@click.option("--constant", "given", multiple=True, metavar="KEY=VALUE", help="Such as gravity_m_s2=9.81744.")
+@json_option
+def command(file: Path, kind: str | None, mapped: tuple[str, ...], given: tuple[str, ...], as_json: bool) -> None:
+    """Take FILE into the record. A raw log of positions becomes the means of its still intervals.
+
+    A column is named by the file's header, or by its number from 1 where there is none.
+    """
+    from calibrations.foreign import Mapped, read_foreign
+    from rig.data import still_positions
+    from rig.record import Record
+
+    table = still_positions(read_foreign(file, kind, [Mapped.parse(m) for m in mapped], _constants(given)))
+    with Record() as record:
+        run = record.add_table(table)
+    if as_json:
+        names = [*table.columns, *table.labels]
+        emit({"schema": "rig.import/1", "run": run, "kind": table.kind, "rows": table.n, "columns": names})
+    else:
+        click.echo(f"{run}: {table.n} rows of {table.kind} ({', '.join(table.columns)})")
+        click.echo(f"Next: rig compare {run}")
+
+
+def _constants(given: tuple[str, ...]) -> dict[str, str | float]:
+    constants: dict[str, str | float] = {}
+    for text in given:
+        key, equals, value = text.partition("=")
+        if not equals:
+            raise click.UsageError(f'"{text}": a constant is given as KEY=VALUE, such as gravity_m_s2=9.81744')
+        try:
+            constants[key] = float(value)
+        except ValueError:
+            constants[key] = value
+    return constants
