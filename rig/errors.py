@@ -4,7 +4,7 @@ RigError (2)             bad usage or bad input
 ├── BenchError           the bench file: file, key and nearest key
 ├── RecordError          the record cannot be opened, or does not hold what is asked
 │   └── UnknownRun       no run of this name; names the nearest
-├── RunBusy              another process works on this run
+├── Busy                 another process works on this run, or with this instrument
 ├── RunMismatch          the bench is not the one that the run was begun with
 └── ExportError          a format that is not there, or does not fit the run
 InstrumentFailed (3)     an instrument cannot be reached or fails; names role, address and remedy
@@ -32,8 +32,8 @@ class UnknownRun(RecordError):
     """No run of this name is in the record."""
 
 
-class RunBusy(RigError):
-    """Another process works on this run."""
+class Busy(RigError):
+    """Another process works on this run, or with this instrument."""
 
 
 class RunMismatch(RigError):

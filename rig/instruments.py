@@ -6,6 +6,7 @@ simulated: time is real, and the twins are served by a thread.
 
 from __future__ import annotations
 
+import hashlib
 import importlib
 import threading
 from collections import defaultdict
@@ -26,6 +27,8 @@ from procedures.errors import ProcedureError
 from procedures.session import Host, Session
 from rig.bench import ROLES, Bench
 from rig.errors import InstrumentFailed
+from rig.home import home
+from rig.lease import lease
 
 
 class SinceStart:
@@ -127,9 +130,12 @@ class Rig:
 def connected(bench: Bench) -> Iterator[Rig]:
     """The bench with every instrument connected; all wires and servers are closed at the end.
 
-    Raises InstrumentFailed with role, address and remedy.
+    Raises InstrumentFailed with role, address and remedy; Busy where another process uses a real instrument, which
+    connecting to it would disturb.
     """
     with ExitStack() as stack:
+        for url in sorted({i.url for i in bench.instruments.values() if not i.simulated}):
+            stack.enter_context(lease(home(), f"wire-{hashlib.sha256(url.encode()).hexdigest()[:16]}", url))
         world = World(WorldConfig.from_mapping(bench.world), bench.seed)
         servers = serve(bench, world)
         for server in servers.values():

@@ -8,7 +8,7 @@ committed with it, so that a resumed run equals an undisturbed one bit for bit.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from typing import Any, Protocol
@@ -21,9 +21,9 @@ from procedures.settings import parse
 from rig.bench import Bench
 from rig.errors import RigError, RunMismatch, Stopped
 from rig.instruments import Rig, connected
+from rig.lease import lease
 from rig.plan import plan
 from rig.record import Kept, Record, Run
-from rig.record.lease import lease
 from rig.signals import stoppable
 
 
@@ -64,13 +64,14 @@ def start(record: Record, bench: Bench, procedure: Procedure, settings: Mapping[
             source=bench.name,
             identities=identities,
         )
-        return _carry_out(record, rig, record.run(run), procedure, watch)
+        with _held(record, run):
+            return _carry_out(record, rig, record.run(run), procedure, watch)
 
 
 def resume(record: Record, run_id: str, watch: Watch, bench: Bench | None = None) -> Outcome:
     """Go on with a run at its first missing pose, on the bench that it was begun with.
 
-    Raises RunBusy, RunMismatch where `bench` or an instrument is another one, and the errors of connection.
+    Raises Busy, RunMismatch where `bench` or an instrument is another one, and the errors of connection.
     """
     run = record.run(run_id)
     if run.state == "complete":
@@ -79,35 +80,45 @@ def resume(record: Record, run_id: str, watch: Watch, bench: Bench | None = None
     if bench is not None and bench.configuration(run.procedure, run.settings) != run.configuration:
         raise RunMismatch(f"run {run_id} was begun with another bench; resume it without --bench, or with that file")
     procedure = find(run.procedure, own.folders.procedures)
-    with stoppable(), connected(own) as rig:
+    with stoppable(), _held(record, run_id), connected(own) as rig:
         _same_instruments(run, rig)
         return _carry_out(record, rig, run, procedure, watch)
 
 
+def _held(record: Record, run: str) -> AbstractContextManager[None]:
+    return lease(record.folder, run, f"run {run}")
+
+
 def _carry_out(record: Record, rig: Rig, run: Run, procedure: Procedure, watch: Watch) -> Outcome:
-    """The run itself, under its lease; every way that it can end is written down."""
-    with lease(record.folder, run.run):
-        record.set_state(run.run, "running")
-        watch.begun(run.run)
-        error: Exception | None = None
-        results: Mapping[str, Any] = {}
-        try:
-            results = _perform(record, rig, run, procedure, watch) or {}
-        except KeyboardInterrupt as interrupt:
-            error = Stopped(f"stopped by {interrupt or 'SIGINT'}; `rig resume {run.run}` goes on where it was")
-        except (DriverError, ProcedureError, RigError) as failure:
-            error = failure
-        except Exception as fault:
-            record.set_state(run.run, "failed", f"{type(fault).__name__}: {fault}")
-            _stop(record, rig, run)
-            raise
-        if error is not None:
-            _stop(record, rig, run)
-        record.set_state(run.run, _state(error), str(error) if error else None, results)
+    """The run itself; however it ends, the stages stand still and the record says how."""
+    record.set_state(run.run, "running")
+    watch.begun(run.run)
+    try:
+        results = _perform(record, rig, run, procedure, watch)
+    except BaseException as failure:
+        complaints = _stop(rig)
+        error = _told(failure, run)
+        for complaint in complaints:
+            record.note(run.run, "not stopped", complaint)
+        record.set_state(run.run, _state(error), str(error))
+        if isinstance(failure, Exception) and error is not failure:
+            raise  # a fault of the program is not the run's
         return Outcome(record.run(run.run), error)
+    record.set_state(run.run, "complete", None, results)
+    return Outcome(record.run(run.run))
 
 
-def _perform(record: Record, rig: Rig, run: Run, procedure: Procedure, watch: Watch) -> Mapping[str, Any] | None:
+def _told(failure: BaseException, run: Run) -> Exception:
+    """What ended a run, as one message."""
+    if isinstance(failure, (DriverError, ProcedureError, RigError)):
+        return failure
+    if isinstance(failure, KeyboardInterrupt):
+        return Stopped(f"stopped by {failure or 'SIGINT'}; `rig resume {run.run}` goes on where it was")
+    return RuntimeError(f"{type(failure).__name__}: {failure}")
+
+
+def _perform(record: Record, rig: Rig, run: Run, procedure: Procedure, watch: Watch) -> Mapping[str, Any]:
+    """The procedure on the bench as the record last saw it; its results."""
     state = record.state(run.run)
     host = RunHost(record, rig, run, watch, state)
     session = rig.session(host)
@@ -117,8 +128,7 @@ def _perform(record: Record, rig: Rig, run: Run, procedure: Procedure, watch: Wa
     else:
         rig.restore(state["rig"])
     settings = parse(procedure, run.settings)
-    result: Mapping[str, Any] | None = procedure.function(session, **settings)
-    return result
+    return procedure.function(session, **settings) or {}
 
 
 class RunHost:
@@ -181,16 +191,15 @@ def _same_instruments(run: Run, rig: Rig) -> None:
             )
 
 
-def _stop(record: Record, rig: Rig, run: Run) -> None:
-    """Bring the stages to rest; what does not obey is written down."""
-    with suppress(KeyboardInterrupt):
-        for complaint in rig.stop():
-            record.note(run.run, "not stopped", complaint)
+def _stop(rig: Rig) -> list[str]:
+    """Bring the stages to rest before anything else; what does not obey."""
+    try:
+        return rig.stop()
+    except KeyboardInterrupt:
+        return ["a second signal came while the stages were being stopped"]
 
 
-def _state(error: Exception | None) -> str:
-    if error is None:
-        return "complete"
+def _state(error: Exception) -> str:
     return "stopped" if isinstance(error, (Stopped, SafetyLimit)) else "failed"
 
 

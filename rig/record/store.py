@@ -23,10 +23,10 @@ from calibrations.table import Table
 from procedures.session import Pose
 from rig.errors import RecordError, UnknownRun
 from rig.home import home
+from rig.lease import is_held
 from rig.nearest import did_you_mean
 from rig.record import codec
 from rig.record.file import open_file
-from rig.record.lease import is_held
 from rig.record.schema import blocks, columns, events, poses, runs, states
 from rig.record.values import Block, Event, Kept, Run
 

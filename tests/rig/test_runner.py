@@ -16,9 +16,9 @@ from procedures.errors import SettingError
 from procedures.session import Limits
 from procedures.sweep import grid
 from rig.bench import Bench, read_bench
-from rig.errors import InstrumentFailed, RunBusy, RunMismatch
+from rig.errors import Busy, InstrumentFailed, RunMismatch
+from rig.lease import lease
 from rig.record import Kept, Record
-from rig.record.lease import lease
 from rig.record.tables import table_of
 from rig.runner import Outcome, resume, start
 
@@ -175,10 +175,10 @@ def test_another_bench_is_refused() -> None:
 def test_two_processes_do_not_work_on_one_run() -> None:
     with Record() as record:
         run = run_small(record, watch=Interrupting(2, raising(KeyboardInterrupt()))).run.run
-        with lease(record.folder, run):
+        with lease(record.folder, run, "it"):
             record.set_state(run, "running")
             assert record.run(run).state == "running"
-            with pytest.raises(RunBusy, match="another process"):
+            with pytest.raises(Busy, match=f"another process works on run {run}"):
                 resume(record, run, Onlooker())
         assert record.run(run).state == "stopped"  # nobody holds it
 

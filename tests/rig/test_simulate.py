@@ -17,6 +17,7 @@ from drivers import labjack_t7, oriental_az
 from drivers.clock import WallClock
 from drivers.links import Address, Links
 from rig.bench import DEFAULT, read_bench
+from rig.errors import Busy
 from rig.instruments import checked, connected
 
 pytestmark = pytest.mark.sockets
@@ -72,6 +73,8 @@ def test_a_bench_of_which_a_part_is_real_runs_in_real_time(
     instruments["oven"]["url"] = document["instruments"]["oven"]["url"]  # elsewhere, so real for this bench
     path = bench_file({"instruments": instruments})
     with connected(read_bench(path)) as mixed:
+        with pytest.raises(Busy, match="another process works on "), connected(read_bench(path)):
+            pass  # its connecting would disturb who measures
         assert mixed.state() is None
         assert mixed.power_on_s() is None
         assert mixed.clock.now() < 60
