@@ -115,19 +115,20 @@ class T7:
         self._write_block((t7.ENABLE, 1))
         try:
             rate_hz = self._unit.read(t7.ACTUAL_RATE)
-            data = self._collect(packets, per_packet * channels, channels * rate_hz)
+            data = self._collect(packets, per_packet * channels, start_s, channels * rate_hz)
         finally:
             self._stop()
         codes = codes_of(data, per_packet * channels, self.name).reshape(-1, channels)[:scans]
         return Samples(self._volts[codes], tuple(self.settings.channels), rate_hz, start_s)
 
-    def _collect(self, packets: int, samples: int, samples_per_s: float) -> bytearray:
-        """Read `packets` packets as they come."""
+    def _collect(self, packets: int, samples: int, start_s: float, samples_per_s: float) -> bytearray:
+        """Read `packets` packets as they come, a good many at a time."""
         count = packets * packet_type(samples).itemsize
         bytes_per_s = samples_per_s * packet_type(samples).itemsize / samples
         data = bytearray()
         while len(data) < count:
-            self._clock.sleep(min(count - len(data), GATHER_BYTES) / bytes_per_s)
+            wanted = min(count, len(data) + GATHER_BYTES)
+            self._clock.sleep(start_s + wanted / bytes_per_s - self._clock.now())
             if not (more := self._stream.read(PATIENCE_S)):
                 codes_of(data, samples, self.name)  # the status of what came may say why
                 raise LinkTimeout(

@@ -15,13 +15,12 @@ from typing import Protocol
 
 import serial
 
-from drivers.clock import Clock, Wire
+from drivers.clock import CHUNK, Clock, Wire
 from drivers.errors import LinkRefused
 from drivers.links.url import Url
 
 CONNECT_TIMEOUT_S = 5.0
 DISCARD_S = 1.0
-CHUNK = 1 << 18
 
 
 class Port(Protocol):

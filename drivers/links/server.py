@@ -18,7 +18,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol
 
 from drivers.links.address import Address
-from drivers.links.link import CHUNK, connection_key
+from drivers.links.link import connection_key
 from drivers.links.url import Url
 
 SILENCE_S = 0.05  # ends an RTU frame: generous, since a computer sends a frame in pieces
@@ -60,7 +60,7 @@ class Connection:
             self.inbox.clear()
         self._heard_s = now_s
         try:
-            data = os.read(self.fileno, CHUNK)
+            data = os.read(self.fileno, 1 << 16)
         except BlockingIOError:
             return True
         except OSError:
