@@ -1,0 +1,27 @@
+"""A signal ends a run once; a terminal that closes does not end what nohup started."""
+
+import signal
+
+import pytest
+
+from rig.signals import SIGNALS, stoppable
+
+
+@pytest.mark.parametrize("number", SIGNALS)
+def test_the_first_signal_interrupts_and_further_ones_are_quiet(number: signal.Signals) -> None:
+    before = [signal.getsignal(each) for each in SIGNALS]
+    with pytest.raises(KeyboardInterrupt, match=number.name), stoppable():
+        try:
+            signal.raise_signal(number)
+        finally:
+            signal.raise_signal(number)
+    assert [signal.getsignal(each) for each in SIGNALS] == before
+
+
+def test_nohup_is_respected() -> None:
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with stoppable():
+            signal.raise_signal(signal.SIGHUP)
+    finally:
+        signal.signal(signal.SIGHUP, before)
