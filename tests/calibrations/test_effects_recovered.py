@@ -1,0 +1,150 @@
+"""Each effect's parameters come back from data made by formulas written out here, within four standard errors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+import synthetic
+from scipy.spatial.transform import Rotation
+
+from calibrations.effect import catalogue
+from calibrations.fit import fit
+from calibrations.model_file import read_model
+from calibrations.table import Array, Table
+
+Columns = dict[str, Array]
+K = np.array([1.02, 0.98])  # V/g of x and y
+B = np.array([2.51, 2.48])  # V
+MADE: dict[str, Made] = {}
+
+
+@dataclass(frozen=True)
+class Made:
+    """Outputs of x and y, shape (2, n), and the values that made them."""
+
+    outputs: Callable[[Columns, Array], Array]
+    truth: dict[tuple[str, str], float]
+
+
+def made(name: str, **truth: float) -> Callable[[Callable[[Columns, Array], Array]], None]:
+    """Register the maker of one effect's data; a key is `parameter` or `parameter_axis`."""
+
+    def register(outputs: Callable[[Columns, Array], Array]) -> None:
+        keys = {tuple(key.split("__")) if "__" in key else (key, ""): value for key, value in truth.items()}
+        MADE[name] = Made(outputs, keys)  # type: ignore[arg-type]
+
+    return register
+
+
+def linear(a: Array) -> Array:
+    return K[:, None] * a[:2] + B[:, None]
+
+
+@made("bias", bias__x=2.51, bias__y=2.48)
+def _bias(columns: Columns, a: Array) -> Array:
+    return linear(a)
+
+
+@made("scale-factor", scale__x=1.02, scale__y=0.98)
+def _scale_factor(columns: Columns, a: Array) -> Array:
+    return linear(a)
+
+
+@made("quadratic-nonlinearity", square__x=0.004, square__y=-0.002)
+def _quadratic(columns: Columns, a: Array) -> Array:
+    return linear(a) + np.array([0.004 * a[0] * a[0], -0.002 * a[1] * a[1]])
+
+
+@made("cross-axis-bias", square__x=0.003, square__y=0.005)
+def _cross_axis(columns: Columns, a: Array) -> Array:
+    return linear(a) + np.array([0.003 * a[1] * a[1], 0.005 * a[0] * a[0]])
+
+
+@made("z-axis-bias", square__x=0.03, square__y=-0.01)
+def _z_bias(columns: Columns, a: Array) -> Array:
+    return linear(a) + np.array([0.03, -0.01])[:, None] * a[2] * a[2]
+
+
+@made("z-axis-scale", slope__x=0.004, slope__y=-0.003, square__x=0.02, square__y=0.01)
+def _z_scale(columns: Columns, a: Array) -> Array:
+    growth = np.array([0.004 * a[2] + 0.02 * a[2] ** 2, -0.003 * a[2] + 0.01 * a[2] ** 2])
+    return linear(a) + growth * a[:2]
+
+
+@made("axis-misalignment", x=0.3, y=-0.7, z=0.5)
+def _misalignment(columns: Columns, a: Array) -> Array:
+    axes = Rotation.from_rotvec([0.3, -0.7, 0.5], degrees=True).as_matrix().T  # rows: sensing axes, turned as a whole
+    return linear(axes @ a)
+
+
+@made("axis-nonorthogonality", xy=0.4)
+def _nonorthogonality(columns: Columns, a: Array) -> Array:
+    lean = np.radians(0.4)
+    return linear(np.array([a[0], np.cos(lean) * a[1] + np.sin(lean) * a[0]]))
+
+
+@made("temperature-bias", slope__x=0.0011, slope__y=-0.0006)
+def _temperature(columns: Columns, a: Array) -> Array:
+    warmer = columns["temperature_c"] - columns["temperature_c"].mean()
+    return linear(a) + np.array([0.0011, -0.0006])[:, None] * warmer
+
+
+@made("hysteresis", height__x=0.012, height__y=0.008, reach=0.15, spread=0.5, pressing=0.0)
+def _hysteresis(columns: Columns, a: Array) -> Array:
+    """Springs in parallel with sliders, dragged along the whole way from pose to pose."""
+    limits = [0.15 * (1 + 0.5 * e) for e in (-5 / 6, -1 / 2, -1 / 6, 1 / 6, 1 / 2, 5 / 6)]
+    held, last = np.zeros((2, 6)), np.array([0.0, 0.0])
+    found = []
+    for way in _ways(columns):
+        for here in way:
+            held = np.clip(held + (here - last)[:, None], -np.array(limits), limits)
+            last = here
+        found.append(held.sum(axis=1) / sum(limits))
+    return linear(a) + np.array([0.012, 0.008])[:, None] * np.transpose(found)
+
+
+def _ways(columns: Columns) -> Iterator[Array]:
+    """x and y on the way to each pose, finely: alpha first, then beta; from home, alpha = 0."""
+    before = 0.0, columns["beta_deg"][0]
+    for alpha, beta in zip(columns["alpha_deg"], columns["beta_deg"], strict=True):
+        u = np.linspace(0, 1, 400)
+        alphas = np.radians(np.concatenate([before[0] + u * (alpha - before[0]), np.full(400, alpha)]))
+        betas = np.radians(np.concatenate([np.full(400, before[1]), before[1] + u * (beta - before[1])]))
+        yield np.column_stack([np.sin(alphas) * np.cos(betas), np.sin(alphas) * np.sin(betas)])
+        before = alpha, beta
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_parameters_come_back(name: str) -> None:
+    columns = synthetic.turns((90, 30, 150, 60, 120), step_deg=10)
+    columns["temperature_c"] = 22 + 3 * np.sin(columns["t_s"] / 400)
+    outputs = MADE[name].outputs(columns, np.array(synthetic.components(columns)))
+    table = synthetic.poses(columns, *outputs, seed=7)
+    model = read_model("linear")
+    found = fit(model if model.holds(name) else model.with_effect(catalogue()[name]), table)
+    assert found.pooled_excess == pytest.approx(1.0, abs=0.1)
+    estimates = {(e.name, e.axis): e for term in found.model.terms if term.name == name for e in term.estimates}
+    assert set(estimates) == set(MADE[name].truth)
+    for key, value in MADE[name].truth.items():
+        assert estimates[key].identified, key
+        assert abs(estimates[key].value - value) < 4 * estimates[key].std, key
+
+
+def test_a_triad_of_unknown_orientation() -> None:
+    """Positions: bias, scales and the three departures from right angles, from |a| = 1 g alone."""
+    a = Rotation.random(80, rng=np.random.default_rng(1)).as_matrix()[:, 0]
+    s = np.sin(np.radians([0.5, -0.8, 0.3]))
+    y = s[0] * a[:, 0] + np.sqrt(1 - s[0] ** 2) * a[:, 1]
+    z = s[1] * a[:, 0] + s[2] * a[:, 1] + np.sqrt(1 - s[1] ** 2 - s[2] ** 2) * a[:, 2]
+    noise = 1e-4 * np.random.default_rng(2).standard_normal((3, 80))
+    v = np.array([0.1 + 1.01 * a[:, 0], -0.2 + 0.99 * y, 0.3 + 1.02 * z]) + noise
+    std = {f"{k}_std": np.full(80, 1e-3) for k in ("ax", "ay", "az")}
+    table = Table.from_columns("positions", {"ax": v[0], "ay": v[1], "az": v[2], **std, "n": np.full(80, 100.0)})
+    found = fit(read_model("linear").with_effect(catalogue()["axis-nonorthogonality"]), table)
+    values = {(e.name, e.axis): e for term in found.model.terms for e in term.estimates}
+    truth = {("bias", "x"): 0.1, ("scale", "z"): 1.02, ("xy", ""): 0.5, ("xz", ""): -0.8, ("yz", ""): 0.3}
+    for key, value in truth.items():
+        assert abs(values[key].value - value) < 4 * values[key].std, key

@@ -1,0 +1,120 @@
+"""What holds for every effect of the catalogue, also one that is added tomorrow."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import synthetic
+from scipy.spatial.transform import Rotation
+
+from calibrations.effect import HOOKS, Effect, catalogue, find
+from calibrations.errors import ModelError, UnknownName
+from calibrations.model_file import read_model
+from calibrations.problem import Problem
+from calibrations.table import Table
+
+EFFECTS = pytest.mark.parametrize("effect", catalogue().values(), ids=catalogue())
+
+
+def full_table(kind: str) -> Table:
+    """A table with every column that an effect may need."""
+    columns = synthetic.turns((90, 30, 150), step_deg=30)
+    a_x, a_y, _ = synthetic.components(columns)
+    n = len(a_x)
+    if kind == "poses":
+        more = {"temperature_c": np.linspace(20, 30, n), "supply_v": np.linspace(4.9, 5.1, n)}
+        return synthetic.poses(columns | more, a_x + 2.5, a_y + 2.5)
+    a = Rotation.random(n, rng=np.random.default_rng(0)).as_matrix()[:, 0]
+    columns = dict(zip(("ax", "ay", "az"), a.T, strict=True))
+    return Table.from_columns("positions", {**columns, "temperature_c": np.linspace(20, 30, n)})
+
+
+@EFFECTS
+def test_every_parameter_changes_the_residual_smoothly(effect: Effect) -> None:
+    for kind in effect.kinds:
+        table = full_table(kind)
+        assert effect.excluded(table) is None
+        problem = Problem.of(read_model("linear").with_effect(effect), table)
+        mine = problem.layout.of_effect(effect.name)
+        assert mine.any()
+        start = problem.layout.starts()[0]
+        jacobian = problem.jacobian(start + 0.3 * problem.layout.typical, mine)
+        assert np.all(np.isfinite(problem.residual(start)))
+        assert np.all(np.isfinite(jacobian))
+        assert np.all(jacobian.any(axis=(0, 1)))
+
+
+@EFFECTS
+def test_says_what_a_person_should_know(effect: Effect) -> None:
+    for text in (
+        effect.summary,
+        effect.formula,
+        effect.symptom,
+        effect.excited_by,
+        effect.confused_with,
+        effect.source,
+    ):
+        assert text
+    assert effect.acts_on in HOOKS
+    for parameter in effect.parameters:
+        assert parameter.unit
+        assert parameter.doc
+        assert parameter.typical > 0
+        assert all(parameter.low <= start <= parameter.high for start in parameter.starts)
+
+
+@EFFECTS
+def test_is_refused_where_its_columns_are_missing(effect: Effect) -> None:
+    table = Table.from_columns("poses", {"alpha_deg": [90.0], "beta_deg": [0.0], "vx_v": [1.0]})
+    assert (effect.excluded(table) is None) == (not effect.needs)
+    assert "is not defined for still" in str(effect.excluded(Table.from_columns("still", {"t_s": [0.0]})))
+
+
+def test_unknown_effect_names_the_nearest() -> None:
+    with pytest.raises(UnknownName, match='unknown effect "hysteresys"; did you mean "hysteresis"'):
+        find("hysteresys", catalogue())
+
+
+OWN = '''"""sag: the output sags with time.
+
+    V += s t
+
+Symptom   the residual follows time.
+"""
+from calibrations.effect import Parameter
+PARAMETERS = (Parameter("sag", "{out}/s", typical=1e-4),)
+def transduction(a, table, p):
+    return table.time_s[:, None] * p["sag"]
+'''
+
+
+def test_a_users_own_effect_is_one_file(tmp_path: Path) -> None:
+    (tmp_path / "sag.py").write_text(OWN)
+    effects = catalogue(tmp_path)
+    assert set(effects) == {*catalogue(), "sag"}
+    assert effects["sag"].summary == "the output sags with time."
+    assert effects["sag"].acts_on == "transduction"
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("x = 1\n", "is not an effect: it defines none of the functions pose, force, transduction, output"),
+        ("import nowhere_to_be_found\n", "ModuleNotFoundError: No module named"),
+        ("def output(v, table, p):\n    return v\n", r"PARAMETERS must be a tuple of Parameter\(\.\.\.\)"),
+        (OWN.replace("Symptom", "Sympton"), "its docstring must begin with"),
+        (OWN.replace("sag: the", "the"), "its docstring must begin with"),
+    ],
+)
+def test_a_file_that_is_not_an_effect(tmp_path: Path, text: str, says: str) -> None:
+    (tmp_path / "wrong.py").write_text(text)
+    with pytest.raises(ModelError, match=says) as error:
+        catalogue(tmp_path)
+    assert "wrong.py" in str(error.value)
+
+
+def test_folder_of_own_effects_must_exist(tmp_path: Path) -> None:
+    with pytest.raises(ModelError, match="the folder of your own effects does not exist"):
+        catalogue(tmp_path / "nowhere")

@@ -1,0 +1,86 @@
+"""The compiled loops against plain references."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from calibrations.kernels import slip, whiten
+from calibrations.noise import Noise, rms, white_only
+from calibrations.table import Array
+
+
+def covariance(gap_s: Array, white: Array, slow: float, tau_s: float) -> Array:
+    t = np.cumsum(gap_s)
+    return np.diag(white**2) + slow**2 * np.exp(-np.abs(t[:, None] - t) / tau_s)
+
+
+@given(st.integers(0, 10_000), st.sampled_from([0.0, 0.1, 1.0, 30.0]), st.sampled_from([1.0, 100.0, 1e4]))
+def test_whiten_is_the_dense_covariance(seed: int, slow: float, tau_s: float) -> None:
+    rng = np.random.default_rng(seed)
+    gap_s, white = rng.uniform(0.1, 20, 40), rng.uniform(0.5, 2, 40)
+    columns = rng.standard_normal((40, 3))
+    out, logdet = whiten(columns, gap_s, white, slow, tau_s)
+    sigma = covariance(gap_s, white, slow, tau_s)
+    lower = np.linalg.cholesky(sigma)
+    dense = np.linalg.solve(lower, columns)
+    np.testing.assert_allclose(out, dense, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(out.T @ out, columns.T @ np.linalg.solve(sigma, columns), rtol=1e-9, atol=1e-9)
+    assert logdet == pytest.approx(2 * np.sum(np.log(np.diag(lower))), rel=1e-9, abs=1e-9)
+
+
+def test_noise_value_agrees_with_its_formula() -> None:
+    """Sigma = W + k^2 I + (rho w)^2 G(tau), channel by channel."""
+    rng = np.random.default_rng(3)
+    gap_s, white = rng.uniform(1, 9, 25), rng.uniform(0.5, 2, (2, 25))
+    noise = Noise(white, gap_s, np.array([0.3, 0.0]), np.array([1.5, 0.7]), np.array([40.0, 90.0]))
+    columns = rng.standard_normal((2, 25, 2))
+    gram, logdet = np.zeros((2, 2)), 0.0
+    for c, (k, rho, tau) in enumerate([(0.3, 1.5, 40.0), (0.0, 0.7, 90.0)]):
+        w = np.sqrt(np.mean(white[c] ** 2 + k**2))
+        sigma = covariance(gap_s, np.sqrt(white[c] ** 2 + k**2), rho * w, tau)
+        gram += columns[c].T @ np.linalg.solve(sigma, columns[c])
+        logdet += np.linalg.slogdet(sigma)[1]
+    out = noise.whiten(columns)
+    np.testing.assert_allclose(out.T @ out, gram, rtol=1e-9)
+    assert noise.logdet == pytest.approx(logdet, rel=1e-9)
+    np.testing.assert_allclose(noise.floor, rms(white))
+
+
+def test_floor_is_the_scatter_where_white_noise_is_not_known() -> None:
+    noise = white_only(None, np.ones(5), 2)
+    assert not noise.known
+    np.testing.assert_array_equal(noise.floor, [1.0, 1.0])
+    np.testing.assert_array_equal(noise.slow, [0.0, 0.0])
+
+
+def play(way: Array, limit: float) -> float:
+    """Krasnosel'skii's play operator: what the input drags behind it, `limit` to either side."""
+    state = 0.0
+    for u in way:
+        state = max(u - limit, min(u + limit, state))
+    return state
+
+
+@given(st.integers(0, 10_000))
+def test_slip_is_what_play_leaves(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    n, turns = 15, 4
+    a, on_the_way = rng.uniform(-1, 1, (n, 3)), rng.uniform(-1, 1, (n, turns, 3))
+    limits = rng.uniform(0.05, 0.5, 6)
+    found = slip(a, on_the_way, np.ones((n, 3)), limits)
+    way = np.concatenate([on_the_way, a[:, None]], axis=1)
+    for i, k in np.ndindex(n, 3):
+        u = way[: i + 1, :, k].ravel()
+        held = sum(u[-1] - play(u, limit) for limit in limits)
+        assert found[i, k] == pytest.approx(held / limits.sum(), abs=1e-12)
+
+
+def test_pressing_widens_the_limits() -> None:
+    a = np.array([[0.1, 0.0, 0.0], [1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]])
+    pressed = np.array([[1.0, 1.0, 1.0], [1.0, 1.0, 1.0], [1.5, 1.0, 1.0]])
+    found = slip(a, np.repeat(a[:, None], 2, axis=1), pressed, np.array([0.2]))
+    np.testing.assert_allclose(found[:, 0], [0.5, 1.0, -1.5])
+    np.testing.assert_array_equal(found[:, 1:], 0.0)
