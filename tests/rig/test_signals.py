@@ -7,14 +7,18 @@ import pytest
 from rig.signals import SIGNALS, stoppable
 
 
+def twice(number: signal.Signals) -> None:
+    try:
+        signal.raise_signal(number)
+    finally:
+        signal.raise_signal(number)
+
+
 @pytest.mark.parametrize("number", SIGNALS)
 def test_the_first_signal_interrupts_and_further_ones_are_quiet(number: signal.Signals) -> None:
     before = [signal.getsignal(each) for each in SIGNALS]
     with pytest.raises(KeyboardInterrupt, match=number.name), stoppable():
-        try:
-            signal.raise_signal(number)
-        finally:
-            signal.raise_signal(number)
+        twice(number)
     assert [signal.getsignal(each) for each in SIGNALS] == before
 
 
