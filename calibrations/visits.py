@@ -35,6 +35,21 @@ def turning_points(table: Table) -> Array:
     return _turns(_along(table, np.column_stack([alphas, alpha]), np.column_stack([betas, beta])))
 
 
+@lru_cache(maxsize=8)
+def last_turn(table: Table) -> Array:
+    """Side of the last move of beta before each pose, +1 or -1, shape (n,): that on which the gear's play lies.
+
+    A pose that was reached without a move of beta keeps the side of the pose before. Rows in order of time.
+    """
+    direction = table.optional("direction", 0.0)
+    if _approach_deg(table) > 0:
+        return direction
+    moved = np.sign(np.diff(table.column("beta_deg"), prepend=np.nan))
+    moved[0] = direction[0]
+    last = np.maximum.accumulate(np.where(moved != 0, np.arange(table.n), 0))
+    return np.asarray(moved[last])
+
+
 def _approach_deg(table: Table) -> float:
     """How far before a pose its approach begins: a constant of the table."""
     return table.number("approach_deg", 0.0 if "t_s" in table else 10.0)
