@@ -126,7 +126,7 @@ class _Search:
         rank = self.rank(columns)
         grams = [g.leading(rank) for g in self.grams]
         least = rms(self.noise.white) / rms(self.noise.fast)
-        free = n - self.smooth.shape[1] - (rank if channels == 1 else 0)
+        free = n - self.smooth.shape[1]
         pick, scale = [0] * channels, np.ones(channels)
         for _ in range(4 if channels > 1 else 1):
             before = list(pick)
@@ -173,18 +173,24 @@ def _grams(gap_s: Array, fast: Array, columns: Array, grid: list[tuple[float, fl
 
 
 def _scores(g: _Grams, rest: Array, free: int, least: float) -> tuple[Array, Array]:
-    """-2 log restricted likelihood up to a constant, and the factor on all noise (profiled), along the grid."""
+    """-2 log restricted likelihood up to a constant, and the factor on all noise (profiled), along the grid.
+
+    `free` rows less smooth columns; the parameters that this channel bears, and not the others, are taken off here.
+    """
     p = len(rest) - 1
     scale = np.ones(len(g.gram))
     ridge = 1e-13 * np.eye(p)
     for _ in range(3):
-        total = g.gram / scale[:, None, None] ** 2 + rest
+        own = g.gram / scale[:, None, None] ** 2
+        total = own + rest
         size = np.trace(total[:, :p, :p], axis1=1, axis2=2)[:, None, None]
         normal = total[:, :p, :p] + ridge * size
-        theta = np.linalg.solve(normal, total[:, :p, p:])[:, :, 0]
-        extended = np.concatenate([-theta, np.ones((len(theta), 1))], axis=1)
+        solved = np.linalg.solve(normal, np.concatenate([total[:, :p, p:], own[:, :p, :p]], axis=2))
+        borne = np.trace(solved[:, :, 1:], axis1=1, axis2=2)
+        extended = np.concatenate([-solved[:, :, 0], np.ones((len(solved), 1))], axis=1)
         rss = np.einsum("gi,gij,gj->g", extended, g.gram, extended)
-        scale = np.maximum(np.sqrt(np.maximum(rss, 0.0) / free), max(least, 1e-300))
+        variance = np.maximum(rss, 0.0) / np.maximum(free - borne, 1.0)
+        scale = np.maximum(np.sqrt(variance), max(least, 1e-300))
     other = np.einsum("gi,ij,gj->g", extended, rest, extended)
     information = g.information + np.linalg.slogdet(normal)[1]
     return rss / scale**2 + other + g.logdet + information + 2 * free * np.log(scale), scale

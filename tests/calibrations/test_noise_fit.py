@@ -1,0 +1,146 @@
+"""The noise of greatest restricted likelihood: levels come back, and a dense implementation agrees."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from calibrations.noise import white_only
+from calibrations.noise_fit import RATIOS, TIME_CONSTANTS, estimate, gain
+from calibrations.table import Array
+
+N, GAP_S = 300, 7.0
+GAPS = np.full(N, GAP_S)
+NONE = np.zeros((N, 0))
+
+
+def gauss_markov(rng: np.random.Generator, std: float, tau_s: float, gaps: Array) -> Array:
+    x = np.empty(len(gaps))
+    x[0] = std * rng.standard_normal()
+    for i in range(1, len(gaps)):
+        phi = np.exp(-gaps[i] / tau_s)
+        x[i] = phi * x[i - 1] + std * np.sqrt(1 - phi**2) * rng.standard_normal()
+    return x
+
+
+@pytest.mark.parametrize("known", [True, False], ids=["white known", "white unknown"])
+@pytest.mark.parametrize(("slow", "tau_s"), [(0.5, 100.0), (1.0, 60.0), (1.5, 200.0)])
+def test_level_of_slow_noise_comes_back(slow: float, tau_s: float, known: bool) -> None:
+    found_slow, found_fast = [], []
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        residual = (rng.standard_normal(N) + gauss_markov(rng, slow, tau_s, GAPS))[None]
+        start = white_only(np.ones((1, N)) if known else None, GAPS, 1)
+        noise = estimate(start, residual, np.ones((1, N, 1)), NONE)
+        found_slow.append(noise.slow[0])
+        found_fast.append(noise.fast[0, 0])
+    assert np.median(found_slow) == pytest.approx(slow, rel=0.25)
+    assert np.median(found_fast) == pytest.approx(1.0, rel=0.1)
+
+
+@pytest.mark.parametrize("known", [True, False], ids=["white known", "white unknown"])
+def test_white_noise_alone_has_little_slow(known: bool) -> None:
+    slow = []
+    for seed in range(20):
+        residual = 3e-5 * np.random.default_rng(seed).standard_normal((2, N))
+        noise = estimate(
+            white_only(np.full((2, N), 3e-5) if known else None, GAPS, 2), residual, np.ones((2, N, 1)), NONE
+        )
+        np.testing.assert_allclose(np.sqrt(np.mean(noise.fast**2, axis=1)), 3e-5, rtol=0.2)
+        slow.append(noise.slow / 3e-5)
+    assert np.median(slow) <= 0.25  # the least step of the grid, or none
+
+
+def test_scatter_beyond_the_white_noise() -> None:
+    rng = np.random.default_rng(8)
+    white = rng.uniform(0.5, 1.5, (1, N))
+    residual = np.hypot(white, 2.0) * rng.standard_normal((1, N))
+    noise = estimate(white_only(white, GAPS, 1), residual, np.ones((1, N, 1)), NONE)
+    assert noise.scatter[0] == pytest.approx(2.0, rel=0.1)
+
+
+def test_a_smooth_misfit_is_not_taken_for_slow_noise() -> None:
+    rng = np.random.default_rng(9)
+    angle = 2 * np.pi * np.arange(N) / 40
+    misfit, smooth = 5 * np.cos(angle), np.column_stack([np.cos(angle), np.sin(angle)])
+    residual = (rng.standard_normal(N) + misfit)[None]
+    with_smooth = estimate(white_only(np.ones((1, N)), GAPS, 1), residual, np.ones((1, N, 1)), smooth)
+    without = estimate(white_only(np.ones((1, N)), GAPS, 1), residual, np.ones((1, N, 1)), NONE)
+    assert with_smooth.slow[0] + with_smooth.scatter[0] < 0.5
+    assert without.slow[0] + without.scatter[0] > 2.0
+
+
+@dataclass(frozen=True)
+class Dense:
+    """The best point of a grid by dense matrices: restricted likelihood to choose, likelihood for the deviance."""
+
+    ratio: float
+    tau_s: float
+    scale: float
+    deviance: float
+
+
+def dense_best(gaps: Array, X: Array, r: Array) -> Dense:
+    n, p = X.shape
+    t, span, gap = np.cumsum(gaps), gaps.sum(), np.median(gaps[1:])
+    taus = np.geomspace(3 * gap, span / 3, TIME_CONSTANTS)
+    best, least = None, np.inf
+    for ratio, tau in [(0.0, 1.0), *((r, t) for t in taus for r in RATIOS)]:
+        sigma = np.eye(n) + ratio**2 * np.exp(-np.abs(t[:, None] - t) / tau)
+        W = np.linalg.inv(sigma)
+        information = X.T @ W @ X
+        error = r - X @ np.linalg.solve(information, X.T @ W @ r)
+        scale = np.sqrt(error @ W @ error / (n - p))
+        logdet = np.linalg.slogdet(sigma)[1]
+        restricted = 2 * (n - p) * np.log(scale) + logdet + np.linalg.slogdet(information)[1]
+        if restricted < least:
+            least = restricted
+            best = Dense(ratio, tau, scale, logdet + 2 * n * np.log(scale) + error @ W @ error / scale**2)
+    assert best is not None
+    return best
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_against_dense_matrices(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    n = 60
+    gaps = rng.uniform(3, 12, n)
+    J, extra, smooth = rng.standard_normal((n, 3)), rng.standard_normal((n, 2)), rng.standard_normal((n, 4))
+    slow = gauss_markov(rng, 1.2, 80.0, gaps)
+    r = 0.3 * (rng.standard_normal(n) + slow) + 0.2 * extra[:, 0]
+    start = white_only(None, gaps, 1)
+    without, beside = dense_best(gaps, np.hstack([smooth, J]), r), dense_best(gaps, np.hstack([smooth, J, extra]), r)
+    found = estimate(start, r[None], J[None], smooth)
+    assert found.ratio[0] == without.ratio
+    assert found.tau_s[0] == pytest.approx(without.tau_s)
+    assert found.scatter[0] == pytest.approx(without.scale, rel=1e-8)
+    twice = gain(start, r[None], J[None], extra[None], smooth)
+    assert twice == pytest.approx(max(0.0, without.deviance - beside.deviance), abs=1e-7)
+
+
+def test_levels_of_two_channels_with_parameters_in_common() -> None:
+    """Too few rows for slow noise: the two levels alone, against a minimum over both by dense matrices."""
+    rng = np.random.default_rng(6)
+    n = 15
+    J, r = rng.standard_normal((2, n, 5)), np.array([[1.0], [4.0]]) * rng.standard_normal((2, n))
+
+    def restricted(log_std: Array) -> float:
+        w = np.repeat(np.exp(-log_std), n)
+        X, y = J.reshape(-1, 5) * w[:, None], r.ravel() * w
+        error = y - X @ np.linalg.lstsq(X, y, rcond=None)[0]
+        return float(error @ error + 2 * n * log_std.sum() + np.linalg.slogdet(X.T @ X)[1])
+
+    best = minimize(restricted, np.zeros(2), tol=1e-10).x
+    noise = estimate(white_only(None, np.full(n, GAP_S), 2), r, J, np.zeros((n, 0)))
+    np.testing.assert_allclose(noise.scatter, np.exp(best), rtol=1e-2)
+
+
+def test_columns_that_the_model_already_has_gain_nothing() -> None:
+    rng = np.random.default_rng(2)
+    J, r = rng.standard_normal((1, N, 2)), rng.standard_normal((1, N))
+    again = J @ rng.standard_normal((2, 2))
+    assert gain(white_only(None, GAPS, 1), r, J, again, NONE) == 0.0
+    assert gain(white_only(None, GAPS, 1), r, J, J[:, :, :0], NONE) == 0.0
