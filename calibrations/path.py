@@ -13,7 +13,7 @@ from calibrations.held_out import held_out_excess
 from calibrations.model import Model
 from calibrations.table import Table
 
-MOST_EFFECTS = 8
+MOST_EFFECTS = 14
 MATERIAL = 1.15  # times the noise floor: a residual below is as good as noise
 
 

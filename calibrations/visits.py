@@ -45,7 +45,7 @@ def last_turn(table: Table) -> Array:
     if _approach_deg(table) > 0:
         return direction
     moved = np.sign(np.diff(table.column("beta_deg"), prepend=np.nan))
-    moved[0] = direction[0]
+    moved[0] = 0.0  # before the first move the side is not known
     last = np.maximum.accumulate(np.where(moved != 0, np.arange(table.n), 0))
     return np.asarray(moved[last])
 

@@ -1,6 +1,6 @@
 """stage-backlash: the table lags behind the motor by the play of its gear, on the side from which it comes.
 
-    beta <- beta - d s                                d in deg: half the play; s = +-1: the side of the last move of beta
+    beta <- beta - d s                                d in deg: half the play; s = +-1: side of the last move of beta
 
 Symptom   clockwise and anticlockwise turns differ by the output's derivative with respect to beta, on all axes alike.
 Excited by  every angle approached from both sides.
