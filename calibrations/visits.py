@@ -1,7 +1,7 @@
 """The way from each pose to the next, as a sensor with a memory feels it.
 
-The stages start at home (alpha = 0), alpha moves first, then beta, by way of the approach from the side of `direction`.
-Only where a component of the specific force turns round on the way does it matter: those points are kept.
+The stages start at home (0, 0); alpha moves first, then beta. Beta arrives from the side of `direction`: a move that
+does not already come from there goes by way of the approach, `approach_deg` before the pose.
 """
 
 from __future__ import annotations
@@ -13,26 +13,28 @@ import numpy as np
 from calibrations.chain import Pose, specific_force
 from calibrations.table import Array, Table
 
-SAMPLES = 24  # of each stage's move
-TURNS = 6  # kept for each axis, on the way to one pose
+SHORTEST_APPROACH_DEG = 0.5  # a move that is shorter has not come from its side
 
 
 @lru_cache(maxsize=8)
 def turning_points(table: Table) -> Array:
-    """Specific force along each reference axis where it turns round on the way to each pose, shape (n, TURNS, 3).
+    """Specific force along each reference axis where it turns round on the way to each pose, shape (n, points, 3).
 
-    Rows in order of time. Moves with fewer turns repeat the last point, which changes nothing.
+    Rows in order of time. Points between which it only grows or only falls are among them; they change nothing.
     """
     alpha, beta = np.radians(table.column("alpha_deg")), np.radians(table.column("beta_deg"))
     away = beta - np.radians(_approach_deg(table)) * table.optional("direction", 0.0)
-    before_alpha, before_beta = np.append(0.0, alpha[:-1]), np.append(beta[0], beta[:-1])
     if "t_s" not in table:  # the order is not known: each pose is reached from its approach alone
-        before_alpha, before_beta = alpha, away
-    u = np.linspace(0.0, 1.0, SAMPLES)
-    still = np.zeros((table.n, SAMPLES))
-    alphas = np.hstack([before_alpha[:, None] + np.outer(alpha - before_alpha, u), still + alpha[:, None]])
-    betas = np.hstack([still + before_beta[:, None], before_beta[:, None] + np.outer(away - before_beta, u)])
-    return _turns(_along(table, np.column_stack([alphas, alpha]), np.column_stack([betas, beta])))
+        last = _on_the_way(table, alpha, away, np.zeros(table.n), beta - away)
+        return np.concatenate([_at(table, alpha, away)[:, None], last[:, :-1]], axis=1)
+    before_alpha, before_beta = np.append(0.0, alpha[:-1]), np.append(0.0, beta[:-1])
+    by_way = np.where(_needs_approach(table, beta - before_beta), away, before_beta)
+    moves = (
+        _on_the_way(table, before_alpha, before_beta, alpha - before_alpha, np.zeros(table.n)),
+        _on_the_way(table, alpha, before_beta, np.zeros(table.n), by_way - before_beta),
+        _on_the_way(table, alpha, by_way, np.zeros(table.n), beta - by_way),
+    )
+    return np.concatenate(moves, axis=1)[:, :-1]  # the last point is the pose itself
 
 
 @lru_cache(maxsize=8)
@@ -41,11 +43,11 @@ def last_turn(table: Table) -> Array:
 
     A pose that was reached without a move of beta keeps the side of the pose before. Rows in order of time.
     """
-    direction = table.optional("direction", 0.0)
-    if _approach_deg(table) > 0:
-        return direction
     moved = np.sign(np.diff(table.column("beta_deg"), prepend=np.nan))
     moved[0] = 0.0  # before the first move the side is not known
+    if _approach_deg(table) > 0:
+        direction = table.optional("direction", 0.0)
+        moved = np.where(direction != 0, direction, moved)
     last = np.maximum.accumulate(np.where(moved != 0, np.arange(table.n), 0))
     return np.asarray(moved[last])
 
@@ -55,22 +57,32 @@ def _approach_deg(table: Table) -> float:
     return table.number("approach_deg", 0.0 if "t_s" in table else 10.0)
 
 
-def _along(table: Table, alphas: Array, betas: Array) -> Array:
-    """Specific force on the paths, shape (n, points, 3)."""
-    n, points = alphas.shape
-    mount = np.repeat(np.radians(table.optional("mount_deg", 0.0)), points)
-    flip = np.repeat(table.optional("flip", 0.0), points)
-    up = np.array([0.0, 0.0, 1.0])
-    return specific_force(Pose(alphas.ravel(), betas.ravel(), mount, flip, up)).reshape(n, points, 3)
+def _needs_approach(table: Table, move: Array) -> Array:
+    """Which moves of beta (rad) do not come from the side of `direction`."""
+    direction = table.optional("direction", 0.0)
+    return np.asarray((direction != 0) & (np.degrees(move) * direction < SHORTEST_APPROACH_DEG))
 
 
-def _turns(path: Array) -> Array:
-    kept = np.repeat(path[:, :1, :], TURNS, axis=1)
-    rising = np.diff(path, axis=1)
-    moving = np.abs(rising) > 1e-9
-    turned = moving[:, :-1] & ((rising[:, 1:] * rising[:, :-1] < 0) | ~moving[:, 1:])
-    for i, k in zip(*np.nonzero(turned.any(axis=1)), strict=True):
-        at = np.flatnonzero(turned[i, :, k]) + 1
-        values = path[i, at[-TURNS:], k]
-        kept[i, :, k] = np.concatenate([values, np.full(TURNS - len(values), values[-1])])
-    return kept
+def _on_the_way(table: Table, alpha: Array, beta: Array, by_alpha: Array, by_beta: Array) -> Array:
+    """Specific force where it turns round while one of the stages moves, and at the end, shape (n, turns + 1, 3).
+
+    Along each axis it is m + A cos s + B sin s, with s the angle gone through: it turns every half turn.
+    """
+
+    def after(s: float) -> Array:
+        return _at(table, alpha + s * np.sign(by_alpha), beta + s * np.sign(by_beta))
+
+    start, across, opposite = after(0.0), after(np.pi / 2), after(np.pi)
+    middle = (start + opposite) / 2
+    A, B = start - middle, across - middle
+    end = np.abs(by_alpha + by_beta)[:, None, None]
+    turns = np.arange(max(1, int(np.ceil(np.max(end) / np.pi))))[:, None]
+    s = np.minimum((np.arctan2(B, A) % np.pi)[:, None] + np.pi * turns, end)
+    s = np.concatenate([s, np.broadcast_to(end, (table.n, 1, 3))], axis=1)
+    return np.asarray(middle[:, None] + A[:, None] * np.cos(s) + B[:, None] * np.sin(s))
+
+
+def _at(table: Table, alpha: Array, beta: Array) -> Array:
+    """Specific force with the stages at these angles, shape (n, 3)."""
+    mount, flip = np.radians(table.optional("mount_deg", 0.0)), table.optional("flip", 0.0)
+    return specific_force(Pose(alpha, beta, mount, flip, np.array([0.0, 0.0, 1.0])))

@@ -99,9 +99,10 @@ class Bench(Strict):
 
     @property
     def constants(self) -> dict[str, str | float]:
-        """What every table from this bench says of the sensor."""
+        """What every table from this bench says of the sensor, and of the way to each pose."""
         sensor = self.sensor.model_dump(exclude_none=True)
-        return {"sensor": sensor.pop("name"), **{key: value for key, value in sensor.items() if value != ""}}
+        said = {key: value for key, value in sensor.items() if value != ""}
+        return {"sensor": said.pop("name"), **said, "approach_deg": self.limits.overrun_deg}
 
     def document(self) -> dict[str, Any]:
         """The whole configuration as JSON; `Bench.model_validate` reads it back."""
