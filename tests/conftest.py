@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import os
-import sys
 from pathlib import Path
 
 import hypothesis
 import pytest
 
-# pytest puts this folder on the path, and `rig`, `drivers` ... in it are no packages: the real ones come first.
-sys.path.insert(0, str(Path(__file__).parents[1]))
-
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as `rig` does; numpy is imported after this
 
 # The same examples in every run, however slow the machine.
 hypothesis.settings.register_profile("steady", derandomize=True, deadline=None, database=None)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ast
 import importlib
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -80,6 +81,8 @@ def rig() -> None:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run one command and leave the process with the contract's exit status; errors are one message."""
+    # Before numpy is imported: the matrices are small, and threads that spin for one another slow a busy machine.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
     def call() -> Any:
         words = list(sys.argv[1:] if arguments is None else arguments)

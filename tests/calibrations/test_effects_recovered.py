@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-import synthetic
 from scipy.spatial.transform import Rotation
 
 from calibrations.effect import catalogue
 from calibrations.fit import fit
 from calibrations.model_file import read_model
 from calibrations.table import Array, Table
+from tests.calibrations import synthetic
 
 Columns = dict[str, Array]
 K = np.array([1.02, 0.98])  # V/g of x and y
@@ -94,25 +94,29 @@ def _temperature(columns: Columns, a: Array) -> Array:
 
 @made("hysteresis", height__x=0.012, height__y=0.008, reach=0.15, spread=0.5, pressing=0.0)
 def _hysteresis(columns: Columns, a: Array) -> Array:
-    """Springs in parallel with sliders, dragged along the whole way from pose to pose."""
-    limits = [0.15 * (1 + 0.5 * e) for e in (-5 / 6, -1 / 2, -1 / 6, 1 / 6, 1 / 2, 5 / 6)]
-    held, last = np.zeros((2, 6)), np.array([0.0, 0.0])
+    return linear(a) + np.array([0.012, 0.008])[:, None] * hysteretic(columns, reach=0.15, spread=0.5)
+
+
+def hysteretic(columns: Columns, reach: float, spread: float) -> Array:
+    """Force in springs with sliders, dragged along the whole way from pose to pose; 1 where all slide; shape (2, n)."""
+    limits = reach * (1 + spread * np.array([-5, -3, -1, 1, 3, 5]) / 6)
+    held, last = np.zeros((2, 6)), np.zeros(2)
     found = []
     for way in _ways(columns):
         for here in way:
-            held = np.clip(held + (here - last)[:, None], -np.array(limits), limits)
+            held = np.clip(held + (here - last)[:, None], -limits, limits)
             last = here
-        found.append(held.sum(axis=1) / sum(limits))
-    return linear(a) + np.array([0.012, 0.008])[:, None] * np.transpose(found)
+        found.append(held.sum(axis=1) / limits.sum())
+    return np.transpose(found)
 
 
 def _ways(columns: Columns) -> Iterator[Array]:
     """x and y on the way to each pose, finely: alpha first, then beta; from home, alpha = 0."""
     before = 0.0, columns["beta_deg"][0]
     for alpha, beta in zip(columns["alpha_deg"], columns["beta_deg"], strict=True):
-        u = np.linspace(0, 1, 400)
-        alphas = np.radians(np.concatenate([before[0] + u * (alpha - before[0]), np.full(400, alpha)]))
-        betas = np.radians(np.concatenate([np.full(400, before[1]), before[1] + u * (beta - before[1])]))
+        u = np.linspace(0, 1, 200)
+        alphas = np.radians(np.concatenate([before[0] + u * (alpha - before[0]), np.full(200, alpha)]))
+        betas = np.radians(np.concatenate([np.full(200, before[1]), before[1] + u * (beta - before[1])]))
         yield np.column_stack([np.sin(alphas) * np.cos(betas), np.sin(alphas) * np.sin(betas)])
         before = alpha, beta
 

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import synthetic
 from scipy.spatial.transform import Rotation
 
 from calibrations.effect import HOOKS, Effect, catalogue, find
@@ -14,6 +13,7 @@ from calibrations.errors import ModelError, UnknownName
 from calibrations.model_file import read_model
 from calibrations.problem import Problem
 from calibrations.table import Table
+from tests.calibrations import synthetic
 
 EFFECTS = pytest.mark.parametrize("effect", catalogue().values(), ids=catalogue())
 

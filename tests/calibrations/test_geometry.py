@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import synthetic
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
@@ -13,6 +12,7 @@ from calibrations.axes import other_in_plane, out_of_plane, rotation
 from calibrations.chain import Pose, Step, backward, force, nominal_pose, respond, sensed, specific_force
 from calibrations.effect import catalogue
 from calibrations.table import Array, Table
+from tests.calibrations import synthetic
 
 angles = st.floats(-720.0, 720.0)
 small = st.floats(-10.0, 10.0)

@@ -6,11 +6,11 @@ import re
 
 import numpy as np
 import pytest
-import synthetic
 
 from calibrations.errors import DataError, MissingColumn
 from calibrations.stepwise import stepwise
 from calibrations.table import Array, Table
+from tests.calibrations import synthetic
 
 SF, B = {"x": 1.013, "y": 0.987}, {"x": 2.513, "y": 2.474}
 Q, R = (0.031, -0.004, 0.0), (0.021, 0.0017)  # h(0) = 0, as it is a difference from 90 deg; r0 is SF

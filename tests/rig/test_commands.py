@@ -9,11 +9,11 @@ from typing import Any
 
 import pytest
 import yaml
-from rigging import POSES, SMALL_ARGUMENTS
 
 from calibrations.read_csv import read_csv
 from rig.bench import DEFAULT
 from rig.record import Record
+from tests.rig.rigging import POSES, SMALL_ARGUMENTS
 
 Rig = Callable[..., Any]
 RUN = ("run", "sweep", "--unattended", *SMALL_ARGUMENTS)

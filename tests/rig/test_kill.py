@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 
 import pytest
-from rigging import POSES, SMALL_ARGUMENTS, Onlooker, in_own_process, signal_at, small_sweep
 
 from rig.bench import read_bench
 from rig.record import Record
 from rig.record.tables import table_of
 from rig.runner import start
+from tests.rig.rigging import POSES, SMALL_ARGUMENTS, Onlooker, in_own_process, signal_at, small_sweep
 
 pytestmark = pytest.mark.sockets
 ARGUMENTS = ("run", "sweep", "--unattended", "--json", *SMALL_ARGUMENTS)

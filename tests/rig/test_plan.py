@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from rigging import Onlooker, small_sweep
 
 from drivers.errors import LimitError
 from procedures.catalogue import find
@@ -16,6 +15,7 @@ from rig.bench import Bench, read_bench
 from rig.plan import plan
 from rig.record import Record
 from rig.runner import start
+from tests.rig.rigging import Onlooker, small_sweep
 
 
 def test_a_sweep_is_518_poses_within_the_limits() -> None:

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from rigging import POSES, Onlooker, small_sweep
 
 from drivers.errors import LimitError, StageAlarm
 from procedures.errors import SettingError
@@ -21,6 +20,7 @@ from rig.lease import lease
 from rig.record import Kept, Record
 from rig.record.tables import table_of
 from rig.runner import Outcome, resume, start
+from tests.rig.rigging import POSES, Onlooker, small_sweep
 
 pytestmark = pytest.mark.sockets
 

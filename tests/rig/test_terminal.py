@@ -6,9 +6,9 @@ import sys
 
 import pexpect
 import pytest
-from rigging import POSES, SMALL_ARGUMENTS
 
 from rig.record import Record
+from tests.rig.rigging import POSES, SMALL_ARGUMENTS
 
 pytestmark = pytest.mark.sockets
 
