@@ -14,24 +14,24 @@ from calibrations.model import Estimate, Model
 from calibrations.parameters import Layout, Slot
 from calibrations.table import Array
 
+ROUNDING = 1e-12  # a column shorter than this, relative to the longest, is zero
+UNDETERMINED = 1e-6  # share of an entry's typical size that may change freely, squared
 RELATIVE_RANK = 1e-8  # singular values below this, relative to the largest, are zero to rounding
 
 
 def covariance(jacobian: Array, typical: Array) -> tuple[Array, Array]:
     """Covariance of the parameters from the whitened jacobian, and the undetermined directions.
 
-    Returns ((p, p), (k, p)): the second holds unit vectors, in units of `typical`, that change nothing.
+    Returns ((p, p), (k, p)): the second an orthonormal basis, in units of `typical`, of what changes nothing.
     """
     scaled = jacobian * typical
     norm = np.linalg.norm(scaled, axis=0)
-    norm = np.where(norm > 0, norm, 1.0)
+    norm = np.where(norm > ROUNDING * norm.max(), norm, 1.0)
     _, s, Vt = np.linalg.svd(scaled / norm, full_matrices=False)
     good = s > RELATIVE_RANK * s[0]
     D = typical / norm
     root = (Vt[good].T / s[good]) * D[:, None]
-    null = Vt[~good] / norm
-    lengths = np.linalg.norm(null, axis=1, keepdims=True)
-    return root @ root.T, null / np.where(lengths > 0, lengths, 1.0)
+    return root @ root.T, np.linalg.qr((Vt[~good] / norm).T)[0].T
 
 
 def estimates(model: Model, layout: Layout, theta: Array, jacobian: Array) -> Model:
@@ -39,13 +39,12 @@ def estimates(model: Model, layout: Layout, theta: Array, jacobian: Array) -> Mo
     if not len(theta):
         return model
     cov, null = covariance(jacobian, layout.typical)
-    std = np.sqrt(np.diag(cov))
+    std, free = np.sqrt(np.diag(cov)), null.T @ null
     found: list[list[Estimate]] = [[] for _ in model.terms]
     for k, slot in enumerate(layout.slots):
-        why = _why_not(k, layout, std, null, jacobian)
+        why = _why_not(k, layout, std, free)
         unit = slot.parameter.unit.replace("{out}", layout.unit)
-        undetermined = bool(len(null)) and bool(np.any(np.abs(null[:, k]) > 1e-3))
-        uncertainty = None if undetermined or not jacobian[:, k].any() else float(std[k])
+        uncertainty = None if free[k, k] > UNDETERMINED else float(std[k])
         found[slot.term].append(
             Estimate(slot.parameter.name, slot.axis, float(theta[k]), uncertainty, unit, why is None, why)
         )
@@ -53,14 +52,18 @@ def estimates(model: Model, layout: Layout, theta: Array, jacobian: Array) -> Mo
     return replace(model, terms=terms)
 
 
-def _why_not(k: int, layout: Layout, std: Array, null: Array, jacobian: Array) -> str | None:
-    """Why entry `k` is not identified, or None."""
-    if not jacobian[:, k].any():
-        return "it changes nothing in this data"
-    for direction in null:
-        if abs(direction[k]) > 1e-3:
-            partners = [_label(layout, s) for j, s in enumerate(layout.slots) if j != k and abs(direction[j]) > 1e-3]
-            return f"on this data it cannot be told from {', '.join(partners)}"
+def _why_not(k: int, layout: Layout, std: Array, free: Array) -> str | None:
+    """Why entry `k` is not identified, or None. `free`: the projector (p, p) on what changes nothing in the data.
+
+    Two entries are told apart where the projector has no element for them, whatever basis it was made from.
+    """
+    if free[k, k] > UNDETERMINED:
+        share = np.diag(free)
+        tied = (share > UNDETERMINED) & (np.abs(free[k]) > 1e-3 * np.sqrt(share[k] * share))
+        partners = [_label(layout, s) for j, s in enumerate(layout.slots) if j != k and tied[j]]
+        if not partners:
+            return "it changes nothing in this data"
+        return f"on this data it cannot be told from {', '.join(partners)}"
     if std[k] >= layout.typical[k]:
         return (
             f"not identifiable from these positions: its standard uncertainty {std[k]:.2g} is no smaller than what a "
