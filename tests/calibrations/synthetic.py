@@ -38,3 +38,13 @@ def poses(columns: dict[str, Array], vx: Array, vy: Array, noise_v: float = NOIS
     std = np.full(n, noise_v * np.sqrt(5000.0))
     measured = {"vx_v": vx + noise[0], "vy_v": vy + noise[1], "vx_std_v": std, "vy_std_v": std, "n": np.full(n, 5000.0)}
     return Table.from_columns("poses", {**columns, **measured}, source="made")
+
+
+def gauss_markov(rng: np.random.Generator, std: float, tau_s: float, gaps: Array) -> Array:
+    """A Gauss-Markov process: standard deviation `std`, time constant `tau_s`, steps of `gaps` s; shape (n,)."""
+    x = np.empty(len(gaps))
+    x[0] = std * rng.standard_normal()
+    for i in range(1, len(gaps)):
+        phi = np.exp(-gaps[i] / tau_s)
+        x[i] = phi * x[i - 1] + std * np.sqrt(1 - phi**2) * rng.standard_normal()
+    return x

@@ -92,6 +92,73 @@ def _temperature(columns: Columns, a: Array) -> Array:
     return linear(a) + np.array([0.0011, -0.0006])[:, None] * warmer
 
 
+@made("cubic-nonlinearity", cube__x=0.003, cube__y=-0.002)
+def _cubic(columns: Columns, a: Array) -> Array:
+    return linear(a) + np.array([0.003 * a[0] * a[0] * a[0], -0.002 * a[1] * a[1] * a[1]])
+
+
+@made("odd-quadratic-nonlinearity", square__x=0.003, square__y=-0.002)
+def _odd_quadratic(columns: Columns, a: Array) -> Array:
+    return linear(a) + np.array([0.003 * np.sign(a[0]) * a[0] ** 2, -0.002 * np.sign(a[1]) * a[1] ** 2])
+
+
+@made("scale-factor-asymmetry", kink__x=0.003, kink__y=-0.001)
+def _asymmetry(columns: Columns, a: Array) -> Array:
+    slopes = K + np.array([0.003, -0.001]), K - np.array([0.003, -0.001])  # where a > 0, where a < 0
+    return np.where(a[:2] > 0, slopes[0][:, None], slopes[1][:, None]) * a[:2] + B[:, None]
+
+
+@made("cross-axis-scale", slope__x=0.003, slope__y=0.004)
+def _cross_axis_scale(columns: Columns, a: Array) -> Array:
+    return linear(a) + np.array([0.003, 0.004])[:, None] * a[0] * a[1]
+
+
+@made("temperature-scale", slope__x=0.0008, slope__y=-0.0005)
+def _temperature_scale(columns: Columns, a: Array) -> Array:
+    warmer = columns["temperature_c"] - columns["temperature_c"].mean()
+    return linear(a) + np.array([0.0008, -0.0005])[:, None] * warmer * a[:2]
+
+
+@made("base-tilt", x=0.2, y=-0.3)
+def _base_tilt(columns: Columns, a: Array) -> Array:
+    """The vertical leans; then the stages turn it: first alpha about y, then beta about z."""
+    up = Rotation.from_rotvec([0.2, -0.3, 0.0], degrees=True).apply([0.0, 0.0, 1.0])
+    turned = Rotation.from_euler("yz", np.column_stack([columns["alpha_deg"], columns["beta_deg"]]), degrees=True)
+    return linear(turned.apply(up).T)
+
+
+@made("stage-zero-offset", alpha=0.15, beta=-0.25)
+def _zero_offset(columns: Columns, a: Array) -> Array:
+    return linear(np.array(synthetic.components(moved(columns, alpha=0.15, beta=-0.25))))
+
+
+@made("stage-eccentricity", sine=0.2, cosine=-0.1)
+def _eccentricity(columns: Columns, a: Array) -> Array:
+    beta = np.radians(columns["beta_deg"])
+    return linear(np.array(synthetic.components(moved(columns, beta=0.2 * np.sin(beta) - 0.1 * np.cos(beta)))))
+
+
+@made("stage-backlash", half_play=0.1)
+def _backlash(columns: Columns, a: Array) -> Array:
+    side, before, lag = 0.0, columns["beta_deg"][0], []
+    for beta in columns["beta_deg"]:
+        side = np.sign(beta - before) or side  # a pose that is held keeps the side of the last move
+        before = beta
+        lag.append(0.1 * side)
+    return linear(np.array(synthetic.components(moved(columns, beta=-np.array(lag)))))
+
+
+def moved(columns: Columns, alpha: Array | float = 0.0, beta: Array | float = 0.0) -> Columns:
+    """The same poses with other true angles."""
+    return columns | {"alpha_deg": columns["alpha_deg"] + alpha, "beta_deg": columns["beta_deg"] + beta}
+
+
+@made("supply-sensitivity", share__x=0.9, share__y=1.1)
+def _supply(columns: Columns, a: Array) -> Array:
+    relative = columns["supply_v"] / columns["supply_v"].mean() - 1
+    return linear(a) * (1 + np.array([0.9, 1.1])[:, None] * relative)
+
+
 @made("hysteresis", height__x=0.012, height__y=0.008, reach=0.15, spread=0.5, pressing=0.0)
 def _hysteresis(columns: Columns, a: Array) -> Array:
     return linear(a) + np.array([0.012, 0.008])[:, None] * hysteretic(columns, reach=0.15, spread=0.5)
@@ -125,6 +192,7 @@ def _ways(columns: Columns) -> Iterator[Array]:
 def test_parameters_come_back(name: str) -> None:
     columns = synthetic.turns((90, 30, 150, 60, 120), step_deg=10)
     columns["temperature_c"] = 22 + 3 * np.sin(columns["t_s"] / 400)
+    columns["supply_v"] = 5 + 0.01 * np.sin(columns["t_s"] / 300)
     outputs = MADE[name].outputs(columns, np.array(synthetic.components(columns)))
     table = synthetic.poses(columns, *outputs, seed=7)
     model = read_model("linear")

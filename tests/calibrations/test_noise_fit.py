@@ -11,19 +11,11 @@ from scipy.optimize import minimize
 from calibrations.noise import white_only
 from calibrations.noise_fit import RATIOS, TIME_CONSTANTS, estimate, gain
 from calibrations.table import Array
+from tests.calibrations import synthetic
 
 N, GAP_S = 300, 7.0
 GAPS = np.full(N, GAP_S)
 NONE = np.zeros((N, 0))
-
-
-def gauss_markov(rng: np.random.Generator, std: float, tau_s: float, gaps: Array) -> Array:
-    x = np.empty(len(gaps))
-    x[0] = std * rng.standard_normal()
-    for i in range(1, len(gaps)):
-        phi = np.exp(-gaps[i] / tau_s)
-        x[i] = phi * x[i - 1] + std * np.sqrt(1 - phi**2) * rng.standard_normal()
-    return x
 
 
 @pytest.mark.parametrize("known", [True, False], ids=["white known", "white unknown"])
@@ -32,7 +24,7 @@ def test_level_of_slow_noise_comes_back(slow: float, tau_s: float, known: bool) 
     found_slow, found_fast = [], []
     for seed in range(20):
         rng = np.random.default_rng(seed)
-        residual = (rng.standard_normal(N) + gauss_markov(rng, slow, tau_s, GAPS))[None]
+        residual = (rng.standard_normal(N) + synthetic.gauss_markov(rng, slow, tau_s, GAPS))[None]
         start = white_only(np.ones((1, N)) if known else None, GAPS, 1)
         noise = estimate(start, residual, np.ones((1, N, 1)), NONE)
         found_slow.append(noise.slow[0])
@@ -109,7 +101,7 @@ def test_against_dense_matrices(seed: int) -> None:
     n = 60
     gaps = rng.uniform(3, 12, n)
     J, extra, smooth = rng.standard_normal((n, 3)), rng.standard_normal((n, 2)), rng.standard_normal((n, 4))
-    slow = gauss_markov(rng, 1.2, 80.0, gaps)
+    slow = synthetic.gauss_markov(rng, 1.2, 80.0, gaps)
     r = 0.3 * (rng.standard_normal(n) + slow) + 0.2 * extra[:, 0]
     start = white_only(None, gaps, 1)
     without, beside = dense_best(gaps, np.hstack([smooth, J]), r), dense_best(gaps, np.hstack([smooth, J, extra]), r)

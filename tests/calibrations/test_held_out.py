@@ -1,0 +1,66 @@
+"""The error on unseen poses, against an explicit refit without them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from calibrations.chain import nominal_pose, specific_force
+from calibrations.fit import fit
+from calibrations.held_out import folds, held_out, held_out_excess
+from calibrations.model_file import read_model
+from calibrations.noise import white_only
+from calibrations.table import Table
+from tests.calibrations import synthetic
+
+
+def table(square: float = 0.0) -> Table:
+    columns = synthetic.turns((90, 30, 150), step_deg=20)
+    a_x, a_y, _ = synthetic.components(columns)
+    return synthetic.poses(columns, a_x + 2.5 + square * a_x**2, 0.97 * a_y + 2.6)
+
+
+@pytest.mark.parametrize("square", [0.0, 0.003])
+def test_equals_a_refit_without_the_fold(square: float) -> None:
+    found = fit(read_model("linear"), table(square))
+    a = specific_force(nominal_pose(found.table))
+    number = folds(found.table)
+    error = np.empty_like(found.residual)
+    for k in np.unique(number):
+        out = number == k
+        for c in range(2):  # one axis's bias and scale factor know nothing of the other's
+            X = np.column_stack([np.ones(found.table.n), a[:, c]])
+            kept = np.linalg.lstsq(X[~out], found.table.outputs[~out, c], rcond=None)[0]
+            error[c, out] = found.table.outputs[out, c] - X[out] @ kept
+    explicit = np.sqrt(np.mean(np.mean(error**2, axis=1) / found.noise.floor**2))
+    white = white_only(found.problem.white, found.noise.gap_s, 2)
+    assert held_out(found.residual, found.jacobian, white, number) == pytest.approx(explicit, rel=1e-8)
+
+
+def test_extra_columns_join_the_fit() -> None:
+    found = fit(read_model("linear"), table(0.003))
+    column = np.zeros((2, found.table.n, 1))
+    column[0, :, 0] = specific_force(nominal_pose(found.table))[:, 0] ** 2
+    assert held_out_excess(found) > 5
+    assert held_out_excess(found, column) == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_useless_column_costs() -> None:
+    found = fit(read_model("linear"), table())
+    useless = np.random.default_rng(3).standard_normal((2, found.table.n, 20))
+    assert held_out_excess(found, useless) > held_out_excess(found)
+
+
+def test_rows_of_one_pose_share_a_fold() -> None:
+    data = table()
+    number = folds(data)
+    for alpha, beta in {*zip(data.column("alpha_deg"), data.column("beta_deg"), strict=True)}:
+        here = (data.column("alpha_deg") == alpha) & (data.column("beta_deg") == beta)
+        assert len(set(number[here])) == 1
+    assert len(np.unique(number)) == 10
+    np.testing.assert_array_equal(number, folds(data))
+
+
+def test_positions_are_left_out_one_by_one() -> None:
+    few = Table.from_columns("positions", dict.fromkeys(("ax", "ay", "az"), np.arange(12.0)))
+    assert sorted(folds(few)) == list(range(12))

@@ -1,0 +1,94 @@
+"""Score tests: the statistic is the full least-squares reduction, and chances are true on noise."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import kstest
+
+from calibrations.fit import Fit, fit
+from calibrations.model_file import read_model
+from calibrations.noise import Noise
+from calibrations.screen import SMALLEST, Screen, Search, of_search
+from calibrations.table import Array
+from tests.calibrations import synthetic
+
+
+@pytest.fixture(scope="module")
+def fitted() -> Fit:
+    """A linear model on a small sweep, under white and slow noise."""
+    columns = synthetic.turns((90, 30), step_deg=20)
+    a_x, a_y, _ = synthetic.components(columns)
+    found = fit(read_model("linear"), synthetic.poses(columns, a_x + 2.5, a_y + 2.5))
+    slow = Noise(found.noise.white, found.noise.gap_s, np.zeros(2), np.array([0.7, 0.3]), np.array([60.0, 90.0]))
+    return replace(found, noise=slow)
+
+
+def reduction(found: Fit, columns: Array) -> float:
+    """What the sum of squares falls by, from two dense least-squares solutions."""
+    white = found.noise.whiten(np.concatenate([found.residual[:, :, None], found.jacobian, columns], axis=2))
+    r, J, both = white[:, 0], white[:, 1:5], white[:, 1:]
+
+    def left(X: Array) -> float:
+        Q, _ = np.linalg.qr(X / np.linalg.norm(X, axis=0))
+        error = r - Q @ (Q.T @ r)
+        return float(error @ error)
+
+    return left(J) - left(both)
+
+
+@pytest.mark.parametrize("apart", [1.0, 0.3, 2 * SMALLEST])
+@pytest.mark.parametrize("seed", range(5))
+def test_statistic_is_the_full_reduction(fitted: Fit, apart: float, seed: int) -> None:
+    """Frisch, Waugh and Lovell; also where columns are nearly those of the model, and nearly each other."""
+    rng = np.random.default_rng(seed)
+    free = rng.standard_normal((*fitted.residual.shape, 3))
+    size = np.linalg.norm(fitted.jacobian.reshape(-1, 4), axis=0)
+    mixed = (fitted.jacobian / size) @ rng.standard_normal((4, 3)) * np.sqrt(fitted.residual.size) + apart * free
+    mixed[:, :, 2] = mixed[:, :, 1] + 1e-4 * free[:, :, 2]
+    screen = Screen(fitted)
+    basis = screen.basis(mixed)
+    assert basis.shape[1] == 3
+    np.testing.assert_allclose(basis.T @ basis, np.eye(3), atol=1e-12)
+    assert screen.statistic(basis) == pytest.approx(reduction(fitted, mixed), rel=1e-9, abs=1e-9)
+
+
+def test_what_the_model_has_adds_nothing(fitted: Fit) -> None:
+    again = fitted.jacobian @ np.random.default_rng(0).standard_normal((4, 2))
+    assert Screen(fitted).basis(again).shape[1] == 0
+    assert Search(Screen(fitted), []).trials == 1.0
+
+
+def drawn(found: Fit, rng: np.random.Generator) -> Fit:
+    """The same fit with a residual drawn from its noise, the model freed from it."""
+    residual = np.empty_like(found.residual)
+    t = np.cumsum(found.noise.gap_s)
+    for c, (slow, tau) in enumerate(zip(found.noise.slow, found.noise.tau_s, strict=True)):
+        sigma = np.diag(found.noise.fast[c] ** 2) + slow**2 * np.exp(-np.abs(t[:, None] - t) / tau)
+        residual[c] = np.linalg.cholesky(sigma) @ rng.standard_normal(len(t))
+    return replace(found, residual=residual)
+
+
+def test_chances_are_uniform_on_noise(fitted: Fit) -> None:
+    """Each alone, and the best of a search whose columns are correlated with each other."""
+    rng = np.random.default_rng(5)
+    common = rng.standard_normal((*fitted.residual.shape, 2))
+    bases = [Screen(fitted).basis(common + rng.standard_normal(common.shape)[:, :, : 1 + k % 2]) for k in range(8)]
+    trials = Search(Screen(fitted), bases).trials
+    assert 1 < trials < 8.5
+    alone, best = [], []
+    for _ in range(300):
+        search = Search(Screen(drawn(fitted, rng)), bases)
+        search.__dict__["trials"] = trials  # the same for the same bases
+        best.append(search.p_values.min())
+        alone.append(Search(search.screen, bases[:1]).statistics[0])
+    assert kstest(best, "uniform").pvalue > 0.01
+    assert kstest(alone, "chi2", args=(bases[0].shape[1],)).pvalue > 0.01
+
+
+def test_of_search_is_exact_for_small_chances() -> None:
+    assert of_search(1e-20, 5.0) == pytest.approx(5e-20, rel=1e-12)
+    assert of_search(0.5, 2.0) == pytest.approx(0.75)
+    assert of_search(1.0, 3.0) == pytest.approx(1.0)
