@@ -16,7 +16,7 @@ from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from sqlalchemy import Connection, Row, Select, func, insert, select, text, update
+from sqlalchemy import Connection, Integer, Row, Select, func, insert, select, text, update
 from sqlalchemy.dialects.sqlite import insert as insert_or
 
 from calibrations.table import Table
@@ -197,7 +197,7 @@ def _put_state(to: Connection, run: str, state: Mapping[str, Any]) -> None:
 
 def _select_runs() -> Select[Any]:
     kept = select(func.count()).where(poses.c.run == runs.c.run).scalar_subquery()
-    imported = select(func.max(func.length(columns.c.numbers) / 8)).where(columns.c.run == runs.c.run)
+    imported = select(func.max(func.length(columns.c.numbers, type_=Integer) // 8)).where(columns.c.run == runs.c.run)
     return select(runs, func.coalesce(imported.scalar_subquery(), kept).label("rows"))
 
 
