@@ -1,51 +1,26 @@
 """A bench file's instruments, connected: drivers by role, on real wires or on the twins that this process serves.
 
-All simulated: time is simulated, and `state` and `restore` continue a rig where it was, sample for sample. Some
-simulated: time is real, and the twins are served by a thread.
+All simulated, `state` and `restore` continue a rig where it was, sample for sample.
 """
 
 from __future__ import annotations
 
-import hashlib
-import importlib
-import threading
-from collections import defaultdict
 from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, cast
 
-from drivers.clock import Clock, SimulatedClock, WallClock, serve_forever
-from drivers.errors import DriverError, LinkRefused
+from drivers.clock import Clock, SimulatedClock
+from drivers.errors import DriverError
 from drivers.instrument import Check, Identity
 from drivers.instrument import Instrument as Driver
-from drivers.links import Address, Links
 from drivers.links.server import Server
-from drivers.simulation.config import WorldConfig
 from drivers.simulation.world import World
 from procedures.errors import ProcedureError
 from procedures.session import Host, Session
 from rig.bench import ROLES, Bench
 from rig.errors import InstrumentFailed
-from rig.home import home
-from rig.lease import lease
-
-
-class SinceStart:
-    """Real time from 0, as the world counts it."""
-
-    def __init__(self) -> None:
-        self._wall = WallClock()
-        self._start_s = self._wall.now()
-
-    def now(self) -> float:
-        return self._wall.now() - self._start_s
-
-    def sleep(self, seconds: float) -> None:
-        self._wall.sleep(seconds)
-
-    def wait_readable(self, wire: Any, timeout_s: float) -> bool:
-        return self._wall.wait_readable(wire, timeout_s)
+from rig.wiring import Wiring, wired
 
 
 class Absent:
@@ -130,81 +105,23 @@ class Rig:
 def connected(bench: Bench) -> Iterator[Rig]:
     """The bench with every instrument connected; all wires and servers are closed at the end.
 
-    Raises InstrumentFailed with role, address and remedy; Busy where another process uses a real instrument, which
-    connecting to it would disturb.
+    Raises InstrumentFailed with role, address and remedy; Busy where another process uses a real instrument.
     """
-    with ExitStack() as stack:
-        for url in sorted({i.url for i in bench.instruments.values() if not i.simulated}):
-            stack.enter_context(lease(home(), f"wire-{hashlib.sha256(url.encode()).hexdigest()[:16]}", url))
-        world = World(WorldConfig.from_mapping(bench.world), bench.seed)
-        servers = serve(bench, world)
-        for server in servers.values():
-            stack.callback(server.close)
-        clock: Clock = SimulatedClock() if bench.simulated else SinceStart()
-        stack.enter_context(_pumped(list(servers.values()), clock))
-        links = Links(clock)
-        stack.callback(links.close)
-        drivers = {role: _connect(bench, role, servers, links) for role in bench.instruments}
-        yield Rig(bench, drivers, clock, world if servers else None, tuple(servers.values()))
+    with wired(bench) as wiring:
+        drivers = {role: wiring.connect(role) for role in bench.instruments}
+        servers = tuple(wiring.servers.values())
+        yield Rig(bench, drivers, wiring.clock, wiring.world if servers else None, servers)
 
 
-def serve(bench: Bench, world: World) -> dict[str, Server]:
-    """The servers of all simulated instruments, each under the roles that it plays; one wire, one server."""
-    wires = defaultdict(list)
-    for role, instrument in bench.instruments.items():
-        if instrument.simulated:
-            wires[instrument.driver, instrument.listen].append(role)
-    servers = {}
-    for (driver, listen), roles in wires.items():
-        twin = importlib.import_module(f"drivers.{driver}_twin")
-        units = {role: (bench.instruments[role].unit, bench.instruments[role].typed_settings()) for role in roles}
-        servers[" ".join(roles)] = twin.serve(world, units, listen or twin.LISTEN)
-    return servers
-
-
-@contextmanager
-def _pumped(servers: list[Server], clock: Clock) -> Iterator[None]:
-    """Let the servers act while the controller waits, or in real time beside it."""
-    if isinstance(clock, SimulatedClock):
-        for server in servers:
-            clock.attach(server)
-        yield
-        return
-    ended = threading.Event()
-    thread = threading.Thread(target=serve_forever, args=(servers, ended.is_set, clock), daemon=True)
-    if servers:
-        thread.start()
-    try:
-        yield
-    finally:
-        ended.set()
-        if servers:
-            thread.join()
-
-
-def _connect(bench: Bench, role: str, servers: Mapping[str, Server], links: Links) -> Driver:
-    instrument = bench.instruments[role]
-    address = _address(bench, role, servers)
-    module = importlib.import_module(f"drivers.{instrument.driver}")
-    try:
-        return cast(Driver, module.connect(address, links, instrument.typed_settings(), role))
-    except LinkRefused as error:
-        raise InstrumentFailed(f"{role} ({instrument.driver}) at {address.url}: {error}") from error
-
-
-def _address(bench: Bench, role: str, servers: Mapping[str, Server]) -> Address:
-    if not bench.instruments[role].simulated:
-        return bench.instruments[role].address
-    return next(server.addresses[role] for roles, server in servers.items() if role in roles.split())
-
-
-def checked(rig: Rig) -> dict[str, tuple[Identity | None, list[Check]]]:
+def checked(bench: Bench) -> dict[str, tuple[Identity | None, list[Check]]]:
     """Identity and self-test of every instrument; one that does not answer has no identity and says why."""
-    return {role: _check(driver) for role, driver in rig.drivers.items()}
+    with wired(bench) as wiring:
+        return {role: _check(wiring, role) for role in bench.instruments}
 
 
-def _check(driver: Driver) -> tuple[Identity | None, list[Check]]:
+def _check(wiring: Wiring, role: str) -> tuple[Identity | None, list[Check]]:
     try:
+        driver = wiring.connect(role)
         return driver.identify(), driver.self_test()
-    except DriverError as error:
+    except (DriverError, InstrumentFailed) as error:
         return None, [Check("answers", False, str(error))]

@@ -10,13 +10,13 @@ from types import FrameType
 
 import click
 
-from drivers.clock import serve_forever
+from drivers.clock import WallClock, serve_forever
 from drivers.simulation.config import WorldConfig
 from drivers.simulation.world import World
 from rig.bench import Bench, read_bench
 from rig.cli.output import bench_option, columns, json_option, note
 from rig.errors import BenchError
-from rig.instruments import SinceStart, serve
+from rig.wiring import serve
 
 
 @click.command("simulate")
@@ -36,7 +36,7 @@ def command(bench_file: Path | None, as_json: bool) -> None:
 
     for each in (signal.SIGINT, signal.SIGTERM):
         signal.signal(each, end)
-    clock = SinceStart()
+    clock = WallClock()
     servers = serve(bench, World(WorldConfig.from_mapping(bench.world), bench.seed))
     if not servers:
         raise BenchError(f"no instrument of {bench.name!r} is simulated; write `url: simulated` for one")

@@ -186,6 +186,7 @@ def test_a_stage_that_is_not_there_is_named(bench: Any) -> None:
 
 
 def test_the_self_test_says_what_is_to_be_done(bench: Any) -> None:
-    assert [c.name for c in bench.alpha.self_test() if not c.ok] == ["coordinates"]
+    assert {check.name: check.detail for check in bench.alpha.self_test()}["coordinates"] == "not set: home first"
     bench.alpha.home()
+    assert {check.name: check.detail for check in bench.alpha.self_test()}["coordinates"] == "set"
     assert all(check.ok for check in bench.alpha.self_test())

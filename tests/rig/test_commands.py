@@ -91,8 +91,11 @@ def test_check_fails_for_an_instrument_that_does_not_answer(rig: Rig, bench_file
     instruments["oven"]["url"] = "tcp://127.0.0.1:1"
     ended = rig("check", "--bench", str(bench_file({"instruments": instruments})))
     assert ended.status == 3
-    assert "oven (omega_cn7500) at tcp://127.0.0.1:1" in ended.err
-    assert "Check the address" in ended.err
+    (told,) = [line for line in ended.out.splitlines() if "FAILED" in line]
+    assert told.startswith("oven")
+    assert "oven (omega_cn7500) at tcp://127.0.0.1:1" in told
+    assert "Check the address" in told
+    assert all(role in ended.out for role in ("alpha", "beta", "adc"))
 
 
 def test_the_example_bench_is_a_bench(rig: Rig, bench_file: Callable[..., Path]) -> None:
