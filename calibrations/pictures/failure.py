@@ -37,7 +37,8 @@ def _poses(fit: Fit) -> Figure:
     for c, name in enumerate(fit.channels):
         for ax, (side, rows) in zip(axes[c], sides, strict=True):
             edges, cells = mean_cells(fit, c, rows, alphas)
-            mesh = ax.pcolormesh(edges, np.arange(len(alphas) + 1) - 0.5, cells, cmap=SIGNED, norm=norm)
+            steps = np.arange(len(alphas) + 1) - 0.5
+            mesh = ax.pcolormesh(edges, steps, cells, cmap=SIGNED, norm=norm, rasterized=True)
             ax.grid(visible=False)
             ax.set_title(f"axis {name}{', ' if WORDS[side] else ''}{WORDS[side]}")
             ax.set_yticks(range(len(alphas)), [f"{value:g}" for value in alphas])

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from calibrations.errors import CalibrationError
+from calibrations.pictures.compact import compact
 from calibrations.pictures.style import RC
 
 
@@ -18,8 +19,9 @@ class PictureError(CalibrationError):
 
 
 def svg(figure: Figure) -> bytes:
-    """The figure as an SVG document; its text stays text."""
-    return _bytes(figure, "svg", {"Date": None, "Creator": None})
+    """The figure as an SVG document; its text stays text, in a font that is as wide where the first is not there."""
+    text = _bytes(figure, "svg", {"Date": None, "Creator": None}).decode()
+    return compact(text.replace("'DejaVu Sans'", "'DejaVu Sans', Verdana, sans-serif")).encode()
 
 
 def png(figure: Figure) -> bytes:
@@ -50,3 +52,15 @@ def save(figure: Figure, path: Path) -> None:
     except OSError as error:
         draft.unlink(missing_ok=True)
         raise PictureError(f"{path}: the picture cannot be written: {error.strerror}") from None
+
+
+def save_all(figures: Mapping[str, Figure], folder: Path, form: str) -> list[Path]:
+    """Write figures by name into `folder`, made where it is not there; their paths. Raises PictureError."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise PictureError(f"{folder}: the folder cannot be made: {error.strerror}") from None
+    paths = {folder / f"{name}.{form}": figure for name, figure in figures.items()}
+    for path, figure in paths.items():
+        save(figure, path)
+    return list(paths)

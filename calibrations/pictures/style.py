@@ -50,6 +50,7 @@ RC: Any = {
     "xtick.labelcolor": INK,
     "ytick.labelcolor": INK,
     "text.color": INK,
+    "text.parse_math": False,  # names are given by users: a dollar sign is a dollar sign
     "lines.linewidth": 1.1,
     "lines.markersize": MARKER,
     "legend.frameon": False,

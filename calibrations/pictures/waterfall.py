@@ -8,10 +8,12 @@ from itertools import pairwise
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from matplotlib.ticker import NullFormatter
 
 from calibrations.discover import Discovery
 from calibrations.fit import Fit
 from calibrations.held_out import held_out_excess
+from calibrations.numerals import plain
 from calibrations.pictures.style import AMBER, BAND, BLUE, GREEN, INK, QUIET, VERMILION, panels, styled
 from calibrations.pictures.view import pooled_mg
 
@@ -43,7 +45,7 @@ def _mg(fit: Fit) -> float:
 @styled
 def picture(found: Discovery) -> Figure:
     """Bars from the error before to the error after each effect; diamonds for unseen poses; the noise floor."""
-    steps = levels(found)
+    steps, kind = levels(found), found.start.table.kind
     figure, axes = panels(1, 1, 4.2)
     ax: Axes = axes[0, 0]
     seen, unseen = [level.seen for level in steps], [level.unseen for level in steps]
@@ -52,7 +54,7 @@ def picture(found: Discovery) -> Figure:
     ax.axhspan(bottom, 1.0, color=BAND, lw=0, zorder=0.5)
     _bars(ax, seen, bottom, VERMILION if found.verdict == "unexplained" else GREEN)
     (diamonds,) = ax.plot(range(len(steps)), unseen, "D", ms=5.5, mfc=AMBER, mec=INK, mew=0.7, zorder=4, ls="")
-    diamonds.set_label("on unseen poses")
+    diamonds.set_label(f"on unseen {kind}")
     for k, level in enumerate(steps):
         _told(ax, k, level)
     names = [level.name for level in steps] + (["left"] if len(steps) > 1 else [])
@@ -62,10 +64,11 @@ def picture(found: Discovery) -> Figure:
     ax.set_xticks(range(len(names)), [_broken(name) for name in names])
     ax.set_ylabel("rms error / noise floor")
     ax.yaxis.set_major_formatter("{x:g}")
+    ax.yaxis.set_minor_formatter(NullFormatter())
     ax.grid(visible=False, axis="x")
-    floor = f"noise floor\n{pooled_mg(found.start)[1]:.2g} mg"
+    floor = f"noise floor\n{plain(pooled_mg(found.start)[1], 2)} mg"
     ax.annotate(floor, (1, 1.0), (-4, 3), xycoords=("axes fraction", "data"), textcoords="offset points", ha="right")
-    ax.legend(handles=[Patch(color=QUIET, label="on the poses of the fit"), diamonds], loc="upper right")
+    ax.legend(handles=[Patch(color=QUIET, label=f"on the {kind} of the fit"), diamonds], loc="upper right")
     return figure
 
 
@@ -83,7 +86,7 @@ def _bars(ax: Axes, seen: list[float], bottom: float, end: str) -> None:
 
 def _told(ax: Axes, k: int, level: Level) -> None:
     """The level in numbers: over the first bar, under the others."""
-    text = f"{level.seen:.3g} ×\n{level.rms_mg:.2g} mg"
+    text = f"{plain(level.seen)} ×\n{plain(level.rms_mg, 2)} mg"
     side, align = (9, "bottom") if k == 0 else (-9, "top")
     ax.annotate(text, (k, level.seen), (0, side), textcoords="offset points", ha="center", va=align, fontsize=8.5,
                 zorder=5)  # fmt: skip

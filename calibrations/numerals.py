@@ -1,0 +1,62 @@
+"""Numbers for print: a value to the digits that its uncertainty leaves it, after the GUM (7.2.6: two digits)."""
+
+from __future__ import annotations
+
+import math
+
+SMALL, LARGE = -4, 6  # powers of ten beyond which a number is written with one
+SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def measured(value: float, std: float | None) -> str:
+    """`2.50013 ± 0.00024`, or `(-1.23 ± 0.11) × 10⁻⁸`; six digits where the uncertainty is not known."""
+    if std is None or not (math.isfinite(std) and std > 0):
+        return minus(f"{value:.6g}")
+    decimals = 1 - exponent(float(f"{std:.1e}"))
+    power = exponent(max(abs(value), std))
+    if SMALL < power <= LARGE:
+        shown = max(decimals, 0)
+        return minus(f"{round(value, decimals):.{shown}f} ± {round(std, decimals):.{shown}f}")
+    shown = decimals + power
+    return minus(f"({value / 10.0**power:.{shown}f} ± {std / 10.0**power:.{shown}f})") + times_ten_to(power)
+
+
+def plain(value: float, digits: int = 3) -> str:
+    """A value to so many significant digits, with a power of ten only where it is very small or large."""
+    if value == 0 or not math.isfinite(value):
+        return f"{value:g}"
+    power = exponent(float(f"{value:.{digits - 1}e}"))
+    if SMALL <= power <= LARGE:
+        return minus(f"{round(value, digits - 1 - power):.{max(digits - 1 - power, 0)}f}")
+    return minus(f"{value / 10.0**power:.{digits - 1}f}") + times_ten_to(power)
+
+
+def chance(p: float) -> str:
+    """A p-value or a probability: `0.02`, `7 × 10⁻¹¹`, `below 10⁻³⁰⁰`."""
+    if p < 1e-300:
+        return f"below{times_ten_to(-300)}".replace(" ×", "")
+    if p < 1e-3:
+        power = exponent(float(f"{p:.0e}"))
+        return f"{p / 10.0**power:.0f}{times_ten_to(power)}"
+    return f"{p:.2g}"
+
+
+def unit(text: str) -> str:
+    """`V/g^2` as `V/g²`, `degC` as `°C`; nothing for a pure number."""
+    head, *powers = text.replace("degC", "°C").split("^")
+    return "" if text == "1" else head + "".join(p[:1].translate(SUPERSCRIPT) + p[1:] for p in powers)
+
+
+def exponent(value: float) -> int:
+    """The power of ten of the first digit."""
+    return math.floor(math.log10(abs(value)))
+
+
+def times_ten_to(power: int) -> str:
+    """` × 10⁻⁸`."""
+    return f" × 10{str(power).translate(SUPERSCRIPT)}"
+
+
+def minus(text: str) -> str:
+    """With a true minus sign."""
+    return text.replace("-", "−")

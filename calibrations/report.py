@@ -1,0 +1,184 @@
+"""The report: one HTML page that needs no network, with verdict, falling error, candidates, model, noise, provenance.
+
+Every number that is uncertain says how uncertain it is, or that this is not known. The page is a template; here its
+words and numbers are made.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from functools import cache
+from pathlib import PurePath, PureWindowsPath
+from typing import Any
+
+import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined, Template
+from markupsafe import Markup
+
+from calibrations.candidates import SIGNIFICANT, Candidate
+from calibrations.compare import Comparison
+from calibrations.discover import Added, Discovery
+from calibrations.fit import Fit
+from calibrations.held_out import held_out_excess
+from calibrations.model import Estimate, Model
+from calibrations.numerals import chance, measured, minus, plain, unit
+from calibrations.pictures.album import Picture, album
+from calibrations.pictures.inline import inline
+from calibrations.pictures.view import mg, pooled_mg
+from calibrations.report_words import VERDICTS, capital, headline, key_figures, next_words, state, summary
+
+EXPLAINED = 6  # candidates shown with formula and symptom, at most; the others in numbers only
+SURE = 0.999  # a probability above is not told to more digits
+
+
+def report(
+    found: Discovery, beside: Comparison, date: str, program: str, pictures: Iterable[Picture] | None = None
+) -> str:
+    """The page as HTML text. `beside` sets the model that was given beside the data; `pictures` are those of `album`.
+
+    `date` and `program` (name and version) stand in the provenance: the same arguments give the same page.
+    """
+    shown = {p.name: _figure(p) for p in (album(found, beside) if pictures is None else pictures)}
+    return _template().render(
+        headline=headline(found),
+        verdict=VERDICTS[state(found)],
+        state=state(found),
+        kind=found.start.table.kind,
+        summary=summary(found),
+        figures=key_figures(found),
+        steps=[_first(found), *(_step(step, found) for step in found.steps)],
+        chance_of_excess=spread_of_excess(found.end),
+        fails=[capital(minus(place.text)).replace(" x ", " × ") for place in beside.fails],
+        given=beside.fit.model.name,
+        given_errors=_errors(beside.fit),
+        candidates=[_candidate(c, k, found.start.table.unit) for k, c in enumerate(found.path.first)],
+        before=(plain(found.start.pooled_excess), plain(held_out_excess(found.start))),
+        model=found.end.model.name,
+        parameters=_parameters(found.end.model, {s.name for s in found.steps}),
+        birge=f"{found.end.birge:.2f}" if found.end.birge > 1.05 else "",
+        end_errors=_errors(found.end),
+        known=found.end.noise.known,
+        next=next_words(found.next_experiment) if found.next_experiment else "",
+        structure=found.residual_structure,
+        provenance=_provenance(found, date, program),
+        pictures=shown,
+        curves=[figure for name, figure in shown.items() if name.startswith("effect-")],
+    )
+
+
+@cache
+def _template() -> Template:
+    pages = Environment(
+        loader=PackageLoader("calibrations", "."),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return pages.get_template("report.html")
+
+
+def spread_of_excess(fit: Fit) -> str:
+    """Standard uncertainty that chance alone gives the pooled excess of a complete model."""
+    return plain(1 / np.sqrt(2 * max(fit.residual.size - len(fit.theta), 1)), 2)
+
+
+def _first(found: Discovery) -> dict[str, str]:
+    level = {"seen": plain(found.start.pooled_excess), "unseen": plain(held_out_excess(found.start))}
+    return {"name": found.start.model.name, "mg": plain(pooled_mg(found.start)[0], 2), "role": "as given", **level}
+
+
+def _step(step: Added, found: Discovery) -> dict[str, str]:
+    level = {"seen": plain(step.after.pooled_excess), "unseen": plain(step.held_out_after)}
+    role = "cause" if step.name in found.causes else "refines the form of a cause"
+    return {"name": f"+ {step.name}", "mg": plain(pooled_mg(step.after)[0], 2), "role": role, **level}
+
+
+def _candidate(c: Candidate, rank: int, out: str) -> dict[str, Any]:
+    likely = f"above {SURE:g}" if c.probability > SURE else chance(c.probability) if c.probability > 0 else "0"
+    return {
+        "name": c.name,
+        "explained": rank == 0 or (rank < EXPLAINED and c.p_value < SIGNIFICANT),
+        "summary": capital(c.effect.summary),
+        "formula": c.effect.formula.replace("{out}", out),
+        "symptom": capital(c.effect.symptom),
+        "seen": plain(c.excess_after),
+        "unseen": plain(c.held_out_after),
+        "p": chance(c.p_value),
+        "probability": likely,
+        "rivals": ", ".join(c.indistinguishable_from) or "–",
+    }
+
+
+def _errors(fit: Fit) -> list[dict[str, str]]:
+    """One row for each channel: error, floor, scatter and slow noise, in the residual's unit and in mg."""
+    posed = fit.table.kind == "poses"
+    noise = {"rmse": fit.rmse, "floor": fit.noise.floor, "scatter": fit.noise.scatter, "slow": fit.noise.slow}
+    rows = []
+    for c, channel in enumerate(fit.channels):
+        row = {"channel": channel, "excess": plain(fit.excess[c]), "tau": _time_constant(fit.noise.taus_s[c])}
+        for name, values in noise.items():
+            volts = f"{plain(1e3 * values[c])} m{fit.table.unit} = " if posed else ""
+            row[name] = f"{volts}{plain(mg(values, fit)[c])} mg" if values[c] > 0 else "none found"
+        if not fit.noise.slow[c] > 0:
+            row["tau"] = "–"
+        rows.append(row)
+    return rows
+
+
+def _time_constant(taus_s: tuple[float, ...]) -> str:
+    if len(taus_s) == 1:
+        return f"{plain(taus_s[0], 2)} s"
+    return f"flicker noise, {plain(min(taus_s), 2)} to {plain(max(taus_s), 2)} s"
+
+
+def _parameters(model: Model, added: set[str]) -> list[dict[str, Any]]:
+    return [
+        {
+            "effect": term.name,
+            "added": term.name in added,
+            "tied": term.tied,
+            "rows": [_estimate(e) for e in term.estimates],
+            "constants": {name: plain(value, 6) for name, value in term.constants.items()},
+        }
+        for term in model.terms
+    ]
+
+
+def _estimate(e: Estimate) -> dict[str, str]:
+    row = {"name": e.name, "axis": e.axis or "–", "remark": "" if e.std else "uncertainty not known"}
+    if not e.identified:
+        return row | {"value": f"not identified: {e.why}", "unit": "", "remark": ""}
+    return row | {"value": measured(e.value, e.std), "unit": unit(e.unit)}
+
+
+def _provenance(found: Discovery, date: str, program: str) -> list[tuple[str, str]]:
+    table, model = found.start.table, found.start.model
+    facts: dict[str, object] = {
+        "data": _name(table.source),
+        "kind and size": f"{table.n} {table.kind}; columns {', '.join(table.columns)}",
+        "SHA-256 of the data": table.digest,
+        "local gravity": f"{table.gravity_m_s2:g} m/s²",
+        **{f"constant {name}": value for name, value in table.constants.items() if name != "gravity_m_s2"},
+        "model given": model.name,
+        **{f"model given: {name}": value for name, value in _named(model.provenance).items()},
+        "program": program,
+        "date": date,
+    }
+    return [(name, str(value)) for name, value in facts.items()]
+
+
+def _named(provenance: Mapping[str, str | float]) -> dict[str, str | float]:
+    return {name: _name(value) if isinstance(value, str) else value for name, value in provenance.items()}
+
+
+def _name(source: str) -> str:
+    """A file by its name alone: where it lies on this machine is nobody else's business."""
+    if PurePath(source).is_absolute() or PureWindowsPath(source).is_absolute():
+        return PureWindowsPath(source).name
+    return source
+
+
+def _figure(picture: Picture) -> dict[str, Any]:
+    drawn = Markup(inline(picture.figure, picture.name, f"{picture.title}. {picture.caption}"))  # noqa: S704 made here
+    return {"svg": drawn, "title": picture.title, "caption": picture.caption}

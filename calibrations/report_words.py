@@ -1,0 +1,91 @@
+"""The report's verdict in words: a headline, a summary, the numbers to remember, and what to run next."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from calibrations.discover import Discovery
+from calibrations.experiment import Experiment
+from calibrations.fit import Fit
+from calibrations.held_out import held_out_excess
+from calibrations.numerals import plain
+from calibrations.pictures.view import pooled_mg
+
+VERDICTS = {
+    "adequate": "nothing missing",
+    "found": "effect found",
+    "ambiguous": "not decided",
+    "unexplained": "not explained",
+}
+
+
+def state(found: Discovery) -> str:
+    """The verdict on the model that was given: as that of the discovery, or `found` where its effects complete it."""
+    return "found" if found.verdict == "adequate" and found.steps else found.verdict
+
+
+def headline(found: Discovery) -> str:
+    """The verdict on the model that was given, in one sentence."""
+    model = found.start.model.name
+    if found.verdict == "unexplained":
+        beside = f"Beside {joined(found.causes)}, the" if found.causes else "The"
+        return f"{beside} model {model} misses something that no effect of the catalogue describes."
+    if not found.steps:
+        return f"Nothing is missing from the model {model}: what it leaves is noise."
+    text = f"The model {model} misses {joined(found.causes)}"
+    doubts = [f"{name} cannot be told from {joined(rivals, 'or')}" for name, rivals in found.alternatives.items()]
+    return f"{text}; on this data {joined(doubts)}." if doubts else f"{text}."
+
+
+def summary(found: Discovery) -> str:
+    """What adding the effects does to the error, in one or two sentences."""
+    kind, (error, floor) = found.start.table.kind, pooled_mg(found.start)
+    rows = f"{found.start.table.n} {kind}"
+    if not found.steps:
+        left = f" Left over: {found.residual_structure}." if found.residual_structure else ""
+        return (
+            f"On {rows} its rms error is {plain(error, 2)} mg, {plain(found.start.pooled_excess)} × the noise floor "
+            f"of {plain(floor, 2)} mg.{left}"
+        )
+    unseen = plain(held_out_excess(found.start)), plain(found.steps[-1].held_out_after)
+    text = (
+        f"On {rows} the rms error falls from {plain(error, 2)} mg to {plain(pooled_mg(found.end)[0], 2)} mg; the noise "
+        f"floor is {plain(floor, 2)} mg. On unseen {kind} it falls from {unseen[0]} to {unseen[1]} × the noise floor."
+    )
+    if found.refinements:
+        text += f" For the form of these effects the model also holds {joined(found.refinements)}."
+    return f"{text} Left over: {found.residual_structure}." if found.residual_structure else text
+
+
+def key_figures(found: Discovery) -> list[tuple[str, str, str]]:
+    """The few numbers to remember: (what, value, remark)."""
+    start, floor = found.start, pooled_mg(found.start)[1]
+    first = "error before" if found.steps else "rms error"
+    shown = [(first, f"{plain(pooled_mg(start)[0], 2)} mg", _over_floor(start, held_out_excess(start)))]
+    if found.steps:
+        unseen = found.steps[-1].held_out_after
+        shown.append(("error after", f"{plain(pooled_mg(found.end)[0], 2)} mg", _over_floor(found.end, unseen)))
+    kind = "white noise of one mean" if start.noise.known else "scatter: the white noise is not known"
+    return [*shown, ("noise floor", f"{plain(floor, 2)} mg", kind)]
+
+
+def _over_floor(fit: Fit, unseen: float) -> str:
+    return f"{plain(fit.pooled_excess)} × the floor; {plain(unseen)} × on unseen {fit.table.kind}"
+
+
+def next_words(e: Experiment) -> str:
+    """What to run next, to tell what from what, and why."""
+    pairs = [f"{a} from {joined([y for x, y in e.separates if x == a], 'or')}" for a in dict(e.separates)]
+    settings = ", ".join(f"{name} = {value}" for name, value in e.settings.items())
+    return f"To tell {joined(pairs)}, run {e.procedure}{f' with {settings}' if settings else ''}: {e.why}."
+
+
+def joined(names: Iterable[str], word: str = "and") -> str:
+    """`a`, `a and b`, `a, b and c`."""
+    *head, last = names
+    return f"{', '.join(head)} {word} {last}" if head else last
+
+
+def capital(text: str) -> str:
+    """The text as the beginning of a sentence."""
+    return text[:1].upper() + text[1:]

@@ -1,0 +1,57 @@
+"""report: one self-contained page on data and model, or its pictures as files."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+
+import click
+
+from rig.cli.output import bench_option, emit, json_option
+
+
+@click.command("report")
+@click.argument("data")
+@click.option("--model", default=None, help="A shipped model by name, or a model file. Default: by kind of data.")
+@click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="Write the page to this HTML file.")
+@click.option("--pictures", "folder", type=click.Path(file_okay=False, path_type=Path), help="Write all pictures here.")
+@click.option("--format", "form", type=click.Choice(["png", "svg"]), default="png", show_default=True)
+@bench_option
+@json_option
+def command(
+    data: str,
+    model: str | None,
+    out: Path | None,
+    folder: Path | None,
+    form: str,
+    bench_file: Path | None,
+    as_json: bool,
+) -> None:
+    """Write a page on DATA (a file or a run) and a model: what the model misses, and the model with it.
+
+    The page is one file that needs no network. --pictures writes its pictures, with or without the page.
+    """
+    if out is None and folder is None:
+        raise click.UsageError("nothing to write: give --out FILE.html, --pictures FOLDER, or both")
+    if out is not None and not out.parent.is_dir():
+        raise click.UsageError(f"{out}: there is no folder {out.parent}; make it, or name another file")
+    from calibrations.compare import compare
+    from calibrations.discover import discover
+    from calibrations.pictures.album import album
+    from calibrations.pictures.save import save_all
+    from calibrations.report import report
+    from rig.cli.asked import asked, write_whole
+
+    table, start, effects = asked(data, model, bench_file)
+    found, beside = discover(table, start, effects), compare(table, start)
+    pictures = album(found, beside)
+    if out is not None:
+        today, program = datetime.now(UTC).date().isoformat(), f"inertial-rig {version('inertial-rig')}"
+        write_whole(out, report(found, beside, today, program, pictures))
+    written = save_all({picture.name: picture.figure for picture in pictures}, folder, form) if folder else []
+    if as_json:
+        emit({"schema": "rig.report/1", "out": str(out) if out else None, "pictures": [str(p) for p in written]})
+    else:
+        for path in [*([out] if out else []), *written]:
+            click.echo(f"written: {path}")
