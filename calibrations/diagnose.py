@@ -23,6 +23,7 @@ from calibrations.patterns import patterns
 from calibrations.screen import Screen, Search
 from calibrations.table import Table
 
+MOST_SCATTER = 1.5  # times the noise floor: more from row to row is not the sensor's own noise
 MOST_LEFT = 1 / 3  # of the excess variance: more left than this, and the catalogue has not explained it
 
 
@@ -96,4 +97,4 @@ def _scatter(fit: Fit) -> str | None:
     if fit.table.kind != "poses" or not fit.noise.known or fit.pooled_excess <= MATERIAL:
         return None
     beyond = float(np.max(fit.noise.scatter / fit.noise.floor))
-    return f"scatter without a pattern, {beyond:.1f} x the noise floor" if beyond > np.sqrt(MATERIAL**2 - 1) else None
+    return f"scatter without a pattern, {beyond:.1f} x the noise floor" if beyond > MOST_SCATTER else None

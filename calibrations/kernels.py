@@ -34,32 +34,48 @@ def slip(a: Array, on_the_way: Array, pressed: Array, limits: Array) -> Array:
 
 
 @njit(cache=True)
-def whiten(columns: Array, gap_s: Array, white: Array, slow: float, tau_s: float) -> tuple[Array, float]:
-    """Columns made white under white noise plus a Gauss-Markov process, and the log-determinant.
+def whiten(columns: Array, gap_s: Array, white: Array, slow: Array, tau_s: Array) -> tuple[Array, float]:
+    """Columns made white under white noise plus Gauss-Markov processes, and the log-determinant.
 
     A Kalman filter's innovations over their standard deviation: exact, and linear in the number of rows.
 
     columns  (n, k), rows in order of time
     gap_s    (n,) time since the row before
     white    (n,) standard deviation of the white noise of each row
-    slow     standard deviation of the Gauss-Markov process, tau_s its time constant
+    slow     (m,) standard deviations of the processes, tau_s (m,) their time constants
     """
     n, k = columns.shape
+    m = len(slow)
     out = np.empty_like(columns)
-    state = np.zeros(k)
-    variance = slow * slow
+    state = np.zeros((m, k))
+    P = np.diag(slow * slow)
+    gain = np.zeros(m)
     logdet = 0.0
     for i in range(n):
-        phi = np.exp(-gap_s[i] / tau_s) if i else 0.0
-        variance = phi * phi * variance + slow * slow * (1.0 - phi * phi)
-        total = variance + white[i] * white[i]
-        gain = variance / total
+        if i:
+            phi = np.exp(-gap_s[i] / tau_s)
+            for p in range(m):
+                for q in range(m):
+                    P[p, q] *= phi[p] * phi[q]
+                P[p, p] += slow[p] * slow[p] * (1.0 - phi[p] * phi[p])
+                for j in range(k):
+                    state[p, j] *= phi[p]
+        total = white[i] * white[i]
+        for p in range(m):
+            gain[p] = 0.0
+            for q in range(m):
+                gain[p] += P[p, q]
+            total += gain[p]
         scale = 1.0 / np.sqrt(total)
         for j in range(k):
-            predicted = phi * state[j]
-            innovation = columns[i, j] - predicted
+            innovation = columns[i, j]
+            for p in range(m):
+                innovation -= state[p, j]
             out[i, j] = innovation * scale
-            state[j] = predicted + gain * innovation
-        variance *= 1.0 - gain
+            for p in range(m):
+                state[p, j] += gain[p] / total * innovation
+        for p in range(m):
+            for q in range(m):
+                P[p, q] -= gain[p] * gain[q] / total
         logdet += np.log(total)
     return out, logdet

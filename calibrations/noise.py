@@ -1,9 +1,10 @@
 """Noise of a table's means, as a value: white, whose level is known from the samples, scatter, and slow noise.
 
-    Sigma = W + k^2 I + (rho w)^2 G(tau)
+    Sigma = W + k^2 I + (rho w)^2 G
 
 per channel. W: the white variances of the means. k: scatter from row to row beyond the white noise. G: a Gauss-Markov
-process of time constant tau; w the rms of white noise and scatter. Where the white noise is not known, W is zero and k
+process, or flicker noise as a sum of them with time constants evenly spaced on a logarithmic scale; w the rms of white
+noise and scatter. Where the white noise is not known, W is zero and k
 takes its place. `noise_fit` estimates it.
 """
 
@@ -26,7 +27,7 @@ class Noise:
     gap_s: Array
     scatter: Array
     ratio: Array
-    tau_s: Array
+    taus_s: tuple[tuple[float, ...], ...]  # time constants, per channel: one, or several for flicker noise
 
     @property
     def known(self) -> bool:
@@ -44,6 +45,11 @@ class Noise:
         return rms(self.white) if self.known else self.scatter
 
     @property
+    def tau_s(self) -> Array:
+        """The longest time constant of the slow noise, s."""
+        return np.array([max(taus) for taus in self.taus_s])
+
+    @property
     def slow(self) -> Array:
         """Standard deviation of the slow noise."""
         return self.ratio * rms(self.fast)
@@ -53,15 +59,22 @@ class Noise:
         return np.concatenate([self._whiten_channel(c, columns[c])[0] for c in range(len(columns))])
 
     def _whiten_channel(self, c: int, columns: Array) -> tuple[Array, float]:
-        slow, tau = float(self.slow[c]), float(self.tau_s[c])
-        out, logdet = whiten(np.ascontiguousarray(columns), self.gap_s, self.fast[c], slow, tau)
-        return out, float(logdet)
+        return correlated(columns, self.gap_s, self.fast[c], float(self.slow[c]), self.taus_s[c])
 
     @cached_property
     def logdet(self) -> float:
         """log det Sigma over all channels."""
         empty = np.zeros((self.white.shape[1], 0))
         return sum(self._whiten_channel(c, empty)[1] for c in range(len(self.white)))
+
+
+def correlated(
+    columns: Array, gap_s: Array, fast: Array, slow: float, taus_s: tuple[float, ...]
+) -> tuple[Array, float]:
+    """Columns (n, k) of one channel made white, and log det Sigma."""
+    each = np.full(len(taus_s), slow / np.sqrt(len(taus_s)))
+    out, logdet = whiten(np.ascontiguousarray(columns), gap_s, fast, each, np.array(taus_s))
+    return out, float(logdet)
 
 
 def rms(x: Array) -> Array:
@@ -73,5 +86,5 @@ def white_only(white: Array | None, gap_s: Array, channels: int) -> Noise:
     """The noise before anything is fitted."""
     ones = np.ones(channels)
     if white is None:
-        return Noise(np.zeros((channels, len(gap_s))), gap_s, ones, 0 * ones, ones)
-    return Noise(white, gap_s, 0 * ones, 0 * ones, ones)
+        return Noise(np.zeros((channels, len(gap_s))), gap_s, ones, 0 * ones, ((1.0,),) * channels)
+    return Noise(white, gap_s, 0 * ones, 0 * ones, ((1.0,),) * channels)

@@ -1,8 +1,8 @@
 """The noise of greatest restricted likelihood (Patterson and Thompson, 1971).
 
 What the model, and any smooth function of the angles, could explain is set aside first: a misfit that returns with the
-angles is then not taken for slow noise, which does not. The time constant is at most a third of the record, and the
-slow noise at most twice the white, so that it cannot take the place of a trend.
+angles is then not taken for slow noise, which does not. Time constants are at most a third of the record, and the slow
+noise is at most a few times the white, so that it cannot take the place of a trend.
 """
 
 from __future__ import annotations
@@ -12,12 +12,17 @@ from functools import cached_property
 
 import numpy as np
 
-from calibrations.kernels import whiten
-from calibrations.noise import Noise, rms
+from calibrations.noise import Noise, correlated, rms
 from calibrations.table import Array
 
-RATIOS = np.array([0.2, 0.3, 0.45, 0.7, 1.0, 1.4, 2.0])  # slow noise over white and scatter; more is a drift
+Point = tuple[float, tuple[float, ...]]  # slow noise over white and scatter, and its time constants
+NO_SLOW: Point = (0.0, (1.0,))
+
+RATIOS = (0.2, 0.3, 0.45, 0.7, 1.0, 1.4, 2.0)  # slow noise over white and scatter; more is a drift
+FLICKER_RATIOS = (*RATIOS, 2.8, 4.0)  # flicker spreads over all times, and less of it is drift
 TIME_CONSTANTS = 4
+FLICKER_PROCESSES = 6
+NOT_TOLD_APART = 6.0  # of twice the log-likelihood: odds of less than 20 to 1
 FEWEST_FOR_SLOW = 20  # rows below which slow noise cannot be told from white
 ROUNDS = 3
 NEARLY_SMOOTH = 1e-2  # of a column's length: less beside the smooth columns is taken as none
@@ -34,7 +39,7 @@ def estimate(start: Noise, residual: Array, jacobian: Array, smooth: Array) -> N
         best = _Search(noise, residual, jacobian, smooth).best(jacobian.shape[2])
         variance = best.scale**2 * np.mean(noise.fast**2, axis=1) - np.mean(noise.white**2, axis=1)
         scatter = np.sqrt(np.maximum(variance, 0.0))
-        noise = replace(noise, scatter=scatter, ratio=best.ratio, tau_s=best.tau_s)
+        noise = replace(noise, scatter=scatter, ratio=best.ratio, taus_s=best.taus_s)
         if np.all(np.abs(best.scale - 1) < 1e-2):
             break
     return noise
@@ -53,17 +58,17 @@ def gain(noise: Noise, residual: Array, jacobian: Array, extra: Array, smooth: A
 
 @dataclass(frozen=True)
 class _Best:
-    """The point of greatest likelihood: per channel ratio, tau and the factor on all noise."""
+    """The point of greatest likelihood: per channel ratio, time constants and the factor on all noise."""
 
     ratio: Array
-    tau_s: Array
+    taus_s: tuple[tuple[float, ...], ...]
     scale: Array
     deviance: float
 
 
 @dataclass(frozen=True)
 class _Search:
-    """Likelihood over a grid of (ratio, tau); gram matrices are made once and serve every leading set of columns."""
+    """Likelihood over a grid of slow noise; gram matrices are made once and serve every leading set of columns."""
 
     noise: Noise
     residual: Array
@@ -76,14 +81,19 @@ class _Search:
         return int(self.jacobian.shape[2])
 
     @cached_property
-    def grid(self) -> list[tuple[float, float]]:
-        """(ratio, tau) to try."""
+    def grid(self) -> list[Point]:
+        """Slow noise to try: none, one process, flicker."""
         gap_s = self.noise.gap_s
         n, span, gap = len(gap_s), float(np.sum(gap_s)), float(np.median(gap_s[1:]))
         if n < FEWEST_FOR_SLOW or gap <= 0 or span < 20 * gap:
-            return [(0.0, 1.0)]
-        taus = np.geomspace(3 * gap, span / 3, TIME_CONSTANTS)
-        return [(0.0, 1.0), *((float(r), float(t)) for t in taus for r in RATIOS)]
+            return [NO_SLOW]
+        single = [(float(tau),) for tau in np.geomspace(3 * gap, span / 3, TIME_CONSTANTS)]
+        flicker = tuple(np.geomspace(gap / 2, span / 3, FLICKER_PROCESSES).tolist())
+        return [
+            NO_SLOW,
+            *((ratio, taus) for taus in single for ratio in RATIOS),
+            *((ratio, flicker) for ratio in FLICKER_RATIOS),
+        ]
 
     @cached_property
     def beside(self) -> tuple[Array, tuple[int, ...]]:
@@ -120,6 +130,17 @@ class _Search:
         fast, gap_s, k = self.noise.fast, self.noise.gap_s, self.smooth.shape[1]
         return [_grams(gap_s, fast[c], columns[c], self.grid, k) for c in range(len(basis))]
 
+    def _choose(self, score: Array) -> int:
+        """The best point; flicker noise where the data cannot tell it from the best.
+
+        Electronics flickers, and has more to say at long times than one process: steps and trends are then judged
+        with caution.
+        """
+        flickers = np.array([len(taus) > 1 or ratio == 0 for ratio, taus in self.grid])
+        best = int(np.argmin(score))
+        flicker = int(np.argmin(np.where(flickers, score, np.inf)))
+        return flicker if score[flicker] - score[best] < NOT_TOLD_APART else best
+
     def best(self, columns: int) -> _Best:
         """The noise of greatest likelihood with the first `columns` in the model; channels in turn."""
         channels, n = self.residual.shape
@@ -133,15 +154,15 @@ class _Search:
             for c in range(channels):
                 others = (grams[d].gram[pick[d]] / scale[d] ** 2 for d in range(channels) if d != c)
                 score, scales = _scores(grams[c], sum(others, np.zeros((rank + 1, rank + 1))), free, float(least[c]))
-                pick[c] = int(np.argmin(score))
+                pick[c] = self._choose(score)
                 scale[c] = scales[pick[c]]
             if pick == before:
                 break
         deviance = sum(float(grams[c].logdet[pick[c]] + 2 * n * np.log(scale[c])) for c in range(channels))
         total = sum((grams[c].gram[pick[c]] / scale[c] ** 2 for c in range(channels)), np.zeros((rank + 1, rank + 1)))
         theta = np.linalg.lstsq(total[:-1, :-1], total[:-1, -1], rcond=1e-10)[0]
-        ratio, tau_s = (np.array([self.grid[k][i] for k in pick]) for i in (0, 1))
-        return _Best(ratio, tau_s, scale, deviance + float(total[-1, -1] - total[:-1, -1] @ theta))
+        ratio, taus_s = zip(*(self.grid[k] for k in pick), strict=True)
+        return _Best(np.array(ratio), taus_s, scale, deviance + float(total[-1, -1] - total[:-1, -1] @ theta))
 
 
 @dataclass(frozen=True)
@@ -158,11 +179,10 @@ class _Grams:
         return replace(self, gram=self.gram[:, keep[:, None], keep])
 
 
-def _grams(gap_s: Array, fast: Array, columns: Array, grid: list[tuple[float, float]], k: int) -> _Grams:
+def _grams(gap_s: Array, fast: Array, columns: Array, grid: list[Point], k: int) -> _Grams:
     """Gram matrices over the grid; the first `k` columns are set aside (Schur complement)."""
     w = float(rms(fast))
-    columns = np.ascontiguousarray(columns)
-    made = [whiten(columns, gap_s, fast, ratio * w, tau) for ratio, tau in grid]
+    made = [correlated(columns, gap_s, fast, ratio * w, taus) for ratio, taus in grid]
     gram = np.stack([out.T @ out for out, _ in made])
     logdet = np.array([logdet for _, logdet in made])
     if not k:
