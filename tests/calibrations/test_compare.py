@@ -1,0 +1,65 @@
+"""Where a model fails: in words and numbers, worst first, and nowhere on noise."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from calibrations.compare import compare, scales
+from calibrations.fit import fit
+from calibrations.model_file import read_model
+from calibrations.table import Array, Table
+from tests.calibrations import synthetic
+
+COLUMNS = synthetic.turns((90, 30, 150, 60, 120), step_deg=10)
+A_X, A_Y, A_Z = synthetic.components(COLUMNS)
+
+
+def table(more_x: Array | float = 0.0, seed: int = 0) -> Table:
+    return synthetic.poses(COLUMNS, 2.0 * A_X + 2.5 + more_x, A_Y + 2.5, seed=seed)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_fails_nowhere_on_noise(seed: int) -> None:
+    found = compare(table(seed=seed), read_model("linear"))
+    assert found.adequate
+    assert found.fails == ()
+
+
+def test_names_the_inclinations() -> None:
+    found = compare(table(0.004 * A_Z**2), read_model("linear"))
+    (place,) = (p for p in found.fails if p.where == "alpha")
+    assert (place.axis, place.low) == ("x", 90.0)
+    assert place.mean == pytest.approx(-0.004 * 0.4, rel=0.02)  # the bias takes the mean of cos^2 alpha, 0.4
+    assert place.text.startswith("alpha 90 deg: x is off by -0.0015")
+    assert "mg) on average, rms" in place.text
+
+
+def test_counts_in_mg_of_its_axis() -> None:
+    model = fit(read_model("linear"), table()).model
+    found = compare(table(0.002), model)
+    np.testing.assert_allclose(scales(found.fit), [2.0, 1.0], rtol=1e-3)
+    assert all(p.axis == "x" for p in found.fails)
+    assert "x is off by +0.002 V (+1 mg) on average" in found.fails[0].text  # 2 mV at 2 V/g
+
+
+@pytest.mark.parametrize(("side", "words"), [(1.0, "turning clockwise"), (-1.0, "turning anticlockwise")])
+def test_names_the_direction(side: float, words: str) -> None:
+    model = fit(read_model("linear"), table()).model
+    found = compare(table(0.002 * (COLUMNS["direction"] == side)), model)
+    assert any(p.text.startswith(words) for p in found.fails)
+
+
+def test_worst_first() -> None:
+    found = compare(table(0.004 * A_Z**2 + 0.001 * COLUMNS["direction"]), read_model("linear"))
+    excesses = [p.excess for p in found.fails]
+    assert excesses == sorted(excesses, reverse=True)
+    assert len({(p.where, p.axis) for p in found.fails}) == len(found.fails)
+
+
+def test_a_model_with_values_is_taken_as_it_is() -> None:
+    model = fit(read_model("linear"), table()).model
+    found = compare(table(0.001), model)  # the bias has moved
+    assert not found.adequate
+    assert found.fit.rmse[0] == pytest.approx(0.001, rel=0.05)
+    assert compare(table(0.001), read_model("linear")).adequate
