@@ -28,7 +28,7 @@ from calibrations.pictures.view import mg, pooled_mg
 from calibrations.report_words import VERDICTS, capital, headline, key_figures, next_words, state, summary
 
 EXPLAINED = 6  # candidates shown with formula and symptom, at most; the others in numbers only
-SURE = 0.999  # a probability above is not told to more digits
+SURE = 0.999  # probabilities beyond, on either side, are not told to more digits
 
 
 def report(
@@ -48,7 +48,7 @@ def report(
         figures=key_figures(found),
         steps=[_first(found), *(_step(step, found) for step in found.steps)],
         chance_of_excess=spread_of_excess(found.end),
-        fails=[capital(minus(place.text)).replace(" x ", " × ") for place in beside.fails],
+        fails=[capital(minus(place.text)).replace("x the noise", "× the noise") for place in beside.fails],
         given=beside.fit.model.name,
         given_errors=_errors(beside.fit),
         candidates=[_candidate(c, k, found.start.table.unit) for k, c in enumerate(found.path.first)],
@@ -95,7 +95,6 @@ def _step(step: Added, found: Discovery) -> dict[str, str]:
 
 
 def _candidate(c: Candidate, rank: int, out: str) -> dict[str, Any]:
-    likely = f"above {SURE:g}" if c.probability > SURE else chance(c.probability) if c.probability > 0 else "0"
     return {
         "name": c.name,
         "explained": rank == 0 or (rank < EXPLAINED and c.p_value < SIGNIFICANT),
@@ -105,9 +104,14 @@ def _candidate(c: Candidate, rank: int, out: str) -> dict[str, Any]:
         "seen": plain(c.excess_after),
         "unseen": plain(c.held_out_after),
         "p": chance(c.p_value),
-        "probability": likely,
+        "probability": _probability(c.probability),
         "rivals": ", ".join(c.indistinguishable_from) or "–",
     }
+
+
+def _probability(p: float) -> str:
+    """Only approximate: neither certain nor impossible."""
+    return f"above {SURE:g}" if p > SURE else f"below {1 - SURE:g}" if p < 1 - SURE else f"{p:.2g}"
 
 
 def _errors(fit: Fit) -> list[dict[str, str]]:

@@ -11,6 +11,7 @@ from calibrations.held_out import held_out_excess
 from calibrations.numerals import plain
 from calibrations.pictures.view import pooled_mg
 
+MOST_NAMED = 3  # effects in the headline
 VERDICTS = {
     "adequate": "nothing missing",
     "found": "effect found",
@@ -28,11 +29,11 @@ def headline(found: Discovery) -> str:
     """The verdict on the model that was given, in one sentence."""
     model = found.start.model.name
     if found.verdict == "unexplained":
-        beside = f"Beside {joined(found.causes)}, the" if found.causes else "The"
+        beside = f"Beside {_few(found.causes)}, the" if found.causes else "The"
         return f"{beside} model {model} misses something that no effect of the catalogue describes."
     if not found.steps:
         return f"Nothing is missing from the model {model}: what it leaves is noise."
-    text = f"The model {model} misses {joined(found.causes)}"
+    text = f"The model {model} misses {_few(found.causes)}"
     doubts = [f"{name} cannot be told from {joined(rivals, 'or')}" for name, rivals in found.alternatives.items()]
     return f"{text}; on this data {joined(doubts)}." if doubts else f"{text}."
 
@@ -84,6 +85,11 @@ def joined(names: Iterable[str], word: str = "and") -> str:
     """`a`, `a and b`, `a, b and c`."""
     *head, last = names
     return f"{', '.join(head)} {word} {last}" if head else last
+
+
+def _few(names: tuple[str, ...]) -> str:
+    """All names, or the first two and how many more."""
+    return joined(names) if len(names) <= MOST_NAMED else f"{names[0]}, {names[1]} and {len(names) - 2} more effects"
 
 
 def capital(text: str) -> str:

@@ -139,7 +139,7 @@ def _others(table: Table, n: int) -> list[Column]:
 
 def _time(table: Table, n: int) -> Column:
     if "t_s" not in table:
-        return _same("row", "number of the row", np.arange(1.0, table.n + 1), n)
+        return _same("row", "row (number)", np.arange(1.0, table.n + 1), n)
     length = float(np.ptp(table.time_s))
     size, unit = next((s, u) for limit, s, u in LENGTHS if length > limit)
     return _same("time", f"time ({unit})", table.time_s / size, n)

@@ -19,6 +19,7 @@ from calibrations.pictures.view import pooled_mg
 
 LARGE_FALL = 8.0  # from first to last: beyond this the last bars would vanish on a linear scale
 BAR = 0.62
+MOST_LEVEL = 7  # names beside each other; more are written aslant
 
 
 @dataclass(frozen=True)
@@ -49,27 +50,40 @@ def picture(found: Discovery) -> Figure:
     figure, axes = panels(1, 1, 4.2)
     ax: Axes = axes[0, 0]
     seen, unseen = [level.seen for level in steps], [level.unseen for level in steps]
-    large = seen[0] / seen[-1] > LARGE_FALL
-    bottom = 0.5 * min(1.0, *seen, *unseen) if large else 0.0
+    bottom = _scale(ax, seen, unseen)
     ax.axhspan(bottom, 1.0, color=BAND, lw=0, zorder=0.5)
     _bars(ax, seen, bottom, VERMILION if found.verdict == "unexplained" else GREEN)
     (diamonds,) = ax.plot(range(len(steps)), unseen, "D", ms=5.5, mfc=AMBER, mec=INK, mew=0.7, zorder=4, ls="")
     diamonds.set_label(f"on unseen {kind}")
     for k, level in enumerate(steps):
         _told(ax, k, level)
-    names = [level.name for level in steps] + (["left"] if len(steps) > 1 else [])
-    ax.set_yscale("log" if large else "linear")
-    ax.set_ylim(bottom, max(*seen, *unseen) * (2.5 if large else 1.2))
-    ax.set_xlim(-0.7, max(len(names), 3) + 0.2)
-    ax.set_xticks(range(len(names)), [_broken(name) for name in names])
-    ax.set_ylabel("rms error / noise floor")
-    ax.yaxis.set_major_formatter("{x:g}")
-    ax.yaxis.set_minor_formatter(NullFormatter())
-    ax.grid(visible=False, axis="x")
+    _names(ax, [level.name for level in steps] + (["left"] if len(steps) > 1 else []))
     floor = f"noise floor\n{plain(pooled_mg(found.start)[1], 2)} mg"
     ax.annotate(floor, (1, 1.0), (-4, 3), xycoords=("axes fraction", "data"), textcoords="offset points", ha="right")
     ax.legend(handles=[Patch(color=QUIET, label=f"on the {kind} of the fit"), diamonds], loc="upper right")
     return figure
+
+
+def _scale(ax: Axes, seen: list[float], unseen: list[float]) -> float:
+    """The vertical axis, logarithmic where the fall is large; its lower end."""
+    large = seen[0] / seen[-1] > LARGE_FALL
+    bottom = 0.5 * min(1.0, *seen, *unseen) if large else 0.0
+    ax.set_yscale("log" if large else "linear")
+    ax.set_ylim(bottom, max(*seen, *unseen) * (2.5 if large else 1.2))
+    ax.set_ylabel("rms error / noise floor")
+    ax.yaxis.set_major_formatter("{x:g}")
+    ax.yaxis.set_minor_formatter(NullFormatter())
+    ax.grid(visible=False, axis="x")
+    return bottom
+
+
+def _names(ax: Axes, names: list[str]) -> None:
+    """The names under the bars, and room on the right for that of the noise floor."""
+    ax.set_xlim(-0.7, 1.13 * max(len(names), 3) - 0.2)
+    if len(names) > MOST_LEVEL:
+        ax.set_xticks(range(len(names)), names, rotation=30, ha="right", rotation_mode="anchor")
+    else:
+        ax.set_xticks(range(len(names)), [_broken(name) for name in names])
 
 
 def _bars(ax: Axes, seen: list[float], bottom: float, end: str) -> None:

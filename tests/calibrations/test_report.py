@@ -1,0 +1,272 @@
+"""The report is one valid page that holds every number it should, reaches nowhere, and escapes what users wrote."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from functools import cache
+from html.parser import HTMLParser
+
+import pytest
+from matplotlib.figure import Figure
+
+from calibrations.compare import Comparison, compare
+from calibrations.discover import Discovery, discover
+from calibrations.effect import catalogue
+from calibrations.experiment import Experiment
+from calibrations.model import Estimate, Model, Term
+from calibrations.model_file import read_model
+from calibrations.numerals import chance, measured, minus, plain, unit
+from calibrations.pictures.album import Picture
+from calibrations.pictures.view import pooled_mg
+from calibrations.report import report
+from calibrations.report_words import headline, joined, next_words, state, summary
+from calibrations.table import Table
+from tests.calibrations.test_pictures import EFFECTS, by_hand, hand_table, warm, warm_table
+
+EMPTY = {"meta", "br", "link", "hr", "img"}
+
+
+class Page(HTMLParser):
+    """Tags must close in order; ids, links and text are kept."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.ids: Counter[str] = Counter()
+        self.references: list[str] = []
+        self.words: list[str] = []
+        self.tags: Counter[str] = Counter()
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags[tag] += 1
+        given = dict(attrs)
+        assert len(given) == len(attrs), f"an attribute of <{tag}> stands twice"
+        if given.get("id"):
+            self.ids[str(given["id"])] += 1
+        self.references += [str(given[name]) for name in ("href", "src", "xlink:href", "srcset") if name in given]
+        if tag not in EMPTY:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.handle_starttag(tag, attrs)
+        self.handle_endtag(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open, f"</{tag}> closes nothing"
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        self.words.append(data)
+
+    @property
+    def text(self) -> str:
+        return re.sub(r"\s+", " ", " ".join(self.words))
+
+
+@cache
+def beside() -> Comparison:
+    return compare(warm_table(), read_model("linear"))
+
+
+@cache
+def page() -> str:
+    return report(warm(), beside(), "2024-05-06", "inertial-rig 1.2.3")
+
+
+@cache
+def hand_page() -> str:
+    return report(by_hand(), compare(hand_table(), read_model("common-scale")), "2024-05-06", "inertial-rig 1.2.3")
+
+
+@cache
+def nothing() -> Discovery:
+    return discover(warm_table(0.0), read_model("linear"), EFFECTS)
+
+
+def blank() -> list[Picture]:
+    """Pictures that take no time to draw."""
+    return [Picture(name, name, "Nothing.", Figure()) for name in ("waterfall", "measurement", "residual", "failure")]
+
+
+def changed(found: Discovery, **values: object) -> Discovery:
+    return Discovery(**{**vars(found), **values})
+
+
+@pytest.mark.parametrize("make", [page, hand_page])
+def test_the_page_is_valid(make: object) -> None:
+    read = Page(make())  # type: ignore[operator]
+    assert not read.open
+    assert set(read.ids.values()) == {1}
+    assert read.tags["h1"] == 1
+    assert read.tags["svg"] == read.tags["figure"] == 5
+
+
+@pytest.mark.parametrize("make", [page, hand_page])
+def test_the_page_reaches_nowhere(make: object) -> None:
+    text = make()  # type: ignore[operator]
+    read = Page(text)
+    assert "http" not in text
+    assert "script" not in read.tags
+    assert "@import" not in text
+    assert all(reference.startswith(("#", "data:")) for reference in read.references)
+    assert {reference[1:] for reference in read.references if reference.startswith("#")} <= set(read.ids)
+    assert all(inside.startswith("#") for inside in re.findall(r"url\(([^)]*)\)", text))
+
+
+def test_it_opens_with_the_verdict_and_the_falling_error() -> None:
+    text = page()
+    assert "<h1>The model linear misses temperature-bias.</h1>" in text
+    assert text.index("<h1>") < text.index("waterfall-") < text.index("Where the model linear fails")
+    assert "effect found" in Page(text).text
+
+
+def test_it_holds_the_errors_before_and_after() -> None:
+    found, text = warm(), Page(page()).text
+    (step,) = found.steps
+    for value in (found.start.pooled_excess, found.end.pooled_excess, step.held_out_before, step.held_out_after):
+        assert f" {plain(value)} " in text
+    for fit in (found.start, found.end):
+        assert f"{plain(pooled_mg(fit)[0], 2)} mg" in text
+        for c in range(2):
+            assert f"{plain(1e3 * fit.rmse[c])} mV" in text
+            assert f"{plain(1e3 * fit.noise.floor[c])} mV" in text
+
+
+def test_it_holds_every_place_where_the_model_fails() -> None:
+    text = Page(page()).text
+    assert beside().fails
+    for place in beside().fails:
+        words = minus(place.text).replace("x the noise", "× the noise")
+        assert words[1:] in text
+
+
+def test_it_holds_every_candidate() -> None:
+    text = Page(page()).text
+    for c in warm().path.first:
+        assert f"{c.name} {plain(c.excess_after)} {plain(c.held_out_after)} {chance(c.p_value)}" in text
+    best = warm().path.first[0].effect
+    assert best.formula.split()[-1] in text
+    assert best.symptom[1:] in text
+
+
+def test_it_holds_every_parameter_with_its_uncertainty() -> None:
+    text = Page(page()).text
+    for term in warm().end.model.terms:
+        for e in term.estimates:
+            assert f"{e.name} {e.axis} {measured(e.value, e.std)} {unit(e.unit)}" in text
+    (reference,) = warm().end.model.terms[-1].constants.values()
+    assert f"{plain(reference, 6)} (a reference value, not fitted)" in text
+
+
+def test_it_says_why_a_parameter_is_not_identified() -> None:
+    bias = Term(catalogue()["bias"], estimates=(Estimate("bias", "x", 1.0, None, "V", False, "nothing moved"),))
+    end = warm().end
+    model = Model("m", (bias, *end.model.terms[1:]))
+    text = Page(report(changed(warm(), start=_with_model(end, model), steps=()), beside(), "d", "p", blank())).text
+    assert "not identified: nothing moved" in text
+
+
+def _with_model(fit: object, model: Model) -> object:
+    from dataclasses import replace
+
+    return replace(fit, model=model)  # type: ignore[type-var]
+
+
+def test_it_holds_the_noise() -> None:
+    text = Page(page()).text
+    noise = warm().end.noise
+    for c in range(2):
+        assert f"{plain(1e3 * noise.floor[c])} mV" in text
+        if noise.scatter[c] > 0:
+            assert f"{plain(1e3 * noise.scatter[c])} mV" in text
+    assert "own uncertainty is not known" in text
+
+
+def test_it_holds_the_provenance_and_no_path_of_this_machine() -> None:
+    table = Table.from_columns("poses", warm_table().columns, {"serial": "A 7"}, "/home/somebody/secret/run.csv")
+    model = Model("given", read_model("linear").terms, provenance={"data": r"C:\secret\old.csv", "rows": 12})
+    text = report(discover(table, model, EFFECTS), compare(table, model), "2024-05-06", "inertial-rig 1.2.3", blank())
+    words = Page(text).text
+    assert "secret" not in text
+    for fact in ("run.csv", "old.csv", table.digest, "A 7", "inertial-rig 1.2.3", "2024-05-06", "250 poses", "9.80665"):
+        assert fact in words
+
+
+def test_what_users_wrote_is_escaped() -> None:
+    table = Table.from_columns("poses", warm_table().columns, {"sensor": "<script>alert(1)</script>"}, "<b>.csv")
+    model = Model("<i>mine</i> & co", read_model("linear").terms)
+    text = report(discover(table, model, EFFECTS), compare(table, model), "<u>", "p")
+    assert not {"script", "i", "u"} & set(Page(text).tags)
+    assert "&lt;script&gt;" in text
+
+
+def test_the_same_arguments_give_the_same_page() -> None:
+    assert report(warm(), beside(), "2024-05-06", "inertial-rig 1.2.3") == page()
+
+
+def test_positions_are_told_as_positions() -> None:
+    text = Page(hand_page()).text
+    assert "on unseen positions" in text
+    assert "norm" in text
+    assert "poses" not in text.replace("poses.", "")
+
+
+def test_nothing_missing_is_said_so() -> None:
+    assert state(nothing()) == "adequate"
+    assert headline(nothing()) == "Nothing is missing from the model linear: what it leaves is noise."
+    assert "On 250 poses its rms error is 0.05" in summary(nothing())
+
+
+def test_doubt_is_said_so_with_the_experiment_that_ends_it() -> None:
+    e = Experiment("sweep", {"flip": 1}, (("a", "b"), ("a", "c")), "it turns")
+    found = changed(
+        warm(), verdict="ambiguous", alternatives={"temperature-bias": ("warm-up-bias", "drift")}, next_experiment=e
+    )
+    doubt = "on this data temperature-bias cannot be told from warm-up-bias or drift"
+    assert headline(found) == f"The model linear misses temperature-bias; {doubt}."
+    assert next_words(e) == "To tell a from b or c, run sweep with flip = 1: it turns."
+    assert next_words(e) in Page(report(found, beside(), "d", "p", blank())).text
+
+
+def test_what_is_not_explained_is_said_so() -> None:
+    found = changed(warm(), steps=(), causes=(), verdict="unexplained", residual_structure="step at t = 3120 s")
+    assert headline(found) == "The model linear misses something that no effect of the catalogue describes."
+    text = Page(report(found, beside(), "d", "p")).text
+    assert "Start from its pattern: step at t = 3120 s." in text
+    assert "It was tried and not kept" in text
+
+
+def test_many_causes_are_counted() -> None:
+    assert headline(changed(warm(), causes=("a", "b", "c", "d"))) == "The model linear misses a, b and 2 more effects."
+    assert joined(["a", "b", "c"]) == "a, b and c"
+
+
+@pytest.mark.parametrize(
+    ("value", "std", "shown"),
+    [
+        (2.500134567, 0.000241, "2.50013 ± 0.00024"),
+        (2.506215, 2.34e-6, "2.5062150 ± 0.0000023"),
+        (-1.234e-8, 1.1e-9, "(−1.23 ± 0.11) × 10⁻⁸"),
+        (1.0, 0.0996, "1.00 ± 0.10"),
+        (33123.8, 123.4, "33120 ± 120"),
+        (0.0, 0.5, "0.00 ± 0.50"),
+        (0.02, None, "0.02"),
+    ],
+)
+def test_values_are_rounded_to_two_digits_of_their_uncertainty(value: float, std: float | None, shown: str) -> None:
+    assert measured(value, std) == shown
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"), [(0.0, "0"), (9.996, "10.0"), (0.05066, "0.0507"), (1234.0, "1230"), (1.5e-7, "1.50 × 10⁻⁷")]
+)
+def test_plain_numbers_have_three_digits(value: float, shown: str) -> None:
+    assert plain(value) == shown
+
+
+def test_chances_and_units() -> None:
+    assert [chance(p) for p in (1.0, 0.0187, 9.7e-12, 0.0)] == ["1", "0.019", "1 × 10⁻¹¹", "below 10⁻³⁰⁰"]
+    assert [unit(u) for u in ("V/g^2", "1", "degC", "V")] == ["V/g²", "", "°C", "V"]
