@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from calibrations.candidates import SIGNIFICANT, candidates
+from calibrations.candidates import SIGNIFICANT, Candidate, candidates
 from calibrations.diagnose import MOST_LEFT, share_left, structure_of
 from calibrations.effect import Effect, catalogue
 from calibrations.experiment import Experiment, separating
@@ -100,10 +100,12 @@ def discover(table: Table, model: Model, effects: Mapping[str, Effect] | None = 
         return Discovery(path.start, (), "unexplained", (), (), {}, structure, None, path)
     kept = _needed(path)
     steps = _in_order(path, kept, effects)
-    rivals = {s.taken.name: s.taken.indistinguishable_from for s in path.steps if s.taken.name in kept}
-    alternatives = {name: names for name, names in rivals.items() if names}
+    new = [name for name in kept if name not in path.start.model.effects]
+    doubtful = [s.taken.name for s in path.steps if s.taken.indistinguishable_from and s.taken.name in new]
+    seen = {name: _beside_the_others(name, steps, effects) for name in doubtful}
+    alternatives = {name: c.indistinguishable_from for name, c in seen.items() if c and c.indistinguishable_from}
     causes = _causes(steps)
-    ambiguous = next((s.taken for s in path.steps if s.taken.name in alternatives and s.taken.name in causes), None)
+    ambiguous = next((seen[name] for name in causes if name in alternatives), None)
     return Discovery(
         start=path.start,
         steps=steps,
@@ -163,6 +165,13 @@ def _in_order(path: Path, kept: list[str], effects: Mapping[str, Effect]) -> tup
         steps.append(Added(name, present, after))
         present = after
     return tuple(steps)
+
+
+def _beside_the_others(name: str, steps: tuple[Added, ...], effects: Mapping[str, Effect]) -> Candidate | None:
+    """The effect as a candidate once all others are in the model: a rival seen before may be ruled out by then."""
+    end = steps[-1].after
+    found = candidates(fit(end.model.without(name), end.table), effects)
+    return next((c for c in found if c.name == name), None)
 
 
 def _causes(steps: tuple[Added, ...]) -> tuple[str, ...]:

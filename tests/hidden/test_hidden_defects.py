@@ -1,0 +1,109 @@
+"""Rigs with a defect that the analysis is not told of: the right effect is named, and the error falls to the noise.
+
+The rigs are mechanisms of `drivers.simulation`; what each should be called is written here and nowhere else.
+"""
+
+from __future__ import annotations
+
+import pytest
+
+from calibrations.diagnose import diagnose
+from calibrations.effect import catalogue
+from calibrations.model import Model
+from calibrations.model_file import read_model
+from calibrations.table import Table
+from tests.hidden import rigs
+
+TIMES_NOISE = (3, 10, 30)
+SEEDS = (1, 2, 3)
+
+# mechanism -> the effects that describe it; the second is its equivalent on this data
+NAMES = {
+    "plate mismatch": {"quadratic-nonlinearity"},
+    "bowed converter": {"quadratic-nonlinearity"},
+    "foreshortened beams": {"cross-axis-bias"},
+    "foreshortened by sag": {"z-axis-bias"},
+    "overlap lost by sag": {"z-axis-scale"},
+    "package turned": {"axis-misalignment"},
+    "beams off square": {"axis-nonorthogonality"},
+    "slipping contacts": {"hysteresis"},
+    "package stress": {"temperature-bias"},
+    "softening by heat": {"temperature-scale"},
+    "hardening springs": {"cubic-nonlinearity"},
+    "one-sided springs": {"scale-factor-asymmetry"},
+    "sliding overlap": {"cross-axis-scale"},
+    "stage zero": {"stage-zero-offset"},
+    "gear play": {"stage-backlash"},
+    "eccentric stage": {"stage-eccentricity"},
+    "tilted base": {"base-tilt", "stage-zero-offset"},
+    "unsteady supply": {"supply-sensitivity"},
+}
+OUTSIDE = ("charge step", "worm gear", "cable tug", "rocking mount", "popping lid")
+
+
+def table(columns: rigs.Table) -> Table:
+    return Table.from_columns("poses", columns, {"sample_rate_hz": 1000.0, "filter_corner_hz": 15.07}, "hidden rig")
+
+
+def linear() -> Model:
+    return read_model("linear")
+
+
+@pytest.mark.parametrize("times_noise", TIMES_NOISE)
+@pytest.mark.parametrize("defect", NAMES)
+def test_the_missing_effect_is_named_and_the_error_falls(defect: str, times_noise: float) -> None:
+    for seed in SEEDS:
+        found = diagnose(table(rigs.rig_with(defect, times_noise, seed)), linear())
+        told = f"{defect}, {times_noise} x, seed {seed}: {[s.taken.name for s in found.path.steps]}"
+        assert found.verdict in ("effect-missing", "ambiguous"), told
+        named = found.path.steps[0].taken
+        assert named.name in NAMES[defect], told
+        assert found.candidates[0].name == named.name, told
+        if found.verdict == "ambiguous":
+            assert {named.name, *named.indistinguishable_from} & NAMES[defect], told
+        assert named.held_out_after <= 1.15, f"{told}: {named.held_out_after} x the noise floor on unseen poses"
+        assert found.held_out_before > 0.9 * times_noise
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_nothing_is_named_on_a_clean_rig(seed: int) -> None:
+    found = diagnose(table(rigs.clean_rig(100 + seed)), linear())
+    assert (found.verdict, found.path.steps) == ("adequate", ())
+    assert found.excess_before < 1.15
+
+
+@pytest.mark.parametrize("times_noise", TIMES_NOISE)
+@pytest.mark.parametrize("defect", OUTSIDE)
+def test_what_no_effect_describes_is_called_unexplained(defect: str, times_noise: float) -> None:
+    found = diagnose(table(rigs.unexplained_rig(defect, times_noise, seed=4)), linear())
+    assert found.verdict == "unexplained"
+    assert found.residual_structure
+
+
+STRUCTURES = {
+    "charge step": "step at t =",
+    "worm gear": "5th harmonic of the stage angle beta",
+    "cable tug": "sector of beta around",
+}
+
+
+@pytest.mark.parametrize(("defect", "words"), STRUCTURES.items())
+def test_the_structure_of_the_unexplained_is_described(defect: str, words: str) -> None:
+    structure = diagnose(table(rigs.unexplained_rig(defect, 10, seed=5)), linear()).residual_structure
+    assert structure is not None
+    assert words in structure
+
+
+def test_a_complete_model_misses_nothing() -> None:
+    defective = table(rigs.rig_with("package stress", 10, seed=6))
+    complete = diagnose(defective, linear().with_effect(catalogue()["temperature-bias"]))
+    assert (complete.verdict, complete.path.steps) == ("adequate", ())
+
+
+@pytest.mark.parametrize("missing", ["bias", "scale-factor"])
+def test_bias_and_scale_factor_are_missed_like_any_other(missing: str) -> None:
+    columns = table(rigs.clean_rig(7))
+    start = linear().without("bias") if missing == "bias" else read_model("common-scale")
+    found = diagnose(columns, start)
+    assert found.path.steps[0].taken.name == missing
+    assert found.path.steps[0].held_out_after <= 1.15
