@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from calibrations.mean_noise import measured_inflation
 from calibrations.table import Array, Table
+from procedures.session import Samples
 from rig.errors import RecordError
 from rig.record.store import Record
 from rig.record.values import Kept
 
 AXES = ("vx", "vy", "vz")  # channels whose scatter is kept; others are regressors
+MOST_BLOCKS = 256  # spread over the run, that its noise is measured on: bounds the memory
+SURE = 0.1  # relative standard error above which the filter's formula knows a mean's noise better
 
 
 def table_of(record: Record, run_id: str) -> Table:
@@ -20,16 +26,20 @@ def table_of(record: Record, run_id: str) -> Table:
         return Table.from_columns(run.kind, numbers, run.constants, run.run, labels)
     rows: list[dict[str, float]] = []
     paths: list[str] = []
-    for kept in record.kept(run_id):
+    blocks: list[Samples] = []
+    stride = 1 + run.rows // MOST_BLOCKS
+    for number, kept in enumerate(record.kept(run_id)):
         rows.append(_row(kept))
         paths.append(kept.pose.path)
-        rate_hz = kept.samples.rate_hz
+        if number % stride == 0:
+            blocks.append(kept.samples)
     if not rows:
         raise RecordError(f"run {run_id} holds no pose yet; `rig resume {run_id}` goes on with it")
     names = [name for name in rows[0] if all(name in row for row in rows)]
     columns = {name: np.array([row[name] for row in rows]) for name in names}
     labels = {"path": tuple(paths)} if any(paths) else {}
-    return Table.from_columns(run.kind, _useful(columns), {**run.constants, "sample_rate_hz": rate_hz}, run.run, labels)
+    constants = {**run.constants, "sample_rate_hz": blocks[0].rate_hz, **_inflations(blocks)}
+    return Table.from_columns(run.kind, _useful(columns), constants, run.run, labels)
 
 
 def _row(kept: Kept) -> dict[str, float]:
@@ -50,3 +60,13 @@ def _row(kept: Kept) -> dict[str, float]:
 def _useful(columns: dict[str, Array]) -> dict[str, Array]:
     """How the sensor is mounted is a column only where it was ever changed."""
     return {k: column for k, column in columns.items() if k not in ("mount_deg", "flip") or column.any()}
+
+
+def _inflations(blocks: Sequence[Samples]) -> dict[str, float]:
+    """How much more a mean scatters than one of independent samples, from the blocks as long as the first."""
+    first = blocks[0]
+    places = [k for k, name in enumerate(first.channels) if name in AXES]
+    alike = np.stack([b.volts[:, places] for b in blocks if b.volts.shape == first.volts.shape])
+    names = [f"noise_inflation_{first.channels[k].removeprefix('v')}" for k in places]
+    found = zip(names, *measured_inflation(alike), strict=True)
+    return {name: float(factor) for name, factor, std in found if std < SURE * factor}

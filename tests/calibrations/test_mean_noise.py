@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from calibrations.mean_noise import inflation, norm_std, white_std
-from calibrations.table import Table
+from calibrations.mean_noise import inflation, measured_inflation, norm_std, white_std
+from calibrations.table import Array, Table
 
 FILTER = {"filter_corner_hz": 15.07, "sample_rate_hz": 1000.0}
 POSE = {"alpha_deg": [90.0, 90.0], "beta_deg": [0.0, 90.0], "vx_v": [3.5, 2.5], "n": [5000.0, 2500.0]}
@@ -46,3 +46,40 @@ def test_magnitude_takes_the_noise_along_itself() -> None:
     np.testing.assert_allclose(norm_std(table, std)[:, 0], [1.0, 1.0, 2.0, 2.0])
     own = Table.from_columns("positions", {**columns, "norm_std": [5.0] * 4})
     np.testing.assert_allclose(norm_std(own, std)[:, 0], 0.5)
+
+
+def correlated(rho: float, blocks: int, n: int) -> Array:
+    """Samples of two channels, each correlated by `rho` from one to the next."""
+    steps = np.random.default_rng(11).standard_normal((blocks, n + 200, 2))
+    return np.asarray(lfilter([1.0], [1.0, -rho], steps, axis=1)[:, 200:])
+
+
+@pytest.mark.parametrize("rho", [0.91, 0.0, -0.3])
+def test_the_inflation_of_samples_is_measured(rho: float) -> None:
+    """Right to 2 % on average over many runs, and its standard error is that of one run."""
+    true = (1 + rho) / (1 - rho)
+    found = [measured_inflation(part) for part in np.split(correlated(rho, 1024, 2500), 16)]
+    factors = np.array([factor for factor, _ in found]).ravel() / true
+    said = np.mean([std for _, std in found]) / true
+    assert factors.mean() == pytest.approx(1.0, abs=min(0.02, 4 * said / np.sqrt(32)))
+    assert factors.std() == pytest.approx(said, rel=0.4)
+
+
+def test_blocks_about_means_of_their_own() -> None:
+    """What differs from pose to pose is no noise."""
+    samples = correlated(0.5, 64, 1000) + np.linspace(0, 1000, 64)[:, None, None]
+    factor, std = measured_inflation(samples)
+    assert np.all(np.abs(factor - 3) < 4 * std)
+
+
+def test_nothing_is_measured_without_noise_or_in_short_blocks() -> None:
+    silent, short = np.ones((5, 100, 1)), correlated(0.99, 20, 200)
+    for blocks in (silent, short, short[:, :1]):
+        assert np.isnan(measured_inflation(blocks)[0]).all()
+
+
+def test_a_measured_inflation_comes_before_the_filters() -> None:
+    both = {**POSE, "vy_v": [1.0, 1.0], "vx_std_v": [1.0, 1.0], "vy_std_v": [1.0, 1.0]}
+    table = Table.from_columns("poses", both, {**FILTER, "noise_inflation_x": 50.0})
+    np.testing.assert_allclose(white_std(table)[0], [0.1, np.sqrt(inflation(table, "y") / 5000)])
+    assert inflation(table, "y") == inflation(table) == pytest.approx(21.14, abs=0.01)
