@@ -1,0 +1,80 @@
+"""`python -m tests.benchmark`: every figure, measured now on this machine, as one JSON document beside its target."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from statistics import median
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from tests.benchmark.child import ROOT, Ended, rig, subject
+
+MOST_MB = 500
+TARGET_S = {
+    "sweep": 30.0,  # 518 poses x 5000 samples x 3 channels through the sockets
+    "demo": 60.0,
+    "help": 0.3,
+    "diagnose, warm: one defect": 2.0,
+    "diagnose, warm: the default rig": 2.0,
+}
+
+Figure = dict[str, Any]
+
+
+def main() -> None:
+    machine = {"cores": os.cpu_count(), "python": platform.python_version(), "load_before": os.getloadavg()[0]}
+    with TemporaryDirectory() as folder:
+        document = {"schema": "rig.benchmark/1", "machine": machine, "figures": dict(_figures(Path(folder)))}
+    json.dump(document, sys.stdout, indent=1)
+    print()
+
+
+def _figures(folder: Path) -> Iterator[tuple[str, Figure]]:
+    """(name, figure), one after another; later ones use the run and the file of earlier ones."""
+    yield "help", _commands("help", folder, 9, "--help")
+    yield "sweep", _commands("sweep", folder, 2, "run", "sweep", "--unattended", "--json")
+    run = json.loads(rig(folder, "runs", "--json").out)["runs"][0]["run"]
+    file = str(folder / "one-defect.csv")
+    subject(folder, "one_defect", file)
+    for name, data in (("one defect", file), ("the default rig", run)):
+        yield f"diagnose, command: {name}", _commands("", folder, 2, "diagnose", data)
+        warm = f"diagnose, warm: {name}"
+        yield warm, _inside(warm, subject(folder, "diagnosis", data))
+    yield "demo", _demo(folder)
+    yield "dwell means of 518 poses", _inside("", subject(folder, "dwells"))
+    yield "screen of candidates", _inside("", subject(folder, "screening", file))
+
+
+def _demo(folder: Path) -> Figure:
+    if not (ROOT / "rig" / "cli" / "demo.py").is_file():
+        return {"note": "there is no `rig demo` yet"}
+    return _commands("demo", folder, 1, "demo")
+
+
+def _commands(name: str, folder: Path, repeats: int, *words: str) -> Figure:
+    """A whole command, each time in a process of its own."""
+    ended = [rig(folder, *words) for _ in range(repeats)]
+    return _figure(name, [e.seconds for e in ended], max(e.peak_mb for e in ended))
+
+
+def _inside(name: str, ended: Ended) -> Figure:
+    """What a subject measured inside its own warm process, and that process's memory."""
+    said = json.loads(ended.out)
+    return {**_figure(name, said.pop("seconds"), ended.peak_mb), **said}
+
+
+def _figure(name: str, seconds: list[float], peak_mb: float) -> Figure:
+    figure = {"min_s": min(seconds), "median_s": median(seconds), "repeats": len(seconds), "peak_mb": peak_mb}
+    rounded = {key: float(f"{value:.4g}") for key, value in figure.items()}
+    target_s = TARGET_S.get(name)
+    met = peak_mb <= MOST_MB and (target_s is None or median(seconds) <= target_s)
+    return {**rounded, "target_s": target_s, "target_mb": MOST_MB, "met": met}
+
+
+if __name__ == "__main__":
+    main()
