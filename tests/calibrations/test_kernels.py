@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -12,18 +14,23 @@ from calibrations.noise import Noise, rms, white_only
 from calibrations.table import Array
 
 
-def covariance(gap_s: Array, white: Array, slow: float, tau_s: float) -> Array:
-    t = np.cumsum(gap_s)
-    return np.diag(white**2) + slow**2 * np.exp(-np.abs(t[:, None] - t) / tau_s)
+def covariance(gap_s: Array, white: Array, slow: Sequence[float], taus_s: Sequence[float]) -> Array:
+    """White noise plus Gauss-Markov processes, dense."""
+    apart = np.abs(np.subtract.outer(np.cumsum(gap_s), np.cumsum(gap_s)))
+    return np.diag(white**2) + sum(s**2 * np.exp(-apart / tau) for s, tau in zip(slow, taus_s, strict=True))
 
 
-@given(st.integers(0, 10_000), st.sampled_from([0.0, 0.1, 1.0, 30.0]), st.sampled_from([1.0, 100.0, 1e4]))
-def test_whiten_is_the_dense_covariance(seed: int, slow: float, tau_s: float) -> None:
+@given(
+    st.integers(0, 10_000),
+    st.lists(st.tuples(st.sampled_from([0.0, 0.1, 1.0, 30.0]), st.sampled_from([1.0, 100.0, 1e4])), max_size=3),
+)
+def test_whiten_is_the_dense_covariance(seed: int, processes: list[tuple[float, float]]) -> None:
     rng = np.random.default_rng(seed)
     gap_s, white = rng.uniform(0.1, 20, 40), rng.uniform(0.5, 2, 40)
     columns = rng.standard_normal((40, 3))
-    out, logdet = whiten(columns, gap_s, white, slow, tau_s)
-    sigma = covariance(gap_s, white, slow, tau_s)
+    slow, taus_s = np.array([s for s, _ in processes]), np.array([tau for _, tau in processes])
+    out, logdet = whiten(columns, gap_s, white, slow, taus_s)
+    sigma = covariance(gap_s, white, slow, taus_s)
     lower = np.linalg.cholesky(sigma)
     dense = np.linalg.solve(lower, columns)
     np.testing.assert_allclose(out, dense, rtol=1e-9, atol=1e-9)
@@ -32,21 +39,25 @@ def test_whiten_is_the_dense_covariance(seed: int, slow: float, tau_s: float) ->
 
 
 def test_noise_value_agrees_with_its_formula() -> None:
-    """Sigma = W + k^2 I + (rho w)^2 G(tau), channel by channel."""
+    """Sigma = W + k^2 I + (rho w)^2 G, channel by channel; flicker shares its level evenly among its processes."""
     rng = np.random.default_rng(3)
     gap_s, white = rng.uniform(1, 9, 25), rng.uniform(0.5, 2, (2, 25))
-    noise = Noise(white, gap_s, np.array([0.3, 0.0]), np.array([1.5, 0.7]), np.array([40.0, 90.0]))
+    taus_s = ((40.0,), (5.0, 30.0, 180.0))
+    noise = Noise(white, gap_s, np.array([0.3, 0.0]), np.array([1.5, 0.7]), taus_s)
     columns = rng.standard_normal((2, 25, 2))
     gram, logdet = np.zeros((2, 2)), 0.0
-    for c, (k, rho, tau) in enumerate([(0.3, 1.5, 40.0), (0.0, 0.7, 90.0)]):
+    for c, (k, rho) in enumerate([(0.3, 1.5), (0.0, 0.7)]):
         w = np.sqrt(np.mean(white[c] ** 2 + k**2))
-        sigma = covariance(gap_s, np.sqrt(white[c] ** 2 + k**2), rho * w, tau)
+        each = [rho * w / np.sqrt(len(taus_s[c]))] * len(taus_s[c])
+        sigma = covariance(gap_s, np.sqrt(white[c] ** 2 + k**2), each, taus_s[c])
         gram += columns[c].T @ np.linalg.solve(sigma, columns[c])
         logdet += np.linalg.slogdet(sigma)[1]
+        assert noise.slow[c] == pytest.approx(rho * w)
     out = noise.whiten(columns)
     np.testing.assert_allclose(out.T @ out, gram, rtol=1e-9)
     assert noise.logdet == pytest.approx(logdet, rel=1e-9)
     np.testing.assert_allclose(noise.floor, rms(white))
+    np.testing.assert_array_equal(noise.tau_s, [40.0, 180.0])
 
 
 def test_floor_is_the_scatter_where_white_noise_is_not_known() -> None:

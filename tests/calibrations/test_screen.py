@@ -14,6 +14,7 @@ from calibrations.noise import Noise
 from calibrations.screen import SMALLEST, Screen, Search, of_search
 from calibrations.table import Array
 from tests.calibrations import synthetic
+from tests.calibrations.test_kernels import covariance
 
 
 @pytest.fixture(scope="module")
@@ -22,7 +23,7 @@ def fitted() -> Fit:
     columns = synthetic.turns((90, 30), step_deg=20)
     a_x, a_y, _ = synthetic.components(columns)
     found = fit(read_model("linear"), synthetic.poses(columns, a_x + 2.5, a_y + 2.5))
-    slow = Noise(found.noise.white, found.noise.gap_s, np.zeros(2), np.array([0.7, 0.3]), np.array([60.0, 90.0]))
+    slow = Noise(found.noise.white, found.noise.gap_s, np.zeros(2), np.array([0.7, 0.3]), ((60.0,), (20.0, 90.0)))
     return replace(found, noise=slow)
 
 
@@ -64,10 +65,9 @@ def test_what_the_model_has_adds_nothing(fitted: Fit) -> None:
 def drawn(found: Fit, rng: np.random.Generator) -> Fit:
     """The same fit with a residual drawn from its noise, the model freed from it."""
     residual = np.empty_like(found.residual)
-    t = np.cumsum(found.noise.gap_s)
-    for c, (slow, tau) in enumerate(zip(found.noise.slow, found.noise.tau_s, strict=True)):
-        sigma = np.diag(found.noise.fast[c] ** 2) + slow**2 * np.exp(-np.abs(t[:, None] - t) / tau)
-        residual[c] = np.linalg.cholesky(sigma) @ rng.standard_normal(len(t))
+    for c, (slow, taus) in enumerate(zip(found.noise.slow, found.noise.taus_s, strict=True)):
+        sigma = covariance(found.noise.gap_s, found.noise.fast[c], [slow / np.sqrt(len(taus))] * len(taus), taus)
+        residual[c] = np.linalg.cholesky(sigma) @ rng.standard_normal(len(sigma))
     return replace(found, residual=residual)
 
 
