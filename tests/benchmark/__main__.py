@@ -46,6 +46,7 @@ def _figures(folder: Path) -> Iterator[tuple[str, Figure]]:
         warm = f"diagnose, warm: {name}"
         yield warm, _inside(warm, subject(folder, "diagnosis", data))
     yield "demo", _demo(folder)
+    yield "samples of one dwell", _inside("", subject(folder, "samples"))
     yield "dwell means of 518 poses", _inside("", subject(folder, "dwells"))
     yield "screen of candidates", _inside("", subject(folder, "screening", file))
 
