@@ -25,7 +25,7 @@ from calibrations.numerals import chance, measured, minus, plain, unit
 from calibrations.pictures.album import Picture, album
 from calibrations.pictures.inline import inline
 from calibrations.pictures.view import mg, pooled_mg
-from calibrations.report_words import VERDICTS, capital, headline, key_figures, next_words, state, summary
+from calibrations.report_words import VERDICTS, capital, headline, key_figures, next_words, state, summary, unbroken
 
 EXPLAINED = 6  # candidates shown with formula and symptom, at most; the others in numbers only
 SURE = 0.999  # probabilities beyond, on either side, are not told to more digits
@@ -44,10 +44,10 @@ def report(
         verdict=VERDICTS[state(found)],
         state=state(found),
         kind=found.start.table.kind,
-        summary=summary(found),
+        summary=unbroken(summary(found)),
         figures=key_figures(found),
         steps=[_first(found), *(_step(step, found) for step in found.steps)],
-        chance_of_excess=spread_of_excess(found.end),
+        chance_of_excess=unbroken(f"1 ± {spread_of_excess(found.end)}"),
         fails=[capital(minus(place.text)).replace("x the noise", "× the noise") for place in beside.fails],
         given=beside.fit.model.name,
         given_errors=_errors(beside.fit),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 
 from calibrations.discover import Discovery
@@ -95,3 +96,8 @@ def _few(names: tuple[str, ...]) -> str:
 def capital(text: str) -> str:
     """The text as the beginning of a sentence."""
     return text[:1].upper() + text[1:]
+
+
+def unbroken(text: str) -> str:
+    """The text with numbers and units that stay on one line."""
+    return re.sub(r"(?<=\d) (?=mg|×|±)|(?<=[×±]) (?=\d)", "\u00a0", text)

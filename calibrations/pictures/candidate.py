@@ -14,17 +14,9 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from calibrations.discover import Added
+from calibrations.pictures.columns import Column, label_column, telling_columns
 from calibrations.pictures.style import INK, floor_band, panels, styled
-from calibrations.pictures.view import (
-    Column,
-    dots,
-    groups,
-    key,
-    label_column,
-    label_residual,
-    shown_unit,
-    telling_columns,
-)
+from calibrations.pictures.view import dots, groups, key, label_residual, shown_unit
 from calibrations.table import Array
 
 MOST_PARTS = 24  # of a column, for each direction
@@ -66,7 +58,8 @@ def change_of(step: Added) -> Array:
 def most_telling(step: Added) -> Column:
     """The plainest column that the change follows; the change itself where it follows none."""
     change, sides = change_of(step) / step.before.noise.floor[:, None], _sides(step)
-    found = telling_columns(step.before)
+    effect = next(term.effect for term in step.after.model.terms if term.name == step.name)
+    found = telling_columns(step.before, effect)
     told = np.array([explained(change, column.values, sides) for column in found])
     if told.max() < TELLING:
         label = f"change made by {step.name} ({shown_unit(step.before)})"

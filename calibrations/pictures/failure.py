@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from calibrations.fit import Fit
+from calibrations.pictures.columns import specific_force
 from calibrations.pictures.style import INK, QUIET, SIGNED, panels, quarters, styled
-from calibrations.pictures.view import specific_force
 from calibrations.table import Array
 
 WORDS = {1: "clockwise", -1: "anticlockwise", 0: ""}

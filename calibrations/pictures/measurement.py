@@ -10,8 +10,9 @@ from matplotlib.figure import Figure
 
 from calibrations.compare import scales
 from calibrations.fit import Fit
+from calibrations.pictures.columns import columns
 from calibrations.pictures.style import INK, QUIET, beside, panels, quarters, styled
-from calibrations.pictures.view import columns, dots, groups, key
+from calibrations.pictures.view import dots, groups, key
 
 
 @styled

@@ -5,8 +5,9 @@ from __future__ import annotations
 from matplotlib.figure import Figure
 
 from calibrations.fit import Fit
+from calibrations.pictures.columns import columns, label_column
 from calibrations.pictures.style import floor_band, panels, styled
-from calibrations.pictures.view import columns, dots, groups, key, label_column, label_residual
+from calibrations.pictures.view import dots, groups, key, label_residual
 
 
 @styled

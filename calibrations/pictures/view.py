@@ -1,4 +1,4 @@
-"""What pictures show of a fit: its rows in groups of one colour and marker, its columns, its residual in mV and mg.
+"""What pictures show of a fit: its rows in groups of one colour and marker, its residual in mV and mg.
 
 Poses are coloured by inclination, positions by the axis that lies nearest to gravity. A filled marker is a clockwise
 approach (or that axis upwards), an open one an anticlockwise one (or downwards), a small one where neither is known.
@@ -16,11 +16,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from calibrations.axes import other_in_plane, out_of_plane
-from calibrations.chain import backward, force
 from calibrations.compare import scales
 from calibrations.fit import Fit
-from calibrations.pictures.style import BLUE, GREEN, INCLINATION, INK, MARKER, VERMILION, beside, quarters
+from calibrations.pictures.columns import specific_force
+from calibrations.pictures.style import BLUE, GREEN, INCLINATION, INK, MARKER, VERMILION, beside
 from calibrations.table import Array, Table
 
 MOST_KEYS = 16
@@ -35,15 +34,6 @@ class Group:
     colour: str
     side: int
     rows: NDArray[np.intp]
-
-
-@dataclass(frozen=True)
-class Column:
-    """Something to draw against: values of shape (channels, n), and a label for each channel."""
-
-    name: str
-    labels: tuple[str, ...]
-    values: Array
 
 
 def groups(fit: Fit) -> list[Group]:
@@ -97,61 +87,6 @@ def key(figure: Figure, found: list[Group]) -> None:
     figure.legend(handles=marks, loc="outside upper left", ncols=KEYS_IN_A_ROW, handletextpad=0.2, columnspacing=1.4)
 
 
-def specific_force(fit: Fit) -> Array:
-    """Specific force along the sensing axes by the model, g, shape (n, 3)."""
-    steps = fit.problem.layout.steps(fit.theta)
-    return force(fit.table, steps) if fit.table.kind == "poses" else backward(fit.table, steps)
-
-
-def columns(fit: Fit) -> list[Column]:
-    """What the residual is drawn against: angle or specific force, time, temperature, as far as measured."""
-    table, n = fit.table, len(fit.channels)
-    if table.kind == "poses":
-        found = [_same("beta", "β (deg)", table.column("beta_deg"), n)]
-    else:
-        forces = specific_force(fit).T
-        found = [_same(f"a{k}", f"specific force along {k} (g)", a, n) for k, a in zip("xyz", forces, strict=True)]
-    return found + _others(table, n)
-
-
-def telling_columns(fit: Fit) -> list[Column]:
-    """Columns that an effect may follow, the plainest cause first."""
-    table, n = fit.table, len(fit.channels)
-    if table.kind != "poses":
-        return columns(fit)[:3] + _others(table, n)[::-1]
-    a = specific_force(fit)
-    roles = {"own": a, "other": other_in_plane(a), "out": out_of_plane(a)}
-    names = {"own": "xyz", "other": "yxx", "out": "zzy"}
-    forces = [
-        Column(role, tuple(f"specific force along {names[role][k]} (g)" for k in range(n)), values.T[:n])
-        for role, values in roles.items()
-    ]
-    return forces + columns(fit)[:1] + _others(table, n)[::-1]
-
-
-def _others(table: Table, n: int) -> list[Column]:
-    """Time, and temperature where it was measured and moved."""
-    found = [_time(table, n)]
-    if "temperature_c" in table and np.ptp(table.column("temperature_c")) > 0:
-        found.append(_same("temperature", "temperature (°C)", table.column("temperature_c"), n))
-    return found
-
-
-def _time(table: Table, n: int) -> Column:
-    if "t_s" not in table:
-        return _same("row", "row (number)", np.arange(1.0, table.n + 1), n)
-    length = float(np.ptp(table.time_s))
-    size, unit = next((s, u) for limit, s, u in LENGTHS if length > limit)
-    return _same("time", f"time ({unit})", table.time_s / size, n)
-
-
-LENGTHS = ((7200.0, 3600.0, "h"), (180.0, 60.0, "min"), (-1.0, 1.0, "s"))
-
-
-def _same(name: str, label: str, values: Array, n: int) -> Column:
-    return Column(name, (label,) * n, np.tile(values, (n, 1)))
-
-
 def shown_unit(fit: Fit) -> str:
     """The unit that a residual is drawn in."""
     return "mg" if fit.table.kind != "poses" else f"m{fit.table.unit}"
@@ -160,14 +95,6 @@ def shown_unit(fit: Fit) -> str:
 def label_of(fit: Fit, c: int) -> str:
     """The name of a channel's residual."""
     return f"residual of {fit.channels[c]}" if fit.table.kind == "poses" else "residual of |a|"
-
-
-def label_column(ax: Axes, column: Column, c: int, last: bool) -> None:
-    """The column's label under the last panel of a column of panels; angles are marked at quarters of a turn."""
-    if column.name == "beta":
-        quarters(ax)
-    if last:
-        ax.set_xlabel(column.labels[c])
 
 
 def label_residual(ax: Axes, fit: Fit, c: int, last: bool) -> None:

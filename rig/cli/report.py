@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
-from importlib.metadata import version
 from pathlib import Path
 
 import click
@@ -41,14 +39,13 @@ def command(
     from calibrations.pictures.album import album
     from calibrations.pictures.save import save_all
     from calibrations.report import report
-    from rig.cli.asked import asked, write_whole
+    from rig.cli.asked import asked, program, today, write_whole
 
     table, start, effects = asked(data, model, bench_file)
     found, beside = discover(table, start, effects), compare(table, start)
     pictures = album(found, beside)
     if out is not None:
-        today, program = datetime.now(UTC).date().isoformat(), f"inertial-rig {version('inertial-rig')}"
-        write_whole(out, report(found, beside, today, program, pictures))
+        write_whole(out, report(found, beside, today(), program(), pictures))
     written = save_all({picture.name: picture.figure for picture in pictures}, folder, form) if folder else []
     if as_json:
         emit({"schema": "rig.report/1", "out": str(out) if out else None, "pictures": [str(p) for p in written]})

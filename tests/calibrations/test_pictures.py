@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from calibrations.model import Model
 from calibrations.model_file import read_model
 from calibrations.pictures import candidate, failure, measurement, residual, waterfall
 from calibrations.pictures.album import MOST_CURVES, album, tried
+from calibrations.pictures.columns import telling_columns
 from calibrations.pictures.compact import compact
 from calibrations.pictures.inline import inline
 from calibrations.pictures.save import PictureError, png, save, save_all, svg
@@ -181,7 +183,7 @@ def test_the_map_of_positions_is_of_equal_area() -> None:
 def test_an_effect_is_drawn_over_what_it_follows() -> None:
     (step,) = warm().steps
     assert step.name == "temperature-bias"
-    assert candidate.most_telling(step).name == "temperature"
+    assert candidate.most_telling(step).name == "temperature_c"
     left, right, *_ = panels(candidate.picture(step))
     kelvin = step.before.table.column("temperature_c")
     assert drawn(left) == points(kelvin, 1e3 * step.before.residual[0])
@@ -212,6 +214,13 @@ def test_where_no_column_tells_the_change_itself_is_drawn() -> None:
     assert column.name == "change"
     ((_, along, curve),) = candidate.curves(step, column, 0)
     np.testing.assert_allclose(along, 1e3 * curve)  # the diagonal
+
+
+def test_an_effect_is_drawn_over_what_it_needs() -> None:
+    effect = replace(catalogue()["bias"], needs=("t_s", "temperature_c", "direction"))
+    labels = [column.labels[1] for column in telling_columns(warm().start, effect)]
+    forces = [f"specific force along {axis} (g)" for axis in "yxz"]
+    assert labels == [*forces, "β (deg)", "time (min)", "temperature (°C)"]
 
 
 def with_(model: Model, effect: str) -> Model:

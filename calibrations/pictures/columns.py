@@ -1,0 +1,98 @@
+"""What a residual is drawn against: angles, specific force, time, temperature, and what an effect says it needs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from calibrations.axes import other_in_plane, out_of_plane
+from calibrations.chain import backward, force
+from calibrations.effect import Effect
+from calibrations.fit import Fit
+from calibrations.pictures.style import quarters
+from calibrations.table import Array, Table
+
+LENGTHS = ((7200.0, 3600.0, "h"), (180.0, 60.0, "min"), (-1.0, 1.0, "s"))  # longer than, unit, its name
+LABELS = {"temperature_c": "temperature (°C)", "supply_v": "supply voltage (V)"}
+SHOWN_OTHERWISE = ("direction", "alpha_deg", "beta_deg")
+
+
+@dataclass(frozen=True)
+class Column:
+    """Something to draw against: values of shape (channels, n), and a label for each channel."""
+
+    name: str
+    labels: tuple[str, ...]
+    values: Array
+
+
+def specific_force(fit: Fit) -> Array:
+    """Specific force along the sensing axes by the model, g, shape (n, 3)."""
+    steps = fit.problem.layout.steps(fit.theta)
+    return force(fit.table, steps) if fit.table.kind == "poses" else backward(fit.table, steps)
+
+
+def columns(fit: Fit) -> list[Column]:
+    """What the residual is drawn against: angle or specific force, time, temperature, as far as measured."""
+    table, n = fit.table, len(fit.channels)
+    if table.kind == "poses":
+        found = [_same("beta", "β (deg)", table.column("beta_deg"), n)]
+    else:
+        forces = specific_force(fit).T
+        found = [_same(f"a{k}", f"specific force along {k} (g)", a, n) for k, a in zip("xyz", forces, strict=True)]
+    return found + _others(table, n)
+
+
+def telling_columns(fit: Fit, effect: Effect) -> list[Column]:
+    """Columns that an effect may follow: the specific forces, beta, and what it needs beside them.
+
+    It cannot follow what it does not know, such as time: inclinations that follow one another would only seem so.
+    """
+    table, n = fit.table, len(fit.channels)
+    needed = [_needed(table, name, n) for name in effect.needs if name not in SHOWN_OTHERWISE]
+    if table.kind != "poses":
+        return columns(fit)[:3] + needed
+    a = specific_force(fit)
+    roles = {"own": a, "other": other_in_plane(a), "out": out_of_plane(a)}
+    names = {"own": "xyz", "other": "yxx", "out": "zzy"}
+    forces = [
+        Column(role, tuple(f"specific force along {names[role][k]} (g)" for k in range(n)), values.T[:n])
+        for role, values in roles.items()
+    ]
+    return forces + columns(fit)[:1] + needed
+
+
+def _needed(table: Table, name: str, n: int) -> Column:
+    if name == "t_s":
+        return _time(table, n)
+    return _same(name, LABELS.get(name, f"{name} (as given)"), table.column(name), n)
+
+
+def _others(table: Table, n: int) -> list[Column]:
+    """Time, and temperature where it was measured and moved."""
+    found = [_time(table, n)]
+    if "temperature_c" in table and np.ptp(table.column("temperature_c")) > 0:
+        found.append(_needed(table, "temperature_c", n))
+    return found
+
+
+def _time(table: Table, n: int) -> Column:
+    if "t_s" not in table:
+        return _same("row", "row (number)", np.arange(1.0, table.n + 1), n)
+    length = float(np.ptp(table.time_s))
+    size, unit = next((s, u) for limit, s, u in LENGTHS if length > limit)
+    return _same("time", f"time ({unit})", table.time_s / size, n)
+
+
+def _same(name: str, label: str, values: Array, n: int) -> Column:
+    return Column(name, (label,) * n, np.tile(values, (n, 1)))
+
+
+def label_column(ax: Axes, column: Column, c: int, last: bool) -> None:
+    """The column's label under the last panel of a column of panels; angles are marked at quarters of a turn."""
+    if column.name == "beta":
+        quarters(ax)
+    if last:
+        ax.set_xlabel(column.labels[c])
