@@ -5,7 +5,7 @@ BIN := .venv/bin
 .PHONY: demo test setup bench lint clean
 
 demo: setup
-	$(BIN)/rig demo
+	$(BIN)/rig demo --folder out/demo
 
 test: setup lint
 	$(BIN)/pytest -n auto

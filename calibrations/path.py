@@ -14,6 +14,7 @@ from calibrations.model import Model
 from calibrations.table import Table
 
 MOST_EFFECTS = 14
+LEAST_SHARE = 0.05  # of what is left beyond noise: a smaller gain may be the wrong form of something strong
 MATERIAL = 1.15  # times the noise floor: a residual below is as good as noise
 
 
@@ -80,12 +81,18 @@ def _next(present: Fit, found: list[Candidate]) -> Step | None:
         if c.p_value >= SIGNIFICANT:
             continue
         step = _taken(present, found, c)
-        if step.held_out_after < step.held_out_before:
+        if step.held_out_after < step.held_out_before and _share(step) >= LEAST_SHARE:
             return step
     if present.table.kind == "poses" or present.pooled_excess <= MATERIAL:
         return None  # with known orientation an effect is seen beside others
     pair = best_pair(present, found)
     return _taken(present, found, pair[0]) if pair else None
+
+
+def _share(step: Step) -> float:
+    """Part of what was left beyond the noise floor that the step explains; 1 where hardly anything was left."""
+    before, after = step.before.pooled_excess**2, step.after.pooled_excess**2
+    return (before - after) / (before - 1) if before > MATERIAL**2 else 1.0
 
 
 def _taken(present: Fit, found: list[Candidate], c: Candidate) -> Step:

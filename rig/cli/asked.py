@@ -38,6 +38,16 @@ def asked(data: str, model: str | None, bench_file: Path | None) -> tuple[Table,
     return table, chosen or read_model(DEFAULTS.get(table.kind, "linear"), effects), effects
 
 
+def program() -> str:
+    """Name and version of this program, as results carry it."""
+    return f"inertial-rig {version('inertial-rig')}"
+
+
+def today() -> str:
+    """The date, for a page that a person reads."""
+    return datetime.now(UTC).date().isoformat()
+
+
 def write_model(found: Fit, parent: Model, out: Path) -> Model:
     """Write the fitted model with its provenance; the file appears whole or not at all. Returns what was written."""
     model = replace(
@@ -47,7 +57,7 @@ def write_model(found: Fit, parent: Model, out: Path) -> Model:
             "data_sha256": found.table.digest,
             "rows": found.table.n,
             "parent": parent.name,
-            "program": f"inertial-rig {version('inertial-rig')}",
+            "program": program(),
             "created": datetime.now(UTC).isoformat(timespec="seconds"),
             "excess": round(found.pooled_excess, 4),
         },

@@ -85,15 +85,21 @@ def _bar(found: Fit, first: Fit) -> str:
 
 
 def _verdict(result: Discovery) -> str:
-    end = result.end.pooled_excess
-    if result.verdict == "unexplained":
-        named = f" beside {joined(result.causes)}" if result.causes else ""
-        return f"Unexplained: no effect of the catalogue describes what is left{named}: {result.residual_structure}."
+    end, start = result.end.pooled_excess, result.start.pooled_excess
+    left = f"What is left, {end:.2f} x the noise floor,"
     if not result.steps:
+        if result.verdict == "unexplained":
+            return f"Unexplained: nothing in the catalogue describes what is left: {result.residual_structure}."
         return "Nothing is missing: what is left is noise."
     what = f"Missing {'was' if len(result.causes) == 1 else 'were'} {joined(result.causes)}"
-    extra = f"; {joined(result.refinements)} refines the form" if result.refinements else ""
-    return f"{what}{extra}. What is left, {end:.2f} x the noise floor, has no pattern."
+    refines = "refines" if len(result.refinements) == 1 else "refine"
+    extra = f"; {joined(result.refinements)} {refines} the form" if result.refinements else ""
+    if result.verdict == "unexplained":
+        return (
+            f"{what}{extra}: the error falls to 1/{start / end:.0f}. {left} still has a pattern that no effect of the "
+            f"catalogue describes: {result.residual_structure}."
+        )
+    return f"{what}{extra}. {left} has no pattern."
 
 
 def paper(table: Table) -> str:
