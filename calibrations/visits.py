@@ -34,7 +34,7 @@ def turning_points(table: Table) -> Array:
         _on_the_way(table, alpha, before_beta, np.zeros(table.n), by_way - before_beta),
         _on_the_way(table, alpha, by_way, np.zeros(table.n), beta - by_way),
     )
-    return np.concatenate(moves, axis=1)[:, :-1]  # the last point is the pose itself
+    return np.ascontiguousarray(np.concatenate(moves, axis=1)[:, :-1])  # the last point is the pose itself
 
 
 @lru_cache(maxsize=8)
