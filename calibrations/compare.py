@@ -22,6 +22,7 @@ from calibrations.table import Array, Table
 
 MOST_PLACES = 8
 STANDS_OUT = 1.1  # times the excess of the whole axis
+ONE_SIDED = 0.5  # of the rms residual of the whole axis, for the mean of a place
 PARTS = 8  # of a column without a natural grid
 
 WORDS: Mapping[str, tuple[str, str]] = {
@@ -107,11 +108,16 @@ def _fails(found: Fit) -> list[Place]:
         return []
     limit = SIGNIFICANT / len(places)
     bad = [k for k, p in enumerate(places) if chances[k] < limit and p.excess > MATERIAL]
-    overall = dict(zip(found.channels, found.excess, strict=True))
-    bad = [k for k in bad if places[k].excess > STANDS_OUT * overall[places[k].axis]] or bad[:1]
+    overall = {axis: (found.excess[c], floor[c]) for c, axis in enumerate(found.channels)}
+    bad = [k for k in bad if _stands_out(places[k], *overall[places[k].axis])] or bad[:1]
     bad.sort(key=lambda k: places[k].excess, reverse=True)
     first = {each[k]: k for k in reversed(bad)}
     return [places[k] for k in bad if first[each[k]] == k]
+
+
+def _stands_out(place: Place, excess: float, floor: float) -> bool:
+    """Whether the residual there is larger than everywhere, or lies to one side."""
+    return place.excess > STANDS_OUT * excess or abs(place.mean) > ONE_SIDED * excess * floor
 
 
 def _parts(table: Table) -> Iterator[tuple[str, float, float, NDArray[np.intp]]]:

@@ -124,5 +124,15 @@ def _result(problem: Problem, theta: Array, noise: Noise) -> Fit:
     residual, jacobian = problem.residual(theta), problem.jacobian(theta)
     model = replace(problem.layout.model, unit=problem.table.unit)
     found = Fit(model, problem, theta, noise, residual, jacobian)
-    widened = found.whitened[:, 1:] / found.birge
-    return replace(found, model=estimates(model, problem.layout, theta, widened))
+    return replace(found, model=estimates(model, problem.layout, theta, _informative(found)))
+
+
+def _informative(found: Fit) -> Array:
+    """The jacobian made white by all that the residual shows, to take standard uncertainties from.
+
+    Here nothing is set aside: where inclinations follow each other in time, smooth functions of the angles take up slow
+    noise as well, and parameters would look more certain than they are.
+    """
+    noise = estimate(found.noise, found.residual, found.jacobian, np.zeros((found.table.n, 0)))
+    plain = replace(found, noise=noise)
+    return np.asarray(plain.whitened[:, 1:] / plain.birge)
