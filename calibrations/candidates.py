@@ -17,7 +17,7 @@ from calibrations.effect import Effect
 from calibrations.fit import Fit, fit
 from calibrations.held_out import held_out_excess
 from calibrations.noise import rms
-from calibrations.noise_fit import gain
+from calibrations.noise_fit import gains
 from calibrations.parameters import Layout
 from calibrations.problem import Problem
 from calibrations.screen import Screen, Search, of_search
@@ -59,7 +59,8 @@ def candidates(before: Fit, effects: Mapping[str, Effect]) -> list[Candidate]:
     ]
     tried = [(effect, columns, basis) for effect, columns, basis in tried if basis.shape[1]]
     search = Search(screen, [basis for _, _, basis in tried])
-    found = [_judge(screen, effect, columns, basis, search.trials) for effect, columns, basis in tried]
+    refitted = _gains(before, [columns for _, columns, _ in tried])
+    found = [_judge(screen, *each, gain, search.trials) for each, gain in zip(tried, refitted, strict=True)]
     unseen = held_out_excess(before)
     found = _with_probabilities(found, before.residual.size, unseen)
     found.sort(key=lambda c: (c.held_out_after < unseen, schwarz(c, before.residual.size)), reverse=True)
@@ -72,13 +73,12 @@ def best_pair(before: Fit, found: list[Candidate]) -> tuple[Candidate, Candidate
     A sensor may miss two effects of which neither is seen while the other is missing.
     """
     pairs = [(a, b) for a, b in combinations(found, 2) if _fits(before, a.effect, b.effect)]
+    joint = _gains(before, [np.concatenate([a.columns, b.columns], axis=2) for a, b in pairs])
     best, least = None, 1.0
-    for a, b in pairs:
+    for (a, b), gain in zip(pairs, joint, strict=True):
         rank = a.rank + b.rank
         free = before.residual.size - before.jacobian.shape[2] - rank - before.problem.smooth.size
-        columns = np.concatenate([a.columns, b.columns], axis=2)
-        joint = gain(before.noise, before.residual, before.jacobian, columns, before.problem.smooth)
-        p = _tail(joint, before.residual.size, rank, max(free, 1)) * len(pairs)
+        p = _tail(gain, before.residual.size, rank, max(free, 1)) * len(pairs)
         if p < least:
             best, least = (a, b), p
     return best if least < SIGNIFICANT else None
@@ -122,11 +122,14 @@ def _columns(screen: Screen, effect: Effect) -> tuple[Array, Array]:
     return best
 
 
-def _judge(screen: Screen, effect: Effect, columns: Array, basis: Array, trials: float) -> Candidate:
+def _gains(before: Fit, extras: list[Array]) -> list[float]:
+    return gains(before.noise, before.residual, before.jacobian, extras, before.problem.smooth)
+
+
+def _judge(screen: Screen, effect: Effect, columns: Array, basis: Array, refitted: float, trials: float) -> Candidate:
     before, rank = screen.fit, basis.shape[1]
     smooth = before.problem.smooth.shape[1]
     score = screen.statistic(basis)
-    refitted = gain(before.noise, before.residual, before.jacobian, columns, before.problem.smooth)
     free = before.residual.size - before.jacobian.shape[2] - rank - smooth * len(before.channels)
     p_score = float(fdtrc(rank, free, score / rank)) if smooth else 1.0
     p_refitted = _tail(refitted, before.residual.size, rank, free)

@@ -112,8 +112,8 @@ def _minimise(problem: Problem, noise: Noise, start: Array) -> tuple[Array, floa
         jac=jacobian,
         bounds=problem.layout.bounds,
         x_scale=problem.layout.typical,
-        ftol=1e-10,
-        xtol=1e-10,
+        ftol=1e-9,
+        xtol=1e-9,
         gtol=1e-12,
         max_nfev=60,
     )

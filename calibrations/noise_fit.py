@@ -7,10 +7,12 @@ noise is at most a few times the white, so that it cannot take the place of a tr
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from calibrations.noise import Noise, correlated, rms
 from calibrations.table import Array
@@ -36,7 +38,7 @@ def estimate(start: Noise, residual: Array, jacobian: Array, smooth: Array) -> N
     """
     noise = start
     for _ in range(ROUNDS):
-        best = _Search(noise, residual, jacobian, smooth).best(jacobian.shape[2])
+        best = _Search(noise, residual, (jacobian,), smooth).best()
         variance = best.scale**2 * np.mean(noise.fast**2, axis=1) - np.mean(noise.white**2, axis=1)
         scatter = np.sqrt(np.maximum(variance, 0.0))
         noise = replace(noise, scatter=scatter, ratio=best.ratio, taus_s=best.taus_s)
@@ -45,15 +47,16 @@ def estimate(start: Noise, residual: Array, jacobian: Array, smooth: Array) -> N
     return noise
 
 
-def gain(noise: Noise, residual: Array, jacobian: Array, extra: Array, smooth: Array) -> float:
-    """Twice the gain in log-likelihood by `extra` columns (channels, n, k), the noise fitted anew with them.
+def gains(noise: Noise, residual: Array, jacobian: Array, extras: Sequence[Array], smooth: Array) -> list[float]:
+    """Twice the gain in log-likelihood by each of `extras` (channels, n, k), the noise fitted anew with it.
 
-    Smooth columns are set aside: this is what the extra columns explain beside them.
+    Smooth columns are set aside: this is what each explains beside them. Gram matrices are made once for all.
     """
-    search = _Search(noise, residual, np.concatenate([jacobian, extra], axis=2), smooth)
-    if not extra.shape[2] or search.rank(jacobian.shape[2]) == search.rank(search.columns):
-        return 0.0
-    return max(0.0, search.best(jacobian.shape[2]).deviance - search.best(search.columns).deviance)
+    search = _Search(noise, residual, (jacobian, *extras), smooth)
+    without = search.best().deviance
+    return [
+        max(0.0, without - search.best(k).deviance) if k in search.beside[1] else 0.0 for k in range(1, len(extras) + 1)
+    ]
 
 
 @dataclass(frozen=True)
@@ -68,17 +71,12 @@ class _Best:
 
 @dataclass(frozen=True)
 class _Search:
-    """Likelihood over a grid of slow noise; gram matrices are made once and serve every leading set of columns."""
+    """Likelihood over a grid of slow noise, for the first group of columns alone or with one of the others."""
 
     noise: Noise
     residual: Array
-    jacobian: Array
+    groups: tuple[Array, ...]
     smooth: Array
-
-    @property
-    def columns(self) -> int:
-        """Number of all columns."""
-        return int(self.jacobian.shape[2])
 
     @cached_property
     def grid(self) -> list[Point]:
@@ -97,29 +95,31 @@ class _Search:
 
     @cached_property
     def beside(self) -> tuple[Array, tuple[int, ...]]:
-        """Orthonormal columns (channels, n, rank) for what each column adds beside the smooth ones and those before it.
+        """Orthonormal columns (channels, n, rank) for what each group adds beside the smooth columns and the first.
 
-        Also the number of the column that each comes from.
+        Also the number of the group that each comes from.
         """
-        channels, n, p = self.jacobian.shape
+        channels, n = self.residual.shape
         fast = self.noise.fast[:, :, None]
-        free = self.jacobian / fast
-        size = np.linalg.norm(free.reshape(-1, p), axis=0)
         Q = [np.linalg.qr(self.smooth / fast[c])[0] for c in range(channels)]
-        free = np.stack([free[c] - Q[c] @ (Q[c].T @ free[c]) for c in range(channels)]).reshape(-1, p)
-        kept, found = np.zeros((len(free), 0)), []
-        for k in range(p):
+        first = self._freed(self.groups[0], Q, np.zeros((channels * n, 0)))
+        others = [self._freed(group, Q, first) for group in self.groups[1:]]
+        origin = np.repeat(np.arange(len(self.groups)), [first.shape[1], *(other.shape[1] for other in others)])
+        columns = np.hstack([first, *others]).reshape(channels, n, -1)
+        return columns * fast, tuple(origin.tolist())
+
+    def _freed(self, group: Array, smooth: list[Array], first: Array) -> Array:
+        """Orthonormal columns (channels * n, rank) for what a group adds."""
+        free = group / self.noise.fast[:, :, None]
+        size = np.linalg.norm(free.reshape(-1, free.shape[2]), axis=0)
+        free = np.stack([free[c] - Q @ (Q.T @ free[c]) for c, Q in enumerate(smooth)]).reshape(-1, free.shape[2])
+        kept = first
+        for k in range(free.shape[1]):
             column = free[:, k] - kept @ (kept.T @ free[:, k])
             column -= kept @ (kept.T @ column)
             if np.linalg.norm(column) > NEARLY_SMOOTH * size[k] > 0:
                 kept = np.column_stack([kept, column / np.linalg.norm(column)])
-                found.append(k)
-        return kept.reshape(channels, n, -1) * fast, tuple(found)
-
-    def rank(self, columns: int) -> int:
-        """How many of the first `columns` add something beside the smooth ones."""
-        origin: tuple[int, ...] = self.beside[1]
-        return len([k for k in origin if k < columns])
+        return kept[:, first.shape[1] :]
 
     @cached_property
     def grams(self) -> list[_Grams]:
@@ -141,11 +141,12 @@ class _Search:
         flicker = int(np.argmin(np.where(flickers, score, np.inf)))
         return flicker if score[flicker] - score[best] < NOT_TOLD_APART else best
 
-    def best(self, columns: int) -> _Best:
-        """The noise of greatest likelihood with the first `columns` in the model; channels in turn."""
+    def best(self, group: int = 0) -> _Best:
+        """The noise of greatest likelihood with the first group in the model, and another; channels in turn."""
         channels, n = self.residual.shape
-        rank = self.rank(columns)
-        grams = [g.leading(rank) for g in self.grams]
+        chosen = np.flatnonzero([origin in (0, group) for origin in self.beside[1]])
+        rank = len(chosen)
+        grams = [g.of(chosen) for g in self.grams]
         least = rms(self.noise.white) / rms(self.noise.fast)
         free = n - self.smooth.shape[1]
         pick, scale = [0] * channels, np.ones(channels)
@@ -173,9 +174,9 @@ class _Grams:
     logdet: Array  # of Sigma, (grid,)
     information: Array  # log det S^T Sigma^-1 S of the smooth columns, (grid,)
 
-    def leading(self, p: int) -> _Grams:
-        """The same with the first `p` columns and the residual."""
-        keep = np.append(np.arange(p), self.gram.shape[1] - 1)
+    def of(self, columns: NDArray[np.intp]) -> _Grams:
+        """The same with some of the columns, and the residual."""
+        keep = np.append(columns, self.gram.shape[1] - 1)
         return replace(self, gram=self.gram[:, keep[:, None], keep])
 
 

@@ -78,10 +78,10 @@ def _next(present: Fit, found: list[Candidate]) -> Step | None:
     Where there is none though much is left, the stronger of the best pair: the other then follows by itself.
     """
     for c in found[:3]:
-        if c.p_value >= SIGNIFICANT:
+        if c.p_value >= SIGNIFICANT or _share(present, c.excess_after) < LEAST_SHARE / 2:
             continue
         step = _taken(present, found, c)
-        if step.held_out_after < step.held_out_before and _share(step) >= LEAST_SHARE:
+        if step.held_out_after < step.held_out_before and _share(present, step.after.pooled_excess) >= LEAST_SHARE:
             return step
     if present.table.kind == "poses" or present.pooled_excess <= MATERIAL:
         return None  # with known orientation an effect is seen beside others
@@ -89,10 +89,10 @@ def _next(present: Fit, found: list[Candidate]) -> Step | None:
     return _taken(present, found, pair[0]) if pair else None
 
 
-def _share(step: Step) -> float:
-    """Part of what was left beyond the noise floor that the step explains; 1 where hardly anything was left."""
-    before, after = step.before.pooled_excess**2, step.after.pooled_excess**2
-    return (before - after) / (before - 1) if before > MATERIAL**2 else 1.0
+def _share(present: Fit, excess_after: float) -> float:
+    """Part of what is left beyond the noise floor that an effect explains; 1 where hardly anything is left."""
+    before = present.pooled_excess**2
+    return (before - excess_after**2) / (before - 1) if before > MATERIAL**2 else 1.0
 
 
 def _taken(present: Fit, found: list[Candidate], c: Candidate) -> Step:

@@ -16,7 +16,7 @@ from calibrations.noise_fit import (
     RATIOS,
     TIME_CONSTANTS,
     estimate,
-    gain,
+    gains,
 )
 from calibrations.table import Array
 from tests.calibrations import synthetic
@@ -123,7 +123,7 @@ def test_against_dense_matrices(seed: int) -> None:
     assert found.ratio[0] == without.ratio
     assert found.slow[0] == 0 or found.taus_s[0] == pytest.approx(without.taus_s)
     assert found.scatter[0] == pytest.approx(without.scale, rel=1e-8)
-    twice = gain(start, r[None], J[None], extra[None], smooth)
+    twice = gains(start, r[None], J[None], [extra[None]], smooth)[0]
     assert twice == pytest.approx(max(0.0, without.deviance - beside.deviance), abs=1e-7)
 
 
@@ -148,5 +148,5 @@ def test_columns_that_the_model_already_has_gain_nothing() -> None:
     rng = np.random.default_rng(2)
     J, r = rng.standard_normal((1, N, 2)), rng.standard_normal((1, N))
     again = J @ rng.standard_normal((2, 2))
-    assert gain(white_only(None, GAPS, 1), r, J, again, NONE) == 0.0
-    assert gain(white_only(None, GAPS, 1), r, J, J[:, :, :0], NONE) == 0.0
+    assert gains(white_only(None, GAPS, 1), [r], J, again, NONE)[0] == 0.0
+    assert gains(white_only(None, GAPS, 1), [r], J, J[:, :, :0], NONE)[0] == 0.0
