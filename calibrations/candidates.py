@@ -14,7 +14,7 @@ import numpy as np
 from scipy.special import fdtrc
 
 from calibrations.effect import Effect
-from calibrations.fit import Fit, fit
+from calibrations.fit import Fit, refit
 from calibrations.held_out import held_out_excess
 from calibrations.noise import rms
 from calibrations.noise_fit import gains
@@ -38,6 +38,7 @@ class Candidate:
     excess_after: float
     held_out_after: float
     probability: float
+    start: Array
     columns: Array
     basis: Array
     indistinguishable_from: tuple[str, ...] = ()
@@ -57,9 +58,9 @@ def candidates(before: Fit, effects: Mapping[str, Effect]) -> list[Candidate]:
         for effect in effects.values()
         if not before.model.holds(effect.name) and effect.excluded(before.table) is None and _fits(before, effect)
     ]
-    tried = [(effect, columns, basis) for effect, columns, basis in tried if basis.shape[1]]
-    search = Search(screen, [basis for _, _, basis in tried])
-    refitted = _gains(before, [columns for _, columns, _ in tried])
+    tried = [each for each in tried if each[3].shape[1]]
+    search = Search(screen, [basis for *_, basis in tried])
+    refitted = _gains(before, [columns for *_, columns, _ in tried])
     found = [_judge(screen, *each, gain, search.trials) for each, gain in zip(tried, refitted, strict=True)]
     unseen = held_out_excess(before)
     found = _with_probabilities(found, before.residual.size, unseen)
@@ -94,9 +95,9 @@ def schwarz(c: Candidate, rows: int) -> float:
     return c.gain - c.rank * float(np.log(rows))
 
 
-def refit(before: Fit, c: Candidate) -> Fit:
+def added(before: Fit, c: Candidate) -> Fit:
     """The model with the candidate added, all parameters fitted jointly."""
-    return fit(before.model.with_effect(c.effect), before.table)
+    return refit(before, before.model.with_effect(c.effect), c.start)
 
 
 def _fits(before: Fit, *added: Effect) -> bool:
@@ -107,18 +108,18 @@ def _fits(before: Fit, *added: Effect) -> bool:
     return before.residual.size > len(Layout.of(model, before.table).slots)
 
 
-def _columns(screen: Screen, effect: Effect) -> tuple[Array, Array]:
-    """Derivatives of the residual with respect to the effect's parameters, at its best start, and their basis."""
+def _columns(screen: Screen, effect: Effect) -> tuple[Array, Array, Array]:
+    """The best start, derivatives of the residual with respect to the effect's parameters there, and their basis."""
     before = screen.fit
     model = before.model.with_effect(effect)
     problem = Problem.of(model, before.table)
     mine = problem.layout.of_effect(effect.name)
-    best = (np.zeros((*before.residual.shape, 0)), np.zeros((before.residual.size, 0)))
+    best = (np.zeros(0), np.zeros((*before.residual.shape, 0)), np.zeros((before.residual.size, 0)))
     for theta in problem.layout.starts():
         columns = problem.jacobian(theta, mine)
         basis = screen.basis(columns)
-        if not best[1].shape[1] or screen.statistic(basis) > screen.statistic(best[1]):
-            best = (columns, basis)
+        if not best[2].shape[1] or screen.statistic(basis) > screen.statistic(best[2]):
+            best = (theta, columns, basis)
     return best
 
 
@@ -126,7 +127,9 @@ def _gains(before: Fit, extras: list[Array]) -> list[float]:
     return gains(before.noise, before.residual, before.jacobian, extras, before.problem.smooth)
 
 
-def _judge(screen: Screen, effect: Effect, columns: Array, basis: Array, refitted: float, trials: float) -> Candidate:
+def _judge(
+    screen: Screen, effect: Effect, start: Array, columns: Array, basis: Array, refitted: float, trials: float
+) -> Candidate:
     before, rank = screen.fit, basis.shape[1]
     smooth = before.problem.smooth.shape[1]
     score = screen.statistic(basis)
@@ -143,6 +146,7 @@ def _judge(screen: Screen, effect: Effect, columns: Array, basis: Array, refitte
         excess_after=float(np.sqrt(np.mean((rms(after) / before.noise.floor) ** 2))),
         held_out_after=held_out_excess(before, columns),
         probability=0.0,
+        start=start,
         columns=columns,
         basis=basis,
     )

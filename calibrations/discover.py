@@ -17,7 +17,7 @@ from calibrations.candidates import SIGNIFICANT, Candidate, candidates
 from calibrations.diagnose import MOST_LEFT, share_left, structure_of
 from calibrations.effect import Effect, catalogue
 from calibrations.experiment import Experiment, separating
-from calibrations.fit import Fit, fit
+from calibrations.fit import Fit, fit, refit
 from calibrations.held_out import held_out_excess
 from calibrations.model import Model
 from calibrations.path import MATERIAL, Path, find_path
@@ -74,7 +74,7 @@ def add(effect: Effect, model: Model, table: Table, effects: Mapping[str, Effect
     before = fit(model, table)
     found = candidates(before, catalogue() if effects is None else effects)
     rivals = next((c.indistinguishable_from for c in found if c.name == effect.name), ())
-    step = Added(effect.name, before, fit(before.model.with_effect(effect), table))
+    step = Added(effect.name, before, refit(before, before.model.with_effect(effect)))
     structure = structure_of(step.after)
     left = step.after.pooled_excess > MATERIAL and structure is not None
     return Discovery(
@@ -127,7 +127,7 @@ def _needed(path: Path) -> list[str]:
     while len([name for name in names if name not in freed]) > 1:
         costs = {name: _cost(present, name) for name in names if name not in freed}
         name = min(costs, key=lambda n: costs[n][0] / max(costs[n][1], 1))
-        smaller = fit(present.model.without(name), present.table)
+        smaller = refit(present, present.model.without(name))
         if chance(*costs[name]) < SIGNIFICANT and held_out_excess(smaller) > held_out_excess(present):
             return names
         names.remove(name)
@@ -161,7 +161,7 @@ def _in_order(path: Path, kept: list[str], effects: Mapping[str, Effect]) -> tup
     steps: list[Added] = []
     present = path.start
     for name in order:
-        after = fit(present.model.with_effect(effects[name]), present.table)
+        after = refit(present, present.model.with_effect(effects[name]))
         steps.append(Added(name, present, after))
         present = after
     return tuple(steps)
@@ -170,7 +170,7 @@ def _in_order(path: Path, kept: list[str], effects: Mapping[str, Effect]) -> tup
 def _beside_the_others(name: str, steps: tuple[Added, ...], effects: Mapping[str, Effect]) -> Candidate | None:
     """The effect as a candidate once all others are in the model: a rival seen before may be ruled out by then."""
     end = steps[-1].after
-    found = candidates(fit(end.model.without(name), end.table), effects)
+    found = candidates(refit(end, end.model.without(name)), effects)
     return next((c for c in found if c.name == name), None)
 
 

@@ -74,11 +74,24 @@ class Fit:
 def fit(model: Model, table: Table) -> Fit:
     """The model with parameters estimated from `table`. Raises TooFewRows, ModelError, DataError."""
     problem = Problem.of(model, table)
-    noise = white_only(problem.white, problem.gap_s, len(problem.channels))
-    theta = min((_minimise(problem, noise, start) for start in problem.layout.starts()), key=lambda t: t[1])[0]
+    return _alternate(problem, white_only(problem.white, problem.gap_s, len(problem.channels)), problem.layout.starts())
+
+
+def refit(before: Fit, model: Model, start: Array | None = None) -> Fit:
+    """A changed model on the data of `before`, from the noise found there; `start` for all its parameters."""
+    problem = Problem.of(model, before.table)
+    return _alternate(problem, before.noise, problem.layout.starts() if start is None else [start])
+
+
+def _alternate(problem: Problem, noise: Noise, starts: list[Array]) -> Fit:
+    """Parameters and noise in turn."""
+    theta = min((_minimise(problem, noise, start) for start in starts), key=lambda t: t[1])[0]
     # with smooth columns set aside the noise hardly depends on the parameters, and one round is enough
     for _ in range(1 if problem.smooth.size else ROUNDS):
-        noise = estimate(noise, problem.residual(theta), problem.jacobian(theta), problem.smooth)
+        found = estimate(noise, problem.residual(theta), problem.jacobian(theta), problem.smooth)
+        if found.is_like(noise):
+            break
+        noise = found
         theta, _ = _minimise(problem, noise, theta)
     return _result(problem, theta, noise)
 

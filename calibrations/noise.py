@@ -54,6 +54,11 @@ class Noise:
         """Standard deviation of the slow noise."""
         return self.ratio * rms(self.fast)
 
+    def is_like(self, other: Noise) -> bool:
+        """Whether both weigh the rows alike, scatter within 1 % of the noise."""
+        same = np.array_equal(self.ratio, other.ratio) and self.taus_s == other.taus_s
+        return same and bool(np.all(np.abs(rms(self.fast) / rms(other.fast) - 1) < 1e-2))
+
     def whiten(self, columns: Array) -> Array:
         """(channels, n, k) -> (channels * n, k), each row of unit variance and independent of the others."""
         return np.concatenate([self._whiten_channel(c, columns[c])[0] for c in range(len(columns))])

@@ -110,9 +110,9 @@ class _Search:
 
     def _freed(self, group: Array, smooth: list[Array], first: Array) -> Array:
         """Orthonormal columns (channels * n, rank) for what a group adds."""
-        free = group / self.noise.fast[:, :, None]
-        size = np.linalg.norm(free.reshape(-1, free.shape[2]), axis=0)
-        free = np.stack([free[c] - Q @ (Q.T @ free[c]) for c, Q in enumerate(smooth)]).reshape(-1, free.shape[2])
+        free, shape = group / self.noise.fast[:, :, None], (self.residual.size, group.shape[2])
+        size = np.linalg.norm(free.reshape(shape), axis=0)
+        free = np.stack([free[c] - Q @ (Q.T @ free[c]) for c, Q in enumerate(smooth)]).reshape(shape)
         kept = first
         for k in range(free.shape[1]):
             column = free[:, k] - kept @ (kept.T @ free[:, k])

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from calibrations.candidates import SIGNIFICANT, Candidate, best_pair, candidates, refit
+from calibrations.candidates import SIGNIFICANT, Candidate, added, best_pair, candidates
 from calibrations.effect import Effect
 from calibrations.fit import Fit, fit
 from calibrations.held_out import held_out_excess
@@ -97,6 +97,6 @@ def _share(present: Fit, excess_after: float) -> float:
 
 def _taken(present: Fit, found: list[Candidate], c: Candidate) -> Step:
     """The step that adds `c`; its errors are then those of the full fit."""
-    after = refit(present, c)
+    after = added(present, c)
     full = replace(c, excess_after=after.pooled_excess, held_out_after=held_out_excess(after))
     return Step(present, after, tuple(full if other is c else other for other in found), full)

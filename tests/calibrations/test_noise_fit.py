@@ -148,5 +148,5 @@ def test_columns_that_the_model_already_has_gain_nothing() -> None:
     rng = np.random.default_rng(2)
     J, r = rng.standard_normal((1, N, 2)), rng.standard_normal((1, N))
     again = J @ rng.standard_normal((2, 2))
-    assert gains(white_only(None, GAPS, 1), [r], J, again, NONE)[0] == 0.0
-    assert gains(white_only(None, GAPS, 1), [r], J, J[:, :, :0], NONE)[0] == 0.0
+    assert gains(white_only(None, GAPS, 1), r, J, [again], NONE)[0] == 0.0
+    assert gains(white_only(None, GAPS, 1), r, J, [J[:, :, :0]], NONE)[0] == 0.0
