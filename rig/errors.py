@@ -6,7 +6,8 @@ RigError (2)             bad usage or bad input
 │   └── UnknownRun       no run of this name; names the nearest
 ├── Busy                 another process works on this run, or with this instrument
 ├── RunMismatch          the bench is not the one that the run was begun with
-└── ExportError          a format that is not there, or does not fit the run
+├── ExportError          a format that is not there, or does not fit the run
+└── OutputError          a file cannot be written where it is wanted
 InstrumentFailed (3)     an instrument cannot be reached or fails; names role, address and remedy
 Stopped (4)              a person or a signal stopped the run, which `rig resume` finishes
 """
@@ -42,6 +43,10 @@ class RunMismatch(RigError):
 
 class ExportError(RigError):
     """The run cannot be written in this format."""
+
+
+class OutputError(RigError):
+    """A result cannot be written to this file."""
 
 
 class InstrumentFailed(RigError):

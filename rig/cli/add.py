@@ -25,7 +25,7 @@ def command(effect: str, model: str, data: str, out: Path, bench_file: Path | No
     from rig.cli.asked import asked, write_model
     from rig.cli.words import discovery, parameters
 
-    table, start, effects = asked(data, model, bench_file)
+    table, start, effects = asked(data, model, bench_file, out)
     chosen = find(effect, effects)
     if start.holds(effect):
         raise ModelError(f"{model}: {effect} is in the model already; its effects: {', '.join(start.effects)}")

@@ -23,7 +23,7 @@ def command(data: str, model: str | None, out: Path | None, check: bool, bench_f
     from rig.cli.asked import asked, write_model
     from rig.cli.words import discovery, parameters
 
-    table, start, effects = asked(data, model, bench_file)
+    table, start, effects = asked(data, model, bench_file, out)
     result = discover(table, start, effects)
     if out is not None:
         write_model(result.end, start, out)

@@ -24,7 +24,7 @@ def command(data: str, model: str | None, out: Path | None, check: bool, bench_f
     from rig.cli.asked import asked, write_model
     from rig.cli.words import errors, paper, parameters
 
-    table, start, _ = asked(data, model, bench_file)
+    table, start, _ = asked(data, model, bench_file, out)
     found = fit(start, table)
     if out is not None:
         write_model(found, start, out)

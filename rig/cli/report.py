@@ -32,8 +32,6 @@ def command(
     """
     if out is None and folder is None:
         raise click.UsageError("nothing to write: give --out FILE.html, --pictures FOLDER, or both")
-    if out is not None and not out.parent.is_dir():
-        raise click.UsageError(f"{out}: there is no folder {out.parent}; make it, or name another file")
     from calibrations.compare import compare
     from calibrations.discover import discover
     from calibrations.pictures.album import album
@@ -41,7 +39,7 @@ def command(
     from calibrations.report import report
     from rig.cli.asked import asked, program, today, write_whole
 
-    table, start, effects = asked(data, model, bench_file)
+    table, start, effects = asked(data, model, bench_file, out)
     found, beside = discover(table, start, effects), compare(table, start)
     pictures = album(found, beside)
     if out is not None:
