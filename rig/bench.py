@@ -124,7 +124,7 @@ def read_bench(path: Path | None = None) -> Bench:
         document = yaml.safe_load(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise BenchError(f"{path}: the bench file cannot be read: {error.strerror}") from None
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
+    except (yaml.YAMLError, ValueError, RecursionError) as error:  # ValueError: no text, no date
         raise BenchError(f"{path}: is not a YAML file: {error}") from None
     if not isinstance(document, dict):
         raise BenchError(f"{path}: a bench file is a mapping that begins with `instruments:`")

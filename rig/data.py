@@ -20,7 +20,8 @@ def still_positions(table: Table) -> Table:
     by_time = "t_s" in table and np.ptp(table.time_s) > 0
     rate_hz = (table.n - 1) / float(np.ptp(table.time_s)) if by_time else table.number("sample_rate_hz", 0.0)
     if not rate_hz > 0:
-        raise DataError(f"{table.source}: a raw log needs the column t_s or the constant sample_rate_hz")
+        needed = "the column t_s, or a line such as `# sample_rate_hz: 100` above its header"
+        raise DataError(f"{table.source}: a raw log needs {needed}")
     return positions(table, rate_hz)
 
 
@@ -29,6 +30,8 @@ def load(data: str, kind: str | None = None) -> Table:
 
     Raises DataError naming file, line and column; UnknownRun naming the nearest run.
     """
+    if Path(data).is_dir():
+        raise DataError(f"{data}: is a folder; name a file in it, or a run (`rig runs` lists them)")
     if Path(data).is_file():
         return still_positions(read_csv(Path(data), kind))
     from rig.record import Record  # a file needs no database
