@@ -58,7 +58,8 @@ class Place:
                 f"{self.where} {self.low:.6g} to {self.high:.6g} {unit}"
             )  # fmt: skip
         mg = 1e3 * self.mean / self.scale
-        value = f"{mg:+.3g} mg" if self.unit == "g" else f"{self.mean:+.3g} {self.unit} ({mg:+.3g} mg)"
+        own = f"{1e3 * self.mean:+.3g} mV" if self.unit == "V" else f"{self.mean:+.3g} {self.unit}"
+        value = f"{mg:+.3g} mg" if self.unit == "g" else f"{own} ({mg:+.3g} mg)"
         return f"{place}: {self.axis} is off by {value} on average, rms {self.excess:.3g} x the noise floor"
 
 

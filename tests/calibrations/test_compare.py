@@ -31,7 +31,7 @@ def test_names_the_inclinations() -> None:
     (place,) = (p for p in found.fails if p.where == "alpha")
     assert (place.axis, place.low) == ("x", 90.0)
     assert place.mean == pytest.approx(-0.004 * 0.4, rel=0.02)  # the bias takes the mean of cos^2 alpha, 0.4
-    assert place.text.startswith("alpha 90 deg: x is off by -0.0015")
+    assert place.text.startswith("alpha 90 deg: x is off by -1.5")
     assert "mg) on average, rms" in place.text
 
 
@@ -41,7 +41,7 @@ def test_counts_in_mg_of_its_axis() -> None:
     np.testing.assert_allclose(scales(found.fit), [2.0, 1.0], rtol=1e-3)
     assert all(p.axis == "x" for p in found.fails)
     for place in found.fails:  # 2 mV at 2 V/g
-        assert f"x is off by {place.mean:+.3g} V ({500 * place.mean:+.3g} mg) on average" in place.text
+        assert f"x is off by {1e3 * place.mean:+.3g} mV ({500 * place.mean:+.3g} mg) on average" in place.text
         assert place.mean == pytest.approx(0.002, rel=0.02)
 
 

@@ -1,0 +1,72 @@
+"""Rigs swept through the instruments' sockets: the answers and the voltages of the world's own dwell means."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from calibrations.diagnose import diagnose
+from calibrations.model_file import read_model
+from calibrations.table import Table
+from drivers.simulation.config import WorldConfig
+from drivers.simulation.defects import DEFECTS
+from drivers.simulation.world import World
+from procedures.catalogue import find
+from procedures.settings import parse
+from rig.bench import read_bench
+from rig.cli.watch import Quiet
+from rig.record import Record
+from rig.record.tables import table_of
+from rig.runner import start
+from tests.hidden import rigs
+
+
+def swept(config: WorldConfig, seed: int, folder: Path, **settings: str) -> Table:
+    """The table of a sweep that went over the wires."""
+    bench = read_bench(None).model_copy(update={"world": asdict(config), "seed": seed})
+    procedure = find("sweep", None)
+    with Record(folder) as record:
+        outcome = start(record, bench, procedure, parse(procedure, settings), Quiet({}))
+        assert outcome.run.state == "complete"
+        return table_of(record, outcome.run.run)
+
+
+@pytest.mark.sockets
+@pytest.mark.parametrize(
+    ("defect", "effect"),
+    [
+        ("plate mismatch", "quadratic-nonlinearity"),
+        ("package stress", "temperature-bias"),
+        ("slipping contacts", "hysteresis"),
+        ("gear play", "stage-backlash"),
+    ],
+)
+def test_the_missing_effect_is_named(defect: str, effect: str, tmp_path: Path) -> None:
+    config = rigs.scaled(DEFECTS[defect], rigs.IDEAL, 11, 10 * rigs.noise_floor_v())
+    found = diagnose(swept(config, 11, tmp_path, step_deg="20"), read_model("linear"))
+    assert found.verdict == "effect-missing"
+    assert found.path.steps[0].taken.name == effect
+    assert found.path.steps[0].held_out_after <= 1.15
+
+
+@pytest.mark.sockets
+def test_nothing_is_named_on_a_clean_rig(tmp_path: Path) -> None:
+    found = diagnose(swept(rigs.IDEAL, 12, tmp_path, step_deg="20"), read_model("linear"))
+    assert (found.verdict, found.path.steps) == ("adequate", ())
+
+
+@pytest.mark.sockets
+def test_means_over_the_wire_are_the_worlds_own(tmp_path: Path) -> None:
+    """Beside noise of the expected size: no shift, no scale, nothing that follows the angles."""
+    config = rigs.scaled(DEFECTS["package turned"], WorldConfig.ideal(), 13, 30 * rigs.noise_floor_v())
+    table = swept(config, 13, tmp_path, step_deg="30")
+    at = {name: table.column(name) for name in ("alpha_deg", "beta_deg")}
+    own = World(config, 13).dwell_mean(**at, direction=table.column("direction").astype(int), noise_free=True)
+    for name in ("vx_v", "vy_v"):
+        z = (table.column(name) - own[name]) / rigs.noise_floor_v(config)
+        assert abs(np.mean(z)) < 4 / np.sqrt(table.n)
+        assert np.std(z) == pytest.approx(1.0, abs=4 / np.sqrt(2 * table.n))
+        assert abs(np.corrcoef(z, own[name])[0, 1]) < 4 / np.sqrt(table.n)
