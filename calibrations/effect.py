@@ -32,7 +32,7 @@ import inspect
 import re
 import sys
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from types import ModuleType
@@ -41,6 +41,7 @@ from typing import Any, TypedDict
 import numpy as np
 
 from calibrations.errors import ModelError, UnknownName, nearest
+from calibrations.guarded import fault, guarded
 from calibrations.table import Array, Table
 
 HOOKS = ("pose", "force", "transduction", "output")
@@ -65,6 +66,10 @@ class Parameter:
     high: float = np.inf
     measured: str = ""
     doc: str = ""
+
+    def __post_init__(self) -> None:
+        if not (isinstance(self.typical, (int, float)) and self.typical > 0):
+            raise ModelError(f"{self.name}: typical is {self.typical!r}; it must be a number above 0")
 
 
 class Sections(TypedDict):
@@ -135,8 +140,15 @@ def find(name: str, effects: Mapping[str, Effect]) -> Effect:
 
 
 def _read_folder(folder: Path, package: str | None) -> Iterable[Effect]:
-    for path in sorted(folder.glob("[a-z]*.py")):
-        yield _from_module(_load(path, package), path)
+    for path in sorted(folder.glob("[!_]*.py")):
+        effect = _from_module(_load(path, package), path)
+        yield effect if package is not None else _guarded(effect, path)
+
+
+def _guarded(effect: Effect, path: Path) -> Effect:
+    """A user's effect, whose faults are told as such."""
+    hooks: dict[str, Any] = {hook: guarded(f, path) for hook in HOOKS if (f := getattr(effect, hook)) is not None}
+    return replace(effect, **hooks)
 
 
 def _load(path: Path, package: str | None) -> ModuleType:
@@ -149,8 +161,8 @@ def _load(path: Path, package: str | None) -> ModuleType:
     sys.modules[spec.name] = module
     try:
         spec.loader.exec_module(module)
-    except Exception as error:
-        raise ModelError(f"{path}: {type(error).__name__}: {error}") from error
+    except (Exception, SystemExit) as error:
+        raise fault(path, error) from error
     return module
 
 
@@ -159,13 +171,13 @@ def _from_module(module: ModuleType, path: Path) -> Effect:
     if not hooks:
         raise ModelError(f"{path}: is not an effect: it defines none of the functions {', '.join(HOOKS)}")
     parameters = getattr(module, "PARAMETERS", ())
-    if not parameters or not all(isinstance(p, Parameter) for p in parameters):
-        raise ModelError(f"{path}: is not an effect: PARAMETERS must be a tuple of Parameter(...)")
+    if not isinstance(parameters, tuple) or not parameters or not all(isinstance(p, Parameter) for p in parameters):
+        raise ModelError(f"{path}: is not an effect: PARAMETERS must be a tuple, as in (Parameter(...),)")
     return Effect(
         name=path.stem.replace("_", "-"),
         parameters=tuple(parameters),
-        needs=tuple(getattr(module, "NEEDS", ())),
-        kinds=tuple(getattr(module, "KINDS", ("poses", "positions"))),
+        needs=_words(module, "NEEDS", (), path),
+        kinds=_words(module, "KINDS", ("poses", "positions"), path),
         constants=dict(getattr(module, "CONSTANTS", {})),
         starts=dict(getattr(module, "STARTS", {})),
         pose=hooks.get("pose"),
@@ -174,6 +186,13 @@ def _from_module(module: ModuleType, path: Path) -> Effect:
         output=hooks.get("output"),
         **_sections(module.__doc__ or "", path),
     )
+
+
+def _words(module: ModuleType, name: str, default: tuple[str, ...], path: Path) -> tuple[str, ...]:
+    words = getattr(module, name, default)
+    if not isinstance(words, tuple) or not all(isinstance(word, str) for word in words):
+        raise ModelError(f'{path}: {name} must be a tuple of names, as in ("temperature_c",)')
+    return words
 
 
 def _sections(doc: str, path: Path) -> Sections:
