@@ -23,7 +23,7 @@ class _Strict(BaseModel):
 
 class _Parameter(_Strict):
     name: str
-    axis: str | None = None
+    axis: Literal["x", "y", "z"] | None = None
     value: float = Field(allow_inf_nan=False)
     std: float | None = Field(default=None, allow_inf_nan=False)
     unit: str = ""
@@ -62,22 +62,28 @@ def read_model(name_or_path: str | Path, effects: Mapping[str, Effect] | None = 
             )
     try:
         text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise ModelError(f"{path}: the model file cannot be read: {error}") from None
+    except OSError as error:
+        raise ModelError(f"{path}: the model file cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError as error:
+        raise ModelError(f"{path}: is not text (byte {error.start}); is it really a model file?") from None
     return parse_model(text, str(path), effects)
 
 
 def parse_model(text: str, source: str, effects: Mapping[str, Effect] | None = None) -> Model:
     """The model in YAML `text`. Raises ModelError or UnknownName."""
     try:
-        content = _File.model_validate(yaml.safe_load(text))
-    except yaml.YAMLError as error:
+        document = yaml.safe_load(text)
+    except (yaml.YAMLError, ValueError, RecursionError) as error:  # ValueError: a date that is none
         raise ModelError(f"{source}: is not YAML: {' '.join(str(error).split())}") from None
+    if not isinstance(document, dict):
+        raise ModelError(f"{source}: is not a model: a model file is a mapping that begins with `schema: {SCHEMA}`")
+    try:
+        content = _File.model_validate(document)
     except ValidationError as error:
         # a misspelt key is also a missing one: the key that is there is what the person can find
         first = min(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
-        key = ".".join(str(part) for part in first["loc"]) or "the file"
-        raise ModelError(f"{source}: {key}: {first['msg']}{_hint(first)}") from None
+        key = ".".join(str(part) for part in first["loc"])
+        raise ModelError(f"{source}, key {key}: {_fault(first)}") from None
     known = catalogue() if effects is None else effects
     terms = tuple(_term(entry, source, known) for entry in content.effects)
     names = [term.name for term in terms]
@@ -87,24 +93,45 @@ def parse_model(text: str, source: str, effects: Mapping[str, Effect] | None = N
     return Model(content.name, terms, content.unit, content.provenance)
 
 
-def _hint(error: Any) -> str:
+def _fault(error: Any) -> str:
+    if error["type"] == "missing":
+        return "is missing"
     if error["type"] != "extra_forbidden":
-        return ""
-    fields = [*_File.model_fields, *_Effect.model_fields, *_Parameter.model_fields]
-    return nearest(str(error["loc"][-1]), [field.strip("_") for field in fields])
+        return f"{error['msg']}, is {error['input']!r}"
+    places: Mapping[int, type[BaseModel]] = {1: _File, 3: _Effect}  # such as effects, 0, parameters, 1, axis
+    place = places.get(len(error["loc"]), _Parameter)
+        len(error["loc"]), _Parameter
+    )  # such as effects, 0, parameters, 1, axis
+    return f"no such key{nearest(str(error['loc'][-1]), [field.strip('_') for field in place.model_fields])}"
 
 
 def _term(entry: _Effect, source: str, known: Mapping[str, Effect]) -> Term:
     try:
         effect = find(entry.effect, known)
     except UnknownName as error:
-        raise UnknownName(f"{source}: {error}") from None
-    declared = {p.name for p in effect.parameters}
-    for p in entry.parameters:
-        if p.name not in declared:
-            raise ModelError(f'{source}: {entry.effect} has no parameter "{p.name}"{nearest(p.name, declared)}')
+        raise UnknownName(
+            f"{source}: {error}; your own effects are found with --bench (its key folders.effects)"
+        ) from None
+    _check_parameters(entry, effect, f"{source}: {entry.effect}")
+    for name in entry.constants:
+        if name not in effect.constants:
+            raise ModelError(f'{source}: {entry.effect} has no constant "{name}"{nearest(name, effect.constants)}')
     given = tuple(Estimate(p.name, p.axis or "", p.value, p.std, p.unit, p.identified, p.why) for p in entry.parameters)
     return Term(effect, entry.tied, given, entry.constants)
+
+
+def _check_parameters(entry: _Effect, effect: Effect, where: str) -> None:
+    declared = {p.name: p.per_axis and not entry.tied for p in effect.parameters}
+    for p in entry.parameters:
+        if p.name not in declared:
+            raise ModelError(f'{where} has no parameter "{p.name}"{nearest(p.name, declared)}')
+        if declared[p.name] and p.axis is None:
+            raise ModelError(f'{where}: "{p.name}" has one value for each axis; it needs `axis: x`, y or z')
+        if not declared[p.name] and p.axis is not None:
+            raise ModelError(f'{where}: "{p.name}" has one value and no axis; it stands for axis {p.axis}')
+    given = [(p.name, p.axis) for p in entry.parameters]
+    if twice := next((key for key in given if given.count(key) > 1), None):
+        raise ModelError(f"{where}: {' '.join(filter(None, twice))} is given twice")
 
 
 def dump_model(model: Model) -> str:

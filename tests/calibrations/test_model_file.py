@@ -16,21 +16,23 @@ from calibrations.model_file import SHIPPED, dump_model, parse_model, read_model
 
 numbers = st.floats(allow_nan=False, allow_infinity=False)
 words = st.text(st.characters(exclude_categories=("C", "Zl", "Zp")), max_size=20)
+TWICE = "{name: bias, value: 1}"
 HEAD = "schema: rig.model/1\nname: mine\n"
 
 
 @st.composite
 def terms(draw: st.DrawFn, name: str) -> Term:
     effect = catalogue()[name]
+    tied = draw(st.booleans())
     estimates = []
     for parameter in effect.parameters if draw(st.booleans()) else ():
-        for axis in ("x", "y") if parameter.per_axis else ("",):
+        for axis in ("x", "y") if parameter.per_axis and not tied else ("",):
             identified = draw(st.booleans())
             std = draw(st.none() | numbers.map(abs))
             why = None if identified else draw(words)
             estimates.append(Estimate(parameter.name, axis, draw(numbers), std, draw(words), identified, why))
     constants = {key: draw(numbers) for key in effect.constants if draw(st.booleans())}
-    return Term(effect, draw(st.booleans()), tuple(estimates), constants)
+    return Term(effect, tied, tuple(estimates), constants)
 
 
 @st.composite
@@ -63,16 +65,16 @@ def test_shipped_models_have_no_values_yet(name: str) -> None:
     ("text", "says"),
     [
         ("a: [", "bad.yaml: is not YAML: while parsing"),
-        ("", "bad.yaml: the file: Input should be a valid dictionary"),
+        ("", "bad.yaml: is not a model: a model file is a mapping"),
         (
             "schema: rig.model/2\nname: mine\neffects: [{effect: bias}]",
-            "bad.yaml: schema: Input should be 'rig.model/1'",
+            "bad.yaml, key schema: Input should be 'rig.model/1', is 'rig.model/2'",
         ),
-        (f"{HEAD}effects: []", "bad.yaml: effects: List should have at least 1 item"),
+        (f"{HEAD}effects: []", "bad.yaml, key effects: List should have at least 1 item"),
         (f"{HEAD}efects: [{{effect: bias}}]", 'did you mean "effects"?'),
         (
             f"{HEAD}effects: [{{effect: bias, tide: true}}]",
-            "effects.0.tide: Extra inputs are not permitted; did you mean",
+            'effects.0.tide: no such key; did you mean "tied"',
         ),
         (f"{HEAD}effects: [{{effect: bias, parameters: [{{name: bias, value: 1, sdt: 2}}]}}]", 'did you mean "std"?'),
         (
@@ -84,6 +86,22 @@ def test_shipped_models_have_no_values_yet(name: str) -> None:
             f"{HEAD}effects: [{{effect: bias, parameters: [{{name: bais, value: 1}}]}}]",
             'no parameter "bais"; did you mean',
         ),
+        (
+            f"{HEAD}effects: [{{effect: bias, parameters: [{{name: bias, axis: w, value: 1}}]}}]",
+            "effects.0.parameters.0.axis: Input should be 'x', 'y' or 'z'",
+        ),
+        (f"{HEAD}effects: [{{effect: bias, parameters: [{{name: bias, value: 1}}]}}]", "needs `axis: x`, y or z"),
+        (
+            f"{HEAD}effects: [{{effect: bias, tied: true, parameters: [{{name: bias, axis: x, value: 1}}]}}]",
+            "has one value and no axis",
+        ),
+        (
+            f"{HEAD}effects: [{{effect: bias, tied: true, parameters: [{TWICE}, {TWICE}]}}]",
+            "bias: bias is given twice",
+        ),
+        (f"{HEAD}effects: [{{effect: hysteresis, constants: {{x: 1}}}}]", 'hysteresis has no constant "x"'),
+        ("schema: [2001-99-99]", "bad.yaml: is not YAML: month must be in"),
+        ("[" * 5000, "bad.yaml: is not YAML"),
         (f"{HEAD}effects: [{{effect: bias}}, {{effect: bias}}]", 'the effect "bias" stands in the model twice'),
     ],
 )
