@@ -100,8 +100,6 @@ def _fault(error: Any) -> str:
         return f"{error['msg']}, is {error['input']!r}"
     places: Mapping[int, type[BaseModel]] = {1: _File, 3: _Effect}  # such as effects, 0, parameters, 1, axis
     place = places.get(len(error["loc"]), _Parameter)
-        len(error["loc"]), _Parameter
-    )  # such as effects, 0, parameters, 1, axis
     return f"no such key{nearest(str(error['loc'][-1]), [field.strip('_') for field in place.model_fields])}"
 
 
