@@ -20,6 +20,11 @@ ACTS_ON = {
     "output": "the output: what becomes of it before it is a number",
 }
 
+SOURCES = """
+Sources: *Ang* is Ang, Khoo, Khosla and Riviere, "Physical Model of a MEMS Accelerometer for Low-g Motion Tracking
+Applications"; *Book* is a chapter 17, "MEMS Inertial Sensors and Magnetic Sensors", whose numbers are given.
+"""
+
 
 def page(effect: Effect) -> str:
     """The page of one effect."""
@@ -48,7 +53,7 @@ def index(effects: Mapping[str, Effect]) -> str:
         "# The catalogue of physical effects\n\n"
         "Made by `python -m calibrations.pages docs/effects` from the files in `calibrations/effects`;\n"
         "`rig effects NAME` shows the same in a terminal.\n\n"
-        f"| effect | acts on | what happens |\n| --- | --- | --- |\n{rows}\n"
+        f"| effect | acts on | what happens |\n| --- | --- | --- |\n{rows}\n{SOURCES}"
     )
 
 
