@@ -37,6 +37,13 @@ def read_csv(path: Path | str, kind: str | None = None) -> Table:
 
 def parse_csv(text: str, source: str, kind: str | None = None) -> Table:
     """The table in `text`. Raises DataError naming source, line and column."""
+    try:
+        return _table(text, source, kind)
+    except csv.Error as error:
+        raise DataError(f"{source}: is not a CSV file: {error}") from None
+
+
+def _table(text: str, source: str, kind: str | None) -> Table:
     lines = text.splitlines()
     constants, first = _constants(lines)
     if first == len(lines):
@@ -77,13 +84,16 @@ def _number_or_text(text: str) -> Constant:
 
 
 def _check_header(header: list[str], where: str) -> None:
+    if all(isinstance(_number_or_text(name), float) for name in header):
+        raise DataError(f"{where}: a header line with column names is missing")
+    if len(header) == 1 and (found := next((s for s in (";", "\t") if s in header[0]), None)):
+        what = "semicolons" if found == ";" else "tabs"
+        raise DataError(f"{where}: values are separated by {what}, not commas; `rig import` takes them so")
     for name in header:
         if not name:
             raise DataError(f"{where}: a column has no name")
         if header.count(name) > 1:
             raise DataError(f'{where}: the column "{name}" occurs twice')
-    if all(isinstance(_number_or_text(name), float) for name in header):
-        raise DataError(f"{where}: a header line with column names is missing")
 
 
 def _parse(

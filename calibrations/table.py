@@ -194,6 +194,12 @@ def guess_kind(names: Iterable[str]) -> str:
         hint = nearest(name, required)
         if name not in required and name not in OPTIONAL and hint.startswith("; did you mean"):
             raise MissingColumn(f'no kind of table has the column "{name}"{hint}')
+    each = [(kind, wanted) for kind, sets in KINDS.items() for wanted in sets]
+    kind, wanted = max(each, key=lambda e: sum(name in names for name in e[1]))
+    missing = [name for name in wanted if name not in names]
+    if len(missing) < len(wanted):
+        there = f"{kind} need {', '.join(wanted)}; there are: {', '.join(names)}"
+        raise MissingColumn(f'the column "{missing[0]}" is missing: {there}')
     raise MissingColumn(
         f"columns {', '.join(names)} are of no known kind of table; "
         "poses need alpha_deg, beta_deg, vx_v; positions need ax, ay, az"
