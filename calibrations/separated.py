@@ -107,7 +107,8 @@ def _lines(path: Path) -> list[str]:
 
 def _splitter(body: Sequence[str]) -> Callable[[str], list[str]]:
     """A function that splits a line at the separator that the file uses."""
-    separator = next((s for s in (";", "\t", ",") if body and s in body[len(body) // 2]), None)
+    filled = [line for line in body if line.strip()] or [""]
+    separator = next((s for s in (";", "\t", ",") if s in filled[len(filled) // 2]), None)
     if separator is None:
         return str.split
     return lambda line: [cell.strip() for cell in next(csv.reader([line], delimiter=separator))]

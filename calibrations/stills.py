@@ -19,6 +19,7 @@ SHORTEST_S = 1.0
 TRIM_S = 0.2
 QUIET_QUANTILE = 0.05  # of the windows, taken as certainly still
 MOVING = 3.0  # times the quiet standard deviation
+SHAKEN = 10.0  # the same, reached when it is turned by hand; never reached in a log that never rests or only rests
 
 
 def positions(log: Table, rate_hz: float) -> Table:
@@ -31,9 +32,9 @@ def positions(log: Table, rate_hz: float) -> Table:
     samples = log.outputs
     bounds = still_intervals(samples, rate_hz)
     if len(bounds) < 2:
-        raise DataError(
-            f"{log.source}: found {len(bounds)} still intervals; a log of positions has many of 1 s or more"
-        )
+        found = "one still interval" if bounds else "no still intervals"
+        needed = "a log of positions has many of 1 s or more, and the sensor is turned between them"
+        raise DataError(f"{log.source}: found {found}; {needed}")
     names = [name for name in log.columns if not name.endswith("_std")]
     columns: dict[str, list[float]] = {name: [] for name in names}
     columns |= {f"{name}_std": [] for name in ("ax", "ay", "az", "norm")} | {"n": []}
@@ -72,6 +73,8 @@ def still_intervals(samples: Array, rate_hz: float) -> list[tuple[int, int]]:
     width = max(4, round(WINDOW_S * rate_hz))
     spread = _moving_std(samples, width)
     quiet = float(np.quantile(spread, QUIET_QUANTILE))
+    if np.max(spread) < SHAKEN * quiet:
+        return []
     still = spread < MOVING * max(quiet, np.finfo(float).tiny)
     trim, shortest = round(TRIM_S * rate_hz), round(SHORTEST_S * rate_hz)
     runs = [(a + trim, b + width - 1 - trim) for a, b in _runs(still)]
