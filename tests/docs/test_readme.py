@@ -1,0 +1,68 @@
+"""README.md, followed by a reader from top to bottom; and nothing that exists goes without a word."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+import pytest
+
+from rig.cli import Commands
+from rig.cli import rig as group
+from tests.docs.markdown import ROOT, commands, section
+
+FOLLOWED = ("My own measurements", "My first real instrument")
+COMMANDS = Commands().list_commands(click.Context(group))
+PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").rglob("*.md"))]
+LINK = re.compile(r"\]\(([^)#:\s]*)(?:#([^)\s]+))?\)")
+
+
+@pytest.mark.parametrize("title", FOLLOWED)
+def test_a_section_works_as_written(title: str, follow: Callable[..., Any]) -> None:
+    follow(commands(section("README.md", title)))
+
+
+def test_the_first_story_works_as_written_and_makes_the_picture(tmp_path: Path, follow: Callable[..., Any]) -> None:
+    follow(commands(section("README.md", "Find what is missing")))
+    made, shown = tmp_path / "pictures" / "waterfall.svg", ROOT / "docs" / "falling-error.svg"
+    assert made.is_file()
+    assert shown.stat().st_size < 200_000
+
+
+def test_the_two_commands_are_targets_of_the_makefile() -> None:
+    lines = [line for block in commands(section("README.md", "Two commands")) for line in block.lines]
+    assert lines == ["make demo", "make test"]
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    assert all(f"\n{line.split()[1]}:" in makefile for line in lines)
+
+
+def test_what_the_page_shows_of_an_own_effect_is_that_of_the_recipe() -> None:
+    recipe = section("CONTRIBUTING.md", "An effect")
+    shown = re.findall(r"```text\n(.*?)```", section("README.md", "My own effect"), re.DOTALL)
+    assert shown[0] in recipe
+    assert "worm-error" in shown[1]
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_is_documented(name: str) -> None:
+    assert f"\n| `rig {name}" in (ROOT / "docs" / "commands.md").read_text(encoding="utf-8"), (
+        f"docs/commands.md has no line for rig {name}"
+    )
+
+
+def test_no_command_is_documented_that_is_not_there() -> None:
+    named = re.findall(r"^\| `rig ([a-z-]+)", (ROOT / "docs" / "commands.md").read_text(encoding="utf-8"), re.MULTILINE)
+    assert set(named) == set(COMMANDS)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_its_links_lead_somewhere(page: Path) -> None:
+    for target, anchor in LINK.findall(page.read_text(encoding="utf-8")):
+        place = (page.parent / target) if target else page
+        assert place.exists(), f"{page}: {target}"
+        if anchor:
+            titles = re.findall(r"^#+ (.*)$", place.read_text(encoding="utf-8"), re.MULTILINE)
+            assert anchor in {title.lower().replace(" ", "-") for title in titles}, f"{page}: #{anchor}"
