@@ -1,0 +1,139 @@
+"""Discovery on tables made by formulas: order, causes and refinements, needless effects, rivals and what parts them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from calibrations.discover import Discovery, add, discover
+from calibrations.effect import catalogue
+from calibrations.model_file import read_model
+from calibrations.table import Array, Table
+from tests.calibrations.synthetic import components, poses, turns
+
+LINEAR = read_model("linear")
+COMMON = read_model("common-scale")
+
+
+def names(found: Discovery) -> list[str]:
+    return [step.name for step in found.steps]
+
+
+def directions(n: int) -> Array:
+    """Unit vectors spread over the sphere, shape (n, 3)."""
+    z = 1 - (2 * np.arange(n) + 1) / n
+    turn = np.pi * (1 + np.sqrt(5)) * np.arange(n)
+    return np.column_stack([np.sqrt(1 - z**2) * np.cos(turn), np.sqrt(1 - z**2) * np.sin(turn), z])
+
+
+def positions(outputs: Array, noise: float = 5e-5, seed: int = 0) -> Table:
+    """A table of positions, in g, each the mean of 100 samples."""
+    rng = np.random.default_rng(seed)
+    measured = outputs + noise * rng.standard_normal(outputs.shape)
+    n = len(outputs)
+    columns = dict(zip(("ax", "ay", "az"), measured.T, strict=True)) | {"n": np.full(n, 100.0)}
+    columns |= {f"{name}_std": np.full(n, 10 * noise) for name in ("ax", "ay", "az")}
+    return Table.from_columns("positions", columns, {"unit": "g"}, "made")
+
+
+def test_nothing_is_added_where_nothing_is_missing() -> None:
+    x, y, _ = components(turns())
+    found = discover(poses(turns(), 2.5 + x, 2.5 + y), LINEAR)
+    assert (found.verdict, found.steps, found.causes, dict(found.alternatives)) == ("adequate", (), (), {})
+    assert found.end is found.start
+
+
+def test_a_value_that_two_axes_share_is_freed_before_anything_new_is_added() -> None:
+    """Though the new effect is the greater, and is found first."""
+    x, y, z = components(turns())
+    square = 0.03 * z**2
+    found = discover(poses(turns(), 2.5 + 1.001 * x + square, 2.5 + 0.999 * y + square), COMMON)
+    assert [step.taken.name for step in found.path.steps] == ["z-axis-bias", "scale-factor"]
+    assert names(found) == ["scale-factor", "z-axis-bias"]
+    assert found.steps[-1].after.pooled_excess < 1.15
+
+
+def test_scales_and_angles_of_a_triad_are_found_on_positions() -> None:
+    x, y, z = directions(30).T
+    measured = np.column_stack([1.01 * x, 0.99 * y + 0.01 * x, z + 0.005 * x - 0.004 * y])
+    found = discover(positions(measured), COMMON)
+    assert names(found) == ["scale-factor", "axis-nonorthogonality"]
+    assert (found.verdict, found.causes) == ("adequate", ("scale-factor", "axis-nonorthogonality"))
+
+
+@pytest.mark.parametrize(("cubic", "causes"), [(3e-3, 2), (5e-4, 1)])
+def test_a_small_correction_of_the_form_is_a_refinement(cubic: float, causes: int) -> None:
+    x, y, _ = components(turns())
+    vx, vy = (2.5 + a + 0.01 * a**2 + cubic * a**3 for a in (x, y))
+    found = discover(poses(turns(), vx, vy), LINEAR)
+    both = ("quadratic-nonlinearity", "cubic-nonlinearity")
+    assert names(found) == list(both)
+    assert (found.causes, found.refinements) == (both[:causes], both[causes:])
+
+
+def test_an_effect_that_later_ones_make_needless_is_dropped() -> None:
+    columns = turns(step_deg=30.0)
+    x, y, _ = components(columns)
+    found = discover(poses(columns, 2.5 + x + 1.5e-3 * (y**2 + abs(x)), 2.5 + y + 1.5e-3 * (x**2 + abs(y))), LINEAR)
+    assert sorted(names(found)) == ["cross-axis-bias", "scale-factor-asymmetry"]
+    assert len(found.path.steps) == 3  # another was taken first, which explained a part of both
+    assert found.end.pooled_excess < 1.15
+    assert not found.end.model.holds(found.path.steps[0].taken.name)
+
+
+@pytest.mark.parametrize("alpha_deg", [90.0, None])
+def test_squares_of_axes_that_add_up_to_one_are_rivals(alpha_deg: float | None) -> None:
+    """In a field of 1 g: over beta at alpha = 90 deg x^2 = 1 - y^2, over alpha at beta = 0 or 180 deg x^2 = 1 - z^2."""
+    if alpha_deg is not None:
+        columns, rival = turns((alpha_deg,), step_deg=5.0), "cross-axis-bias"
+    else:
+        alpha = np.tile(np.arange(5.0, 180.0, 5.0), 4)
+        columns = {"alpha_deg": alpha, "beta_deg": np.repeat([0.0, 180.0, 0.0, 180.0], 35), "t_s": 7.0 * np.arange(140)}
+        rival = "z-axis-bias"
+    x, y, _ = components(columns)
+    table = poses(columns, 2.5 + x + 2e-3 * x**2, 2.5 + y)
+    if alpha_deg is None:
+        table = Table.from_columns("poses", {k: v for k, v in table.columns.items() if "vy" not in k}, source="made")
+    found = discover(table, LINEAR)
+    assert found.verdict == "ambiguous"
+    (cause,) = found.causes
+    assert rival in {cause, *found.alternatives[cause]}
+    assert {cause, *found.alternatives[cause]} <= {"quadratic-nonlinearity", "cross-axis-bias", "z-axis-bias"}
+    assert found.next_experiment is not None
+    assert found.next_experiment.procedure == "motion"
+    assert found.next_experiment.separates == tuple((cause, name) for name in found.alternatives[cause])
+
+
+def test_a_turned_sensor_and_a_turned_stage_are_told_apart_face_down() -> None:
+    columns = turns(step_deg=45.0)
+    x, y, _ = components(columns)
+    turn = np.radians(0.1)
+    vx, vy = np.cos(turn) * x - np.sin(turn) * y, np.cos(turn) * y + np.sin(turn) * x
+    found = discover(poses(columns, 2.5 + vx, 2.5 + vy), LINEAR)
+    assert found.verdict == "ambiguous"
+    (cause,) = found.causes
+    assert {"axis-misalignment", "stage-zero-offset"} <= {cause, *found.alternatives[cause]}
+    assert found.next_experiment is not None
+    assert (found.next_experiment.procedure, found.next_experiment.settings) == ("sweep", {"flip": 1})
+
+
+def test_what_no_effect_describes_is_unexplained() -> None:
+    columns = turns()
+    x, y, _ = components(columns)
+    step = 0.005 * (columns["t_s"] > 1000)
+    found = discover(poses(columns, 2.5 + x + step, 2.5 + y - step), LINEAR)
+    assert found.verdict == "unexplained"
+    assert found.residual_structure
+    assert found.next_experiment is None
+
+
+def test_the_effect_that_a_person_chooses_is_added_whatever_it_is_worth() -> None:
+    x, y, z = components(turns())
+    table = poses(turns(), 2.5 + x + 0.002 * z**2, 2.5 + y + 0.002 * z**2)
+    right = add(catalogue()["z-axis-bias"], LINEAR, table)
+    wrong = add(catalogue()["cubic-nonlinearity"], LINEAR, table)
+    assert (right.verdict, right.causes) == ("adequate", ("z-axis-bias",))
+    assert right.steps[0].held_out_after < 1.15 < right.steps[0].held_out_before
+    assert wrong.verdict == "unexplained"
+    assert wrong.steps[0].held_out_after > 0.9 * wrong.steps[0].held_out_before
+    assert right.start.model.effects == LINEAR.effects
