@@ -85,7 +85,7 @@ def best_pair(before: Fit, found: list[Candidate]) -> tuple[Candidate, Candidate
     return best if least < SIGNIFICANT else None
 
 
-def _tail(twice_gain: float, rows: int, rank: int, free: int) -> float:
+def _tail(twice_gain: float, rows: int, rank: int, free: float) -> float:
     """Chance of such a gain on noise. F rather than chi-squared: the noise's level is estimated from these rows."""
     return float(fdtrc(rank, free, np.expm1(min(twice_gain / rows, 500.0)) * free / rank))
 
@@ -133,7 +133,9 @@ def _judge(
     before, rank = screen.fit, basis.shape[1]
     smooth = before.problem.smooth.shape[1]
     score = screen.statistic(basis)
-    free = before.residual.size - before.jacobian.shape[2] - rank - smooth * len(before.channels)
+    free = min(
+        before.residual.size - before.jacobian.shape[2] - rank - smooth * len(before.channels), before.noise.freedom
+    )
     p_score = float(fdtrc(rank, free, score / rank)) if smooth else 1.0
     p_refitted = _tail(refitted, before.residual.size, rank, free)
     tests = 2 if smooth else 1

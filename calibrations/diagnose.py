@@ -18,12 +18,12 @@ from calibrations.experiment import Experiment, separating
 from calibrations.fit import Fit
 from calibrations.held_out import held_out_excess
 from calibrations.model import Model
-from calibrations.path import MATERIAL, Path, find_path
+from calibrations.path import MATERIAL, Path, find_path, share_left
 from calibrations.patterns import patterns
 from calibrations.screen import Screen, Search
 from calibrations.table import Table
 
-MOST_SCATTER = 1.5  # times the noise floor: more from row to row is not the sensor's own noise
+MOST_NOISE = 2.5  # times the noise floor: more than white and slow noise of a sensor alone
 MOST_LEFT = 1 / 3  # of the excess variance: more left than this, and the catalogue has not explained it
 
 
@@ -47,7 +47,7 @@ class Diagnosis:
 
 def diagnose(table: Table, model: Model, effects: Mapping[str, Effect] | None = None) -> Diagnosis:
     """Fit `model` to `table` and find what it misses. Raises what `fit` raises."""
-    path = find_path(model, table, catalogue() if effects is None else effects)
+    path = find_path(model, table, catalogue() if effects is None else effects, enough=MOST_LEFT)
     structure = structure_of(path.end)
     left = path.left
     verdict = verdict_of(path, structure)
@@ -64,18 +64,16 @@ def diagnose(table: Table, model: Model, effects: Mapping[str, Effect] | None = 
 
 def verdict_of(path: Path, structure: str | None) -> str:
     """The verdict on the model at the start of `path`, given what is left at its end."""
-    if structure is not None and share_left(path) > MOST_LEFT and path.end.pooled_excess > MATERIAL:
+    if structure is not None and _share_left(path) > MOST_LEFT and path.end.pooled_excess > MATERIAL:
         return "unexplained"
     if not path.steps:
         return "adequate"
     return "ambiguous" if path.steps[0].taken.indistinguishable_from else "effect-missing"
 
 
-def share_left(path: Path) -> float:
+def _share_left(path: Path) -> float:
     """Part of the excess variance that the path has not explained; 1 where it has not begun."""
-    if not path.steps:
-        return 1.0
-    return max(path.end.pooled_excess**2 - 1, 0.0) / max(path.start.pooled_excess**2 - 1, 1e-9)
+    return share_left(path.start, path.end) if path.steps else 1.0
 
 
 def structure_of(fit: Fit) -> str | None:
@@ -89,12 +87,13 @@ def structure_of(fit: Fit) -> str | None:
     if len(tried) and np.min(search.p_values) < SIGNIFICANT:
         significant = np.where(search.p_values < SIGNIFICANT, worth, -np.inf)
         return tried[int(np.argmax(significant))][0].text
-    return _scatter(fit)
+    return _patternless(fit)
 
 
-def _scatter(fit: Fit) -> str | None:
-    """Scatter without a pattern. On positions it is how well a hand repeats them, and no effect of the sensor."""
-    if fit.table.kind != "poses" or not fit.noise.known or fit.pooled_excess <= MATERIAL:
+def _patternless(fit: Fit) -> str | None:
+    """More noise than a sensor makes by itself. On positions it is how well a hand repeats them, and no effect."""
+    if fit.table.kind != "poses" or not fit.noise.known or fit.pooled_excess <= MOST_NOISE:
         return None
-    beyond = float(np.max(fit.noise.scatter / fit.noise.floor))
-    return f"scatter without a pattern, {beyond:.1f} x the noise floor" if beyond > MOST_SCATTER else None
+    slow, scatter = (float(np.max(noise / fit.noise.floor)) for noise in (fit.noise.slow, fit.noise.scatter))
+    what = "slow drift" if slow > scatter else "scatter"
+    return f"{what} without a pattern, {max(slow, scatter):.1f} x the noise floor"

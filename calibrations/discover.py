@@ -14,13 +14,13 @@ from functools import cached_property
 import numpy as np
 
 from calibrations.candidates import SIGNIFICANT, Candidate, candidates
-from calibrations.diagnose import MOST_LEFT, share_left, structure_of
+from calibrations.diagnose import MOST_LEFT, structure_of
 from calibrations.effect import Effect, catalogue
 from calibrations.experiment import Experiment, separating
 from calibrations.fit import Fit, fit, refit
 from calibrations.held_out import held_out_excess
 from calibrations.model import Model
-from calibrations.path import MATERIAL, Path, find_path
+from calibrations.path import MATERIAL, Path, find_path, share_left
 from calibrations.screen import chance
 from calibrations.table import Table
 
@@ -96,7 +96,7 @@ def discover(table: Table, model: Model, effects: Mapping[str, Effect] | None = 
     path = find_path(model, table, effects)
     structure = structure_of(path.end)
     left = path.end.pooled_excess > MATERIAL and structure is not None
-    if left and share_left(path) > MOST_LEFT:
+    if left and (not path.steps or share_left(path.start, path.end) > MOST_LEFT):
         return Discovery(path.start, (), "unexplained", (), (), {}, structure, None, path)
     kept = _needed(path)
     steps = _in_order(path, kept, effects)

@@ -18,6 +18,8 @@ import numpy as np
 from calibrations.kernels import whiten
 from calibrations.table import Array
 
+SLOW_FREEDOM = 60.0  # as a process has whose time constant is a hundredth of the record
+
 
 @dataclass(frozen=True)
 class Noise:
@@ -53,6 +55,11 @@ class Noise:
     def slow(self) -> Array:
         """Standard deviation of the slow noise."""
         return self.ratio * rms(self.fast)
+
+    @property
+    def freedom(self) -> float:
+        """Degrees of freedom with which the noise is known: few where it is slow, as a record holds few long times."""
+        return SLOW_FREEDOM if np.any(self.slow > 0.1 * rms(self.fast)) else float(self.white.size)
 
     def is_like(self, other: Noise) -> bool:
         """Whether both weigh the rows alike, scatter within 1 % of the noise."""

@@ -44,7 +44,7 @@ class Path:
 
     start: Fit
     steps: tuple[Step, ...]
-    left: tuple[Candidate, ...]  # candidates at the end, none of them good enough
+    left: tuple[Candidate, ...]  # candidates of the last search
 
     @property
     def end(self) -> Fit:
@@ -57,8 +57,11 @@ class Path:
         return self.steps[0].candidates if self.steps else self.left
 
 
-def find_path(model: Model, table: Table, effects: Mapping[str, Effect]) -> Path:
-    """Add the best effect until none is significant. Raises what `fit` raises."""
+def find_path(model: Model, table: Table, effects: Mapping[str, Effect], enough: float = 0.0) -> Path:
+    """Add the best effect until none is significant, or no more than `enough` of the excess variance is left.
+
+    Raises what `fit` raises.
+    """
     start = present = fit(model, table)
     steps: list[Step] = []
     found = candidates(present, effects)
@@ -68,8 +71,15 @@ def find_path(model: Model, table: Table, effects: Mapping[str, Effect]) -> Path
             break
         steps.append(step)
         present = step.after
+        if share_left(start, present) <= enough:
+            break
         found = candidates(present, effects)
     return Path(start, tuple(steps), tuple(found))
+
+
+def share_left(start: Fit, present: Fit) -> float:
+    """Part of the excess variance at the start that the present fit has not explained."""
+    return max(present.pooled_excess**2 - 1, 0.0) / max(start.pooled_excess**2 - 1, 1e-9)
 
 
 def _next(present: Fit, found: list[Candidate]) -> Step | None:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.special import chdtrc
+from scipy.special import chdtrc, fdtrc
 
 from calibrations.fit import Fit
 from calibrations.table import Array
@@ -45,6 +45,12 @@ class Screen:
         left = np.linalg.norm(free, axis=0)
         keep = left > SMALLEST * np.where(size > 0, size, 1.0)
         return _basis(free[:, keep])
+
+    @property
+    def free(self) -> int:
+        """Rows that the model leaves free."""
+        rows, explained = self.explained.shape
+        return max(int(rows - explained), 1)
 
     def statistic(self, basis: Array) -> float:
         """Sum of squares of the residual along `basis`."""
@@ -84,8 +90,10 @@ class Search:
 
     @cached_property
     def p_values(self) -> Array:
-        """Chance that the best of this search does as well as each basis, on noise alone."""
-        single = np.where(self.ranks > 0, chdtrc(np.maximum(self.ranks, 1), self.statistics), 1.0)
+        """Chance that the best of this search does as well as each basis, on noise alone (F: its level is fitted)."""
+        ranks = np.maximum(self.ranks, 1)
+        free = min(self.screen.free, self.screen.fit.noise.freedom)
+        single = np.where(self.ranks > 0, fdtrc(ranks, free, self.statistics / ranks), 1.0)
         return of_search(single, self.trials)
 
 

@@ -63,6 +63,14 @@ def _told(result: Diagnosis, data: str, model: str) -> str:
     return "\n".join(lines).rstrip()
 
 
+def _more(result: Diagnosis) -> str:
+    """What is left once the effect is added, where that is more than noise."""
+    from calibrations.path import MATERIAL
+
+    left = result.path.steps[0].held_out_after
+    return f" More may be: with it, {left:.3g} x the noise floor is left on unseen poses." if left > MATERIAL else ""
+
+
 def headline(result: Diagnosis) -> str:
     """The verdict in a sentence."""
     if result.verdict == "adequate":
@@ -75,6 +83,4 @@ def headline(result: Diagnosis) -> str:
     if result.verdict == "ambiguous":
         rivals = " or ".join((best.name, *best.indistinguishable_from))
         return f"an effect is missing: {rivals}; this data cannot tell which."
-    more = len(result.path.steps) - 1
-    after = f", and {more} more after it" if more else ""
-    return f"an effect is missing: {best.name}{after}."
+    return f"an effect is missing: {best.name}.{_more(result)}"
