@@ -27,6 +27,8 @@ FLICKER_PROCESSES = 6
 NOT_TOLD_APART = 6.0  # of twice the log-likelihood: odds of less than 20 to 1
 FEWEST_FOR_SLOW = 20  # rows below which slow noise cannot be told from white
 ROUNDS = 3
+LEAST_STEP = 1e-9  # of the noise: less than this in one round is an exact fit, and no noise
+EXACT = 1e-12  # of a parameter's effect: noise below this is rounding
 NEARLY_SMOOTH = 1e-2  # of a column's length: less beside the smooth columns is taken as none
 
 
@@ -37,10 +39,11 @@ def estimate(start: Noise, residual: Array, jacobian: Array, smooth: Array) -> N
     found is turned into scatter, and the search repeated.
     """
     noise = start
+    rounding = 0.0 if start.known or not jacobian.size else EXACT * rms(jacobian.swapaxes(1, 2)).max(axis=1)
     for _ in range(ROUNDS):
         best = _Search(noise, residual, (jacobian,), smooth).best()
         variance = best.scale**2 * np.mean(noise.fast**2, axis=1) - np.mean(noise.white**2, axis=1)
-        scatter = np.sqrt(np.maximum(variance, 0.0))
+        scatter = np.maximum(np.sqrt(np.maximum(variance, 0.0)), rounding)
         noise = replace(noise, scatter=scatter, ratio=best.ratio, taus_s=best.taus_s)
         if np.all(np.abs(best.scale - 1) < 1e-2):
             break
@@ -147,7 +150,7 @@ class _Search:
         chosen = np.flatnonzero([origin in (0, group) for origin in self.beside[1]])
         rank = len(chosen)
         grams = [g.of(chosen) for g in self.grams]
-        least = rms(self.noise.white) / rms(self.noise.fast)
+        least = np.maximum(rms(self.noise.white) / rms(self.noise.fast), LEAST_STEP)
         free = n - self.smooth.shape[1]
         pick, scale = [0] * channels, np.ones(channels)
         for _ in range(4 if channels > 1 else 1):
@@ -211,7 +214,7 @@ def _scores(g: _Grams, rest: Array, free: int, least: float) -> tuple[Array, Arr
         extended = np.concatenate([-solved[:, :, 0], np.ones((len(solved), 1))], axis=1)
         rss = np.einsum("gi,gij,gj->g", extended, g.gram, extended)
         variance = np.maximum(rss, 0.0) / np.maximum(free - borne, 1.0)
-        scale = np.maximum(np.sqrt(variance), max(least, 1e-300))
+        scale = np.maximum(np.sqrt(variance), least)
     other = np.einsum("gi,ij,gj->g", extended, rest, extended)
     information = g.information + np.linalg.slogdet(normal)[1]
     return rss / scale**2 + other + g.logdet + information + 2 * free * np.log(scale), scale

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrations.chain import backward, force, forward
-from calibrations.errors import ModelError, TooFewRows
+from calibrations.errors import DataError, ModelError, TooFewRows
 from calibrations.lack_of_fit import smooth_columns
 from calibrations.mean_noise import norm_std, white_std
 from calibrations.model import Model
@@ -36,6 +36,8 @@ class Problem:
         model = model.for_table(table)
         if table.kind not in ("poses", "positions"):
             raise ModelError(f"{table.source}: models are fitted to poses or positions, not to a table of {table.kind}")
+        if table.kind == "positions":
+            _check_positions(table)
         layout = Layout.of(model, table)
         rows = table.n * len(table.axes) if table.kind == "poses" else table.n
         if rows <= len(layout.slots):
@@ -110,3 +112,14 @@ class Problem:
     def smooth(self) -> Array:
         """Columns set aside when noise is estimated, shape (n, k)."""
         return smooth_columns(self.table)
+
+
+def _check_positions(table: Table) -> None:
+    """Positions turn each of three axes. Raises DataError."""
+    if len(table.axes) < 3:
+        raise DataError(
+            f"{table.source}: models of positions need the columns ax, ay, az; it has: {', '.join(table.columns)}"
+        )
+    still = [name for name, spread in zip(("ax", "ay", "az"), np.ptp(table.outputs, axis=0), strict=True) if not spread]
+    if still:
+        raise DataError(f'{table.source}: the column "{still[0]}" never changes; positions turn each axis up and down')

@@ -155,6 +155,7 @@ def _check(table: Table) -> None:
     if not table.n:
         raise DataError(f"{table.source}: the table has no rows")
     _check_columns(table)
+    _check_numbers(table)
     for name, values in table.columns.items():
         bad = np.flatnonzero(~np.isfinite(values))
         if len(bad):
@@ -162,6 +163,25 @@ def _check(table: Table) -> None:
                 f'{table.source}: row {bad[0] + 1}, column "{name}" is {values[bad[0]]}, not a finite number'
                 f"{f' (and {len(bad) - 1} more)' if len(bad) > 1 else ''}; remove the row or the column"
             )
+
+
+def _check_numbers(table: Table) -> None:
+    """Counts, standard deviations, directions and constants that cannot be."""
+    for name, values in table.columns.items():
+        if name == "n":
+            bad, must = values < 1, "at least 1: it counts averaged samples"
+        elif name == "direction":
+            bad, must = ~np.isin(values, (-1, 0, 1)), "1 (beta growing), -1 (falling) or 0 (unknown)"
+        elif "_std" in name:
+            bad, must = values < 0, "0 or more"
+        else:
+            continue
+        if bad.any():
+            row = int(np.argmax(bad))
+            raise DataError(f'{table.source}: row {row + 1}, column "{name}" is {values[row]:g}; it must be {must}')
+    for name in ("filter_corner_hz", "sample_rate_hz", "gravity_m_s2"):
+        if not table.number(name, 1.0) > 0:
+            raise DataError(f'{table.source}: the constant "{name}" is {table.constants[name]}; it must be above 0')
 
 
 def _check_columns(table: Table) -> None:

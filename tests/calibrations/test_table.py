@@ -44,10 +44,35 @@ def test_missing_column_names_the_nearest() -> None:
 
 
 def test_a_constant_must_be_a_number() -> None:
-    table = Table.from_columns("poses", POSES, {"gravity_m_s2": "about ten", "approach_deg": "5"}, "made.csv")
+    table = Table.from_columns("poses", POSES, {"approach_deg": "5", "serial": "A 7"}, "made.csv")
     assert table.number("approach_deg", 0.0) == 5.0
-    with pytest.raises(DataError, match="the constant \"gravity_m_s2\" is 'about ten', not a number"):
-        _ = table.gravity_m_s2
+    with pytest.raises(DataError, match="the constant \"serial\" is 'A 7', not a number"):
+        table.number("serial", 0.0)
+
+
+@pytest.mark.parametrize("name", ["gravity_m_s2", "sample_rate_hz", "filter_corner_hz"])
+@pytest.mark.parametrize(
+    ("value", "says"), [("ten", "'ten', not a number"), (0.0, "0.0; it must be above 0"), (-1.0, "-1")]
+)
+def test_a_constant_that_cannot_be(name: str, value: str | float, says: str) -> None:
+    with pytest.raises(DataError, match=f'made.csv: the constant "{name}" is {says}'):
+        Table.from_columns("poses", POSES, {name: value}, "made.csv")
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "says"),
+    [
+        ("n", 0.0, "is 0; it must be at least 1: it counts averaged samples"),
+        ("vx_std_v", -1e-3, "is -0.001; it must be 0 or more"),
+        ("direction", 2.0, r"is 2; it must be 1 \(beta growing\), -1 \(falling\) or 0 \(unknown\)"),
+    ],
+)
+def test_a_number_that_cannot_be(name: str, value: float, says: str) -> None:
+    rows = len(next(iter(POSES.values())))
+    column = np.ones(rows)
+    column[1] = value
+    with pytest.raises(DataError, match=f'made.csv: row 2, column "{name}" {says}'):
+        Table.from_columns("poses", {**POSES, name: column}, source="made.csv")
 
 
 def test_columns_cannot_be_changed() -> None:

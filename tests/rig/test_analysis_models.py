@@ -12,6 +12,7 @@ import yaml
 
 from calibrations.model_file import read_model
 from calibrations.read_csv import read_csv, write_csv
+from calibrations.table import Table
 from tests.calibrations.synthetic import components, poses, turns
 
 Rig = Callable[..., Any]
@@ -89,6 +90,21 @@ def test_a_fitted_model_is_evaluated_as_it_is(rig: Rig, data: str, tmp_path: Pat
     assert other["rmse"]["x"] == pytest.approx(0.01, rel=0.02)
     assert other["fails"][0]["excess"] > 100
     assert model.read_bytes() == before
+
+
+def test_data_without_any_noise_has_its_answer(rig: Rig, tmp_path: Path) -> None:
+    columns = turns(step_deg=30.0)
+    x, y, z = components(columns)
+    whole = poses(columns, 2.5 + x + 0.002 * z**2, 2.5 + y, seed=None)
+    bare = {name: values for name, values in whole.columns.items() if "std" not in name and name != "n"}
+    write_csv(Table.from_columns("poses", bare), tmp_path / "exact.csv")
+    ended = rig(
+        "discover", str(tmp_path / "exact.csv"), "--model", "linear", "--out", str(tmp_path / "m.yaml"), "--json"
+    )
+    found = json.loads(ended.out)
+    assert (ended.status, found["verdict"], found["causes"]) == (0, "adequate", ["z-axis-bias"])
+    values = [e.value for term in read_model(tmp_path / "m.yaml").terms for e in term.estimates]
+    assert values == pytest.approx([2.5, 2.5, 1.0, 1.0, 0.002, 0.0], abs=1e-9)
 
 
 def test_a_model_is_named_or_a_file(rig: Rig, data: str, tmp_path: Path) -> None:

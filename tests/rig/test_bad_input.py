@@ -140,6 +140,23 @@ def test_a_file_that_is_no_table(refused: Callable[..., str], work: Path, text: 
     assert says in refused("fit", "bad.csv", "--model", "linear", "--out", "out.yaml", "--json")
 
 
+@pytest.mark.parametrize(
+    ("head", "row", "says"),
+    [
+        ("mx,my,mz", (1, 2, 3), "bad.csv: models of positions need the columns ax, ay, az; it has: mx, my, mz"),
+        ("ax,ay,az", (1, 0, 3), 'bad.csv: the column "ay" never changes; positions turn each axis up and down'),
+        ("ax,ay,az,n", (1, 2, 3, 0), 'bad.csv: row 1, column "n" is 0; it must be at least 1'),
+    ],
+)
+def test_positions_that_cannot_be(
+    refused: Callable[..., str], work: Path, head: str, row: tuple[int, ...], says: str
+) -> None:
+    rows = "\n".join(",".join(str(k * factor) for factor in row) for k in range(20))
+    (work / "bad.csv").write_text(f"{head}\n{rows}\n")
+    for command in ("fit", "diagnose"):
+        assert says in refused(command, "bad.csv", "--model", "linear")
+
+
 def test_fewer_poses_than_parameters(refused: Callable[..., str], work: Path, text: str) -> None:
     (work / "few.csv").write_text("\n".join(text.splitlines()[:4]))
     for command in ("fit", "compare", "diagnose", "discover"):
@@ -360,7 +377,7 @@ def test_an_effect_of_ones_own_with_a_fault(
             ("log.csv",),
             "log.csv: a raw log needs the column t_s, or a line such as `# sample_rate_hz: 100` above its header",
         ),
-        (("log.csv", "--constant", "sample_rate_hz=0"), "log.csv: a raw log needs the column t_s"),
+        (("log.csv", "--constant", "sample_rate_hz=0"), 'constant "sample_rate_hz" is 0.0; it must be above 0'),
         (("log.csv", "--constant", "sample_rate_hz=fast"), "the constant \"sample_rate_hz\" is 'fast', not a number"),
         (
             ("log.csv", "--constant", "sample_rate_hz=100"),
