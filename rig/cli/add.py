@@ -23,7 +23,7 @@ def command(effect: str, model: str, data: str, out: Path, bench_file: Path | No
     from calibrations.effect import find
     from calibrations.errors import ModelError
     from rig.cli.asked import asked, write_model
-    from rig.cli.words import discovery, parameters
+    from rig.cli.words import addition, parameters
 
     table, start, effects = asked(data, model, bench_file, out)
     chosen = find(effect, effects)
@@ -36,5 +36,7 @@ def command(effect: str, model: str, data: str, out: Path, bench_file: Path | No
     if as_json:
         emit(discovery_document(result, str(out)))
     else:
-        click.echo(f"{effect} added to {start.name}\n\n{discovery(result)}\n\n{parameters(result.end.model)}\n")
+        click.echo(
+            f"{effect} added to {start.name}\n\n{addition(result, data, out)}\n\n{parameters(result.end.model)}\n"
+        )
         click.echo(f"written to {out}")

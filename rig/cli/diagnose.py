@@ -33,11 +33,11 @@ def command(data: str, model: str | None, check: bool, bench_file: Path | None, 
     if as_json:
         emit(diagnosis_document(result, name))
     else:
-        click.echo(_told(result, data, name))
+        click.echo(_told(result, data, name, f" --bench {bench_file}" if bench_file else ""))
     return 1 if check and result.verdict != "adequate" else 0
 
 
-def _told(result: Diagnosis, data: str, model: str) -> str:
+def _told(result: Diagnosis, data: str, model: str, bench: str) -> str:
     from calibrations.documents import why
 
     lines = [f"{model} on {result.fit.table.n} rows of {result.fit.table.source}: {headline(result)}", ""]
@@ -57,7 +57,7 @@ def _told(result: Diagnosis, data: str, model: str) -> str:
     if result.verdict in ("effect-missing", "ambiguous"):
         best = result.path.steps[0].taken
         lines += [f"{best.name}: {why(best, result)}", "", f"    {best.effect.formula.splitlines()[0]}", ""]
-        lines.append(f"Add it: rig add {best.name} --model {model} --data {data} --out model.yaml")
+        lines.append(f"Add it: rig add {best.name} --model {model} --data {data} --out model.yaml{bench}")
     if result.next_experiment:
         lines.append(f"To tell them apart: {result.next_experiment.why}.")
     return "\n".join(lines).rstrip()

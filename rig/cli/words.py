@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from pathlib import Path
 
 from calibrations.discover import Discovery
 from calibrations.errors import DataError
@@ -64,18 +65,33 @@ def quantity(value: float, unit: str) -> str:
 
 def discovery(result: Discovery) -> str:
     """The falling error, step by step, and the verdict."""
+    return "\n".join([falling(result), "", _verdict(result), *_rivals(result)])
+
+
+def addition(result: Discovery, data: str, out: Path) -> str:
+    """The falling error with one effect added, and whether more is missing."""
+    end = f"What is left is {result.end.pooled_excess:.2f} x the noise floor."
+    if result.verdict == "unexplained":
+        end += (
+            f" It is not noise: {result.residual_structure}.\nWhat else is missing: rig diagnose {data} --model {out}"
+        )
+    return "\n".join([falling(result), "", end, *_rivals(result)])
+
+
+def falling(result: Discovery) -> str:
+    """The error of each model, as a table with bars."""
     first = result.start
     rows = [(first.model.name, f"{first.pooled_excess:.2f}", f"{held_out_excess(first):.2f}", _bar(first, first))]
     rows += [
         (f"+ {s.name}", f"{s.after.pooled_excess:.2f}", f"{s.held_out_after:.2f}", _bar(s.after, first))
         for s in result.steps
     ]
-    lines = [columns(("model", "error / floor", "unseen poses", ""), rows), "", _verdict(result)]
-    for name, rivals in result.alternatives.items():
-        lines.append(f"This data cannot tell {name} from {joined(rivals)}.")
-    if result.next_experiment:
-        lines.append(f"To tell them apart: {result.next_experiment.why}.")
-    return "\n".join(lines)
+    return columns(("model", "error / floor", "unseen poses", ""), rows)
+
+
+def _rivals(result: Discovery) -> list[str]:
+    lines = [f"This data cannot tell {name} from {joined(rivals)}." for name, rivals in result.alternatives.items()]
+    return [*lines, f"To tell them apart: {result.next_experiment.why}."] if result.next_experiment else lines
 
 
 def _bar(found: Fit, first: Fit) -> str:
