@@ -173,15 +173,14 @@ def _with_probabilities(found: list[Candidate], rows: int, unseen: float) -> lis
 
 
 def _like(c: Candidate, others: list[Candidate], screen: Screen) -> tuple[str, ...]:
-    """Candidates that would take up nearly all that `c` takes up, at no greater price."""
+    """Candidates that would take up nearly all that `c` takes up, with at most one parameter more."""
     signal = c.basis @ (c.basis.T @ screen.residual)
     strength = float(signal @ signal)
     if strength < 2 * NOT_TOLD_APART:
         return ()
-    price = float(np.log(len(signal)))
     same = []
     for other in others:
-        lost = strength - float(np.sum((other.basis.T @ signal) ** 2)) + price * (other.rank - c.rank)
-        if other is not c and lost < NOT_TOLD_APART:
+        lost = strength - float(np.sum((other.basis.T @ signal) ** 2))
+        if other is not c and lost < NOT_TOLD_APART and other.rank <= c.rank + 1:
             same.append(other.name)
     return tuple(same)

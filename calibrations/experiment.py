@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from calibrations.candidates import Candidate
 
+LEVELS = {"stage-zero-offset", "base-tilt"}
 SQUARES = {"bias", "quadratic-nonlinearity", "cross-axis-bias", "z-axis-bias"}
 
 
@@ -30,6 +31,9 @@ def separating(best: Candidate) -> Experiment | None:
     if names <= SQUARES:
         why = "in a field of 1 g the squares of the three axes add up to a constant; motion along one axis does not"
         return Experiment("motion", {}, pairs, why)
+    if names <= LEVELS:
+        why = "an offset of alpha and a tilt of the base turn gravity alike at every pose; a digital level tells them"
+        return Experiment("level-check", {}, pairs, why)
     if names & {"axis-misalignment"} and names & {"stage-zero-offset", "base-tilt"}:
         why = "mounted face down, an error of the sensor's axes turns with the sensor and one of the stage does not"
         return Experiment("sweep", {"flip": 1}, pairs, why)

@@ -41,7 +41,7 @@ def noise_floor_v(config: WorldConfig = IDEAL) -> float:
 
 def clean_rig(seed: int) -> Table:
     """A sweep on a rig without a defect."""
-    return _swept(IDEAL, seed)
+    return swept(IDEAL, seed)
 
 
 def rig_with(defect_name: str, times_noise: float, seed: int) -> Table:
@@ -57,10 +57,10 @@ def unexplained_rig(name: str, times_noise: float, seed: int) -> Table:
 def scaled(defect: Defect, config: WorldConfig, seed: int, target_v: float) -> WorldConfig:
     """`config` with the defect at the size at which its unexplained rms is `target_v`, within 1 %."""
     share = _y_share(seed)
-    clean, size = _swept(config.changed(defect.settings(0.0, share)), seed, noise_free=True), 1.0
+    clean, size = swept(config.changed(defect.settings(0.0, share)), seed, noise_free=True), 1.0
     for _ in range(12):
         changed = config.changed(defect.settings(size, share))
-        rms = unexplained_rms_v(_swept(changed, seed, noise_free=True), clean)
+        rms = unexplained_rms_v(swept(changed, seed, noise_free=True), clean)
         if abs(rms / target_v - 1) < 0.01:
             return changed
         size *= target_v / rms
@@ -87,10 +87,11 @@ def _y_share(seed: int) -> float:
 
 
 def _defective(defect: Defect, times_noise: float, seed: int) -> Table:
-    return _swept(scaled(defect, IDEAL, seed, times_noise * noise_floor_v()), seed)
+    return swept(scaled(defect, IDEAL, seed, times_noise * noise_floor_v()), seed)
 
 
-def _swept(config: WorldConfig, seed: int, noise_free: bool = False) -> Table:
+def swept(config: WorldConfig, seed: int, noise_free: bool = False) -> Table:
+    """A sweep on a rig of the given physics."""
     alpha, beta, direction = sweep()
     # No scatter of the defect itself: its size is the one that was chosen.
     config = config.changed({"spread": {"imperfection_fraction": 0.0}})

@@ -107,3 +107,21 @@ def test_bias_and_scale_factor_are_missed_like_any_other(missing: str) -> None:
     found = diagnose(columns, start)
     assert found.path.steps[0].taken.name == missing
     assert found.path.steps[0].held_out_after <= 1.15
+
+
+TWINS = [
+    ({"sensor": {"package": {"turn_z_deg": 0.05}}}, {"axis-misalignment", "stage-zero-offset"}, ("sweep", {"flip": 1})),
+    ({"base": {"tilt_y_deg": 0.05}}, {"base-tilt", "stage-zero-offset"}, ("level-check", {})),
+]
+
+
+@pytest.mark.parametrize(("defect", "names", "experiment"), TWINS, ids=["turned about z", "tilted about alpha"])
+def test_what_no_pose_can_tell_apart_is_listed_with_the_experiment_that_can(
+    defect: dict[str, object], names: set[str], experiment: tuple[str, dict[str, int]]
+) -> None:
+    found = diagnose(table(rigs.swept(rigs.IDEAL.changed(defect), seed=8)), linear())
+    best = found.path.steps[0].taken
+    assert found.verdict == "ambiguous"
+    assert {best.name, *best.indistinguishable_from} == names
+    assert found.next_experiment is not None
+    assert (found.next_experiment.procedure, dict(found.next_experiment.settings)) == experiment
