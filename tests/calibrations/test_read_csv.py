@@ -30,7 +30,8 @@ def tables(draw: st.DrawFn) -> Table:
     optional = draw(st.sets(st.sampled_from(["vy_v", "t_s", "direction", "temperature_c", "n"])))
     unknown = draw(st.sets(names, max_size=2))
     wanted = ["alpha_deg", "beta_deg", "vx_v", *sorted(optional), *sorted(unknown)]
-    columns = {name: draw(st.lists(numbers, min_size=n, max_size=n)) for name in wanted}
+    own = {"direction": st.sampled_from([-1.0, 0.0, 1.0]), "n": st.floats(1, 1e9)}
+    columns = {name: draw(st.lists(own.get(name, numbers), min_size=n, max_size=n)) for name in wanted}
     labels = (
         {"path": tuple(draw(st.lists(words.map(str.strip), min_size=n, max_size=n)))} if draw(st.booleans()) else {}
     )
