@@ -6,14 +6,14 @@ from pathlib import Path
 
 import click
 
-from rig.cli.output import bench_option, emit, json_option
+from rig.cli.output import bench_option, check_option, emit, json_option, model_option
 
 
 @click.command("fit")
 @click.argument("data")
-@click.option("--model", default=None, help="A shipped model by name, or a model file. Default: by kind of data.")
+@model_option
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="Write the fitted model to this file.")
-@click.option("--check", is_flag=True, help="Exit with 1 unless the model is adequate.")
+@check_option
 @bench_option
 @json_option
 def command(data: str, model: str | None, out: Path | None, check: bool, bench_file: Path | None, as_json: bool) -> int:

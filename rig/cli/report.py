@@ -6,12 +6,12 @@ from pathlib import Path
 
 import click
 
-from rig.cli.output import bench_option, emit, json_option
+from rig.cli.output import bench_option, emit, json_option, model_option
 
 
 @click.command("report")
 @click.argument("data")
-@click.option("--model", default=None, help="A shipped model by name, or a model file. Default: by kind of data.")
+@model_option
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="Write the page to this HTML file.")
 @click.option("--pictures", "folder", type=click.Path(file_okay=False, path_type=Path), help="Write all pictures here.")
 @click.option("--format", "form", type=click.Choice(["png", "svg"]), default="png", show_default=True)
