@@ -17,6 +17,7 @@ from drivers.simulation.errors import BadSetting, UnknownSetting, nearest
 from drivers.simulation.friction import Friction
 from drivers.simulation.gravity import Base, Package
 from drivers.simulation.heat import Heat, Oven
+from drivers.simulation.level import Level
 from drivers.simulation.noise import Noise
 from drivers.simulation.oddities import Oddities
 from drivers.simulation.plates import Plates
@@ -68,6 +69,7 @@ class WorldConfig:
     supply: Supply = field(default_factory=Supply)
     noise: Noise = field(default_factory=Noise)
     converter: Converter = field(default_factory=Converter)
+    level: Level = field(default_factory=Level)
     oddities: Oddities = field(default_factory=Oddities)
     spread: Spread = field(default_factory=Spread)
 
@@ -179,4 +181,5 @@ ADXL203: dict[str, Any] = {
     "supply": {"wander_v": 0.0002},
     "noise": {"flicker_v": 5e-6},
     "converter": {"noise_v": 60e-6},
+    "level": {"offset_x_deg": 0.012, "offset_y_deg": -0.008},
 }

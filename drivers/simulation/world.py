@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from drivers.simulation import dwell, gravity, mechanics, sampling, stage, state, visit
+from drivers.simulation import dwell, gravity, level, mechanics, sampling, stage, state, visit
 from drivers.simulation.beginning import beginning
 from drivers.simulation.config import WorldConfig
 from drivers.simulation.errors import TimeReversal, UnknownInput, nearest
@@ -29,6 +29,7 @@ class World:
     def __init__(self, config: WorldConfig, seed: int) -> None:
         self.config = individual(config, seed)
         self._numbers = record(self.config)
+        self._seed = seed
         self._slow = np.random.Generator(np.random.PCG64([seed, 1]))
         self._fast = np.random.Generator(np.random.PCG64([seed, 2]))
         self._world = beginning(self.config, self._numbers, self._slow)
@@ -77,6 +78,10 @@ class World:
         """What the thermocouple on the sensor's package shows now."""
         return float(self._world.thermocouple_c)
 
+    def level_deg(self) -> tuple[float, float]:
+        """What a level on the turntable shows now: how far the positive ends of its x and y axis are up, in deg."""
+        return level.shown_deg(self._world, self._numbers, self._seed)
+
     def adc_volts(self, inputs: Sequence[str], start_s: float, interval_s: float, n: int) -> Floats:
         """Volts at the converter's inputs, shape (n, len(inputs)), before rounding to codes.
 
@@ -93,8 +98,8 @@ class World:
         volts = np.empty((n, len(channels)))
         if n:
             self._advance_ns(start_ns)
-            fast, slow = self._fast.standard_normal((*volts.shape, 2)), self._due(int(times_ns[-1]))
-            sampling.sample(self._world, self._numbers, channels, times_ns, fast, slow, volts)
+            slow = self._due(int(times_ns[-1]))
+            sampling.sample(self._world, self._numbers, channels, times_ns, self._fast, slow, volts)
         return volts
 
     def dwell_mean(
