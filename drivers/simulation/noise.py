@@ -50,32 +50,34 @@ def tick(world: State, noise: Noise, step_s: float, normals: Floats) -> None:
 
 
 @kernel
-def kept(world: State, noise: Noise, gap_ns: int) -> float:
-    """Share of an old value that the filter still holds after `gap_ns`; the last answer is remembered."""
-    if gap_ns <= 0:
-        return 1.0
+def remember(world: State, noise: Noise, gap_ns: int) -> None:
+    """Work out what the filter keeps over `gap_ns`, unless that was asked last."""
     if gap_ns != world.kept_ns:
         world.kept_ns = gap_ns
         world.kept = math.exp(-1e-9 * gap_ns / (noise.filter_ohm * noise.filter_farad))
-    return world.kept
+        world.fresh = math.sqrt(1 - world.kept * world.kept)
 
 
 @kernel
 def charge(world: State, noise: Noise, axis: int, t_ns: int) -> None:
     """Let the capacitor of one axis follow the voltage that has stood at its input until `t_ns`."""
-    target = world.volts[axis] + world.slow_v[axis]
-    share = kept(world, noise, t_ns - world.filtered_ns[axis])
-    world.filtered_v[axis] = target + share * (world.filtered_v[axis] - target)
-    world.filtered_ns[axis] = max(t_ns, world.filtered_ns[axis])
+    gap_ns = t_ns - world.filtered_ns[axis]
+    if gap_ns > 0:
+        remember(world, noise, gap_ns)
+        target = world.volts[axis] + world.slow_v[axis]
+        world.filtered_v[axis] = target + world.kept * (world.filtered_v[axis] - target)
+        world.filtered_ns[axis] = t_ns
 
 
 @kernel
 def output_v(world: State, noise: Noise, axis: int, t_ns: int, normal: float) -> float:
     """What the capacitor of one axis holds at `t_ns`, noise included."""
     charge(world, noise, axis, t_ns)
-    share = kept(world, noise, t_ns - world.white_ns[axis])
-    world.white[axis] = share * world.white[axis] + math.sqrt(1 - share * share) * normal
-    world.white_ns[axis] = max(t_ns, world.white_ns[axis])
+    gap_ns = t_ns - world.white_ns[axis]
+    if gap_ns > 0:
+        remember(world, noise, gap_ns)
+        world.white[axis] = world.kept * world.white[axis] + world.fresh * normal
+        world.white_ns[axis] = t_ns
     volts: float = world.filtered_v[axis] + noise.white_v * world.white[axis] + hum_v(noise, t_ns)
     return volts
 

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+from numpy.random import Generator
+
 from drivers.simulation import converter, noise
 from drivers.simulation.config import WorldConfig
 from drivers.simulation.kernel import Floats, Ints, kernel
-from drivers.simulation.mechanics import STEP_NS, run_to
+from drivers.simulation.mechanics import STEP_NS, next_event_ns, run_to
 from drivers.simulation.state import State
 
 INPUTS = ("vx", "vy", "supply", "thermistor", "ground")
@@ -20,29 +23,43 @@ KELVIN = 273.15
 
 @kernel
 def sample(
-    world: State, config: WorldConfig, channels: Ints, times_ns: Ints, fast: Floats, slow: Floats, volts: Floats
+    world: State, config: WorldConfig, channels: Ints, times_ns: Ints, random: Generator, slow: Floats, volts: Floats
 ) -> None:
-    """Fill `volts` (scans, channels); `fast` holds two normal numbers per sample, `slow` a row per tick."""
-    skew_ns = round(1e9 * config.converter.skew_s)
-    used = 0
+    """Fill `volts` (scans, channels); noise is drawn from `random` sample by sample, `slow` holds a row per tick."""
+    used = done = 0
+    while done < len(times_ns):
+        used += run_to(world, config, times_ns[done], STEP_NS, slow[used:])
+        event_ns, first = next_event_ns(world, STEP_NS), done
+        while done < len(times_ns) and times_ns[done] < event_ns:
+            done += 1
+        convert(world, config, channels, times_ns[first:done], random, volts[first:done])
+        world.now_ns = max(times_ns[done - 1], world.now_ns)
+
+
+@kernel
+def convert(
+    world: State, config: WorldConfig, channels: Ints, times_ns: Ints, random: Generator, volts: Floats
+) -> None:
+    """Fill `volts` with scans between which nothing happens: only filters and noise go on."""
+    skew_ns, steady = round(1e9 * config.converter.skew_s), steady_v(world)
     for i in range(len(times_ns)):
-        used += run_to(world, config, times_ns[i], STEP_NS, slow[used:])
         for k in range(len(channels)):
-            analog = input_v(world, config, channels[k], times_ns[i] + k * skew_ns, fast[i, k, 0])
-            noisy = analog + config.converter.noise_v * fast[i, k, 1]
+            if channels[k] < SUPPLY:
+                t_ns = times_ns[i] + k * skew_ns
+                analog = noise.output_v(world, config.noise, channels[k], t_ns, random.standard_normal())
+            else:
+                analog = steady[channels[k]]
+            noisy = analog + config.converter.noise_v * random.standard_normal()
             volts[i, k] = converter.bowed_v(config.converter, noisy)
 
 
 @kernel
-def input_v(world: State, config: WorldConfig, channel: int, t_ns: int, normal: float) -> float:
-    """Voltage at one input, by its place in INPUTS."""
-    if channel < SUPPLY:
-        return noise.output_v(world, config.noise, channel, t_ns, normal)
-    if channel == SUPPLY:
-        return world.supply_v * world.powered
-    if channel == THERMISTOR:
-        return thermistor_v(world.body_c + world.board_k, world.supply_v * world.powered)
-    return 0.0
+def steady_v(world: State) -> Floats:
+    """Voltages of INPUTS that change at events only; 0 for the others."""
+    volts = np.zeros(len(INPUTS))
+    volts[SUPPLY] = world.supply_v * world.powered
+    volts[THERMISTOR] = thermistor_v(world.body_c + world.board_k, volts[SUPPLY])
+    return volts
 
 
 @kernel

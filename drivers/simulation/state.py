@@ -60,8 +60,9 @@ class State:
     filtered_ns: Ints = field(default_factory=zeros(2, dtype=int))
     white: Floats = field(default_factory=zeros(2))  # behind the filter, in units of its rms
     white_ns: Ints = field(default_factory=zeros(2, dtype=int))
-    kept_ns: int = 0  # the filter's last step, and its answer
-    kept: float = 1.0
+    kept_ns: int = 0  # the filter's last step, and its answers
+    kept: float = 1.0  # share of the old
+    fresh: float = 0.0  # share of new white noise, in rms
 
     seat: float = 0.5  # of a mount that rocks
     lid_in: float = 0.0  # 1 while a lid is popped in
