@@ -8,7 +8,7 @@ Source: T-series datasheet; see labjack_t7_table and labjack_t7_stream.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Mapping
+from collections.abc import Generator, Mapping
 from dataclasses import dataclass, field
 from urllib.parse import urlsplit
 
@@ -16,16 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers import labjack_t7_table as t7
-from drivers.errors import LimitError, LinkTimeout, Refused, StreamError
+from drivers.errors import LimitError, Refused, StreamError
 from drivers.instrument import Check, Identity
-from drivers.labjack_t7_stream import Calibration, codes_of, packet_type
+from drivers.labjack_t7_reception import Reception
+from drivers.labjack_t7_stream import Calibration
 from drivers.links import Address, Links
 from drivers.links.link import Link
 from drivers.links.modbus import Unit
 from drivers.links.register import Register
 
-GATHER_BYTES = 32768  # let this much arrive before it is read: well within any receive buffer
-PATIENCE_S = 1.0  # beyond the time at which the bytes were due
 QUIET_S = 0.01  # after a stop, no packet is late by more
 
 
@@ -103,40 +102,35 @@ class T7:
         self._unit.write(t7.dio(self.settings.power_dio), int(on))
 
     def acquire(self, duration_s: float) -> Samples:
-        """Record all channels for `duration_s`, rounded to whole scans.
+        """Record all channels for `duration_s`, rounded to whole scans; raises as `stream`."""
+        (samples,) = self.stream(duration_s, duration_s)
+        return samples
+
+    def stream(self, duration_s: float, block_s: float) -> Generator[Samples, None, None]:
+        """Record all channels for `duration_s` without a gap, and hand it out in blocks of `block_s`.
+
+        Both are rounded to whole scans; the last block holds what is left. The device takes one record, so the
+        samples are the same whatever `block_s` is. Take the next block before the network's buffers are full
+        (a minute is no risk at 10 kB/s). Closing the iterator ends the stream.
 
         Raises StreamError when scans were lost, Refused when the device declines the settings, LinkTimeout.
         """
-        channels = len(self.settings.channels)
-        scans = max(1, round(duration_s * self.settings.rate_hz))
-        packets, per_packet = _even_packets(scans, channels)
-        self._configure(per_packet * channels)
+        channels, scans, block = tuple(self.settings.channels), self._scans(duration_s), self._scans(block_s)
+        per_packet = _scans_per_packet(scans, len(channels))
+        self._configure(per_packet * len(channels))
         start_s = self._clock.now()
         self._write_block((t7.ENABLE, 1))
         try:
             rate_hz = self._unit.read(t7.ACTUAL_RATE)
-            data = self._collect(packets, per_packet * channels, start_s, channels * rate_hz)
+            reception = Reception(self._stream, self.name, start_s, rate_hz, len(channels), per_packet)
+            for first in range(0, scans, block):
+                codes = reception.take(min(block, scans - first))
+                yield Samples(self._volts[codes], channels, rate_hz, start_s + first / rate_hz)
         finally:
             self._stop()
-        codes = codes_of(data, per_packet * channels, self.name).reshape(-1, channels)[:scans]
-        return Samples(self._volts[codes], tuple(self.settings.channels), rate_hz, start_s)
 
-    def _collect(self, packets: int, samples: int, start_s: float, samples_per_s: float) -> bytearray:
-        """Read `packets` packets as they come, a good many at a time."""
-        count = packets * packet_type(samples).itemsize
-        bytes_per_s = samples_per_s * packet_type(samples).itemsize / samples
-        data = bytearray()
-        while len(data) < count:
-            wanted = min(count, len(data) + GATHER_BYTES)
-            self._clock.sleep(start_s + wanted / bytes_per_s - self._clock.now())
-            if not (more := self._stream.read(PATIENCE_S)):
-                codes_of(data, samples, self.name)  # the status of what came may say why
-                raise LinkTimeout(
-                    f"{self.name}: the stream fell silent after {len(data)} of {count} bytes",
-                    "Check network and power of the device, and that no other program uses its stream",
-                )
-            data += more
-        return data[:count]
+    def _scans(self, duration_s: float) -> int:
+        return max(1, round(duration_s * self.settings.rate_hz))
 
     def _configure(self, samples_per_packet: int) -> None:
         inputs = list(self.settings.channels.values())
@@ -191,10 +185,10 @@ class T7:
         return self.settings.channels[name]
 
 
-def _even_packets(scans: int, channels: int) -> tuple[int, int]:
-    """(packets, scans in each): as few packets as possible, and of them the shortest that hold all scans."""
+def _scans_per_packet(scans: int, channels: int) -> int:
+    """Of as few packets as possible, the shortest that hold all scans."""
     packets = -(-scans // (t7.MOST_SAMPLES_PER_PACKET // channels))
-    return packets, -(-scans // packets)
+    return -(-scans // packets)
 
 
 def connect(address: Address, links: Links, settings: Settings, name: str) -> T7:

@@ -27,6 +27,7 @@ STATUS = {
     SKIP_OVERFLOW: "it lost count of the scans it skipped",
     BUFFER_FULL: "its buffer ran over and the stream stopped",
 }
+REMEDY = "Lower the rate or the number of channels, or free the network between device and computer"
 
 
 def packet_type(samples: int) -> np.dtype[np.void]:
@@ -36,37 +37,61 @@ def packet_type(samples: int) -> np.dtype[np.void]:
     return np.dtype([*header, *rest, ("samples", ">u2", (samples,))])
 
 
+class Packets:
+    """The packets of one stream, `samples` samples in each: bytes in, codes out, and nothing missing in between."""
+
+    def __init__(self, samples: int, name: str) -> None:
+        self.layout = packet_type(samples)
+        self._name = name
+        self._seen = 0
+        self._rest = b""
+        self._last = np.empty(0, np.int64)  # transaction number of the last packet seen
+
+    def codes(self, data: bytes | bytearray) -> NDArray[np.uint16]:
+        """The samples of all packets that `data` completes, one after the other.
+
+        Raises StreamError when the device reports lost scans, a packet is missing, or one is not of this stream.
+        """
+        data = self._rest + data
+        packets = np.frombuffer(data, self.layout, count=len(data) // self.layout.itemsize)
+        self._rest = bytes(data[len(packets) * self.layout.itemsize :])
+        self._require_ours(packets)
+        self._require_no_loss(packets)
+        self._require_all(packets["transaction"].astype(np.int64))
+        self._seen += len(packets)
+        return packets["samples"].astype(np.uint16).ravel()
+
+    def _require_ours(self, packets: NDArray[np.void]) -> None:
+        expected = (0, self.layout.itemsize - 6, UNIT, FUNCTION, KIND)
+        fields = ("protocol", "length", "unit", "function", "kind")
+        for field, value in zip(fields, expected, strict=True):
+            if (wrong := np.flatnonzero(packets[field] != value)).size:
+                found = f"packet {self._seen + wrong[0]} has {field} {packets[field][wrong[0]]} instead of {value}"
+                raise StreamError(f"{self._name}: {found}", "Let no other program use the device's stream, then repeat")
+
+    def _require_no_loss(self, packets: NDArray[np.void]) -> None:
+        status = packets["status"]
+        if (bad := np.flatnonzero((status != 0) & (status != BURST_COMPLETE))).size:
+            packet = packets[bad[-1]]
+            words = STATUS.get(int(packet["status"]), "it reports status {status}")
+            raise StreamError(
+                f"{self._name}: {words.format(additional=packet['additional'], status=packet['status'])} "
+                f"(status {packet['status']} in packet {self._seen + bad[-1]})",
+                REMEDY,
+            )
+
+    def _require_all(self, transactions: NDArray[np.int64]) -> None:
+        numbers = np.concatenate([self._last, transactions])
+        steps = np.mod(np.diff(numbers), 65536)
+        if (gaps := np.flatnonzero(steps != 1)).size:
+            before = self._seen - len(self._last) + gaps[0]
+            raise StreamError(f"{self._name}: packets are missing after packet {before} of the record", REMEDY)
+        self._last = numbers[-1:]
+
+
 def codes_of(data: bytes | bytearray, samples: int, name: str) -> NDArray[np.uint16]:
-    """The samples of all whole packets in `data`, one after the other.
-
-    Raises StreamError when the device reports lost scans, a packet is missing, or one is not of this stream.
-    """
-    layout = packet_type(samples)
-    packets = np.frombuffer(data, layout, count=len(data) // layout.itemsize)
-    expected = (0, layout.itemsize - 6, UNIT, FUNCTION, KIND)
-    fields = ("protocol", "length", "unit", "function", "kind")
-    for field, value in zip(fields, expected, strict=True):
-        if (wrong := np.flatnonzero(packets[field] != value)).size:
-            found = f"packet {wrong[0]} has {field} {packets[field][wrong[0]]} instead of {value}"
-            raise StreamError(f"{name}: {found}", "Let no other program use the device's stream, then repeat")
-    _require_no_loss(packets, name)
-    return packets["samples"].astype(np.uint16).ravel()
-
-
-def _require_no_loss(packets: NDArray[np.void], name: str) -> None:
-    remedy = "Lower the rate or the number of channels, or free the network between device and computer"
-    status = packets["status"]
-    if (bad := np.flatnonzero((status != 0) & (status != BURST_COMPLETE))).size:
-        packet = packets[bad[-1]]
-        words = STATUS.get(int(packet["status"]), "it reports status {status}")
-        raise StreamError(
-            f"{name}: {words.format(additional=packet['additional'], status=packet['status'])} "
-            f"(status {packet['status']} in packet {bad[-1]})",
-            remedy,
-        )
-    steps = np.mod(np.diff(packets["transaction"].astype(np.int64)), 65536)
-    if (gaps := np.flatnonzero(steps != 1)).size:
-        raise StreamError(f"{name}: packets are missing after packet {gaps[0]} of the record", remedy)
+    """The samples of all whole packets in `data`; raises StreamError as `Packets.codes`."""
+    return Packets(samples, name).codes(data)
 
 
 @dataclass(frozen=True)
