@@ -50,6 +50,9 @@ class SmallWorld:
     def thermometer_c(self) -> float:
         return 21.5 + (self.now_s > 100 and self.oven[1]) * 10
 
+    def level_deg(self) -> tuple[float, float]:
+        return self.motor_angle_deg("alpha") + 0.002 * np.sin(1e3 * self.now_s), -0.007
+
     def adc_volts(self, inputs: Sequence[str], start_s: float, interval_s: float, n: int) -> NDArray[np.float64]:
         assert start_s >= self.now_s - 1e-9, "samples of the past"
         t = start_s + interval_s * np.arange(n)

@@ -1,0 +1,119 @@
+"""The simulated DPG2: talks unasked until it is stopped, and shows what the world's level does."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, Protocol
+from weakref import WeakKeyDictionary
+
+from drivers.dpg2 import ONE_READING, STOP, VERSION, Settings
+from drivers.links.address import Address
+from drivers.links.server import Connection, Port, Server
+
+LISTEN = "pty:?baud=9600"
+INTERVAL_S = 0.1  # from one pair of lines to the next [M]
+THINKING_S = 0.002  # [M]
+START = b"S"
+WHO = b"DPL2 V1.8.0\r\nSN:123456789\r\n"
+
+
+class World(Protocol):
+    """What a level knows of physics."""
+
+    @property
+    def now_s(self) -> float: ...
+
+    def advance(self, t_s: float) -> None: ...
+
+    def level_deg(self) -> tuple[float, float]: ...
+
+
+class Inclinometer:
+    """One level on a line of its own. Wakes talking; nobody hears what it says into an open line, or a full one."""
+
+    def __init__(self, world: World, settings: Settings, port: Port) -> None:
+        self._world, self._range_deg, self._port = world, settings.range_deg, port
+        self._running, self._next_s = True, 0.0
+        self._given: WeakKeyDictionary[Connection, int] = WeakKeyDictionary()  # bytes so far
+        port.answer = self._answer
+
+    def advance(self, now_s: float) -> None:
+        """The level is the world's; it looks at it only when it speaks, since the converter may still be sampling."""
+
+    def speak(self, now_s: float) -> None:
+        """Say what is due by `now_s`."""
+        while self._running and self._next_s <= now_s:
+            if listeners := [c for c in self._port.connections.values() if self._heard_all(c)]:
+                lines = self._reading(self._next_s)
+                for connection in listeners:
+                    self._say(connection, lines, self._next_s)
+            self._next_s += INTERVAL_S
+
+    def due_s(self) -> float:
+        return self._next_s if self._running else math.inf
+
+    def state(self) -> dict[str, Any]:
+        return {"running": self._running, "next_s": self._next_s}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        self._running, self._next_s = state["running"], state["next_s"]
+
+    def _answer(self, connection: Connection, now_s: float) -> None:
+        """Obey letter by letter; it does not know most of them, and but two of them while it talks."""
+        for letter in bytes(connection.inbox):
+            self._obey(bytes([letter]), connection, now_s)
+        connection.inbox.clear()
+
+    def _obey(self, letter: bytes, connection: Connection, now_s: float) -> None:
+        began_s = now_s + self._port.timing.character_s + THINKING_S
+        if letter == STOP:
+            self._running = False
+            self._say(connection, [STOP], began_s)
+        elif letter == START:
+            self._running, self._next_s = True, began_s
+        elif letter == ONE_READING and not self._running:
+            self._say(connection, self._reading(now_s), began_s)
+        elif letter == VERSION and not self._running:
+            self._say(connection, WHO.splitlines(keepends=True), began_s)
+
+    def _reading(self, t_s: float) -> list[bytes]:
+        """Both lines at `t_s`, or as soon after it as the world still can."""
+        self._world.advance(max(t_s, self._world.now_s))
+        return [
+            f"{axis}={self._shown(deg)}\r\n".encode() for axis, deg in zip("XY", self._world.level_deg(), strict=True)
+        ]
+
+    def _shown(self, deg: float) -> str:
+        return f"{deg:+07.3f}" if abs(deg) <= self._range_deg else 7 * "+-"[deg < 0]
+
+    def _heard_all(self, connection: Connection) -> bool:
+        """Whether what was said before has gone out by now."""
+        connection.emit(self._next_s)
+        return connection.emitted == self._given.get(connection, 0)
+
+    def _say(self, connection: Connection, lines: list[bytes], began_s: float) -> None:
+        """Send line by line, each when its last character is through."""
+        for line in lines:
+            began_s += len(line) * self._port.timing.character_s
+            connection.send(line, began_s)
+            self._given[connection] = self._given.get(connection, 0) + len(line)
+
+
+class LevelServer(Server):
+    """A server whose twins speak when all others have caught up with the time."""
+
+    def __init__(self, ports: Mapping[str, Port], twins: Mapping[str, Inclinometer]) -> None:
+        super().__init__(list(ports.values()), twins, {role: Address(port.url) for role, port in ports.items()})
+        self._levels = twins
+
+    def emit(self, now_s: float) -> None:
+        for level in self._levels.values():
+            level.speak(now_s)
+        super().emit(now_s)
+
+
+def serve(world: World, roles: Mapping[str, tuple[int, Settings]], listen: str = LISTEN) -> LevelServer:
+    """A line with a level for each role: role -> (unit id, which such a level has not, settings)."""
+    ports = {role: Port(listen) for role in roles}
+    return LevelServer(ports, {role: Inclinometer(world, roles[role][1], port) for role, port in ports.items()})
