@@ -42,7 +42,7 @@ PRODUCT_ID = Register(60000, "float32", "PRODUCT_ID")
 FIRMWARE = Register(60004, "float32", "FIRMWARE_VERSION")
 SERIAL_NUMBER = Register(60028, "uint32", "SERIAL_NUMBER")
 CORE_TIMER = Register(61520, "uint32", "CORE_TIMER")
-CORE_HZ = 40e6
+CORE_HZ, CORE_NS = 40e6, 25
 
 # Internal flash: write an address, then read words from it; here the factory's calibration.
 FLASH_POINTER = Register(61810, "uint32", "INTERNAL_FLASH_READ_POINTER")

@@ -17,6 +17,7 @@ from drivers.links.address import Address
 from drivers.links.modbus_server import DEVICE_FAILURE, ILLEGAL_ADDRESS, ILLEGAL_VALUE, Refusal, modbus_port
 from drivers.links.register import Register
 from drivers.links.server import Port, Server
+from drivers.simulation.kernel import kernel
 
 LISTEN = "tcp://127.0.0.1:0"
 SERIAL, FIRMWARE = 470012345, 1.0312
@@ -53,43 +54,56 @@ class Inputs:
         self, numbers: Sequence[int], ranges_v: Sequence[float], start_s: float, interval_s: float, n: int
     ) -> NDArray[np.uint16]:
         """Codes of `n` scans, shape (n, inputs). An open input reads 0 V."""
-        volts = np.zeros((n, len(numbers)))
+        constants = [Calibration.from_flash(FLASH_WORDS, range_v) for range_v in ranges_v]
+        return codes_of_volts(self._volts(numbers, start_s, interval_s, n), constants)
+
+    def _volts(self, numbers: Sequence[int], start_s: float, interval_s: float, n: int) -> NDArray[np.float64]:
         wired = [k for k, number in enumerate(numbers) if number in self._wiring]
+        volts = np.zeros((n, len(numbers)))
         if wired:
             names = [self._wiring[numbers[k]] for k in wired]
             volts[:, wired] = self._world.adc_volts(names, start_s, interval_s, n)
-        constants = [Calibration.from_flash(FLASH_WORDS, range_v) for range_v in ranges_v]
-        return codes_of_volts(volts, constants)
+        return volts
 
 
 def codes_of_volts(volts: NDArray[np.float64], ranges: Sequence[Calibration]) -> NDArray[np.uint16]:
     """The converter: nearest code of each column, clipped at the ends of its range."""
-    positive = np.array([c.positive_slope for c in ranges])
-    negative = np.array([c.negative_slope for c in ranges])
-    center = np.array([c.center for c in ranges])
-    codes = center + np.where(volts < 0, -volts / negative, volts / positive)
-    nearest: NDArray[np.uint16] = np.clip(np.rint(codes), 0, 65535).astype(np.uint16)
-    return nearest
+    constants = np.array([(c.positive_slope, c.negative_slope, c.center) for c in ranges])
+    codes = np.empty(volts.shape, np.uint16)
+    _round(volts, constants, codes)
+    return codes
+
+
+@kernel
+def _round(volts: NDArray[np.float64], constants: NDArray[np.float64], codes: NDArray[np.uint16]) -> None:
+    for i in range(len(volts)):
+        for k in range(len(constants)):
+            positive, negative, center = constants[k]
+            distance = volts[i, k] / positive if volts[i, k] >= 0 else -volts[i, k] / negative
+            codes[i, k] = min(max(np.rint(center + distance), 0.0), 65535.0)
 
 
 class Stream:
-    """A running stream: scan i is taken at `start_s` + i / rate, a packet leaves when it is full."""
+    """A running stream: scan i is taken i intervals after the start, a packet leaves when it is full.
+
+    Its clock has 25 ns, so all times are whole ns: however time is cut into steps, each scan has its own.
+    """
 
     def __init__(
-        self, scan: Callable[[float, float, int], NDArray[np.uint16]], start_s: float, rate_hz: float,
+        self, scan: Callable[[float, float, int], NDArray[np.uint16]], start_s: float, interval_ns: int,
         channels: int, per_packet: int,
     ) -> None:  # fmt: skip
-        self._scan, self._start_s, self._rate_hz = scan, start_s, rate_hz
+        self._scan, self._start_ns, self._interval_ns = scan, round(1e9 * start_s), interval_ns
         self._channels, self._per_packet = channels, per_packet
         self._scans = self._packets = 0
         self._rest = np.empty(0, np.uint16)
 
     def packets_until(self, now_s: float) -> bytes:
         """Take all scans that have begun; the packets that became full."""
-        new = math.floor((now_s - self._start_s) * self._rate_hz + 1e-7) + 1 - self._scans
+        new = (round(1e9 * now_s) - self._start_ns) // self._interval_ns + 1 - self._scans
         if new <= 0:
             return b""
-        codes = self._scan(self._start_s + self._scans / self._rate_hz, 1 / self._rate_hz, new)
+        codes = self._scan(self._time_s(self._scans), 1e-9 * self._interval_ns, new)
         self._scans += new
         samples = np.concatenate([self._rest, codes.ravel()])
         count = len(samples) // self._per_packet
@@ -98,8 +112,10 @@ class Stream:
 
     def due_s(self) -> float:
         """When the next packet is full: at its last scan."""
-        scans = -(-(self._packets + 1) * self._per_packet // self._channels)
-        return self._start_s + (scans - 1) / self._rate_hz
+        return self._time_s(-(-(self._packets + 1) * self._per_packet // self._channels) - 1)
+
+    def _time_s(self, scan: int) -> float:
+        return 1e-9 * (self._start_ns + scan * self._interval_ns)
 
     def _pack(self, samples: NDArray[np.uint16]) -> bytes:
         layout = packet_type(self._per_packet)
@@ -177,9 +193,9 @@ class Converter:
             self._fail(t7.BAD_PACKET)
         if buffer > t7.LARGEST_BUFFER or buffer & (buffer - 1):
             self._fail(t7.BAD_BUFFER)
-        rate_hz = t7.CORE_HZ / round(t7.CORE_HZ / rate_hz)
-        self._set(t7.ACTUAL_RATE, rate_hz)
-        return Stream(self._scanner(channels), now_s, rate_hz, channels, per_packet)
+        core_ticks = round(t7.CORE_HZ / rate_hz)
+        self._set(t7.ACTUAL_RATE, t7.CORE_HZ / core_ticks)
+        return Stream(self._scanner(channels), now_s, core_ticks * t7.CORE_NS, channels, per_packet)
 
     def _scanner(self, channels: int) -> Callable[[float, float, int], NDArray[np.uint16]]:
         """Takes n scans of the scan list from a time on, at an interval."""
