@@ -26,6 +26,17 @@ def test_more_values_than_a_converter_has_come_back_too() -> None:
     assert np.array_equal(decode(encode(samples)), samples)
 
 
+def test_values_that_fall_on_one_place_of_the_table_come_back() -> None:
+    """Of a few thousand values some do, for certain."""
+    samples = 315.9e-6 * np.random.default_rng(1).integers(0, 5000, (20_000, 1))
+    assert np.array_equal(decode(encode(samples)), samples)
+
+
+def test_a_block_of_an_earlier_version_is_read() -> None:
+    kept = bytes.fromhex("780163666060600462262086800ff6109ae50023230300130201fc")
+    assert decode(kept).tolist() == [[-2.5], [-2.5], [1.0]]
+
+
 def test_negative_zero_stays_negative() -> None:
     assert np.signbit(decode(encode(np.array([[-0.0], [0.0]])))).ravel().tolist() == [True, False]
 
