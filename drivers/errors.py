@@ -7,12 +7,12 @@
     │   ├── LinkTimeout    silence
     │   ├── BadFrame       bytes that are no answer: CRC, length, function code
     │   ├── WrongUnit      another unit of the bus answered
-    │   └── Refused        an exception answer: the instrument understood and declined
+    │   └── Refused        the instrument understood and declined: a Modbus exception, a GCS error
     ├── InstrumentError    the instrument
     │   ├── StageAlarm     the drive stands still with an alarm
     │   ├── NotSettled     the stage did not arrive
     │   ├── StreamError    scans were lost, or packets are not what was asked for
-    │   └── SensorFault    the thermometer gives no temperature
+    │   └── SensorFault    the thermometer gives no temperature, the displacement sensor no distance
     └── ClockStuck         a simulated instrument's bytes never arrived: a bound in real time, a defect of ours
 
 Each says what happened, where (instrument and register), and what to do.
@@ -55,7 +55,7 @@ class WrongUnit(LinkError):
 
 
 class Refused(LinkError):
-    """A Modbus exception answer; `code` is its number."""
+    """A Modbus exception answer or a GCS error; `code` is its number."""
 
     def __init__(self, what: str, remedy: str, code: int) -> None:
         super().__init__(what, remedy)
@@ -83,7 +83,7 @@ class StreamError(InstrumentError):
 
 
 class SensorFault(InstrumentError):
-    """A thermometer without a temperature."""
+    """A thermometer without a temperature, a displacement sensor without a distance."""
 
 
 class ClockStuck(DriverError):

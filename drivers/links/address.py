@@ -10,9 +10,9 @@ class Address:
     """A wire and the place on it.
 
     `url` is one of
-        tcp://host:port                             Modbus TCP
+        tcp://host:port                             Modbus TCP, GCS
         rtu+tcp://host:port                         Modbus RTU frames through a converter on TCP
-        serial:/dev/ttyUSB0?baud=115200&parity=E    Modbus RTU on a serial line (parity N, E or O)
+        serial:/dev/ttyUSB0?baud=115200&parity=E    a serial line (parity N, E or O): Modbus RTU, GCS, text
     `unit` is the Modbus unit id; instruments with the same url share the wire.
     `stream_url` is the second port of an instrument that has one.
     """

@@ -8,16 +8,19 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from drivers import labjack_t7, labjack_t7_twin, omega_cn7500, omega_cn7500_twin, oriental_az, oriental_az_twin
 from drivers.clock import SimulatedClock
 from drivers.links import Links
 from drivers.links.server import Server
+from drivers.simulation import positioner
+from drivers.simulation.kernel import record
 from drivers.simulation.trajectory import Trajectory, at_rest
 
 STAGE = oriental_az.Settings(limits_deg=(-400.0, 400.0), speed_deg_s=20.0, acceleration_deg_s2=40.0)
 CONVERTER = labjack_t7.Settings(channels={"time": 2, "noise": 0, "supply": 5}, rate_hz=1000.0, power_dio=3)
+LOOP = record(positioner.Positioner())
 OVEN = omega_cn7500.Settings(limits_c=(0.0, 85.0))
 
 
@@ -29,6 +32,7 @@ class SmallWorld:
         self.powered = True
         self.oven = (25.0, False)
         self.plans = {"alpha": at_rest(7.0), "beta": at_rest(0.0)}
+        self.carriages = {axis: positioner.at_rest(0.5) for axis in positioner.AXES}
         self._random = np.random.Generator(np.random.PCG64(seed))
 
     def advance(self, t_s: float) -> None:
@@ -40,6 +44,13 @@ class SmallWorld:
 
     def motor_angle_deg(self, axis: str) -> float:
         return self.plans[axis].angle_deg(self.now_s)
+
+    def move_positioner(self, axis: str, command: positioner.Command) -> float:
+        self.carriages[axis], settled_s = positioner.following(LOOP, self.carriages[axis], command)
+        return settled_s
+
+    def positioner_um(self, axis: str, times_s: ArrayLike) -> NDArray[np.float64]:
+        return positioner.read_um(LOOP, self.carriages[axis], times_s, positioner.AXES.index(axis))
 
     def power(self, on: bool) -> None:
         self.powered = on
@@ -65,6 +76,7 @@ class SmallWorld:
         return {
             "now_s": self.now_s,
             "plans": {axis: asdict(plan) for axis, plan in self.plans.items()},
+            "carriages": {axis: pieces.tolist() for axis, pieces in self.carriages.items()},
             "oven": list(self.oven),
             "random": self._random.bit_generator.state,
         }
@@ -72,6 +84,7 @@ class SmallWorld:
     def restore(self, state: dict[str, Any]) -> None:
         self.now_s = state["now_s"]
         self.plans = {axis: Trajectory(**plan) for axis, plan in state["plans"].items()}
+        self.carriages = {axis: np.array(pieces) for axis, pieces in state["carriages"].items()}
         self.oven = (state["oven"][0], state["oven"][1])
         self._random.bit_generator.state = state["random"]
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from drivers import labjack_t7, omega_cn7500, oriental_az
+from drivers import labjack_t7, omega_cn7500, oriental_az, pi_e727
 
 
 @pytest.mark.parametrize(
@@ -17,6 +17,10 @@ from drivers import labjack_t7, omega_cn7500, oriental_az
         (oriental_az, {"acceleration_deg_s2": float("nan")}, "acceleration_deg_s2 must be positive"),
         (oriental_az, {"limits_deg": (10.0, -10.0)}, "limits_deg must be the lower limit, then the upper one"),
         (omega_cn7500, {"limits_c": (50.0, 50.0)}, "limits_c must be the lower limit, then the upper one"),
+        (pi_e727, {"axes": {}}, "axes must name the controller's axes, each once, and at least one"),
+        (pi_e727, {"axes": {"x": "1", "y": "1"}}, "each once"),
+        (pi_e727, {"limits_um": (90.0, 10.0)}, "limits_um must be the lower limit, then the upper one"),
+        (pi_e727, {"settle_um": 0.0, "record_hz": -1.0}, "settle_um, record_hz must be positive"),
         (labjack_t7, {"channels": {}}, "and at least one"),
         (labjack_t7, {"channels": {"vx": 14}}, "channels must name analog inputs, 0 to 13"),
         (labjack_t7, {"rate_hz": 40e3}, "at most 100000 samples a second"),

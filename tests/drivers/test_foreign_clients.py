@@ -1,4 +1,4 @@
-"""The twins answer clients that are not ours: mbpoll on TCP and RTU, minimalmodbus on RTU. In real time."""
+"""The twins answer clients that are not ours: mbpoll, minimalmodbus, and PI's pipython. In real time."""
 
 from __future__ import annotations
 
@@ -11,8 +11,19 @@ from typing import Any
 
 import minimalmodbus
 import pytest
+from pipython import GCSDevice, GCSError, datarectools, pitools
+from pipython.pidevice.interfaces.pisocket import PISocket
 
-from drivers import labjack_t7, labjack_t7_twin, omega_cn7500, omega_cn7500_twin, oriental_az, oriental_az_twin
+from drivers import (
+    labjack_t7,
+    labjack_t7_twin,
+    omega_cn7500,
+    omega_cn7500_twin,
+    oriental_az,
+    oriental_az_twin,
+    pi_e727,
+    pi_e727_twin,
+)
 from drivers.clock import serve_forever
 from drivers.links.server import Server
 from drivers.links.url import Url
@@ -123,3 +134,54 @@ def test_minimalmodbus_is_told_what_is_declined(serve: Serve, small_world: Any) 
     stage.serial.baudrate, stage.serial.timeout = 115200, 0.5
     with pytest.raises(minimalmodbus.IllegalRequestError):
         stage.read_register(0x007F, functioncode=4)
+
+
+@pytest.fixture
+def nanocube(serve: Serve, small_world: Any) -> Iterator[Any]:
+    """The positioner as PI's own client sees it, servos on."""
+    url = Url.parse(serve(pi_e727_twin.serve(small_world, {"positioner": (1, pi_e727.Settings())})))
+    with GCSDevice(gateway=PISocket(url.host, url.port)) as device:
+        pitools.startup(device)
+        yield device
+
+
+def test_pipython_connects_and_moves(nanocube: Any) -> None:
+    assert (nanocube.devname, nanocube.axes) == ("E-727", ["1", "2", "3"])
+    assert nanocube.qTMX() == {"1": 100.0, "2": 100.0, "3": 100.0}
+    assert nanocube.getparam(0x0E000200) == pytest.approx(50e-6)
+    pitools.moveandwait(nanocube, "1", 30.0)
+    assert nanocube.qPOS("1")["1"] == pytest.approx(30.0, abs=0.01)
+
+
+def test_pipython_runs_a_sine_records_it_and_stops(nanocube: Any) -> None:
+    pitools.moveandwait(nanocube, "2", 10.0)
+    nanocube.WTR(2, 1, 0)
+    nanocube.WAV_SIN_P(
+        table=2, firstpoint=0, numpoints=2000, append="X", center=1000, amplitude=20, offset=10, seglength=2000
+    )
+    nanocube.WSL(2, 2)
+    nanocube.WGC(2, 0)
+    with datarectools.Datarecorder(nanocube) as recorder:
+        recorder.samplefreq, recorder.numvalues = 1000, 150
+        recorder.sources, recorder.options, recorder.trigsources = "2", 2, 0
+        recorder.arm()
+        nanocube.WGO(2, 1)
+        header, (places,) = recorder.getdata(timeout=5)
+    assert (header["NDATA"], header["SAMPLE_TIME"]) == (150, pytest.approx(1e-3))
+    assert (min(places), max(places)) == (pytest.approx(10.0, abs=0.1), pytest.approx(30.0, abs=0.3))
+    assert places.index(max(places)) == pytest.approx(52, abs=2)  # half a period, and the loop's lag
+
+    with pytest.raises(GCSError, match="wave generator"):
+        nanocube.MOV("2", 50)
+    pitools.stopall(nanocube)
+    pitools.waitontarget(nanocube)
+    assert nanocube.IsGeneratorRunning(2) == {2: False}
+    stopped = nanocube.qPOS("2")["2"]
+    assert nanocube.qPOS("2")["2"] == pytest.approx(stopped, abs=0.02)
+
+
+def test_pipython_is_told_what_is_wrong(nanocube: Any) -> None:
+    for command, number in ((lambda: nanocube.MOV("1", 101), 7), (lambda: nanocube.WGO(3, 1), 75)):
+        with pytest.raises(GCSError) as raised:
+            command()
+        assert raised.value.val == number
