@@ -22,13 +22,17 @@ SHIPPED = Path(__file__).parent
 
 @dataclass(frozen=True)
 class Procedure:
-    """A script that runs on a session. `summary` is one line, `doc` what it excites and is blind to."""
+    """A script that runs on a session. `summary` is one line, `doc` what it excites and is blind to.
+
+    `kind` is the table that its poses make (KIND of its file): poses where nothing else is said.
+    """
 
     name: str
     function: Callable[..., Any]
     summary: str
     doc: str
     path: Path
+    kind: str = "poses"
 
     @property
     def defaults(self) -> dict[str, Any]:
@@ -65,8 +69,9 @@ def find(wanted: str, folder: Path | None = None) -> Procedure:
     path = known.get(wanted.replace("_", "-"))
     if path is None:
         raise UnknownProcedure(f"no procedure {wanted!r}{nearest(wanted, known)}")
-    function = getattr(_load(path), path.stem)
-    return Procedure(name(path), function, summary(path), _doc(path), path)
+    module = _load(path)
+    kind = getattr(module, "KIND", "poses")
+    return Procedure(name(path), getattr(module, path.stem), summary(path), _doc(path), path, kind)
 
 
 def _is_procedure(path: Path) -> bool:

@@ -3,7 +3,9 @@
 ProcedureError
 ├── UnknownProcedure    no file of this name; names the nearest
 ├── SettingError        a setting that it does not have, of the wrong type, or out of range
-├── NoAnswer            a question to a person that nobody can answer
+├── BadAnswer           an answer that a question does not accept
+├── NoAnswer            a question to a person that nobody is there to answer; the run stops and can be resumed
+├── Declined            a person said no; the run stops and can be resumed
 └── SafetyLimit         a limit of the bench was passed; the procedure stops
 """
 
@@ -25,8 +27,16 @@ class SettingError(ProcedureError):
     """A setting that the procedure does not have, or a value that it cannot have."""
 
 
+class BadAnswer(ProcedureError):
+    """An answer that the question does not accept."""
+
+
 class NoAnswer(ProcedureError):
-    """A question to a person that nobody can answer."""
+    """A question to a person that nobody is there to answer."""
+
+
+class Declined(ProcedureError):
+    """A person said no to what the procedure needs."""
 
 
 class SafetyLimit(ProcedureError):

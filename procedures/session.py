@@ -7,14 +7,15 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from procedures.errors import SafetyLimit
+from procedures.errors import Declined, SafetyLimit
+from procedures.questions import Confirm, Mounting, Number, Question
 
 SHORTEST_APPROACH_DEG = 0.5  # a stage that is nearer to a pose has not come from its side
 
@@ -36,10 +37,40 @@ class Pose:
 
 @dataclass(frozen=True)
 class Limits:
-    """Measured values outside these stop a run. `overrun_deg`: how far beyond a pose its approach begins."""
+    """What stops a run, and what its results are judged by.
+
+    temperature_c   of the sensor
+    overrun_deg     how far beyond a pose its approach begins
+    level_deg       the greatest tilt of the table that a procedure begins with; None: it is not asked for
+    results         by name: the greatest magnitude of a result, or its (lowest, highest) value
+    """
 
     temperature_c: tuple[float, float] = (-20.0, 85.0)
     overrun_deg: float = 5.0
+    level_deg: float | None = None
+    results: Mapping[str, float | tuple[float, float]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Dwell:
+    """What was measured at a pose: of every channel the mean and the standard deviation of `n` samples, in V."""
+
+    pose: Pose
+    t_s: float
+    means: Mapping[str, float]
+    stds: Mapping[str, float]
+    n: int
+    temperature_c: float | None = None
+
+
+@dataclass(frozen=True)
+class Reading:
+    """One number that belongs to the run and to none of its poses, such as the table's tilt."""
+
+    name: str
+    value: float
+    unit: str
+    std: float | None = None
 
 
 class Samples(Protocol):
@@ -69,6 +100,11 @@ class Adc(Protocol):
     """The converter that the sensor's outputs go to."""
 
     def acquire(self, duration_s: float) -> Samples: ...
+    def stream(self, duration_s: float, block_s: float) -> Iterator[Samples]:
+        """The same without a gap between blocks of `block_s`."""
+
+    def power(self, on: bool) -> None:
+        """Switch the sensor's supply."""
 
 
 class Oven(Protocol):
@@ -79,6 +115,35 @@ class Oven(Protocol):
 
     def set_temperature(self, c: float) -> None: ...
     def run(self, on: bool) -> None: ...
+
+
+class Tilt(Protocol):
+    """A reading of the level, deg."""
+
+    @property
+    def x_deg(self) -> float: ...
+    @property
+    def y_deg(self) -> float: ...
+    @property
+    def std_deg(self) -> float: ...
+
+
+class Level(Protocol):
+    """The digital level that lies on the table of beta."""
+
+    def read(self) -> Tilt: ...
+
+
+class Positioner(Protocol):
+    """The nano-positioner that shakes the sensor along its x axis."""
+
+    def servo(self, on: bool) -> None: ...
+    def move_to(self, axis: str, um: float) -> None: ...
+    def position_um(self, axis: str) -> float: ...
+    def oscillate(self, axis: str, *, peak_to_peak_um: float, frequency_hz: float, centre_um: float) -> float:
+        """Begin a sine; the frequency that it really has, Hz."""
+
+    def stop(self) -> None: ...
 
 
 class Clock(Protocol):
@@ -97,10 +162,20 @@ class Host(Protocol):
     def expect(self, missing: int) -> None:
         """So many poses are to come."""
 
-    def keep(self, pose: Pose, samples: Samples, temperature_c: float | None) -> None: ...
+    def measured(self) -> Sequence[Dwell]:
+        """What was measured at them, in the order of keeping."""
 
-    def ask(self, name: str, question: str, default: str) -> str:
-        """A person's answer; an answer that the record holds is not asked for again."""
+    def readings(self) -> Sequence[Reading]:
+        """The readings that the record already holds."""
+
+    def keep(self, pose: Pose, samples: Samples, temperature_c: float | None) -> None: ...
+    def keep_reading(self, reading: Reading) -> None: ...
+
+    def ask(self, question: Question) -> str:
+        """A person's checked answer; an answer that the record holds is not asked for again.
+
+        Raises NoAnswer where nobody is there.
+        """
 
     def doing(self, text: str) -> None:
         """What happens now, for people."""
@@ -114,6 +189,8 @@ class Session:
     beta: Stage
     adc: Adc
     oven: Oven
+    level: Level | None  # None: a person reads one and types
+    positioner: Positioner
     clock: Clock
     host: Host
     limits: Limits = Limits()
@@ -131,7 +208,11 @@ class Session:
         yield from left
 
     def move_to(self, pose: Pose) -> None:
-        """Turn both stages to `pose`; beta arrives from below for direction +1, from above for -1."""
+        """Turn both stages to `pose`; beta arrives from below for direction +1, from above for -1.
+
+        A person is asked where the sensor is mounted otherwise. Raises Declined, NoAnswer.
+        """
+        self.mount(pose.mount_deg, pose.flip)
         self.host.doing(f"moving to alpha {pose.alpha_deg:g}, beta {pose.beta_deg:g} deg")
         self.alpha.move_to(pose.alpha_deg)
         way_deg = (pose.beta_deg - self.beta.angle_deg()) * pose.direction
@@ -139,6 +220,17 @@ class Session:
             self.beta.move_to(pose.beta_deg - pose.direction * self.limits.overrun_deg)
         self.beta.move_to(pose.beta_deg)
         self.host.doing(f"holding alpha {pose.alpha_deg:g}, beta {pose.beta_deg:g} deg")
+
+    def mount(self, mount_deg: float, flip: int) -> None:
+        """Have the sensor mounted so, at alpha = 0 where it lies flat; nothing where it is."""
+        if (mount_deg, flip) == (self.reading("mount") or 0.0, self.reading("flip") or 0.0):
+            return
+        self.alpha.move_to(0.0)
+        question = Mounting.of(mount_deg, flip)
+        if self.host.ask(question) == "no":
+            raise Declined(f"{question.name}: the sensor is not mounted so; mount it, then resume the run")
+        self.keep_reading("mount", mount_deg, "deg")
+        self.keep_reading("flip", flip, "")
 
     def keep(self, pose: Pose, *, samples: Samples, temperature_c: float | None = None) -> None:
         """Put `pose` into the record. Raises SafetyLimit for a temperature outside the bench's limits."""
@@ -150,9 +242,32 @@ class Session:
             )
         self.host.keep(pose, samples, temperature_c)
 
-    def ask(self, name: str, question: str, default: str = "yes") -> str:
-        """A person's answer to `question`; `name` is its key in a file of answers."""
-        return self.host.ask(name, question, default)
+    def keep_stretch(self, poses: Sequence[Pose], block_s: float) -> None:
+        """Put a record without gaps into the record: `block_s` seconds of it as each of `poses`, which stand still."""
+        stretch = self.adc.stream(len(poses) * block_s, block_s)
+        for pose, samples in zip(poses, stretch, strict=True):
+            self.keep(pose, samples=samples, temperature_c=self.oven.temperature_c())
+
+    def measured(self) -> Sequence[Dwell]:
+        """All that the record holds of this run, in the order of keeping: what an adaptive procedure goes by."""
+        return self.host.measured()
+
+    def reading(self, name: str) -> float | None:
+        """A reading of this run that the record holds."""
+        return next((reading.value for reading in self.host.readings() if reading.name == name), None)
+
+    def keep_reading(self, name: str, value: float, unit: str, std: float | None = None) -> None:
+        """Put a number that belongs to the run and to no pose into the record."""
+        self.host.keep_reading(Reading(name, value, unit, std))
+
+    def confirm(self, name: str, text: str, drawing: str = "") -> None:
+        """A person confirms `text`; `name` is its key in a file of answers. Raises Declined, NoAnswer."""
+        if self.host.ask(Confirm(name, text, drawing)) == "no":
+            raise Declined(f'{name}: "{text}" was answered with no; put it right, then resume the run')
+
+    def number(self, name: str, text: str, unit: str, low: float, high: float) -> float:
+        """A number that a person reads off and types. Raises NoAnswer."""
+        return float(self.host.ask(Number(name, text, unit=unit, low=low, high=high)))
 
     def wait(self, seconds: float) -> None:
         """Let time pass."""

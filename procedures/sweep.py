@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from typing import Literal
 
 from procedures.errors import SettingError
+from procedures.level_check import levelled
 from procedures.session import Pose, Session
 
 INCLINATIONS_DEG = (90.0, 30.0, 150.0, 60.0, 120.0, 45.0, 135.0)
@@ -33,7 +34,8 @@ def sweep(
     if dwell_s <= 0 or settle_s < 0:
         raise SettingError(f"sweep: dwell_s is {dwell_s:g}, settle_s is {settle_s:g}: give times above 0")
     poses = list(grid(inclinations_deg, step_deg, paths))
-    rig.ask("mounting", "Is the sensor mounted face up, and has the digital level been read?")
+    rig.confirm("mounting", "Is the sensor mounted face up on the table, its cable free to turn?", drawing="face-up")
+    levelled(rig)
     for pose in rig.missing(poses):
         rig.move_to(pose)
         rig.wait(settle_s)

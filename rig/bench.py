@@ -27,7 +27,7 @@ from rig.nearest import did_you_mean
 DEFAULT = Path(__file__).with_name("bench_default.yaml")
 SIMULATED = "simulated"
 UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
-ROLES = ("alpha", "beta", "adc", "oven")
+ROLES = ("alpha", "beta", "adc", "oven", "level", "positioner")
 
 
 class Strict(BaseModel):
@@ -103,6 +103,13 @@ class Bench(Strict):
         sensor = self.sensor.model_dump(exclude_none=True)
         said = {key: value for key, value in sensor.items() if value != ""}
         return {"sensor": said.pop("name"), **said, "approach_deg": self.limits.overrun_deg}
+
+    @property
+    def result_limits(self) -> Mapping[str, float | tuple[float, float]]:
+        """What results are judged by: those of the file, and the limit that the level check has anyway."""
+        level_deg = self.limits.level_deg
+        level = {} if level_deg is None else {"level-x": level_deg, "level-y": level_deg}
+        return {**level, **self.limits.results}
 
     def document(self) -> dict[str, Any]:
         """The whole configuration as JSON; `Bench.model_validate` reads it back."""

@@ -22,6 +22,8 @@ from rig.bench import ROLES, Bench
 from rig.errors import InstrumentFailed
 from rig.wiring import Wiring, wired
 
+MOVING = ("alpha", "beta", "positioner")
+
 
 class Absent:
     """Stands for an instrument that the bench file does not name: any use of it says so."""
@@ -44,8 +46,10 @@ class NoOven(Absent):
         return None
 
 
-def absent(role: str) -> Absent:
-    """What stands in a role that the bench does not fill."""
+def absent(role: str) -> Absent | None:
+    """What stands in a role that the bench does not fill; nothing for the level, which a person can read."""
+    if role == "level":
+        return None
     return NoOven(role) if role == "oven" else Absent(role)
 
 
@@ -89,15 +93,15 @@ class Rig:
         self.clock.restore(state["clock_s"])
 
     def stop(self) -> list[str]:
-        """Stop both stages at once, whatever else is wrong; what could not be stopped."""
+        """Stop all that moves, at once and whatever else is wrong; what could not be stopped."""
         failed = []
-        for role in ("alpha", "beta"):
-            stage = cast(Any, self.drivers.get(role))
+        for role in MOVING:
+            mover = cast(Any, self.drivers.get(role))
             try:
-                if stage is not None:
-                    stage.stop()
+                if mover is not None:
+                    mover.stop()
             except DriverError as error:
-                failed.append(f"{role} may still turn: {error}")
+                failed.append(f"{role} may still move: {error}")
         return failed
 
 

@@ -11,14 +11,31 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from procedures.catalogue import Procedure
-from procedures.session import Pose, Samples, Session
+from procedures.questions import Question
+from procedures.session import Dwell, Pose, Reading, Samples, Session
 from rig.bench import ROLES, Bench
 from rig.instruments import absent
-from rig.planned import Ledger, PlannedAdc, PlannedOven, PlannedStage, Step
+from rig.planned import (
+    Ledger,
+    PlannedAdc,
+    PlannedLevel,
+    PlannedOven,
+    PlannedPositioner,
+    PlannedStage,
+    Step,
+    planned_answer,
+)
 
 BYTES_PER_SAMPLE = 0.4  # in the record, measured on a sweep; an estimate for other noise
 BYTES_PER_POSE = 512  # the rest of a pose in the record
-PLANNED = {"alpha": PlannedStage, "beta": PlannedStage, "adc": PlannedAdc, "oven": PlannedOven}
+PLANNED = {
+    "alpha": PlannedStage,
+    "beta": PlannedStage,
+    "adc": PlannedAdc,
+    "oven": PlannedOven,
+    "level": PlannedLevel,
+    "positioner": PlannedPositioner,
+}
 
 
 @dataclass(frozen=True)
@@ -47,12 +64,21 @@ class PlanHost:
     def expect(self, missing: int) -> None:
         """A plan has no progress."""
 
+    def measured(self) -> Sequence[Dwell]:
+        return ()
+
+    def readings(self) -> Sequence[Reading]:
+        return ()
+
     def keep(self, pose: Pose, samples: Samples, temperature_c: float | None) -> None:  # noqa: ARG002
         self.ledger.poses += 1
 
-    def ask(self, name: str, question: str, default: str) -> str:
-        self.ledger.questions.append(f"{name}: {question}")
-        return default
+    def keep_reading(self, reading: Reading) -> None:
+        """A plan reads nothing."""
+
+    def ask(self, question: Question) -> str:
+        self.ledger.questions.append(f"{question.name}: {question.text}")
+        return planned_answer(question)
 
     def doing(self, text: str) -> None:
         """Its steps say what it does."""

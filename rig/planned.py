@@ -1,8 +1,10 @@
-"""Instruments that only count what they are told: a plan's stages, converter and oven, on a plan's clock."""
+"""Instruments that only count what they are told: a plan's stages, converter, oven and the others, on its clock."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -11,9 +13,11 @@ from drivers.labjack_t7 import Settings as AdcSettings
 from drivers.omega_cn7500 import Settings as OvenSettings
 from drivers.oriental_az import Settings as StageSettings
 from drivers.simulation.trajectory import Trajectory
+from procedures.questions import Choice, Number, Question
 from procedures.session import Samples
 from rig.record.values import Block
 
+LEVEL_S = 1.0  # a reading of the level
 EXCHANGE_S = 0.05  # what commands and polls add to a move or a record
 
 
@@ -95,12 +99,18 @@ class PlannedAdc:
         self._name, self._settings, self._ledger = name, settings, ledger
 
     def acquire(self, duration_s: float) -> Samples:
-        n = max(1, round(duration_s * self._settings.rate_hz))
-        names = tuple(self._settings.channels)
+        return next(self.stream(duration_s, duration_s))
+
+    def stream(self, duration_s: float, block_s: float) -> Iterator[Samples]:
+        names, rate_hz = tuple(self._settings.channels), self._settings.rate_hz
         start_s = self._ledger.now()
         self._ledger.add(f"{self._name} records {', '.join(names)} for {duration_s:g} s", duration_s + EXCHANGE_S)
-        self._ledger.samples += n * len(names)
-        return Block(np.zeros((1, len(names))), names, self._settings.rate_hz, start_s)
+        self._ledger.samples += max(1, round(duration_s * rate_hz)) * len(names)
+        for k in range(max(1, round(duration_s / block_s))):
+            yield Block(np.zeros((1, len(names))), names, rate_hz, start_s + k * block_s)
+
+    def power(self, on: bool) -> None:
+        self._ledger.add(f"{self._name} switches the sensor {'on' if on else 'off'}", EXCHANGE_S)
 
 
 class PlannedOven:
@@ -123,3 +133,64 @@ class PlannedOven:
 
     def run(self, on: bool) -> None:
         self._ledger.add(f"{self._name} {'on' if on else 'off'}", EXCHANGE_S)
+
+
+@dataclass(frozen=True)
+class PlannedTilt:
+    """The reading of a level on a table that is level."""
+
+    x_deg: float = 0.0
+    y_deg: float = 0.0
+    std_deg: float = 0.0
+
+
+class PlannedLevel:
+    """A level that shows 0."""
+
+    def __init__(self, name: str, settings: Any, ledger: Ledger) -> None:  # noqa: ARG002
+        self._name, self._ledger = name, ledger
+
+    def read(self) -> PlannedTilt:
+        self._ledger.add(f"{self._name} is read", LEVEL_S)
+        return PlannedTilt()
+
+
+class PlannedPositioner:
+    """A positioner that stands where it was told, and refuses what its driver would refuse."""
+
+    def __init__(self, name: str, settings: Any, ledger: Ledger) -> None:
+        self._name, self._settings, self._ledger = name, settings, ledger
+        self._at_um: dict[str, float] = {}
+
+    def servo(self, on: bool) -> None:
+        self._ledger.add(f"{self._name} servo {'on' if on else 'off'}", EXCHANGE_S)
+
+    def move_to(self, axis: str, um: float) -> None:
+        self._within(um, um)
+        self._ledger.add(f"{self._name} moves {axis} to {um:g} um", EXCHANGE_S)
+        self._at_um[axis] = um
+
+    def position_um(self, axis: str) -> float:
+        return self._at_um.get(axis, 0.0)
+
+    def oscillate(self, axis: str, *, peak_to_peak_um: float, frequency_hz: float, centre_um: float) -> float:
+        self._within(centre_um - peak_to_peak_um / 2, centre_um + peak_to_peak_um / 2)
+        what = f"{self._name} swings {axis} by {peak_to_peak_um:g} um peak to peak at {frequency_hz:g} Hz"
+        self._ledger.add(what, EXCHANGE_S)
+        return frequency_hz
+
+    def stop(self) -> None:
+        self._ledger.add(f"{self._name} stops", EXCHANGE_S)
+
+    def _within(self, lowest_um: float, highest_um: float) -> None:
+        low, high = self._settings.limits_um
+        if not low <= lowest_um <= highest_um <= high:
+            outside = f"{self._name}: {lowest_um:g} .. {highest_um:g} um is outside its limits {low:g} .. {high:g} um"
+            raise LimitError(outside, "Choose a smaller motion, or change limits_um in the bench file")
+
+
+def planned_answer(question: Question) -> str:
+    """An answer that lets the plan go on."""
+    if isinstance(question, Number):
+        return repr(min(max(0.0, question.low), question.high))
+    return question.choices[0] if isinstance(question, Choice) else "yes"

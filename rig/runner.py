@@ -15,8 +15,9 @@ from typing import Any, Protocol
 
 from drivers.errors import DriverError
 from procedures.catalogue import Procedure, find
-from procedures.errors import ProcedureError, SafetyLimit
-from procedures.session import Pose, Samples
+from procedures.errors import Declined, NoAnswer, ProcedureError, SafetyLimit
+from procedures.questions import Question
+from procedures.session import Dwell, Pose, Reading, Samples
 from procedures.settings import parse
 from rig.bench import Bench
 from rig.errors import RigError, RunMismatch, Stopped
@@ -24,7 +25,9 @@ from rig.instruments import Rig, connected
 from rig.lease import lease
 from rig.plan import plan
 from rig.record import Kept, Record, Run
+from rig.results import Result, documents, evaluated, returned
 from rig.signals import stoppable
+from rig.technician import answer
 
 
 class Watch(Protocol):
@@ -34,9 +37,10 @@ class Watch(Protocol):
     def doing(self, text: str) -> None: ...
     def expect(self, total: int, done: int) -> None: ...
     def kept(self, kept: Kept) -> None: ...
+    def read(self, reading: Reading) -> None: ...
 
-    def ask(self, name: str, question: str, default: str) -> str:
-        """A person's answer. Raises NoAnswer where there is none."""
+    def ask(self, question: Question, instead: str | None) -> str:
+        """A person's checked answer, or `instead` of one where nobody looks on. Raises NoAnswer where there is none."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +67,7 @@ def start(record: Record, bench: Bench, procedure: Procedure, settings: Mapping[
             constants=bench.constants,
             source=bench.name,
             identities=identities,
+            kind=procedure.kind,
         )
         with _held(record, run):
             return _carry_out(record, rig, record.run(run), procedure, watch)
@@ -94,7 +99,8 @@ def _carry_out(record: Record, rig: Rig, run: Run, procedure: Procedure, watch: 
     record.set_state(run.run, "running")
     watch.begun(run.run)
     try:
-        results = _perform(record, rig, run, procedure, watch)
+        own = _perform(record, rig, run, procedure, watch)
+        results = documents(own or evaluated(record, run), rig.bench.result_limits)
     except BaseException as failure:
         complaints = _stop(rig)
         error = _told(failure, run)
@@ -117,8 +123,8 @@ def _told(failure: BaseException, run: Run) -> Exception:
     return RuntimeError(f"{type(failure).__name__}: {failure}")
 
 
-def _perform(record: Record, rig: Rig, run: Run, procedure: Procedure, watch: Watch) -> Mapping[str, Any]:
-    """The procedure on the bench as the record last saw it; its results."""
+def _perform(record: Record, rig: Rig, run: Run, procedure: Procedure, watch: Watch) -> Mapping[str, Result]:
+    """The procedure on the bench as the record last saw it; the results that it returns itself."""
     state = record.state(run.run)
     host = RunHost(record, rig, run, watch, state)
     session = rig.session(host)
@@ -128,7 +134,7 @@ def _perform(record: Record, rig: Rig, run: Run, procedure: Procedure, watch: Wa
     else:
         rig.restore(state["rig"])
     settings = parse(procedure, run.settings)
-    return procedure.function(session, **settings) or {}
+    return {name: returned(name, result) for name, result in (procedure.function(session, **settings) or {}).items()}
 
 
 class RunHost:
@@ -137,11 +143,21 @@ class RunHost:
     def __init__(self, record: Record, rig: Rig, run: Run, watch: Watch, state: Mapping[str, Any] | None) -> None:
         self._record, self._rig, self._run, self._watch = record, rig, run.run, watch
         self._poses = record.poses(run.run)
+        self._next = record.next_number(run.run)
+        self._dwells: list[Dwell] | None = None  # read from the record only if the procedure asks for them
         self._answers = {e.what: e.text for e in record.events(run.run) if e.what.startswith("answer ")}
         self._zero_s = state["zero_s"] if state else _zero_s(rig, run)
 
     def kept(self) -> Sequence[Pose]:
         return self._poses
+
+    def measured(self) -> Sequence[Dwell]:
+        if self._dwells is None:
+            self._dwells = [kept.dwell for kept in self._record.kept(self._run) if kept.excluded is None]
+        return self._dwells
+
+    def readings(self) -> Sequence[Reading]:
+        return self._record.readings(self._run)
 
     def expect(self, missing: int) -> None:
         self._watch.expect(missing + len(self._poses), len(self._poses))
@@ -149,21 +165,31 @@ class RunHost:
     def keep(self, pose: Pose, samples: Samples, temperature_c: float | None) -> None:
         middle_s = samples.start_s + len(samples.volts) / samples.rate_hz / 2
         kept = Kept(pose, samples, middle_s - self._zero_s, temperature_c)
-        self._record.keep(self._run, len(self._poses), kept, self._state())
+        self._record.keep(self._run, self._next, kept, self._state())
+        self._next += 1
         self._poses.append(pose)
+        if self._dwells is not None:
+            self._dwells.append(kept.dwell)
         self._watch.kept(kept)
+
+    def keep_reading(self, reading: Reading) -> None:
+        self._record.keep_reading(self._run, reading, self._state())
+        self._watch.read(reading)
 
     def keep_state(self) -> None:
         """The bench is ready and nothing is measured yet."""
         if (state := self._state()) is not None:
             self._record.keep_state(self._run, state)
 
-    def ask(self, name: str, question: str, default: str) -> str:
-        key = f"answer {name}"
-        if key not in self._answers:
-            self._answers[key] = self._watch.ask(name, question, default)
-            self._record.note(self._run, key, self._answers[key])
-        return self._answers[key]
+    def ask(self, question: Question) -> str:
+        key = f"answer {question.name}"
+        if key in self._answers and not question.repeated:
+            return self._answers[key]
+        given = question.checked(self._watch.ask(question, answer(question, self._rig)))
+        if given != "no":  # what was refused is asked again when the run goes on
+            self._answers[key] = given
+            self._record.note(self._run, key, given)
+        return given
 
     def doing(self, text: str) -> None:
         self._watch.doing(text)
@@ -200,7 +226,7 @@ def _stop(rig: Rig) -> list[str]:
 
 
 def _state(error: Exception) -> str:
-    return "stopped" if isinstance(error, (Stopped, SafetyLimit)) else "failed"
+    return "stopped" if isinstance(error, (Stopped, SafetyLimit, NoAnswer, Declined)) else "failed"
 
 
 def _plain(settings: Mapping[str, Any]) -> dict[str, Any]:

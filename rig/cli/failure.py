@@ -19,6 +19,8 @@ import click
 STATUS = {
     "calibrations.errors.CalibrationError": 2,
     "procedures.errors.SafetyLimit": 4,
+    "procedures.errors.Declined": 4,
+    "procedures.errors.NoAnswer": 4,
     "procedures.errors.ProcedureError": 2,
     "drivers.errors.LimitError": 4,
     "drivers.errors.DriverError": 3,
@@ -51,6 +53,8 @@ def _failed(error: Exception) -> int:
     status = status_of(error)
     if os.environ.get("RIG_DEBUG"):
         traceback.print_exc()
+    if isinstance(error, OSError) and error.strerror:
+        return _told(_of_file(error), status)
     if status != PROGRAM_FAULT:
         return _told(str(error), status)
     text = f"{type(error).__name__}: {error}".rstrip(": ")
@@ -66,6 +70,14 @@ def status_of(error: BaseException) -> int:
         if (status := STATUS.get(f"{kind.__module__}.{kind.__qualname__}")) is not None:
             return status
     return 2 if isinstance(error, OSError) else PROGRAM_FAULT  # a file that cannot be read or written
+
+
+def _of_file(error: OSError) -> str:
+    """What the operating system refused, with the file and what to do."""
+    what = (error.strerror or "").lower()
+    if error.filename is None:
+        return f"the operating system refuses: {what}; free what is full or busy, and try again"
+    return f"{error.filename}: cannot be used: {what}; check its name and its permissions, or name another"
 
 
 def _told(message: str, status: int) -> int:

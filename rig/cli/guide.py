@@ -14,6 +14,9 @@ from rich.prompt import Prompt
 from rich.table import Table
 from rich.text import Text
 
+from procedures.errors import BadAnswer
+from procedures.questions import Question
+from procedures.session import Reading
 from rig.cli.output import duration
 from rig.record import Kept
 
@@ -58,14 +61,27 @@ class Guide:
         self._readings = _readings(kept)
         self._live.update(self._page())
 
-    def ask(self, name: str, question: str, default: str) -> str:
-        if name in self._answers:
-            return self._answers[name]
+    def read(self, reading: Reading) -> None:
+        self._console.print(f"{reading.name} = {reading.value:g} {reading.unit}", highlight=False)
+
+    def ask(self, question: Question, instead: str | None) -> str:
+        """Asked until the answer makes sense; a simulated bench's answer is proposed."""
+        if question.name in self._answers:
+            return self._answers[question.name]
         self._live.stop()
         try:
-            return Prompt.ask(question, console=self._console, default=default)
+            return self._asked(question, instead)
         finally:
             self._live.start()
+
+    def _asked(self, question: Question, instead: str | None) -> str:
+        text = f"{question.text} ({question.accepts})"
+        while True:
+            given = Prompt.ask(Text(text), console=self._console, default=instead or "")
+            try:
+                return question.checked(given)
+            except BadAnswer as refused:
+                self._console.print(str(refused), style="yellow", highlight=False)
 
     def _left_s(self) -> float:
         task = self._bar.tasks[0]

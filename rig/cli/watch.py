@@ -11,8 +11,11 @@ from typing import Any
 import click
 import yaml
 
-from procedures.errors import NoAnswer
+from procedures.errors import BadAnswer, NoAnswer
+from procedures.questions import Question
+from procedures.session import Reading
 from rig.cli.output import emit, note
+from rig.cli.verdicts import lines as results
 from rig.record import Kept
 from rig.runner import Outcome, Watch
 
@@ -25,7 +28,7 @@ def watch_options(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 class Quiet:
-    """Nobody looks on. A question takes its answer from the file, else its default."""
+    """Nobody looks on. A question takes its answer from the file, or from the technician of a simulated bench."""
 
     def __init__(self, answers: Mapping[str, str]) -> None:
         self._answers = answers
@@ -42,8 +45,17 @@ class Quiet:
     def kept(self, kept: Kept) -> None:
         """The record has it."""
 
-    def ask(self, name: str, question: str, default: str) -> str:  # noqa: ARG002
-        return self._answers.get(name, default)
+    def read(self, reading: Reading) -> None:
+        """The record has it."""
+
+    def ask(self, question: Question, instead: str | None) -> str:
+        given = self._answers.get(question.name, instead)
+        if given is None:
+            raise NoAnswer(
+                f'nobody is there to answer "{question.text}"; put `{question.name}: ...` ({question.accepts}) into a '
+                "file for --answers, or run it in a terminal without --unattended"
+            )
+        return given
 
 
 @contextmanager
@@ -65,12 +77,13 @@ def _answers(path: Path | None) -> dict[str, str]:
     try:
         document = yaml.safe_load(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise NoAnswer(f"{path}: the file of answers cannot be read: {error.strerror}") from None
+        raise BadAnswer(f"{path}: the file of answers cannot be read: {error.strerror}") from None
     except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise NoAnswer(f"{path}: is not a YAML file: {error}") from None
+        raise BadAnswer(f"{path}: is not a YAML file: {error}") from None
     if not isinstance(document, dict):
-        raise NoAnswer(f"{path}: a file of answers is a mapping, such as `mounting: yes`")
-    return {str(name): "yes" if answer is True else str(answer) for name, answer in document.items()}
+        raise BadAnswer(f"{path}: a file of answers is a mapping, such as `mounting: yes`")
+    yes_no = {"True": "yes", "False": "no"}  # what YAML makes of an unquoted yes
+    return {str(name): yes_no.get(str(answer), str(answer)) for name, answer in document.items()}
 
 
 def tell(outcome: Outcome, as_json: bool) -> int:
@@ -80,8 +93,7 @@ def tell(outcome: Outcome, as_json: bool) -> int:
         head = {"schema": "rig.run/1", "run": run.run, "procedure": run.procedure, "state": run.state}
         emit({**head, "poses": run.rows, "results": run.results})
     else:
-        lines = [f"  {name} = {r['value']:g} {r['unit']}  {r['verdict'] or ''}" for name, r in run.results.items()]
-        click.echo("\n".join([f"{run.run}: {run.state}, {run.rows} poses", *lines]))
+        click.echo("\n".join([f"{run.run}: {run.state}, {run.rows} poses", *results(run.results)]))
     if outcome.error is not None:
         raise outcome.error
     return int(any(result["verdict"] == "fail" for result in run.results.values()))

@@ -12,11 +12,11 @@ from sqlalchemy import Engine, create_engine, event, text
 from sqlalchemy.exc import DatabaseError, OperationalError
 
 from rig.errors import RecordError
-from rig.record.schema import SCHEMA, metadata
+from rig.record.schema import MIGRATIONS, SCHEMA, metadata
 
 
 def open_file(path: Path) -> Engine:
-    """The file's engine; its tables are made where there are none.
+    """The file's engine; its tables are made where there are none, and brought up to date where they are older.
 
     Raises RecordError where it cannot be opened, is damaged, or was written by a newer program.
     """
@@ -42,8 +42,10 @@ def _make_tables(engine: Engine, path: Path) -> None:
                 f"{path}: written by a newer version of this program (schema {version}, this one knows {SCHEMA}); "
                 "update the program, or name another folder in RIG_HOME"
             )
-        if version == 0:
+        if version < SCHEMA:
             metadata.create_all(to)
+            for statement in (each for old in range(version or SCHEMA, SCHEMA) for each in MIGRATIONS[old]):
+                to.execute(text(statement))
             to.execute(text(f"PRAGMA user_version = {SCHEMA:d}"))
 
 

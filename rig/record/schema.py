@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sqlalchemy import JSON, Column, Float, ForeignKey, Index, Integer, LargeBinary, MetaData, String, Table
 
-SCHEMA = 1
+SCHEMA = 2
 metadata = MetaData()
 
 runs = Table(
@@ -39,6 +39,18 @@ poses = Table(
     Column("flip", Integer, nullable=False),
     Column("t_s", Float, nullable=False),  # middle of the dwell
     Column("temperature_c", Float),
+    Column("excluded", String),  # why a person took it out of every analysis; it stays in the record
+)
+
+readings = Table(  # numbers that belong to a run and to none of its poses
+    "readings",
+    metadata,
+    Column("run", ForeignKey("runs.run"), primary_key=True),
+    Column("name", String, primary_key=True),
+    Column("at", String, nullable=False),  # ISO 8601, UTC
+    Column("value", Float, nullable=False),
+    Column("std", Float),
+    Column("unit", String, nullable=False),
 )
 
 blocks = Table(
@@ -80,3 +92,6 @@ events = Table(
     Column("text", String, nullable=False),
     Index("events_of_run", "run"),
 )
+
+# What brings an older file to the next version. Tables that are wholly new are made before.
+MIGRATIONS = {1: ("ALTER TABLE poses ADD COLUMN excluded VARCHAR",)}

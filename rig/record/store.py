@@ -7,7 +7,7 @@ nothing else.
 from __future__ import annotations
 
 import secrets
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -17,17 +17,18 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 from sqlalchemy import Connection, Integer, Row, Select, func, insert, select, text, update
+from sqlalchemy import Table as SqlTable
 from sqlalchemy.dialects.sqlite import insert as insert_or
 
 from calibrations.table import Table
-from procedures.session import Pose
+from procedures.session import Pose, Reading
 from rig.errors import RecordError, UnknownRun
 from rig.home import home
 from rig.lease import is_held
 from rig.nearest import did_you_mean
 from rig.record import codec
 from rig.record.file import open_file
-from rig.record.schema import blocks, columns, events, poses, runs, states
+from rig.record.schema import blocks, columns, events, poses, readings, runs, states
 from rig.record.values import Block, Event, Kept, Run
 
 FILE = "record.db"
@@ -68,9 +69,10 @@ class Record:
         configuration: str,
         constants: Mapping[str, str | float],
         source: str,
+        kind: str = "poses",
     ) -> str:
-        """A new run of `procedure`, in the state "running"; its id."""
-        values = {"kind": "poses", "procedure": procedure, "state": "running", "settings": dict(settings)}
+        """A new run of `procedure`, in the state "running", for a table of `kind`; its id."""
+        values = {"kind": kind, "procedure": procedure, "state": "running", "settings": dict(settings)}
         values |= {"bench": dict(bench), "identities": dict(identities), "configuration": configuration}
         with self._engine.begin() as to:
             return _new_run(to, values | {"constants": dict(constants), "source": source})
@@ -87,6 +89,24 @@ class Record:
             to.execute(insert(blocks), key | samples)
             if state is not None:
                 _put_state(to, run, state)
+
+    def keep_reading(self, run: str, reading: Reading, state: Mapping[str, Any] | None) -> None:
+        """A reading and the simulated bench's `state`, in one transaction; a name that is there is replaced."""
+        values = {"run": run, "at": _now(), **vars(reading)}
+        with self._engine.begin() as to:
+            _put(to, readings, values, ("run", "name"))
+            if state is not None:
+                _put_state(to, run, state)
+
+    def exclude(self, run: str, number: int, reason: str | None) -> None:
+        """Leave a pose out of every analysis, with a reason that stays; None takes it in again.
+
+        Raises RecordError where there is no such pose.
+        """
+        chosen = (poses.c.run == run) & (poses.c.number == number)
+        with self._engine.begin() as to:
+            if not to.execute(update(poses).where(chosen).values(excluded=reason)).rowcount:
+                raise RecordError(f"run {run} has no pose {number}; `rig show {run}` says how many it has")
 
     def keep_state(self, run: str, state: Mapping[str, Any]) -> None:
         """The simulated bench's state before the first pose."""
@@ -107,9 +127,10 @@ class Record:
         with self._engine.begin() as to:
             to.execute(insert(events), {"run": run, "at": _now(), "what": what, "text": text})
 
-    def add_table(self, table: Table) -> str:
-        """An imported table as a run of its own; its id."""
-        values = {"kind": table.kind, "procedure": "import", "state": "complete", "settings": {}, "bench": {}}
+    def add_table(self, table: Table, settings: Mapping[str, Any] | None = None) -> str:
+        """An imported table as a run of its own, with how it was taken from its file; its id."""
+        values = {"kind": table.kind, "procedure": "import", "state": "complete", "bench": {}}
+        values |= {"settings": dict(settings or {})}
         values |= {"configuration": table.digest, "constants": dict(table.constants), "source": table.source}
         cells: list[dict[str, Any]] = [
             *({"name": name, "numbers": column.astype("<f8").tobytes()} for name, column in table.columns.items()),
@@ -139,13 +160,27 @@ class Record:
         raise UnknownRun(f"no run {run!r} in {self.path}.{did_you_mean(run, known[-20:])}")
 
     def poses(self, run: str) -> list[Pose]:
-        """The kept poses, in their order."""
-        query = select(*[poses.c[name] for name in _POSE]).where(poses.c.run == run).order_by(poses.c.number)
+        """The kept poses, in their order, without those that were excluded."""
+        chosen = (poses.c.run == run) & poses.c.excluded.is_(None)
+        query = select(*[poses.c[name] for name in _POSE]).where(chosen).order_by(poses.c.number)
         with self._engine.connect() as at:
             return [Pose(**row._mapping) for row in at.execute(query)]
 
+    def next_number(self, run: str) -> int:
+        """The number of the next pose to be kept; excluded ones keep theirs."""
+        with self._engine.connect() as at:
+            highest = at.execute(select(func.max(poses.c.number)).where(poses.c.run == run)).scalar_one()
+        return 0 if highest is None else int(highest) + 1
+
+    def readings(self, run: str) -> list[Reading]:
+        """The run's readings, in the order of their names."""
+        names = ("name", "value", "unit", "std")
+        query = select(*[readings.c[name] for name in names]).where(readings.c.run == run).order_by(readings.c.name)
+        with self._engine.connect() as at:
+            return [Reading(*row) for row in at.execute(query)]
+
     def kept(self, run: str) -> Iterator[Kept]:
-        """Every pose with its samples, in order; few in memory at a time."""
+        """Every pose with its samples, in order, excluded ones too; few in memory at a time."""
         same = (poses.c.run == blocks.c.run) & (poses.c.number == blocks.c.number)
         query = select(poses, blocks).join_from(poses, blocks, same).where(poses.c.run == run)
         with self._engine.connect() as at:
@@ -191,8 +226,12 @@ def _new_run(to: Connection, values: Mapping[str, Any]) -> str:
 
 
 def _put_state(to: Connection, run: str, state: Mapping[str, Any]) -> None:
-    values = {"run": run, "state": dict(state)}
-    to.execute(insert_or(states).values(values).on_conflict_do_update(index_elements=["run"], set_=values))
+    _put(to, states, {"run": run, "state": dict(state)}, ("run",))
+
+
+def _put(to: Connection, table: SqlTable, values: Mapping[str, Any], key: Sequence[str]) -> None:
+    """Insert a row, or replace the one of the same key."""
+    to.execute(insert_or(table).values(values).on_conflict_do_update(index_elements=list(key), set_=dict(values)))
 
 
 def _select_runs() -> Select[Any]:
@@ -210,4 +249,6 @@ def _kept(row: Row[Any]) -> Kept:
     except ValueError as error:
         raise RecordError(f"{where}: {error}; restore a copy of the record") from None
     pose = Pose(**{name: row._mapping[name] for name in _POSE})
-    return Kept(pose, Block(volts, tuple(row.channels), row.rate_hz, row.start_s), row.t_s, row.temperature_c)
+    return Kept(
+        pose, Block(volts, tuple(row.channels), row.rate_hz, row.start_s), row.t_s, row.temperature_c, row.excluded
+    )

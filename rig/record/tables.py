@@ -10,6 +10,7 @@ from calibrations.mean_noise import measured_inflation
 from calibrations.table import Array, Table
 from procedures.session import Samples
 from rig.errors import RecordError
+from rig.record.raw import samples_table
 from rig.record.store import Record
 from rig.record.values import Kept
 
@@ -24,11 +25,15 @@ def table_of(record: Record, run_id: str) -> Table:
     numbers, labels = record.columns(run_id)
     if numbers:
         return Table.from_columns(run.kind, numbers, run.constants, run.run, labels)
+    if run.kind != "poses":
+        return samples_table(record, run)
     rows: list[dict[str, float]] = []
     paths: list[str] = []
     blocks: list[Samples] = []
     stride = 1 + run.rows // MOST_BLOCKS
     for number, kept in enumerate(record.kept(run_id)):
+        if kept.excluded is not None:
+            continue
         rows.append(_row(kept))
         paths.append(kept.pose.path)
         if number % stride == 0:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from procedures.session import Pose, Samples
+from procedures.session import Dwell, Pose, Samples
 
 
 @dataclass(frozen=True)
@@ -54,6 +54,17 @@ class Kept:
     samples: Samples
     t_s: float
     temperature_c: float | None
+    excluded: str | None = None  # why it is left out of every analysis
+
+    @property
+    def dwell(self) -> Dwell:
+        """Mean and standard deviation of every channel."""
+        volts, names = self.samples.volts, self.samples.channels
+        stds = volts.std(axis=0, ddof=1) if len(volts) > 1 else np.zeros(len(names))
+        means = dict(zip(names, volts.mean(axis=0).tolist(), strict=True))
+        return Dwell(
+            self.pose, self.t_s, means, dict(zip(names, stds.tolist(), strict=True)), len(volts), self.temperature_c
+        )
 
 
 @dataclass(frozen=True)

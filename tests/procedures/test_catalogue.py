@@ -32,8 +32,10 @@ def folder(tmp_path: Path) -> Path:
 
 
 def test_a_file_with_a_function_of_its_name_is_a_procedure(folder: Path) -> None:
-    assert list(paths(folder)) == ["noise-floor", "sweep"]
-    assert list(paths()) == ["sweep"]
+    assert set(paths(folder)) == {"noise-floor", *paths()}
+    assert paths(folder)["noise-floor"].parent == folder
+    assert list(paths()) == sorted(paths())
+    assert not {"session", "settings", "questions", "catalogue"} & set(paths())
     assert summary(folder / "noise_floor.py") == "a still record"
 
 

@@ -10,8 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from procedures.errors import SafetyLimit
-from procedures.session import Limits, Pose, Samples, Session
+from procedures.errors import Declined, SafetyLimit
+from procedures.questions import Question
+from procedures.session import Dwell, Limits, Pose, Reading, Samples, Session
 from procedures.sweep import grid
 
 POSES = st.builds(Pose, st.sampled_from([30.0, 90.0]), st.sampled_from([0.0, 10.0]), st.sampled_from([-1, 1]))
@@ -46,6 +47,8 @@ class Book:
 
     held: list[Pose] = field(default_factory=list)
     said: list[str] = field(default_factory=list)
+    read: list[Reading] = field(default_factory=list)
+    answers: dict[str, str] = field(default_factory=dict)
 
     def kept(self) -> Sequence[Pose]:
         return self.held
@@ -56,8 +59,18 @@ class Book:
     def keep(self, pose: Pose, samples: Samples, temperature_c: float | None) -> None:
         self.held.append(pose)
 
-    def ask(self, name: str, question: str, default: str) -> str:
-        return f"{name} {question} {default}"
+    def measured(self) -> Sequence[Dwell]:
+        return ()
+
+    def readings(self) -> Sequence[Reading]:
+        return self.read
+
+    def keep_reading(self, reading: Reading) -> None:
+        self.read.append(reading)
+
+    def ask(self, question: Question) -> str:
+        self.said.append(question.text)
+        return question.checked(self.answers[question.name])
 
     def doing(self, text: str) -> None:
         self.said.append(text)
@@ -65,7 +78,7 @@ class Book:
 
 def session(book: Book | None = None, beta: Stage | None = None, alpha: Stage | None = None) -> Session:
     nothing: Any = None
-    parts: dict[str, Any] = {"adc": nothing, "oven": nothing, "clock": nothing}
+    parts: dict[str, Any] = {"adc": nothing, "oven": nothing, "level": nothing, "positioner": nothing, "clock": nothing}
     return Session(alpha or Stage(), beta or Stage(), host=book or Book(), limits=Limits((10.0, 40.0), 5.0), **parts)
 
 
@@ -125,5 +138,22 @@ def test_only_a_stage_that_does_not_know_its_zero_is_homed() -> None:
     assert book.said == ["homing beta"]
 
 
-def test_a_question_goes_to_the_host() -> None:
-    assert session().ask("mounting", "mounted?") == "mounting mounted? yes"
+def test_what_a_person_confirms_lets_the_procedure_go_on() -> None:
+    book = Book(answers={"mounting": "yes"})
+    session(book).confirm("mounting", "Is it mounted?")
+    assert book.said == ["Is it mounted?"]
+
+
+def test_what_a_person_declines_stops_it() -> None:
+    with pytest.raises(Declined, match='mounting: "Is it mounted\\?" was answered with no'):
+        session(Book(answers={"mounting": "no"})).confirm("mounting", "Is it mounted?")
+
+
+def test_a_typed_number_is_a_number() -> None:
+    assert session(Book(answers={"level-x": "-0,25 deg"})).number("level-x", "What?", "deg", -45, 45) == -0.25
+
+
+def test_a_reading_is_found_by_its_name() -> None:
+    rig = session()
+    rig.keep_reading("level-x", 0.02, "deg", 0.001)
+    assert (rig.reading("level-x"), rig.reading("level-y")) == (0.02, None)

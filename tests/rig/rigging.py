@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from procedures.catalogue import find
+from procedures.questions import Question
+from procedures.session import Reading
 from procedures.settings import parse
 from rig.record import Kept
 
@@ -24,7 +26,7 @@ def small_sweep() -> tuple[Any, dict[str, Any]]:
 
 @dataclass
 class Onlooker:
-    """Remembers what it was shown; answers every question by its default."""
+    """Remembers what it was shown; leaves every answer to the simulated technician."""
 
     run: str = ""
     said: list[str] = field(default_factory=list)
@@ -43,9 +45,13 @@ class Onlooker:
     def kept(self, kept: Kept) -> None:
         self.seen.append(kept)
 
-    def ask(self, name: str, question: str, default: str) -> str:
-        self.said.append(f"{name}: {question}")
-        return default
+    def read(self, reading: Reading) -> None:
+        self.said.append(f"{reading.name} read")
+
+    def ask(self, question: Question, instead: str | None) -> str:
+        self.said.append(f"{question.name}: {question.text}")
+        assert instead is not None
+        return instead
 
 
 def in_own_process(*arguments: str, harm: str = "") -> subprocess.CompletedProcess[str]:

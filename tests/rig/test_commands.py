@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from calibrations.read_csv import read_csv
-from rig.bench import DEFAULT
+from rig.bench import DEFAULT, read_bench
 from rig.record import Record
 from tests.rig.rigging import POSES, SMALL_ARGUMENTS
 
@@ -80,7 +80,7 @@ def test_check_identifies_and_tests_every_instrument(rig: Rig) -> None:
     ended = rig("check", "--json")
     instruments = json.loads(ended.out)["instruments"]
     assert ended.status == 0
-    assert set(instruments) == {"alpha", "beta", "adc", "oven"}
+    assert set(instruments) == set(read_bench().instruments)
     assert instruments["adc"]["identity"]["model"] == "LabJack T7"
     assert "FAILED" not in rig("check").out
 
@@ -139,9 +139,13 @@ def test_bad_usage_is_one_message_with_status_2_and_writes_nothing(
 @pytest.mark.sockets
 def test_answers_come_from_a_file(rig: Rig, tmp_path: Path) -> None:
     answers = tmp_path / "answers.yaml"
-    answers.write_text("mounting: checked by hand")
-    run = json.loads(rig(*RUN, "--answers", str(answers), "--json").out)["run"]
-    assert "checked by hand" in rig("show", run).out
+    answers.write_text("mounting: no")
+    ended = rig(*RUN, "--answers", str(answers), "--json")
+    run = json.loads(ended.out)
+    assert (ended.status, run["state"], run["poses"]) == (4, "stopped", 0)
+    assert "was answered with no" in ended.err
+    answers.write_text("mounting: yes")
+    assert rig("resume", run["run"], "--answers", str(answers), "--unattended").status == 0
 
 
 @pytest.mark.parametrize("text", ["- a list", "a: ["])

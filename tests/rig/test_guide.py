@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from procedures.errors import NoAnswer
+from procedures.questions import Confirm, Number
 from procedures.session import Pose
 from rig.cli.guide import Guide
 from rig.cli.output import columns, duration, size
@@ -33,18 +35,34 @@ def test_it_shows_what_happens_progress_readings_and_time() -> None:
         assert piece in shown
 
 
+MOUNTED = Confirm("mounting", "Is it mounted?")
+
+
 def test_a_person_is_asked_unless_the_file_answers(monkeypatch: pytest.MonkeyPatch) -> None:
     screen = Console(file=io.StringIO(), force_terminal=True, width=90)
     monkeypatch.setattr("builtins.input", lambda *prompt: "no")
     with Guide("sweep", {"known": "from the file"}, screen) as guide:
-        assert guide.ask("known", "Is it known?", "yes") == "from the file"
-        assert guide.ask("mounting", "Is it mounted?", "yes") == "no"
+        assert guide.ask(Confirm("known", "Is it known?"), "yes") == "from the file"
+        assert guide.ask(MOUNTED, "yes") == "no"
+
+
+def test_a_person_is_asked_until_the_answer_makes_sense(monkeypatch: pytest.MonkeyPatch) -> None:
+    screen = Console(file=io.StringIO(), force_terminal=True, width=200)
+    said = iter(["much", "90", "0,2"])
+    monkeypatch.setattr("builtins.input", lambda *prompt: next(said))
+    with Guide("sweep", {}, screen) as guide:
+        assert guide.ask(Number("level-x", "What does it show?", unit="deg", low=-45, high=45), None) == "0.2"
+    assert "it takes a number from -45 to 45 deg" in screen.file.getvalue()  # type: ignore[attr-defined]
 
 
 def test_who_is_not_at_a_terminal_is_not_asked() -> None:
     with watching("sweep", unattended=False, answers=None) as watch:
         assert isinstance(watch, Quiet)
-        assert watch.ask("mounting", "Is it mounted?", "yes") == "yes"
+        assert watch.ask(MOUNTED, "yes") == "yes"
+        with pytest.raises(
+            NoAnswer, match=r'to answer "Is it mounted\?"; put `mounting: ...` \(yes or no\) into a file'
+        ):
+            watch.ask(MOUNTED, None)
 
 
 def test_times_and_sizes_read_well() -> None:

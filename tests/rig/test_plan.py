@@ -34,7 +34,11 @@ def test_every_move_is_listed_once_and_in_time() -> None:
     assert [step.start_s for step in planned.steps[1:]] == ends[:-1]
     assert planned.duration_s == ends[-1]
     moves = [step.what for step in planned.steps if step.what.startswith("beta from")]
-    assert moves[:3] == ["beta from 0 to -5 deg", "beta from -5 to 0 deg", "beta from 0 to 90 deg"]
+    assert moves[:3] == [
+        "beta from 0 to 180 deg",
+        "beta from 180 to -5 deg",
+        "beta from -5 to 0 deg",
+    ]  # level check first
 
 
 @pytest.mark.sockets

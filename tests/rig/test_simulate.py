@@ -39,12 +39,8 @@ def test_drivers_find_the_instruments_at_the_printed_addresses(served: Any) -> N
     _, document = served
     assert document["schema"] == "rig.addresses/1"
     instruments = document["instruments"]
-    assert {role: each["driver"] for role, each in instruments.items()} == {
-        "alpha": "oriental_az",
-        "beta": "oriental_az",
-        "adc": "labjack_t7",
-        "oven": "omega_cn7500",
-    }
+    expected = {role: each.driver for role, each in read_bench().instruments.items()}
+    assert {role: each["driver"] for role, each in instruments.items()} == expected
     links = Links(WallClock())
     alpha, adc = ({k: v for k, v in instruments[role].items() if k != "driver"} for role in ("alpha", "adc"))
     stage = oriental_az.connect(Address(**alpha), links, oriental_az.Settings(), "alpha")
@@ -80,7 +76,12 @@ def test_a_bench_of_which_a_part_is_real_runs_in_real_time(
         assert mixed.clock.now() < 60
         assert set(mixed.identities()) == set(instruments)
     settings = ("--step-deg", "180", "--inclinations-deg", "0", "--dwell-s", "0.01", "--settle-s", "0")
-    ended = rig("run", "sweep", *settings, "--bench", str(path), "--json")
+    asked = rig("run", "sweep", *settings, "--bench", str(path), "--json", "--unattended")
+    assert (asked.status, json.loads(asked.out)["state"]) == (4, "stopped")
+    assert 'nobody is there to answer "Is the sensor mounted face up' in asked.err
+    path.with_name("answers.yaml").write_text("mounting: yes")
+    answers = ("--answers", str(path.with_name("answers.yaml")))
+    ended = rig("run", "sweep", *settings, "--bench", str(path), *answers, "--json", "--unattended")
     assert ended.status == 0, ended.err
 
 
@@ -93,7 +94,9 @@ def test_a_bench_without_twins_serves_nothing(rig: Callable[..., Any], bench_fil
 
 def test_pseudo_terminals_are_served_where_the_bench_asks(bench_file: Callable[..., Path]) -> None:
     instruments = yaml.safe_load(DEFAULT.read_text())["instruments"]
-    for role in ("alpha", "beta", "oven"):
+    roles = ("alpha", "beta", "oven")
+    instruments = {role: instruments[role] for role in (*roles, "adc")}
+    for role in roles:
         instruments[role]["url"] = "simulated:pty:"
     with connected(read_bench(bench_file({"instruments": instruments}))) as rig:
         assert sorted(server.url.partition(":")[0] for server in rig.servers) == ["serial", "serial", "tcp"]

@@ -1,6 +1,7 @@
 """The record keeps what it was given, in order, and says clearly what it cannot do."""
 
 import sqlite3
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -9,9 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from calibrations.table import Table
-from procedures.session import Pose
+from procedures.session import Pose, Reading
 from rig.errors import RecordError, UnknownRun
 from rig.record import Block, Kept, Record
+from rig.record.schema import SCHEMA
 from rig.record.tables import table_of
 
 ANGLES = st.floats(-400, 400)
@@ -158,3 +160,43 @@ def test_a_damaged_block_names_its_pose() -> None:
             connection.exec_driver_sql("UPDATE blocks SET samples = x'00'")
         with pytest.raises(RecordError, match="pose 0: damaged sample block"):
             list(record.kept(run))
+
+
+def test_a_record_of_the_first_version_is_brought_up_to_date(tmp_path: Path) -> None:
+    with Record(tmp_path) as record:
+        run = begin(record)
+        record.keep(run, 0, Kept(Pose(90, 0), block([[2.0, 1.0]]), 3.5, 21.5), None)
+    with closing(sqlite3.connect(tmp_path / "record.db")) as connection:
+        connection.executescript("ALTER TABLE poses DROP COLUMN excluded; DROP TABLE readings; PRAGMA user_version = 1")
+    with Record(tmp_path) as record:
+        record.keep_reading(run, Reading("level-x", 0.02, "deg", 0.001), None)
+        record.exclude(run, 0, "touched")
+        assert [kept.excluded for kept in record.kept(run)] == ["touched"]
+    with closing(sqlite3.connect(tmp_path / "record.db")) as connection:
+        assert connection.execute("PRAGMA user_version").fetchone() == (SCHEMA,)
+
+
+def test_a_reading_is_replaced_by_one_of_its_name() -> None:
+    with Record() as record:
+        run = begin(record)
+        for value in (0.1, 0.2):
+            record.keep_reading(run, Reading("level-x", value, "deg"), {"at": value})
+        assert record.readings(run) == [Reading("level-x", 0.2, "deg", None)]
+        assert record.state(run) == {"at": 0.2}
+
+
+def test_an_excluded_pose_stays_with_its_reason_and_is_left_out() -> None:
+    with Record() as record:
+        run = begin(record)
+        for number in range(3):
+            kept = Kept(Pose(90, 10.0 * number), block([[number, 1.0], [number, 1.0]]), number, 21.5)
+            record.keep(run, number, kept, None)
+        record.exclude(run, 1, "a lorry passed")
+        assert [kept.excluded for kept in record.kept(run)] == [None, "a lorry passed", None]
+        assert [pose.beta_deg for pose in record.poses(run)] == [0.0, 20.0]
+        assert list(table_of(record, run).column("beta_deg")) == [0.0, 20.0]
+        assert record.next_number(run) == 3
+        record.exclude(run, 1, None)
+        assert len(record.poses(run)) == 3
+        with pytest.raises(RecordError, match=f"run {run} has no pose 7"):
+            record.exclude(run, 7, "nothing")

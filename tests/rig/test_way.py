@@ -47,11 +47,22 @@ class Stage:
 class Silent:
     def doing(self, text: str) -> None: ...
 
+    def readings(self) -> tuple[()]:
+        return ()
+
 
 def gone(poses: list[Pose]) -> tuple[Array, list[int]]:
     """Specific force all along the session's way, and where on it the poses are."""
     way, parts, places = Way(), {}, []
-    parts |= {"adc": None, "oven": None, "clock": None, "host": Silent(), "limits": Limits()}
+    parts |= {
+        "adc": None,
+        "oven": None,
+        "level": None,
+        "positioner": None,
+        "clock": None,
+        "host": Silent(),
+        "limits": Limits(),
+    }
     session = Session(alpha=Stage(way, 0), beta=Stage(way, 1), **parts)  # type: ignore[arg-type]
     for pose in poses:
         session.move_to(pose)

@@ -1,0 +1,61 @@
+"""level-check: how far the table is from level, by the digital level or a typed reading.
+
+Excites   tilt of the base, zero offset of alpha.
+Blind to  turns about the vertical; the level's own offset, which the half turn of beta takes out.
+Source    Ang V: the level is read before every experiment; reversal, as for any spirit level.
+"""
+
+from __future__ import annotations
+
+from procedures.errors import SafetyLimit
+from procedures.session import Session
+
+HALF_TURN = (("front", 0.0), ("back", 180.0))  # of beta: the table's tilt turns its sign on the level, its offset not
+LEVEL_RANGE_DEG = 45.0
+
+
+def level_check(rig: Session, *, settle_s: float = 2.0) -> None:
+    """Read the level at beta = 0 and 180 deg with alpha at 0, and refuse to go on where the table is not level.
+
+    Other procedures begin with it where the bench has limits.level_deg. Raises SafetyLimit.
+    """
+    for side, beta_deg in HALF_TURN:
+        if rig.reading(f"level-{side}-y") is None:
+            _read(rig, side, beta_deg, settle_s)
+    x_deg, y_deg = tilt_deg(rig)
+    limit = rig.limits.level_deg
+    if limit is not None and max(abs(x_deg), abs(y_deg)) > limit:
+        raise SafetyLimit(
+            f"the table is tilted by {x_deg:.3f} deg along x and {y_deg:.3f} deg along y, more than "
+            f"limits.level_deg = {limit:g}; level the base and the zero of alpha, then start a new run"
+        )
+
+
+def levelled(rig: Session) -> None:
+    """The level check that other procedures begin with: once a run, and only where the bench has a limit for it."""
+    if rig.limits.level_deg is not None:
+        level_check(rig)
+
+
+def tilt_deg(rig: Session) -> tuple[float, float]:
+    """The table's tilt from both readings, deg, along x and y of the level at beta = 0."""
+    front_x, front_y, back_x, back_y = (
+        rig.reading(f"level-{side}-{axis}") or 0.0 for side, _ in HALF_TURN for axis in "xy"
+    )
+    return (front_x - back_x) / 2, (front_y - back_y) / 2
+
+
+def _read(rig: Session, side: str, beta_deg: float, settle_s: float) -> None:
+    """One reading of both axes: from the level, or typed where the bench has none."""
+    rig.alpha.move_to(0.0)
+    rig.beta.move_to(beta_deg)
+    rig.wait(settle_s)
+    if rig.level is not None:
+        shown = rig.level.read()
+        rig.keep_reading(f"level-{side}-x", shown.x_deg, "deg", shown.std_deg)
+        rig.keep_reading(f"level-{side}-y", shown.y_deg, "deg", shown.std_deg)
+        return
+    for axis in "xy":
+        text = f"What does the level on the table show along {axis}, in deg? (alpha 0, beta {beta_deg:g} deg)"
+        typed = rig.number(f"level-{side}-{axis}", text, "deg", -LEVEL_RANGE_DEG, LEVEL_RANGE_DEG)
+        rig.keep_reading(f"level-{side}-{axis}", typed, "deg")

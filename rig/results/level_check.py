@@ -1,0 +1,20 @@
+"""level-check: the table's tilt, and the level's own offset, from two readings half a turn apart."""
+
+from __future__ import annotations
+
+from math import hypot
+
+from rig.record import Record, Run
+from rig.results.result import Result
+
+
+def evaluate(record: Record, run: Run) -> dict[str, Result]:
+    """Tilt along x and y of the level, and the offset that the half turn takes out, deg."""
+    read = {reading.name: reading for reading in record.readings(run.run)}
+    results = {}
+    for axis in "xy":
+        front, back = read[f"level-front-{axis}"], read[f"level-back-{axis}"]
+        std = hypot(front.std, back.std) / 2 if front.std is not None and back.std is not None else None
+        results[f"level-{axis}"] = Result((front.value - back.value) / 2, "deg", std)
+        results[f"level-offset-{axis}"] = Result((front.value + back.value) / 2, "deg", std)
+    return results

@@ -1,0 +1,36 @@
+"""noise-floor: rms and peak-to-peak noise of each axis, and the inclination that it hides."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from calibrations.errors import DataError
+from calibrations.noise_floor import hidden_inclination_deg, rms
+from procedures.noise_floor import STILL
+from rig.record import Kept, Record, Run
+from rig.results.result import Result
+
+PEAK_TO_PEAK = 4  # x rms: Ang V
+UPRIGHT_DEG = {"x": (0.0, 180.0), "y": (90.0, 270.0)}  # beta at +1 g and at -1 g
+
+
+def evaluate(record: Record, run: Run) -> dict[str, Result]:
+    """V, and deg for the inclination. Raises DataError where the still record is missing."""
+    upright: list[Kept] = []
+    still: list[Kept] = []
+    for kept in record.kept(run.run):
+        (still if kept.pose.path.startswith(STILL) else upright).append(kept)
+    if not still:
+        raise DataError(f"run {run.run} holds no still record yet; `rig resume {run.run}` goes on with it")
+    first, results = still[0].samples, {}
+    for axis, betas in UPRIGHT_DEG.items():
+        if (channel := f"v{axis}") not in first.channels:
+            continue
+        k = first.channels.index(channel)
+        value, std = rms([kept.samples.volts[:, k] for kept in still])
+        plus, minus = (np.mean([u.dwell.means[channel] for u in upright if u.pose.beta_deg == b]) for b in betas)
+        inclination = hidden_inclination_deg(PEAK_TO_PEAK * value, float(plus - minus) / 2)
+        results[f"noise-rms-{axis}"] = Result(value, "V", std)
+        results[f"noise-pp-{axis}"] = Result(PEAK_TO_PEAK * value, "V", PEAK_TO_PEAK * std)
+        results[f"inclination-{axis}"] = Result(inclination, "deg", inclination * std / value if value else None)
+    return results

@@ -1,0 +1,58 @@
+"""One measured quantity, and its verdict against a limit: the uncertainty has its say.
+
+pass      within the limit by more than the expanded uncertainty (k = 2)
+fail      beyond it by more than that
+marginal  neither can be said
+Source    ISO 14253-1, JCGM 106: a guard band on both sides of the limit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from procedures.errors import ProcedureError
+
+COVERAGE = 2.0
+Limit = float | tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Result:
+    """A value with its standard uncertainty, in `unit`; no `std` where it is not known."""
+
+    value: float
+    unit: str
+    std: float | None = None
+
+    def verdict(self, limit: Limit) -> str:
+        """pass, fail or marginal; a single number limits the magnitude."""
+        low, high = (-limit, limit) if isinstance(limit, (int, float)) else limit
+        inside = min(self.value - low, high - self.value)
+        guard = COVERAGE * (self.std or 0.0)
+        return "pass" if inside >= guard else "fail" if inside < -guard else "marginal"
+
+
+def returned(name: str, given: Any) -> Result:
+    """A result that a procedure returns itself: {"value": 2.0, "unit": "g", "std": 0.1}. Raises ProcedureError."""
+    try:
+        std = given.get("std")
+        return Result(float(given["value"]), str(given["unit"]), None if std is None else float(std))
+    except (AttributeError, KeyError, TypeError, ValueError):
+        wanted = 'a result is a mapping such as {"value": 2.0, "unit": "g", "std": 0.1}'
+        raise ProcedureError(f"the procedure returned {name} = {given!r}; {wanted}") from None
+
+
+def documents(results: Mapping[str, Result], limits: Mapping[str, Limit]) -> dict[str, dict[str, Any]]:
+    """The results as JSON, each beside its limit and verdict where the bench has one."""
+    return {
+        name: {
+            "value": result.value,
+            "std": result.std,
+            "unit": result.unit,
+            "limit": limits.get(name),
+            "verdict": result.verdict(limits[name]) if name in limits else None,
+        }
+        for name, result in results.items()
+    }
