@@ -59,9 +59,11 @@ class Inputs:
 
     def _volts(self, numbers: Sequence[int], start_s: float, interval_s: float, n: int) -> NDArray[np.float64]:
         wired = [k for k, number in enumerate(numbers) if number in self._wiring]
+        names = [self._wiring[numbers[k]] for k in wired]
+        if len(wired) == len(numbers):
+            return self._world.adc_volts(names, start_s, interval_s, n)
         volts = np.zeros((n, len(numbers)))
         if wired:
-            names = [self._wiring[numbers[k]] for k in wired]
             volts[:, wired] = self._world.adc_volts(names, start_s, interval_s, n)
         return volts
 
