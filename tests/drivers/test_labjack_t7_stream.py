@@ -1,0 +1,174 @@
+"""The continuous stream: one record of the device, however it is cut; nothing lost in silence, no waiting for ever."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from drivers import labjack_t7, labjack_t7_reception, labjack_t7_twin
+from drivers.clock import SimulatedClock
+from drivers.errors import LinkTimeout, StreamError
+from drivers.labjack_t7_reception import Reception
+from drivers.labjack_t7_stream import Packets
+from drivers.links import Links
+from drivers.links.link import Link, open_link
+from drivers.links.server import Port, Server
+from drivers.simulation.config import WorldConfig
+from drivers.simulation.world import World
+
+FOUR = labjack_t7.Settings(channels={"vx": 0, "vy": 1, "supply": 2, "thermistor": 3})
+
+
+@pytest.fixture
+def converter() -> Iterator[Callable[[], tuple[World, labjack_t7.T7]]]:
+    """Makes a converter in front of a whole simulated rig, always of the same seed."""
+    opened: list[Any] = []
+
+    def make() -> tuple[World, labjack_t7.T7]:
+        clock, world = SimulatedClock(), World(WorldConfig.adxl203(), seed=4)
+        server, links = labjack_t7_twin.serve(world, {"adc": (1, FOUR)}), Links(clock)
+        clock.attach(server)
+        opened.extend([links, server])
+        return world, labjack_t7.connect(server.addresses["adc"], links, FOUR, "adc")
+
+    yield make
+    for one in opened:
+        one.close()
+
+
+@pytest.mark.parametrize("block_s", [0.1, 1.7, 60.0])
+def test_samples_and_times_do_not_depend_on_the_blocks(converter: Any, block_s: float) -> None:
+    (whole,) = converter()[1].stream(90.0, 90.0)
+    blocks = list(converter()[1].stream(90.0, block_s))
+    assert np.array_equal(np.concatenate([b.volts for b in blocks]), whole.volts)
+    scans = np.cumsum([0, *[len(b.volts) for b in blocks]])
+    assert scans[-1] == 90_000
+    assert {len(b.volts) for b in blocks[:-1]} <= {round(1000 * block_s)}
+    assert [b.start_s for b in blocks] == [whole.start_s + scan / whole.rate_hz for scan in scans[:-1]]
+
+
+def test_a_record_is_a_stream_of_one_block(converter: Any) -> None:
+    (block,) = converter()[1].stream(2.0, 60.0)
+    record = converter()[1].acquire(2.0)
+    assert np.array_equal(block.volts, record.volts)
+    assert block.start_s == record.start_s
+
+
+def test_a_stream_that_is_closed_early_is_stopped(bench: Any) -> None:
+    with closing(bench.adc.stream(3600.0, 1.0)) as blocks:
+        next(blocks)
+    assert bench.clock.now() < 2.0
+    assert bench.adc.read_volts("supply") == pytest.approx(5.0, abs=1e-3)  # declined while a stream runs
+    assert bench.adc.acquire(0.5).volts.shape == (500, 3)
+
+
+def test_what_is_done_between_blocks_makes_no_gap(bench: Any) -> None:
+    """A minute passes, and other instruments are asked: it waits in the network's buffers and in the twin's."""
+    blocks = []
+    for block in bench.adc.stream(200.0, 20.0):
+        bench.clock.sleep(30.0)
+        bench.oven.temperature_c()
+        blocks.append(block)
+    volts = np.concatenate([block.volts for block in blocks])
+    np.testing.assert_allclose(volts[:, 0], 0.01 * (blocks[0].start_s + 1e-3 * np.arange(200_000)), atol=3.2e-4)
+
+
+def test_transaction_numbers_turn_over_within_a_long_stream(bench: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(labjack_t7.t7, "MOST_SAMPLES_PER_PACKET", 3)  # one scan a packet: over 65536 in 66 s
+    scans = [len(block.volts) for block in bench.adc.stream(70.0, 30.0)]
+    assert scans == [30_000, 30_000, 10_000]
+
+
+class Device:
+    """Sends `data`, once, a second from now on."""
+
+    def __init__(self, data: bytes) -> None:
+        self.port, self._data = Port("tcp://127.0.0.1:0"), data
+
+    def advance(self, now_s: float) -> None:
+        for connection in self.port.connections.values():
+            connection.send(self._data, 1.0)
+            self._data = b""
+
+    def due_s(self) -> float:
+        return 1.0 if self._data else float("inf")
+
+    def state(self) -> dict[str, Any]:
+        return {}
+
+    def restore(self, state: Any) -> None: ...
+
+
+@pytest.fixture
+def device() -> Iterator[Callable[[bytes], Link]]:
+    """A link to a device that sends these bytes."""
+    opened: list[Any] = []
+
+    def start(data: bytes) -> Link:
+        clock, twin = SimulatedClock(), Device(data)
+        server = Server([twin.port], {"device": twin}, {})
+        clock.attach(server)
+        opened.extend([open_link(server.url, clock), server])
+        return opened[-2]
+
+    yield start
+    for one in opened:
+        one.close()
+
+
+def packet(number: int, status: int = 0) -> bytes:
+    """Two scans of two channels: 0, 1 and 2, 3."""
+    header = struct.pack(">HHHBBBBHHH", number % 65536, 0, 18, 1, 76, 16, 0, 0, status, 5)
+    return header + struct.pack(">4H", 0, 1, 2, 3)
+
+
+def reception(link: Link) -> Reception:
+    return Reception(link, "adc", start_s=0.0, rate_hz=2.0, channels=2, per_packet=2)
+
+
+def test_scans_are_cut_out_of_packets_and_the_numbers_turn_over(device: Callable[[bytes], Link]) -> None:
+    stream = reception(device(packet(65535) + packet(65536)))
+    assert stream.take(1).tolist() == [[0, 1]]
+    assert stream.take(3).tolist() == [[2, 3], [0, 1], [2, 3]]
+
+
+def test_a_packet_missing_between_two_blocks_is_noticed(device: Callable[[bytes], Link]) -> None:
+    stream = reception(device(packet(0) + packet(2)))
+    stream.take(2)
+    with pytest.raises(StreamError, match="adc: packets are missing after packet 0"):
+        stream.take(2)
+
+
+def test_scans_skipped_in_a_later_block_are_noticed(device: Callable[[bytes], Link]) -> None:
+    stream = reception(device(packet(0) + packet(1, status=2941)))
+    stream.take(2)
+    with pytest.raises(StreamError, match=r"adc: its buffer ran over and it skipped 5 scans \(status 2941 in packet 1"):
+        stream.take(1)
+
+
+def test_a_device_that_falls_silent_is_given_up_a_second_after_its_bytes_were_due(
+    device: Callable[[bytes], Link],
+) -> None:
+    link = device(packet(0) + packet(1)[:7])
+    stream = reception(link)
+    stream.take(2)
+    with pytest.raises(LinkTimeout, match="fell silent after 31 of 48 bytes"):
+        stream.take(2)
+    assert link.clock.now() == 2.0 + labjack_t7_reception.PATIENCE_S
+
+
+@settings(derandomize=True, deadline=None)
+@given(st.lists(st.integers(0, 60), max_size=12), st.integers(0, 8))
+def test_packets_may_be_fed_in_any_pieces(cuts: list[int], count: int) -> None:
+    data, packets = b"".join(packet(65534 + k) for k in range(count)), Packets(4, "adc")
+    edges = [0, *sorted(min(cut * 4, len(data)) for cut in cuts), len(data)]
+    codes = [packets.codes(data[a:b]) for a, b in pairwise(edges)]
+    assert np.concatenate(codes).tolist() == [0, 1, 2, 3] * count
