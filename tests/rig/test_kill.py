@@ -1,71 +1,88 @@
-"""A process that is killed loses the pose in flight and nothing else; a signal leaves a run that can be resumed."""
+"""A process that is killed loses the pose in flight and nothing else; a signal leaves a run that can be resumed.
+
+Kills at random moments are drawn by seeds; `python -m tests.benchmark.kills` survives hundreds.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import json
+import os
+import random
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
-from rig.bench import read_bench
 from rig.record import Record
-from rig.record.tables import table_of
-from rig.runner import start
-from tests.rig.rigging import POSES, SMALL_ARGUMENTS, Onlooker, in_own_process, signal_at, small_sweep
+from tests.rig.killing import Story, Undisturbed, finished, inspected, many, measured, undisturbed
+from tests.rig.nursery import Harm, Nursery
+from tests.rig.rigging import in_own_process, signal_at
 
 pytestmark = pytest.mark.sockets
-Measured = tuple[str, list[bytes]]
-ARGUMENTS = ("run", "sweep", "--unattended", "--json", *SMALL_ARGUMENTS)
-
-
-def content(record: Record, run: str) -> Measured:
-    """All that was measured: the table's digest, and every sample."""
-    return table_of(record, run).digest, [kept.samples.volts.tobytes() for kept in record.kept(run)]
+KILLS = 10  # of each seed
 
 
 @pytest.fixture(scope="module")
-def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Measured:
-    with Record(tmp_path_factory.mktemp("undisturbed")) as record:
-        return content(record, start(record, read_bench(), *small_sweep(), Onlooker()).run.run)
+def nursery() -> Iterator[Nursery]:
+    with Nursery() as warm:
+        yield warm
 
 
-def measured(run: str) -> Measured:
-    with Record() as record:
-        return content(record, run)
+@pytest.fixture(scope="module")
+def whole(nursery: Nursery, tmp_path_factory: pytest.TempPathFactory) -> Undisturbed:
+    return undisturbed(nursery, tmp_path_factory.mktemp("undisturbed"))
 
 
-@pytest.mark.parametrize("pose", [1, 9])
-def test_kill_9_inside_a_transaction_then_resume(pose: int, undisturbed: Measured) -> None:
-    killed = in_own_process(*ARGUMENTS, harm=signal_at("blocks", pose, "SIGKILL"))
-    assert killed.returncode == -9
-    with Record() as record:
-        (run,) = record.runs()
-        assert (run.state, run.rows) == ("stopped", pose - 1)
-    resumed = in_own_process("resume", run.run, "--unattended", "--json")
-    assert resumed.returncode == 0, resumed.stderr
-    assert json.loads(resumed.stdout)["state"] == "complete"
-    with Record() as record:
-        poses = record.poses(run.run)
-    assert len(poses) == len(set(poses)) == POSES
-    assert measured(run.run) == undisturbed
+@pytest.mark.parametrize("seed", range(5))
+def test_kills_at_random_moments(nursery: Nursery, whole: Undisturbed, tmp_path: Path, seed: int) -> None:
+    survived = many(nursery, tmp_path, whole, seed, KILLS)
+    assert survived.total() >= KILLS
 
 
-@pytest.mark.parametrize("table", ["states", "events"])
-def test_kill_9_before_the_first_pose_then_resume(table: str, undisturbed: Measured) -> None:
-    killed = in_own_process(*ARGUMENTS, harm=signal_at(table, 1, "SIGKILL"))
-    assert killed.returncode == -9
-    with Record() as record:
-        (run,) = record.runs()
-    assert in_own_process("resume", run.run, "--unattended").returncode == 0
-    assert measured(run.run) == undisturbed
+@pytest.mark.parametrize(
+    ("table", "number", "poses"), [("blocks", 1, 0), ("blocks", 9, 8), ("states", 1, 0), ("events", 1, 0)]
+)
+def test_a_kill_inside_a_transaction(
+    nursery: Nursery, whole: Undisturbed, rig_home: Path, table: str, number: int, poses: int
+) -> None:
+    killed = nursery.run(rig_home, *whole.words, harm=Harm(f"INSERT INTO {table}", number))
+    assert killed.status == -signal.SIGKILL
+    seen = inspected(rig_home, whole.measured)
+    assert (seen.state, seen.poses) == ("stopped", poses)
+    finished(nursery, rig_home, whole, Story(seen=[seen]))
+
+
+def test_whole_processes_killed_while_they_start(nursery: Nursery, whole: Undisturbed, rig_home: Path) -> None:
+    luck, seen = random.Random(1), Story().seen[-1]
+    for _ in range(3):
+        words = ("resume", seen.run, "--unattended") if seen.run else whole.words
+        process = subprocess.Popen(
+            [sys.executable, "-m", "rig", *words],
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
+        )  # fmt: skip
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(luck.uniform(0.05, 0.6))
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+        seen = inspected(rig_home, whole.measured)
+    finished(nursery, rig_home, whole, Story(seen=[seen]))
 
 
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
-def test_a_signal_ends_the_process_with_status_4_and_resume_finishes_the_run(name: str, undisturbed: Measured) -> None:
-    stopped = in_own_process(*ARGUMENTS, harm=signal_at("blocks", 5, name))
+def test_a_signal_ends_the_process_with_status_4_and_resume_finishes_the_run(
+    name: str, nursery: Nursery, whole: Undisturbed, rig_home: Path
+) -> None:
+    stopped = in_own_process(*whole.words, harm=signal_at("blocks", 5, name))
     document = json.loads(stopped.stdout)
     assert (stopped.returncode, document["state"]) == (4, "stopped")
     assert f"stopped by {name}; `rig resume {document['run']}` goes on" in stopped.stderr
     assert "Traceback" not in stopped.stderr
-    resumed = in_own_process("resume", document["run"], "--unattended", "--json")
-    assert (resumed.returncode, json.loads(resumed.stdout)["state"]) == (0, "complete")
-    assert measured(document["run"]) == undisturbed
+    resumed = nursery.run(rig_home, "resume", document["run"], "--unattended", "--json")
+    assert resumed.status == 0, resumed.said
+    with Record() as record:
+        assert measured(record, document["run"]) == whole.measured
