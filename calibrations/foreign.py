@@ -1,53 +1,46 @@
-"""Other people's text tables: any separator, with or without a header, their names and units mapped to ours.
+"""Anybody's table as ours: their names and units mapped to our columns.
 
 A column is named by their header, or by its number from 1 where there is none. Units are those of the target column
-(V, deg, degC, s); outputs of `positions` may be in any unit, which the table then carries.
+(V, deg, degC, s); outputs of `positions` may be in any unit, which the table then carries. A header with our names
+needs no mapping, whatever the separator; units in it are used.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-
+from calibrations.cells import cells
 from calibrations.errors import DataError, MissingColumn, nearest
-from calibrations.separated import Text, number_or_text, parse
-from calibrations.table import KINDS, OPTIONAL, Array, Constant, Table, guess_kind
+from calibrations.plausible import check_at_rest, doubts
+from calibrations.proposal import command, proposed
+from calibrations.separated import Sheet, is_number, sheet
+from calibrations.table import KINDS, NUMBERS, Array, Constant, Table, guess_kind
+from calibrations.text_file import text_file
+from calibrations.units import UNITS, Mapped, own_unit
 
-# unit -> (unit of the target column, factor, offset)
-UNITS: Mapping[str, tuple[str, float, float]] = {
-    "V": ("V", 1.0, 0.0), "mV": ("V", 1e-3, 0.0), "uV": ("V", 1e-6, 0.0),
-    "deg": ("deg", 1.0, 0.0), "rad": ("deg", 180 / np.pi, 0.0), "mrad": ("deg", 0.18 / np.pi, 0.0),
-    "degC": ("degC", 1.0, 0.0), "K": ("degC", 1.0, -273.15), "degF": ("degC", 5 / 9, -160 / 9),
-    "s": ("s", 1.0, 0.0), "ms": ("s", 1e-3, 0.0), "us": ("s", 1e-6, 0.0),
-    "min": ("s", 60.0, 0.0), "h": ("s", 3600.0, 0.0),
-    "m": ("m", 1.0, 0.0), "mm": ("m", 1e-3, 0.0), "um": ("m", 1e-6, 0.0),
-    "g": ("g", 1.0, 0.0), "mg": ("g", 1e-3, 0.0), "m/s2": ("m/s2", 1.0, 0.0),
-    "count": ("count", 1.0, 0.0), "counts": ("count", 1.0, 0.0), "uT": ("uT", 1.0, 0.0),
-    "deg/s": ("deg/s", 1.0, 0.0), "rad/s": ("deg/s", 180 / np.pi, 0.0),
-}  # fmt: skip
-SUFFIXES = {"_deg_s": "deg/s", "_v": "V", "_deg": "deg", "_c": "degC", "_s": "s", "_m": "m"}
-NUMERIC = {name for sets in KINDS.values() for wanted in sets for name in wanted} | set(OPTIONAL) - {"path"}
+TRIADS = (("ax", "ay", "az"), ("mx", "my", "mz"))
 
 
 @dataclass(frozen=True)
-class Mapped:
-    """One column: our name, theirs, and their unit ("" where it is ours already)."""
+class Taken:
+    """A table, and how it was made of a file: `mapped` has a line for every column that was renamed or converted."""
 
-    name: str
-    theirs: str
-    unit: str = ""
+    table: Table
+    sheet: Sheet
+    mapped: tuple[Mapped, ...]
 
-    @staticmethod
-    def parse(text: str) -> Mapped:
-        """From `vx_v=Vout:mV` or `vx_v=Vout`. Raises DataError."""
-        name, equals, rest = text.partition("=")
-        theirs, _, unit = rest.rpartition(":") if rest.rpartition(":")[2] in UNITS else (rest, "", "")
-        if not equals or not name.strip() or not theirs.strip():
-            raise DataError(f'"{text}": a column is given as NAME=THEIRS or NAME=THEIRS:UNIT, such as vx_v=Vout:mV')
-        return Mapped(name.strip(), theirs.strip(), unit.strip())
+    @property
+    def settings(self) -> dict[str, object]:
+        """What is kept with a run, so that it can be made again."""
+        names = {None: "blanks", ",": "comma", ";": "semicolon", "\t": "tab"}
+        return {
+            "file": Path(self.sheet.name).name,
+            "separator": names.get(self.sheet.separator, self.sheet.separator),
+            "columns": {m.name: m.text.partition("=")[2] for m in self.mapped},
+            "constants": dict(self.table.constants),
+        }
 
 
 def read_foreign(
@@ -57,56 +50,121 @@ def read_foreign(
 
     Raises DataError naming file, line and column.
     """
-    text = parse(path)
-    known = {**text.constants, **(constants or {})}
-    columns: dict[str, Array] = {}
-    for m in mapped:
-        if m.name in columns:
-            raise DataError(f'{path}: the column "{m.name}" is given twice')
-        columns[m.name] = _converted(_theirs(text, m), m, path)
-    if unit := _output_unit(mapped, path):
-        known["unit"] = unit
-    labels = {}
-    for name in text.others({m.theirs for m in mapped} | set(columns)):
-        if name in NUMERIC or isinstance(number_or_text(text.cells(name)[0]), float):
-            columns[name] = text.numbers(name)
-        else:
-            labels[name] = tuple(text.cells(name))
+    return take(sheet(text_file(path)), kind, mapped, constants).table
+
+
+def take(
+    laid: Sheet, kind: str | None, mapped: Sequence[Mapped] = (), constants: Mapping[str, Constant] | None = None
+) -> Taken:
+    """The table in a sheet. Raises DataError; MissingColumn holds the import that may be meant, ready to be copied."""
+    chosen = mapping(laid, mapped)
+    kept = _kept(laid, chosen, bool(mapped))
     try:
-        kind = kind or guess_kind(columns)
-    except DataError as error:
-        raise DataError(f"{path}: {error}; --column gives one of yours the name, as in vx_v=Vout:mV") from None
-    return Table.from_columns(kind, columns, known, str(path), labels)
+        kind = kind or guess_kind([*(m.name for m in chosen), *kept])
+    except MissingColumn as error:
+        what = error if laid.named else "a header line with column names is missing"
+        raise MissingColumn(f"{laid.name}, line {laid.line}: {what}{proposed(laid, kind, chosen)}") from None
+    known = {**laid.constants, **(constants or {})} | _output_unit(chosen, laid.name)
+    taken = {m.theirs for m in chosen}
+    numbers, texts = cells(laid, [name for name in laid.header if name not in taken and _is_text(laid, name)])
+    columns = {m.name: _converted(numbers[m.theirs], m) for m in chosen}
+    columns |= {name: numbers[name] for name in kept if name in numbers}
+    try:
+        table = Table.from_columns(kind, columns, known, laid.name, {k: texts[k] for k in kept if k in texts})
+    except MissingColumn as error:
+        raise MissingColumn(f"{error}{proposed(laid, kind, chosen)}") from None
+    _check_units(table, laid, chosen)
+    check_at_rest(table)
+    return Taken(table, laid, tuple(chosen))
 
 
-def _theirs(text: Text, m: Mapped) -> Array:
-    """The column that `m` names. Raises MissingColumn, or DataError for a unit that nobody here knows."""
-    if m.theirs in text.header:
-        return text.numbers(m.theirs)
-    name, _, unit = m.theirs.rpartition(":")
-    if not m.unit and name in text.header:
-        raise DataError(f'{text.path}: unknown unit "{unit}" of the column "{name}"{nearest(unit, UNITS)}')
-    raise MissingColumn(f'{text.path}: there is no column "{m.theirs}"{nearest(m.theirs, text.header)}')
+def mapping(laid: Sheet, mapped: Sequence[Mapped]) -> list[Mapped]:
+    """`mapped` with the header's names and units filled in, and the columns that have our names. Raises DataError."""
+    chosen: list[Mapped] = []
+    for m in mapped:
+        if m.name in [other.name for other in chosen]:
+            raise DataError(f'{laid.name}: the column "{m.name}" is given twice')
+        chosen.append(_found(laid, m))
+    taken = {m.theirs for m in chosen}
+    for header, bare, unit in zip(laid.header, laid.bare, laid.units, strict=True):
+        if bare in NUMBERS - {m.name for m in chosen} and header not in taken:
+            chosen.append(fitting(Mapped(bare, header, unit), laid.name))
+    return [m for m in chosen if m.unit or m.name != m.theirs]
 
 
-def _converted(values: Array, m: Mapped, path: Path) -> Array:
+def needs_mapping(laid: Sheet, kind: str | None, mapped: Sequence[Mapped]) -> bool:
+    """Whether columns of a table of `kind`, or of any, are still without our name. Raises what `mapping` raises."""
+    chosen = mapping(laid, mapped)
+    names = {m.name for m in chosen} | set(_kept(laid, chosen, bool(mapped)))
+    sets = KINDS[kind] if kind else [wanted for wanteds in KINDS.values() for wanted in wanteds if len(wanted) > 1]
+    return not any(names.issuperset(wanted) for wanted in sets)
+
+
+def _found(laid: Sheet, m: Mapped) -> Mapped:
+    """With the file's full name of the column, and its unit where none is given. Raises MissingColumn, DataError."""
+    for names in (laid.header, laid.bare):
+        if m.theirs in names:
+            place = names.index(m.theirs)
+            return fitting(replace(m, theirs=laid.header[place], unit=m.unit or laid.units[place]), laid.name)
+    bare, _, unit = m.theirs.rpartition(":")
+    if not m.unit and bare in laid.header:
+        raise DataError(f'{laid.name}: unknown unit "{unit}" of the column "{bare}"{nearest(unit, UNITS)}')
+    raise MissingColumn(f'{laid.name}: there is no column "{m.theirs}"{nearest(m.theirs, laid.header)}')
+
+
+def fitting(m: Mapped, source: str) -> Mapped:
+    """The same. Raises DataError for a unit that cannot become the target's."""
+    own = own_unit(m.name)
+    if m.unit and own and UNITS[m.unit][0] != own:
+        raise DataError(f'{source}: the column "{m.name}" is in {own}; "{m.theirs}" in {m.unit} cannot become that')
+    return m
+
+
+def _kept(laid: Sheet, chosen: Sequence[Mapped], is_mapped: bool) -> list[str]:
+    """The columns that are taken beside the mapped ones, under their own names: none of a number where some are."""
+    gone = {name for m in chosen for name in (m.name, m.theirs)}
+    return [name for name in laid.header if name not in gone] if laid.named or not is_mapped else []
+
+
+def _is_text(laid: Sheet, name: str) -> bool:
+    """Whether a column that is none of ours holds words: the path, and one whose first cell does."""
+    return name == "path" or (name not in NUMBERS and not is_number(laid.sample[0][laid.header.index(name)]))
+
+
+def _converted(values: Array, m: Mapped) -> Array:
     """Values in the target column's unit."""
-    if not m.unit:
-        return values
-    target, factor, offset = UNITS[m.unit]
-    own = next((unit for suffix, unit in SUFFIXES.items() if m.name.endswith(suffix)), None)
-    if own is not None and target != own:
-        raise DataError(f'{path}: the column "{m.name}" is in {own}; "{m.theirs}" in {m.unit} cannot become that')
-    return values * factor + offset
+    _, factor, offset = UNITS[m.unit] if m.unit else ("", 1.0, 0.0)
+    return values if (factor, offset) == (1.0, 0.0) else values * factor + offset
 
 
-def _output_unit(mapped: Sequence[Mapped], path: Path) -> str:
-    """The unit of the three axes, "" where none is given. Raises DataError where they differ."""
-    for axes in (("ax", "ay", "az"), ("mx", "my", "mz")):
-        units = {m.name: UNITS[m.unit][0] if m.unit else "" for m in mapped if m.name in axes}
+def _check_units(table: Table, laid: Sheet, chosen: Sequence[Mapped]) -> None:
+    """Raises DataError for numbers that can hardly be in their unit, with the import that gives them another."""
+    found = doubts(table, {m.name for m in chosen if m.unit})
+    if not found:
+        return
+    name, (what, unit) = next(iter(found.items()))
+    by_name = {name: Mapped(name, name) for name in found} | {m.name: m for m in chosen}
+    better = [replace(m, unit=found[m.name][1] if m.name in found else m.unit) for m in by_name.values()]
+    own = next(replace(m, unit=own_unit(name)) for m in better if m.name == name)
+    if not unit:
+        raise DataError(
+            f'{laid.name}: the column "{name}" {what}; give the unit that it is in, as in --column {own.text}'
+        )
+    raise DataError(
+        f'{laid.name}: the column "{name}" {what}\nIf they are in {unit}, this takes them:\n\n'
+        f"    {command(laid, table.kind, better)}\n\n"
+        f"Whoever states the unit is believed: if they are in {own.unit} after all, --column {own.text} says so"
+    )
+
+
+def _output_unit(mapped: Sequence[Mapped], source: str) -> dict[str, Constant]:
+    """The unit of the three axes, where one is given. Raises DataError where they differ."""
+    for axes in TRIADS:
+        given = {m.name: UNITS[m.unit][0] for m in mapped if m.unit}
+        units = {axis: given.get(axis, "") for axis in axes}
         if len(set(units.values())) > 1:
-            said = ", ".join(f"{name} in {unit or 'no unit'}" for name, unit in units.items())
-            raise DataError(f"{path}: the three axes must be in one unit: {said}")
-        if units:
-            return next(iter(units.values()))
-    return ""
+            said = ", ".join(f"{axis} in {unit or 'no unit'}" for axis, unit in units.items())
+            raise DataError(f"{source}: the three axes must be in one unit: {said}")
+        if units[axes[0]]:
+            return {"unit": units[axes[0]]}
+    return {}

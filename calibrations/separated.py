@@ -1,128 +1,194 @@
-"""Separated text as others write it: any separator, a header or none, decimal commas, gzip, constants on top."""
+"""How a separated text is laid out, as its first lines show: separator, header, units, constants above the header.
+
+Any separator, a header or none, units in the header's names or in a row below it, decimal commas. The rows themselves
+are read by `calibrations/cells.py`.
+"""
 
 from __future__ import annotations
 
 import csv
-import gzip
-import io
 import re
-import zlib
 from collections import Counter
-from collections.abc import Callable, Sequence, Set
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from pathlib import Path
-
-import numpy as np
+from itertools import islice
 
 from calibrations.errors import DataError
-from calibrations.table import Array, Constant
+from calibrations.table import Constant
+from calibrations.text_file import Source
+from calibrations.units import name_and_unit, unit_of
+
+HEAD = 200  # lines that the layout is taken from
+BLANK = " \t\r\n\x1a"
+NO_UNIT = ("", "-", "1", "n/a")
+Row = tuple[int, list[str]]  # the number of a line, from 1, and its cells
 
 
 @dataclass(frozen=True)
-class Text:
-    """A file as text: column names ("1", "2", ... where it has none), and each row's line and cells."""
+class Sheet:
+    """A text's layout. `header` and `units` have one entry a column; `line` is that of the header, `first` that of
+    the first row of data.
 
-    path: Path
-    header: list[str]
-    rows: list[list[str]]
-    lines: list[int]
+    Without a header (`named` is false) columns are called "1", "2", ... `width` counts cells of a row: it is greater
+    than the number of columns where a spreadsheet wrote empty ones behind them. `sample` holds the first rows.
+    """
+
+    source: Source
+    separator: str | None
+    header: tuple[str, ...]
+    units: tuple[str, ...]
+    named: bool
+    width: int
+    line: int
+    first: int
+    sample: tuple[tuple[str, ...], ...]
     constants: dict[str, Constant]
 
-    @cached_property
-    def _all(self) -> Array | None:
-        """All cells as numbers, shape (rows, columns); None where one is none."""
-        try:
-            cells = np.loadtxt(io.StringIO("\n".join("\t".join(row) for row in self.rows)), delimiter="\t", ndmin=2)
-        except ValueError:
-            return None
-        return cells if np.isfinite(cells).all() else None
+    @property
+    def name(self) -> str:
+        """What messages call it."""
+        return self.source.name
 
-    def others(self, taken: Set[str]) -> list[str]:
-        """The columns that the header names and that are not `taken`; all of them, where nothing is taken."""
-        named = [name for name in self.header if not name.isdecimal()]
-        return [name for name in named if name not in taken] if taken else self.header
+    @property
+    def bare(self) -> tuple[str, ...]:
+        """The header's names without the units in them."""
+        return tuple(name_and_unit(name)[0] for name in self.header)
 
-    def cells(self, name: str) -> list[str]:
-        """One column as text."""
-        k = self.header.index(name)
-        return [row[k] for row in self.rows]
-
-    def numbers(self, name: str) -> Array:
-        """One column as numbers. Raises DataError naming line and column."""
-        if self._all is not None:
-            return self._all[:, self.header.index(name)]
-        values = np.array([_number(cell) for cell in self.cells(name)])
-        bad = np.flatnonzero(~np.isfinite(values))
-        if len(bad):
-            where = f'{self.path}, line {self.lines[bad[0]]}, column "{name}"'
-            raise DataError(
-                f'{where}: "{self.cells(name)[bad[0]]}" where a number belongs; correct it or remove the row'
-            )
-        return values
+    def rows(self) -> Iterator[Row]:
+        """Every row of data, a few in memory at a time. Raises DataError for one of another width."""
+        with self.source.lines() as lines:
+            for number, cells in split(islice(lines, self.first - 1, None), self.separator, self.name, self.first):
+                if len(cells) != self.width:
+                    raise DataError(_another_width(self.name, number, cells, self.header))
+                yield number, cells
 
 
-def parse(path: Path) -> Text:
-    """The file as text, split at the separator that it uses. Raises DataError naming file and line."""
-    lines = _lines(path)
-    start = next((k for k, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")), len(lines))
-    constants: dict[str, Constant] = {}
-    for line in lines[:start]:
-        key, colon, value = line.strip().lstrip("#").partition(":")
-        if colon:
-            constants[key.strip()] = number_or_text(value.strip())
-    split = _splitter(lines[start:])
-    try:
-        body = [(number, split(line)) for number, line in enumerate(lines[start:], start + 1) if line.strip()]
-    except csv.Error as error:
-        raise DataError(f"{path}: cannot be split into columns: {error}") from None
-    if not body:
-        raise DataError(f"{path}: the file is empty")
-    width = Counter(len(cells) for _, cells in body).most_common(1)[0][0]
-    # lines above the header that have another number of cells, such as `Fs,100`, are constants too
-    while len(body[0][1]) != width:
-        above = body.pop(0)[1]
-        if len(above) == 2:
-            constants[above[0]] = number_or_text(above[1])
-    header = [str(k + 1) for k in range(width)]
-    if not np.isfinite([_number(cell) for cell in body[0][1]]).all():
-        first, header = body.pop(0)
-        if len(set(header)) < len(header) or not all(header):
-            raise DataError(f"{path}, line {first}: column names must be there and differ: {', '.join(header)}")
-    if not body:
-        raise DataError(f"{path}: no rows below the header")
-    for number, cells in body:
-        if len(cells) != width:
-            raise DataError(f"{path}, line {number}: {len(cells)} values for {width} columns ({', '.join(header)})")
-    return Text(path, header, [cells for _, cells in body], [number for number, _ in body], constants)
+def sheet(source: Source) -> Sheet:
+    """The layout of `source`. Raises DataError naming file and line."""
+    constants, start, head = _head(source)
+    separator = _separator(head)
+    rows = list(split(head, separator, source.name, start + 1))
+    if not rows:
+        raise DataError(f"{source.name}: the file is empty: a header line with column names is missing")
+    width = _width(rows)
+    rows = _without_titles(rows, width, constants)
+    (line, header), named = rows[0], not all(map(is_number, rows[0][1]))
+    if named and len(header) != width and len(rows) > 1:
+        raise DataError(_another_width(source.name, *rows[1], header))
+    columns = width - _empty_behind([cells for _, cells in rows if len(cells) == width])
+    header = _checked(header[:columns], f"{source.name}, line {line}") if named else list(map(str, range(1, width + 1)))
+    below, units = _units(header, rows[1 if named else 0 :], named)
+    if not below:
+        raise DataError(f"{source.name}: no rows below the header")
+    sample = tuple(tuple(cells[:columns]) for _, cells in below if len(cells) == width)
+    return Sheet(
+        source, separator, tuple(header[:columns]), tuple(units), named, width, line, below[0][0], sample, constants
+    )
 
 
-def _lines(path: Path) -> list[str]:
-    try:
-        raw = gzip.decompress(path.read_bytes()) if path.suffix == ".gz" else path.read_bytes()
-        return raw.decode("utf-8-sig").splitlines()
-    except (OSError, EOFError, zlib.error, UnicodeDecodeError) as error:
-        raise DataError(f"{path}: cannot be read as text: {error}") from None
-
-
-def _splitter(body: Sequence[str]) -> Callable[[str], list[str]]:
-    """A function that splits a line at the separator that the file uses."""
-    filled = [line for line in body if line.strip()] or [""]
-    separator = next((s for s in (";", "\t", ",") if s in filled[len(filled) // 2]), None)
+def split(lines: Iterable[str], separator: str | None, name: str, first: int) -> Iterator[Row]:
+    """The rows that are not blank. `first` is the number of the first line. Raises DataError."""
     if separator is None:
-        return str.split
-    return lambda line: [cell.strip() for cell in next(csv.reader([line], delimiter=separator))]
+        yield from ((k, line.split()) for k, line in enumerate(lines, first) if line.strip(BLANK))
+        return
+    reader = csv.reader(lines, delimiter=separator)
+    try:
+        for row in reader:
+            cells = [cell.strip(BLANK) for cell in row]
+            if any(cells):
+                yield first + reader.line_num - 1, cells
+    except csv.Error as error:
+        raise DataError(f"{name}: cannot be split into columns: {error}") from None
 
 
-def _number(cell: str) -> float:
-    """The number in a cell, whose decimal point may be a comma; NaN where there is none."""
-    number = number_or_text(re.sub(r",(?=\d+([eE]|$))", ".", cell))
-    return number if isinstance(number, float) else np.nan
+def number(cell: str) -> float:
+    """The number in a cell, whose decimal point may be a comma. Raises ValueError where there is none."""
+    if "_" in cell:
+        raise ValueError(cell)  # float() would take 1_000
+    return float(re.sub(r",(?=\d+([eE]|$))", ".", cell))
 
 
-def number_or_text(text: str) -> Constant:
+def is_number(cell: str) -> bool:
+    """Whether a number stands in a cell; "nan" and the like are none."""
+    return isinstance(value := number_or_text(cell), float) and abs(value) != float("inf") and value == value
+
+
+def number_or_text(cell: str) -> Constant:
     """A number where it is one."""
     try:
-        return float(text)
+        return number(cell)
     except ValueError:
-        return text
+        return cell
+
+
+def _head(source: Source) -> tuple[dict[str, Constant], int, list[str]]:
+    """The `# key: value` lines, how many lines stand above the others, and the first of the others."""
+    constants: dict[str, Constant] = {}
+    with source.lines() as lines:
+        for start, line in enumerate(lines):
+            plain = line.strip(BLANK)
+            if plain and not plain.startswith("#"):
+                return constants, start, [line, *islice(lines, HEAD)]
+            key, colon, value = plain.lstrip("#").rstrip(";,\t ").partition(":")
+            if colon and key.strip():
+                constants[key.strip()] = number_or_text(value.strip())
+    raise DataError(f"{source.name}: the file is empty: a header line with column names is missing")
+
+
+def _separator(head: Sequence[str]) -> str | None:
+    """The separator that a line in the middle holds; None for blanks."""
+    filled = [line for line in head if line.strip(BLANK)]
+    return next((s for s in (";", "\t", ",") if s in filled[len(filled) // 2].strip(" \r\n")), None)
+
+
+def _width(rows: Sequence[Row]) -> int:
+    return Counter(len(cells) for _, cells in rows).most_common(1)[0][0]
+
+
+def _without_titles(rows: list[Row], width: int, constants: dict[str, Constant]) -> list[Row]:
+    """The rows without those above the header, such as a title or `Fs,100`; pairs go to `constants`."""
+    first = next((k for k, (_, cells) in enumerate(rows) if not _is_title(cells, width)), 0)
+    for _, cells in rows[:first]:
+        filled = [cell for cell in cells if cell]
+        if len(filled) == 2:
+            constants[filled[0].rstrip(":")] = number_or_text(filled[1])
+    return rows[first:]
+
+
+def _is_title(cells: list[str], width: int) -> bool:
+    """Whether a row is narrower than the table, or a spreadsheet filled it up with empty cells to be as wide."""
+    if len(cells) != width:
+        return len(cells) < 3 or any(map(is_number, cells)) or not all(cells)
+    return width > 3 and not any(cells[2:])
+
+
+def _empty_behind(rows: Sequence[list[str]]) -> int:
+    """How many columns at the end are empty throughout, header included."""
+    return min(next((k for k, cell in enumerate(reversed(cells)) if cell), len(cells)) for cells in rows)
+
+
+def _checked(header: list[str], where: str) -> list[str]:
+    if "" in header:
+        raise DataError(f"{where}: a column has no name: {', '.join(header)}")
+    if twice := next((name for name in header if header.count(name) > 1), None):
+        raise DataError(f'{where}: the column "{twice}" occurs twice')
+    return header
+
+
+def _units(header: Sequence[str], rows: list[Row], named: bool) -> tuple[list[Row], list[str]]:
+    """The rows of data, and a unit for each column: of the header's name, or of a row of units below it."""
+    units = [name_and_unit(name)[1] for name in header]
+    if named and rows and _is_units(rows[0][1]):
+        below = map(unit_of, rows[0][1])
+        return rows[1:], [unit or other for unit, other in zip(units, below, strict=False)]
+    return rows, units
+
+
+def _is_units(cells: Sequence[str]) -> bool:
+    """No numbers, and most of what is said is a unit."""
+    said = [cell for cell in cells if cell not in NO_UNIT]
+    return bool(said) and not any(map(is_number, said)) and 2 * sum(map(bool, map(unit_of, said))) >= len(said)
+
+
+def _another_width(name: str, line: int, cells: Sequence[str], header: Sequence[str]) -> str:
+    return f"{name}, line {line}: {len(cells)} values for {len(header)} columns ({', '.join(header)})"

@@ -6,6 +6,7 @@ angles), `positions` (the mean of one still position of unknown orientation), `m
 
 from __future__ import annotations
 
+import difflib
 import hashlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -40,8 +41,10 @@ OPTIONAL = (
     "gx", "gy", "gz", "mx", "my", "mz",
 )
 # fmt: on
+NUMBERS = {name for sets in KINDS.values() for wanted in sets for name in wanted} | set(OPTIONAL) - {"path"}
 AXES = ("x", "y", "z")
 STANDARD_GRAVITY = 9.80665
+LARGEST = 1e30  # in any unit: what is measured is smaller, and its fourth power must still be a number
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,11 +159,17 @@ def _check(table: Table) -> None:
         raise DataError(f"{table.source}: the table has no rows")
     _check_columns(table)
     _check_numbers(table)
+    _check_sizes(table)
+
+
+def _check_sizes(table: Table) -> None:
+    """Numbers that are none, or so large that nothing can be computed from them."""
     for name, values in table.columns.items():
-        bad = np.flatnonzero(~np.isfinite(values))
+        bad = np.flatnonzero(~(np.abs(values) <= LARGEST))
         if len(bad):
+            what = "not a finite number" if not np.isfinite(values[bad[0]]) else "more than anything measured"
             raise DataError(
-                f'{table.source}: row {bad[0] + 1}, column "{name}" is {values[bad[0]]}, not a finite number'
+                f'{table.source}: row {bad[0] + 1}, column "{name}" is {values[bad[0]]:g}, {what}'
                 f"{f' (and {len(bad) - 1} more)' if len(bad) > 1 else ''}; remove the row or the column"
             )
 
@@ -174,6 +183,8 @@ def _check_numbers(table: Table) -> None:
             bad, must = ~np.isin(values, (-1, 0, 1)), "1 (beta growing), -1 (falling) or 0 (unknown)"
         elif "_std" in name:
             bad, must = values < 0, "0 or more"
+        elif name == "supply_v":
+            bad, must = values <= 0, "above 0: without supply there is no output"
         else:
             continue
         if bad.any():
@@ -211,9 +222,9 @@ def guess_kind(names: Iterable[str]) -> str:
             return kind
     required = {name for sets in KINDS.values() for wanted in sets for name in wanted}
     for name in names:
-        hint = nearest(name, required)
-        if name not in required and name not in OPTIONAL and hint.startswith("; did you mean"):
-            raise MissingColumn(f'no kind of table has the column "{name}"{hint}')
+        close = difflib.get_close_matches(name, required, n=1, cutoff=0.65)
+        if name not in required and name not in OPTIONAL and close:
+            raise MissingColumn(f'no kind of table has the column "{name}"; did you mean "{close[0]}"?')
     each = [(kind, wanted) for kind, sets in KINDS.items() for wanted in sets]
     kind, wanted = max(each, key=lambda e: sum(name in names for name in e[1]))
     missing = [name for name in wanted if name not in names]

@@ -2,46 +2,73 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
+from calibrations.duplicates import check_duplicates
+from calibrations.dwells import is_pose_log, pose_means
 from calibrations.errors import DataError
 from calibrations.read_csv import read_csv
 from calibrations.stills import is_raw_log, positions
 from calibrations.table import Table
 from rig.errors import RecordError, UnknownRun
+from rig.home import home
 
 
-def still_positions(table: Table) -> Table:
-    """The table itself, or the still positions in it where it is a raw log. Raises DataError where there are none."""
-    if not is_raw_log(table):
-        return table
-    by_time = "t_s" in table and np.ptp(table.time_s) > 0
-    rate_hz = (table.n - 1) / float(np.ptp(table.time_s)) if by_time else table.number("sample_rate_hz", 0.0)
+def averaged(log: Table, tell: Callable[[str], None]) -> Table:
+    """The table itself, or the means of what a raw log holds still, which `tell` is then told.
+
+    Raises DataError where nothing holds still, and for rows that are there twice.
+    """
+    table = _means(log)
+    if table is not log:
+        what = "poses" if table.kind == "poses" else "still positions"
+        tell(f"{log.source} is a log of raw samples: the means of {table.n} {what}, out of {log.n} samples, are taken.")
+    check_duplicates(table)
+    return table
+
+
+def _means(log: Table) -> Table:
+    if is_pose_log(log):
+        return pose_means(log)
+    return positions(log, _rate_hz(log)) if is_raw_log(log) else log
+
+
+def _rate_hz(log: Table) -> float:
+    """Samples a second. Raises DataError where the log does not say."""
+    by_time = "t_s" in log and np.ptp(log.time_s) > 0
+    rate_hz = (log.n - 1) / float(np.ptp(log.time_s)) if by_time else log.number("sample_rate_hz", 0.0)
     if not rate_hz > 0:
         needed = "the column t_s, or a line such as `# sample_rate_hz: 100` above its header"
-        raise DataError(f"{table.source}: a raw log needs {needed}")
-    return positions(table, rate_hz)
+        raise DataError(f"{log.source}: a raw log needs {needed}")
+    return rate_hz
 
 
-def load(data: str, kind: str | None = None) -> Table:
-    """The table that `data` names. A file of that name is preferred to a run.
+def load(data: str, kind: str | None = None, tell: Callable[[str], None] = lambda _: None) -> Table:
+    """The table that `data` names. A file of that name is preferred to a run. `tell` hears what is done to a raw log.
 
     Raises DataError naming file, line and column; UnknownRun naming the nearest run.
     """
     if Path(data).is_dir():
         raise DataError(f"{data}: is a folder; name a file in it, or a run (`rig runs` lists them)")
     if Path(data).is_file():
-        return still_positions(read_csv(Path(data), kind))
-    from rig.record import Record  # a file needs no database
-    from rig.record.tables import table_of
-
-    with Record() as record:
-        try:
-            table = table_of(record, data)
-        except UnknownRun as error:
-            raise UnknownRun(f"{data}: there is no such file, and {error}") from None
+        return averaged(read_csv(Path(data), kind), tell)
+    table = _of_run(data)
     if kind is not None and table.kind != kind:
         raise RecordError(f"run {data} is a table of {table.kind}, not of {kind}")
     return table
+
+
+def _of_run(data: str) -> Table:
+    from rig.record.store import FILE, Record  # a file needs no database
+    from rig.record.tables import table_of
+
+    if not (home() / FILE).is_file():  # looking for a run makes no record
+        raise UnknownRun(f"{data}: there is no such file, and no run either: there are none yet in {home()}")
+    with Record() as record:
+        try:
+            return table_of(record, data)
+        except UnknownRun as error:
+            raise UnknownRun(f"{data}: there is no such file, and {error}") from None

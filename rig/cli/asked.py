@@ -10,11 +10,16 @@ from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 
+import numpy as np
+
 from calibrations.effect import Effect, catalogue
+from calibrations.errors import ModelError
 from calibrations.fit import Fit
 from calibrations.model import Model
 from calibrations.model_file import dump_model, read_model
 from calibrations.table import Table
+from calibrations.units import UNITS, unit_of
+from rig.cli.output import note
 from rig.data import load
 from rig.errors import OutputError
 
@@ -41,8 +46,21 @@ def asked(
         _check_out(out, data, model, bench_file)
     effects = effects_of(bench_file)
     chosen = read_model(model, effects) if model is not None else None
-    table = load(data)
+    table = load(data, tell=note)
+    if chosen is not None:
+        _check_unit(chosen, table)
     return table, chosen or read_model(DEFAULTS.get(table.kind, "linear"), effects), effects
+
+
+def _check_unit(model: Model, table: Table) -> None:
+    """Values in counts say nothing of volts. Raises ModelError."""
+    fitted = any(term.estimates for term in model.terms)
+    ours, theirs = (UNITS.get(unit_of(unit), (unit,))[0] for unit in (model.unit, table.unit))
+    if fitted and ours and ours != theirs:
+        raise ModelError(
+            f"{model.name}: its values are for outputs in {model.unit}, and {table.source} is in {table.unit}; "
+            "take a model that was fitted to data in this unit, or a shipped one (`rig models`)"
+        )
 
 
 def _check_out(out: Path, *inputs: str | Path | None) -> None:
@@ -52,6 +70,22 @@ def _check_out(out: Path, *inputs: str | Path | None) -> None:
     for given in inputs:
         if given is not None and Path(given).exists() and out.exists() and out.samefile(given):
             raise OutputError(f"{out}: would overwrite {given}, which this is made from; name another file")
+
+
+def tell_blind(found: Fit, effects: Mapping[str, Effect]) -> None:
+    """Name the effects that the data cannot show beside the model: no verdict holds for them."""
+    from calibrations.blind import blind_to
+
+    hidden, table = blind_to(found, effects), found.table
+    if not hidden:
+        return
+    one = table.kind == "poses" and not np.ptp(table.column("alpha_deg"))
+    why = (
+        f" It holds one inclination only, alpha = {table.column('alpha_deg')[0]:g} deg; measure at others."
+        if one
+        else ""
+    )
+    note(f"This data cannot show, beside {found.model.name}: {', '.join(hidden)}.{why}")
 
 
 def program() -> str:

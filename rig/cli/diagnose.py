@@ -25,10 +25,11 @@ def command(data: str, model: str | None, check: bool, bench_file: Path | None, 
     """Find the physical effect that a model misses on DATA (a file or a run)."""
     from calibrations.diagnose import diagnose
     from calibrations.documents import diagnosis_document
-    from rig.cli.asked import asked
+    from rig.cli.asked import asked, tell_blind
 
     table, start, effects = asked(data, model, bench_file)
     result = diagnose(table, start, effects)
+    tell_blind(result.fit, effects)
     name = model or start.name
     if as_json:
         emit(diagnosis_document(result, name))
@@ -54,7 +55,7 @@ def _told(result: Diagnosis, data: str, model: str, bench: str) -> str:
     if rows:
         head = ("candidate", "error on unseen poses / floor", "p-value", "probability", "not told apart from")
         lines += [columns(head, rows), ""]
-    if result.verdict in ("effect-missing", "ambiguous"):
+    if result.verdict in ("effect-missing", "ambiguous") and result.path.steps:
         best = result.path.steps[0].taken
         lines += [f"{best.name}: {why(best, result)}", "", f"    {best.effect.formula.splitlines()[0]}", ""]
         lines.append(f"Add it: rig add {best.name} --model {model} --data {data} --out model.yaml{bench}")
@@ -79,6 +80,8 @@ def headline(result: Diagnosis) -> str:
         return f"nothing is missing; what is left is noise.{rest}"
     if result.verdict == "unexplained":
         return f"nothing in the catalogue explains this. Left over: {result.residual_structure}."
+    if not result.path.steps:
+        return f"nothing shows that an effect is missing, but {result.caution}."
     best = result.path.steps[0].taken
     if result.verdict == "ambiguous":
         rivals = " or ".join((best.name, *best.indistinguishable_from))

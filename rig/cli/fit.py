@@ -19,22 +19,24 @@ from rig.cli.output import bench_option, check_option, emit, json_option, model_
 def command(data: str, model: str | None, out: Path | None, check: bool, bench_file: Path | None, as_json: bool) -> int:
     """Estimate the parameters of a model from DATA (a file or a run), with standard uncertainties."""
     from calibrations.compare import compare
+    from calibrations.determined import undetermined
     from calibrations.documents import fit_document
     from calibrations.fit import fit
-    from rig.cli.asked import asked, write_model
-    from rig.cli.words import errors, paper, parameters
+    from rig.cli.asked import asked, tell_blind, write_model
+    from rig.cli.words import errors, paper, parameters, warning
 
-    table, start, _ = asked(data, model, bench_file, out)
+    table, start, effects = asked(data, model, bench_file, out)
     found = fit(start, table)
+    tell_blind(found, effects)
     if out is not None:
         write_model(found, start, out)
     if as_json:
         emit(fit_document(found, str(out) if out else None))
     else:
         click.echo(f"{found.model.name} fitted to {table.n} rows of {table.source}\n\n{parameters(found.model)}\n")
-        click.echo(errors(found))
+        click.echo("\n".join([errors(found), *(f"\n{line}" for line in warning(undetermined(found)))]))
         if "cross-axis-bias" in start.effects and table.kind == "poses":
             click.echo(f"\n{paper(table)}")
         if out is not None:
             click.echo(f"\nwritten to {out}")
-    return 1 if check and not compare(table, found.model).adequate else 0
+    return 1 if check and (undetermined(found) or not compare(table, found.model).adequate) else 0

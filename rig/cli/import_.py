@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import click
 
-from rig.cli.output import emit, json_option
+from rig.cli.output import emit, json_option, note
 
 
 @click.command("import")
@@ -18,17 +19,27 @@ from rig.cli.output import emit, json_option
 @click.option("--constant", "given", multiple=True, metavar="KEY=VALUE", help="Such as gravity_m_s2=9.81744.")
 @json_option
 def command(file: Path, kind: str | None, mapped: tuple[str, ...], given: tuple[str, ...], as_json: bool) -> None:
-    """Take FILE into the record. A raw log of positions becomes the means of its still intervals.
+    """Take FILE into the record. A raw log becomes the means of what it holds still.
 
-    A column is named by the file's header, or by its number from 1 where there is none.
+    A column is named by the file's header, or by its number from 1 where there is none. At a terminal the program
+    proposes what is not given, and asks.
     """
-    from calibrations.foreign import Mapped, read_foreign
-    from rig.data import still_positions
+    from calibrations.foreign import needs_mapping, take
+    from calibrations.separated import sheet
+    from calibrations.text_file import text_file
+    from calibrations.units import Mapped
+    from rig.data import averaged
     from rig.record import Record
 
-    table = still_positions(read_foreign(file, kind, [Mapped.parse(m) for m in mapped], _constants(given)))
+    laid, columns, constants = sheet(text_file(file)), [Mapped.parse(m) for m in mapped], _constants(given)
+    if sys.stdin.isatty() and sys.stderr.isatty() and needs_mapping(laid, kind, columns):
+        from rig.cli.mapping import ask_mapping
+
+        kind, columns = ask_mapping(laid, kind, columns, given)
+    taken = take(laid, kind, columns, constants)
+    table = averaged(taken.table, note)
     with Record() as record:
-        run = record.add_table(table)
+        run = record.add_table(table, taken.settings)
     if as_json:
         names = [*table.columns, *table.labels]
         emit({"schema": "rig.import/1", "run": run, "kind": table.kind, "rows": table.n, "columns": names})

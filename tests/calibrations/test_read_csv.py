@@ -18,7 +18,7 @@ from calibrations.table import Table
 HEADER = "alpha_deg,beta_deg,vx_v"
 GOOD = f"{HEADER}\n90,0,3.5\n90,90,2.5\n"
 
-numbers = st.floats(allow_nan=False, allow_infinity=False)
+numbers = st.floats(-1e30, 1e30)
 words = st.text(st.characters(codec="ascii", categories=("L", "N"), include_characters=" ,-+'\""), max_size=8)
 names = st.from_regex(r"[a-z]{3,8}_[a-z]{2}", fullmatch=True)
 
@@ -30,7 +30,13 @@ def tables(draw: st.DrawFn) -> Table:
     optional = draw(st.sets(st.sampled_from(["vy_v", "t_s", "direction", "temperature_c", "n"])))
     unknown = draw(st.sets(names, max_size=2))
     wanted = ["alpha_deg", "beta_deg", "vx_v", *sorted(optional), *sorted(unknown)]
-    own = {"direction": st.sampled_from([-1.0, 0.0, 1.0]), "n": st.floats(1, 1e9)}
+    angles, volts = st.integers(-360, 360).map(float), st.floats(-50, 50)
+    own = {"alpha_deg": angles, "beta_deg": angles, "vx_v": volts, "vy_v": volts}
+    own |= {
+        "temperature_c": st.floats(-100, 200),
+        "direction": st.sampled_from([-1.0, 0.0, 1.0]),
+        "n": st.floats(1, 1e9),
+    }
     columns = {name: draw(st.lists(own.get(name, numbers), min_size=n, max_size=n)) for name in wanted}
     labels = (
         {"path": tuple(draw(st.lists(words.map(str.strip), min_size=n, max_size=n)))} if draw(st.booleans()) else {}
@@ -109,7 +115,7 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
         read_csv(tmp_path)
     binary = tmp_path / "binary.csv"
     binary.write_bytes(b"\x00\xff\xfe")
-    with pytest.raises(DataError, match="is not UTF-8 text"):
+    with pytest.raises(DataError, match="is not text \\(byte 0 is 0x00\\); is it really a CSV file"):
         read_csv(binary)
 
 

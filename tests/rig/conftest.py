@@ -9,8 +9,22 @@ from pathlib import Path
 import pytest
 import yaml
 
+from calibrations.read_csv import write_csv
 from rig.bench import DEFAULT
 from rig.cli import main
+from rig.record import Record
+from tests.calibrations.synthetic import components, poses, turns
+
+MODEL = """schema: rig.model/1
+name: mine
+unit: V
+effects:
+- effect: bias
+  parameters:
+  - {name: bias, axis: x, value: 2.5, std: 1.0e-5, unit: V}
+  - {name: bias, axis: y, value: 2.5, std: 1.0e-5, unit: V}
+- effect: scale-factor
+"""
 
 
 @dataclass(frozen=True)
@@ -49,3 +63,50 @@ def bench_file(tmp_path: Path) -> Callable[[Mapping[str, object] | str], Path]:
         return path
 
     return write
+
+
+@pytest.fixture(scope="module")
+def text(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """A good table of poses, as CSV: line 1 is its header, line 4 holds beta 60."""
+    columns = turns((90, 30), step_deg=30.0)
+    x, y, _ = components(columns)
+    path = tmp_path_factory.mktemp("good") / "good.csv"
+    write_csv(poses(columns, 2.5 + x, 2.5 + y), path)
+    return path.read_text()
+
+
+@pytest.fixture
+def work(tmp_path: Path, text: str, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder that commands are called in, with one good table and one good model."""
+    folder = tmp_path / "work"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    (folder / "good.csv").write_text(text)
+    (folder / "mine.yaml").write_text(MODEL)
+    return folder
+
+
+@pytest.fixture
+def refused(rig: Callable[..., Ended], work: Path) -> Callable[..., str]:
+    """Call a command that must fail, and nothing else; its message."""
+
+    def call(*arguments: str, status: int = 2) -> str:
+        with Record() as record:
+            runs = record.runs()
+        before = contents(work)
+        ended = rig(*arguments)
+        assert ended.status == status, ended.out + ended.err
+        assert ended.out == ""
+        assert "Traceback" not in ended.err
+        assert contents(work) == before
+        with Record() as record:
+            assert record.runs() == runs
+        return str(ended.err)
+
+    return call
+
+
+def contents(folder: Path) -> Mapping[str, bytes | None]:
+    """Every file below a folder, but for what Python keeps of what it compiled."""
+    paths = [path for path in sorted(folder.rglob("*")) if "__pycache__" not in path.parts]
+    return {str(path.relative_to(folder)): path.read_bytes() if path.is_file() else None for path in paths}

@@ -1,0 +1,54 @@
+"""Imports that cannot be: one message; status 2; no run in the record."""
+
+from __future__ import annotations
+
+import gzip
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("nowhere.csv",), "File 'nowhere.csv' does not exist"),
+        (("good.csv", "--kind", "pose"), "'pose' is not one of 'poses', 'positions'"),
+        (
+            ("good.csv", "--column", "vx_v"),
+            '"vx_v": a column is given as NAME=THEIRS or NAME=THEIRS:UNIT, such as vx_v=Vout:mV',
+        ),
+        (("good.csv", "--column", "vx_v=Vot"), 'good.csv: there is no column "Vot"'),
+        (("good.csv", "--column", "vx_v=vx_v:mvolt"), 'good.csv: unknown unit "mvolt" of the column "vx_v"'),
+        (
+            ("good.csv", "--column", "vx_v=vx_v:rad"),
+            'good.csv: the column "vx_v" is in V; "vx_v" in rad cannot become that',
+        ),
+        (("good.csv", "--kind", "positions"), 'good.csv: a table of positions needs the column "ax"'),
+        (
+            ("good.csv", "--constant", "gravity"),
+            '"gravity": a constant is given as KEY=VALUE, such as gravity_m_s2=9.81744',
+        ),
+        (("empty.csv",), "empty.csv: the file is empty"),
+        (("cut.csv.gz",), "cut.csv.gz: cannot be read as text"),
+        (
+            ("log.csv",),
+            "log.csv: a raw log needs the column t_s, or a line such as `# sample_rate_hz: 100` above its header",
+        ),
+        (("log.csv", "--constant", "sample_rate_hz=0"), 'constant "sample_rate_hz" is 0.0; it must be above 0'),
+        (("log.csv", "--constant", "sample_rate_hz=fast"), "the constant \"sample_rate_hz\" is 'fast', not a number"),
+        (
+            ("log.csv", "--constant", "sample_rate_hz=100"),
+            "log.csv: found no still intervals; a log of positions has many of 1 s or more",
+        ),
+    ],
+)
+def test_an_import_that_cannot_be(
+    refused: Callable[..., str], work: Path, text: str, arguments: tuple[str, ...], says: str
+) -> None:
+    (work / "empty.csv").write_text("")
+    (work / "cut.csv.gz").write_bytes(gzip.compress(text.encode())[:100])
+    noise = np.random.default_rng(0).standard_normal((1500, 3)).round(4).tolist()
+    (work / "log.csv").write_text("ax,ay,az\n" + "".join(f"{x},{y},{z}\n" for x, y, z in noise))
+    assert says in refused("import", *arguments)
