@@ -6,13 +6,10 @@ Each is checked as in tests/rig/test_kill.py; the first that costs more than the
 from __future__ import annotations
 
 import json
-import os
 import sys
 import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
-
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as `rig` does; numpy is imported after this
 
 from tests.rig.killing import many, undisturbed
 from tests.rig.nursery import Nursery
