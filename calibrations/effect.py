@@ -121,14 +121,17 @@ class Effect:
 def catalogue(folder: Path | None = None) -> Mapping[str, Effect]:
     """Every effect by name: the shipped ones, and those of a user's `folder`.
 
-    Raises ModelError for a file that is not an effect, naming what it lacks.
+    Raises ModelError for a file that is not an effect, naming what it lacks, and for one with a shipped one's name.
     """
     shipped = Path(__file__).parent / "effects"
     effects = {e.name: e for e in _read_folder(shipped, "calibrations.effects")}
     if folder is not None:
         if not folder.is_dir():
             raise ModelError(f"{folder}: the folder of your own effects does not exist")
-        effects |= {e.name: e for e in _read_folder(folder, None)}
+        own = {e.name: e for e in _read_folder(folder, None)}
+        if taken := sorted(effects.keys() & own.keys()):
+            raise ModelError(f"{folder}: {', '.join(taken)} is in the catalogue already; give your effect another name")
+        effects |= own
     return effects
 
 
