@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 
 from drivers.simulation.converter import Converter
 from drivers.simulation.errors import BadSetting, UnknownSetting, nearest
+from drivers.simulation.fibre_probe import FibreProbe
 from drivers.simulation.friction import Friction
 from drivers.simulation.gravity import Base, Package
 from drivers.simulation.heat import Heat, Oven
@@ -21,6 +22,7 @@ from drivers.simulation.level import Level
 from drivers.simulation.noise import Noise
 from drivers.simulation.oddities import Oddities
 from drivers.simulation.plates import Plates
+from drivers.simulation.positioner import Positioner
 from drivers.simulation.scatter import Spread
 from drivers.simulation.springs import Springs
 from drivers.simulation.stage import Stage
@@ -70,6 +72,8 @@ class WorldConfig:
     noise: Noise = field(default_factory=Noise)
     converter: Converter = field(default_factory=Converter)
     level: Level = field(default_factory=Level)
+    positioner: Positioner = field(default_factory=Positioner)
+    d63: FibreProbe = field(default_factory=FibreProbe)
     oddities: Oddities = field(default_factory=Oddities)
     spread: Spread = field(default_factory=Spread)
 

@@ -26,7 +26,7 @@ class FibreProbe:
     peak_v: float = 5.0  # at the optical peak: the gain is set there
     spacing_um: float = 200.0  # from lighting to receiving fibres
     spot_um: float = 60.0  # radius of the spot without gap
-    divergence: float = 0.3  # tangent of the fibres' angle
+    divergence_deg: float = 16.7  # half the angle of the fibres' cone
     standoff_um: float = 150.0  # gap with the carriage at 0
     noise_v: float = 0.3e-3  # rms of a sample
 
@@ -34,6 +34,6 @@ class FibreProbe:
 @kernel
 def seen_v(probe: FibreProbe, gap_um: float) -> float:
     """Output at a gap; a target that touches the tip is at 0."""
-    width = probe.spot_um + 2 * max(0.0, gap_um) * probe.divergence
+    width = probe.spot_um + 2 * max(0.0, gap_um) * math.tan(math.radians(probe.divergence_deg))
     reach = 2 * (probe.spacing_um / width) ** 2
     return probe.peak_v * reach * math.exp(1 - reach)

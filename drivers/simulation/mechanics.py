@@ -1,13 +1,18 @@
 """The mechanisms composed: what happens at an event, and which event comes next.
 
 Slow processes (heat, supply, flicker) advance in ticks of 0.1 s on an absolute grid of time; the
-mechanics are brought up to date at every tick and, while a stage turns, at finer steps. Between
-events nothing changes but the filter, which is exact. So no result depends on how time is cut.
+mechanics are brought up to date at every tick and, while a stage turns or the carriage moves, at
+finer steps. Between events nothing changes but the filter, which is exact. So no result depends on
+how time is cut.
+
+A moving carriage shakes the sensor at frequencies that the filter sees. Each step of it takes the
+acceleration of its middle: of a sinusoid the steps then keep the phase, and all but (w step)^2 / 24
+of the amplitude, 1e-5 at 10 Hz.
 """
 
 from __future__ import annotations
 
-from drivers.simulation import friction, gravity, heat, noise, oddities, plates, springs, stage, supply
+from drivers.simulation import friction, gravity, heat, noise, oddities, plates, positioner, springs, stage, supply
 from drivers.simulation.config import SensingAxis, WorldConfig
 from drivers.simulation.kernel import Floats, kernel
 from drivers.simulation.state import State
@@ -15,6 +20,8 @@ from drivers.simulation.state import State
 TICK_NS = 100_000_000
 TICK_S = 1e-9 * TICK_NS
 STEP_NS = 2_000_000  # of the mechanics while a stage turns
+SHAKE_NS = 250_000  # of the mechanics while the carriage moves
+UM_PER_G = 1e6 * springs.STANDARD_GRAVITY_M_S2  # um/s^2 in 1 g
 NORMALS = noise.NORMALS + 3  # random numbers of one tick
 REFERENCE_C = 25.0  # at which the factory trimmed the sensor
 
@@ -39,13 +46,24 @@ def run_to(world: State, config: WorldConfig, t_ns: int, step_ns: int, normals: 
 
 @kernel
 def next_event_ns(world: State, step_ns: int) -> int:
-    """The next tick, or the next step of a stage that turns, or the moment at which it stands."""
+    """The next tick, or the next step of a stage or carriage that moves, or the moment at which it stands."""
     event = (world.ticks + 1) * TICK_NS
     for axis in range(2):
         rest = world.rest_ns[axis]
         if world.mechanics_ns < rest:
             event = min(event, rest, (world.mechanics_ns // step_ns + 1) * step_ns)
+    for axis in range(3):
+        rest = world.carriage_rest_ns[axis]
+        if world.mechanics_ns < rest:
+            event = min(event, rest, (world.mechanics_ns // SHAKE_NS + 1) * SHAKE_NS)
     return event
+
+
+@kernel
+def interrupt(world: State, config: WorldConfig) -> None:
+    """Let the filters follow what has been until now, before the carriage gets another motion."""
+    noise.charge(world, config.noise, 0, world.now_ns)
+    noise.charge(world, config.noise, 1, world.now_ns)
 
 
 @kernel
@@ -63,7 +81,7 @@ def tick(world: State, config: WorldConfig, normals: Floats) -> None:
 def update(world: State, config: WorldConfig, t_ns: int) -> None:
     """From the motors' angles at `t_ns` to the volts in front of the filter."""
     world.mechanics_ns = t_ns
-    gx, gy, gz = load_g(world, config, 1e-9 * t_ns)
+    gx, gy, gz = load_g(world, config, t_ns)
     oddities.rock(world, config.oddities, gx, gy)
     x, y, sag = displaced_nm(world, config, gx, gy, gz, 1e-9 * t_ns)
     on, sx, sy = world.powered, config.sensor.x, config.sensor.y
@@ -72,8 +90,9 @@ def update(world: State, config: WorldConfig, t_ns: int) -> None:
 
 
 @kernel
-def load_g(world: State, config: WorldConfig, t_s: float) -> tuple[float, float, float]:
+def load_g(world: State, config: WorldConfig, t_ns: int) -> tuple[float, float, float]:
     """Specific force along both sensing beams and out of their plane."""
+    t_s = 1e-9 * t_ns
     a_motor = stage.motor_angle_deg(world.pieces[0], t_s)
     b_motor = stage.motor_angle_deg(world.pieces[1], t_s)
     world.table_deg[0] = stage.engaged_deg(config.stages.alpha, world.table_deg[0], a_motor)
@@ -81,7 +100,20 @@ def load_g(world: State, config: WorldConfig, t_s: float) -> tuple[float, float,
     alpha = stage.true_angle_rad(config.stages.alpha, world.table_deg[0])
     beta = stage.true_angle_rad(config.stages.beta, world.table_deg[1])
     gx, gy, gz = gravity.felt_g(world.up, world.mount, alpha, beta)
+    for axis in range(3):
+        if t_ns < world.carriage_rest_ns[axis]:
+            shaken = shaken_g(world, config.positioner, axis, t_ns)
+            gx += world.mount[0, axis] * shaken
+            gy += world.mount[1, axis] * shaken
+            gz += world.mount[2, axis] * shaken
     return gx, gravity.along_y(config.sensor.package, gx, gy), gz
+
+
+@kernel
+def shaken_g(world: State, loop: positioner.Positioner, axis: int, t_ns: int) -> float:
+    """Acceleration of the carriage in the middle of the step that begins at `t_ns`."""
+    middle_s = 0.5e-9 * (t_ns + (t_ns // SHAKE_NS + 1) * SHAKE_NS)
+    return positioner.motion(loop, world.carriage[axis], middle_s)[2] / UM_PER_G
 
 
 @kernel

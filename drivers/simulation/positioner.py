@@ -35,12 +35,14 @@ class Positioner:
     """Flexure stage and servo loop of one axis; the travel and the speed are the controller's."""
 
     servo_hz: float = 120.0  # natural frequency of the closed loop
-    damping: float = 0.8  # relative to critical; below 1
+    damping_fraction: float = 0.8  # relative to critical; below 1
     noise_nm: float = 1.0  # rms of one reading of the position sensor
 
     def __post_init__(self) -> None:
-        if not (self.servo_hz > 0 and 0 < self.damping < 1):
-            raise BadSetting(f"No servo loop has {self}", "Give a positive servo_hz and a damping between 0 and 1")
+        if not (self.servo_hz > 0 and 0 < self.damping_fraction < 1):
+            raise BadSetting(
+                f"No servo loop has {self}", "Give a positive servo_hz and a damping_fraction between 0 and 1"
+            )
 
 
 @dataclass(frozen=True)
@@ -88,14 +90,14 @@ def following(positioner: Positioner, pieces: Floats, command: Command) -> tuple
     _begin(positioner, new[0], pieces)
     new[1, :2] = command.end_s, command.um(command.end_s)
     _begin(positioner, new[1], new[:1])
-    return new, command.end_s + FORGOTTEN / (2 * math.pi * positioner.servo_hz * positioner.damping)
+    return new, command.end_s + FORGOTTEN / (2 * math.pi * positioner.servo_hz * positioner.damping_fraction)
 
 
 def _settled(positioner: Positioner, command: Command) -> tuple[float, ...]:
     """What the loop follows a command with, once its beginning is forgotten: later, weaker, turned in phase."""
     own, asked = 2 * math.pi * positioner.servo_hz, 2 * math.pi * command.frequency_hz
-    answer = own**2 / complex(own**2 - asked**2, 2 * positioner.damping * own * asked)
-    late_s = 2 * positioner.damping / own
+    answer = own**2 / complex(own**2 - asked**2, 2 * positioner.damping_fraction * own * asked)
+    late_s = 2 * positioner.damping_fraction / own
     phase = command.phase_rad + math.atan2(answer.imag, answer.real)
     place = command.at_um - late_s * command.rate_um_s
     return command.start_s, place, command.rate_um_s, command.amplitude_um * abs(answer), asked, phase
@@ -113,7 +115,7 @@ def _begin(positioner: Positioner, piece: Floats, before: Floats) -> None:
 def _poles(positioner: Positioner) -> tuple[float, float]:
     """Decay and angular frequency of the loop's own motion, in 1/s."""
     own = 2 * math.pi * positioner.servo_hz
-    return positioner.damping * own, own * math.sqrt(1 - positioner.damping**2)
+    return positioner.damping_fraction * own, own * math.sqrt(1 - positioner.damping_fraction**2)
 
 
 @kernel
@@ -124,7 +126,7 @@ def motion(positioner: Positioner, pieces: Floats, t_s: float) -> tuple[float, f
         k -= 1
     start, place, rate, amplitude, asked, phase, a, b = pieces[k]
     decay, swing = _poles(positioner)
-    t = t_s - start
+    t = max(0.0, t_s - start)
     turned = asked * t + phase
     left = math.exp(-decay * t)
     c, s = left * math.cos(swing * t), left * math.sin(swing * t)

@@ -7,14 +7,14 @@ import math
 import numpy as np
 from numpy.random import Generator
 
-from drivers.simulation import converter, noise
+from drivers.simulation import converter, fibre_probe, noise, positioner
 from drivers.simulation.config import WorldConfig
 from drivers.simulation.kernel import Floats, Ints, kernel
 from drivers.simulation.mechanics import STEP_NS, next_event_ns, run_to
 from drivers.simulation.state import State
 
-INPUTS = ("vx", "vy", "supply", "thermistor", "ground")
-SUPPLY, THERMISTOR = 2, 3
+INPUTS = ("vx", "vy", "supply", "thermistor", "ground", "d63")
+SUPPLY, THERMISTOR, D63 = 2, 3, 5
 
 # A 10 kOhm thermistor at the package, below a 10 kOhm resistor on the sensor's supply.
 THERMISTOR_B_K = 3950.0
@@ -47,10 +47,19 @@ def convert(
             if channels[k] < SUPPLY:
                 t_ns = times_ns[i] + k * skew_ns
                 analog = noise.output_v(world, config.noise, channels[k], t_ns, random.standard_normal())
+            elif channels[k] == D63:
+                analog = displacement_v(world, config, times_ns[i] + k * skew_ns, random.standard_normal())
             else:
                 analog = steady[channels[k]]
             noisy = analog + config.converter.noise_v * random.standard_normal()
             volts[i, k] = converter.bowed_v(config.converter, noisy)
+
+
+@kernel
+def displacement_v(world: State, config: WorldConfig, t_ns: int, normal: float) -> float:
+    """Output of the displacement sensor behind the carriage."""
+    x_um = positioner.motion(config.positioner, world.carriage[0], 1e-9 * t_ns)[0]
+    return fibre_probe.seen_v(config.d63, config.d63.standoff_um + x_um) + config.d63.noise_v * normal
 
 
 @kernel

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from drivers.simulation import friction, noise, stage
+from drivers.simulation import friction, noise, positioner, stage
 from drivers.simulation.errors import BadSetting
 from drivers.simulation.kernel import Floats, Ints, record
 
@@ -33,6 +33,8 @@ class State:
     table_deg: Floats = field(default_factory=zeros(2))  # behind the gear play
     up: Floats = field(default_factory=zeros(3))  # the vertical in the base
     mount: Floats = field(default_factory=zeros(3, 3))  # package from table
+    carriage: Floats = field(default_factory=zeros(3, positioner.PIECES, positioner.TERMS))  # its motion in x, y, z
+    carriage_rest_ns: Ints = field(default_factory=zeros(3, dtype=int))  # when it has settled
 
     seats_nm: Floats = field(default_factory=zeros(2, friction.ELEMENTS))  # of the slip elements
     volts: Floats = field(default_factory=zeros(2))  # in front of the filter, without noise

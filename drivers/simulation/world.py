@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from drivers.simulation import dwell, gravity, level, mechanics, sampling, stage, state, visit
+from drivers.simulation import dwell, gravity, level, mechanics, positioner, sampling, stage, state, visit
 from drivers.simulation.beginning import beginning
 from drivers.simulation.config import WorldConfig
 from drivers.simulation.errors import TimeReversal, UnknownInput, nearest
@@ -52,6 +52,29 @@ class World:
         """Where the motor of `axis` stands now."""
         return float(stage.motor_angle_deg(self._world.pieces[_place(axis, stage.AXES, "stage")], self.now_s))
 
+    def move_positioner(self, axis: str, command: positioner.Command) -> float:
+        """Let the carriage follow `command` along the table's `axis` ("x", "y", "z") from now on.
+
+        Its acceleration adds to the specific force of the sensor, which is mounted on it. Gives the time in s
+        at which it will stand still.
+        """
+        number, numbers = _place(axis, positioner.AXES, "axis of the positioner"), self._numbers
+        mechanics.interrupt(self._world, numbers)
+        pieces, rest_s = positioner.following(numbers.positioner, self._world.carriage[number], command)
+        self._world.carriage[number] = pieces
+        self._world.carriage_rest_ns[number] = round(1e9 * rest_s)
+        mechanics.update(self._world, numbers, int(self._world.now_ns))
+        return rest_s
+
+    def positioner_um(self, axis: str, times_s: ArrayLike | None = None) -> Floats:
+        """What the position sensor of `axis` shows, now or at `times_s` within its present motion; no time passes."""
+        number, times = (
+            _place(axis, positioner.AXES, "axis of the positioner"),
+            self.now_s if times_s is None else times_s,
+        )
+        salt = self._seed * len(positioner.AXES) + number
+        return positioner.read_um(self._numbers.positioner, self._world.carriage[number], times, salt)
+
     def mount_sensor(self, mount_deg: float = 0.0, flip: int = 0) -> None:
         """Put the sensor on the table turned by `mount_deg` about its z axis, face down if `flip`.
 
@@ -86,7 +109,7 @@ class World:
         """Volts at the converter's inputs, shape (n, len(inputs)), before rounding to codes.
 
         Scan i begins at `start_s + i * interval_s`; the k-th input follows k times the converter's skew later.
-        The world is at the last scan afterwards. Inputs: vx, vy, supply, thermistor, ground.
+        The world is at the last scan afterwards. Inputs: vx, vy, supply, thermistor, ground, d63.
 
         Raises:
             UnknownInput: an input of another name.

@@ -17,7 +17,7 @@ PROBE = record(FibreProbe())
 def test_it_has_a_near_side_a_peak_and_a_far_side() -> None:
     peak = minimize_scalar(lambda gap: -seen_v(PROBE, gap), bounds=(0, 1000), method="bounded")
     assert -peak.fun == pytest.approx(PROBE.peak_v)
-    width = PROBE.spot_um + 2 * peak.x * PROBE.divergence
+    width = PROBE.spot_um + 2 * peak.x * np.tan(np.radians(PROBE.divergence_deg))
     assert width**2 == pytest.approx(2 * PROBE.spacing_um**2, rel=1e-4)
     gaps = np.linspace(0, 3000, 301)
     steps = np.diff([seen_v(PROBE, gap) for gap in gaps])

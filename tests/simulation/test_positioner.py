@@ -21,7 +21,7 @@ from drivers.simulation.positioner import (
     standing,
 )
 
-LOOP = record(Positioner(servo_hz=120.0, damping=0.8))
+LOOP = record(Positioner(servo_hz=120.0, damping_fraction=0.8))
 SINE = Command(0.02, 50.0, amplitude_um=30.0, frequency_hz=10.0, phase_rad=-math.pi / 2)
 RAMP = Command(0.02, 20.0, rate_um_s=1000.0, end_s=0.05)
 
@@ -32,7 +32,7 @@ def integrated_um(command: Command, start_um: float, times_s: np.ndarray) -> np.
 
     def slopes(t: float, state: np.ndarray) -> list[float]:
         x, v = state
-        return [v, own**2 * (command.um(t) - x) - 2 * LOOP.damping * own * v]
+        return [v, own**2 * (command.um(t) - x) - 2 * LOOP.damping_fraction * own * v]
 
     span = (command.start_s, times_s[-1])
     return solve_ivp(slopes, span, [start_um, 0.0], t_eval=times_s, rtol=1e-9, atol=1e-9, max_step=1e-3).y[0]
@@ -59,7 +59,7 @@ def test_the_paper_s_motion_has_the_paper_s_acceleration() -> None:
     pieces, _ = following(LOOP, at_rest(20.0), SINE)
     peak = max(motion(LOOP, pieces, t)[2] for t in np.linspace(1.0, 1.1, 1001))
     ratio = 10 / LOOP.servo_hz
-    lag = math.hypot(1 - ratio**2, 2 * LOOP.damping * ratio)
+    lag = math.hypot(1 - ratio**2, 2 * LOOP.damping_fraction * ratio)
     assert 1e-3 * peak == pytest.approx(118.4 / lag, rel=1e-3)
 
 
