@@ -14,6 +14,7 @@ from drivers.errors import BadFrame, LinkTimeout, Refused
 from drivers.links.link import Link
 
 TIMEOUT_S = 1.0  # of silence; the longest answers come in many pieces
+QUIET_S = 0.02  # after which nothing more of an interrupted answer comes
 LATIN = "latin-1"  # one character is one byte
 REMEDY = "Check power and cable, and that no other program holds the controller"
 
@@ -47,8 +48,9 @@ class Gcs:
         return self._lines(f"#{number}")[0]
 
     def tell_byte(self, number: int) -> None:
-        """Send a command of one byte that has no answer."""
+        """Send a command of one byte that has no answer; an answer that it interrupts is thrown away."""
         self._send(chr(number))
+        self.link.discard(QUIET_S)
 
     def error(self) -> int:
         """The controller's error number, which it forgets by telling it; 0 is none."""

@@ -213,6 +213,17 @@ def test_after_a_stop_in_mid_wave_nothing_moves(
     positioner.move_to("x", 50.0)  # and it can be used again
 
 
+def test_it_serves_a_serial_line_as_well(small_world: Any, clock: SimulatedClock) -> None:
+    served, links = pi_e727_twin.serve(small_world, {"positioner": (1, Settings())}, "pty:"), Links(clock)
+    clock.attach(served)
+    positioner = connect(served.addresses["positioner"], links, Settings(), "positioner")
+    assert all(check.ok for check in positioner.self_test())
+    positioner.servo(True)
+    positioner.move_to("z", 30.0)
+    links.close()
+    served.close()
+
+
 def test_a_stop_is_safe_in_any_state(positioner: Positioner) -> None:
     for _ in range(2):
         positioner.stop()

@@ -218,6 +218,12 @@ def test_a_record_that_is_too_short(positioner: Positioners) -> None:
         positioner(*told("DRL? 1\n", "1=3\n"), *told("DRR? 1 3 1\n", answer)).recorded("x")
 
 
+def test_a_stop_in_the_middle_of_an_answer(positioner: Positioners) -> None:
+    """What is left of a long record is no answer to what follows."""
+    rest = "20.4734 \n20.6183 \n20.7000\n"
+    positioner(("\x18", rest), ("ERR?\n", "10\n"), ("\x09", "0\n"), ("\x05", "0\n")).stop()
+
+
 def test_a_stop_is_one_byte_and_waits_until_nothing_moves(positioner: Positioners) -> None:
     positioner(
         ("\x18", ""),
