@@ -2,7 +2,8 @@
 
 The answer is one of four. `adequate`: nothing that the catalogue or a pattern could describe is left beyond noise.
 `effect-missing`: one effect, or several, explain what is left. `ambiguous`: the best has a rival that this data cannot
-tell from it. `unexplained`: something is left, and the catalogue does not explain most of it.
+tell from it, or nothing shows because the data do not even determine the model. `unexplained`: something is left, and
+the catalogue does not explain most of it.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibrations.candidates import SIGNIFICANT, Candidate
+from calibrations.determined import undetermined
 from calibrations.effect import Effect, catalogue
 from calibrations.experiment import Experiment, separating
 from calibrations.fit import Fit
@@ -38,6 +40,7 @@ class Diagnosis:
     residual_structure: str | None
     next_experiment: Experiment | None
     path: Path
+    caution: str | None  # why the data do not even determine the model, where they do not
 
     @property
     def excess_before(self) -> float:
@@ -50,15 +53,18 @@ def diagnose(table: Table, model: Model, effects: Mapping[str, Effect] | None = 
     path = find_path(model, table, catalogue() if effects is None else effects, enough=MOST_LEFT)
     structure = structure_of(path.end)
     left = path.left
-    verdict = verdict_of(path, structure)
+    verdict, caution = verdict_of(path, structure), undetermined(path.start)
+    if verdict == "adequate" and caution:
+        verdict = "ambiguous"
     return Diagnosis(
         fit=path.start,
         verdict=verdict,
         candidates=path.first or left,
         held_out_before=held_out_excess(path.start),
         residual_structure=structure if verdict == "unexplained" else None,
-        next_experiment=separating(path.first[0]) if verdict == "ambiguous" else None,
+        next_experiment=separating(path.first[0]) if verdict == "ambiguous" and path.steps else None,
         path=path,
+        caution=caution,
     )
 
 

@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from calibrations.candidates import SIGNIFICANT, Candidate, candidates
+from calibrations.determined import undetermined
 from calibrations.diagnose import MOST_LEFT, structure_of
 from calibrations.effect import Effect, catalogue
 from calibrations.experiment import Experiment, separating
@@ -65,6 +66,11 @@ class Discovery:
         """The fit of the final model."""
         return self.steps[-1].after if self.steps else self.start
 
+    @cached_property
+    def caution(self) -> str | None:
+        """Why the data do not even determine the final model, where they do not."""
+        return undetermined(self.end)
+
 
 def add(effect: Effect, model: Model, table: Table, effects: Mapping[str, Effect] | None = None) -> Discovery:
     """`model` with one effect more, both fitted to `table`. Raises what `fit` raises.
@@ -106,10 +112,11 @@ def discover(table: Table, model: Model, effects: Mapping[str, Effect] | None = 
     alternatives = {name: c.indistinguishable_from for name, c in seen.items() if c and c.indistinguishable_from}
     causes = _causes(steps)
     ambiguous = next((seen[name] for name in causes if name in alternatives), None)
+    uncertain = ambiguous or undetermined(steps[-1].after if steps else path.start)
     return Discovery(
         start=path.start,
         steps=steps,
-        verdict="unexplained" if left else "ambiguous" if ambiguous else "adequate",
+        verdict="unexplained" if left else "ambiguous" if uncertain else "adequate",
         causes=causes,
         refinements=tuple(s.name for s in steps if s.name not in causes),
         alternatives=alternatives,

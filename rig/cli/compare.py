@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from rig.cli.output import bench_option, check_option, emit, json_option, model_option
+from rig.cli.output import bench_option, check_option, emit, json_option, model_option, notes
 
 
 @click.command("compare")
@@ -18,19 +18,22 @@ from rig.cli.output import bench_option, check_option, emit, json_option, model_
 def command(data: str, model: str | None, check: bool, bench_file: Path | None, as_json: bool) -> int:
     """Set a model beside DATA (a file or a run) and say where it fails. A model without values is fitted first."""
     from calibrations.compare import compare
+    from calibrations.determined import undetermined
     from calibrations.documents import comparison_document
     from rig.cli.asked import asked
-    from rig.cli.words import errors
+    from rig.cli.words import errors, warning
 
     table, start, _ = asked(data, model, bench_file)
     result = compare(table, start)
+    caution = undetermined(result.fit)
     if as_json:
         emit(comparison_document(result, model or start.name))
+        notes(warning(caution))
     else:
         click.echo(f"{start.name} beside {table.n} rows of {table.source}\n\n{errors(result.fit)}\n")
         if result.adequate:
-            click.echo("The model fails nowhere: what is left is noise.")
+            click.echo("\n".join(["The model fails nowhere: what is left is noise.", *warning(caution)]))
         else:
             click.echo("It fails, worst first:\n" + "\n".join(f"  {place.text}" for place in result.fails))
             click.echo(f"\nWhich effect is missing: rig diagnose {data} --model {model or start.name}")
-    return 1 if check and not result.adequate else 0
+    return 1 if check and (not result.adequate or caution) else 0

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from rig.cli.output import bench_option, check_option, columns, emit, json_option, model_option
+from rig.cli.output import bench_option, check_option, columns, emit, json_option, model_option, notes
 
 if TYPE_CHECKING:
     from calibrations.diagnose import Diagnosis
@@ -26,6 +26,7 @@ def command(data: str, model: str | None, check: bool, bench_file: Path | None, 
     from calibrations.diagnose import diagnose
     from calibrations.documents import diagnosis_document
     from rig.cli.asked import asked, tell_blind
+    from rig.cli.words import warning
 
     table, start, effects = asked(data, model, bench_file)
     result = diagnose(table, start, effects)
@@ -33,6 +34,7 @@ def command(data: str, model: str | None, check: bool, bench_file: Path | None, 
     name = model or start.name
     if as_json:
         emit(diagnosis_document(result, name))
+        notes(warning(result.caution))
     else:
         click.echo(_told(result, data, name, f" --bench {bench_file}" if bench_file else ""))
     return 1 if check and result.verdict != "adequate" else 0

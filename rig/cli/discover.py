@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from rig.cli.output import bench_option, check_option, emit, json_option, model_option
+from rig.cli.output import bench_option, check_option, emit, json_option, model_option, notes
 
 
 @click.command("discover")
@@ -21,7 +21,7 @@ def command(data: str, model: str | None, out: Path | None, check: bool, bench_f
     from calibrations.discover import discover
     from calibrations.documents import discovery_document
     from rig.cli.asked import asked, write_model
-    from rig.cli.words import discovery, parameters
+    from rig.cli.words import discovery, parameters, warning
 
     table, start, effects = asked(data, model, bench_file, out)
     result = discover(table, start, effects)
@@ -29,6 +29,7 @@ def command(data: str, model: str | None, out: Path | None, check: bool, bench_f
         write_model(result.end, start, out)
     if as_json:
         emit(discovery_document(result, str(out) if out else None))
+        notes(warning(result.caution))
     else:
         click.echo(f"{table.n} rows of {table.source}\n\n{discovery(result)}\n\n{parameters(result.end.model)}")
         if out is not None:

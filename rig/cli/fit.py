@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from rig.cli.output import bench_option, check_option, emit, json_option, model_option
+from rig.cli.output import bench_option, check_option, emit, json_option, model_option, notes
 
 
 @click.command("fit")
@@ -27,11 +27,12 @@ def command(data: str, model: str | None, out: Path | None, check: bool, bench_f
 
     table, start, effects = asked(data, model, bench_file, out)
     found = fit(start, table)
-    tell_blind(found, effects)
     if out is not None:
         write_model(found, start, out)
+    tell_blind(found, effects)
     if as_json:
         emit(fit_document(found, str(out) if out else None))
+        notes(warning(undetermined(found)))
     else:
         click.echo(f"{found.model.name} fitted to {table.n} rows of {table.source}\n\n{parameters(found.model)}\n")
         click.echo("\n".join([errors(found), *(f"\n{line}" for line in warning(undetermined(found)))]))

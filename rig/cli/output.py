@@ -32,6 +32,12 @@ def note(text: str) -> None:
     click.echo(text, err=True)
 
 
+def notes(lines: Iterable[str]) -> None:
+    """Several remarks, or none."""
+    for line in lines:
+        note(line)
+
+
 def columns(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     """A table of text, columns aligned to the left and two spaces apart."""
     cells = [tuple(head), *[tuple(str(cell) for cell in row) for row in rows]]

@@ -65,7 +65,7 @@ def quantity(value: float, unit: str) -> str:
 
 def discovery(result: Discovery) -> str:
     """The falling error, step by step, and the verdict."""
-    return "\n".join([falling(result), "", _verdict(result), *_rivals(result)])
+    return "\n".join([falling(result), "", _verdict(result), *_rivals(result), *warning(result.caution)])
 
 
 def addition(result: Discovery, data: str, out: Path) -> str:
@@ -92,6 +92,11 @@ def falling(result: Discovery) -> str:
 def _rivals(result: Discovery) -> list[str]:
     lines = [f"This data cannot tell {name} from {joined(rivals)}." for name, rivals in result.alternatives.items()]
     return [*lines, f"To tell them apart: {result.next_experiment.why}."] if result.next_experiment else lines
+
+
+def warning(caution: str | None) -> list[str]:
+    """A line that keeps a reader from trusting a small residual, where there is reason to."""
+    return [f"But {caution}."] if caution else []
 
 
 def _bar(found: Fit, first: Fit) -> str:

@@ -1,0 +1,66 @@
+"""A residual as small as noise proves nothing where the data do not determine the model."""
+
+import numpy as np
+import pytest
+
+from calibrations.determined import undetermined, unseen_variance
+from calibrations.diagnose import diagnose
+from calibrations.discover import discover
+from calibrations.effect import catalogue
+from calibrations.fit import fit
+from calibrations.model import Model
+from calibrations.model_file import read_model
+from calibrations.table import Table
+from tests.calibrations.test_real_data import mikoff, suarez, xsens
+
+
+def nine() -> Model:
+    return read_model("linear").with_effect(catalogue()["axis-nonorthogonality"])
+
+
+def turned(betas: list[float], seed: int) -> Table:
+    """An ideal axis at alpha = 90 deg, its means with white noise of 50 uV."""
+    beta = np.array(betas)
+    v = 2.5 + np.cos(np.radians(beta)) + np.random.default_rng(seed).normal(0, 5e-5, len(beta))
+    columns = {"alpha_deg": np.full(len(beta), 90.0), "beta_deg": beta, "vx_v": v}
+    noise = {"vx_std_v": np.full(len(beta), 5e-5), "n": np.ones(len(beta))}
+    return Table.from_columns("poses", columns | noise)
+
+
+def test_the_variance_on_an_unseen_row_is_that_of_leaving_it_out() -> None:
+    betas = [0.0, 40.0, 100.0, 180.0, 270.0]
+    errors = []
+    for seed in range(300):
+        table = turned(betas, seed)
+        for k in range(len(betas)):
+            seen = np.arange(len(betas)) != k
+            cos = np.cos(np.radians(table.column("beta_deg")))
+            scale, bias = np.polyfit(cos[seen], table.column("vx_v")[seen], 1)
+            errors.append(table.column("vx_v")[k] - bias - scale * cos[k])
+    found = unseen_variance(fit(read_model("linear"), turned(betas, 0)))
+    assert found == pytest.approx(np.var(errors) / 5e-5**2, rel=0.1)
+
+
+def test_many_rows_determine_a_model_and_few_do_not() -> None:
+    assert undetermined(fit(read_model("linear"), turned(list(range(0, 360, 10)), 1))) is None
+    few = undetermined(fit(read_model("linear"), turned([0.0, 10.0, 20.0], 1)))
+    assert few is not None
+    assert "the 2 parameters are not identifiable from these rows: 3 of them" in few
+
+
+def test_published_sets_of_many_positions_determine_nine_parameters() -> None:
+    assert [undetermined(fit(nine(), table)) for table in (xsens(), mikoff())] == [None, None]
+
+
+@pytest.mark.parametrize("model", [nine(), read_model("linear")])
+def test_on_ten_positions_a_small_residual_is_not_reported_as_good(model: Model) -> None:
+    found = diagnose(suarez(), model)
+    assert found.verdict == "ambiguous"
+    assert "not identifiable from these positions: 10 of them" in str(found.caution)
+    assert found.next_experiment is None
+
+
+def test_a_discovery_on_ten_positions_says_so_too() -> None:
+    found = discover(suarez(), read_model("common-scale"))
+    assert (found.verdict, found.causes) == ("ambiguous", ("scale-factor",))
+    assert "the 6 parameters are not identifiable from these positions" in str(found.caution)
