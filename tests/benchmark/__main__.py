@@ -55,6 +55,7 @@ def _figures(folder: Path) -> Iterator[tuple[str, Figure]]:
     yield "soak", _inside("soak", subject(folder, "soak", "12"))
     yield "generation", _generation(folder)
     yield "poses in real time", _overhead(folder)
+    yield "100 kills", _inside("", subject(folder, "kills", "100"))
 
 
 def _generation(folder: Path) -> Figure:

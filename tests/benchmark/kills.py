@@ -1,4 +1,4 @@
-"""Kills at random moments that runs survived: `python -m tests.benchmark.kills [KILLS] [SEED]`, by default 500.
+"""Kills at random moments that runs survived: `python -m tests.benchmark.kills [KILLS] [SEED]`; 500 take two minutes.
 
 Each is checked as in tests/rig/test_kill.py; the first that costs more than the pose in flight ends it with an error.
 """
