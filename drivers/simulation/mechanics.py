@@ -12,6 +12,8 @@ of the amplitude, 1e-5 at 10 Hz.
 
 from __future__ import annotations
 
+from numpy.random import Generator
+
 from drivers.simulation import friction, gravity, heat, noise, oddities, plates, positioner, springs, stage, supply
 from drivers.simulation.config import SensingAxis, WorldConfig
 from drivers.simulation.kernel import Floats, kernel
@@ -22,26 +24,22 @@ TICK_S = 1e-9 * TICK_NS
 STEP_NS = 2_000_000  # of the mechanics while a stage turns
 SHAKE_NS = 250_000  # of the mechanics while the carriage moves
 UM_PER_G = 1e6 * springs.STANDARD_GRAVITY_M_S2  # um/s^2 in 1 g
-NORMALS = noise.NORMALS + 3  # random numbers of one tick
 REFERENCE_C = 25.0  # at which the factory trimmed the sensor
 
 
 @kernel
-def run_to(world: State, config: WorldConfig, t_ns: int, step_ns: int, normals: Floats) -> int:
-    """Let everything due up to `t_ns` happen; returns how many rows of `normals` (ticks) were used."""
-    used = 0
+def run_to(world: State, config: WorldConfig, t_ns: int, step_ns: int, random: Generator) -> None:
+    """Let everything due up to `t_ns` happen; what the ticks need of chance is drawn from `random`."""
     event_ns = next_event_ns(world, step_ns)
     while event_ns <= t_ns:
         noise.charge(world, config.noise, 0, event_ns)
         noise.charge(world, config.noise, 1, event_ns)
         if event_ns == (world.ticks + 1) * TICK_NS:
             world.ticks += 1
-            tick(world, config, normals[used])
-            used += 1
+            tick(world, config, random)
         update(world, config, event_ns)
         event_ns = next_event_ns(world, step_ns)
     world.now_ns = max(t_ns, world.now_ns)
-    return used
 
 
 @kernel
@@ -67,14 +65,14 @@ def interrupt(world: State, config: WorldConfig) -> None:
 
 
 @kernel
-def tick(world: State, config: WorldConfig, normals: Floats) -> None:
+def tick(world: State, config: WorldConfig, random: Generator) -> None:
     """Advance the slow processes to the present tick."""
     t_s = world.ticks * TICK_S
-    heat.tick(world, config.heat, config.oven, t_s, TICK_S, normals[0])
-    supply.tick(world, config.supply, t_s, TICK_S, normals[1])
+    heat.tick(world, config.heat, config.oven, t_s, TICK_S, random.standard_normal())
+    supply.tick(world, config.supply, t_s, TICK_S, random.standard_normal())
     world.charged = heat.lagged(world.charged, world.powered, TICK_S, config.sensor.charging_s)
-    oddities.tick(world, config.oddities, TICK_S, normals[2])
-    noise.tick(world, config.noise, TICK_S, normals[3:])
+    oddities.tick(world, config.oddities, TICK_S, random.standard_normal())
+    noise.tick(world, config.noise, TICK_S, random)
 
 
 @kernel

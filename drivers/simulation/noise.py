@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.random import Generator
 
 from drivers.simulation.heat import wandered
 from drivers.simulation.kernel import Floats, kernel
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from drivers.simulation.state import State
 
 DECADES = 5  # correlation times 1 s to 10 000 s
-NORMALS = 2 * (DECADES + 1)  # random numbers per tick, both axes
 
 
 @dataclass(frozen=True)
@@ -37,16 +37,15 @@ class Noise:
 
 
 @kernel
-def tick(world: State, noise: Noise, step_s: float, normals: Floats) -> None:
+def tick(world: State, noise: Noise, step_s: float, random: Generator) -> None:
     """Advance flicker noise and random walk of both axes by one tick."""
     for axis in range(2):
-        slow = 0.0
         for k in range(DECADES):
-            time_s, normal = 10.0**k, normals[axis * DECADES + k]
-            world.flicker_v[axis, k] = wandered(world.flicker_v[axis, k], noise.flicker_v, time_s, step_s, normal)
-            slow += world.flicker_v[axis, k]
-        world.walk_v[axis] += noise.walk_v_per_sqrt_h * math.sqrt(step_s / 3600) * normals[2 * DECADES + axis]
-        world.slow_v[axis] = slow + world.walk_v[axis]
+            old, time_s = world.flicker_v[axis, k], 10.0**k
+            world.flicker_v[axis, k] = wandered(old, noise.flicker_v, time_s, step_s, random.standard_normal())
+    for axis in range(2):
+        world.walk_v[axis] += noise.walk_v_per_sqrt_h * math.sqrt(step_s / 3600) * random.standard_normal()
+        world.slow_v[axis] = world.flicker_v[axis].sum() + world.walk_v[axis]
 
 
 @kernel

@@ -23,16 +23,16 @@ KELVIN = 273.15
 
 @kernel
 def sample(
-    world: State, config: WorldConfig, channels: Ints, times_ns: Ints, random: Generator, slow: Floats, volts: Floats
+    world: State, config: WorldConfig, channels: Ints, times_ns: Ints, slow: Generator, fast: Generator, volts: Floats
 ) -> None:
-    """Fill `volts` (scans, channels); noise is drawn from `random` sample by sample, `slow` holds a row per tick."""
-    used = done = 0
+    """Fill `volts` (scans, channels); chance is drawn from `slow` tick by tick, from `fast` sample by sample."""
+    done = 0
     while done < len(times_ns):
-        used += run_to(world, config, times_ns[done], STEP_NS, slow[used:])
+        run_to(world, config, times_ns[done], STEP_NS, slow)
         event_ns, first = next_event_ns(world, STEP_NS), done
         while done < len(times_ns) and times_ns[done] < event_ns:
             done += 1
-        convert(world, config, channels, times_ns[first:done], random, volts[first:done])
+        convert(world, config, channels, times_ns[first:done], fast, volts[first:done])
         world.now_ns = max(times_ns[done - 1], world.now_ns)
 
 

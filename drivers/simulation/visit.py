@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+from numpy.random import Generator
 from numpy.typing import ArrayLike
 
 from drivers.simulation.config import WorldConfig
@@ -100,23 +101,22 @@ def _nanoseconds(seconds: list[list[float]]) -> Ints:
 
 @kernel
 def visit(
-    world: State, config: WorldConfig, motions: Floats, rest_ns: Ints, dwell_ns: Ints, mounts: Floats, normals: Floats
+    world: State, config: WorldConfig, motions: Floats, rest_ns: Ints, dwell_ns: Ints, mounts: Floats, random: Generator
 ) -> Floats:
-    """Run through a plan; `normals` holds a row per tick. Means over the dwells, shape (n, MEANS)."""
+    """Run through a plan; the ticks draw from `random`. Means over the dwells, shape (n, MEANS)."""
     means = np.zeros((len(motions), MEANS))
-    used = 0
     for i in range(len(means)):
         world.pieces[:] = motions[i]
         world.rest_ns[:] = rest_ns[i]
         world.mount[:] = mounts[i]
-        used += hold(world, config, dwell_ns[i, 0], dwell_ns[i, 1], normals[used:], means[i])
+        hold(world, config, dwell_ns[i, 0], dwell_ns[i, 1], random, means[i])
     return means
 
 
 @kernel
-def hold(world: State, config: WorldConfig, start_ns: int, end_ns: int, normals: Floats, means: Floats) -> int:
-    """Run to a dwell and through it, add up its `means` (MEANS,); returns how many rows of `normals` were used."""
-    used = run_to(world, config, start_ns, STEP_NS, normals)
+def hold(world: State, config: WorldConfig, start_ns: int, end_ns: int, random: Generator, means: Floats) -> None:
+    """Run to a dwell and through it, add up its `means` (MEANS,)."""
+    run_to(world, config, start_ns, STEP_NS, random)
     t_ns = start_ns
     while t_ns < end_ns:
         after_ns = min(next_event_ns(world, STEP_NS), end_ns)
@@ -126,6 +126,5 @@ def hold(world: State, config: WorldConfig, start_ns: int, end_ns: int, normals:
             means[2 + axis] += share * world.slow_v[axis]
         means[4] += share * world.thermocouple_c
         means[5] += share * world.supply_v * world.powered
-        used += run_to(world, config, after_ns, STEP_NS, normals[used:])
+        run_to(world, config, after_ns, STEP_NS, random)
         t_ns = after_ns
-    return used

@@ -20,8 +20,6 @@ from drivers.simulation.kernel import Floats, record
 from drivers.simulation.scatter import individual
 from drivers.simulation.trajectory import Trajectory
 
-BLOCK_NS = 1000 * mechanics.TICK_NS  # of a long wait: bounds the memory for random numbers
-
 
 class World:
     """A rig in simulated time, from `now_s` = 0 with both stages at motor angle 0."""
@@ -40,7 +38,7 @@ class World:
 
     def advance(self, t_s: float) -> None:
         """Let time pass until `t_s`. Raises TimeReversal."""
-        self._advance_ns(self._later_ns(t_s))
+        mechanics.run_to(self._world, self._numbers, self._later_ns(t_s), mechanics.STEP_NS, self._slow)
 
     def move_stage(self, axis: str, trajectory: Trajectory) -> None:
         """Let the motor of `axis` ("alpha" or "beta") follow `trajectory` from now on."""
@@ -119,10 +117,7 @@ class World:
         start_ns = self._later_ns(start_s)
         times_ns = start_ns + np.rint(1e9 * interval_s * np.arange(n)).astype(np.int64)
         volts = np.empty((n, len(channels)))
-        if n:
-            self._advance_ns(start_ns)
-            slow = self._due(int(times_ns[-1]))
-            sampling.sample(self._world, self._numbers, channels, times_ns, self._fast, slow, volts)
+        sampling.sample(self._world, self._numbers, channels, times_ns, self._slow, self._fast, volts)
         return volts
 
     def dwell_mean(
@@ -146,8 +141,8 @@ class World:
         visited, pace = visit.poses(alpha_deg, beta_deg, direction, mount_deg, flip), visit.Timing(**timing)
         motors = self.motor_angle_deg("alpha"), self.motor_angle_deg("beta")
         plan = visit.plan(visited, pace, self.config.sensor.package, self.now_s, motors)
-        slow, numbers = self._due(int(plan.dwell_ns[-1, 1])), self._numbers
-        means = visit.visit(self._world, numbers, plan.motions, plan.rest_ns, plan.dwell_ns, plan.mounts, slow)
+        motions = plan.motions, plan.rest_ns, plan.dwell_ns, plan.mounts
+        means = visit.visit(self._world, self._numbers, *motions, self._slow)
         middle_s = 1e-9 * plan.dwell_ns.mean(axis=1)
         random = None if noise_free else self._fast
         measured = dwell.columns(means, middle_s, self.config.noise, self.config.converter, pace, random)
@@ -173,15 +168,6 @@ class World:
         if t_ns < now_ns - 1:
             raise TimeReversal(f"The world is at {self.now_s:.9f} s, past {t_s:.9f} s", "Ask for a later time")
         return max(t_ns, now_ns)
-
-    def _advance_ns(self, t_ns: int) -> None:
-        for stop_ns in (*range(int(self._world.now_ns) + BLOCK_NS, t_ns, BLOCK_NS), t_ns):
-            mechanics.run_to(self._world, self._numbers, stop_ns, mechanics.STEP_NS, self._due(stop_ns))
-
-    def _due(self, t_ns: int) -> Floats:
-        """The random numbers of all ticks up to `t_ns`, one row each."""
-        ticks = max(0, t_ns // mechanics.TICK_NS - int(self._world.ticks))
-        return self._slow.standard_normal((ticks, mechanics.NORMALS))
 
 
 def _place(name: str, names: tuple[str, ...], what: str) -> int:
