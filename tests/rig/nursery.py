@@ -33,18 +33,15 @@ WARMING = ("run", "sweep", "--unattended", "--step-deg", "90", "--dwell-s", "0.2
 class Harm:
     """What a command comes to, and when.
 
-    clock   SIGKILL after so many seconds
-    sql     SIGKILL at the so manieth point of the record: before and after a statement, before and after a commit
-    wire    SIGKILL at the so manieth request to an instrument
-    INSERT INTO name    SIGKILL at the so manieth insert into that table
-    disk    no file can grow beyond so many bytes: dies of SIGXFSZ where a write is half done
+    clock               SIGKILL after `at` seconds
+    sql                 SIGKILL at point `at` of the record: before and after a statement, before and after a commit
+    INSERT INTO table   SIGKILL at insert `at` into that table
+    wire                SIGKILL at request `at` to an instrument
+    disk                no file grows beyond `at` bytes: death by SIGXFSZ, with a write half done
     """
 
     kind: str = "none"
     at: float = 0
-
-
-UNHARMED = Harm()
 
 
 @dataclass(frozen=True)
