@@ -1,8 +1,9 @@
 """Raw samples of poses: a log of stage angles and outputs, many rows to a dwell, as a table of means.
 
 Nobody repeats one pose for fifty rows on end where a row is a mean of seconds; a logger at 10 Hz or more does so in
-each dwell of 5 s. So a table whose rows mostly stand in such stretches, and that does not count averaged samples, is
-a log. Poses measured twice or three times stay as they are, and so does a soak with a row every few seconds.
+each dwell of 5 s. So a table that does not count averaged samples is a log where its times follow each other as no
+means can and the stages rest at all; without times, where most rows stand in such stretches. Poses measured twice or
+three times stay as they are, and so does a soak with a row every few seconds.
 """
 
 from __future__ import annotations
@@ -32,9 +33,10 @@ def is_pose_log(table: Table) -> bool:
     """Whether rows of poses are samples rather than means."""
     if table.kind != "poses" or table.n < 2 * SHORTEST or "n" in table or any(_std(v) in table for v in OUTPUTS):
         return False
-    if "t_s" in table and np.median(np.abs(np.diff(table.column("t_s")))) > FASTEST_MEANS_S:
-        return False
     still = _windows(table, SHORTEST)
+    if "t_s" in table:
+        apart_s = float(np.median(np.abs(np.diff(table.column("t_s")))))
+        return apart_s <= FASTEST_MEANS_S and len(still) > 0
     return 2 * sum(last - first for first, last in still) > table.n
 
 

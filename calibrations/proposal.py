@@ -18,7 +18,7 @@ from calibrations.separated import Sheet, is_number, number
 from calibrations.table import KINDS, NUMBERS, Array
 from calibrations.units import UNITS, Mapped, name_and_unit, own_unit
 
-AXIS = r"(?:^|[^a-z])?(?P<axis>[xyz])(?:[^a-z]|$)"
+AXIS = r"(?:^|[^a-z])(?P<axis>[xyz])(?:[^a-z]|$)"
 SCATTER = r"std|stdev|sigma|noise|scatter|deviation"
 # what a name says, the first that fits; {axis} is the letter x, y or z in it
 WORDS: Mapping[str, Sequence[tuple[str, str]]] = {

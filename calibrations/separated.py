@@ -159,7 +159,9 @@ def _is_title(cells: list[str], width: int) -> bool:
     """Whether a row is narrower than the table, or a spreadsheet filled it up with empty cells to be as wide."""
     if len(cells) != width:
         return len(cells) < 3 or any(map(is_number, cells)) or not all(cells)
-    return width > 3 and not any(cells[2:])
+    if width < 3 or any(cells[2:]):
+        return False
+    return width > 3 or not cells[1] or is_number(cells[1])
 
 
 def _empty_behind(rows: Sequence[list[str]]) -> int:

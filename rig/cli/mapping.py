@@ -17,7 +17,7 @@ from rig.cli.output import note
 
 LEAVE = "-"
 CHOICES = {
-    "poses": "alpha_deg beta_deg vx_v vy_v vz_v direction t_s temperature_c supply_v vx_std_v vy_std_v n",
+    "poses": "alpha_deg beta_deg vx_v vy_v vz_v direction t_s temperature_c supply_v vx_std_v vy_std_v n mount_deg flip",
     "positions": "ax ay az t_s temperature_c n",
 }
 
@@ -80,7 +80,7 @@ def _understood(
         return fitting(replace(proposal, unit=unit_of(answer)), source)
     name, colon, unit = answer.partition(":")
     if name not in NUMBERS:
-        raise DataError(f'there is no column "{name}" here{nearest(name, NUMBERS)}')
+        raise DataError(f'"{name}" is none of our columns{nearest(name, " ".join(CHOICES.values()).split())}')
     if name in {m.name for m in before}:
         raise DataError(f"{name} is taken already")
     if colon and not unit_of(unit):

@@ -1,0 +1,125 @@
+"""Numbers that can hardly be in their unit are refused with the unit that fits; whoever states the unit is believed."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from calibrations.duplicates import check_duplicates
+from calibrations.errors import DataError
+from calibrations.foreign import take
+from calibrations.plausible import gravity_unit, looks_like_radians
+from calibrations.separated import sheet
+from calibrations.table import Table
+from calibrations.text_file import text
+from calibrations.units import Mapped
+
+TURN = np.arange(0.0, 361.0, 30.0)
+
+
+def poses(alpha: float = 90.0, scale: float = 1.0, **more: float) -> str:
+    """A turn of beta at one inclination, as CSV; `scale` times its angles, and more constant columns."""
+    head = ",".join(["alpha_deg", "beta_deg", "vx_v", *more])
+    beta = [f"{scale * alpha:.6g},{scale * b:.6g},{more.get('vx_v', 2.5)}" for b in TURN]
+    return "\n".join([head, *(",".join([row, *map(str, more.values())]) for row in beta)]) + "\n"
+
+
+def read(content: str, *columns: str, kind: str | None = None) -> Table:
+    return take(sheet(text(content, "some.csv")), kind, [Mapped.parse(c) for c in columns]).table
+
+
+@pytest.mark.parametrize(
+    ("content", "name", "says", "fits"),
+    [
+        (poses(scale=np.pi / 180), "alpha_deg", "these look like radians", "alpha_deg=alpha_deg:rad"),
+        (poses(scale=np.pi / 180), "alpha_deg", "these look like radians", "beta_deg=beta_deg:rad"),
+        (poses(vy_v=2500.0), "vy_v", "reaches 2500 V, and no sensor puts out more than 50 V", "vy_v=vy_v:mV"),
+        (poses(supply_v=5000.0), "supply_v", "reaches 5000 V", "supply_v=supply_v:mV"),
+        (poses(vy_v=2.5e6), "vy_v", "reaches 2.5e+06 V", "vy_v=vy_v:uV"),
+        (poses(temperature_c=295.0), "temperature_c", "from 295 to 295 degC", "temperature_c=temperature_c:K"),
+    ],
+)
+def test_a_unit_that_can_hardly_be(content: str, name: str, says: str, fits: str) -> None:
+    with pytest.raises(DataError, match=re.escape(f'some.csv: the column "{name}" ')) as error:
+        read(content)
+    assert says in str(error.value)
+    line = next(
+        line for line in str(error.value).splitlines() if line.startswith("    rig import some.csv --kind poses")
+    )
+    assert f"--column {fits}" in line
+    # what the message says is done: by the proposal, and by stating the unit all the same
+    options = re.findall(r"--column (\S+)", line)
+    assert read(content, *options).kind == "poses"
+    stated = [re.sub(r":\w+$", "", option) for option in options]
+    own = {"alpha_deg": "deg", "beta_deg": "deg", "temperature_c": "degC"}
+    assert read(content, *(f"{each}:{own.get(each.partition('=')[0], 'V')}" for each in stated)).kind == "poses"
+
+
+@pytest.mark.parametrize(
+    ("column", "says"),
+    [
+        ("alpha_deg=alpha_deg:rad", "reaches 5156.62 deg, and no stage turns beyond 360; give the unit that it is in"),
+        ("beta_deg=beta_deg:rad", "reaches 20626.5 deg, and no stage turns beyond 3600; give the unit that it is in"),
+    ],
+)
+def test_degrees_taken_for_radians(column: str, says: str) -> None:
+    with pytest.raises(DataError, match=re.escape(says)):
+        read(poses(), column)
+
+
+def test_what_nobody_knows_a_unit_for_may_still_be_stated() -> None:
+    with pytest.raises(DataError, match="give the unit that it is in, as in --column temperature_c=temperature_c:degC"):
+        read(poses(temperature_c=5000.0))
+    assert read(poses(temperature_c=5000.0), "temperature_c=temperature_c:degC").n == len(TURN)
+
+
+@pytest.mark.parametrize(
+    ("angles", "expected"),
+    [
+        (np.radians(TURN), True),
+        (np.radians([30, 90, 150]), True),
+        (np.round(np.radians(np.arange(0, 360, 10)), 2), True),
+        ([0.3, 0.71, 1.93, 2.22, 3.04, 4.4, 5.1], True),
+        (np.arange(0.0, 7.0), False),
+        (np.arange(-2.0, 2.1, 0.1), False),
+        (np.arange(24) / 12, False),  # the stages' steps of 5 arcmin
+        (np.round(np.arange(24) / 12, 3), False),
+        ([0.0, 0.0], False),
+        (TURN, False),
+        ([0.3, 0.7], False),  # two values say too little
+    ],
+)
+def test_radians_are_off_every_grid_of_degrees(angles: Sequence[float], expected: bool) -> None:
+    assert looks_like_radians(np.asarray(angles, dtype=float)) is expected
+
+
+@pytest.mark.parametrize(("size", "unit"), [(1.02, "g"), (9.79, "m/s2"), (995.0, "mg"), (16384.0, "counts")])
+def test_gravity_gives_the_unit_of_a_sensor_at_rest(size: float, unit: str) -> None:
+    assert gravity_unit(size * np.vstack([np.eye(3), -np.eye(3)])) == unit
+
+
+def test_a_sensor_at_rest_shows_gravity() -> None:
+    content = "ax,ay,az\n9.8,0,0\n0,9.8,0\n0,0,9.8\n"
+    with pytest.raises(
+        DataError, match=r"have the magnitude 9.8 g, where a sensor at rest shows 1; they look like m/s2"
+    ):
+        read(content, "ax=ax:g", "ay=ay:g", "az=az:g")
+    with pytest.raises(DataError, match=r"the magnitude 1 m/s2, where a sensor at rest shows 9.807; they look like g"):
+        read(content.replace("9.8", "1"), *(f"{a}={a}:m/s2" for a in ("ax", "ay", "az")))
+    with pytest.raises(DataError, match=r"are imported as counts: --column ax=\.\.\.:counts"):
+        read(content.replace("9.8", "17"), "ax=ax:g", "ay=ay:g", "az=az:g")
+    assert read(content, *(f"{a}={a}:m/s2" for a in ("ax", "ay", "az"))).unit == "m/s2"
+    assert read(content, *(f"{a}={a}:counts" for a in ("ax", "ay", "az"))).unit == "count"
+
+
+def test_rows_that_are_there_twice() -> None:
+    columns = {"t_s": [0.0, 1, 2, 0, 1], "alpha_deg": [90.0] * 5, "beta_deg": [0.0, 30, 60, 0, 30], "vx_v": [1.0] * 5}
+    with pytest.raises(DataError, match=r"row 4 \(as 1\), 5 \(as 2\); remove the copies"):
+        check_duplicates(Table.from_columns("poses", columns, source="made"))
+    for name, values in {"t_s": [0.0, 1, 2, 3, 4], "vx_v": [1.0, 1, 1, 1.1, 1.1]}.items():  # measured again
+        check_duplicates(Table.from_columns("poses", {**columns, name: values}))
+    del columns["t_s"]
+    check_duplicates(Table.from_columns("poses", columns))  # maybe read to few digits

@@ -1,0 +1,132 @@
+"""What a file's columns are taken for: by name, by unit, by values; and the command that the message ends with."""
+
+from __future__ import annotations
+
+import re
+import shlex
+
+import numpy as np
+import pytest
+
+from calibrations.errors import MissingColumn
+from calibrations.foreign import needs_mapping, take
+from calibrations.proposal import command, likely_kind, propose
+from calibrations.separated import Sheet, sheet
+from calibrations.text_file import text
+from calibrations.units import Mapped, name_and_unit, unit_of
+
+
+def laid(content: str) -> Sheet:
+    return sheet(text(content, "theirs.csv"))
+
+
+def proposed(content: str, kind: str | None = None, *mapped: str) -> set[str]:
+    return {m.text for m in propose(laid(content), kind, [Mapped.parse(m) for m in mapped])}
+
+
+ROWS = "90;0;3500\n90;30;3400\n30;0;3000\n"
+
+
+@pytest.mark.parametrize(
+    ("header", "expected"),
+    [
+        ("inclination;table angle;Vout", {"alpha_deg=inclination", "beta_deg=table angle", "vx_v=Vout:mV"}),
+        ("Alpha;Beta;Vx (mV)", {"alpha_deg=Alpha", "beta_deg=Beta", "vx_v=Vx (mV):mV"}),
+        ("tilt [deg];azimuth [deg];out_y", {"alpha_deg=tilt [deg]:deg", "beta_deg=azimuth [deg]:deg", "vy_v=out_y:mV"}),
+        ("alphaAngle;tableAngle;accX", {"alpha_deg=alphaAngle", "beta_deg=tableAngle", "vx_v=accX:mV"}),
+        ("alpha_deg;beta_deg;signal", {"vx_v=signal:mV"}),
+        ("pitch;yaw;CH0", {"alpha_deg=pitch", "beta_deg=yaw", "vx_v=CH0:mV"}),
+    ],
+)
+def test_names_and_values(header: str, expected: set[str]) -> None:
+    assert proposed(f"{header}\n{ROWS}") == expected
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "expected"),
+    [
+        ("time", 3, "t_s=time"),
+        ("Time (min)", 3, "t_s=Time (min):min"),
+        ("temp", 22, "temperature_c=temp"),
+        ("T", 295, "temperature_c=T:K"),
+        ("Temperature/°C", 22, "temperature_c=Temperature/°C:degC"),
+        ("body [°F]", 72, "temperature_c=body [°F]:degF"),
+        ("Vdd", 5, "supply_v=Vdd"),
+        ("turning", 1, "direction=turning"),
+        ("std_x", 0.7, "vx_std_v=std_x:mV"),
+        ("noise y", 0.7, "vy_std_v=noise y"),
+        ("samples", 500, "n=samples"),
+        ("humidity", 40, None),
+    ],
+)
+def test_further_columns(name: str, value: float, expected: str | None) -> None:
+    rows = "".join(f"90;{k};3500;{value}\n" for k in (0, 30, 60))
+    found = proposed(f"alpha_deg;beta_deg;Vx;{name}\n{rows}")
+    assert found == {"vx_v=Vx:mV"} | ({expected} if expected else set())
+
+
+def test_radians_are_proposed_as_such() -> None:
+    rows = "".join(f"1.5708,{b:.4f},2.5\n" for b in np.radians(np.arange(0, 360, 30)))
+    assert proposed(f"alpha,beta,vx_v\n{rows}") == {"alpha_deg=alpha:rad", "beta_deg=beta:rad"}
+
+
+@pytest.mark.parametrize(("one_g", "unit"), [(1.0, "g"), (9.81, "m/s2"), (4096.0, "counts")])
+def test_three_axes_are_positions_in_the_unit_that_gravity_gives(one_g: float, unit: str) -> None:
+    rows = "".join(f"{k},{one_g * (k == 0)},{one_g * (k == 1)},{one_g * (k == 2)},7\n" for k in range(3))
+    content = f"time,accX,accY,accZ,gyrX\n{rows}"
+    assert likely_kind(laid(content)) == "positions"
+    axes = {f"a{axis}=acc{axis.upper()}:{unit}" for axis in "xyz"}
+    assert proposed(content) == {"t_s=time", "gx=gyrX", *axes}
+
+
+def test_columns_without_names_are_told_by_their_values() -> None:
+    turn = "".join(
+        f"{k}.5 {a} {b} {2.5 + b / 1000}\n" for k, (a, b) in enumerate([(90, 0), (90, 30), (90, 60), (30, 0)])
+    )
+    assert proposed(turn) == {"t_s=1", "alpha_deg=2", "beta_deg=3", "vx_v=4"}
+    held = "".join(f"{k} {x} {y} {z}\n" for k, (x, y, z) in enumerate(np.roll(np.eye(3), 1, axis=0) * 9.8))
+    assert proposed(held) == {"t_s=1", "ax=2:m/s2", "ay=3:m/s2", "az=4:m/s2"}
+
+
+def test_what_is_given_already_stays() -> None:
+    found = proposed(f"a;b;Vout\n{ROWS}", None, "alpha_deg=b", "beta_deg=a:rad")
+    assert found == {"alpha_deg=b", "beta_deg=a:rad", "vx_v=Vout:mV"}
+
+
+def test_a_message_ends_with_the_command_that_works() -> None:
+    content = f"Inclination (°);Table angle (°);Vx [mV]\n{ROWS}"
+    with pytest.raises(MissingColumn) as error:
+        take(laid(content), None)
+    line = str(error.value).splitlines()[-1]
+    assert shlex.split(line)[:5] == ["rig", "import", "theirs.csv", "--kind", "poses"]
+    columns = [Mapped.parse(word) for word in shlex.split(line)[6::2]]
+    assert take(laid(content), "poses", columns).table.column("vx_v").tolist() == [3.5, 3.4, 3.0]
+
+
+def test_what_is_still_to_be_named_is_said() -> None:
+    with pytest.raises(MissingColumn, match=re.escape("put your column's name for YOURS: one, two")) as error:
+        take(laid(f"one;two;Vout\n{ROWS}"), None)
+    assert "--column vx_v=Vout:mV --column alpha_deg=YOURS --column beta_deg=YOURS" in str(error.value)
+
+
+def test_a_mapping_is_needed_where_our_names_are_missing() -> None:
+    assert not needs_mapping(laid(f"alpha_deg (°);beta_deg;vx_v [mV]\n{ROWS}"), None, [])
+    assert needs_mapping(laid(f"alpha_deg;beta_deg;Vout\n{ROWS}"), None, [])
+    assert not needs_mapping(laid(f"alpha_deg;beta_deg;Vout\n{ROWS}"), None, [Mapped("vx_v", "Vout", "mV")])
+    assert needs_mapping(laid(f"alpha_deg;beta_deg;vx_v\n{ROWS}"), "positions", [])
+
+
+def test_the_command_holds_all_that_was_said() -> None:
+    words = shlex.split(command(laid(f"a a;b;c\n{ROWS}"), "poses", [Mapped("vx_v", "a a", "mV")], ["sensor=A 7"]))
+    assert words == [
+        *("rig", "import", "theirs.csv", "--kind", "poses"),
+        *("--column", "vx_v=a a:mV", "--constant", "sensor=A 7"),
+    ]
+
+
+def test_how_units_are_spelt() -> None:
+    assert [unit_of(u) for u in ("mV", "°", "[°C]", "m/s²", "Volts", "µV", "k", "kPa", "")] == [
+        "mV", "deg", "degC", "m/s2", "V", "uV", "", "", "",
+    ]  # fmt: skip
+    assert name_and_unit("Vx [mV]") == ("Vx", "mV")
+    assert name_and_unit("Run (raw data)") == ("Run (raw data)", "")

@@ -1,0 +1,92 @@
+"""Numbers that cannot be what their column says: one message with the way out; status 2; nothing written."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from calibrations.text_file import LARGEST_BYTES
+from tests.rig.test_analysis_models import OWN
+
+Refused = Callable[..., str]
+TURN = range(0, 360, 30)
+
+
+def poses(*more: str, alpha: float = 90.0, scale: float = 1.0, volts: float = 1.0) -> str:
+    """A turn of beta as CSV; `more` are further cells of each row, the first their header."""
+    head, *cells = more or ("",)
+    rows = [",".join([f"{scale * alpha:g},{scale * b:g},{volts * (2.5 + b / 1e3):g}", *cells]) for b in TURN]
+    return "\n".join([",".join(["alpha_deg,beta_deg,vx_v", *([head] if head else [])]), *rows]) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        (poses(scale=0.0174533), "--column alpha_deg=alpha_deg:rad --column beta_deg=beta_deg:rad"),
+        (poses(volts=1000.0), "rig import bad.csv --kind poses --column vx_v=vx_v:mV"),
+        (poses("temperature_c", "295.1"), "--column temperature_c=temperature_c:K"),
+        (poses("supply_v", "0"), 'bad.csv: row 1, column "supply_v" is 0; it must be above 0: without supply there is'),
+        ("ax,ay,az\n" + "1e200,1,2\n2,3e200,1\n" * 9, 'row 1, column "ax" is 1e+200, more than anything measured'),
+        ("# unit: g\nax,ay,az\n" + "9.8,0,1\n0,9.8,0\n0,1,9.8\n" * 5, "where a sensor at rest shows 1; they look like"),
+        (
+            "t_s," + poses().replace("\n90", "\n1,90") + "1,90,0,2.5\n",
+            "rows that are there twice, the same to the last digit and at the same time: row 13 (as 1); remove the",
+        ),
+    ],
+    ids=["radians", "millivolts", "kelvin", "no-supply", "astronomic", "m/s2", "twice"],
+)
+def test_numbers_that_cannot_be(refused: Refused, work: Path, content: str, says: str) -> None:
+    (work / "bad.csv").write_text(content)
+    for command in (("fit", "bad.csv", "--out", "out.yaml"), ("diagnose", "bad.csv"), ("import", "bad.csv")):
+        assert says in refused(*command)
+
+
+def test_degrees_taken_for_radians(refused: Refused, work: Path) -> None:
+    (work / "bad.csv").write_text(poses())
+    said = refused("import", "bad.csv", "--column", "alpha_deg=alpha_deg:rad")
+    assert "reaches 5156.62 deg, and no stage turns beyond 360; give the unit that it is in" in said
+
+
+@pytest.mark.parametrize("size", [2 * LARGEST_BYTES, LARGEST_BYTES // 2])
+def test_a_huge_file_of_nothing_is_answered_at_once(
+    refused: Refused, work: Path, size: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with (work / "huge.csv").open("wb") as file:
+        file.truncate(size)
+    monkeypatch.setattr("tests.rig.conftest.contents", lambda folder: sorted(folder.iterdir()))  # reads no GiB
+    for command in ("fit", "import"):
+        said = refused(command, "huge.csv")
+        assert "more than the 1 GiB that are read" in said or "is not text (byte 0 is 0x00)" in said
+
+
+def test_a_model_in_counts_says_nothing_of_volts(refused: Refused, work: Path) -> None:
+    model = (work / "mine.yaml").read_text().replace("unit: V", "unit: counts")
+    (work / "counts.yaml").write_text(model)
+    for command in ("compare", "diagnose", "fit"):
+        said = refused(command, "good.csv", "--model", "counts.yaml")
+        assert "its values are for outputs in counts, and good.csv is in V; take a model that was fitted to" in said
+
+
+def test_looking_for_a_run_makes_no_record(
+    rig: Callable[..., object], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("RIG_HOME", str(tmp_path / "home"))
+    ended = rig("compare", "nowhere")
+    assert getattr(ended, "status", 0) == 2
+    assert "nowhere: there is no such file, and no run either: there are none yet in" in getattr(ended, "err", "")
+    assert not (tmp_path / "home").exists()
+
+
+def test_an_effect_of_ones_own_takes_no_shipped_name(
+    refused: Refused, work: Path, bench_file: Callable[..., Path]
+) -> None:
+    (work / "bias.py").write_text(OWN)
+    bench = str(bench_file({"folders": {"effects": str(work)}}))
+    said = refused("diagnose", "good.csv", "--bench", bench)
+    assert f"{work}: bias is in the catalogue already; give your effect another name" in said
+
+
+def test_an_unknown_procedure_names_the_nearest(refused: Refused) -> None:
+    assert "did you mean 'sweep'?" in refused("run", "swep", "--unattended")

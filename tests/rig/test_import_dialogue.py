@@ -1,0 +1,69 @@
+"""At a terminal `rig import` proposes what each column is; a person confirms, corrects, or gives up."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pexpect
+import pytest
+
+from rig.record import Record
+
+THEIRS = "Zeit;inclination;table;Ux\n" + "".join(f"{k};90;{30 * k};{2500 + k}\n" for k in range(12))
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    path = tmp_path / "theirs.csv"
+    path.write_text(THEIRS)
+    return path
+
+
+def at_terminal(file: Path) -> pexpect.spawn[str]:
+    words = ["-m", "rig", "import", str(file)]
+    return pexpect.spawn(sys.executable, words, encoding="utf-8", timeout=30, dimensions=(40, 200))
+
+
+def test_a_mapping_is_confirmed_corrected_and_can_be_repeated(file: Path, rig: Callable[..., Any]) -> None:
+    with at_terminal(file) as terminal:
+        for question, answer in (
+            (r"\[poses\]: ", ""),
+            (r"Zeit .*\[-\]: ", "times"),
+            (r'"times" is none of our columns.*Zeit .*\[-\]: ', "t_s:min"),
+            (r"inclination +90 \.\. 90 +\[alpha_deg\]: ", ""),
+            (r"table .*\[beta_deg\]: ", "V"),
+            (r'in deg; "table" in V cannot become that.*table .*\[beta_deg\]: ', "alpha_deg"),
+            (r"alpha_deg is taken already.*table .*\[beta_deg\]: ", ""),
+            (r"Ux .*\[vx_v:mV\]: ", "uV"),
+            (r"The same again, without questions:\s+rig ([^\r\n]*)", None),
+        ):
+            terminal.expect(question)
+            if answer is not None:
+                terminal.sendline(answer)
+        repeated = shlex.split(terminal.match.group(1))
+        terminal.expect("12 rows of poses")
+        terminal.expect(pexpect.EOF)
+    assert terminal.exitstatus == 0
+    assert rig(*repeated).status == 0
+    with Record() as record:
+        first, again = (record.columns(run.run)[0] for run in record.runs())
+    assert {name: values.tolist() for name, values in first.items()} == {
+        name: values.tolist() for name, values in again.items()
+    }
+    assert first["t_s"][1] == 60.0
+    assert first["vx_v"][0] == pytest.approx(2500e-6)
+
+
+def test_who_gives_up_has_imported_nothing(file: Path) -> None:
+    with at_terminal(file) as terminal:
+        terminal.expect(r"\[poses\]: ")
+        terminal.sendintr()
+        terminal.expect("stopped")
+        terminal.expect(pexpect.EOF)
+    assert terminal.exitstatus == 4
+    with Record() as record:
+        assert record.runs() == []

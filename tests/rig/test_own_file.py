@@ -1,0 +1,101 @@
+"""A person's own file: what import keeps of how it was taken, what is said of raw samples, and every command on it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.calibrations.synthetic import components, turns
+
+Rig = Callable[..., Any]
+MAPPED = ("--column", "alpha_deg=tilt", "--column", "beta_deg=table", "--column", "vx_v=Ux:mV")
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with a table of a spreadsheet user: their names, semicolons, decimal commas, mV."""
+    monkeypatch.chdir(tmp_path)
+    write(tmp_path / "theirs.csv", "tilt;table;Ux [mV]", factor=1000)
+    write(tmp_path / "ours.csv", "alpha_deg (°);beta_deg (°);vx_v (mV)", factor=1000)
+    return tmp_path
+
+
+def write(path: Path, header: str, factor: float = 1.0, samples: int = 1) -> None:
+    """A sweep at four inclinations; every pose for so many rows."""
+    columns = turns((90, 30, 150, 60), step_deg=30.0)
+    noise = np.random.default_rng(0).standard_normal((len(columns["beta_deg"]), samples)) * 1e-4
+    x = 2.5 + components(columns)[0][:, None] + noise
+    lines = [
+        f"{alpha:g};{beta:g};{factor * v:.6f}"
+        for alpha, beta, row in zip(columns["alpha_deg"], columns["beta_deg"], x, strict=True)
+        for v in row
+    ]
+    path.write_text("\n".join([header, *lines]).replace(".", ","), encoding="utf-16")
+
+
+@pytest.mark.usefixtures("folder")
+def test_the_mapping_is_kept_with_the_run(rig: Rig) -> None:
+    run = json.loads(rig("import", "theirs.csv", *MAPPED, "--constant", "sensor=A7", "--json").out)["run"]
+    settings = json.loads(rig("show", run, "--json").out)["settings"]
+    assert settings == {
+        "file": "theirs.csv",
+        "separator": "semicolon",
+        "columns": {"alpha_deg": "tilt", "beta_deg": "table", "vx_v": "Ux [mV]:mV"},
+        "constants": {"sensor": "A7"},
+    }
+    assert "'vx_v': 'Ux [mV]:mV'" in rig("show", run).out
+
+
+@pytest.mark.usefixtures("folder")
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("fit", "ours.csv"),
+        ("compare", "ours.csv"),
+        ("diagnose", "ours.csv"),
+        ("discover", "ours.csv"),
+        ("add", "cubic-nonlinearity", "--model", "linear", "--data", "ours.csv", "--out", "model.yaml"),
+        ("export", "ours.csv", "--out", "again.csv"),
+    ],
+    ids=lambda words: words[0],
+)
+def test_every_command_takes_a_spreadsheet_with_our_names(rig: Rig, arguments: tuple[str, ...]) -> None:
+    ended = rig(*arguments)
+    assert ended.status == 0, ended.err
+
+
+@pytest.mark.parametrize("command", ["fit", "compare", "diagnose", "discover"])
+def test_foreign_names_are_answered_with_the_import_that_takes_them(rig: Rig, folder: Path, command: str) -> None:
+    ended = rig(command, "theirs.csv")
+    assert ended.status == 2
+    line = "    rig import theirs.csv --kind poses --column alpha_deg=tilt --column beta_deg=table --column vx_v=Ux:mV"
+    assert line in ended.err.splitlines()
+    assert sorted(path.name for path in folder.iterdir()) == ["ours.csv", "theirs.csv"]
+
+
+def test_raw_samples_become_poses_and_it_is_said(rig: Rig, folder: Path) -> None:
+    write(folder / "raw.csv", "alpha_deg;beta_deg;vx_v", samples=60)
+    said = "raw.csv is a log of raw samples: the means of 100 poses, out of 6240 samples, are taken."
+    ended = rig("compare", "raw.csv", "--json")
+    assert (ended.status, ended.err.strip()) == (0, said)
+    assert json.loads(ended.out)["n"] == 100  # 104 but for four that are the same pose again, without a pause
+    ended = rig("import", "raw.csv")
+    assert said in ended.err
+    assert "100 rows of poses" in ended.out
+
+
+def test_one_inclination_is_told_with_what_it_hides(rig: Rig, folder: Path) -> None:
+    text = (folder / "ours.csv").read_text("utf-16").splitlines()
+    (folder / "one.csv").write_text("\n".join([text[0], *(line for line in text if line.startswith("90;"))]))
+    for command in ("fit", "diagnose"):
+        ended = rig(command, "one.csv", "--model", "linear", "--json")
+        assert ended.status == 0
+        assert json.loads(ended.out)
+        assert "This data cannot show, beside linear: " in ended.err
+        assert "z-axis-scale. It holds one inclination only, alpha = 90 deg; measure at others." in ended.err
+    assert "one inclination" not in rig("fit", "ours.csv", "--model", "linear").err
