@@ -58,7 +58,9 @@ def convert(
 @kernel
 def displacement_v(world: State, config: WorldConfig, t_ns: int, normal: float) -> float:
     """Output of the displacement sensor behind the carriage."""
-    x_um = positioner.motion(config.positioner, world.carriage[0], 1e-9 * t_ns)[0]
+    x_um = world.carriage[0, -1, 1]  # where it ends up
+    if t_ns < world.carriage_rest_ns[0]:
+        x_um = positioner.motion(config.positioner, world.carriage[0], 1e-9 * t_ns)[0]
     return fibre_probe.seen_v(config.d63, config.d63.standoff_um + x_um) + config.d63.noise_v * normal
 
 
