@@ -20,7 +20,8 @@ from drivers.simulation.kernel import Floats, kernel
 if TYPE_CHECKING:
     from drivers.simulation.state import State
 
-DECADES = 5  # correlation times 1 s to 10 000 s
+FLICKER_S = (1.0, 10.0, 100.0, 1e3, 1e4)  # correlation times of flicker noise
+DECADES = len(FLICKER_S)
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,7 @@ def tick(world: State, noise: Noise, step_s: float, random: Generator) -> None:
     """Advance flicker noise and random walk of both axes by one tick."""
     for axis in range(2):
         for k in range(DECADES):
-            old, time_s = world.flicker_v[axis, k], 10.0**k
+            old, time_s = world.flicker_v[axis, k], FLICKER_S[k]
             world.flicker_v[axis, k] = wandered(old, noise.flicker_v, time_s, step_s, random.standard_normal())
     for axis in range(2):
         world.walk_v[axis] += noise.walk_v_per_sqrt_h * math.sqrt(step_s / 3600) * random.standard_normal()

@@ -60,7 +60,7 @@ def _figures(folder: Path) -> Iterator[tuple[str, Figure]]:
 
 def _generation(folder: Path) -> Figure:
     said = json.loads(subject(folder, "generation").out)
-    met = all(each["times_faster"] >= LEAST_TIMES_FASTER for each in said.values())
+    met = said["outputs"]["times_faster"] >= LEAST_TIMES_FASTER
     return {**said, "target_times_faster": LEAST_TIMES_FASTER, "met": met}
 
 

@@ -25,8 +25,8 @@ from drivers.simulation.config import WorldConfig
 from drivers.simulation.world import World
 
 SCANS, INTERVAL_S = 10_000, 1e-3  # what the simulated clock lets a stream gather at most: 10 s
-OUTPUTS = ("vx", "vy")  # every channel a sensor's output
-SOAK = ("vx", "vy", "supply", "thermistor")  # two of four channels have the converter's noise only
+OUTPUTS = ("vx", "vy")  # every channel with all of that
+SOAK = ("vx", "vy", "supply", "thermistor")  # two of four channels with the converter's noise only
 SLOW_S = (1.0, 10.0, 100.0, 1e3, 1e4, 1e7)
 CONFIG = WorldConfig.adxl203().changed({"noise": {"walk_v_per_sqrt_h": 1e-5}})
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from drivers.simulation.config import WorldConfig
+from drivers.simulation.noise import FLICKER_S
 from drivers.simulation.trajectory import Trajectory
 from drivers.simulation.world import World
 
@@ -24,6 +25,37 @@ def test_white_noise_behind_the_filter_has_its_rms_and_correlation() -> None:
         correlation = np.corrcoef(x[:-lag], x[lag:])[0, 1]
         assert correlation == pytest.approx(math.exp(-lag * 1e-3 / TAU_S), abs=0.03)
     assert abs(np.corrcoef(x, y)[0, 1]) < 0.05
+
+
+def test_white_noise_is_normal_out_to_its_tails() -> None:
+    """Samples 0.2 s apart are independent; the bounds are 4 standard errors."""
+    z = samples(400_000, interval_s=0.2, flicker_v=0.0)[:, 0]
+    z = (z - z.mean()) / 0.775e-3
+    n = len(z)
+    assert (z**2).mean() == pytest.approx(1.0, abs=4 * math.sqrt(2 / n))
+    assert (z**3).mean() == pytest.approx(0.0, abs=4 * math.sqrt(15 / n))
+    assert (z**4).mean() == pytest.approx(3.0, abs=4 * math.sqrt(96 / n))
+    for limit in (1.0, 2.0, 3.0, 4.0):
+        beyond = math.erfc(limit / math.sqrt(2))
+        assert np.mean(np.abs(z) > limit) == pytest.approx(beyond, abs=4 * math.sqrt(beyond / n))
+
+
+def test_the_converters_noise_is_new_in_every_sample_and_channel() -> None:
+    config = WorldConfig.ideal().changed({"converter": {"noise_v": 1e-3}})
+    volts = World(config, seed=3).adc_volts(["ground", "ground"], 0.0, 1e-3, 100_000) / 1e-3
+    x = volts.ravel()  # in the order in which they were drawn
+    assert x.std() == pytest.approx(1.0, abs=0.01)
+    for lag in (1, 2, 3, 7):
+        assert abs(np.mean(x[:-lag] * x[lag:])) < 4 / math.sqrt(len(x))
+
+
+def test_flicker_noise_wanders_as_the_sum_of_its_decades() -> None:
+    """Mean square of what it wanders over a lag: 2 rms^2 (1 - exp(-lag / T)) of each correlation time T."""
+    x = samples(200_000, interval_s=0.5, white_v=0.0, flicker_v=1e-4)
+    for lag_s in (0.5, 1.0, 5.0, 20.0):
+        wandered = x[round(lag_s / 0.5) :] - x[: -round(lag_s / 0.5)]
+        expected = sum(2e-8 * (1 - math.exp(-lag_s / time_s)) for time_s in FLICKER_S)
+        assert np.mean(wandered**2, axis=0) == pytest.approx(np.full(2, expected), rel=0.06)
 
 
 def test_the_noise_does_not_depend_on_the_rate() -> None:
