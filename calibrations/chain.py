@@ -2,8 +2,9 @@
 
     pose -> force -> transduction -> output
 
-Forward for `poses`, where the orientation is known; backward for `positions`, where only the magnitude of gravity
-is. The backward way solves the same functions, so that an effect is written once.
+Forward for `poses`, where the orientation is known, and for samples of `motion`, where the reference acceleration adds
+to gravity and the output filter and the converter's skew stand behind the transduction; backward for `positions`, where
+only the magnitude of gravity is known. The backward way solves the same functions, so that an effect is written once.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibrations.effect import Effect, Values
+from calibrations.motion.output import sampled
 from calibrations.table import Array, Table
 
 Step = tuple[Effect, Values]
@@ -31,10 +33,10 @@ class Pose:
 
 
 def nominal_pose(table: Table) -> Pose:
-    """The pose that the stages report."""
+    """The pose that the stages report; level where a table of motion does not say."""
     return Pose(
-        np.radians(table.column("alpha_deg")),
-        np.radians(table.column("beta_deg")),
+        np.radians(table.optional("alpha_deg", 0.0)),
+        np.radians(table.optional("beta_deg", 0.0)),
         np.radians(table.optional("mount_deg", 0.0)),
         table.optional("flip", 0.0),
         np.array([0.0, 0.0, 1.0]),
@@ -58,7 +60,10 @@ def force(table: Table, steps: Sequence[Step]) -> Array:
     for effect, p in steps:
         if effect.pose is not None:
             pose = effect.pose(pose, table, p)
-    return sensed(specific_force(pose), table, steps)
+    a = specific_force(pose)
+    if table.kind == "motion":  # along the sensor's reference edge x, Ang V
+        a[:, 0] += table.column("acceleration_m_s2") / table.gravity_m_s2
+    return sensed(a, table, steps)
 
 
 def sensed(a: Array, table: Table, steps: Sequence[Step]) -> Array:
@@ -75,6 +80,8 @@ def respond(a: Array, table: Table, steps: Sequence[Step]) -> Array:
     for effect, p in steps:
         if effect.transduction is not None:
             v += effect.transduction(a, table, p)
+    if table.kind == "motion":
+        v = sampled(v, table)
     for effect, p in steps:
         if effect.output is not None:
             v = effect.output(v, table, p)

@@ -46,6 +46,7 @@ class Place:
     mean: float
     unit: str
     scale: float  # output per g of that channel; 1 for a residual in g
+    part: str = ""  # of a motion, such as " in phase at 10 Hz"
 
     @property
     def text(self) -> str:
@@ -60,7 +61,7 @@ class Place:
         mg = 1e3 * self.mean / self.scale
         own = f"{1e3 * self.mean:+.3g} mV" if self.unit == "V" else f"{self.mean:+.3g} {self.unit}"
         value = f"{mg:+.3g} mg" if self.unit == "g" else f"{own} ({mg:+.3g} mg)"
-        return f"{place}: {self.axis} is off by {value} on average, rms {self.excess:.3g} x the noise floor"
+        return f"{place}: {self.axis}{self.part} is off by {value} on average, rms {self.excess:.3g} x the noise floor"
 
 
 @dataclass(frozen=True)
@@ -84,33 +85,41 @@ def compare(table: Table, model: Model) -> Comparison:
 
 def scales(found: Fit) -> Array:
     """Output per g of each channel; 1 for a residual in g."""
-    if found.table.kind != "poses":
+    if found.table.kind == "positions":
         return np.ones(1)
     terms = [term for term in found.model.terms if term.name == "scale-factor"]
     values = {e.axis: abs(e.value) for term in terms for e in term.estimates}
-    return np.array([values.get(axis, values.get("", found.problem.layout.nominal)) for axis in found.channels])
+    axes = [axis_of(channel) for channel in found.channels]
+    return np.array([values.get(axis, values.get("", found.problem.layout.nominal)) for axis in axes])
+
+
+def axis_of(channel: str) -> str:
+    """The axis that a channel belongs to: "x" of "x in phase at 10 Hz"; itself where it has no parts."""
+    return channel.partition(" ")[0]
 
 
 def _fails(found: Fit) -> list[Place]:
     """Places where the residual is more than noise, worst first; at most one for each column and channel."""
     places, chances, each = [], [], []
     scale = scales(found)
-    unit = found.table.unit if found.table.kind == "poses" else "g"
+    unit = found.problem.unit
     floor = found.noise.floor
     own = np.hypot(found.noise.floor, found.noise.slow) if found.noise.known else found.noise.floor
     for where, low, high, rows in _parts(found.table):
-        for c, axis in enumerate(found.channels):
+        for c, channel in enumerate(found.channels):
+            axis = axis_of(channel)
             r = found.residual[c, rows]
             excess = float(rms(r) / floor[c])
-            places.append(Place(where, low, high, axis, excess, float(r.mean()), unit, float(scale[c])))
+            part = channel[len(axis) :]
+            places.append(Place(where, low, high, axis, excess, float(r.mean()), unit, float(scale[c]), part))
             chances.append(float(chdtrc(len(r), np.sum((r / own[c]) ** 2))))
-            each.append((where, axis))
+            each.append((where, channel))
     if not places:
         return []
     limit = SIGNIFICANT / len(places)
     bad = [k for k, p in enumerate(places) if chances[k] < limit and p.excess > MATERIAL]
-    overall = {axis: (found.excess[c], floor[c]) for c, axis in enumerate(found.channels)}
-    bad = [k for k in bad if _stands_out(places[k], *overall[places[k].axis])] or bad[:1]
+    overall = {channel: (found.excess[c], floor[c]) for c, channel in enumerate(found.channels)}
+    bad = [k for k in bad if _stands_out(places[k], *overall[each[k][1]])] or bad[:1]
     bad.sort(key=lambda k: places[k].excess, reverse=True)
     first = {each[k]: k for k in reversed(bad)}
     return [places[k] for k in bad if first[each[k]] == k]

@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 
 from calibrations.candidates import Candidate
-from calibrations.compare import Comparison
+from calibrations.compare import Comparison, axis_of
 from calibrations.diagnose import Diagnosis
 from calibrations.discover import Added, Discovery
 from calibrations.experiment import Experiment
 from calibrations.fit import Fit
+from calibrations.noise import rms
 from calibrations.table import Array
 
 Document = dict[str, Any]
@@ -110,7 +111,11 @@ def _noise(found: Fit) -> Document:
 
 
 def _by_channel(found: Fit, values: Array) -> dict[str, float]:
-    return {channel: float(v) for channel, v in zip(found.channels, np.asarray(values), strict=True)}
+    """The parts of a motion are brought together by axis: their root mean square."""
+    by_axis: dict[str, list[float]] = {}
+    for channel, value in zip(found.channels, np.asarray(values), strict=True):
+        by_axis.setdefault(axis_of(channel), []).append(float(value))
+    return {axis: each[0] if len(each) == 1 else float(rms(np.array(each))) for axis, each in by_axis.items()}
 
 
 def _candidate(c: Candidate, result: Diagnosis) -> Document:

@@ -45,6 +45,7 @@ from calibrations.guarded import fault, guarded
 from calibrations.table import Array, Table
 
 HOOKS = ("pose", "force", "transduction", "output")
+KINDS = ("poses", "positions", "motion")  # of tables, where an effect does not say
 Values = Mapping[str, Array]  # parameter name -> shape (3,) if per axis, else a scalar
 
 
@@ -96,7 +97,7 @@ class Effect:
     confused_with: str
     source: str
     needs: tuple[str, ...] = ()
-    kinds: tuple[str, ...] = ("poses", "positions")
+    kinds: tuple[str, ...] = KINDS
     constants: Mapping[str, Callable[[Table], float]] = field(default_factory=dict)
     starts: Mapping[str, Callable[[Table], Array]] = field(default_factory=dict)
     pose: Callable[..., Any] | None = None
@@ -180,7 +181,7 @@ def _from_module(module: ModuleType, path: Path) -> Effect:
         name=path.stem.replace("_", "-"),
         parameters=tuple(parameters),
         needs=_words(module, "NEEDS", (), path),
-        kinds=_words(module, "KINDS", ("poses", "positions"), path),
+        kinds=_words(module, "KINDS", KINDS, path),
         constants=dict(getattr(module, "CONSTANTS", {})),
         starts=dict(getattr(module, "STARTS", {})),
         pose=hooks.get("pose"),

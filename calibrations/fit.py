@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from scipy.optimize import least_squares
 
-from calibrations.identify import estimates
+from calibrations.identify import RELATIVE_RANK, estimates
 from calibrations.model import Model
 from calibrations.noise import Noise, rms, white_only
 from calibrations.noise_fit import estimate
@@ -21,6 +21,8 @@ from calibrations.problem import Problem
 from calibrations.table import Array, Table
 
 ROUNDS = 2
+NEWTON_STEPS = 20
+SMALL_GAIN = 1e-6  # of a sum of squares whose unit is the noise
 
 
 @dataclass(frozen=True)
@@ -112,6 +114,8 @@ def _minimise(problem: Problem, noise: Noise, start: Array) -> tuple[Array, floa
     """(parameters, cost) of least squares under `noise`."""
     if not len(start):
         return start, 0.0
+    if problem.table.kind == "motion":
+        return _determined(problem, noise, start)
 
     def residual(theta: Array) -> Array:
         return noise.whiten(problem.residual(theta)[:, :, None])[:, 0]
@@ -133,6 +137,32 @@ def _minimise(problem: Problem, noise: Noise, start: Array) -> tuple[Array, floa
     return answer.x, float(answer.cost)
 
 
+def _determined(problem: Problem, noise: Noise, start: Array) -> tuple[Array, float]:
+    """As `_minimise`, by Gauss and Newton's shortest steps: what the data do not determine stays as it began.
+
+    At one attitude an axis that does not move cannot tell its scale factor from its bias.
+    """
+    typical, (low, high) = problem.layout.typical, problem.layout.bounds
+
+    def white(theta: Array) -> Array:
+        return noise.whiten(problem.residual(theta)[:, :, None])[:, 0]
+
+    theta, left = start, white(start)
+    for _ in range(NEWTON_STEPS):
+        J = noise.whiten(problem.jacobian(theta)) * typical
+        size = np.linalg.norm(J, axis=0).max() or 1.0
+        step = typical * np.linalg.lstsq(J / size, -left / size, rcond=RELATIVE_RANK)[0]
+        tried = [(t, white(t)) for t in (np.clip(theta + share * step, low, high) for share in (1.0, 0.25))]
+        after, least = min(tried, key=lambda t: float(t[1] @ t[1]))
+        gain = float(left @ left - least @ least)
+        if not gain > 0:
+            break
+        theta, left = after, least
+        if gain < SMALL_GAIN:
+            break
+    return theta, float(left @ left) / 2
+
+
 def _result(problem: Problem, theta: Array, noise: Noise) -> Fit:
     residual, jacobian = problem.residual(theta), problem.jacobian(theta)
     model = replace(problem.layout.model, unit=problem.table.unit)
@@ -147,5 +177,5 @@ def _informative(found: Fit) -> Array:
     noise as well, and parameters would look more certain than they are.
     """
     noise = estimate(found.noise, found.residual, found.jacobian, np.zeros((found.table.n, 0)))
-    plain = replace(found, noise=noise)
+    plain = replace(found, noise=noise.prolonged())
     return np.asarray(plain.whitened[:, 1:] / plain.birge)

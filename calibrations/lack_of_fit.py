@@ -21,8 +21,11 @@ ROWS_PER_COLUMN = 5  # at least so many rows for each column
 def smooth_columns(table: Table) -> Array:
     """Spherical harmonics of the direction of gravity, as polynomials, and the same times direction, shape (n, k).
 
-    No columns for tables of unknown orientation, nor for fewer rows than the lowest degree needs.
+    For motion, what a sensor could do alike in every stretch at one attitude. No columns for tables of unknown
+    orientation, nor for fewer rows than the lowest degree needs.
     """
+    if table.kind == "motion":
+        return _attitudes(table)
     if table.kind != "poses":
         return np.zeros((table.n, 0))
     a = specific_force(nominal_pose(table))
@@ -37,6 +40,14 @@ def smooth_columns(table: Table) -> Array:
         if basis.shape[1] <= most:
             return basis
     return np.zeros((table.n, 0))
+
+
+def _attitudes(table: Table) -> Array:
+    """One column for each attitude, 1 where the sensor was in it."""
+    angles = np.column_stack([table.optional(name, 0.0) for name in ("alpha_deg", "beta_deg", "mount_deg", "flip")])
+    _, group = np.unique(angles, axis=0, return_inverse=True)
+    columns: Array = (group.ravel()[:, None] == np.arange(group.max() + 1)) * 1.0
+    return columns if columns.shape[1] <= table.n // ROWS_PER_COLUMN else columns[:, :0]
 
 
 def _harmonics(a: Array, degree: int) -> Iterator[Array]:

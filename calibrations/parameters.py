@@ -41,7 +41,8 @@ class Layout:
         """The layout for `table`."""
         slots = tuple(slot for i, term in enumerate(model.terms) for slot in _slots(i, term, table))
         spread = float(np.median(np.ptp(table.outputs, axis=0))) / 2
-        return Layout(model, table.axes, slots, table.unit, spread or 1.0, _from_data(model, table))
+        nominal = table.number("output_per_g", spread or 1.0)
+        return Layout(model, table.axes, slots, table.unit, nominal, _from_data(model, table))
 
     @cached_property
     def typical(self) -> Array:

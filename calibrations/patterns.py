@@ -33,6 +33,8 @@ def patterns(table: Table, channels: tuple[str, ...]) -> list[Pattern]:
     found = [*_in_time(table), *_in_columns(table)]
     if table.kind == "poses":
         found += [*_in_angles(table), *_in_stage(table, len(channels))]
+    if table.kind == "motion":
+        found += _in_parts(table, channels)
     return [_per_channel(p, len(channels)) for p in found if np.ptp(p.columns) > 0]
 
 
@@ -61,12 +63,19 @@ def _in_time(table: Table) -> Iterator[Pattern]:
 def _in_columns(table: Table) -> Iterator[Pattern]:
     words = {"direction": "direction of turning", "temperature_c": "temperature", "supply_v": "supply voltage"}
     skip = {"alpha_deg", "beta_deg", "t_s", "n", "flip", "mount_deg", *("ax", "ay", "az", "vx_v", "vy_v", "vz_v")}
+    skip.add("displacement_m")
     for name, values in table.columns.items():
         if name in skip or name.endswith(("_std", "_std_v")) or not np.ptp(values):
             continue
         u = (values - values.mean()) / np.ptp(values)
         powers = [u, u**2] if len(np.unique(values)) > 3 else [u]
         yield Pattern(f"follows {words.get(name, name)}", np.column_stack(powers))
+
+
+def _in_parts(table: Table, channels: tuple[str, ...]) -> Iterator[Pattern]:
+    """A part of the motion that is off alike in every stretch."""
+    for channel, one in zip(channels, np.eye(len(channels)), strict=True):
+        yield Pattern(f"{channel} is off throughout", np.tile(one[:, None, None], (1, table.n, 1)))
 
 
 def _in_angles(table: Table) -> Iterator[Pattern]:

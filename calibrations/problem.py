@@ -2,6 +2,7 @@
 
 For `poses` the residual is measured minus predicted output, one block of rows per axis, in the output's unit.
 For `positions` it is |a| - 1, where a is the specific force that the model makes of the output, in g.
+For `motion` it is what each stretch of the record holds of measured minus predicted output, part by part.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from calibrations.errors import DataError, ModelError, TooFewRows
 from calibrations.lack_of_fit import smooth_columns
 from calibrations.mean_noise import norm_std, white_std
 from calibrations.model import Model
+from calibrations.motion.stretches import Stretches, stretches
 from calibrations.parameters import Layout
 from calibrations.table import Array, Table
 
@@ -32,14 +34,16 @@ class Problem:
     @staticmethod
     def of(model: Model, table: Table) -> Problem:
         """The problem. Raises ModelError and TooFewRows where there is none to solve."""
-        table = table.rows(table.order)
+        table = stretches(table) if table.kind == "motion" else table.rows(table.order)
         model = model.for_table(table)
-        if table.kind not in ("poses", "positions"):
-            raise ModelError(f"{table.source}: models are fitted to poses or positions, not to a table of {table.kind}")
+        if table.kind not in ("poses", "positions", "motion"):
+            raise ModelError(
+                f"{table.source}: models are fitted to poses, positions or motion, not to a table of {table.kind}"
+            )
         if table.kind == "positions":
             _check_positions(table)
         layout = Layout.of(model, table)
-        rows = table.n * len(table.axes) if table.kind == "poses" else table.n
+        rows = table.n * len(_channels(table))
         if rows <= len(layout.slots):
             raise TooFewRows(
                 f"{table.source}: {table.n} rows cannot determine the {len(layout.slots)} parameters of {model.name}; "
@@ -49,12 +53,20 @@ class Problem:
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Names of the residual's blocks: the measured axes, or "norm" for positions."""
-        return self.table.axes if self.table.kind == "poses" else ("norm",)
+        """Names of the residual's blocks: the measured axes, "norm" for positions, the parts of a motion."""
+        return _channels(self.table)
+
+    @property
+    def unit(self) -> str:
+        """Unit of the residual."""
+        return "g" if self.table.kind == "positions" else self.table.unit
 
     def residual(self, theta: Array) -> Array:
         """Shape (channels, n)."""
         steps = self.layout.steps(theta)
+        if isinstance(self.table, Stretches):
+            samples = self.table.samples
+            return self.table.parts(samples.outputs - forward(samples, steps))
         if self.table.kind == "poses":
             error = self.table.outputs - forward(self.table, steps)
         else:
@@ -98,6 +110,8 @@ class Problem:
     @cached_property
     def white(self) -> Array | None:
         """Each mean's standard deviation by white noise, in the residual's unit, (channels, n); None if not known."""
+        if isinstance(self.table, Stretches):
+            return self.table.white
         std = white_std(self.table)
         if self.table.kind == "poses" or std is None:
             return None if std is None else std.T
@@ -112,6 +126,12 @@ class Problem:
     def smooth(self) -> Array:
         """Columns set aside when noise is estimated, shape (n, k)."""
         return smooth_columns(self.table)
+
+
+def _channels(table: Table) -> tuple[str, ...]:
+    if isinstance(table, Stretches):
+        return table.channels
+    return table.axes if table.kind == "poses" else ("norm",)
 
 
 def _check_positions(table: Table) -> None:

@@ -14,7 +14,7 @@ from calibrations.axes import rotation
 from calibrations.effect import Parameter, Values
 from calibrations.table import Array, Table
 
-KINDS = ("poses",)
+KINDS = ("poses", "motion")
 PARAMETERS = (
     Parameter("x", "deg", typical=2.0, per_axis=False, doc="turn about the sensor's x axis"),
     Parameter("y", "deg", typical=2.0, per_axis=False, doc="turn about the sensor's y axis"),

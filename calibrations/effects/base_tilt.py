@@ -17,7 +17,7 @@ from calibrations.chain import Pose
 from calibrations.effect import Parameter, Values
 from calibrations.table import Table
 
-KINDS = ("poses",)
+KINDS = ("poses", "motion")
 PARAMETERS = (
     Parameter("x", "deg", typical=1.0, per_axis=False, doc="tilt of the base about its x axis"),
     Parameter("y", "deg", typical=1.0, per_axis=False, doc="tilt of the base about its y axis, that of alpha"),

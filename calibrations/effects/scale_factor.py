@@ -14,7 +14,15 @@ from calibrations.effect import Parameter, Values
 from calibrations.table import Array, Table
 
 PARAMETERS = (Parameter("scale", "{out}/g", typical=1.0, starts=(1.0,), doc="change of output per g"),)
-STARTS = {"scale": lambda table: np.ptp(table.outputs, axis=0) / 2}
+
+
+def _slope(table: Table) -> Array:
+    """Half the range of each output; in a table of motion what the motion shows."""
+    spread: Array = np.ptp(table.outputs, axis=0) / 2
+    return np.full(len(spread), table.number("output_per_g", 0.0)) if table.kind == "motion" else spread
+
+
+STARTS = {"scale": _slope}
 
 
 def transduction(a: Array, table: Table, p: Values) -> Array:

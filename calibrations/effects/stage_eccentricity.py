@@ -16,7 +16,7 @@ from calibrations.chain import Pose
 from calibrations.effect import Parameter, Values
 from calibrations.table import Table
 
-KINDS = ("poses",)
+KINDS = ("poses", "motion")
 PARAMETERS = (
     Parameter("sine", "deg", typical=0.2, per_axis=False, doc="error of beta at beta = 90 deg"),
     Parameter("cosine", "deg", typical=0.2, per_axis=False, doc="error of beta at beta = 0 deg"),

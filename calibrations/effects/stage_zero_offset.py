@@ -17,7 +17,7 @@ from calibrations.chain import Pose
 from calibrations.effect import Parameter, Values
 from calibrations.table import Table
 
-KINDS = ("poses",)
+KINDS = ("poses", "motion")
 PARAMETERS = (
     Parameter("alpha", "deg", typical=1.0, per_axis=False, doc="added to the angle alpha"),
     Parameter("beta", "deg", typical=1.0, per_axis=False, doc="added to the angle beta"),

@@ -15,6 +15,10 @@ POSES = (
     "Dots are measured, lines are the model {}.",
     "The residual of the model {} over both stage angles; pale is near the noise.",
 )
+MOTION = (
+    "Output over a few periods, less its mean: dots are measured, lines are the model {}.",
+    "What the model {} leaves over one period of the motion's strongest line: means of all periods, with their noise.",
+)
 POSITIONS = (
     "What the model {} makes of each position: the magnitude of gravity, 1 g if it were right.",
     "The residual of the model {} over the direction that gravity came from; pale is near the noise.",
@@ -35,7 +39,7 @@ def album(found: Discovery, beside: Comparison) -> list[Picture]:
     """The falling error, the model given beside its data and where it fails, then each effect's curve."""
     fit = beside.fit
     model, kind = fit.model.name, fit.table.kind
-    shown, mapped = POSES if kind == "poses" else POSITIONS
+    shown, mapped = {"poses": POSES, "motion": MOTION}.get(kind, POSITIONS)
     fall = (
         "Error of the model before and after each effect, as a multiple of the noise floor: "
         f"bars on the {kind} that the fit used, diamonds on {kind} that it did not see."

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from calibrations.discover import Added
 from calibrations.pictures.columns import Column, label_column, telling_columns
 from calibrations.pictures.style import INK, floor_band, panels, styled
-from calibrations.pictures.view import dots, groups, key, label_residual, shown_unit
+from calibrations.pictures.view import dots, groups, key, label_residual, row_height, shown_unit
 from calibrations.table import Array
 
 MOST_PARTS = 24  # of a column, for each direction
@@ -33,7 +33,7 @@ def picture(step: Added) -> Figure:
     """
     before, after = step.before, step.after
     found, column = groups(before), most_telling(step)
-    figure, axes = panels(len(before.channels), 2, 3.0, sharex="row", sharey="row")
+    figure, axes = panels(len(before.channels), 2, row_height(before), sharex="row", sharey="row")
     for c, (left, right) in enumerate(axes):
         for ax, fit in ((left, before), (right, after)):
             floor_band(ax, 1e3 * float(before.noise.floor[c]))
@@ -61,6 +61,8 @@ def most_telling(step: Added) -> Column:
     effect = next(term.effect for term in step.after.model.terms if term.name == step.name)
     found = telling_columns(step.before, effect)
     told = np.array([explained(change, column.values, sides) for column in found])
+    if step.before.table.kind == "motion":
+        return found[0]
     if told.max() < TELLING:
         label = f"change made by {step.name} ({shown_unit(step.before)})"
         return Column("change", (label,) * len(change), 1e3 * change_of(step))

@@ -39,6 +39,8 @@ def columns(fit: Fit) -> list[Column]:
     table, n = fit.table, len(fit.channels)
     if table.kind == "poses":
         found = [_same("beta", "β (deg)", table.column("beta_deg"), n)]
+    elif table.kind == "motion":
+        found = []
     else:
         forces = specific_force(fit).T
         found = [_same(f"a{k}", f"specific force along {k} (g)", a, n) for k, a in zip("xyz", forces, strict=True)]
@@ -52,6 +54,8 @@ def telling_columns(fit: Fit, effect: Effect) -> list[Column]:
     """
     table, n = fit.table, len(fit.channels)
     needed = [_needed(table, name, n) for name in effect.needs if name not in SHOWN_OTHERWISE]
+    if table.kind == "motion":  # what it explains returns in every stretch
+        return columns(fit)[:1] + needed
     if table.kind != "poses":
         return columns(fit)[:3] + needed
     a = specific_force(fit)

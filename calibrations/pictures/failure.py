@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from calibrations.fit import Fit
+from calibrations.pictures import motion
 from calibrations.pictures.columns import specific_force
 from calibrations.pictures.style import INK, QUIET, SIGNED, panels, quarters, styled
 from calibrations.table import Array
@@ -24,7 +25,9 @@ MOST_COLUMNS = 90  # of distinct beta; more are brought together
 
 @styled
 def picture(fit: Fit) -> Figure:
-    """A row of maps for each axis."""
+    """A row of maps for each axis; for a motion the residual over one period."""
+    if fit.table.kind == "motion":
+        return motion.failure(fit)
     return _poses(fit) if fit.table.kind == "poses" else _positions(fit)
 
 

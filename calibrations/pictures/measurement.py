@@ -1,4 +1,5 @@
-"""Measurement beside model: the output over beta, a curve for each inclination; |a| over time for positions.
+"""Measurement beside model: the output over beta, a curve for each inclination; |a| over time for positions; the
+output over a few periods for a motion.
 
 Dots are measured, lines are the model. Clockwise and anticlockwise lines differ where the model knows hysteresis.
 """
@@ -10,6 +11,7 @@ from matplotlib.figure import Figure
 
 from calibrations.compare import scales
 from calibrations.fit import Fit
+from calibrations.pictures import motion
 from calibrations.pictures.columns import columns
 from calibrations.pictures.style import INK, QUIET, beside, panels, quarters, styled
 from calibrations.pictures.view import dots, groups, key
@@ -18,6 +20,8 @@ from calibrations.pictures.view import dots, groups, key
 @styled
 def picture(fit: Fit) -> Figure:
     """A panel for each axis, output in the table's unit on the left and in g on the right."""
+    if fit.table.kind == "motion":
+        return motion.measurement(fit)
     return _poses(fit) if fit.table.kind == "poses" else _positions(fit)
 
 

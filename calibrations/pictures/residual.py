@@ -7,14 +7,14 @@ from matplotlib.figure import Figure
 from calibrations.fit import Fit
 from calibrations.pictures.columns import columns, label_column
 from calibrations.pictures.style import floor_band, panels, styled
-from calibrations.pictures.view import dots, groups, key, label_residual
+from calibrations.pictures.view import dots, groups, key, label_residual, row_height
 
 
 @styled
 def picture(fit: Fit) -> Figure:
     """A row of panels for each axis, a column for each thing that the residual may follow."""
     across, found = columns(fit), groups(fit)
-    figure, axes = panels(len(fit.channels), len(across), 3.0, sharex="col", sharey="row")
+    figure, axes = panels(len(fit.channels), len(across), row_height(fit), sharex="col", sharey="row")
     for c in range(len(fit.channels)):
         for k, (ax, column) in enumerate(zip(axes[c], across, strict=True)):
             floor_band(ax, 1e3 * float(fit.noise.floor[c]))

@@ -40,6 +40,8 @@ def groups(fit: Fit) -> list[Group]:
     """The rows of a fit in groups."""
     if fit.table.kind == "poses":
         return list(_by_inclination(fit.table))
+    if fit.table.kind == "motion":
+        return list(_by_attitude(fit.table))
     return list(_by_axis(specific_force(fit)))
 
 
@@ -53,6 +55,14 @@ def _by_inclination(table: Table) -> Iterator[Group]:
             rows = np.flatnonzero((alpha == value) & (side == s))
             if len(rows):
                 yield Group(f"α = {value:g}°", colour, s, rows)
+
+
+def _by_attitude(table: Table) -> Iterator[Group]:
+    angles = np.column_stack([table.optional(name, 0.0) for name in ("alpha_deg", "beta_deg")])
+    values, number = np.unique(angles, axis=0, return_inverse=True)
+    for k, (alpha, beta) in enumerate(values):
+        colour = to_hex(INCLINATION(k / (len(values) - 1) if len(values) > 1 else 0.4))
+        yield Group(f"α = {alpha:g}°, β = {beta:g}°", colour, 1, np.flatnonzero(number.ravel() == k))
 
 
 def _by_axis(a: Array) -> Iterator[Group]:
@@ -79,6 +89,9 @@ def key(figure: Figure, found: list[Group]) -> None:
     shown = list(colours)[:: 1 + (len(colours) - 1) // MOST_KEYS]
     marks = [Line2D([], [], color=colours[label], marker="o", ls="", label=label) for label in shown]
     turning = found[0].label.startswith("α")
+    if found[0].label.startswith("α") and "β" in found[0].label:  # a motion has no direction of turning
+        figure.legend(handles=marks, loc="outside upper left", ncols=KEYS_IN_A_ROW // 2)
+        return
     words = {1: "clockwise" if turning else "upwards", -1: "anticlockwise" if turning else "downwards"}
     for side, word in words.items():
         if any(g.side == side for g in found):
@@ -89,20 +102,27 @@ def key(figure: Figure, found: list[Group]) -> None:
 
 def shown_unit(fit: Fit) -> str:
     """The unit that a residual is drawn in."""
-    return "mg" if fit.table.kind != "poses" else f"m{fit.table.unit}"
+    return f"m{fit.problem.unit}"
 
 
 def label_of(fit: Fit, c: int) -> str:
     """The name of a channel's residual."""
-    return f"residual of {fit.channels[c]}" if fit.table.kind == "poses" else "residual of |a|"
+    if fit.table.kind == "motion":
+        return f"residual of {fit.channels[c]}".replace(" in ", "\nin ").replace(" with", "\nwith")
+    return "residual of |a|" if fit.table.kind == "positions" else f"residual of {fit.channels[c]}"
 
 
 def label_residual(ax: Axes, fit: Fit, c: int, last: bool) -> None:
     """The residual's unit on the left axis; on the last panel of a row mg on the right."""
     if ax.get_subplotspec() is None or ax.get_subplotspec().is_first_col():  # type: ignore[union-attr]
         ax.set_ylabel(f"{label_of(fit, c)} ({shown_unit(fit)})")
-    if last and fit.table.kind == "poses":
+    if last and fit.table.kind != "positions":
         beside(ax, float(scales(fit)[c]), 0.0, "mg")
+
+
+def row_height(fit: Fit) -> float:
+    """Inches for a channel's row of panels: a motion has many channels."""
+    return 3.0 if fit.table.kind != "motion" else 2.0
 
 
 def mg(values: Array, fit: Fit) -> Array:

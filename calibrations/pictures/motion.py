@@ -1,0 +1,100 @@
+"""Pictures of a motion: models beside the reference (Ang Fig. 12), output beside model, the residual over a period."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from calibrations.chain import forward
+from calibrations.fit import Fit
+from calibrations.motion.evaluate import MotionResult, Quantity
+from calibrations.motion.stretches import Stretches, stretches
+from calibrations.noise import rms
+from calibrations.pictures.style import BLUE, INK, VERMILION, floor_band, panels, quarters, styled
+from calibrations.table import Array
+
+SHOWN_S = 0.5  # of the record: five periods of the paper's motion
+BINS = 40  # of a period
+
+
+@styled
+def evaluation(result: MotionResult) -> Figure:
+    """Fig. 12 of the paper: each model's acceleration beside the reference above, and its error below."""
+    figure, axes = panels(2, 2, 2.8, sharex=True, sharey="row")
+    first = result.t_s[0]
+    shown = (result.t_s - first) < SHOWN_S
+    t = result.t_s[shown] - first
+    for k, (name, values, error) in enumerate(_models(result)):
+        above, below = axes[:, k]
+        above.plot(t, values[shown], color=(VERMILION, BLUE)[k], lw=1.4, label=f"sensor, {name} model")
+        above.plot(t, result.reference[shown], color=INK, ls=":", lw=1.4, label="displacement sensor")
+        above.set_title(f"{'ab'[k]}  {name} model: rmse {error.value:.4g} ± {error.std:.2g} mm/s²")
+        above.margins(y=0.2)
+        above.legend(loc="upper right", ncols=2)
+        floor_band(below, result.noise_limit.value)
+        below.plot(t, (values - result.reference)[shown], color=(VERMILION, BLUE)[k])
+        below.set_xlabel("time (s)")
+    axes[0, 0].set_ylabel("acceleration (mm/s²)")
+    axes[1, 0].set_ylabel("sensor less reference (mm/s²)")
+    return figure
+
+
+def _models(result: MotionResult) -> tuple[tuple[str, Array, Quantity], ...]:
+    return (
+        ("linear", result.linear, result.rmse_linear),
+        ("physical", result.physical, result.rmse_physical),
+    )
+
+
+@styled
+def measurement(fit: Fit) -> Figure:
+    """A panel for each axis: output less its mean over a few periods, mV; dots measured, line the model."""
+    table = _stretches(fit)
+    axes_of = table.axes
+    figure, axes = panels(len(axes_of), 1, 2.6, sharex=True)
+    predicted, measured, t = _predicted(fit), table.samples.outputs, table.samples.time_s
+    start = int(np.searchsorted(t, table.time_s[len(table.time_s) // 2]))
+    rows = slice(start, int(np.searchsorted(t, t[start] + SHOWN_S)))
+    for c, ax in enumerate(axes[:, 0]):
+        middle = predicted[rows, c].mean()
+        ax.plot(t[rows], 1e3 * (predicted[rows, c] - middle), color=BLUE, zorder=1.5)
+        ax.plot(t[rows], 1e3 * (measured[rows, c] - middle), "o", color=INK, mfc="none", mew=0.7)
+        ax.set(title=f"axis {axes_of[c]}", ylabel=f"output less mean (m{table.unit})")
+    axes[-1, 0].set_xlabel("time (s)")
+    return figure
+
+
+@styled
+def failure(fit: Fit) -> Figure:
+    """A panel for each axis: mean residual over one period of the strongest line, mV, the noise of a mean as a band."""
+    table = _stretches(fit)
+    figure, axes = panels(len(table.axes), 1, 2.6, sharex=True)
+    phase, line = _phase(table)
+    part = np.minimum((phase * BINS / 360).astype(int), BINS - 1)
+    count = np.bincount(part, minlength=BINS)
+    centres = (np.arange(BINS) + 0.5) * 360 / BINS
+    for c, ax in enumerate(axes[:, 0]):
+        residual = table.samples.outputs[:, c] - _predicted(fit)[:, c]
+        mean = np.bincount(part, residual, minlength=BINS) / np.maximum(count, 1)
+        # a part of the period comes once in a period: by then the output filter has forgotten
+        floor_band(ax, 1e3 * float(rms(residual - mean[part])) / np.sqrt(np.median(count)))
+        ax.plot(centres[count > 0], 1e3 * mean[count > 0], "o-", color=VERMILION)
+        quarters(ax)
+        ax.set(title=f"axis {table.axes[c]}", ylabel=f"mean residual (m{table.unit})")
+    axes[-1, 0].set_xlabel(f"phase of the motion {line} (deg)")
+    return figure
+
+
+def _stretches(fit: Fit) -> Stretches:
+    return stretches(fit.table)  # itself, by its own kind
+
+
+def _predicted(fit: Fit) -> Array:
+    """The model's output at each sample, shape (samples, axes)."""
+    return forward(_stretches(fit).samples, fit.problem.layout.steps(fit.theta))
+
+
+def _phase(table: Stretches) -> tuple[Array, str]:
+    """Phase of the strongest line at each sample, deg, and its name; zero at its greatest output."""
+    line = table.lines[0]
+    return np.degrees(np.arctan2(-line.in_quadrature, line.in_phase)) % 360, line.name

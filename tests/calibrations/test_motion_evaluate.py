@@ -1,0 +1,146 @@
+"""Both models beside the displacement sensor: the paper's numbers on a rig whose truth is known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from calibrations.effect import catalogue
+from calibrations.errors import DataError, ModelError
+from calibrations.fit import fit
+from calibrations.model import Model
+from calibrations.model_file import read_model
+from calibrations.motion.evaluate import MotionResult, evaluate
+from calibrations.pictures.motion import evaluation
+from calibrations.pictures.save import png
+from calibrations.table import Array, Table
+from tests.calibrations import shaken, synthetic
+
+KAPPA = np.array([[0.0, 0.010, 0.0512], [0.012, 0.0, 0.030]])  # x reads 30.6 mg too much at the paper's attitude
+NOISE_V = 155e-6  # density behind which 15 Hz leave the paper's 3.1 mV p-p
+EXPECTED = 1e3 * shaken.GRAVITY * 0.0306  # mm/s^2
+
+
+@cache
+def models() -> tuple[Model, Model]:
+    """The manufacturer's model from alpha = 90 deg, and the physical one from a whole sweep."""
+    columns = synthetic.turns((90, 30, 150, 60, 120, 45, 135), step_deg=10)
+    squares = np.column_stack(synthetic.components(columns)) ** 2 @ KAPPA.T
+    x, y, _ = synthetic.components(columns)
+    sweep = synthetic.poses(columns, 2.5 + x + squares[:, 0], 2.5 + y + squares[:, 1])
+    ideal = synthetic.poses(columns, 2.5 + x, 2.5 + y)  # what a data sheet gives
+    return fit(read_model("linear"), ideal).model, fit(read_model("physical"), sweep).model
+
+
+@cache
+def shaken_rig(seed: int = 0) -> Table:
+    return shaken.record(duration_s=30.0, seed=seed, kappa=KAPPA, noise_v=NOISE_V)
+
+
+@cache
+def still() -> Table:
+    moving = shaken.record(((1e-12, 10.0),), 30.0, seed=7, kappa=KAPPA, noise_v=NOISE_V)
+    columns = {name: moving.column(name) for name in ("t_s", "vx_v")}
+    return Table.from_columns("still", columns, moving.constants, "still")
+
+
+@cache
+def result(seed: int = 0) -> MotionResult:
+    return evaluate(shaken_rig(seed), *models(), still())
+
+
+def test_the_physical_model_leaves_the_sensors_noise() -> None:
+    found = [result(seed) for seed in range(4)]
+    assert all(r.rmse_linear.value == pytest.approx(EXPECTED, abs=5) for r in found)
+    assert all(r.improvement.value >= 0.97 for r in found)
+    assert all(r.excess < 1.1 for r in found)
+
+
+def test_noise_limit_is_that_of_the_paper() -> None:
+    with_still, without = result().noise_limit, evaluate(shaken_rig(), *models()).noise_limit
+    # white noise in the band of a second-order Butterworth, pi / (2 sqrt 2) x 20 Hz, the line's correction 1.031
+    expected = 1e3 * shaken.GRAVITY * NOISE_V * np.sqrt(np.pi / (2 * np.sqrt(2)) * 20) * 1.031
+    assert with_still.value == pytest.approx(expected, abs=4 * with_still.std)
+    assert without.value == pytest.approx(expected, abs=4 * without.std)
+
+
+def test_amplitude_is_the_papers_with_its_uncertainty() -> None:
+    true = 1e3 * 30e-6 * (2 * np.pi * 10) ** 2
+    assert true == pytest.approx(118.4, abs=0.05)
+    found = [result(seed).amplitude for seed in range(4)]
+    assert all(abs(q.value - true) < 4 * q.std < 1e-3 * true for q in found)
+
+
+def test_uncertainties_are_the_scatter_between_records() -> None:
+    found = [result(seed).rmse_physical for seed in range(12)]
+    assert np.std([q.value for q in found]) == pytest.approx(np.mean([q.std for q in found]), rel=0.6)
+
+
+def test_results_have_the_names_of_a_run() -> None:
+    found = result().results
+    assert {"rmse-linear-x", "rmse-physical-x", "improvement-x", "noise-limit-x", "amplitude"} <= set(found)
+    assert found["improvement-x"].unit == "1"
+    assert found["improvement-x"].value == pytest.approx(
+        1 - found["rmse-physical-x"].value / found["rmse-linear-x"].value, rel=1e-12
+    )
+
+
+def test_both_references_agree_within_the_probes_noise() -> None:
+    found = result()
+    difference = found.by_the_paper - found.reference
+    # noise of density d through f^2 to the corner and flat above it, up to 500 Hz
+    density = 0.2e-6 * np.sqrt(2 / shaken.RATE_HZ)
+    assert np.sqrt(np.mean(difference**2)) < 1.5e3 * density * (2 * np.pi * 20) ** 2 * np.sqrt(500)
+    assert any("Butterworth" in b.name for b in found.biases)
+    assert all(b.text for b in found.biases)
+
+
+def test_one_axis_takes_the_other_from_the_attitude() -> None:
+    one = evaluate(shaken.without_y(shaken_rig()), *(_of_x(m) for m in models()), still())
+    assert one.rmse_physical.value == pytest.approx(result().rmse_physical.value, abs=1.0)
+
+
+def _of_x(model: Model) -> Model:
+    terms = [replace(t, estimates=tuple(e for e in t.estimates if e.axis in ("x", ""))) for t in model.terms]
+    return replace(model, terms=tuple(t for t in terms if t.name != "axis-nonorthogonality"))
+
+
+def test_a_corner_that_the_model_holds_takes_the_place_of_the_nominal_one() -> None:
+    moved = shaken.record(duration_s=30.0, kappa=KAPPA, noise_v=20e-6, corner_hz=13.0)
+    filtered = fit(read_model("linear").with_effect(catalogue()["output-filter"]), _two_lines())
+    term = next(t for t in filtered.model.terms if t.name == "output-filter")
+    physical = models()[1]
+    with_filter = replace(physical, terms=(*physical.terms, term))
+    before, after = (evaluate(moved, models()[0], m) for m in (physical, with_filter))
+    assert before.excess > 4
+    assert after.excess < 2
+
+
+def _two_lines() -> Table:
+    return shaken.record(shaken.TWO, 20.0, kappa=KAPPA, noise_v=20e-6, corner_hz=13.0)
+
+
+def test_models_without_values_and_records_without_motion_are_said() -> None:
+    with pytest.raises(ModelError, match="the model linear has no values yet; fit it to a sweep of the same sensor"):
+        evaluate(shaken_rig(), read_model("linear"), models()[1])
+    with pytest.raises(DataError, match="holds no motion that stands out of its noise"):
+        evaluate(shaken.record(((1e-12, 10.0),)), *models())
+    mirrored = {**shaken_rig().columns, "displacement_m": -shaken_rig().column("displacement_m")}
+    with pytest.raises(DataError, match="falls where the sensor's acceleration along x rises; change its sign"):
+        evaluate(Table.from_columns("motion", mirrored, shaken.CONSTANTS, "mirrored"), *models())
+
+
+def test_picture_shows_reference_models_and_errors() -> None:
+    figure = evaluation(result())
+    (above, other), (left, right) = np.reshape(np.array(figure.axes), (2, 2))
+    lines: list[Array] = [line.get_ydata() for ax in (above, other) for line in ax.lines]
+    n = len(lines[0])
+    for drawn, values in zip(lines, ("linear", "reference", "physical", "reference"), strict=True):
+        np.testing.assert_array_equal(drawn, getattr(result(), values)[:n])
+    assert "rmse 300" in above.get_title(loc="left")
+    assert all("(" in ax.get_ylabel() for ax in (above, left))
+    assert left.get_xlabel() == right.get_xlabel() == "time (s)"
+    assert png(figure).startswith(b"\x89PNG")
