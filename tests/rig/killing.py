@@ -17,8 +17,9 @@ from rig.bench import DEFAULT
 from rig.record import Kept, Record
 from rig.record.tables import table_of
 from tests.rig.nursery import Ended, Harm, Nursery
-from tests.rig.rigging import POSES, SMALL_ARGUMENTS
 
+SWEEP = ("--step-deg", "90", "--dwell-s", "0.2", "--inclinations-deg", "90")
+POSES = 10  # of it
 KINDS = ("clock", "sql", "wire", "disk")
 MOST_IN_A_ROW = 5
 WAL = "record.db-wal"
@@ -80,7 +81,7 @@ def undisturbed(nursery: Nursery, folder: Path) -> Undisturbed:
     """Run to the end without harm, and see how long that takes."""
     bench, whole, short = folder / "bench.yaml", folder / "whole", folder / "short"
     bench.write_text(without_level_check(DEFAULT.read_text(encoding="utf-8")), encoding="utf-8")
-    words = ("run", "sweep", "--unattended", "--json", "--bench", str(bench), *SMALL_ARGUMENTS)
+    words = ("run", "sweep", "--unattended", "--json", "--bench", str(bench), *SWEEP)
     ended = nursery.run(whole, *words)
     assert ended.status == 0, ended.said
     last = nursery.run(short, *words, harm=Harm("sql", ended.points["sql"] - 1))  # the log goes with the last commit
