@@ -63,6 +63,13 @@ class Wave:
     cycles: int
     cycle_s: float
 
+    @classmethod
+    def near(cls, frequency_hz: float, cycle_s: float, most_points: int) -> Wave:
+        """The one that comes nearest to a frequency: as fine as so many points allow."""
+        all_cycles = 1 / (frequency_hz * cycle_s)
+        cycles = math.ceil(all_cycles / most_points)
+        return cls(2 * round(all_cycles / cycles / 2), cycles, cycle_s)
+
     @property
     def frequency_hz(self) -> float:
         return 1 / (self.points * self.cycles * self.cycle_s)
@@ -198,7 +205,7 @@ class Positioner:
             raise LimitError(what, "Ask for a positive width, peak to peak")
 
     def _wave(self, frequency_hz: float) -> Wave:
-        """The table that comes nearest to a frequency: as fine as the memory allows. Raises LimitError."""
+        """How the controller plays a frequency. Raises LimitError for one that it cannot play."""
         cycle_s = self._gcs.number(f"{e727.ASK_PARAMETER} 1 {e727.CYCLE_TIME}")
         fastest_hz = 1 / (FEWEST_POINTS * cycle_s)
         if not 0 < frequency_hz <= fastest_hz:
@@ -206,9 +213,7 @@ class Positioner:
                 f"{self.name}: no wave table plays {frequency_hz:g} Hz; nothing was moved",
                 f"Ask for a positive frequency of at most {fastest_hz:g} Hz",
             )
-        all_points = 1 / (frequency_hz * cycle_s)
-        cycles = math.ceil(all_points / self.settings.wave_points)
-        return Wave(2 * round(all_points / cycles / 2), cycles, cycle_s)
+        return Wave.near(frequency_hz, cycle_s, self.settings.wave_points)
 
     def _write_wave(self, axis: str, wave: Wave, peak_to_peak_um: float, lowest_um: float) -> None:
         place, n = self._place(axis), wave.points

@@ -28,7 +28,7 @@ WAVE_POINTS = 262144  # of the wave memory [M]
 # Data recorder: tables that each record one thing, every RTR servo cycles, from a trigger on.
 RECORD, RECORD_TRIGGER, RECORD_RATE, RECORDED_POINTS, RECORDED = "DRC", "DRT", "RTR", "DRL?", "DRR?"
 ACTUAL_POSITION = 2  # of DRC
-WITH_THE_WAVE = 0  # of DRT
+WITH_THE_WAVE, WITH_A_MOTION, WITH_THE_NEXT_COMMAND, AT_ONCE = 0, 1, 2, 4  # of DRT
 RECORD_POINTS = 262144  # of one table
 
 # Parameters: SPA? item identifier, the identifier in decimal or as 0x hexadecimal.

@@ -11,9 +11,9 @@ from drivers.links.address import Address
 from drivers.links.gcs_server import OUT_OF_RANGE, UNKNOWN_COMMAND, Refusal, gcs_port, groups, lines, one_of, whole
 from drivers.links.server import Server
 from drivers.pi_e727 import Settings
-from drivers.pi_e727_twin_axes import Axes, Handler, World
-from drivers.pi_e727_twin_recorder import NEXT_COMMAND, WITH_A_MOTION, Recorder
-from drivers.pi_e727_twin_waves import CYCLE_S, Waves
+from drivers.pi_e727_twin_axes import CYCLE_S, Axes, Handler, World
+from drivers.pi_e727_twin_recorder import Recorder
+from drivers.pi_e727_twin_waves import Waves
 
 LISTEN = "tcp://127.0.0.1:0"
 IDENTITY = "(c)2015 Physik Instrumente (PI) GmbH & Co. KG, E-727, 0117055412, 13.21.00.09"
@@ -30,7 +30,7 @@ class Controller:
     def __init__(self, world: World, settings: Settings) -> None:
         self._axes = Axes(world, settings.axes)
         self._recorder = Recorder(self._axes)
-        self._waves = Waves(self._axes, self._recorder.trigger(e727.WITH_THE_WAVE, WITH_A_MOTION, NEXT_COMMAND))
+        self._waves = Waves(self._axes, self._recorder)
         self._error = 0
         self._handlers: dict[str, Handler] = {
             **self._axes.handlers(),
@@ -49,17 +49,14 @@ class Controller:
     def answer(self, command: str, now_s: float) -> str | None:
         if command[0] < " ":
             return self._urgent(ord(command[0]), now_s)
-        name, *arguments = command.split()
+        name, *arguments = command.split() or [""]
         try:
             if name.upper() not in self._handlers:
                 raise Refusal(UNKNOWN_COMMAND)
-            answer = self._handlers[name.upper()](arguments, now_s)
+            return self._handlers[name.upper()](arguments, now_s)
         except Refusal as refusal:
             self._error = refusal.code
             return None
-        if name.upper() == "MOV":
-            self._recorder.trigger(WITH_A_MOTION, NEXT_COMMAND)(now_s)
-        return answer
 
     def advance(self, now_s: float) -> None:
         self._recorder.advance(now_s)
@@ -109,8 +106,8 @@ class Controller:
 
     def _refuse_parameter(self, arguments: Sequence[str]) -> None:
         """`SPA item identifier value`: none of the simulated parameters can be changed."""
-        for _ in self._identified(groups(arguments, 3)):
-            raise Refusal(OUT_OF_RANGE)
+        self._identified(groups(arguments, 3))
+        raise Refusal(OUT_OF_RANGE)
 
     def _identified(self, asked: Sequence[Sequence[str]]) -> list[tuple[str, str, int]]:
         found = [(one_of(item, self._axes.ids, e727.BAD_AXIS), text) for item, text, *_ in asked]

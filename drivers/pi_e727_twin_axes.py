@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any, Protocol
@@ -14,6 +15,7 @@ from drivers.simulation.kernel import Floats
 from drivers.simulation.positioner import Command, standing
 
 TRAVEL_UM = (0.0, 100.0)  # of the P-611.3S in closed loop
+CYCLE_S = 50e-6  # of the servo
 VELOCITY_UM_S = 1000.0  # of the command's ramp to a new place [M]
 
 Handler = Callable[[Sequence[str], float], str | None]
@@ -125,6 +127,6 @@ class Axes:
 
     def _set_velocity(self, arguments: Sequence[str], _now_s: float) -> None:
         values = {one_of(axis, self.ids, e727.BAD_AXIS): number(text) for axis, text in groups(arguments, 2)}
-        if not all(value > 0 for value in values.values()):
+        if not all(0 < value < math.inf for value in values.values()):
             raise Refusal(OUT_OF_RANGE)
         self._velocity_um_s.update(values)

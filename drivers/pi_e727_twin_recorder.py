@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from drivers import pi_e727_table as e727
 from drivers.links.gcs_server import OUT_OF_RANGE, groups, lines, one_of, table, whole
-from drivers.pi_e727_twin_axes import Axes, Handler
-from drivers.pi_e727_twin_waves import CYCLE_S
+from drivers.pi_e727_twin_axes import CYCLE_S, Axes, Handler
 from drivers.simulation.kernel import Floats
 
 TABLES = [str(k + 1) for k in range(8)]
 OPTIONS = ("Nothing", "Commanded Position of Axis", "Actual Position of Axis", "Position Error of Axis")
-WITH_A_MOTION, NEXT_COMMAND, AT_ONCE = 1, 2, 4  # of DRT, beside WITH_THE_WAVE
-TRIGGERS = (e727.WITH_THE_WAVE, WITH_A_MOTION, NEXT_COMMAND, AT_ONCE)
+TRIGGERS = (e727.WITH_THE_WAVE, e727.WITH_A_MOTION, e727.WITH_THE_NEXT_COMMAND, e727.AT_ONCE)
 
 
 class Recorder:
@@ -53,15 +51,11 @@ class Recorder:
         self._triggers, self._rate = dict(state["triggers"]), state["rate"]
         self._start_s = math.inf
 
-    def trigger(self, *kinds: int) -> Callable[[float], None]:
-        """What starts a new recording at a time, if a table waits for one of `kinds`."""
-
-        def start(now_s: float) -> None:
-            if any(self._triggers[k] in kinds and self._what[k][1] for k in TABLES):
-                self._start_s = now_s
-                self._data = {place: [] for place in TABLES}
-
-        return start
+    def trigger(self, now_s: float, *kinds: int) -> None:
+        """Start a new recording if a table waits for one of `kinds`. The next command is taken for the next motion."""
+        if any(self._triggers[k] in kinds and self._what[k][1] for k in TABLES):
+            self._start_s = now_s
+            self._data = {place: [] for place in TABLES}
 
     def advance(self, now_s: float) -> None:
         """Record all that is due; the axes have followed their present commands since the last time."""
@@ -97,7 +91,7 @@ class Recorder:
             trigger = int(one_of(source, map(str, TRIGGERS), OUT_OF_RANGE))
             for each in TABLES if place == "0" else [one_of(place, TABLES, OUT_OF_RANGE)]:
                 self._triggers[each] = trigger
-        self.trigger(AT_ONCE)(now_s)
+        self.trigger(now_s, e727.AT_ONCE)
 
     def _set_rate(self, arguments: Sequence[str]) -> None:
         self._rate = whole(groups(arguments, 1)[0][0], 1, 10**6)

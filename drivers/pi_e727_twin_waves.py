@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
 from drivers import pi_e727_table as e727
 from drivers.links.gcs_server import OUT_OF_RANGE, PARAMETER_COUNT, Refusal, groups, number, one_of, table, whole
-from drivers.pi_e727_twin_axes import Axes, Handler
+from drivers.pi_e727_twin_axes import CYCLE_S, Axes, Handler
+from drivers.pi_e727_twin_recorder import Recorder
 from drivers.simulation.positioner import FOREVER_S, Command
 
-CYCLE_S = 50e-6
+MOST_CYCLES = 2**31 - 1  # of the servo for a point, and of a wave
 TABLES = [str(k + 1) for k in range(8)]
 
 
@@ -30,7 +31,7 @@ class Sine:
         period_s = self.points * point_s
         phase = 2 * math.pi * (self.first / self.points - 0.25)
         half_um = self.width_um / 2
-        end_s = start_s + cycles * period_s if cycles else FOREVER_S
+        end_s = min(start_s + cycles * period_s, FOREVER_S) if cycles else FOREVER_S
         return Command(start_s, self.lowest_um + half_um, 0.0, half_um, 1 / period_s, phase, end_s)
 
 
@@ -48,10 +49,10 @@ def written(shape: Sequence[str]) -> Sine:
 
 
 class Waves:
-    """Generators, one for each axis and numbered by its place; `started` is called with the time of a start."""
+    """Generators, one for each axis and numbered by its place: all that sets axes in motion, and the recorder off."""
 
-    def __init__(self, axes: Axes, started: Callable[[float], None]) -> None:
-        self._axes, self._started = axes, started
+    def __init__(self, axes: Axes, recorder: Recorder) -> None:
+        self._axes, self._recorder = axes, recorder
         self._axis = {str(k + 1): axis for k, axis in enumerate(axes.ids)}
         self._tables: dict[str, Sine] = {}
         self._selected = dict.fromkeys(self._axis, 0)
@@ -68,7 +69,7 @@ class Waves:
             "WSL?": lambda a, _: table((k, self._selected[k]) for k in self._asked(a)),
             "WTR": self._set_rates,
             "WTR?": lambda a, _: table((k, f"{self._rates[k][0]} {self._rates[k][1]}") for k in self._asked(a)),
-            "WGC": lambda a, _: self._cycles.update(self._values(a, math.inf)),
+            "WGC": lambda a, _: self._cycles.update(self._values(a, MOST_CYCLES)),
             "WGC?": lambda a, _: table((k, self._cycles[k]) for k in self._asked(a)),
             "WGO": self._play,
             "WGO?": lambda a, now_s: table((k, int(now_s < self._until_s[k])) for k in self._asked(a)),
@@ -123,7 +124,7 @@ class Waves:
 
     def _set_rates(self, arguments: Sequence[str], _now_s: float) -> None:
         for k, rate, kind in groups(arguments, 3):
-            rates = [whole(rate, 1, math.inf), whole(kind, 0, 1)]
+            rates = [whole(rate, 1, MOST_CYCLES), whole(kind, 0, 1)]
             for generator in self._axis if k == "0" else [one_of(k, self._axis, e727.ILLEGAL_AXIS)]:
                 self._rates[generator] = rates
 
@@ -138,7 +139,7 @@ class Waves:
                 self._until_s[generator] = now_s
                 self._axes.halt(self._axis[generator], now_s)
         if starting:
-            self._started(now_s)
+            self._recorder.trigger(now_s, e727.WITH_THE_WAVE, e727.WITH_A_MOTION, e727.WITH_THE_NEXT_COMMAND)
 
     def _selected_wave(self, generator: str, now_s: float) -> Command:
         """What a generator would play. Refused without a table, without servo, outside the travel."""
@@ -155,3 +156,4 @@ class Waves:
             raise Refusal(e727.WAVE_RUNS)
         for axis, um in targets.items():
             self._axes.go(axis, um, now_s)
+        self._recorder.trigger(now_s, e727.WITH_A_MOTION, e727.WITH_THE_NEXT_COMMAND)

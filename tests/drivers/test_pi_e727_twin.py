@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from drivers import pi_e727_twin
 from drivers.clock import SimulatedClock
@@ -16,6 +18,7 @@ from drivers.links import Links
 from drivers.links.link import Link, open_link
 from drivers.links.server import Server
 from drivers.pi_e727 import Positioner, Settings, connect
+from tests.drivers.conftest import SmallWorld
 
 SINE = "WAV 2 X SIN_P 2000 20 10 2000 0 1000"  # 10 Hz at table rate 1
 READY_TO_PLAY = ("SVO 2 1", "MOV 2 10", SINE, "WSL 2 2")
@@ -155,6 +158,21 @@ def test_a_wave_ends_at_once_when_it_is_told_to(ask: Ask, clock: SimulatedClock)
     assert error(ask, "WGO 2 0") == 0
     assert ask("\x09") == "0\n"
     assert error(ask, "MOV 2 50") == 0
+
+
+HELP = pi_e727_twin.Controller(SmallWorld(), Settings()).answer("HLP?", 0.0) or ""
+VERBS = [*(line.strip() for line in HELP.splitlines()), " "]
+WORDS = ["0", "1", "2", "3", "X", "SIN_P", "2000", "1000", "-5", "1e400", "nan", "0x10", "9" * 30, "\xb5"]
+
+
+@given(st.lists(st.tuples(st.sampled_from(VERBS), st.lists(st.sampled_from(WORDS), max_size=9)), max_size=12))
+def test_no_command_upsets_it(commands: list[tuple[str, list[str]]]) -> None:
+    controller = pi_e727_twin.Controller(SmallWorld(), Settings())
+    for k, (verb, words) in enumerate([("SVO", ["1", "1", "2", "1"]), *commands]):
+        controller.advance(0.01 * k)
+        answer = controller.answer(" ".join([verb, *words]), 0.01 * k)
+        assert answer is None or answer.endswith("\n")
+    assert int(controller.answer("ERR?", 1.0) or "") in range(100)
 
 
 def test_half_a_line_waits_for_its_end(link: Link) -> None:
