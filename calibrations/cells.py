@@ -9,6 +9,7 @@ from __future__ import annotations
 from array import array
 from collections.abc import Collection, Mapping
 from itertools import chain
+from math import isfinite
 
 import numpy as np
 
@@ -51,26 +52,29 @@ def _at_once(sheet: Sheet) -> Array | None:
 def _one_by_one(sheet: Sheet, texts: Collection[str]) -> tuple[Mapping[str, Array], Mapping[str, tuple[str, ...]]]:
     numbers = {name: array("d") for name in sheet.header if name not in texts}
     words: dict[str, list[str]] = {name: [] for name in sheet.header if name in texts}
-    for line, row in sheet.rows():
-        for name, cell in zip(sheet.header, row, strict=False):
+    places = list(enumerate(sheet.header))
+    for row in sheet.rows():
+        for k, name in places:
             if name in words:
-                words[name].append(cell)
+                words[name].append(row[1][k])
             else:
-                numbers[name].append(_number(cell, sheet, (line, row), name))
+                numbers[name].append(_number(sheet, row, k))
     return (
         {name: np.frombuffer(values, dtype=np.float64) for name, values in numbers.items()},
         {name: tuple(values) for name, values in words.items()},
     )
 
 
-def _number(cell: str, sheet: Sheet, row: Row, name: str) -> float:
-    """The number in a cell. Raises DataError with its place."""
-    where = f'{sheet.name}, line {row[0]}, column "{name}"'
+def _number(sheet: Sheet, row: Row, k: int) -> float:
+    """The number in cell `k`. Raises DataError with its place."""
+    line, cells = row
     try:
-        value = number(cell)
+        value = number(cells[k])
     except ValueError:
-        what = f'"{cell}"' if cell else "empty"
-        raise DataError(f"{where}: {what} where a number belongs; correct the cell or remove the row") from None
-    if not np.isfinite(value):
-        raise DataError(f'{where}: "{cell}" is not a finite number; correct the cell or remove the row')
-    return value
+        what = f'"{cells[k]}" where a number belongs' if cells[k] else "empty where a number belongs"
+    else:
+        if isfinite(value):
+            return value
+        what = f'"{cells[k]}" is not a finite number'
+    where = f'{sheet.name}, line {line}, column "{sheet.header[k]}"'
+    raise DataError(f"{where}: {what}; correct the cell or remove the row")

@@ -20,6 +20,7 @@ from calibrations.units import name_and_unit, unit_of
 
 HEAD = 200  # lines that the layout is taken from
 BLANK = " \t\r\n\x1a"
+_COMMA = re.compile(r",(?=\d+([eE]|$))")
 NO_UNIT = ("", "-", "1", "n/a")
 Row = tuple[int, list[str]]  # the number of a line, from 1, and its cells
 
@@ -105,7 +106,7 @@ def number(cell: str) -> float:
     """The number in a cell, whose decimal point may be a comma. Raises ValueError where there is none."""
     if "_" in cell:
         raise ValueError(cell)  # float() would take 1_000
-    return float(re.sub(r",(?=\d+([eE]|$))", ".", cell))
+    return float(_COMMA.sub(".", cell) if "," in cell else cell)
 
 
 def is_number(cell: str) -> bool:
