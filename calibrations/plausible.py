@@ -16,6 +16,7 @@ from calibrations.units import own_unit
 
 HIGHEST_V = 50.0  # analog outputs of sensors end at their supply, 36 V at the most
 HOTTEST_C, COLDEST_C = 200.0, -100.0  # parts are specified from -55 to 125 degC, some to 175
+LONGEST_M = 0.5  # a piezo stage travels 0.1 mm, a shaker some centimetres
 LARGEST_ALPHA_DEG = 360.0  # an inclination is known within a turn
 LARGEST_BETA_DEG = 3600.0  # ten turns: cables allow less
 ARC_MINUTE_DEG = 1 / 60
@@ -45,7 +46,7 @@ def _on_grid(values: Array, step: float, rounding: float) -> bool:
 
 
 def fitting_unit(name: str, values: Array) -> str:
-    """The unit that makes sense of numbers that are no V, deg or degC; "" where they may be that."""
+    """The unit that makes sense of numbers that are no V, deg, degC or m; "" where they may be that."""
     doubt = _unlikely(name, values)
     return doubt[1] if doubt else ""
 
@@ -88,6 +89,11 @@ def _voltage(values: Array) -> Doubt | None:
     return f"reaches {largest:.6g} V, and no sensor puts out more than {HIGHEST_V:g} V", unit
 
 
+def _length(values: Array) -> Doubt | None:
+    longest = float(np.max(np.abs(values)))
+    return (f"reaches {longest:.6g} m, and no stage travels so far", "um") if longest > LONGEST_M else None
+
+
 def _temperature(values: Array) -> Doubt | None:
     low, high = float(values.min()), float(values.max())
     if low >= COLDEST_C and high <= HOTTEST_C:
@@ -96,7 +102,12 @@ def _temperature(values: Array) -> Doubt | None:
     return f"runs from {low:.6g} to {high:.6g} degC, and no sensor lives there", unit
 
 
-DOUBTS: Mapping[str, Callable[[Array], Doubt | None]] = {"deg": _angle, "V": _voltage, "degC": _temperature}
+DOUBTS: Mapping[str, Callable[[Array], Doubt | None]] = {
+    "deg": _angle,
+    "V": _voltage,
+    "degC": _temperature,
+    "m": _length,
+}
 
 
 def check_at_rest(table: Table) -> None:

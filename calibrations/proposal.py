@@ -15,7 +15,7 @@ import numpy as np
 
 from calibrations.plausible import fitting_unit, gravity_unit
 from calibrations.separated import Sheet, is_number, number
-from calibrations.table import KINDS, NUMBERS, Array
+from calibrations.table import AXES, KINDS, NUMBERS, OUTPUTS, Array
 from calibrations.units import UNITS, Mapped, name_and_unit, own_unit
 
 AXIS = r"(?:^|[^a-z])(?P<axis>[xyz])(?:[^a-z]|$)"
@@ -40,16 +40,20 @@ WORDS: Mapping[str, Sequence[tuple[str, str]]] = {
         (r"gyr|omega|rate|^g[xyz]$", "g{axis}"),
         (r"mag|^m[xyz]$", "m{axis}"),
     ),
+    "motion": (
+        (r"displac|distance|position|stroke", "displacement_m"),
+        (r"suppl|vdd|vcc|excitation", "supply_v"),
+        (r"temp|thermo", "temperature_c"),
+        (r"^t(_?s)?$|time|elapsed|seconds", "t_s"),
+    ),
 }
-OUTPUTS = {"poses": ("vx_v", "vy_v", "vz_v"), "positions": ("ax", "ay", "az")}
 SCATTERS = {"poses": "v{axis}_std_v", "positions": "a{axis}_std"}
-NAMES = {kind: KINDS[kind][0] for kind in OUTPUTS}
 
 
 def propose(laid: Sheet, kind: str | None = None, mapped: Sequence[Mapped] = ()) -> list[Mapped]:
     """A mapping for the columns that are not in `mapped`, which it begins with; each of our names once."""
     kind = kind or likely_kind(laid, mapped)
-    if kind not in OUTPUTS:
+    if kind not in WORDS:
         return list(mapped)
     found = list(mapped)
     left = [name for name in laid.header if name not in {m.theirs for m in mapped} | NUMBERS]
@@ -62,10 +66,13 @@ def propose(laid: Sheet, kind: str | None = None, mapped: Sequence[Mapped] = ())
 
 
 def likely_kind(laid: Sheet, mapped: Iterable[Mapped] = ()) -> str:
-    """`poses` where there is an angle of a stage, or fewer than three outputs; else `positions`."""
+    """`poses` where there is an angle of a stage, `motion` where there is a displacement, `positions` where there are
+    three outputs; else `poses`."""
     names = {*(m.name for m in mapped), *laid.bare, *(_by_name(bare, "poses") for bare in laid.bare)}
     if {"alpha_deg", "beta_deg"} & names:
         return "poses"
+    if "displacement_m" in {*names, *(_by_name(bare, "motion") for bare in laid.bare)}:
+        return "motion"
     if laid.named:
         return "positions" if names.issuperset(OUTPUTS["poses"]) or names & set(OUTPUTS["positions"]) else "poses"
     angles = [name for name in laid.header if _is_angle(values_of(laid, name))]
@@ -75,7 +82,12 @@ def likely_kind(laid: Sheet, mapped: Iterable[Mapped] = ()) -> str:
 def missing(kind: str | None, laid: Sheet, mapped: Iterable[Mapped]) -> list[str]:
     """The columns that a table of this kind needs and that neither header nor mapping gives."""
     given = {m.name for m in mapped} | set(laid.bare)
-    return [name for name in NAMES.get(kind or "", ()) if name not in given]
+    return [name for name in needed(kind) if name not in given]
+
+
+def needed(kind: str | None) -> tuple[str, ...]:
+    """The columns that a table of this kind has at least."""
+    return KINDS[kind][0] if kind else ()
 
 
 def command(laid: Sheet, kind: str | None, mapped: Sequence[Mapped], constants: Sequence[str] = ()) -> str:
@@ -97,8 +109,7 @@ def proposed(laid: Sheet, kind: str | None, mapped: Sequence[Mapped]) -> str:
     found = propose(laid, kind, mapped)
     kind = kind or likely_kind(laid, mapped)
     lacking = missing(kind, laid, found)
-    needed = NAMES.get(kind, ())
-    if not found or len(lacking) == len(needed):
+    if not found or len(lacking) == len(needed(kind)):
         return "; --column gives one of yours the name, as in vx_v=Vout:mV"
     line = command(laid, kind, [*found, *(Mapped(name, "YOURS") for name in lacking)])
     fill = f" (put your column's name for YOURS: {_choice(laid, found)})" if lacking else ""
@@ -150,14 +161,14 @@ def _by_name(bare: str, kind: str) -> str:
     lower = words.lower()
     if bare in ("T", "Temp"):
         return "temperature_c"
-    if axis and re.search(SCATTER, lower):
+    if axis and kind in SCATTERS and re.search(SCATTER, lower):
         return SCATTERS[kind].format(axis=axis)
     ours = next((ours for pattern, ours in WORDS[kind] if re.search(pattern, lower)), None)
     if ours is not None:
         return "" if "{axis}" in ours and not axis else ours.format(axis=axis)
     last = re.search(r"(?:^|[_\W]|^v|^u|^a|acc|out)(?P<axis>[xyz])\d*$", lower)
     axis = axis or (last["axis"] if last else "")
-    return OUTPUTS[kind]["xyz".index(axis)] if axis else ""
+    return dict(zip(AXES, OUTPUTS[kind], strict=False)).get(axis, "")
 
 
 def _by_unit(bare: str, unit: str) -> str:

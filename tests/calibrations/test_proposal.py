@@ -88,6 +88,13 @@ def test_columns_without_names_are_told_by_their_values() -> None:
     assert proposed(held) == {"t_s=1", "ax=2:m/s2", "ay=3:m/s2", "az=4:m/s2"}
 
 
+def test_a_displacement_makes_it_motion() -> None:
+    rows = "".join(f"{k / 1000};{2.5 + k / 100};{30 + k}\n" for k in range(20))
+    found = proposed(f"time;out_x;displacement\n{rows}")
+    assert found == {"t_s=time", "vx_v=out_x", "displacement_m=displacement:um"}
+    assert likely_kind(laid(f"time;out_x;displacement\n{rows}")) == "motion"
+
+
 def test_what_is_given_already_stays() -> None:
     found = proposed(f"a;b;Vout\n{ROWS}", None, "alpha_deg=b", "beta_deg=a:rad")
     assert found == {"alpha_deg=b", "beta_deg=a:rad", "vx_v=Vout:mV"}
