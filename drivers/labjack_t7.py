@@ -25,8 +25,6 @@ from drivers.links.link import Link
 from drivers.links.modbus import Unit
 from drivers.links.register import Register
 
-QUIET_S = 0.01  # after a stop, no packet is late by more: a move is longer, so nobody waits for it
-
 
 @dataclass(frozen=True)
 class Settings:
@@ -68,7 +66,6 @@ class T7:
         self.name = unit.name
         self.settings = settings
         self._unit, self._stream, self._clock = unit, stream, stream.clock
-        self._quiet_from_s = 0.0  # when no packet of the last stream can come any more
         self._prepare_inputs()
         self._calibration = self._read_calibration()
         self._volts = self._calibration.table()
@@ -119,7 +116,7 @@ class T7:
         channels, scans, block = tuple(self.settings.channels), self._scans(duration_s), self._scans(block_s)
         per_packet = _scans_per_packet(scans, len(channels))
         self._configure(per_packet * len(channels))
-        self._stream.discard(self._quiet_from_s - self._clock.now())
+        self._stream.discard()
         start_s = self._clock.now()
         self._write_block((t7.ENABLE, 1))
         try:
@@ -151,10 +148,9 @@ class T7:
         self._write_block(*((t7.scan_list(k), t7.ain(number).address) for k, number in enumerate(inputs)))
 
     def _stop(self) -> None:
-        """Stop the stream. What is still on its way is dropped before the next one."""
+        """Stop the stream. What is still on its way comes before the next one is set up, and is dropped then."""
         with contextlib.suppress(Refused):  # it has stopped by itself
             self._unit.write(t7.ENABLE, 0)
-        self._quiet_from_s = self._clock.now() + QUIET_S
 
     def _write_block(self, *values: tuple[Register, float]) -> None:
         """As the unit's, but a refusal is explained in the device's own words."""

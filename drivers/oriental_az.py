@@ -99,17 +99,23 @@ class RotaryStage:
 
         Raises LimitError before anything is sent, StageAlarm, NotSettled, and the errors of the link.
         """
-        self.start(angle_deg)
-        self.wait()
+        if self.start(angle_deg):
+            self.wait()
 
-    def start(self, angle_deg: float) -> None:
-        """Start turning to `angle_deg` and return at once; raises LimitError before anything is sent."""
+    def start(self, angle_deg: float) -> bool:
+        """Start turning to `angle_deg` and return at once; False where it stands there already.
+
+        Raises LimitError before anything is sent, StageAlarm.
+        """
         self._require_within_limits(angle_deg)
-        self._require_no_alarm(self.alarm())
+        outputs = self._status()
         distance_deg = abs(angle_deg - self.angle_deg())
-        self._target_deg = angle_deg
+        self._target_deg, self._expected_end_s = angle_deg, self._clock.now()
+        if _stands(outputs, az.HOME_END | az.IN_POSITION) and distance_deg < 180 / self.settings.steps_per_turn:
+            return False
         self._unit.write_block(*self._direct_operation(angle_deg))
         self._expected_end_s = self._clock.now() + self._duration_s(distance_deg)
+        return True
 
     def wait(self) -> None:
         """Return when the move that was started has ended where it should. Raises StageAlarm, NotSettled."""
@@ -174,18 +180,27 @@ class RotaryStage:
     def _outputs(self) -> int:
         return int(self._unit.read(az.OUTPUTS))
 
+    def _status(self) -> int:
+        """The outputs, and the alarm in the same exchange. Raises StageAlarm."""
+        outputs, code = map(int, self._unit.read_block(az.OUTPUTS, az.ALARM))
+        self._require_no_alarm(az.alarm_of(code))
+        return outputs
+
     def _poll_until(self, wanted: int, timeout_s: float, complaint: str) -> None:
-        """Wait for a standstill with the `wanted` outputs on; outputs and alarm come in one exchange."""
+        """Wait for a standstill with the `wanted` outputs on."""
         deadline = self._clock.now() + timeout_s
         while True:
-            outputs, code = map(int, self._unit.read_block(az.OUTPUTS, az.ALARM))
-            self._require_no_alarm(az.alarm_of(code))
-            if not outputs & az.MOVE and outputs & wanted == wanted:
+            if _stands(self._status(), wanted):
                 return
             if self._clock.now() >= deadline:
                 remedy = "Look at the stage: is it blocked? Then home it and repeat"
                 raise NotSettled(f"{self.name}: {complaint} after {timeout_s:g} s", remedy)
             self._clock.sleep(POLL_S)
+
+
+def _stands(outputs: int, wanted: int) -> bool:
+    """Whether it stands still with the `wanted` outputs on."""
+    return not outputs & az.MOVE and outputs & wanted == wanted
 
 
 def connect(address: Address, links: Links, settings: Settings, name: str) -> RotaryStage:

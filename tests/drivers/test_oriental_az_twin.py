@@ -139,6 +139,23 @@ def test_a_move_ends_where_it_should_after_as_long_as_it_takes(bench: Any) -> No
     assert bench.clock.now() - started == pytest.approx(90 / 20 + 20 / 40, abs=0.1)
 
 
+def test_where_it_stands_already_it_does_not_turn_again(bench: Any) -> None:
+    bench.alpha.home()
+    bench.alpha.move_to(90.0)
+    started = bench.clock.now()
+    bench.alpha.move_to(90.0)
+    assert bench.clock.now() - started < 0.03  # two exchanges
+    assert not bench.alpha.start(90.0)
+    bench.alpha.wait()
+
+
+def test_an_angle_that_it_only_seems_to_have_is_no_arrival(bench: Any) -> None:
+    """Before homing nobody knows where zero is."""
+    assert bench.beta.angle_deg() == 0.0
+    with pytest.raises(StageAlarm, match="4A"):
+        bench.beta.move_to(0.0)
+
+
 def test_both_stages_of_a_bus_turn_at_once(bench: Any) -> None:
     bench.alpha.home()
     bench.beta.home()
@@ -181,7 +198,7 @@ def test_a_limit_is_kept_without_a_word_on_the_wire(bench: Any) -> None:
 
 def test_a_stage_that_is_not_there_is_named(bench: Any) -> None:
     absent = connect(Address(bench.servers["bus"].url, 3), bench.links, Settings(), "gamma")
-    with pytest.raises(LinkTimeout, match="gamma: reading register 0x0080"):
+    with pytest.raises(LinkTimeout, match="gamma: reading register 0x007F"):
         absent.move_to(0.0)
 
 

@@ -41,7 +41,7 @@ STANDING = "01 03 06 40 20 00 00 00 00 AE 72"  # IN-POS, READY, no alarm
 MOVING = "01 03 06 20 00 00 00 00 00 26 15"
 BLOCKED = "01 03 06 00 80 00 00 00 30 20 BF"  # ALM, alarm 30
 HOMED = "01 03 06 40 30 00 00 00 00 6F B1"  # IN-POS, READY, HOME-END
-START = [(ASK_ALARM, NO_ALARM), (ASK_POSITION, AT_MINUS_4500), (MOVE_TO_8500, TAKEN)]
+START = [(ASK_STATUS, STANDING), (ASK_POSITION, AT_MINUS_4500), (MOVE_TO_8500, TAKEN)]
 Stages = Callable[[list[tuple[str, str]]], RotaryStage]
 
 
@@ -57,6 +57,10 @@ def test_angle_is_the_feedback_position(stage: Stages) -> None:
 def test_a_move_is_one_block_and_sleeps_through_its_duration(stage: Stages, clock: SimulatedClock) -> None:
     stage([*START, (ASK_STATUS, STANDING), (ASK_POSITION, AT_8500)]).move_to(85.0)
     assert clock.now() == pytest.approx(130 / 20 + 20 / 15, abs=0.01)  # 130 deg: a trapezoid of speed
+
+
+def test_where_it_stands_already_it_is_not_sent(stage: Stages) -> None:
+    stage([(ASK_STATUS, HOMED), (ASK_POSITION, AT_8500)]).move_to(85.0)
 
 
 def test_a_move_that_lasts_longer_is_polled(stage: Stages) -> None:
@@ -83,7 +87,7 @@ def test_an_alarm_during_a_move_is_put_into_words(stage: Stages) -> None:
 
 def test_with_an_alarm_no_move_is_started(stage: Stages) -> None:
     with pytest.raises(StageAlarm, match=r"alarm 4A, absolute move before the coordinates are set. Home"):
-        stage([(ASK_ALARM, "01 03 04 00 00 00 4A 7B C4")]).move_to(85.0)
+        stage([(ASK_STATUS, "01 03 06 00 80 00 00 00 4A A1 5C")]).move_to(85.0)
 
 
 def test_a_stop_holds_the_input_until_the_motor_stands(stage: Stages) -> None:
