@@ -110,7 +110,8 @@ class Controller:
         raise Refusal(OUT_OF_RANGE)
 
     def _identified(self, asked: Sequence[Sequence[str]]) -> list[tuple[str, str, int]]:
-        found = [(one_of(item, self._axes.ids, e727.BAD_AXIS), text) for item, text, *_ in asked]
+        items = {"1", *self._axes.ids}  # the controller itself is item 1, whatever its axes are called
+        found = [(one_of(item, items, e727.BAD_AXIS), text) for item, text, *_ in asked]
         known = [(item, text, whole(text, 0, math.inf)) for item, text in found]
         if any(parameter not in PARAMETERS for *_, parameter in known):
             raise Refusal(e727.UNKNOWN_PARAMETER)

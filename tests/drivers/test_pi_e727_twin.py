@@ -231,6 +231,21 @@ def test_after_a_stop_in_mid_wave_nothing_moves(
     positioner.move_to("x", 50.0)  # and it can be used again
 
 
+def test_axes_have_the_names_of_the_bench(small_world: Any, clock: SimulatedClock) -> None:
+    settings, links = Settings(axes={"z": "C", "x": "A"}), Links(clock)
+    served = pi_e727_twin.serve(small_world, {"positioner": (1, settings)})
+    clock.attach(served)
+    positioner = connect(served.addresses["positioner"], links, settings, "positioner")
+    positioner.servo(True)
+    positioner.oscillate("x", peak_to_peak_um=20.0, frequency_hz=5.0, centre_um=50.0)
+    clock.sleep(0.4)
+    spans = {axis: np.ptp(small_world.positioner_um(axis, clock.now() + np.linspace(0, 0.2, 50))) for axis in "xyz"}
+    assert (spans["x"] > 19, spans["y"] < 0.1, spans["z"] < 0.1) == (True, True, True)
+    assert np.ptp(positioner.recorded("x").position_um) > 19
+    links.close()
+    served.close()
+
+
 def test_it_serves_a_serial_line_as_well(small_world: Any, clock: SimulatedClock) -> None:
     served, links = pi_e727_twin.serve(small_world, {"positioner": (1, Settings())}, "pty:"), Links(clock)
     clock.attach(served)
