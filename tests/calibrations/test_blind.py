@@ -45,6 +45,14 @@ def test_four_positions_a_turn_hide_odd_powers() -> None:
     assert not {"bias", "scale-factor", "axis-misalignment", "quadratic-nonlinearity"} & hidden
 
 
+def test_noise_hides_what_is_smaller() -> None:
+    columns = turns((90, 30, 150, 60))
+    x, y, _ = components(columns)
+    hidden = blind(poses(columns, 2.5 + x, 2.5 + y, noise_v=0.5))
+    assert {"hysteresis", "cubic-nonlinearity"} <= hidden
+    assert not {"bias", "scale-factor"} & hidden
+
+
 def test_effects_without_their_column_are_another_matter() -> None:
     assert "temperature_c" not in table((90,))
     assert "temperature-bias" not in blind(table((90,)))

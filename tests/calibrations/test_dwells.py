@@ -68,6 +68,11 @@ def test_rows_while_the_stages_move_are_left_out() -> None:
     assert set(pose_means(log()).column("n")) == {float(ROWS)}  # where nothing moves, nothing is taken off
 
 
+def test_a_creeping_stage_is_not_taken_for_a_resting_one() -> None:
+    creeping = log([(90.0, 0.0), (90.0, 2.0), (90.0, 4.0)], speed_deg_s=0.08)  # 0.04 deg in as many rows as a dwell has
+    assert pose_means(creeping).column("beta_deg") == pytest.approx(np.array([0.0, 2.0, 4.0]), abs=0.02)
+
+
 def test_time_is_the_middle_and_other_columns_are_averaged() -> None:
     samples = log(temperature_c=np.linspace(20, 27, ROWS * len(TURN)))
     table = pose_means(samples)

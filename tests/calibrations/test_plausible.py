@@ -70,6 +70,13 @@ def test_degrees_taken_for_radians(column: str, says: str) -> None:
         read(poses(), column)
 
 
+def test_a_mapping_without_a_unit_states_none() -> None:
+    content = poses().replace("vx_v", "Ux").replace("2.5\n", "2500\n")
+    with pytest.raises(DataError, match="--column vx_v=Ux:mV"):
+        read(content, "vx_v=Ux")
+    assert read(content, "vx_v=Ux:V").n == len(TURN)
+
+
 def test_what_nobody_knows_a_unit_for_may_still_be_stated() -> None:
     with pytest.raises(DataError, match="give the unit that it is in, as in --column temperature_c=temperature_c:degC"):
         read(poses(temperature_c=5000.0))
