@@ -217,7 +217,7 @@ def _nearest_given(missing: str, others: list[str]) -> str:
 def guess_kind(names: Iterable[str]) -> str:
     """The kind of table that has these columns. Raises MissingColumn when none has."""
     names = list(names)
-    for kind in ("poses", "motion", "rates", "positions"):
+    for kind in ("motion", "poses", "rates", "positions"):
         if any(all(name in names for name in wanted) for wanted in KINDS[kind]):
             return kind
     required = {name for sets in KINDS.values() for wanted in sets for name in wanted}

@@ -92,7 +92,8 @@ def evaluate(table: Table, linear: Model, physical: Model, still: Table | None =
     """
     record = max(records(table), key=lambda r: r.end - r.first)
     part = table.rows(np.arange(record.first, record.end))
-    found = reference(part.time_s, part.column("displacement_m"), record.rate_hz)
+    times_s = record.times_s(table.time_s)
+    found = reference(times_s, part.column("displacement_m"), record.rate_hz)
     if not found.lines:
         raise DataError(f"{table.source}: the displacement holds no motion that stands out of its noise")
     line = found.lines[0]
@@ -111,7 +112,7 @@ def evaluate(table: Table, linear: Model, physical: Model, still: Table | None =
     low, high = _jackknife(blocks[:1], _rmse), _jackknife(blocks[1:], _rmse)
     amplitude, std = found.amplitude
     return MotionResult(
-        t_s=part.time_s[inner],
+        t_s=times_s[inner],
         reference=true[inner],
         by_the_paper=paper[inner],
         linear=(true + errors["linear"])[inner],

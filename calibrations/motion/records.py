@@ -12,7 +12,7 @@ from calibrations.errors import DataError, TooFewRows
 from calibrations.table import Array, Table
 
 GAP = 1.5  # times the usual step of time
-UNEVEN = 0.2  # of a step: more, and samples are not evenly spaced
+UNEVEN = 0.75  # of a step: rounded times are less, a lost sample is more
 SHORTEST_S = 2.0
 SAME = ("alpha_deg", "beta_deg", "mount_deg", "flip", "record")  # throughout a record
 
@@ -30,6 +30,10 @@ class Record:
         """The rows."""
         return slice(self.first, self.end)
 
+    def times_s(self, t: Array) -> Array:
+        """The rows' times, evenly spaced: those of the table `t` may be rounded."""
+        return np.asarray(t[self.first] + np.arange(self.end - self.first) / self.rate_hz)
+
 
 @lru_cache(maxsize=8)
 def records(table: Table) -> tuple[Record, ...]:
@@ -38,10 +42,12 @@ def records(table: Table) -> tuple[Record, ...]:
     Raises DataError for samples that are not evenly spaced, TooFewRows where no record is long enough.
     """
     t = table.column("t_s")
-    if table.n < 2 or not np.all(np.diff(t) > 0):
-        row = int(np.argmax(np.diff(t) <= 0)) + 2 if table.n > 1 else 1
-        raise DataError(f'{table.source}: row {row}, column "t_s" does not grow; samples stand in order of time')
-    step = float(np.median(np.diff(t)))
+    if np.any(np.diff(t) < 0):
+        row = int(np.argmax(np.diff(t) < 0)) + 2
+        raise DataError(f'{table.source}: row {row}, column "t_s" falls; samples stand in order of time')
+    if table.n < 2 or not t[-1] > t[0]:
+        raise TooFewRows(f"{table.source}: {table.n} samples at one time are no record of a motion")
+    step = float(np.median(np.diff(t))) or float(t[-1] - t[0]) / (table.n - 1)
     cut = np.diff(t) > GAP * step
     for name in SAME:
         cut |= np.diff(table.optional(name, 0.0)) != 0

@@ -65,7 +65,7 @@ def stretches(table: Table) -> Stretches:
     if isinstance(table, Stretches):
         return table
     found = records(table)
-    made = [reference(table.time_s[r.rows], table.column("displacement_m")[r.rows], r.rate_hz) for r in found]
+    made = [reference(r.times_s(table.time_s), table.column("displacement_m")[r.rows], r.rate_hz) for r in found]
     samples = _averaged(table, found, made)
     expected = _expected(samples)
     slope = _slope(samples, expected)
@@ -113,7 +113,8 @@ def _averaged(table: Table, found: Sequence[Record], made: Sequence[Reference]) 
     for number, (record, each) in enumerate(zip(found, made, strict=True)):
         block = max(1, int(record.rate_hz / rate_hz))
         n = (record.end - record.first) // block
-        for name, values in table.columns.items():
+        even = {**table.columns, "t_s": np.append(np.zeros(record.first), record.times_s(table.time_s))}
+        for name, values in even.items():
             pieces[name].append(values[record.first : record.first + n * block].reshape(n, block).mean(axis=1))
         pieces["acceleration_m_s2"].append(each.acceleration_m_s2[: n * block].reshape(n, block).mean(axis=1))
         pieces["record"].append(np.full(n, float(number)))

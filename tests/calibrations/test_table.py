@@ -119,3 +119,7 @@ def test_guesses_the_kind() -> None:
         guess_kind(["alpha_deg", "bta_deg", "vx_v"])
     with pytest.raises(MissingColumn, match="are of no known kind of table; poses need"):
         guess_kind(["when", "humidity"])
+
+
+def test_a_motion_at_a_known_attitude_is_no_table_of_poses() -> None:
+    assert guess_kind(["t_s", "vx_v", "displacement_m", "alpha_deg", "beta_deg"]) == "motion"
