@@ -30,7 +30,7 @@ def cells(sheet: Sheet, texts: Collection[str]) -> tuple[Mapping[str, Array], Ma
 
 def _at_once(sheet: Sheet) -> Array | None:
     """All cells as numbers, shape (rows, columns); None where one is none."""
-    if not sheet.sample or len(sheet.header) != sheet.width:
+    if len(sheet.header) != sheet.width:
         return None
     comma = sheet.separator != "," and any("," in cell for row in sheet.sample for cell in row)
     with sheet.source.lines() as lines:

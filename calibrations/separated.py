@@ -82,6 +82,8 @@ def sheet(source: Source) -> Sheet:
     if not below:
         raise DataError(f"{source.name}: no rows below the header")
     sample = tuple(tuple(cells[:columns]) for _, cells in below if len(cells) == width)
+    if not sample:
+        raise DataError(_another_width(source.name, *below[0], header))
     return Sheet(
         source, separator, tuple(header[:columns]), tuple(units), named, width, line, below[0][0], sample, constants
     )
@@ -167,7 +169,8 @@ def _is_title(cells: list[str], width: int) -> bool:
 
 def _empty_behind(rows: Sequence[list[str]]) -> int:
     """How many columns at the end are empty throughout, header included."""
-    return min(next((k for k, cell in enumerate(reversed(cells)) if cell), len(cells)) for cells in rows)
+    ends = (next((k for k, cell in enumerate(reversed(cells)) if cell), len(cells)) for cells in rows)
+    return min(ends, default=0)
 
 
 def _checked(header: list[str], where: str) -> list[str]:
@@ -181,7 +184,7 @@ def _checked(header: list[str], where: str) -> list[str]:
 def _units(header: Sequence[str], rows: list[Row], named: bool) -> tuple[list[Row], list[str]]:
     """The rows of data, and a unit for each column: of the header's name, or of a row of units below it."""
     units = [name_and_unit(name)[1] for name in header]
-    if named and rows and _is_units(rows[0][1]):
+    if named and rows and len(rows[0][1]) >= len(header) and _is_units(rows[0][1]):
         below = map(unit_of, rows[0][1])
         return rows[1:], [unit or other for unit, other in zip(units, below, strict=False)]
     return rows, units

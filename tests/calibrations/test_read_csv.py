@@ -56,6 +56,36 @@ def test_round_trip(tmp_path_factory: pytest.TempPathFactory, table: Table) -> N
     assert again.source == str(path)
 
 
+FRAGMENTS = (
+    *(
+        "vx_v",
+        "ax",
+        "ay",
+        "az",
+        "path",
+        "Vx [mV]",
+        "(deg)",
+        "mV",
+        "deg",
+        "1",
+        "2,5",
+        "nan",
+        "1e200",
+        "",
+        '"',
+        "#",
+        "\x1a",
+    ),
+    *(";", ",", "\t", "\n", "\n", "\n", " "),
+)
+
+
+@given(st.lists(st.sampled_from(FRAGMENTS), max_size=40).map("".join))
+def test_any_fragments_are_a_table_or_one_clear_error(text: str) -> None:
+    with contextlib.suppress(CalibrationError):
+        parse_csv(text, "any.csv")
+
+
 @given(st.text(max_size=100) | st.text(',.0123456789-e\n" #x', max_size=100).map(f"{HEADER}\n".__add__))
 def test_any_text_is_a_table_or_one_clear_error(text: str) -> None:
     with contextlib.suppress(CalibrationError):
@@ -74,6 +104,8 @@ def test_any_text_is_a_table_or_one_clear_error(text: str) -> None:
         ("alpha_deg,vx_v\n1,2\n", "poses need alpha_deg, beta_deg, vx_v"),
         ("alpha_deg,bta_deg,vx_v\n1,2,3\n", 'line 1: no kind of table has the column "bta_deg"; did you mean "beta_'),
         (f"{HEADER}\n90,0,3.5\n90,10\n", "bad.csv, line 3: 2 values for 3 columns (alpha_deg, beta_deg, vx_v)"),
+        (f"{HEADER},humidity\n90,0,3.5\n", "bad.csv, line 2: 3 values for 4 columns"),
+        ("north,east\n1,2,3\n", "bad.csv, line 2: 3 values for 2 columns (north, east)"),
         (f"{HEADER}\n90,0,3.5\n90,10,1,2\n", "bad.csv, line 3: 4 values for 3 columns"),
         (f"{HEADER}\n90,0,3.5,1\n90,10,1,2\n", "bad.csv, line 2: 4 values for 3 columns"),
         (f"# sensor: A\n\n{HEADER}\n90,0,3.5\n90,10,high\n", 'bad.csv, line 5, column "vx_v": "high" where a number'),
