@@ -184,9 +184,9 @@ class T7:
 
 
 def _scans_per_packet(scans: int, channels: int) -> int:
-    """Of as few packets as possible, the shortest that hold all scans."""
-    packets = -(-scans // (t7.MOST_SAMPLES_PER_PACKET // channels))
-    return -(-scans // packets)
+    """Large packets, of a size that lets the last one end with the record or soon after: nobody waits for more."""
+    most = min(scans, t7.MOST_SAMPLES_PER_PACKET // channels)
+    return min(range(most, most // 2, -1), key=lambda size: -scans % size)
 
 
 def connect(address: Address, links: Links, settings: Settings, name: str) -> T7:

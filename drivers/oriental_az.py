@@ -113,8 +113,10 @@ class RotaryStage:
         self._target_deg, self._expected_end_s = angle_deg, self._clock.now()
         if _stands(outputs, az.HOME_END | az.IN_POSITION) and distance_deg < 180 / self.settings.steps_per_turn:
             return False
+        asked_s = self._clock.now()
         self._unit.write_block(*self._direct_operation(angle_deg))
-        self._expected_end_s = self._clock.now() + self._duration_s(distance_deg)
+        begun_s = (asked_s + self._clock.now()) / 2  # it starts when it has the request, and then answers
+        self._expected_end_s = begun_s + self._duration_s(distance_deg)
         return True
 
     def wait(self) -> None:

@@ -1,6 +1,7 @@
-"""What the program adds to moves and dwells: poses in real time, the simulated instruments served by a thread.
+"""What a sweep adds to its moves and dwells in real time: the simulated instruments are served by a thread.
 
-Needed is what the mechanics and the record need: every move's trapezoid, every dwell's scans. The rest is overhead.
+Needed is what the mechanics and the record need: every move's trapezoid, the settling, every dwell's scans. The rest
+is overhead: exchanges on the wires at their true speed, polls, the stream's start and stop, the thermometer.
 """
 
 from __future__ import annotations
@@ -8,29 +9,31 @@ from __future__ import annotations
 import json
 import sys
 import threading
+from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 
-from drivers import labjack_t7, labjack_t7_twin, oriental_az, oriental_az_twin
+from drivers import labjack_t7, labjack_t7_twin, omega_cn7500, omega_cn7500_twin, oriental_az, oriental_az_twin
 from drivers.clock import WallClock, serve_forever
 from drivers.links import Links
 from drivers.simulation.config import WorldConfig
 from drivers.simulation.trajectory import Trajectory
 from drivers.simulation.world import World
 
-STAGE = oriental_az.Settings()
-CONVERTER = labjack_t7.Settings()
-STEP_DEG = 10.0
+STAGE, CONVERTER, OVEN = oriental_az.Settings(), labjack_t7.Settings(), omega_cn7500.Settings()
+STEP_DEG, SETTLE_S = 10.0, 0.5
 
 
 @dataclass(frozen=True)
 class Bench:
-    """A stage and a converter in real time."""
+    """All that a sweep needs, in real time."""
 
     clock: WallClock
+    alpha: oriental_az.RotaryStage
     beta: oriental_az.RotaryStage
     adc: labjack_t7.T7
+    oven: omega_cn7500.Oven
 
 
 @contextmanager
@@ -40,8 +43,9 @@ def served() -> Iterator[Bench]:
     labjack_t7_twin.Inputs(world, {0: "vx"}).codes([0], [10.0], 0.0, 1e-3, 101)  # compiled before the clock runs
     clock = WallClock(world.now_s)
     servers = [
-        oriental_az_twin.serve(world, {"beta": (1, STAGE)}),
+        oriental_az_twin.serve(world, {"alpha": (1, STAGE), "beta": (2, STAGE)}),
         labjack_t7_twin.serve(world, {"adc": (1, CONVERTER)}),
+        omega_cn7500_twin.serve(world, {"oven": (1, OVEN)}),
     ]
     at = {role: address for server in servers for role, address in server.addresses.items()}
     thread = threading.Thread(target=serve_forever, args=(servers, over.is_set, clock))
@@ -53,34 +57,56 @@ def served() -> Iterator[Bench]:
         stack.callback(over.set)
         links = Links(clock)
         stack.callback(links.close)
-        beta = oriental_az.connect(at["beta"], links, STAGE, "beta")
-        yield Bench(clock, beta, labjack_t7.connect(at["adc"], links, CONVERTER, "adc"))
+        yield Bench(
+            clock,
+            oriental_az.connect(at["alpha"], links, STAGE, "alpha"),
+            oriental_az.connect(at["beta"], links, STAGE, "beta"),
+            labjack_t7.connect(at["adc"], links, CONVERTER, "adc"),
+            omega_cn7500.connect(at["oven"], links, OVEN, "oven"),
+        )
 
 
-def overhead_s(bench: Bench, poses: int, dwell_s: float) -> tuple[list[float], list[float]]:
-    """Of each move and of each dwell, beyond what it needs."""
-    move_s = Trajectory(0.0, 0.0, STEP_DEG, STAGE.speed_deg_s, STAGE.acceleration_deg_s2).end_s
-    moves, dwells, now = [], [], bench.clock.now
+def sweep(bench: Bench, poses: int, dwell_s: float) -> dict[str, float]:
+    """Poses along beta as a sweep visits them; how long each of its parts took, in s."""
+    took: dict[str, float] = defaultdict(float)
+    began = bench.clock.now()
+
+    def done(part: str) -> None:
+        nonlocal began
+        now = bench.clock.now()
+        took[part] += now - began
+        began = now
+
     for pose in range(poses):
-        began = now()
+        bench.alpha.move_to(0.0)
+        done("alpha")
+        bench.beta.angle_deg()
         bench.beta.move_to(STEP_DEG * (pose + 1))
-        arrived = now()
+        done("beta")
+        bench.clock.sleep(SETTLE_S)
+        done("settling")
         bench.adc.acquire(dwell_s)
-        moves.append(arrived - began - move_s)
-        dwells.append(now() - arrived - dwell_s)
-    return moves, dwells
+        done("dwell")
+        bench.oven.temperature_c()
+        done("thermometer")
+    return took
+
+
+def needed(dwell_s: float) -> dict[str, float]:
+    """What the parts of one pose need, in s."""
+    move_s = Trajectory(0.0, 0.0, STEP_DEG, STAGE.speed_deg_s, STAGE.acceleration_deg_s2).end_s
+    return {"alpha": 0.0, "beta": move_s, "settling": SETTLE_S, "dwell": dwell_s, "thermometer": 0.0}
 
 
 def main(poses: str, dwell: str) -> None:
-    count, dwell_s = int(poses), float(dwell)
+    count, least = int(poses), needed(float(dwell))
     with served() as bench:
+        bench.alpha.home()
         bench.beta.home()
-        began = bench.clock.now()
-        moves, dwells = overhead_s(bench, count, dwell_s)
-        seconds = bench.clock.now() - began
-    added = sum(moves) + sum(dwells)
-    shares = {"of_moves_ms": 1e3 * sum(moves) / count, "of_dwells_ms": 1e3 * sum(dwells) / count}
-    print(json.dumps({"seconds": seconds, "overhead": added / (seconds - added), **shares}))
+        took = sweep(bench, count, float(dwell))
+    added = {f"{part}_added_ms": 1e3 * (took[part] / count - least[part]) for part in least}
+    overhead = sum(took.values()) / count / sum(least.values()) - 1
+    print(json.dumps({"seconds": sum(took.values()), "overhead": overhead, **added}))
 
 
 if __name__ == "__main__":

@@ -81,6 +81,14 @@ def test_what_is_done_between_blocks_makes_no_gap(bench: Any) -> None:
     np.testing.assert_allclose(volts[:, 0], 0.01 * (blocks[0].start_s + 1e-3 * np.arange(200_000)), atol=3.2e-4)
 
 
+@pytest.mark.parametrize(("duration_s", "late_s"), [(5.0, 0.0), (60.0, 0.0), (4.999, 0.002), (0.001, 0.0)])
+def test_a_dwell_ends_with_its_last_scan(bench: Any, duration_s: float, late_s: float) -> None:
+    """As far as its length has divisors; the exchanges that start and stop the stream take 5 ms."""
+    began = bench.clock.now()
+    bench.adc.acquire(duration_s)
+    assert bench.clock.now() - began < duration_s + late_s + 0.005
+
+
 def test_transaction_numbers_turn_over_within_a_long_stream(bench: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(labjack_t7.t7, "MOST_SAMPLES_PER_PACKET", 3)  # one scan a packet: over 65536 in 66 s
     scans = [len(block.volts) for block in bench.adc.stream(70.0, 30.0)]
