@@ -108,8 +108,8 @@ class T7:
         """Record all channels for `duration_s` without a gap, and hand it out in blocks of `block_s`.
 
         Both are rounded to whole scans; the last block holds what is left. The device takes one record, so the
-        samples are the same whatever `block_s` is. Take the next block before the network's buffers are full
-        (a minute is no risk at 10 kB/s). Closing the iterator ends the stream.
+        samples are the same whatever `block_s` is. Take the next block within a few seconds, before the
+        buffers of network and device are full. Closing the iterator ends the stream.
 
         Raises StreamError when scans were lost, Refused when the device declines the settings, LinkTimeout.
         """
