@@ -24,7 +24,8 @@ SHIPPED = Path(__file__).parent
 class Procedure:
     """A script that runs on a session. `summary` is one line, `doc` what it excites and is blind to.
 
-    `kind` is the table that its poses make (KIND of its file): poses where nothing else is said.
+    `kind` is the table that its poses make (KIND of its file): poses where nothing else is said. An `adaptive` one
+    (ADAPTIVE) goes by what it has measured, so that its plan needs measurements too.
     """
 
     name: str
@@ -33,6 +34,7 @@ class Procedure:
     doc: str
     path: Path
     kind: str = "poses"
+    adaptive: bool = False
 
     @property
     def defaults(self) -> dict[str, Any]:
@@ -70,8 +72,8 @@ def find(wanted: str, folder: Path | None = None) -> Procedure:
     if path is None:
         raise UnknownProcedure(f"no procedure {wanted!r}{nearest(wanted, known)}")
     module = _load(path)
-    kind = getattr(module, "KIND", "poses")
-    return Procedure(name(path), getattr(module, path.stem), summary(path), _doc(path), path, kind)
+    kind, adaptive = getattr(module, "KIND", "poses"), getattr(module, "ADAPTIVE", False)
+    return Procedure(name(path), getattr(module, path.stem), summary(path), _doc(path), path, kind, adaptive)
 
 
 def _is_procedure(path: Path) -> bool:

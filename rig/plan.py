@@ -1,12 +1,14 @@
 """A dry run: the procedure itself on instruments that only count what they are told. Nothing is touched.
 
-Each move, the limits that it stays within, how long all of it takes, the room that it needs on the disk.
+Each move, the limits that it stays within, how long all of it takes, the room that it needs on the disk. A procedure
+that goes by what it measures is rehearsed on twins: its plan is that of one simulated run.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -25,6 +27,7 @@ from rig.planned import (
     Step,
     planned_answer,
 )
+from rig.rehearsal import rehearsing
 
 BYTES_PER_SAMPLE = 0.4  # in the record, measured on a sweep; an estimate for other noise
 BYTES_PER_POSE = 512  # the rest of a pose in the record
@@ -73,7 +76,7 @@ class PlanHost:
     def keep(self, pose: Pose, samples: Samples, temperature_c: float | None) -> None:  # noqa: ARG002
         self.ledger.poses += 1
 
-    def keep_reading(self, reading: Reading) -> None:
+    def keep_readings(self, *readings: Reading) -> None:
         """A plan reads nothing."""
 
     def ask(self, question: Question) -> str:
@@ -88,10 +91,10 @@ def plan(bench: Bench, procedure: Procedure, settings: Mapping[str, Any]) -> Pla
     """What `procedure` would do on `bench`. Raises what the run would: LimitError, SettingError, ProcedureError."""
     ledger = Ledger()
     parts = _parts(bench, ledger)
-    limits = replace(bench.limits, temperature_c=(-math.inf, math.inf))  # nobody knows it yet
-    session = Session(**parts, clock=ledger, host=PlanHost(ledger), limits=limits)
-    session.reference()
-    procedure.function(session, **settings)
+    dry = rehearsing if procedure.adaptive else _counting
+    with dry(bench, parts, ledger) as session:
+        session.reference()
+        procedure.function(session, **settings)
     stages = {role: part for role, part in parts.items() if isinstance(part, PlannedStage)}
     return Plan(
         procedure=procedure.name,
@@ -103,6 +106,13 @@ def plan(bench: Bench, procedure: Procedure, settings: Mapping[str, Any]) -> Pla
         duration_s=ledger.now_s,
         bytes=round(ledger.samples * BYTES_PER_SAMPLE + ledger.poses * BYTES_PER_POSE),
     )
+
+
+@contextmanager
+def _counting(bench: Bench, parts: Mapping[str, Any], ledger: Ledger) -> Iterator[Session]:
+    """A session on instruments that only count."""
+    limits = replace(bench.limits, temperature_c=(-math.inf, math.inf))  # nobody knows it yet
+    yield Session(**parts, clock=ledger, host=PlanHost(ledger), limits=limits)
 
 
 def _parts(bench: Bench, ledger: Ledger) -> dict[str, Any]:

@@ -1,0 +1,99 @@
+"""A dry run of a procedure that goes by what it measures: on a simulated copy of the bench, every step counted.
+
+Nothing real is touched and nothing is kept: all instruments are twins, in the world that the bench file describes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from inspect import isgenerator
+from typing import Any
+
+from procedures.questions import Question
+from procedures.session import Dwell, Pose, Reading, Samples, Session
+from rig.bench import SIMULATED, Bench
+from rig.instruments import Rig, absent, connected
+from rig.planned import Ledger, planned_answer
+from rig.record.values import Kept
+from rig.technician import answer
+
+
+class Counted:
+    """Does what it is told with `twin`, after `planned` has counted it, or refused it."""
+
+    def __init__(self, planned: Any, twin: Any) -> None:
+        self._planned, self._twin = planned, twin
+
+    def __getattr__(self, what: str) -> Any:
+        count, act = getattr(self._planned, what), getattr(self._twin, what)
+
+        def both(*arguments: Any, **named: Any) -> Any:
+            counted = count(*arguments, **named)
+            if isgenerator(counted):
+                deque(counted, maxlen=0)  # to its end
+            return act(*arguments, **named)
+
+        return both
+
+
+@dataclass
+class RehearsalHost:
+    """The session's host that remembers what the twins measure, for as long as the rehearsal lasts."""
+
+    ledger: Ledger
+    rig: Rig
+    dwells: list[Dwell] = field(default_factory=list)
+    read: dict[str, Reading] = field(default_factory=dict)
+
+    def kept(self) -> Sequence[Pose]:
+        return [dwell.pose for dwell in self.dwells]
+
+    def expect(self, missing: int) -> None:
+        """A rehearsal has no progress."""
+
+    def measured(self) -> Sequence[Dwell]:
+        return self.dwells
+
+    def readings(self) -> Sequence[Reading]:
+        return list(self.read.values())
+
+    def keep(self, pose: Pose, samples: Samples, temperature_c: float | None) -> None:
+        self.ledger.poses += 1
+        self.dwells.append(Kept(pose, samples, samples.start_s, temperature_c).dwell)
+
+    def keep_readings(self, *readings: Reading) -> None:
+        self.read |= {reading.name: reading for reading in readings}
+
+    def ask(self, question: Question) -> str:
+        self.ledger.questions.append(f"{question.name}: {question.text}")
+        return answer(question, self.rig) or planned_answer(question)
+
+    def doing(self, text: str) -> None:
+        """Its steps say what it does."""
+
+
+@contextmanager
+def rehearsing(bench: Bench, planned: Mapping[str, Any], ledger: Ledger) -> Iterator[Session]:
+    """A session on the twins of `bench`, in which `planned` instruments count along.
+
+    The limits of the world are not the bench's: the simulated table may stand worse than the real one.
+    """
+    with connected(_simulated(bench)) as rig:
+        parts: dict[str, Any] = {role: absent(role) for role in planned}
+        parts |= {role: Counted(planned[role], driver) for role, driver in rig.drivers.items()}
+        level_deg = None if bench.limits.level_deg is None else math.inf
+        limits = replace(bench.limits, temperature_c=(-math.inf, math.inf), level_deg=level_deg)
+        clock: Any = Counted(ledger, rig.clock)
+        yield Session(**parts, clock=clock, host=RehearsalHost(ledger, rig), limits=limits)
+
+
+def _simulated(bench: Bench) -> Bench:
+    """The same bench with a twin in every role."""
+    twins = {
+        role: part.model_copy(update={"url": SIMULATED, "stream_url": None}) for role, part in bench.instruments.items()
+    }
+    return bench.model_copy(update={"instruments": twins})

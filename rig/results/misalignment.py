@@ -1,0 +1,43 @@
+"""misalignment: the directions of the sensing axes, their angles, and the matrix that corrects for them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from calibrations.axis_search import Direction, correction, directions, non_orthogonality_deg
+from rig.record import Record, Run
+from rig.record.tables import table_of
+from rig.results.result import Result
+
+REFERENCE = "xyz"
+
+
+def evaluate(record: Record, run: Run) -> dict[str, Result]:
+    """theta-xx .. theta-yz, alpha-x .. beta-y in deg, and the correction of Ang (20)-(21) for accelerations in order.
+
+    Raises DataError where no round of the search is complete.
+    """
+    found = directions(table_of(record, run.run))
+    results: dict[str, Result] = {}
+    for direction in found.values():
+        results |= _of_axis(direction)
+    value, std = non_orthogonality_deg(found["x"], found["y"])
+    results["non-orthogonality"] = Result(value, "deg", std)
+    matrix = correction(found["x"].theta, found["y"].theta)
+    for (row, column), factor in np.ndenumerate(matrix):
+        results[f"correction-{REFERENCE[row]}{REFERENCE[column]}"] = Result(float(factor), "")
+    return results | {"rounds": Result(float(found["x"].rounds), "")}
+
+
+def _of_axis(direction: Direction) -> dict[str, Result]:
+    stds = np.sqrt(np.diag(direction.covariance))
+    thetas = {
+        f"theta-{direction.axis}{reference}": Result(float(value), "", float(std))
+        for reference, value, std in zip(REFERENCE, direction.theta, stds, strict=True)
+    }
+    stds_deg = np.sqrt(np.diag(direction.angles_covariance_deg2))
+    angles = {
+        f"{name}-{direction.axis}": Result(float(value), "deg", float(std))
+        for name, value, std in zip(("alpha", "beta"), direction.angles_deg, stds_deg, strict=True)
+    }
+    return thetas | angles
