@@ -8,7 +8,7 @@ Source    Ang V: the level is read before every experiment; reversal, as for any
 from __future__ import annotations
 
 from procedures.errors import SafetyLimit
-from procedures.session import Session
+from procedures.session import Reading, Session
 
 HALF_TURN = (("front", 0.0), ("back", 180.0))  # of beta: the table's tilt turns its sign on the level, its offset not
 LEVEL_RANGE_DEG = 45.0
@@ -50,12 +50,17 @@ def _read(rig: Session, side: str, beta_deg: float, settle_s: float) -> None:
     rig.alpha.move_to(0.0)
     rig.beta.move_to(beta_deg)
     rig.wait(settle_s)
+    std_deg: float | None = None
     if rig.level is not None:
         shown = rig.level.read()
-        rig.keep_reading(f"level-{side}-x", shown.x_deg, "deg", shown.std_deg)
-        rig.keep_reading(f"level-{side}-y", shown.y_deg, "deg", shown.std_deg)
-        return
-    for axis in "xy":
-        text = f"What does the level on the table show along {axis}, in deg? (alpha 0, beta {beta_deg:g} deg)"
-        typed = rig.number(f"level-{side}-{axis}", text, "deg", -LEVEL_RANGE_DEG, LEVEL_RANGE_DEG)
-        rig.keep_reading(f"level-{side}-{axis}", typed, "deg")
+        x_deg, y_deg, std_deg = shown.x_deg, shown.y_deg, shown.std_deg
+    else:
+        x_deg, y_deg = (_typed_deg(rig, f"level-{side}-{axis}", axis, beta_deg) for axis in "xy")
+    rig.keep_readings(
+        Reading(f"level-{side}-x", x_deg, "deg", std_deg), Reading(f"level-{side}-y", y_deg, "deg", std_deg)
+    )
+
+
+def _typed_deg(rig: Session, name: str, axis: str, beta_deg: float) -> float:
+    text = f"What does the level on the table show along {axis}, in deg? (alpha 0, beta {beta_deg:g} deg)"
+    return rig.number(name, text, "deg", -LEVEL_RANGE_DEG, LEVEL_RANGE_DEG)

@@ -169,7 +169,8 @@ class Host(Protocol):
         """The readings that the record already holds."""
 
     def keep(self, pose: Pose, samples: Samples, temperature_c: float | None) -> None: ...
-    def keep_reading(self, reading: Reading) -> None: ...
+    def keep_readings(self, *readings: Reading) -> None:
+        """All of them or none: a run that goes on does not meet a half of what was read at once."""
 
     def ask(self, question: Question) -> str:
         """A person's checked answer; an answer that the record holds is not asked for again.
@@ -229,8 +230,7 @@ class Session:
         question = Mounting.of(mount_deg, flip)
         if self.host.ask(question) == "no":
             raise Declined(f"{question.name}: the sensor is not mounted so; mount it, then resume the run")
-        self.keep_reading("mount", mount_deg, "deg")
-        self.keep_reading("flip", flip, "")
+        self.keep_readings(Reading("mount", mount_deg, "deg"), Reading("flip", flip, ""))
 
     def keep(self, pose: Pose, *, samples: Samples, temperature_c: float | None = None) -> None:
         """Put `pose` into the record. Raises SafetyLimit for a temperature outside the bench's limits."""
@@ -256,9 +256,9 @@ class Session:
         """A reading of this run that the record holds."""
         return next((reading.value for reading in self.host.readings() if reading.name == name), None)
 
-    def keep_reading(self, name: str, value: float, unit: str, std: float | None = None) -> None:
-        """Put a number that belongs to the run and to no pose into the record."""
-        self.host.keep_reading(Reading(name, value, unit, std))
+    def keep_readings(self, *readings: Reading) -> None:
+        """Put numbers that belong to the run and to no pose into the record: all that were read at once, at once."""
+        self.host.keep_readings(*readings)
 
     def confirm(self, name: str, text: str, drawing: str = "") -> None:
         """A person confirms `text`; `name` is its key in a file of answers. Raises Declined, NoAnswer."""

@@ -172,9 +172,10 @@ class RunHost:
             self._dwells.append(kept.dwell)
         self._watch.kept(kept)
 
-    def keep_reading(self, reading: Reading) -> None:
-        self._record.keep_reading(self._run, reading, self._state())
-        self._watch.read(reading)
+    def keep_readings(self, *readings: Reading) -> None:
+        self._record.keep_readings(self._run, readings, self._state())
+        for reading in readings:
+            self._watch.read(reading)
 
     def keep_state(self) -> None:
         """The bench is ready and nothing is measured yet."""

@@ -7,7 +7,7 @@ nothing else.
 from __future__ import annotations
 
 import secrets
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -90,11 +90,11 @@ class Record:
             if state is not None:
                 _put_state(to, run, state)
 
-    def keep_reading(self, run: str, reading: Reading, state: Mapping[str, Any] | None) -> None:
-        """A reading and the simulated bench's `state`, in one transaction; a name that is there is replaced."""
-        values = {"run": run, "at": _now(), **vars(reading)}
+    def keep_readings(self, run: str, read: Iterable[Reading], state: Mapping[str, Any] | None) -> None:
+        """Readings and the simulated bench's `state`, in one transaction; a name that is there is replaced."""
         with self._engine.begin() as to:
-            _put(to, readings, values, ("run", "name"))
+            for reading in read:
+                _put(to, readings, {"run": run, "at": _now(), **vars(reading)}, ("run", "name"))
             if state is not None:
                 _put_state(to, run, state)
 

@@ -65,8 +65,8 @@ class Book:
     def readings(self) -> Sequence[Reading]:
         return self.read
 
-    def keep_reading(self, reading: Reading) -> None:
-        self.read.append(reading)
+    def keep_readings(self, *readings: Reading) -> None:
+        self.read.extend(readings)
 
     def ask(self, question: Question) -> str:
         self.said.append(question.text)
@@ -155,5 +155,5 @@ def test_a_typed_number_is_a_number() -> None:
 
 def test_a_reading_is_found_by_its_name() -> None:
     rig = session()
-    rig.keep_reading("level-x", 0.02, "deg", 0.001)
+    rig.keep_readings(Reading("level-x", 0.02, "deg", 0.001))
     assert (rig.reading("level-x"), rig.reading("level-y")) == (0.02, None)

@@ -11,14 +11,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import yaml
-
-from rig.bench import DEFAULT
 from rig.record import Kept, Record
 from rig.record.tables import table_of
 from tests.rig.nursery import Ended, Harm, Nursery
 
-SWEEP = ("--step-deg", "90", "--dwell-s", "0.2", "--inclinations-deg", "90")
+RUN = ("run", "sweep", "--unattended", "--json", "--step-deg", "90", "--dwell-s", "0.2", "--inclinations-deg", "90")
 POSES = 10  # of it
 KINDS = ("clock", "sql", "wire", "disk")
 MOST_IN_A_ROW = 5
@@ -38,7 +35,6 @@ class Measured:
 class Undisturbed:
     """A run to which nothing happened, and how far each kind of harm can reach into one."""
 
-    words: tuple[str, ...]  # that begin it
     measured: Measured
     reach: dict[str, float]  # seconds, points, bytes of the log
 
@@ -79,24 +75,15 @@ def _pose(kept: Kept) -> tuple[Any, ...]:
 
 def undisturbed(nursery: Nursery, folder: Path) -> Undisturbed:
     """Run to the end without harm, and see how long that takes."""
-    bench, whole, short = folder / "bench.yaml", folder / "whole", folder / "short"
-    bench.write_text(without_level_check(DEFAULT.read_text(encoding="utf-8")), encoding="utf-8")
-    words = ("run", "sweep", "--unattended", "--json", "--bench", str(bench), *SWEEP)
-    ended = nursery.run(whole, *words)
+    whole, short = folder / "whole", folder / "short"
+    ended = nursery.run(whole, *RUN)
     assert ended.status == 0, ended.said
-    last = nursery.run(short, *words, harm=Harm("sql", ended.points["sql"] - 1))  # the log goes with the last commit
+    last = nursery.run(short, *RUN, harm=Harm("sql", ended.points["sql"] - 1))  # the log goes with the last commit
     assert last.status < 0, last.said
     log = (short / WAL).stat().st_size - LEAST_BYTES
     with Record(whole) as record:
         found = measured(record, record.runs()[0].run)
-    return Undisturbed(words, found, {"clock": ended.seconds, "disk": log, **ended.points})
-
-
-def without_level_check(bench: str) -> str:
-    """A bench file whose runs begin with their poses: the two axes of the level are kept one after the other."""
-    document = yaml.safe_load(bench)
-    document["limits"].pop("level_deg", None)
-    return str(yaml.safe_dump(document))
+    return Undisturbed(found, {"clock": ended.seconds, "disk": log, **ended.points})
 
 
 def tormented(nursery: Nursery, home: Path, whole: Undisturbed, luck: random.Random) -> list[Harm]:
@@ -106,7 +93,7 @@ def tormented(nursery: Nursery, home: Path, whole: Undisturbed, luck: random.Ran
         seen = story.seen[-1]
         left = 1 - seen.poses / (POSES + 1)
         harm = whole.drawn(luck, left, log.stat().st_size if log.exists() else 0)
-        ended = nursery.run(home, *_words(whole, seen), harm=harm)
+        ended = nursery.run(home, *_words(seen), harm=harm)
         story.seen.append(inspected(home, whole.measured))
         _check(story, ended)
         if ended.status >= 0:
@@ -118,7 +105,7 @@ def tormented(nursery: Nursery, home: Path, whole: Undisturbed, luck: random.Ran
 
 def finished(nursery: Nursery, home: Path, whole: Undisturbed, story: Story) -> None:
     """Go on with the run, to the end: it is the same as if nothing had happened."""
-    ended = nursery.run(home, *_words(whole, story.seen[-1]))
+    ended = nursery.run(home, *_words(story.seen[-1]))
     assert ended.status == 0, (story, ended.said)
     with Record(home) as record:
         (run,) = record.runs()
@@ -126,8 +113,8 @@ def finished(nursery: Nursery, home: Path, whole: Undisturbed, story: Story) -> 
         assert measured(record, run.run) == whole.measured, story
 
 
-def _words(whole: Undisturbed, seen: Seen) -> tuple[str, ...]:
-    return ("resume", seen.run, "--unattended", "--json") if seen.run else whole.words
+def _words(seen: Seen) -> tuple[str, ...]:
+    return ("resume", seen.run, "--unattended", "--json") if seen.run else RUN
 
 
 def _check(story: Story, ended: Ended) -> None:

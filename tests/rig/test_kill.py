@@ -18,7 +18,7 @@ from pathlib import Path
 import pytest
 
 from rig.record import Record
-from tests.rig.killing import Story, Undisturbed, finished, inspected, many, measured, undisturbed
+from tests.rig.killing import RUN, Story, Undisturbed, finished, inspected, many, measured, undisturbed
 from tests.rig.nursery import Harm, Nursery
 from tests.rig.rigging import in_own_process, signal_at
 
@@ -44,12 +44,13 @@ def test_kills_at_random_moments(nursery: Nursery, whole: Undisturbed, tmp_path:
 
 
 @pytest.mark.parametrize(
-    ("table", "number", "poses"), [("blocks", 1, 0), ("blocks", 9, 8), ("states", 1, 0), ("events", 1, 0)]
+    ("table", "number", "poses"),
+    [("blocks", 1, 0), ("blocks", 9, 8), ("states", 1, 0), ("events", 1, 0), ("readings", 2, 0), ("readings", 4, 0)],
 )
 def test_a_kill_inside_a_transaction(
     nursery: Nursery, whole: Undisturbed, rig_home: Path, table: str, number: int, poses: int
 ) -> None:
-    killed = nursery.run(rig_home, *whole.words, harm=Harm(f"INSERT INTO {table}", number))
+    killed = nursery.run(rig_home, *RUN, harm=Harm(f"INSERT INTO {table}", number))
     assert killed.status == -signal.SIGKILL
     seen = inspected(rig_home, whole.measured)
     assert (seen.state, seen.poses) == ("stopped", poses)
@@ -59,7 +60,7 @@ def test_a_kill_inside_a_transaction(
 def test_whole_processes_killed_while_they_start(nursery: Nursery, whole: Undisturbed, rig_home: Path) -> None:
     luck, seen = random.Random(1), Story().seen[-1]
     for _ in range(3):
-        words = ("resume", seen.run, "--unattended") if seen.run else whole.words
+        words = ("resume", seen.run, "--unattended") if seen.run else RUN
         process = subprocess.Popen(
             [sys.executable, "-m", "rig", *words],
             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
@@ -77,7 +78,7 @@ def test_whole_processes_killed_while_they_start(nursery: Nursery, whole: Undist
 def test_a_signal_ends_the_process_with_status_4_and_resume_finishes_the_run(
     name: str, nursery: Nursery, whole: Undisturbed, rig_home: Path
 ) -> None:
-    stopped = in_own_process(*whole.words, harm=signal_at("blocks", 5, name))
+    stopped = in_own_process(*RUN, harm=signal_at("blocks", 5, name))
     document = json.loads(stopped.stdout)
     assert (stopped.returncode, document["state"]) == (4, "stopped")
     assert f"stopped by {name}; `rig resume {document['run']}` goes on" in stopped.stderr

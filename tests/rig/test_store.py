@@ -169,7 +169,7 @@ def test_a_record_of_the_first_version_is_brought_up_to_date(tmp_path: Path) -> 
     with closing(sqlite3.connect(tmp_path / "record.db")) as connection:
         connection.executescript("ALTER TABLE poses DROP COLUMN excluded; DROP TABLE readings; PRAGMA user_version = 1")
     with Record(tmp_path) as record:
-        record.keep_reading(run, Reading("level-x", 0.02, "deg", 0.001), None)
+        record.keep_readings(run, [Reading("level-x", 0.02, "deg", 0.001)], None)
         record.exclude(run, 0, "touched")
         assert [kept.excluded for kept in record.kept(run)] == ["touched"]
     with closing(sqlite3.connect(tmp_path / "record.db")) as connection:
@@ -180,7 +180,7 @@ def test_a_reading_is_replaced_by_one_of_its_name() -> None:
     with Record() as record:
         run = begin(record)
         for value in (0.1, 0.2):
-            record.keep_reading(run, Reading("level-x", value, "deg"), {"at": value})
+            record.keep_readings(run, [Reading("level-x", value, "deg")], {"at": value})
         assert record.readings(run) == [Reading("level-x", 0.2, "deg", None)]
         assert record.state(run) == {"at": 0.2}
 
