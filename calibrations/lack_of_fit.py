@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from scipy.linalg import qr
 
 from calibrations.chain import nominal_pose, specific_force
 from calibrations.table import Array, Table
@@ -61,5 +62,6 @@ def _harmonics(a: Array, degree: int) -> Iterator[Array]:
 
 
 def _orthonormal(columns: Array) -> Array:
-    U, s, _ = np.linalg.svd(columns, full_matrices=False)
-    return U[:, s > 1e-8 * s[0]]
+    Q, R, _ = qr(columns, mode="economic", pivoting=True)
+    size = np.abs(np.diag(R))
+    return np.asarray(Q[:, size > 1e-8 * size[0]])

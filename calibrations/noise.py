@@ -10,7 +10,7 @@ takes its place. `noise_fit` estimates it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -18,6 +18,7 @@ import numpy as np
 from calibrations.kernels import whiten
 from calibrations.table import Array
 
+BEYOND = 10.0  # lengths of a record: the longest times at which it is said to flicker
 SLOW_FREEDOM = 60.0  # as a process has whose time constant is a hundredth of the record
 
 
@@ -65,6 +66,20 @@ class Noise:
         """Whether both weigh the rows alike, scatter within 1 % of the noise."""
         same = np.array_equal(self.ratio, other.ratio) and self.taus_s == other.taus_s
         return same and bool(np.all(np.abs(rms(self.fast) / rms(other.fast) - 1) < 1e-2))
+
+    def prolonged(self) -> Noise:
+        """Flicker noise goes on at times longer than a record: with time constants up to BEYOND times its length.
+
+        What wanders so slowly looks like a bias in the record, which is then known no better than it wanders.
+        """
+        taus_s, ratio = list(self.taus_s), self.ratio.copy()
+        for c, taus in enumerate(self.taus_s):
+            if len(taus) > 1:
+                step = taus[1] / taus[0]
+                more = int(np.log(BEYOND * float(np.sum(self.gap_s)) / taus[-1]) / np.log(step))
+                taus_s[c] = (*taus, *(taus[-1] * step**k for k in range(1, more + 1)))
+                ratio[c] *= np.sqrt(len(taus_s[c]) / len(taus))
+        return replace(self, ratio=ratio, taus_s=tuple(taus_s))
 
     def whiten(self, columns: Array) -> Array:
         """(channels, n, k) -> (channels * n, k), each row of unit variance and independent of the others."""
