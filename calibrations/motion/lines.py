@@ -13,7 +13,7 @@ import numpy as np
 
 from calibrations.motion.output import corner_hz
 from calibrations.motion.records import records
-from calibrations.motion.reference import Reference
+from calibrations.motion.reference import Reference, strength
 from calibrations.motion.spectrum import first_order, periodogram
 from calibrations.table import Array, Table
 
@@ -53,7 +53,7 @@ def lines_of(samples: Table, made: Sequence[Reference], expected: Array, length_
 def _frequencies(made: Sequence[Reference], length_s: float) -> list[float]:
     lines = [line for each in made for line in each.lines]
     chosen: list[float] = []
-    for line in sorted(lines, key=lambda s: s.frequency_hz**2 * s.amplitude, reverse=True):
+    for line in sorted(lines, key=strength, reverse=True):
         if all(abs(line.frequency_hz - f) * length_s > 0.9 for f in (0.0, *chosen)):
             chosen.append(line.frequency_hz)
     return chosen

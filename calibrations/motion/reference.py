@@ -16,15 +16,25 @@ import numpy as np
 
 from calibrations.motion.sine import Sine, sines
 from calibrations.motion.smoother import Smoothed, smooth
-from calibrations.motion.spectrum import PAPER_CORNER_HZ, Complex, Response, butterworth, corrected, through
+from calibrations.motion.spectrum import (
+    PAPER_CORNER_HZ,
+    Complex,
+    Response,
+    butterworth,
+    corrected,
+    periodogram,
+    through,
+)
 from calibrations.table import Array
 
+HIGHEST_HZ = 30.0  # of a line that is motion, or so many times the strongest's: above it is the probe's hum
+HIGHEST = 1.5
 STENCIL = np.array([-1.0, 16.0, -30.0, 16.0, -1.0]) / 12  # second derivative, of fourth order
 
 
 @dataclass(frozen=True)
 class Reference:
-    """Acceleration in m/s^2, shape (n,), and how it was made. `lines` are strongest first."""
+    """Acceleration in m/s^2, shape (n,), and how it was made. `lines` are those of the greatest acceleration first."""
 
     acceleration_m_s2: Array
     lines: tuple[Sine, ...]
@@ -37,14 +47,29 @@ class Reference:
         return len(self.acceleration_m_s2) / self.rate_hz
 
     @property
+    def at_hz(self) -> float:
+        """The motion's frequency: of the strongest line, else the middle of the spectrum of its acceleration."""
+        if self.lines:
+            return self.lines[0].frequency_hz
+        f, power = periodogram(self.acceleration_m_s2, self.rate_hz)
+        return float(np.sum(f * power) / np.sum(power))
+
+    @property
     def amplitude(self) -> tuple[float, float]:
-        """Peak acceleration of the strongest line and its standard uncertainty, m/s^2; zero where there is no line."""
+        """Peak acceleration and its standard uncertainty, m/s^2: of the strongest line, else the greatest of all."""
         if not self.lines:
-            return 0.0, 0.0
+            corner_hz = self.rest.corner_hz(self.rate_hz)
+            left = self.rest.noise_std * np.sqrt(2 * corner_hz / self.rate_hz)  # noise that the smoother lets through
+            return float(np.max(np.abs(self.acceleration_m_s2))), float(left * (2 * np.pi * corner_hz) ** 2)
         line = self.lines[0]
         turn, turn_std = 2 * np.pi * line.frequency_hz, 2 * np.pi * line.frequency_std_hz
         std = np.hypot(turn**2 * line.amplitude_std, 2 * turn * line.amplitude * turn_std)
         return turn**2 * line.amplitude, float(std)
+
+    @property
+    def moves(self) -> bool:
+        """Whether there is motion that stands out of the displacement's noise."""
+        return bool(self.lines) or float(np.std(self.rest.values)) > self.rest.noise_std
 
 
 @dataclass(frozen=True)
@@ -75,11 +100,18 @@ class Bias:
 
 def reference(t_s: Array, displacement_m: Array, rate_hz: float) -> Reference:
     """The acceleration by sines and smoother. Shapes (n,)."""
-    lines = sines(t_s, displacement_m)
-    left = displacement_m - sum((line.at(t_s) for line in lines), np.zeros(len(t_s)))
+    found = sines(t_s, displacement_m)
+    left = displacement_m - sum((line.at(t_s) for line in found), np.zeros(len(t_s)))
     rest = smooth(left - left.mean())
+    most = max(HIGHEST_HZ, HIGHEST * max(found, key=lambda line: line.amplitude).frequency_hz) if found else 0.0
+    lines = sorted((line for line in found if line.frequency_hz <= most), key=strength, reverse=True)
     moving = sum((-((2 * np.pi * s.frequency_hz) ** 2) * s.at(t_s) for s in lines), np.zeros(len(t_s)))
-    return Reference(moving + second_derivative(rest.values, rate_hz, STENCIL), lines, rest, rate_hz)
+    return Reference(moving + second_derivative(rest.values, rate_hz, STENCIL), tuple(lines), rest, rate_hz)
+
+
+def strength(line: Sine) -> float:
+    """What a line's acceleration grows with."""
+    return line.frequency_hz**2 * line.amplitude
 
 
 def paper_reference(displacement_m: Array, rate_hz: float, frequency_hz: float) -> Array:
@@ -95,37 +127,24 @@ def second_derivative(x: Array, rate_hz: float, stencil: Array) -> Array:
     return np.pad(inner, reach, mode="edge")
 
 
-def biases(found: Reference) -> tuple[Bias, Bias, Bias]:
-    """What each step to a reference does by itself: the paper's filter and the sines at the strongest line, the
+def biases(found: Reference) -> tuple[Bias, ...]:
+    """What each step to a reference does by itself: the paper's filter and the sines at the motion's frequency, the
     smoother at a quarter of its corner. An amplitude is never negative: noise makes it longer, by half its variance.
     """
-    line = found.lines[0]
-    frequency_hz, periods = line.frequency_hz, 1 / found.duration_s
-    rate_hz = found.rate_hz
+    at_hz, rate_hz, periods = found.at_hz, found.rate_hz, 1 / found.duration_s
 
     def paper(f: Array) -> Complex:
-        return np.asarray(corrected(butterworth(rate_hz), frequency_hz)(f) * _differences(f, rate_hz, (-2.0, 2.0)))
+        return np.asarray(corrected(butterworth(rate_hz), at_hz)(f) * _differences(f, rate_hz, (-2.0, 2.0)))
 
     def smoother(f: Array) -> Complex:
         return np.asarray(found.rest.response(f, rate_hz) * _differences(f, rate_hz, (-2.5, 16 / 6, -1 / 6)))
 
+    quarter, edge_s = found.rest.corner_hz(rate_hz) / 4, found.rest.edge_s(rate_hz)
+    longer = [(line.amplitude_std / line.amplitude) ** 2 / 2 for line in found.lines[:1]]
     return (
-        bias_of("Butterworth low-pass, two differences", paper, frequency_hz, rate_hz, 4 / PAPER_CORNER_HZ),
-        Bias(
-            "sine approximation",
-            frequency_hz,
-            (line.amplitude_std / line.amplitude) ** 2 / 2,
-            0.0,
-            (frequency_hz - periods, frequency_hz + periods),
-            0.0,
-        ),
-        bias_of(
-            "Kalman smoother of the rest",
-            smoother,
-            found.rest.corner_hz(rate_hz) / 4,
-            rate_hz,
-            found.rest.edge_s(rate_hz),
-        ),
+        bias_of("Butterworth low-pass, two differences", paper, at_hz, rate_hz, 4 / PAPER_CORNER_HZ),
+        *(Bias("sine approximation", at_hz, share, 0.0, (at_hz - periods, at_hz + periods), 0.0) for share in longer),
+        bias_of("Kalman smoother of the rest", smoother, quarter, rate_hz, edge_s),
     )
 
 

@@ -55,7 +55,7 @@ def four_parameter(t_s: Array, x: Array, frequency_hz: float | None = None) -> S
 
 
 def sines(t_s: Array, x: Array) -> tuple[Sine, ...]:
-    """The lines that stand out of a record, strongest first, each fitted beside the others."""
+    """The lines that stand out of a record, the most prominent first, each fitted beside the others."""
     found: list[Sine] = []
     left = x
     while len(found) < MOST_SINES:

@@ -22,7 +22,7 @@ from calibrations.errors import TooFewRows
 from calibrations.motion.lines import Line, lines_of, noise_density
 from calibrations.motion.output import sampled
 from calibrations.motion.records import Record, records
-from calibrations.motion.reference import Reference, reference
+from calibrations.motion.reference import Reference, reference, strength
 from calibrations.table import Array, Table
 
 STRETCHES = 30  # of all records together; slow noise wants 20
@@ -143,8 +143,8 @@ def _length_s(found: Sequence[Record], made: Sequence[Reference]) -> float:
     lines = [line for each in made for line in each.lines]
     if not lines:
         return wanted
-    strongest = max(lines, key=lambda line: line.frequency_hz**2 * line.amplitude)
-    return max(1, round(wanted * strongest.frequency_hz)) / strongest.frequency_hz
+    at_hz = max(lines, key=strength).frequency_hz
+    return max(1, round(wanted * at_hz)) / at_hz
 
 
 def _cuts(samples: Table, length_s: float) -> Iterator[tuple[int, int]]:

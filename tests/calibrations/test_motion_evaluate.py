@@ -144,3 +144,20 @@ def test_picture_shows_reference_models_and_errors() -> None:
     assert all("(" in ax.get_ylabel() for ax in (above, left))
     assert left.get_xlabel() == right.get_xlabel() == "time (s)"
     assert png(figure).startswith(b"\x89PNG")
+
+
+def test_motion_that_is_no_sine_is_followed() -> None:
+    lines = tuple((40e-6 / f, f) for f in np.arange(3.0, 14.0, 0.37))  # none stands out of the others for long
+    table = shaken.record(lines, 30.0, kappa=KAPPA, noise_v=NOISE_V)
+    found = evaluate(table, *models(), still())
+    assert found.improvement.value > 0.97
+    assert found.excess < 1.2
+    assert np.ptp(found.reference) > 200
+
+
+def test_a_line_above_the_motion_is_the_probes_hum() -> None:
+    table = shaken_rig()
+    hum = 2e-6 * np.sin(2 * np.pi * 50 * table.time_s)
+    columns = {**table.columns, "displacement_m": table.column("displacement_m") + hum}
+    found = evaluate(Table.from_columns("motion", columns, table.constants), *models(), still())
+    assert found.rmse_physical.value == pytest.approx(result().rmse_physical.value, rel=0.01)
