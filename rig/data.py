@@ -14,7 +14,6 @@ from calibrations.read_csv import read_csv
 from calibrations.stills import is_raw_log, positions
 from calibrations.table import Table
 from rig.errors import RecordError, UnknownRun
-from rig.home import home
 
 
 def averaged(log: Table, tell: Callable[[str], None]) -> Table:
@@ -62,13 +61,11 @@ def load(data: str, kind: str | None = None, tell: Callable[[str], None] = lambd
 
 
 def _of_run(data: str) -> Table:
-    from rig.record.store import FILE, Record  # a file needs no database
+    from rig.record.store import Record  # a file needs no database
     from rig.record.tables import table_of
 
-    if not (home() / FILE).is_file():  # looking for a run makes no record
-        raise UnknownRun(f"{data}: there is no such file, and no run either: there are none yet in {home()}")
-    with Record() as record:
-        try:
+    try:
+        with Record.to_find(data) as record:
             return table_of(record, data)
-        except UnknownRun as error:
-            raise UnknownRun(f"{data}: there is no such file, and {error}") from None
+    except UnknownRun as error:
+        raise UnknownRun(f"{data}: there is no such file, and {error}") from None

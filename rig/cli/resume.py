@@ -24,6 +24,6 @@ def command(run: str, unattended: bool, answers: Path | None, bench_file: Path |
     With --bench the run goes on only if that file is still the same.
     """
     bench = read_bench(bench_file) if bench_file else None
-    with Record() as record, watching(record.run(run).procedure, unattended, answers) as watch:
+    with Record.to_find(run) as record, watching(record.run(run).procedure, unattended, answers) as watch:
         outcome = resume(record, run, watch, bench)
     return tell(outcome, as_json)

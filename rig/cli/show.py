@@ -14,7 +14,7 @@ from rig.record.tables import table_of
 @json_option
 def command(run: str, as_json: bool) -> None:
     """Show how RUN was made, how it ended, and the range of each of its columns."""
-    with Record() as record:
+    with Record.to_find(run) as record:
         found, events = record.run(run), record.events(run)
         table = table_of(record, run) if found.rows else None
     ranges = {name: (float(v.min()), float(v.max())) for name, v in table.columns.items()} if table else {}

@@ -46,6 +46,13 @@ class Record:
         self.path = self.folder / FILE
         self._engine = open_file(self.path)
 
+    @classmethod
+    def to_find(cls, run: str) -> Self:
+        """The application's own record, to look for a run in, which makes none. Raises UnknownRun."""
+        if not (home() / FILE).is_file():
+            raise UnknownRun(f"no run {run!r}: nothing is recorded yet in {home()}")
+        return cls()
+
     def __enter__(self) -> Self:
         return self
 

@@ -75,7 +75,7 @@ def test_looking_for_a_run_makes_no_record(
     monkeypatch.setenv("RIG_HOME", str(tmp_path / "home"))
     ended = rig("compare", "nowhere")
     assert getattr(ended, "status", 0) == 2
-    assert "nowhere: there is no such file, and no run either: there are none yet in" in getattr(ended, "err", "")
+    assert "there is no such file, and no run 'nowhere': nothing is recorded yet in" in getattr(ended, "err", "")
     assert not (tmp_path / "home").exists()
 
 

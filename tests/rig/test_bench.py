@@ -16,7 +16,7 @@ ALPHA = {"driver": "oriental_az", "url": "simulated"}
 def test_the_simulated_rig_is_the_default() -> None:
     bench = read_bench()
     assert bench.simulated
-    assert set(bench.instruments) == {"alpha", "beta", "adc", "oven"}
+    assert set(bench.instruments) == {"alpha", "beta", "adc", "oven", "level"}
     assert bench.constants["sensor"] == "ADXL203"
     assert bench.constants["filter_corner_hz"] == 15.07
 

@@ -12,6 +12,7 @@ import yaml
 
 from calibrations.read_csv import read_csv
 from rig.bench import DEFAULT, read_bench
+from rig.home import home
 from rig.record import Record
 from tests.rig.rigging import POSES, SMALL_ARGUMENTS
 
@@ -194,3 +195,11 @@ def test_an_export_into_no_folder_is_said(rig: Rig, tmp_path: Path) -> None:
     ended = rig("export", "anything", "--out", str(tmp_path / "no" / "x.csv"))
     assert ended.status == 2
     assert "there is no folder" in ended.err
+
+
+@pytest.mark.parametrize("words", [("show", "nothing"), ("resume", "nothing"), ("compare", "nothing")])
+def test_looking_for_a_run_makes_no_record(rig: Rig, words: tuple[str, ...]) -> None:
+    ended = rig(*words)
+    assert ended.status == 2
+    assert "no run 'nothing': nothing is recorded yet in " in ended.err
+    assert not list(home().rglob("record.db"))
