@@ -98,7 +98,7 @@ def structure_of(fit: Fit) -> str | None:
 
 def _patternless(fit: Fit) -> str | None:
     """More noise than a sensor makes by itself. On positions it is how well a hand repeats them, and no effect."""
-    if fit.table.kind != "poses" or not fit.noise.known or fit.pooled_excess <= MOST_NOISE:
+    if fit.table.kind == "positions" or not fit.noise.known or fit.pooled_excess <= MOST_NOISE:
         return None
     slow, scatter = (float(np.max(noise / fit.noise.floor)) for noise in (fit.noise.slow, fit.noise.scatter))
     what = "slow drift" if slow > scatter else "scatter"

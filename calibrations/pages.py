@@ -86,8 +86,9 @@ def _row(p: Parameter) -> str:
 
 
 def _footnote(effect: Effect) -> str:
-    outputs = any("{out}" in p.unit for p in effect.parameters)
-    return "\n{out} is the unit of the sensor's output: V for poses, the unit of the data for positions.\n" * outputs
+    if not any("{out}" in p.unit for p in effect.parameters):
+        return ""
+    return "\n{out} is the unit of the sensor's output: V for poses and motion, the unit of the data for positions.\n"
 
 
 if __name__ == "__main__":

@@ -40,7 +40,7 @@ def parameters(model: Model) -> str:
 
 def errors(found: Fit) -> str:
     """Residual, noise floor and slow noise of each channel."""
-    unit = found.table.unit if found.table.kind == "poses" else "g"
+    unit = found.problem.unit
     rows = [
         (
             channel,
