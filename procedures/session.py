@@ -234,13 +234,17 @@ class Session:
 
     def keep(self, pose: Pose, *, samples: Samples, temperature_c: float | None = None) -> None:
         """Put `pose` into the record. Raises SafetyLimit for a temperature outside the bench's limits."""
+        self.check_temperature(temperature_c)
+        self.host.keep(pose, samples, temperature_c)
+
+    def check_temperature(self, temperature_c: float | None) -> None:
+        """Raises SafetyLimit for a sensor's temperature outside the bench's limits; an unknown one passes."""
         low, high = self.limits.temperature_c
         if temperature_c is not None and not (math.isfinite(temperature_c) and low <= temperature_c <= high):
             raise SafetyLimit(
                 f"the sensor is at {temperature_c:g} C, outside the bench's limits of {low:g} to {high:g} C; "
                 "let it come back, or change limits.temperature_c in the bench file"
             )
-        self.host.keep(pose, samples, temperature_c)
 
     def keep_stretch(self, poses: Sequence[Pose], block_s: float) -> None:
         """Put a record without gaps into the record: `block_s` seconds of it as each of `poses`, which stand still."""

@@ -15,6 +15,7 @@ from procedures.level_check import levelled
 from procedures.session import Pose, Session
 
 INCLINATIONS_DEG = (90.0, 30.0, 150.0, 60.0, 120.0, 45.0, 135.0)
+REFERENCE = Pose(90.0, 45.0, 1, "reference")  # both axes feel gravity, always approached from the same side
 Paths = Literal["grid", "ang"]
 
 
@@ -26,14 +27,18 @@ def sweep(
     dwell_s: float = 5.0,
     settle_s: float = 0.5,
     paths: Paths = "grid",
+    reference_every: int = 0,
 ) -> None:
     """Record `dwell_s` seconds at every angle of the grid, clockwise then anticlockwise.
 
-    `paths="ang"` adds every inclination's negative, and the half turns to each side at 90 deg.
+    `paths="ang"` adds every inclination's negative, and the half turns to each side at 90 deg. `reference_every` other
+    poses, one reference pose comes again, which tells drift from everything else; 0 for none.
     """
     if dwell_s <= 0 or settle_s < 0:
         raise SettingError(f"sweep: dwell_s is {dwell_s:g}, settle_s is {settle_s:g}: give times above 0")
-    poses = list(grid(inclinations_deg, step_deg, paths))
+    if reference_every < 0:
+        raise SettingError(f"sweep: reference_every is {reference_every}; give a number of poses, or 0 for none")
+    poses = referenced(list(grid(inclinations_deg, step_deg, paths)), reference_every)
     rig.confirm("mounting", "Is the sensor mounted face up on the table, its cable free to turn?", drawing="face-up")
     levelled(rig)
     for pose in rig.missing(poses):
@@ -56,6 +61,14 @@ def grid(inclinations_deg: Sequence[float], step_deg: float, paths: Paths = "gri
             for side, path in ((180, "A+ to A-"), (-180, "B+ to B-")):
                 yield from turn(alpha, 0, side, step_deg, path)
                 yield from turn(alpha, side, 0, step_deg, path)
+
+
+def referenced(poses: Sequence[Pose], every: int) -> list[Pose]:
+    """`poses` with the reference pose before the first, after every `every` of them, and after the last."""
+    if not every:
+        return list(poses)
+    parts = [[REFERENCE, *poses[k : k + every]] for k in range(0, len(poses), every)]
+    return [pose for part in parts for pose in part] + [REFERENCE]
 
 
 def turn(alpha_deg: float, from_deg: float, to_deg: float, step_deg: float, path: str) -> Iterator[Pose]:

@@ -93,7 +93,10 @@ class Rig:
         self.clock.restore(state["clock_s"])
 
     def stop(self) -> list[str]:
-        """Stop all that moves, at once and whatever else is wrong; what could not be stopped."""
+        """Stop all that moves, at once and whatever else is wrong, then the oven's heat; what could not be stopped.
+
+        The limits of temperature are looked at by a run only: without one, nobody watches the oven.
+        """
         failed = []
         for role in MOVING:
             mover = cast(Any, self.drivers.get(role))
@@ -102,6 +105,12 @@ class Rig:
                     mover.stop()
             except DriverError as error:
                 failed.append(f"{role} may still move: {error}")
+        oven = cast(Any, self.drivers.get("oven"))
+        try:
+            if oven is not None:
+                oven.run(False)
+        except DriverError as error:
+            failed.append(f"oven may still heat: {error}")
         return failed
 
 

@@ -110,6 +110,8 @@ class PlannedAdc:
             yield Block(np.zeros((1, len(names))), names, rate_hz, start_s + k * block_s)
 
     def power(self, on: bool) -> None:
+        if self._settings.power_dio is None:
+            raise LimitError(f"{self._name}: no line switches the power", "Set power_dio in the bench file")
         self._ledger.add(f"{self._name} switches the sensor {'on' if on else 'off'}", EXCHANGE_S)
 
 

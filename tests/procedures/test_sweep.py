@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from procedures.errors import SettingError
 from procedures.session import Pose
-from procedures.sweep import INCLINATIONS_DEG, grid, turn
+from procedures.sweep import INCLINATIONS_DEG, REFERENCE, grid, referenced, turn
 
 STEPS = st.sampled_from([180 / k for k in range(1, 40)])
 ANGLES = st.lists(st.floats(-180, 180), min_size=1, max_size=4, unique=True)
@@ -67,3 +67,11 @@ def test_a_step_that_does_not_divide_half_a_turn_is_refused(step: float) -> None
 def test_no_inclination_is_refused() -> None:
     with pytest.raises(SettingError, match="inclinations_deg is empty"):
         list(grid((), 10.0))
+
+
+def test_the_reference_pose_comes_first_last_and_between() -> None:
+    poses = list(turn(90, 0, 180, 45, "up"))
+    kept = referenced(poses, 2)
+    assert [pose == REFERENCE for pose in kept] == [True, False, False, True, False, False, True, False, True]
+    assert [pose for pose in kept if pose != REFERENCE] == poses
+    assert referenced(poses, 0) == poses

@@ -1,0 +1,26 @@
+"""repeat: standard deviations of bias and scale factor between repetitions of each kind, beyond their noise."""
+
+from __future__ import annotations
+
+from calibrations.repeatability import between
+from calibrations.tumble import tumbles
+from rig.record import Record, Run
+from rig.record.tables import table_of
+from rig.results.result import Result
+
+AXES = "xy"
+
+
+def evaluate(record: Record, run: Run) -> dict[str, Result]:
+    """bias-as-is-x, scale-power-y and so on: V, and a fraction. Raises DataError for fewer than two repetitions."""
+    table, results = table_of(record, run.run), {}
+    for axis in (axis for axis in table.axes if axis in AXES):
+        done = tumbles(table, axis)
+        for kind in dict.fromkeys(each.path.partition(" ")[0] for each in done):
+            mine = [each for each in done if each.path.partition(" ")[0] == kind]
+            bias = between([each.bias_v for each in mine], [each.bias_std_v for each in mine])
+            mean = sum(each.scale_v_per_g for each in mine) / len(mine)
+            scale = between([each.scale_v_per_g / mean for each in mine], [each.scale_std for each in mine])
+            results[f"bias-{kind}-{axis}"] = Result(bias[0], "V", bias[1])
+            results[f"scale-{kind}-{axis}"] = Result(scale[0], "", scale[1])
+    return results

@@ -1,0 +1,26 @@
+"""temperature-cycle: what temperature does to bias and scale factor, and what it leaves behind."""
+
+from __future__ import annotations
+
+from calibrations.temperature_coefficients import bias_coefficients, scale_coefficients
+from calibrations.tumble import tumbles
+from rig.record import Record, Run
+from rig.record.tables import table_of
+from rig.results.result import Result
+
+AXES = "xy"
+
+
+def evaluate(record: Record, run: Run) -> dict[str, Result]:
+    """Slopes in V/K and 1/K; hysteresis (up minus down) in V and as a fraction. Raises DataError for too few steps."""
+    table, results = table_of(record, run.run), {}
+    for axis in (axis for axis in table.axes if axis in AXES):
+        steps = tumbles(table, axis)
+        for name, unit, found in (
+            ("bias", "V", bias_coefficients(steps)),
+            ("scale", "", scale_coefficients(steps)),
+        ):
+            results[f"{name}-temperature-{axis}"] = Result(found.slope[0], f"{unit or '1'}/K", found.slope[1])
+            hysteresis, std = found.hysteresis
+            results[f"{name}-temperature-hysteresis-{axis}"] = Result(hysteresis, unit, std)
+    return results

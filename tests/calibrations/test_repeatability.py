@@ -1,0 +1,103 @@
+"""Tumbles, the spread between them, and temperature coefficients, on numbers that are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from calibrations.errors import DataError
+from calibrations.repeatability import between
+from calibrations.table import Table
+from calibrations.temperature_coefficients import bias_coefficients, scale_coefficients
+from calibrations.tumble import Tumble, tumbles
+from procedures.tumbles import tumble
+
+WHITE_V = 50e-6
+
+
+def table(paths: list[str], random: np.random.Generator | None = None, last: int | None = None) -> Table:
+    """Tumbles with bias 2.5 V, 1.02 V/g, hysteresis of 3 mV and a cross-axis term of 20 mV/g."""
+    poses = [pose for path in paths for pose in tumble(path)][:last]
+    beta = np.radians([pose.beta_deg for pose in poses])
+    side = np.array([pose.direction for pose in poses])
+    noise = random.standard_normal(len(poses)) if random is not None else np.zeros(len(poses))
+    volts = 2.5 + 1.02 * np.cos(beta) + 0.02 * np.sin(beta) + 3e-3 * side * np.sin(beta) + WHITE_V * noise
+    columns = {
+        "alpha_deg": np.full(len(poses), 90.0),
+        "beta_deg": np.degrees(beta),
+        "vx_v": volts,
+        "vx_std_v": np.full(len(poses), WHITE_V * np.sqrt(100)),
+        "n": np.full(len(poses), 100.0),
+        "t_s": np.arange(float(len(poses))),
+    }
+    return Table.from_columns("poses", columns, {}, "tumbles", {"path": tuple(p.path for p in poses)})
+
+
+def test_a_tumble_gives_bias_and_scale_whatever_hysteresis() -> None:
+    (one,) = tumbles(table(["as-is 1"]), "x")
+    assert (one.bias_v, one.scale_v_per_g) == pytest.approx((2.5, 1.02), abs=1e-12)
+
+
+def test_its_standard_errors_are_true() -> None:
+    random = np.random.default_rng(2)
+    done = tumbles(table([f"as-is {k}" for k in range(400)], random), "x")
+    assert np.std([t.bias_v for t in done]) == pytest.approx(done[0].bias_std_v, rel=0.1)
+    assert np.std([t.scale_v_per_g / 1.02 for t in done]) == pytest.approx(done[0].scale_std, rel=0.1)
+
+
+def test_an_incomplete_tumble_is_refused() -> None:
+    with pytest.raises(DataError, match="'as-is 1' is not complete"):
+        tumbles(table(["as-is 1"], last=2), "x")
+    with pytest.raises(DataError, match="holds no tumble"):
+        tumbles(table(["reference"]), "x")
+
+
+def test_the_spread_between_is_freed_from_noise_on_the_mean() -> None:
+    """2000 times six repetitions: 3 between them, noise of 2 on each."""
+    random = np.random.default_rng(1)
+    values = 3 * random.standard_normal((2000, 6)) + 2 * random.standard_normal((2000, 6))
+    found = np.array([between(row, [2.0] * 6) for row in values])
+    assert np.mean(found[:, 0] ** 2) == pytest.approx(9.0, rel=0.1)
+    within = np.abs(found[:, 0] - 3) < 2 * found[:, 1]
+    assert 0.8 < within.mean() < 1.0
+
+
+def test_noise_alone_is_no_spread_but_its_bound_is_told() -> None:
+    value, std = between([1.0, 1.1, 0.9], [0.5] * 3)
+    assert value == 0
+    assert std == pytest.approx(np.sqrt(0.01 * np.sqrt(2 / 2)))
+    with pytest.raises(DataError, match="two repetitions"):
+        between([1.0], [0.1])
+
+
+def steps(cycles: int, drift_v: float = 0.0, curve: float = 0.0) -> list[Tumble]:
+    """1 mV/K, hysteresis 0.4 mV, 100 ppm/K."""
+    made = []
+    for k in range(1, cycles + 1):
+        for way, c in (("up", 35), ("up", 50), ("up", 65), ("down", 50), ("down", 35)):
+            t_s = float(len(made))
+            side = {"up": 2e-4, "down": -2e-4}[way]
+            bias_v = 2.5 + 1e-3 * c + side + drift_v * t_s + curve * (c - 50) ** 2
+            made.append(Tumble(f"{way} {c} cycle {k}", t_s, float(c), bias_v, 1 + 1e-4 * (c - 47), 1e-6, 1e-6))
+    return made
+
+
+def test_coefficients_are_exact() -> None:
+    bias, scale = bias_coefficients(steps(1)), scale_coefficients(steps(1))
+    assert (bias.slope[0], bias.hysteresis[0]) == pytest.approx((1e-3, 4e-4), abs=1e-9)
+    assert scale.slope[0] == pytest.approx(1e-4, rel=1e-6)
+    assert scale.hysteresis[0] == pytest.approx(0, abs=1e-12)
+
+
+def test_two_cycles_tell_drift_from_hysteresis() -> None:
+    assert bias_coefficients(steps(2, drift_v=1e-4)).hysteresis[0] == pytest.approx(4e-4, abs=1e-9)
+    assert bias_coefficients(steps(1, drift_v=1e-4)).hysteresis[0] != pytest.approx(4e-4, abs=1e-4)
+
+
+def test_what_a_straight_line_leaves_widens_the_standard_errors() -> None:
+    assert bias_coefficients(steps(1, curve=1e-6)).slope[1] > 10 * bias_coefficients(steps(1)).slope[1]
+
+
+def test_one_temperature_has_no_slope() -> None:
+    with pytest.raises(DataError, match="no temperatures up and down"):
+        bias_coefficients([step for step in steps(1) if step.temperature_c == 35])
