@@ -86,7 +86,7 @@ def add(effect: Effect, model: Model, table: Table, effects: Mapping[str, Effect
     return Discovery(
         start=before,
         steps=(step,),
-        verdict="unexplained" if left else "ambiguous" if rivals else "adequate",
+        verdict="unexplained" if left else "ambiguous" if rivals or undetermined(step.after) else "adequate",
         causes=(effect.name,),
         refinements=(),
         alternatives={effect.name: rivals} if rivals else {},

@@ -32,6 +32,8 @@ def headline(found: Discovery) -> str:
     if found.verdict == "unexplained":
         beside = f"Beside {_few(found.causes)}, the" if found.causes else "The"
         return f"{beside} model {model} misses something that no effect of the catalogue describes."
+    if not found.steps and found.caution:
+        return f"Nothing shows that the model {model} misses an effect, but this data does not determine it."
     if not found.steps:
         return f"Nothing is missing from the model {model}: what it leaves is noise."
     text = f"The model {model} misses {_few(found.causes)}"
@@ -40,7 +42,11 @@ def headline(found: Discovery) -> str:
 
 
 def summary(found: Discovery) -> str:
-    """What adding the effects does to the error, in one or two sentences."""
+    """What adding the effects does to the error, in one or two sentences, and whether that can be trusted."""
+    return f"{_error(found)} But {found.caution}." if found.caution else _error(found)
+
+
+def _error(found: Discovery) -> str:
     kind, (error, floor) = found.start.table.kind, pooled_mg(found.start)
     rows = f"{found.start.table.n} {kind}"
     if not found.steps:

@@ -42,7 +42,12 @@ def tilt_deg(rig: Session) -> tuple[float, float]:
     front_x, front_y, back_x, back_y = (
         rig.reading(f"level-{side}-{axis}") or 0.0 for side, _ in HALF_TURN for axis in "xy"
     )
-    return (front_x - back_x) / 2, (front_y - back_y) / 2
+    return reversal(front_x, back_x)[0], reversal(front_y, back_y)[0]
+
+
+def reversal(front_deg: float, back_deg: float) -> tuple[float, float]:
+    """(tilt, the level's own offset) from its readings before and after half a turn, deg."""
+    return (front_deg - back_deg) / 2, (front_deg + back_deg) / 2
 
 
 def _read(rig: Session, side: str, beta_deg: float, settle_s: float) -> None:

@@ -7,25 +7,24 @@ that goes by what it measures is rehearsed on twins: its plan is that of one sim
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
 from procedures.catalogue import Procedure
-from procedures.questions import Question
-from procedures.session import Dwell, Pose, Reading, Samples, Session
+from procedures.session import Session
 from rig.bench import ROLES, Bench
 from rig.instruments import absent
 from rig.planned import (
     Ledger,
+    PlanHost,
     PlannedAdc,
     PlannedLevel,
     PlannedOven,
     PlannedPositioner,
     PlannedStage,
     Step,
-    planned_answer,
 )
 from rig.rehearsal import rehearsing
 
@@ -53,38 +52,6 @@ class Plan:
     poses: int
     duration_s: float
     bytes: int
-
-
-@dataclass
-class PlanHost:
-    """The session's host that keeps nothing."""
-
-    ledger: Ledger
-
-    def kept(self) -> Sequence[Pose]:
-        return ()
-
-    def expect(self, missing: int) -> None:
-        """A plan has no progress."""
-
-    def measured(self) -> Sequence[Dwell]:
-        return ()
-
-    def readings(self) -> Sequence[Reading]:
-        return ()
-
-    def keep(self, pose: Pose, samples: Samples, temperature_c: float | None) -> None:  # noqa: ARG002
-        self.ledger.poses += 1
-
-    def keep_readings(self, *readings: Reading) -> None:
-        """A plan reads nothing."""
-
-    def ask(self, question: Question) -> str:
-        self.ledger.questions.append(f"{question.name}: {question.text}")
-        return planned_answer(question)
-
-    def doing(self, text: str) -> None:
-        """Its steps say what it does."""
 
 
 def plan(bench: Bench, procedure: Procedure, settings: Mapping[str, Any]) -> Plan:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -14,7 +14,7 @@ from drivers.omega_cn7500 import Settings as OvenSettings
 from drivers.oriental_az import Settings as StageSettings
 from drivers.simulation.trajectory import Trajectory
 from procedures.questions import Choice, Number, Question
-from procedures.session import Samples
+from procedures.session import Dwell, Pose, Reading, Samples
 from rig.record.values import Block
 
 LEVEL_S = 1.0  # a reading of the level
@@ -196,3 +196,35 @@ def planned_answer(question: Question) -> str:
     if isinstance(question, Number):
         return repr(min(max(0.0, question.low), question.high))
     return question.choices[0] if isinstance(question, Choice) else "yes"
+
+
+@dataclass
+class PlanHost:
+    """The session's host that keeps nothing."""
+
+    ledger: Ledger
+
+    def kept(self) -> Sequence[Pose]:
+        return ()
+
+    def expect(self, missing: int) -> None:
+        """A plan has no progress."""
+
+    def measured(self) -> Sequence[Dwell]:
+        return ()
+
+    def readings(self) -> Sequence[Reading]:
+        return ()
+
+    def keep(self, pose: Pose, samples: Samples, temperature_c: float | None) -> None:  # noqa: ARG002
+        self.ledger.poses += 1
+
+    def keep_readings(self, *readings: Reading) -> None:
+        """A plan reads nothing."""
+
+    def ask(self, question: Question) -> str:
+        self.ledger.questions.append(f"{question.name}: {question.text}")
+        return planned_answer(question)
+
+    def doing(self, text: str) -> None:
+        """Its steps say what it does."""

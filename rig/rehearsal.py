@@ -17,7 +17,7 @@ from procedures.questions import Question
 from procedures.session import Dwell, Pose, Reading, Samples, Session
 from rig.bench import SIMULATED, Bench
 from rig.instruments import Rig, absent, connected
-from rig.planned import Ledger, planned_answer
+from rig.planned import Ledger, PlanHost
 from rig.record.values import Kept
 from rig.technician import answer
 
@@ -41,19 +41,15 @@ class Counted:
 
 
 @dataclass
-class RehearsalHost:
-    """The session's host that remembers what the twins measure, for as long as the rehearsal lasts."""
+class RehearsalHost(PlanHost):
+    """A plan's host that remembers what the twins of `rig` measure, for as long as the rehearsal lasts."""
 
-    ledger: Ledger
     rig: Rig
     dwells: list[Dwell] = field(default_factory=list)
     read: dict[str, Reading] = field(default_factory=dict)
 
     def kept(self) -> Sequence[Pose]:
         return [dwell.pose for dwell in self.dwells]
-
-    def expect(self, missing: int) -> None:
-        """A rehearsal has no progress."""
 
     def measured(self) -> Sequence[Dwell]:
         return self.dwells
@@ -62,18 +58,15 @@ class RehearsalHost:
         return list(self.read.values())
 
     def keep(self, pose: Pose, samples: Samples, temperature_c: float | None) -> None:
-        self.ledger.poses += 1
+        super().keep(pose, samples, temperature_c)
         self.dwells.append(Kept(pose, samples, samples.start_s, temperature_c).dwell)
 
     def keep_readings(self, *readings: Reading) -> None:
         self.read |= {reading.name: reading for reading in readings}
 
     def ask(self, question: Question) -> str:
-        self.ledger.questions.append(f"{question.name}: {question.text}")
-        return answer(question, self.rig) or planned_answer(question)
-
-    def doing(self, text: str) -> None:
-        """Its steps say what it does."""
+        planned = super().ask(question)
+        return answer(question, self.rig) or planned
 
 
 @contextmanager

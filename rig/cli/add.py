@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from rig.cli.output import bench_option, emit, json_option
+from rig.cli.output import bench_option, emit, json_option, notes
 
 
 @click.command("add")
@@ -23,7 +23,7 @@ def command(effect: str, model: str, data: str, out: Path, bench_file: Path | No
     from calibrations.effect import find
     from calibrations.errors import ModelError
     from rig.cli.asked import asked, write_model
-    from rig.cli.words import addition, parameters
+    from rig.cli.words import addition, parameters, warning
 
     table, start, effects = asked(data, model, bench_file, out)
     chosen = find(effect, effects)
@@ -35,6 +35,7 @@ def command(effect: str, model: str, data: str, out: Path, bench_file: Path | No
     write_model(result.end, start, out)
     if as_json:
         emit(discovery_document(result, str(out)))
+        notes(warning(result.caution))
     else:
         click.echo(
             f"{effect} added to {start.name}\n\n{addition(result, data, out)}\n\n{parameters(result.end.model)}\n"

@@ -30,14 +30,15 @@ def command(data: str, model: str | None, out: Path | None, check: bool, bench_f
     if out is not None:
         write_model(found, start, out)
     tell_blind(found, effects)
+    caution = undetermined(found)
     if as_json:
         emit(fit_document(found, str(out) if out else None))
-        notes(warning(undetermined(found)))
+        notes(warning(caution))
     else:
         click.echo(f"{found.model.name} fitted to {table.n} rows of {table.source}\n\n{parameters(found.model)}\n")
-        click.echo("\n".join([errors(found), *(f"\n{line}" for line in warning(undetermined(found)))]))
+        click.echo("\n".join([errors(found), *(f"\n{line}" for line in warning(caution))]))
         if "cross-axis-bias" in start.effects and table.kind == "poses":
             click.echo(f"\n{paper(table)}")
         if out is not None:
             click.echo(f"\nwritten to {out}")
-    return 1 if check and (undetermined(found) or not compare(table, found.model).adequate) else 0
+    return 1 if check and (caution or not compare(table, found.model).adequate) else 0

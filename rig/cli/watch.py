@@ -82,8 +82,7 @@ def _answers(path: Path | None) -> dict[str, str]:
         raise BadAnswer(f"{path}: is not a YAML file: {error}") from None
     if not isinstance(document, dict):
         raise BadAnswer(f"{path}: a file of answers is a mapping, such as `mounting: yes`")
-    yes_no = {"True": "yes", "False": "no"}  # what YAML makes of an unquoted yes
-    return {str(name): yes_no.get(str(answer), str(answer)) for name, answer in document.items()}
+    return {str(name): str(answer) for name, answer in document.items()}
 
 
 def tell(outcome: Outcome, as_json: bool) -> int:

@@ -75,7 +75,7 @@ def addition(result: Discovery, data: str, out: Path) -> str:
         end += (
             f" It is not noise: {result.residual_structure}.\nWhat else is missing: rig diagnose {data} --model {out}"
         )
-    return "\n".join([falling(result), "", end, *_rivals(result)])
+    return "\n".join([falling(result), "", end, *_rivals(result), *warning(result.caution)])
 
 
 def falling(result: Discovery) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from math import hypot
 
+from procedures.level_check import reversal
 from rig.record import Record, Run
 from rig.results.result import Result
 
@@ -15,6 +16,7 @@ def evaluate(record: Record, run: Run) -> dict[str, Result]:
     for axis in "xy":
         front, back = read[f"level-front-{axis}"], read[f"level-back-{axis}"]
         std = hypot(front.std, back.std) / 2 if front.std is not None and back.std is not None else None
-        results[f"level-{axis}"] = Result((front.value - back.value) / 2, "deg", std)
-        results[f"level-offset-{axis}"] = Result((front.value + back.value) / 2, "deg", std)
+        tilt_deg, offset_deg = reversal(front.value, back.value)
+        results[f"level-{axis}"] = Result(tilt_deg, "deg", std)
+        results[f"level-offset-{axis}"] = Result(offset_deg, "deg", std)
     return results

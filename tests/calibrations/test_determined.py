@@ -5,11 +5,12 @@ import pytest
 
 from calibrations.determined import undetermined, unseen_variance
 from calibrations.diagnose import diagnose
-from calibrations.discover import discover
+from calibrations.discover import add, discover
 from calibrations.effect import catalogue
 from calibrations.fit import fit
 from calibrations.model import Model
 from calibrations.model_file import read_model
+from calibrations.report_words import headline, summary
 from calibrations.table import Table
 from tests.calibrations.test_real_data import mikoff, suarez, xsens
 
@@ -64,3 +65,17 @@ def test_a_discovery_on_ten_positions_says_so_too() -> None:
     found = discover(suarez(), read_model("common-scale"))
     assert (found.verdict, found.causes) == ("ambiguous", ("scale-factor",))
     assert "the 6 parameters are not identifiable from these positions" in str(found.caution)
+
+
+def test_adding_an_effect_on_ten_positions_says_so_too() -> None:
+    found = add(catalogue()["axis-nonorthogonality"], read_model("linear"), suarez())
+    assert found.end.pooled_excess < 0.1
+    assert found.verdict == "ambiguous"
+    assert "the 9 parameters are not identifiable from these positions" in str(found.caution)
+
+
+def test_a_report_on_ten_positions_says_so_too() -> None:
+    found = discover(suarez(), nine())
+    assert not found.steps
+    assert headline(found).endswith("but this data does not determine it.")
+    assert "not identifiable from these positions" in summary(found)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from dataclasses import replace
 from functools import cache
 from html.parser import HTMLParser
 
@@ -92,7 +93,7 @@ def blank() -> list[Picture]:
 
 
 def changed(found: Discovery, **values: object) -> Discovery:
-    return Discovery(**{**vars(found), **values})
+    return replace(found, **values)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("make", [page, hand_page])
