@@ -8,8 +8,9 @@ Source: T-series datasheet; see labjack_t7_table and labjack_t7_stream.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Generator, Mapping
+from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, field
+from typing import TypeVar
 from urllib.parse import urlsplit
 
 import numpy as np
@@ -24,6 +25,8 @@ from drivers.links import Address, Links
 from drivers.links.link import Link
 from drivers.links.modbus import Unit
 from drivers.links.register import Register
+
+Read = TypeVar("Read")
 
 
 @dataclass(frozen=True)
@@ -103,6 +106,16 @@ class T7:
         """Record all channels for `duration_s`, rounded to whole scans; raises as `stream`."""
         (samples,) = self.stream(duration_s, duration_s)
         return samples
+
+    def acquire_with(self, duration_s: float, reading: Callable[[], Read]) -> tuple[Samples, Read]:
+        """The same, and what `reading` gives in the middle of it, while the device records on."""
+        stream = self.stream(duration_s, duration_s / 2)
+        blocks = [next(stream)]
+        read = reading()
+        blocks += stream
+        first = blocks[0]
+        volts = np.concatenate([block.volts for block in blocks])
+        return Samples(volts, first.channels, first.rate_hz, first.start_s), read
 
     def stream(self, duration_s: float, block_s: float) -> Generator[Samples, None, None]:
         """Record all channels for `duration_s` without a gap, and hand it out in blocks of `block_s`.

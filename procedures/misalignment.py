@@ -130,9 +130,7 @@ def standard_error_deg(rounds: Sequence[NDArray[np.float64]]) -> float:
 def _measure(rig: Session, poses: Iterator[Pose], dwell_s: float, settle_s: float) -> None:
     for pose in rig.missing(poses):
         _approach(rig, pose)
-        rig.move_to(pose)
-        rig.wait(settle_s)
-        rig.keep(pose, samples=rig.adc.acquire(dwell_s), temperature_c=rig.oven.temperature_c())
+        rig.hold(pose, dwell_s, settle_s)
 
 
 def _approach(rig: Session, pose: Pose) -> None:

@@ -24,8 +24,7 @@ def noise_floor(
         raise SettingError("noise-floor: duration_s, block_s and dwell_s must be above 0")
     levelled(rig)
     for pose in rig.missing(UPRIGHT):
-        rig.move_to(pose)
-        rig.keep(pose, samples=rig.adc.acquire(dwell_s), temperature_c=rig.oven.temperature_c())
+        rig.hold(pose, dwell_s, settle_s)
     still = [Pose(0.0, 0.0, 0, f"{STILL} {k}") for k in range(max(1, round(duration_s / block_s)))]
     if left := list(rig.missing(still)):
         rig.move_to(left[0])

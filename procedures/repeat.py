@@ -11,7 +11,7 @@ from drivers.errors import LimitError
 from procedures.errors import SettingError
 from procedures.level_check import levelled
 from procedures.session import Session
-from procedures.tumbles import hold, is_first, tumble
+from procedures.tumbles import is_first, tumble
 
 AS_IS, POWER, MOUNT = "as-is", "power", "mount"
 
@@ -43,7 +43,7 @@ def repeat(
             _power_cycle(rig, number, off_s, warm_s)
         if is_first(pose) and kind == MOUNT:
             _remount(rig, number)
-        hold(rig, pose, dwell_s, settle_s)
+        rig.hold(pose, dwell_s, settle_s)
 
 
 def _power_cycle(rig: Session, number: str, off_s: float, warm_s: float) -> None:

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from procedures.errors import Declined, SafetyLimit
 from procedures.questions import Confirm, Mounting, Number, Question
 
+Read = TypeVar("Read")
 SHORTEST_APPROACH_DEG = 0.5  # a stage that is nearer to a pose has not come from its side
 
 
@@ -100,6 +101,9 @@ class Adc(Protocol):
     """The converter that the sensor's outputs go to."""
 
     def acquire(self, duration_s: float) -> Samples: ...
+    def acquire_with(self, duration_s: float, reading: Callable[[], Read]) -> tuple[Samples, Read]:
+        """The same, and what `reading` gives in the middle of it."""
+
     def stream(self, duration_s: float, block_s: float) -> Iterator[Samples]:
         """The same without a gap between blocks of `block_s`."""
 
@@ -221,6 +225,13 @@ class Session:
             self.beta.move_to(pose.beta_deg - pose.direction * self.limits.overrun_deg)
         self.beta.move_to(pose.beta_deg)
         self.host.doing(f"holding alpha {pose.alpha_deg:g}, beta {pose.beta_deg:g} deg")
+
+    def hold(self, pose: Pose, dwell_s: float, settle_s: float) -> None:
+        """Go to `pose`, let it settle, and keep `dwell_s` seconds of it, with the temperature in their middle."""
+        self.move_to(pose)
+        self.wait(settle_s)
+        samples, temperature_c = self.adc.acquire_with(dwell_s, self.oven.temperature_c)
+        self.keep(pose, samples=samples, temperature_c=temperature_c)
 
     def mount(self, mount_deg: float, flip: int) -> None:
         """Have the sensor mounted so, at alpha = 0 where it lies flat; nothing where it is."""

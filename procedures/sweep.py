@@ -42,9 +42,7 @@ def sweep(
     rig.confirm("mounting", "Is the sensor mounted face up on the table, its cable free to turn?", drawing="face-up")
     levelled(rig)
     for pose in rig.missing(poses):
-        rig.move_to(pose)
-        rig.wait(settle_s)
-        rig.keep(pose, samples=rig.adc.acquire(dwell_s), temperature_c=rig.oven.temperature_c())
+        rig.hold(pose, dwell_s, settle_s)
 
 
 def grid(inclinations_deg: Sequence[float], step_deg: float, paths: Paths = "grid") -> Iterator[Pose]:

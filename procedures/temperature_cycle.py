@@ -11,7 +11,7 @@ from __future__ import annotations
 from procedures.errors import SettingError
 from procedures.level_check import levelled
 from procedures.session import Session
-from procedures.tumbles import hold, is_first, tumble
+from procedures.tumbles import is_first, tumble
 
 SLICE_S = 600.0  # of a soak: how often the limits of temperature are looked at meanwhile
 DRIFTED_K = 3.0  # from the set point: an oven that stood still in an interruption
@@ -39,7 +39,7 @@ def temperature_cycle(
     set_c = dict(steps)
     for pose in rig.missing(pose for path, _ in steps for pose in tumble(path)):
         _warm(rig, set_c[pose.path], soak_s, is_first(pose))
-        hold(rig, pose, dwell_s, settle_s)
+        rig.hold(pose, dwell_s, settle_s)
     rig.oven.run(False)
 
 

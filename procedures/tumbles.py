@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from procedures.session import Pose, Session
+from procedures.session import Pose
 
 QUARTERS_DEG = (0.0, 90.0, 180.0, 270.0)
 
@@ -20,10 +20,3 @@ def tumble(path: str) -> Iterator[Pose]:
 def is_first(pose: Pose) -> bool:
     """Whether `pose` begins a tumble: what shall come before one is done before it, and not again on the way."""
     return (pose.beta_deg, pose.direction) == (QUARTERS_DEG[0], 1)
-
-
-def hold(rig: Session, pose: Pose, dwell_s: float, settle_s: float) -> None:
-    """Go to `pose` and keep `dwell_s` seconds of it."""
-    rig.move_to(pose)
-    rig.wait(settle_s)
-    rig.keep(pose, samples=rig.adc.acquire(dwell_s), temperature_c=rig.oven.temperature_c())

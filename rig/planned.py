@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -100,6 +100,9 @@ class PlannedAdc:
 
     def acquire(self, duration_s: float) -> Samples:
         return next(self.stream(duration_s, duration_s))
+
+    def acquire_with(self, duration_s: float, reading: Callable[[], Any]) -> tuple[Samples, None]:  # noqa: ARG002
+        return self.acquire(duration_s), None
 
     def stream(self, duration_s: float, block_s: float) -> Iterator[Samples]:
         names, rate_hz = tuple(self._settings.channels), self._settings.rate_hz

@@ -1,7 +1,7 @@
 """What a sweep adds to its moves and dwells in real time: the simulated instruments are served by a thread.
 
 Needed is what the mechanics and the record need: every move's trapezoid, the settling, every dwell's scans. The rest
-is overhead: exchanges on the wires at their true speed, polls, the stream's start and stop, the thermometer.
+is overhead: exchanges on the wires at their true speed, polls, the stream's start and stop.
 """
 
 from __future__ import annotations
@@ -85,17 +85,15 @@ def sweep(bench: Bench, poses: int, dwell_s: float) -> dict[str, float]:
         done("beta")
         bench.clock.sleep(SETTLE_S)
         done("settling")
-        bench.adc.acquire(dwell_s)
+        bench.adc.acquire_with(dwell_s, bench.oven.temperature_c)
         done("dwell")
-        bench.oven.temperature_c()
-        done("thermometer")
     return took
 
 
 def needed(dwell_s: float) -> dict[str, float]:
     """What the parts of one pose need, in s."""
     move_s = Trajectory(0.0, 0.0, STEP_DEG, STAGE.speed_deg_s, STAGE.acceleration_deg_s2).end_s
-    return {"alpha": 0.0, "beta": move_s, "settling": SETTLE_S, "dwell": dwell_s, "thermometer": 0.0}
+    return {"alpha": 0.0, "beta": move_s, "settling": SETTLE_S, "dwell": dwell_s}
 
 
 def main(poses: str, dwell: str) -> None:

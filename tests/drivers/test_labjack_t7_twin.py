@@ -73,6 +73,15 @@ def test_any_duration_gives_whole_scans(bench: Any, duration_s: float) -> None:
     assert bench.adc.acquire(duration_s).volts.shape == (max(1, round(duration_s * 1000)), 3)
 
 
+@pytest.mark.parametrize("duration_s", [0.001, 0.005, 5.0])
+def test_something_else_is_read_in_the_middle_of_a_record(bench: Any, duration_s: float) -> None:
+    before = bench.clock.now()
+    samples, read_s = bench.adc.acquire_with(duration_s, bench.clock.now)
+    expected = samples.start_s + np.arange(round(1000 * duration_s)) / samples.rate_hz
+    np.testing.assert_allclose(samples.volts[:, 0], 0.01 * expected, atol=STEP_V)
+    assert before + duration_s / 2 <= read_s <= before + duration_s / 2 + 0.05
+
+
 def test_records_follow_each_other_without_remains(bench: Any) -> None:
     first, second = bench.adc.acquire(0.5), bench.adc.acquire(0.5)
     assert second.start_s > first.start_s + 0.5

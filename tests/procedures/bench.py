@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -54,6 +55,9 @@ class Adc:
         volts = self.world.adc_volts(CHANNELS, start_s, 1 / RATE_HZ, n)
         step_v = self.world.config.converter.step_v
         return Block(np.rint(volts / step_v) * step_v, CHANNELS, RATE_HZ, start_s)
+
+    def acquire_with(self, duration_s: float, reading: Callable[[], Any]) -> tuple[Samples, Any]:
+        return self.acquire(duration_s), reading()
 
     def stream(self, duration_s: float, block_s: float) -> Iterator[Samples]:
         raise NotImplementedError
