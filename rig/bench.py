@@ -11,12 +11,15 @@ import hashlib
 import importlib
 import json
 from collections.abc import Mapping
+from datetime import date
 from pathlib import Path
 from typing import Any
 
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
+from calibrations.error_table import ErrorTable, Point, read_error_table
+from calibrations.errors import DataError
 from drivers.links.address import Address
 from drivers.simulation.config import WorldConfig
 from drivers.simulation.errors import SimulationError
@@ -28,6 +31,7 @@ DEFAULT = Path(__file__).with_name("bench_default.yaml")
 SIMULATED = "simulated"
 UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
 ROLES = ("alpha", "beta", "adc", "oven", "level", "positioner")
+TURNING = ("alpha", "beta")
 
 
 class Strict(BaseModel):
@@ -36,14 +40,28 @@ class Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
+class Certificate(Strict):
+    """A calibration certificate, good until the end of the day `due`."""
+
+    model_config = ConfigDict(coerce_numbers_to_str=True)
+
+    number: str
+    due: date
+
+
 class Instrument(Strict):
-    """One instrument: a driver's name, an address, and settings that the driver declares."""
+    """One instrument: a driver's name, an address, and settings that the driver declares.
+
+    `error_table` is a stage's own, as points or as a CSV file beside the bench file; `read_bench` leaves the points.
+    """
 
     driver: str
     url: str
     unit: int = 1
     stream_url: str | None = None
     settings: dict[str, Any] = {}
+    certificate: Certificate | None = None
+    error_table: tuple[Point, ...] | Path | None = None
 
     @property
     def simulated(self) -> bool:
@@ -89,6 +107,7 @@ class Bench(Strict):
     instruments: dict[str, Instrument]
     sensor: Sensor = Sensor()
     limits: Limits = Limits()
+    certificates: dict[str, Certificate] = {}  # of what plays no role: a hand level, a displacement sensor's curve
     world: dict[str, Any] = {}
     folders: Folders = Folders()
 
@@ -143,16 +162,16 @@ def _checked(document: dict[str, Any], path: Path) -> Bench:
         bench = Bench.model_validate(document)
     except ValidationError as error:
         raise BenchError(_told(error, path, Bench)) from None
-    for role, instrument in bench.instruments.items():
-        _check_instrument(role, instrument, path)
+    instruments = {role: _checked_instrument(role, part, path) for role, part in bench.instruments.items()}
     try:
         WorldConfig.from_mapping(bench.world)
     except SimulationError as error:
         raise BenchError(f"{path}, key world: {error}") from None
-    return bench.model_copy(update={"folders": _beside(bench.folders, path)})
+    return bench.model_copy(update={"instruments": instruments, "folders": _beside(bench.folders, path)})
 
 
-def _check_instrument(role: str, instrument: Instrument, path: Path) -> None:
+def _checked_instrument(role: str, instrument: Instrument, path: Path) -> Instrument:
+    """The instrument with what its files hold. Raises BenchError."""
     key = f"{path}, key instruments.{role}"
     if role not in ROLES:
         raise BenchError(f"{key}: no such role.{did_you_mean(role, ROLES)}")
@@ -166,6 +185,21 @@ def _check_instrument(role: str, instrument: Instrument, path: Path) -> None:
         where = ".".join(str(part) for part in fault["loc"])
         names = [field.name for field in dataclasses.fields(kind)]
         raise BenchError(f"{key}.{where}: {_fault(fault, names)}") from None
+    return instrument.model_copy(update={"error_table": _error_table(role, instrument.error_table, path)})
+
+
+def _error_table(role: str, given: tuple[Point, ...] | Path | None, path: Path) -> tuple[Point, ...] | None:
+    """The points of a stage's error table, from its file if it is one."""
+    key = f"{path}, key instruments.{role}.error_table"
+    if given is None:
+        return None
+    if role not in TURNING:
+        raise BenchError(f"{key}: only {' and '.join(TURNING)} have errors of angle; remove it")
+    try:
+        points = read_error_table(path.parent / given.expanduser()) if isinstance(given, Path) else given
+        return ErrorTable(points).points
+    except DataError as error:
+        raise BenchError(f"{key}: {error}") from None
 
 
 def drivers() -> list[str]:
@@ -188,7 +222,7 @@ def _told(error: ValidationError, path: Path, model: type[BaseModel]) -> str:
     """The first fault, with the key's place in the file; a misspelt key comes before the one that it was meant for."""
     faults = error.errors()
     fault = min(faults, key=lambda fault: fault["type"] not in UNKNOWN)
-    where = [str(part) for part in fault["loc"]]
+    where = [str(part) for part in fault["loc"] if "[" not in str(part)]  # a type of several is no key
     return f"{path}, key {'.'.join(where)}: {_fault(fault, _keys(model, where[:-1]))}"
 
 
@@ -204,6 +238,8 @@ def _keys(model: Any, where: list[str]) -> list[str]:
     """The keys that are known at a place of the file."""
     parts = {"instruments": Instrument, "sensor": Sensor, "folders": Folders, "limits": Limits}
     part = parts.get(where[0], model) if where else model
+    if where and (where[0] == "certificates" or where[-1] == "certificate"):
+        part = Certificate
     if dataclasses.is_dataclass(part):
         return [field.name for field in dataclasses.fields(part)]
     return list(part.model_fields)

@@ -1,6 +1,7 @@
 """The bench file: what is refused, and how the message helps."""
 
 from collections.abc import Callable
+from datetime import date
 from pathlib import Path
 
 import pytest
@@ -57,6 +58,21 @@ def test_every_driver_is_found_by_its_file() -> None:
             {"instruments": {"alpha": ALPHA | {"settings": {"speed_deg_s": "fast"}}}},
             "key instruments.alpha.settings.speed_deg_s: Input should be a valid number",
         ),
+        ({"instruments": {"alpha": ALPHA | {"error_table": [[0, 0.1]]}}}, "alpha.error_table.0.2: is missing"),
+        ({"instruments": {"alpha": ALPHA | {"error_table": "a.csv"}}}, "a.csv: cannot be read: No such file"),
+        (
+            {"instruments": {"alpha": ALPHA | {"error_table": [[0, 0, 0.1], [10, -11, 0.1]]}}},
+            "key instruments.alpha.error_table: an error table makes the stage turn back after 0 deg",
+        ),
+        (
+            {"instruments": {"oven": {"driver": "omega_cn7500", "url": "simulated", "error_table": [[0, 0, 0.1]]}}},
+            "key instruments.oven.error_table: only alpha and beta have errors of angle",
+        ),
+        (
+            {"instruments": {"alpha": ALPHA | {"certificate": {"nummer": "1", "due": "2027-03-01"}}}},
+            "key instruments.alpha.certificate.nummer: no such key. Did you mean 'number'?",
+        ),
+        ({"certificates": {"d63": {"number": 1, "due": "soon"}}}, "key certificates.d63.due: Input should be a valid"),
         ({"world": {"sensr": {}}}, "'sensr' of the simulated world. Did you mean 'sensor'?"),
         ({"folders": {"effects": "nowhere"}}, "key folders.effects: there is no folder"),
         ("- a list", "a bench file is a mapping"),
@@ -99,6 +115,19 @@ def test_a_real_address_is_passed_on_and_a_simulated_one_may_say_where_it_listen
     assert bench.instruments["adc"].listen == "tcp://127.0.0.1:5022"
     assert bench.instruments["oven"].listen is None
     assert not bench.simulated
+
+
+def test_an_error_table_is_read_from_beside_the_file_and_goes_with_the_bench(
+    bench_file: Callable[..., Path], tmp_path: Path
+) -> None:
+    (tmp_path / "alpha.csv").write_text("angle_deg,error_deg,std_deg\n0,0.01,0.001\n30,0.02,0.001\n")
+    certificate = {"number": 17, "due": date(2027, 3, 1)}
+    alpha = ALPHA | {"error_table": "alpha.csv", "certificate": certificate}
+    bench = read_bench(bench_file({"instruments": {"alpha": alpha}, "certificates": {"hand level": certificate}}))
+    assert bench.instruments["alpha"].error_table == ((0.0, 0.01, 0.001), (30.0, 0.02, 0.001))
+    assert bench.instruments["alpha"].certificate == bench.certificates["hand level"]
+    (tmp_path / "alpha.csv").unlink()
+    assert Bench.model_validate(bench.document()) == bench
 
 
 def test_the_configuration_is_that_of_procedure_settings_and_bench() -> None:
