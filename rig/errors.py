@@ -56,6 +56,10 @@ class InstrumentFailed(RigError):
 
 
 class Stopped(RigError):
-    """A person or a signal stopped the run."""
+    """A person or a signal stopped the run; `by` is the signal's name: SIGINT is a person at the terminal."""
 
     exit_status = 4
+
+    def __init__(self, message: str, by: str = "SIGINT") -> None:
+        super().__init__(message)
+        self.by = by

@@ -3,6 +3,8 @@
 A procedure is a function of its settings and of what the record holds, so there is one way to resume whatever the
 interruption was: run it again over the poses that are missing. On a simulated bench the state after each pose is
 committed with it, so that a resumed run equals an undisturbed one bit for bit.
+
+Whoever looks on may have an interrupted run go on at once. That is the same way: everything is let go, then resumed.
 """
 
 from __future__ import annotations
@@ -11,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 from drivers.errors import DriverError
 from procedures.catalogue import Procedure, find
@@ -23,15 +25,21 @@ from rig.bench import Bench
 from rig.errors import RigError, RunMismatch, Stopped
 from rig.instruments import Rig, connected
 from rig.lease import lease
-from rig.plan import plan
+from rig.plan import Plan, plan
 from rig.record import Kept, Record, Run
 from rig.results import Result, documents, evaluated, returned
 from rig.signals import stoppable
 from rig.technician import answer
 
+Wish = Literal["resume", "repeat", "end"]
+REPEATED = "repeated by hand"
+
 
 class Watch(Protocol):
     """Who looks on: a terminal, a test, nobody."""
+
+    def planned(self, plan: Plan) -> None:
+        """All that a new run will do, before it begins. Raises Declined where a person does not want it."""
 
     def begun(self, run: str) -> None: ...
     def doing(self, text: str) -> None: ...
@@ -42,21 +50,34 @@ class Watch(Protocol):
     def ask(self, question: Question, instead: str | None) -> str:
         """A person's checked answer, or `instead` of one where nobody looks on. Raises NoAnswer where there is none."""
 
+    def interrupted(self, outcome: Outcome) -> Wish:
+        """The run does not go on and all stands still: resume it, repeat its last pose and go on, or end it."""
+
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a run ended: complete, stopped or failed; `error` says why it is not complete."""
+    """How a run ended: complete, stopped or failed; `error` says why it is not complete.
+
+    `moving` names what could not be stopped.
+    """
 
     run: Run
     error: Exception | None = None
+    moving: tuple[str, ...] = ()
 
 
 def start(record: Record, bench: Bench, procedure: Procedure, settings: Mapping[str, Any], watch: Watch) -> Outcome:
     """Run `procedure` from the beginning. Whatever is wrong before its first move leaves the record untouched.
 
-    Raises the errors of settings, plan and connection; an error of the run itself is in the outcome.
+    Raises the errors of settings, plan and connection, Declined; an error of the run itself is in the outcome.
     """
-    plan(bench, procedure, settings)  # every move within its limits, or an error here
+    planned = plan(bench, procedure, settings)  # every move within its limits, or an error here
+    with stoppable():
+        watch.planned(planned)
+        return _as_wished(record, _begun(record, bench, procedure, settings, watch), watch)
+
+
+def _begun(record: Record, bench: Bench, procedure: Procedure, settings: Mapping[str, Any], watch: Watch) -> Outcome:
     with stoppable(), connected(bench) as rig:
         identities = {role: asdict(identity) for role, identity in rig.identities().items()}
         run = record.begin(
@@ -78,6 +99,11 @@ def resume(record: Record, run_id: str, watch: Watch, bench: Bench | None = None
 
     Raises Busy, RunMismatch where `bench` or an instrument is another one, and the errors of connection.
     """
+    with stoppable():
+        return _as_wished(record, _resumed(record, run_id, watch, bench), watch)
+
+
+def _resumed(record: Record, run_id: str, watch: Watch, bench: Bench | None = None) -> Outcome:
     run = record.run(run_id)
     if run.state == "complete":
         return Outcome(run)
@@ -88,6 +114,30 @@ def resume(record: Record, run_id: str, watch: Watch, bench: Bench | None = None
     with stoppable(), _held(record, run_id), connected(own) as rig:
         _same_instruments(run, rig)
         return _carry_out(record, rig, run, procedure, watch)
+
+
+def _as_wished(record: Record, outcome: Outcome, watch: Watch) -> Outcome:
+    """An interrupted run goes on for as long as who looks on wants it to."""
+    while outcome.error is not None and (wish := _wish(outcome, watch)) != "end":
+        run = outcome.run.run
+        if wish == "repeat" and outcome.run.rows:
+            record.exclude(run, record.next_number(run) - 1, REPEATED)
+        try:
+            outcome = _resumed(record, run, watch)
+        except (DriverError, RigError) as error:  # such as an instrument that still does not answer
+            outcome = Outcome(record.run(run), error)
+    return outcome
+
+
+def _wish(outcome: Outcome, watch: Watch) -> Wish:
+    """A person's wish. A signal that is none of theirs ends the run, as does any signal while they are asked."""
+    if isinstance(outcome.error, Stopped) and outcome.error.by != "SIGINT":
+        return "end"
+    try:
+        with stoppable():
+            return watch.interrupted(outcome)
+    except KeyboardInterrupt:
+        return "end"
 
 
 def _held(record: Record, run: str) -> AbstractContextManager[None]:
@@ -109,7 +159,7 @@ def _carry_out(record: Record, rig: Rig, run: Run, procedure: Procedure, watch: 
         record.set_state(run.run, _state(error), str(error))
         if isinstance(failure, Exception) and error is not failure:
             raise  # a fault of the program is not the run's
-        return Outcome(record.run(run.run), error)
+        return Outcome(record.run(run.run), error, tuple(complaints))
     record.set_state(run.run, "complete", None, results)
     return Outcome(record.run(run.run))
 
@@ -119,7 +169,8 @@ def _told(failure: BaseException, run: Run) -> Exception:
     if isinstance(failure, (DriverError, ProcedureError, RigError)):
         return failure
     if isinstance(failure, KeyboardInterrupt):
-        return Stopped(f"stopped by {failure or 'SIGINT'}; `rig resume {run.run}` goes on where it was")
+        by = str(failure) or "SIGINT"
+        return Stopped(f"stopped by {by}; `rig resume {run.run}` goes on where it was", by)
     return RuntimeError(f"{type(failure).__name__}: {failure}")
 
 

@@ -18,7 +18,9 @@ from procedures.errors import BadAnswer
 from procedures.questions import Question
 from procedures.session import Reading
 from rig.cli.output import duration
+from rig.plan import Plan
 from rig.record import Kept
+from rig.runner import Outcome, Wish
 
 
 class Guide:
@@ -43,6 +45,9 @@ class Guide:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._live.stop()
+
+    def planned(self, plan: Plan) -> None:
+        """Nothing yet."""
 
     def begun(self, run: str) -> None:
         self._console.print(f"run {run}; Ctrl-C stops the stages, `rig resume {run}` goes on", highlight=False)
@@ -73,6 +78,9 @@ class Guide:
             return self._asked(question, instead)
         finally:
             self._live.start()
+
+    def interrupted(self, outcome: Outcome) -> Wish:  # noqa: ARG002
+        return "end"
 
     def _asked(self, question: Question, instead: str | None) -> str:
         text = f"{question.text} ({question.accepts})"

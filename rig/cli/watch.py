@@ -14,10 +14,11 @@ import yaml
 from procedures.errors import BadAnswer, NoAnswer
 from procedures.questions import Question
 from procedures.session import Reading
-from rig.cli.output import emit, note
+from rig.cli.output import emit, note, notes
 from rig.cli.verdicts import lines as results
+from rig.plan import Plan
 from rig.record import Kept
-from rig.runner import Outcome, Watch
+from rig.runner import Outcome, Watch, Wish
 
 
 def watch_options(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -32,6 +33,9 @@ class Quiet:
 
     def __init__(self, answers: Mapping[str, str]) -> None:
         self._answers = answers
+
+    def planned(self, plan: Plan) -> None:
+        """It is done as it is planned."""
 
     def begun(self, run: str) -> None:
         note(f"run {run}")
@@ -56,6 +60,10 @@ class Quiet:
                 "file for --answers, or run it in a terminal without --unattended"
             )
         return given
+
+    def interrupted(self, outcome: Outcome) -> Wish:  # noqa: ARG002
+        """Nobody is there who could put it right."""
+        return "end"
 
 
 @contextmanager
@@ -94,5 +102,6 @@ def tell(outcome: Outcome, as_json: bool) -> int:
     else:
         click.echo("\n".join([f"{run.run}: {run.state}, {run.rows} poses", *results(run.results)]))
     if outcome.error is not None:
+        notes(outcome.moving)
         raise outcome.error
     return int(any(result["verdict"] == "fail" for result in run.results.values()))

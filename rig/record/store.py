@@ -106,14 +106,16 @@ class Record:
                 _put_state(to, run, state)
 
     def exclude(self, run: str, number: int, reason: str | None) -> None:
-        """Leave a pose out of every analysis, with a reason that stays; None takes it in again.
+        """Leave a pose out of every analysis, with a reason that stays as an event; None takes it in again.
 
         Raises RecordError where there is no such pose.
         """
         chosen = (poses.c.run == run) & (poses.c.number == number)
         with self._engine.begin() as to:
             if not to.execute(update(poses).where(chosen).values(excluded=reason)).rowcount:
-                raise RecordError(f"run {run} has no pose {number}; `rig show {run}` says how many it has")
+                raise RecordError(f"run {run} has no pose {number}; `rig show {run} --poses` lists those that it has")
+            what = f"pose {number} {'included' if reason is None else 'excluded'}"
+            to.execute(insert(events), {"run": run, "at": _now(), "what": what, "text": reason or "again"})
 
     def keep_state(self, run: str, state: Mapping[str, Any]) -> None:
         """The simulated bench's state before the first pose."""
@@ -128,6 +130,11 @@ class Record:
         values = {"state": state, "message": message, "ended": ended, "results": dict(results or {})}
         with self._engine.begin() as to:
             to.execute(update(runs).where(runs.c.run == run).values(values))
+
+    def set_results(self, run: str, results: Mapping[str, Any]) -> None:
+        """Results that were made anew after the end of a run."""
+        with self._engine.begin() as to:
+            to.execute(update(runs).where(runs.c.run == run).values(results=dict(results)))
 
     def note(self, run: str, what: str, text: str) -> None:
         """Something that happened in a run."""

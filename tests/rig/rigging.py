@@ -11,7 +11,9 @@ from procedures.catalogue import find
 from procedures.questions import Question
 from procedures.session import Reading
 from procedures.settings import parse
+from rig.plan import Plan
 from rig.record import Kept
+from rig.runner import Outcome, Wish
 
 SMALL = {"step_deg": "90", "dwell_s": "0.2", "inclinations_deg": "90,45"}
 SMALL_ARGUMENTS = ("--step-deg", "90", "--dwell-s", "0.2", "--inclinations-deg", "90,45")
@@ -26,12 +28,21 @@ def small_sweep() -> tuple[Any, dict[str, Any]]:
 
 @dataclass
 class Onlooker:
-    """Remembers what it was shown; leaves every answer to the simulated technician."""
+    """Remembers what it was shown; leaves every answer to the simulated technician.
+
+    What it wishes where the run is interrupted is given in order; then it wishes the end.
+    """
 
     run: str = ""
     said: list[str] = field(default_factory=list)
     expected: list[tuple[int, int]] = field(default_factory=list)
     seen: list[Kept] = field(default_factory=list)
+    wishes: list[Wish] = field(default_factory=list)
+    outcomes: list[Outcome] = field(default_factory=list)
+    plan: Plan | None = None
+
+    def planned(self, plan: Plan) -> None:
+        self.plan = plan
 
     def begun(self, run: str) -> None:
         self.run = run
@@ -52,6 +63,10 @@ class Onlooker:
         self.said.append(f"{question.name}: {question.text}")
         assert instead is not None
         return instead
+
+    def interrupted(self, outcome: Outcome) -> Wish:
+        self.outcomes.append(outcome)
+        return self.wishes.pop(0) if self.wishes else "end"
 
 
 def in_own_process(*arguments: str, harm: str = "") -> subprocess.CompletedProcess[str]:

@@ -1,0 +1,150 @@
+"""An interrupted run: stages stand still, then whoever looks on has it resumed, its last pose repeated, or ended."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable
+
+import pytest
+
+from drivers.errors import StageAlarm
+from procedures.errors import Declined
+from procedures.session import Limits
+from rig.bench import read_bench
+from rig.errors import InstrumentFailed
+from rig.plan import Plan
+from rig.record import Kept, Record
+from rig.runner import REPEATED, Outcome, Wish, start
+from tests.rig.rigging import POSES, Onlooker, small_sweep
+
+pytestmark = pytest.mark.sockets
+
+
+class Disturbed(Onlooker):
+    """Something happens, once, when the pose `at` has been kept."""
+
+    def __init__(self, then: Callable[[], object], *wishes: Wish, at: int = 7) -> None:
+        super().__init__(wishes=list(wishes))
+        self._then, self._at = then, at
+
+    def kept(self, kept: Kept) -> None:
+        super().kept(kept)
+        if len(self.seen) == self._at:
+            self._then()
+
+
+def interrupt() -> None:
+    signal.raise_signal(signal.SIGINT)
+
+
+def alarm() -> None:
+    raise StageAlarm("beta: stands still with alarm 30", "Look at the stage", 0x30)
+
+
+def measured(record: Record, run: str) -> list[object]:
+    """What analyses see, comparable bit for bit."""
+    return [(k.pose, k.samples.volts.tobytes(), k.t_s) for k in record.kept(run) if k.excluded is None]
+
+
+@pytest.mark.parametrize("disturb", [interrupt, alarm])
+def test_resumed_at_once_it_equals_an_undisturbed_run(disturb: Callable[[], object]) -> None:
+    with Record() as record:
+        whole = start(record, read_bench(), *small_sweep(), Onlooker())
+        watch = Disturbed(disturb, "resume")
+        outcome = start(record, read_bench(), *small_sweep(), watch)
+        assert (outcome.run.state, outcome.error, len(watch.outcomes)) == ("complete", None, 1)
+        assert measured(record, outcome.run.run) == measured(record, whole.run.run)
+        assert len(record.runs()) == 2
+
+
+def test_a_repeated_pose_stays_in_the_record_and_is_measured_again() -> None:
+    watch = Disturbed(interrupt, "repeat")
+    with Record() as record:
+        outcome = start(record, read_bench(), *small_sweep(), watch)
+        kept = list(record.kept(outcome.run.run))
+        events = [(event.what, event.text) for event in record.events(outcome.run.run)]
+    assert outcome.run.state == "complete"
+    assert [k.excluded for k in kept] == [None] * 6 + [REPEATED] + [None] * (POSES - 6)
+    assert kept[7].pose == kept[6].pose
+    assert kept[7].t_s > kept[6].t_s
+    assert ("pose 6 excluded", REPEATED) in events
+
+
+def test_with_nothing_kept_there_is_nothing_to_repeat() -> None:
+    watch = Onlooker(wishes=["repeat"])
+    first = iter([interrupt])
+    watch.doing = lambda text: next(first, lambda: None)()  # type: ignore[method-assign]
+    with Record() as record:
+        outcome = start(record, read_bench(), *small_sweep(), watch)
+        assert (outcome.run.state, outcome.run.rows) == ("complete", POSES)
+
+
+def test_it_stands_still_and_says_so_before_anybody_is_asked() -> None:
+    watch = Disturbed(interrupt)
+    with Record() as record:
+        outcome = start(record, read_bench(), *small_sweep(), watch)
+    (seen,) = watch.outcomes
+    assert (seen.run.state, seen.moving) == ("stopped", ())
+    assert outcome == seen
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_nobody_is_asked_after_another_signal(number: signal.Signals) -> None:
+    watch = Disturbed(lambda: signal.raise_signal(number), "resume")
+    with Record() as record:
+        outcome = start(record, read_bench(), *small_sweep(), watch)
+    assert (outcome.run.state, outcome.run.rows, watch.outcomes) == ("stopped", 7, [])
+
+
+class Impatient(Disturbed):
+    """Sends a signal while they are asked."""
+
+    signal = signal.SIGINT
+
+    def interrupted(self, outcome: Outcome) -> Wish:
+        signal.raise_signal(self.signal)
+        return "resume"
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_at_the_question_ends_the_run(number: signal.Signals) -> None:
+    watch = Impatient(interrupt)
+    watch.signal = number
+    with Record() as record:
+        outcome = start(record, read_bench(), *small_sweep(), watch)
+        assert (outcome.run.state, outcome.run.rows) == ("stopped", 7)
+        assert "stopped by SIGINT" in str(outcome.error)
+
+
+def test_an_instrument_that_does_not_come_back_is_told_and_asked_about_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    def gone(*arguments: object) -> None:
+        raise InstrumentFailed("beta does not answer")
+
+    watch = Disturbed(lambda: (monkeypatch.setattr("rig.runner._same_instruments", gone), alarm()), "resume")
+    with Record() as record:
+        outcome = start(record, read_bench(), *small_sweep(), watch)
+    assert [str(seen.error) for seen in watch.outcomes][1:] == ["beta does not answer"]
+    assert (outcome.run.state, outcome.run.rows) == ("failed", 7)
+
+
+def test_a_limit_that_is_still_passed_is_asked_about_until_the_end() -> None:
+    bench = read_bench().model_copy(update={"limits": Limits(temperature_c=(0.0, 10.0))})
+    watch = Onlooker(wishes=["resume", "resume"])
+    with Record() as record:
+        outcome = start(record, bench, *small_sweep(), watch)
+    assert len(watch.outcomes) == 3
+    assert "outside the bench's limits" in str(outcome.error)
+
+
+def test_a_run_that_is_not_wanted_leaves_nothing() -> None:
+    watch = Onlooker()
+
+    def refuse(plan: Plan) -> None:
+        assert plan.poses == POSES
+        raise Declined("not begun")
+
+    watch.planned = refuse  # type: ignore[method-assign]
+    with Record() as record:
+        with pytest.raises(Declined):
+            start(record, read_bench(), *small_sweep(), watch)
+        assert record.runs() == []
