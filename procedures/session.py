@@ -186,9 +186,14 @@ class Host(Protocol):
         """What happens now, for people."""
 
 
+def never(dwells: Sequence[Dwell]) -> bool:  # noqa: ARG001
+    """A plan's answer to whether what was measured has come to rest: it is that of the longest run."""
+    return False
+
+
 @dataclass(frozen=True)
 class Session:
-    """The bench as a procedure sees it."""
+    """The bench as a procedure sees it. `steady` judges whether bias and scale factor of dwells have come to rest."""
 
     alpha: Stage
     beta: Stage
@@ -199,6 +204,7 @@ class Session:
     clock: Clock
     host: Host
     limits: Limits = Limits()
+    steady: Callable[[Sequence[Dwell]], bool] = never
 
     def missing(self, poses: Iterable[Pose]) -> Iterator[Pose]:
         """Those of `poses` that the record does not hold yet, in order; a pose named twice is kept twice."""
