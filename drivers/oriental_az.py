@@ -45,6 +45,13 @@ class Settings:
         if not self.limits_deg[0] < self.limits_deg[1]:
             raise ValueError("limits_deg must be the lower limit, then the upper one")
 
+    def move_s(self, distance_deg: float) -> float:
+        """How long a move takes: a trapezoid of speed, or a triangle when the way is short."""
+        speed, acceleration = self.speed_deg_s, self.acceleration_deg_s2
+        if distance_deg < speed**2 / acceleration:
+            return 2 * math.sqrt(distance_deg / acceleration)
+        return distance_deg / speed + speed / acceleration
+
 
 class RotaryStage:
     """A stage that is told angles in deg and stands at them."""
@@ -116,7 +123,7 @@ class RotaryStage:
         asked_s = self._clock.now()
         self._unit.write_block(*self._direct_operation(angle_deg))
         begun_s = (asked_s + self._clock.now()) / 2  # it starts when it has the request, and then answers
-        self._expected_end_s = begun_s + self._duration_s(distance_deg)
+        self._expected_end_s = begun_s + self.settings.move_s(distance_deg)
         return True
 
     def wait(self) -> None:
@@ -171,13 +178,6 @@ class RotaryStage:
         percent = self.settings.current_percent
         values = (0, az.ABSOLUTE, angle_deg * per_deg, speed, rate, rate, percent, az.TRIGGER_ALL)
         return list(zip(az.DIRECT, values, strict=True))
-
-    def _duration_s(self, distance_deg: float) -> float:
-        """A trapezoid of speed, or a triangle when the way is short."""
-        speed, acceleration = self.settings.speed_deg_s, self.settings.acceleration_deg_s2
-        if distance_deg < speed**2 / acceleration:
-            return 2 * math.sqrt(distance_deg / acceleration)
-        return distance_deg / speed + speed / acceleration
 
     def _outputs(self) -> int:
         return int(self._unit.read(az.OUTPUTS))

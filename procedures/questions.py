@@ -91,6 +91,40 @@ class Number(Question):
 
 
 @dataclass(frozen=True)
+class Dial(Number):
+    """What a person reads after setting `stage` to `expected`, which yes or nothing stands for; None: a reading only."""
+
+    repeated: bool = True
+    stage: str = ""
+    expected: float | None = None
+
+    @property
+    def accepts(self) -> str:
+        if self.expected is None:
+            return super().accepts
+        return f"yes for {self.expected:g} {self.unit}, or {super().accepts}"
+
+    def checked(self, answer: str) -> str:
+        confirmed = answer.strip().lower() in ("", "yes", "y", "true")
+        return super().checked(repr(self.expected) if confirmed and self.expected is not None else answer)
+
+
+@dataclass(frozen=True)
+class PowerCycle(Confirm):
+    """The sensor is switched off by hand for `off_s` seconds, and on again."""
+
+    repeated: bool = True
+    off_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class Remount(Confirm):
+    """The sensor is taken off the table and put back the same way."""
+
+    repeated: bool = True
+
+
+@dataclass(frozen=True)
 class Choice(Question):
     """One of `choices`."""
 

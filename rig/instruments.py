@@ -14,10 +14,13 @@ from drivers.clock import Clock, SimulatedClock
 from drivers.errors import DriverError
 from drivers.instrument import Check, Identity
 from drivers.instrument import Instrument as Driver
+from drivers.links.person import PersonLink
 from drivers.links.server import Server
+from drivers.manual_stage import ManualStage
 from drivers.simulation.world import World
 from procedures.errors import ProcedureError
 from procedures.session import Host, Session
+from rig.attended import AtTheRig
 from rig.bench import ROLES, Bench
 from rig.errors import InstrumentFailed
 from rig.wiring import Wiring, wired
@@ -62,11 +65,18 @@ class Rig:
     clock: Clock
     world: World | None  # of the simulated instruments
     servers: tuple[Server, ...]
+    person: PersonLink
 
     def session(self, host: Host) -> Session:
-        """What a procedure is given."""
+        """What a procedure is given; from now on `host` answers for the person at the rig."""
+        self.person.attended_by = AtTheRig(host)
         parts: dict[str, Any] = {role: self.drivers.get(role) or absent(role) for role in ROLES}
         return Session(**parts, clock=self.clock, host=host, limits=self.bench.limits)
+
+    def read_deg(self) -> dict[str, float]:
+        """What the dials of stages that are turned by hand showed last, by role."""
+        dials = {role: driver.read_deg for role, driver in self.drivers.items() if isinstance(driver, ManualStage)}
+        return {role: read_deg for role, read_deg in dials.items() if read_deg is not None}
 
     def power_on_s(self) -> float | None:
         """The clock's reading when the sensor was powered; None where nobody knows."""
@@ -123,7 +133,7 @@ def connected(bench: Bench) -> Iterator[Rig]:
     with wired(bench) as wiring:
         drivers = {role: wiring.connect(role) for role in bench.instruments}
         servers = tuple(wiring.servers.values())
-        yield Rig(bench, drivers, wiring.clock, wiring.world if servers else None, servers)
+        yield Rig(bench, drivers, wiring.clock, wiring.world if servers else None, servers, wiring.links.person)
 
 
 def checked(bench: Bench) -> dict[str, tuple[Identity | None, list[Check]]]:

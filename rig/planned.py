@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from drivers.errors import LimitError
 from drivers.labjack_t7 import Settings as AdcSettings
 from drivers.omega_cn7500 import Settings as OvenSettings
-from drivers.oriental_az import Settings as StageSettings
-from drivers.simulation.trajectory import Trajectory
 from procedures.questions import Choice, Number, Question
 from procedures.session import Dwell, Pose, Reading, Samples
 from rig.record.values import Block
@@ -51,6 +49,15 @@ class Ledger:
         self.now_s += duration_s
 
 
+class StageSettings(Protocol):
+    """What a plan needs to know of a stage, whatever turns it."""
+
+    @property
+    def limits_deg(self) -> tuple[float, float]: ...
+
+    def move_s(self, distance_deg: float) -> float: ...
+
+
 class PlannedStage:
     """A stage that counts: it stands where it was told, and refuses what its driver would refuse."""
 
@@ -61,16 +68,15 @@ class PlannedStage:
         self.reach = (0.0, 0.0)
 
     def move_to(self, deg: float) -> None:
-        s = self._settings
-        low, high = s.limits_deg
+        low, high = self._settings.limits_deg
         if not low <= deg <= high:
             raise LimitError(
                 f"{self._name}: {deg:g} deg is outside its limits {low:g} .. {high:g} deg; nothing was moved",
                 "Choose other settings, or change limits_deg in the bench file after looking at the cables",
             )
         if deg != self._at_deg:
-            move = Trajectory(0.0, self._at_deg, deg, s.speed_deg_s, s.acceleration_deg_s2)
-            self._ledger.add(f"{self._name} from {self._at_deg:g} to {deg:g} deg", move.end_s + EXCHANGE_S)
+            move_s = self._settings.move_s(abs(deg - self._at_deg))
+            self._ledger.add(f"{self._name} from {self._at_deg:g} to {deg:g} deg", move_s + EXCHANGE_S)
         self._at_deg = deg
         self.reach = (min(self.reach[0], deg), max(self.reach[1], deg))
 

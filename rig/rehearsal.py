@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from inspect import isgenerator
 from typing import Any
 
-from procedures.questions import Question
+from procedures.questions import Dial, Question
 from procedures.session import Dwell, Pose, Reading, Samples, Session
 from rig.bench import SIMULATED, Bench
 from rig.instruments import Rig, absent, connected
@@ -65,8 +65,11 @@ class RehearsalHost(PlanHost):
         self.read |= {reading.name: reading for reading in readings}
 
     def ask(self, question: Question) -> str:
+        done = answer(question, self.rig)
+        if isinstance(question, Dial) and done is not None:  # the planned stage has counted the move
+            return done
         planned = super().ask(question)
-        return answer(question, self.rig) or planned
+        return done or planned
 
 
 @contextmanager
@@ -81,7 +84,8 @@ def rehearsing(bench: Bench, planned: Mapping[str, Any], ledger: Ledger) -> Iter
         level_deg = None if bench.limits.level_deg is None else math.inf
         limits = replace(bench.limits, temperature_c=(-math.inf, math.inf), level_deg=level_deg)
         clock: Any = Counted(ledger, rig.clock)
-        yield Session(**parts, clock=clock, host=RehearsalHost(ledger, rig), limits=limits)
+        host = RehearsalHost(ledger, rig)
+        yield replace(rig.session(host), **parts, clock=clock, limits=limits)
 
 
 def _simulated(bench: Bench) -> Bench:

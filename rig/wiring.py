@@ -19,6 +19,7 @@ from drivers.clock import Clock, SimulatedClock, WallClock, serve_forever
 from drivers.errors import LinkRefused
 from drivers.instrument import Instrument as Driver
 from drivers.links import Address, Links
+from drivers.links.person import PERSON
 from drivers.links.server import Server
 from drivers.simulation.config import WorldConfig
 from drivers.simulation.world import World
@@ -60,7 +61,7 @@ def wired(bench: Bench) -> Iterator[Wiring]:
     Raises Busy where another process uses a real instrument, which connecting to it would disturb.
     """
     with ExitStack() as stack:
-        for url in sorted({i.url for i in bench.instruments.values() if not i.simulated}):
+        for url in sorted({i.url for i in bench.instruments.values() if not i.simulated} - {PERSON}):
             stack.enter_context(lease(home(), f"wire-{hashlib.sha256(url.encode()).hexdigest()[:16]}", url))
         world = World(WorldConfig.from_mapping(bench.world), bench.seed)
         servers = serve(bench, world)

@@ -6,6 +6,7 @@ from drivers.clock import Clock
 from drivers.links.address import Address
 from drivers.links.link import Link, open_link
 from drivers.links.modbus import Bus, Unit
+from drivers.links.person import PersonLink
 
 
 class Links:
@@ -13,6 +14,7 @@ class Links:
 
     def __init__(self, clock: Clock) -> None:
         self.clock = clock
+        self.person = PersonLink()
         self._buses: dict[str, Bus] = {}
         self._links: list[Link] = []
 

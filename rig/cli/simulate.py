@@ -11,6 +11,9 @@ from types import FrameType
 import click
 
 from drivers.clock import WallClock, serve_forever
+from drivers.links import Address
+from drivers.links.person import PERSON
+from drivers.links.server import Server
 from drivers.simulation.config import WorldConfig
 from drivers.simulation.world import World
 from rig.bench import Bench, read_bench
@@ -38,16 +41,25 @@ def command(bench_file: Path | None, as_json: bool) -> None:
         signal.signal(each, end)
     clock = WallClock()
     servers = serve(bench, World(WorldConfig.from_mapping(bench.world), bench.seed))
-    if not servers:
-        raise BenchError(f"no instrument of {bench.name!r} is simulated; write `url: simulated` for one")
     try:
-        addresses = {role: address for server in servers.values() for role, address in server.addresses.items()}
+        addresses = _served(bench, list(servers.values()))
         documents = {role: _document(bench, role, asdict(address)) for role, address in addresses.items()}
         _tell(documents, as_json)
         serve_forever(list(servers.values()), lambda: bool(ended), clock)
     finally:
         for server in servers.values():
             server.close()
+
+
+def _served(bench: Bench, servers: list[Server]) -> dict[str, Address]:
+    """Where each role is served; a stage that is turned by hand is not. Raises BenchError where nothing is."""
+    addresses = {role: address for server in servers for role, address in server.addresses.items()}
+    by_hand = sorted(role for role, address in addresses.items() if address.url == PERSON)
+    if by_hand:
+        note(f"{', '.join(by_hand)}: turned by hand, so there is nothing to serve")
+    if len(by_hand) == len(addresses):
+        raise BenchError(f"no instrument of {bench.name!r} can be served; write `url: simulated` for one with a wire")
+    return {role: address for role, address in addresses.items() if role not in by_hand}
 
 
 def _document(bench: Bench, role: str, address: dict[str, object]) -> dict[str, object]:

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from drivers import labjack_t7, omega_cn7500, oriental_az, pi_e727
+from drivers import labjack_t7, manual_stage, omega_cn7500, oriental_az, pi_e727
 
 
 @pytest.mark.parametrize(
@@ -16,6 +16,9 @@ from drivers import labjack_t7, omega_cn7500, oriental_az, pi_e727
         (oriental_az, {"steps_per_turn": 0}, "steps_per_turn must be positive"),
         (oriental_az, {"acceleration_deg_s2": float("nan")}, "acceleration_deg_s2 must be positive"),
         (oriental_az, {"limits_deg": (10.0, -10.0)}, "limits_deg must be the lower limit, then the upper one"),
+        (manual_stage, {"resolution_deg": 0.0, "seconds_per_move": float("inf")}, "resolution_deg, seconds_per_move"),
+        (manual_stage, {"tolerance_deg": 0.01}, "tolerance_deg must not be less than resolution_deg"),
+        (manual_stage, {"limits_deg": (1.0, 1.0)}, "limits_deg must be the lower limit, then the upper one"),
         (omega_cn7500, {"limits_c": (50.0, 50.0)}, "limits_c must be the lower limit, then the upper one"),
         (pi_e727, {"axes": {}}, "axes must name the controller's axes, each once, and at least one"),
         (pi_e727, {"axes": {"x": "1", "y": "1"}}, "each once"),

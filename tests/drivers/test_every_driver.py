@@ -18,7 +18,7 @@ from drivers.links import Links
 
 MODULES = sorted(file.stem for file in Path(clock_module.__file__).parent.glob("[a-z]*.py"))
 NAMES = [name for name in MODULES if hasattr(import_module(f"drivers.{name}"), "connect")]
-SERIAL = [name for name in NAMES if not import_module(f"drivers.{name}_twin").LISTEN.startswith("tcp")]
+SERIAL = [name for name in NAMES if import_module(f"drivers.{name}_twin").LISTEN.startswith("pty")]
 OTHERS = ("rtu+tcp://127.0.0.1:0", "tcp://127.0.0.1:0")
 WIRES = [(name, None) for name in NAMES] + [(name, listen) for name in SERIAL for listen in OTHERS]
 

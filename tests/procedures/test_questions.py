@@ -1,14 +1,17 @@
 """A question accepts what makes sense as its answer, and says what that is."""
 
+from dataclasses import replace
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from procedures.errors import BadAnswer
-from procedures.questions import Choice, Confirm, Number, Question
+from procedures.questions import Choice, Confirm, Dial, Number, Question
 
 MOUNTED = Confirm("mounting", "Is it mounted?")
 LEVEL = Number("level-x", "What does it show?", unit="deg", low=-45, high=45)
+DIAL = Dial("beta-90", "Turn beta to 90 deg", unit="deg", low=89.5, high=90.5, stage="beta", expected=90.0)
 SIDE = Choice("side", "Which side?", choices=("front", "back"))
 
 
@@ -23,6 +26,11 @@ def test_a_number_comes_back_to_the_last_bit(value: float) -> None:
     assert float(LEVEL.checked(repr(value).replace(".", ","))) == value
 
 
+@pytest.mark.parametrize("said", ["", "yes", "True", "90", "90 deg"])
+def test_a_dial_is_confirmed_or_read(said: str) -> None:
+    assert (DIAL.checked(said), DIAL.checked("90,083")) == ("90.0", "90.083")
+
+
 def test_a_choice_is_one_of_its_own() -> None:
     assert SIDE.checked(" back ") == "back"
 
@@ -35,6 +43,9 @@ def test_a_choice_is_one_of_its_own() -> None:
         (LEVEL, "45.1", "it takes a number from -45 to 45 deg"),
         (LEVEL, "nan", "it takes a number from -45 to 45 deg"),
         (LEVEL, "level", "it takes a number from -45 to 45 deg"),
+        (DIAL, "9", "it takes yes for 90 deg, or a number from 89.5 to 90.5 deg"),
+        (DIAL, "no", "it takes yes for 90 deg"),
+        (replace(DIAL, expected=None), "", "it takes a number from 89.5 to 90.5 deg"),
         (SIDE, "bakc", "it takes one of front, back; did you mean 'back'?"),
     ],
 )

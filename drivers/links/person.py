@@ -1,0 +1,36 @@
+"""The wire to a person: some instruments are set and read by hand.
+
+A driver asks for a number and cannot know who answers: whoever runs the rig says who stands at it, for as long as
+somebody does.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from drivers.errors import LinkRefused
+
+PERSON = "person"  # the url of an instrument whose wire is a person
+
+
+class Person(Protocol):
+    """Somebody who does what is asked, and tells what they see then."""
+
+    def ask(self, name: str, text: str, unit: str, low: float, high: float, expected: float | None = None) -> float:
+        """What they read, in `unit` and from `low` to `high`; `name` is the question's key in a file of answers.
+
+        A confirmation stands for the `expected` number. Raises what whoever runs the rig raises where nobody answers.
+        """
+
+
+class PersonLink:
+    """The place at the rig: questions go to whoever stands there."""
+
+    def __init__(self) -> None:
+        self.attended_by: Person | None = None
+
+    def ask(self, name: str, text: str, unit: str, low: float, high: float, expected: float | None = None) -> float:
+        """As `Person.ask`. Raises LinkRefused where nobody stands at the rig."""
+        if self.attended_by is None:
+            raise LinkRefused(f'nobody stands at the rig to be asked "{text}"', "Ask within a run")
+        return self.attended_by.ask(name, text, unit, low, high, expected)
