@@ -84,12 +84,19 @@ class Instrument(Strict):
 
 
 class Sensor(Strict):
-    """The sensor under test; these become constants of every table."""
+    """A sensor under test; these become constants of its tables, apart from what its simulated twin has of its own."""
 
     name: str = "sensor"
     serial: str = ""
     gravity_m_s2: float = 9.80665
     filter_corner_hz: float | None = None
+    world: dict[str, Any] = {}
+
+    @property
+    def constants(self) -> dict[str, str | float]:
+        """What every table of this sensor says of it."""
+        said = self.model_dump(exclude_none=True, exclude={"world"})
+        return {"sensor": said.pop("name"), **{key: value for key, value in said.items() if value != ""}}
 
 
 class Folders(Strict):
@@ -106,6 +113,7 @@ class Bench(Strict):
     seed: int = Field(default=1, ge=0)
     instruments: dict[str, Instrument]
     sensor: Sensor = Sensor()
+    sensors: dict[str, Sensor] = {}
     limits: Limits = Limits()
     certificates: dict[str, Certificate] = {}  # of what plays no role: a hand level, a displacement sensor's curve
     world: dict[str, Any] = {}
@@ -118,10 +126,9 @@ class Bench(Strict):
 
     @property
     def constants(self) -> dict[str, str | float]:
-        """What every table from this bench says of the sensor, and of the way to each pose."""
-        sensor = self.sensor.model_dump(exclude_none=True)
-        said = {key: value for key, value in sensor.items() if value != ""}
-        return {"sensor": said.pop("name"), **said, "approach_deg": self.limits.overrun_deg}
+        """What every table from this bench says of the sensor (those of a batch are named apart), and of the way."""
+        sensor = {} if self.sensors else self.sensor.constants
+        return {**sensor, "approach_deg": self.limits.overrun_deg}
 
     @property
     def result_limits(self) -> Mapping[str, float | tuple[float, float]]:

@@ -61,8 +61,8 @@ def load(data: str, kind: str | None = None, tell: Callable[[str], None] = lambd
 
 
 def _of_run(data: str) -> Table:
+    from rig.record.measured import table_of
     from rig.record.store import Record  # a file needs no database
-    from rig.record.tables import table_of
 
     try:
         with Record.to_find(data) as record:

@@ -22,7 +22,7 @@ from calibrations.table import Table
 from rig.data import load
 from rig.errors import ExportError
 from rig.record import Record, Run
-from rig.record.tables import table_of
+from rig.record.measured import table_of
 
 FORMATS = ("csv", "parquet", "hdf5", "event-model")
 UNITS = {"deg": "deg", "v": "V", "s": "s", "c": "degC"}

@@ -6,7 +6,7 @@ import click
 
 from rig.cli.output import emit, json_option
 from rig.record import Event, Record, Run
-from rig.record.tables import table_of
+from rig.record.measured import table_of
 
 
 @click.command("show")

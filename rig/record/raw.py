@@ -5,19 +5,20 @@ A procedure names them by their path: `still 0`, `still 1` ... of a table of kin
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from calibrations.table import Array, Table
 from rig.errors import RecordError
-from rig.record.store import Record
 from rig.record.values import Kept, Run
 
 
-def samples_table(record: Record, run: Run) -> Table:
+def samples_table(run: Run, poses: Iterable[Kept]) -> Table:
     """Every sample of the run's kind with its time. Raises RecordError where nothing is kept yet."""
-    stretches = [k for k in record.kept(run.run) if k.pose.path.split(" ")[0] == run.kind and k.excluded is None]
+    stretches = [kept for kept in poses if kept.pose.path.split(" ")[0] == run.kind]
     if not stretches:
-        raise RecordError(f"run {run.run} holds no record of kind {run.kind} yet; `rig resume {run.run}` goes on")
+        raise RecordError(f"run {run.run} holds no record of kind {run.kind} yet; `rig resume` goes on with it")
     names = stretches[0].samples.channels
     volts = np.concatenate([kept.samples.volts for kept in stretches])
     columns = {"t_s": np.concatenate([_times_s(kept) for kept in stretches])}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -10,36 +10,26 @@ from calibrations.mean_noise import measured_inflation
 from calibrations.table import Array, Table
 from procedures.session import Samples
 from rig.errors import RecordError
-from rig.record.raw import samples_table
-from rig.record.store import Record
-from rig.record.values import Kept
+from rig.record.values import Kept, Run
 
 AXES = ("vx", "vy", "vz")  # channels whose scatter is kept; others are regressors
 MOST_BLOCKS = 256  # spread over the run, that its noise is measured on: bounds the memory
 SURE = 0.1  # relative standard error above which the filter's formula knows a mean's noise better
 
 
-def table_of(record: Record, run_id: str) -> Table:
-    """The table of a run, measured or imported. Raises UnknownRun, or RecordError where nothing is kept yet."""
-    run = record.run(run_id)
-    numbers, labels = record.columns(run_id)
-    if numbers:
-        return Table.from_columns(run.kind, numbers, run.constants, run.run, labels)
-    if run.kind != "poses":
-        return samples_table(record, run)
+def poses_table(run: Run, poses: Iterable[Kept]) -> Table:
+    """A row for each of the run's `poses`. Raises RecordError where there is none yet."""
     rows: list[dict[str, float]] = []
     paths: list[str] = []
     blocks: list[Samples] = []
     stride = 1 + run.rows // MOST_BLOCKS
-    for number, kept in enumerate(record.kept(run_id)):
-        if kept.excluded is not None:
-            continue
+    for number, kept in enumerate(poses):
         rows.append(_row(kept))
         paths.append(kept.pose.path)
         if number % stride == 0:
             blocks.append(kept.samples)
     if not rows:
-        raise RecordError(f"run {run_id} holds no pose yet; `rig resume {run_id}` goes on with it")
+        raise RecordError(f"run {run.run} holds no pose yet; `rig resume` goes on with it")
     names = [name for name in rows[0] if all(name in row for row in rows)]
     columns = {name: np.array([row[name] for row in rows]) for name in names}
     labels = {"path": tuple(paths)} if any(paths) else {}

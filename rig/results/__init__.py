@@ -1,6 +1,6 @@
 """What a run's measurements come to: one file for each procedure that has results, found by its name.
 
-`noise_floor.py` holds `evaluate(record, run) -> {name: Result}` for the procedure "noise-floor". A procedure of the
+`noise_floor.py` holds `evaluate(measured) -> {name: Result}` for the procedure "noise-floor". A procedure of the
 user's own may return its results instead, as such a mapping.
 """
 

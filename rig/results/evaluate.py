@@ -6,16 +6,23 @@ import importlib
 from pathlib import Path
 
 from rig.record import Record, Run
+from rig.record.measured import Measured, sensors_of
 from rig.results.result import Result
 
 
 def evaluated(record: Record, run: Run) -> dict[str, Result]:
     """What the run's measurements come to, by name; nothing for a procedure without results.
 
-    Raises DataError where the record does not hold enough for them.
+    Those of a batch begin with the sensor's name: `a1/bias-drift-x`. What belongs to the bench (OF_THE_BENCH of the
+    file) is given once. Raises DataError where the record does not hold enough.
     """
     name = run.procedure.replace("-", "_")
     if not Path(__file__).with_name(f"{name}.py").is_file():
         return {}
-    found: dict[str, Result] = importlib.import_module(f"rig.results.{name}").evaluate(record, run)
-    return found
+    module = importlib.import_module(f"rig.results.{name}")
+    sensors = [] if getattr(module, "OF_THE_BENCH", False) else sensors_of(run)
+    if not sensors:
+        found: dict[str, Result] = module.evaluate(Measured(record, run))
+        return found
+    each = {sensor: module.evaluate(Measured(record, run, sensor)) for sensor in sensors}
+    return {f"{sensor}/{name}": result for sensor, results in each.items() for name, result in results.items()}

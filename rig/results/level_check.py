@@ -5,13 +5,15 @@ from __future__ import annotations
 from math import hypot
 
 from procedures.level_check import reversal
-from rig.record import Record, Run
+from rig.record.measured import Measured
 from rig.results.result import Result
 
+OF_THE_BENCH = True
 
-def evaluate(record: Record, run: Run) -> dict[str, Result]:
+
+def evaluate(measured: Measured) -> dict[str, Result]:
     """Tilt along x and y of the level, and the offset that the half turn takes out, deg."""
-    read = {reading.name: reading for reading in record.readings(run.run)}
+    read = {reading.name: reading for reading in measured.readings()}
     results = {}
     for axis in "xy":
         front, back = read[f"level-front-{axis}"], read[f"level-back-{axis}"]

@@ -5,19 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from calibrations.axis_search import Direction, correction, directions, non_orthogonality_deg
-from rig.record import Record, Run
-from rig.record.tables import table_of
+from rig.record.measured import Measured
 from rig.results.result import Result
 
 REFERENCE = "xyz"
 
 
-def evaluate(record: Record, run: Run) -> dict[str, Result]:
+def evaluate(measured: Measured) -> dict[str, Result]:
     """theta-xx .. theta-yz, alpha-x .. beta-y in deg, and the correction of Ang (20)-(21) for accelerations in order.
 
     Raises DataError where no round of the search is complete.
     """
-    found = directions(table_of(record, run.run))
+    found = directions(measured.table())
     results: dict[str, Result] = {}
     for direction in found.values():
         results |= _of_axis(direction)

@@ -7,21 +7,22 @@ import numpy as np
 from calibrations.errors import DataError
 from calibrations.noise_floor import hidden_inclination_deg, rms
 from procedures.noise_floor import STILL
-from rig.record import Kept, Record, Run
+from rig.record import Kept
+from rig.record.measured import Measured
 from rig.results.result import Result
 
 PEAK_TO_PEAK = 4  # x rms: Ang V
 UPRIGHT_DEG = {"x": (0.0, 180.0), "y": (90.0, 270.0)}  # beta at +1 g and at -1 g
 
 
-def evaluate(record: Record, run: Run) -> dict[str, Result]:
+def evaluate(measured: Measured) -> dict[str, Result]:
     """V, and deg for the inclination. Raises DataError where the still record is missing."""
     upright: list[Kept] = []
     still: list[Kept] = []
-    for kept in record.kept(run.run):
+    for kept in measured.kept():
         (still if kept.pose.path.startswith(STILL) else upright).append(kept)
     if not still:
-        raise DataError(f"run {run.run} holds no still record yet; `rig resume {run.run}` goes on with it")
+        raise DataError(f"run {measured.run.run} holds no still record yet; `rig resume` goes on with it")
     first, results = still[0].samples, {}
     for axis, betas in UPRIGHT_DEG.items():
         if (channel := f"v{axis}") not in first.channels:

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from calibrations.repeatability import between
 from calibrations.tumble import tumbles
-from rig.record import Record, Run
-from rig.record.tables import table_of
+from rig.record.measured import Measured
 from rig.results.result import Result
 
 AXES = "xy"
 
 
-def evaluate(record: Record, run: Run) -> dict[str, Result]:
+def evaluate(measured: Measured) -> dict[str, Result]:
     """bias-as-is-x, scale-power-y and so on: V, and a fraction. Raises DataError for fewer than two repetitions."""
-    table, results = table_of(record, run.run), {}
+    table, results = measured.table(), {}
     for axis in (axis for axis in table.axes if axis in AXES):
         done = tumbles(table, axis)
         for kind in dict.fromkeys(each.path.partition(" ")[0] for each in done):

@@ -51,8 +51,8 @@ def documents(results: Mapping[str, Result], limits: Mapping[str, Limit]) -> dic
             "value": result.value,
             "std": result.std,
             "unit": result.unit,
-            "limit": limits.get(name),
-            "verdict": result.verdict(limits[name]) if name in limits else None,
+            "limit": (limit := limits.get(name.rpartition("/")[2])),
+            "verdict": result.verdict(limit) if limit is not None else None,
         }
         for name, result in results.items()
     }

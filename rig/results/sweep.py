@@ -6,17 +6,17 @@ import numpy as np
 
 from calibrations.trend import FEWEST, trend
 from procedures.sweep import REFERENCE
-from rig.record import Record, Run
+from rig.record.measured import Measured
 from rig.results.result import Result
 
 HOUR_S = 3600.0
 
 
-def evaluate(record: Record, run: Run) -> dict[str, Result]:
+def evaluate(measured: Measured) -> dict[str, Result]:
     """Trend of the outputs at the reference pose, V/h, with the standard error that its scatter gives."""
-    if not run.settings.get("reference_every"):
+    if not measured.run.settings.get("reference_every"):
         return {}
-    visits = [k.dwell for k in record.kept(run.run) if k.pose == REFERENCE and k.excluded is None]
+    visits = [kept.dwell for kept in measured.kept() if kept.pose == REFERENCE]
     if len(visits) < FEWEST:
         return {}
     hours = np.array([dwell.t_s for dwell in visits]) / HOUR_S

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from calibrations.temperature_coefficients import bias_coefficients, scale_coefficients
 from calibrations.tumble import tumbles
-from rig.record import Record, Run
-from rig.record.tables import table_of
+from rig.record.measured import Measured
 from rig.results.result import Result
 
 AXES = "xy"
 
 
-def evaluate(record: Record, run: Run) -> dict[str, Result]:
+def evaluate(measured: Measured) -> dict[str, Result]:
     """Slopes in V/K and 1/K; hysteresis (up minus down) in V and as a fraction. Raises DataError for too few steps."""
-    table, results = table_of(record, run.run), {}
+    table, results = measured.table(), {}
     for axis in (axis for axis in table.axes if axis in AXES):
         steps = tumbles(table, axis)
         for name, unit, found in (

@@ -19,7 +19,7 @@ from procedures.settings import parse
 from rig.bench import read_bench
 from rig.cli.watch import Quiet
 from rig.record import Record
-from rig.record.tables import table_of
+from rig.record.measured import table_of
 from rig.runner import start
 from tests.hidden import rigs
 

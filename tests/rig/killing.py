@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from rig.record import Kept, Record
-from rig.record.tables import table_of
+from rig.record.measured import table_of
 from tests.rig.nursery import Ended, Harm, Nursery
 
 RUN = ("run", "sweep", "--unattended", "--json", "--step-deg", "90", "--dwell-s", "0.2", "--inclinations-deg", "90")

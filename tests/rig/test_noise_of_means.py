@@ -12,7 +12,7 @@ from drivers.simulation.config import WorldConfig
 from drivers.simulation.world import World
 from procedures.session import Pose
 from rig.record import Kept, Record
-from rig.record.tables import table_of
+from rig.record.measured import table_of
 
 CLEAN = WorldConfig.ideal().changed({"converter": {"noise_v": 0.0}, "noise": {"flicker_v": 0.0}})
 FILTER = {"filter_corner_hz": 15.07}

@@ -12,7 +12,7 @@ import yaml
 from procedures.errors import ProcedureError
 from rig.bench import DEFAULT
 from rig.record import Record
-from rig.record.tables import table_of
+from rig.record.measured import table_of
 from rig.results import Result, documents, returned
 
 Rig = Callable[..., Any]

@@ -18,7 +18,7 @@ from rig.bench import Bench, read_bench
 from rig.errors import Busy, InstrumentFailed, RunMismatch
 from rig.lease import lease
 from rig.record import Kept, Record
-from rig.record.tables import table_of
+from rig.record.measured import table_of
 from rig.runner import Outcome, resume, start
 from tests.rig.rigging import POSES, Onlooker, small_sweep
 

@@ -13,8 +13,8 @@ from calibrations.table import Table
 from procedures.session import Pose, Reading
 from rig.errors import RecordError, UnknownRun
 from rig.record import Block, Kept, Record
+from rig.record.measured import table_of
 from rig.record.schema import SCHEMA
-from rig.record.tables import table_of
 
 ANGLES = st.floats(-400, 400)
 POSES = st.builds(
