@@ -33,6 +33,7 @@ Read = TypeVar("Read")
 class Settings:
     """Channels as {name: AIN number}, in the order of the scan; one range for all.
 
+    `interchannel_s` is from one channel of a scan to the next [M: measure it with one signal on two channels].
     Raises ValueError for what no T7 has or can do.
     """
 
@@ -40,6 +41,7 @@ class Settings:
     rate_hz: float = 1000.0
     range_v: float = 10.0
     power_dio: int | None = None  # the digital line that switches the sensor's power
+    interchannel_s: float = t7.INTERCHANNEL_S
 
     def __post_init__(self) -> None:
         if not self.channels or not set(self.channels.values()) <= set(range(t7.INPUTS)):
@@ -50,6 +52,12 @@ class Settings:
             raise ValueError(f"range_v must be one of {', '.join(f'{r:g}' for r in t7.RANGES_V)} V")
         if self.power_dio is not None and self.power_dio not in range(t7.LINES):
             raise ValueError(f"power_dio must be a digital line, 0 to {t7.LINES - 1}")
+        if not self.interchannel_s >= 0:
+            raise ValueError("interchannel_s must be a time of 0 s or more")
+
+    def lag_s(self, channel: str) -> float:
+        """How long after the beginning of a scan this channel is sampled."""
+        return list(self.channels).index(channel) * self.interchannel_s
 
 
 @dataclass(frozen=True, eq=False)

@@ -69,6 +69,7 @@ MOST_SAMPLES_PER_PACKET = 512
 LARGEST_BUFFER = 32768
 MOST_SAMPLES_PER_S = 100_000
 MOST_ADDRESSES = 128
+INTERCHANNEL_S = 15e-6  # at resolution index 1 and automatic settling [M]
 
 
 def scan_list(index: int) -> Register:
