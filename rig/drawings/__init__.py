@@ -1,0 +1,14 @@
+"""Drawings of the rig for a technician: how the stages stand, and how the sensor is mounted on them.
+
+attitude    the four numbers, and where the sensor's axes point
+page        the whole drawing as SVG: the rig, the tilt of alpha, the table of beta, what the sensor feels
+sketch      the table of beta in a terminal, as braille
+named       which drawing belongs to a question
+"""
+
+from rig.drawings.attitude import Attitude
+from rig.drawings.named import drawing_of
+from rig.drawings.page import page
+from rig.drawings.sketch import sketch
+
+__all__ = ["Attitude", "drawing_of", "page", "sketch"]

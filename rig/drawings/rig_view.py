@@ -1,0 +1,127 @@
+"""The rig as it stands on its bench: alpha tilts, beta turns on it, the sensor lies on beta's table."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from rig.drawings import svg
+from rig.drawings.attitude import Attitude, Vectors
+from rig.drawings.solids import Camera, Solid, box, cylinder
+
+STEEL, DARK, ALUMINIUM, LIGHT_METAL = "#8b98a6", "#5b6875", "#c3ccd5", "#dde3e9"
+BOARD, BOARD_EDGE, PACKAGE = "#2f7d5b", "#1c5b40", "#3a4450"
+LAB = np.eye(3)
+CAMERA_FROM = (0.62, -1.0, 0.62)
+AXIS_LENGTH = 0.95
+GRAVITY = np.array([[-1.35, -0.9, 0.75], [-1.35, -0.9, -0.15]])  # from, to
+BOARD_HALF, PACKAGE_HALF = 0.36, 0.22
+POSITIONER_HALF, POSITIONER_HEIGHT = 0.46, 0.26
+
+
+def rig_view(attitude: Attitude, centre: tuple[float, float], scale: float) -> Iterator[str]:
+    """The rig from the front, a little from the right and from above."""
+    camera = Camera(CAMERA_FROM, scale, centre)
+    faces_us = bool(attitude.tilted[2] @ camera.toward > 0)
+    for solid in [*_stand(), *_bracket(attitude, faces_us)]:
+        yield from solid.drawn(camera)
+    yield _axis_of_alpha(camera)
+    stack = _stack(attitude)
+    for solid in stack if faces_us else stack[::-1]:
+        yield from solid.drawn(camera)
+        if solid is stack[-1]:
+            yield from _mark(attitude, camera)
+    if not faces_us:
+        yield _hidden(attitude, camera)
+    yield from _axes(attitude, camera)
+
+
+def _stand() -> list[Solid]:
+    """What does not move: base plate, column, drive of alpha behind."""
+    return [
+        box((-1.15, -0.95, -1.42), (1.15, 1.6, -1.3), LAB, LIGHT_METAL),
+        box((-0.42, 1.0, -1.3), (0.42, 1.45, 0.1), LAB, ALUMINIUM),
+        cylinder(0.62, 0.98, 1.5, 1, LAB, STEEL),
+        cylinder(0.5, 0.86, 0.98, 1, LAB, DARK),
+    ]
+
+
+def _bracket(attitude: Attitude, faces_us: bool) -> list[Solid]:
+    """What alpha tilts: the angle that carries beta, seen from the side that looks this way."""
+    back = box((-0.42, 0.74, -0.74), (0.42, 0.86, 0.42), attitude.tilted, ALUMINIUM)
+    floor = box((-0.42, -0.5, -0.74), (0.42, 0.74, -0.62), attitude.tilted, ALUMINIUM)
+    return [back, floor] if faces_us else [back]
+
+
+def _stack(attitude: Attitude) -> list[Solid]:
+    """What lies on the bracket, from the floor up: drive of beta, its table, what is between, the sensor."""
+    frame, plate, case = _on_table(attitude), BOARD_HALF, PACKAGE_HALF
+    foot = foot_of(attitude)
+    under, thin, package = (foot + 0.12, foot + 0.17, foot) if attitude.flip else (foot, foot + 0.05, foot + 0.05)
+    board = box((-plate, -plate, under), (plate, plate, thin), frame, BOARD)
+    case_of = box((-case, -case, package), (case, case, package + 0.12), frame, PACKAGE)
+    return [
+        box((-0.42, -0.5, -0.74), (0.42, 0.74, -0.62), attitude.tilted, ALUMINIUM),
+        cylinder(0.52, -0.62, -0.2, 2, attitude.tilted, STEEL),
+        cylinder(0.7, -0.2, 0.0, 2, attitude.table, LIGHT_METAL),
+        *(_carriage(frame) if attitude.shaken else []),
+        *([case_of, board] if attitude.flip else [board, case_of]),
+    ]
+
+
+def _carriage(frame: Vectors) -> list[Solid]:
+    """The fibre whose tip looks along x at the carriage, and the nano-positioner."""
+    half = POSITIONER_HALF
+    return [
+        box((-1.0, -0.045, 0.09), (-half - 0.06, 0.045, 0.18), frame, DARK),
+        box((-half, -half, 0.0), (half, half, POSITIONER_HEIGHT), frame, STEEL),
+    ]
+
+
+def foot_of(attitude: Attitude) -> float:
+    """How high above the table the sensor begins."""
+    return POSITIONER_HEIGHT if attitude.shaken else 0.0
+
+
+def _on_table(attitude: Attitude) -> Vectors:
+    """The sensor's x and y, and the table's normal: a frame in which up is away from the table, face up or down."""
+    return Attitude(attitude.alpha_deg, attitude.beta_deg, attitude.mount_deg).sensor
+
+
+def _mark(attitude: Attitude, camera: Camera) -> Iterator[str]:
+    """Pin 1 on the package, where it can be seen; screws of the board."""
+    frame = _on_table(attitude)
+    seen = bool(attitude.tilted[2] @ camera.toward > 0.05)
+    if seen and not attitude.flip:
+        pin = np.array([-0.13, 0.13, foot_of(attitude) + 0.17]) @ frame
+        yield svg.circle(camera.project(pin)[0], 0.035 * camera.scale, "#f7c948", "none", 0)
+    height = foot_of(attitude) + (0.17 if attitude.flip else 0.05)
+    for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1)) if seen else ():
+        screw = np.array([0.82 * x * BOARD_HALF, 0.82 * y * BOARD_HALF, height]) @ frame
+        yield svg.circle(camera.project(screw)[0], 0.025 * camera.scale, "#e8edf2", "none", 0)
+
+
+def _hidden(attitude: Attitude, camera: Camera) -> str:
+    """The outline of a board that the table hides."""
+    h, foot = BOARD_HALF, foot_of(attitude)
+    corners = np.array([[-h, -h, foot], [h, -h, foot], [h, h, foot], [-h, h, foot], [-h, -h, foot]])
+    return svg.line(camera.project(corners @ _on_table(attitude)), BOARD_EDGE, 1.4, stroke_dasharray="4 3")
+
+
+def _axis_of_alpha(camera: Camera) -> str:
+    """The axis that alpha turns about, dash-dotted as on a drawing."""
+    ends = camera.project(np.array([[0, -1.85, 0], [0, 1.9, 0]], float))
+    return svg.line(ends, svg.QUIET, 1.0, stroke_dasharray="12 4 2 4") + svg.text(
+        (ends[0][0] - 8, ends[0][1] + 13), "axis of alpha", 11, svg.QUIET
+    )
+
+
+def _axes(attitude: Attitude, camera: Camera) -> Iterator[str]:
+    """The sensor's axes, and gravity."""
+    middle = foot_of(attitude) * attitude.table[2]
+    for axis, name, colour in zip(attitude.sensor, "xyz", (svg.RED, svg.GREEN, svg.BLUE), strict=True):
+        start, end, label = camera.project(middle + np.outer([0, AXIS_LENGTH, 1.14 * AXIS_LENGTH], axis))
+        yield svg.arrow(start, end, colour) + svg.text(label, name, 14, colour, bold=True)
+    top, bottom = camera.project(GRAVITY)
+    yield svg.arrow(top, bottom, svg.INK, 2.6) + svg.text((bottom[0], bottom[1] + 13), "gravity", 12)

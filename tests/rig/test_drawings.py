@@ -1,0 +1,119 @@
+"""Drawings of the rig: the geometry of the sensor, valid SVG without foreign parts, and what a technician must see."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from itertools import product
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from procedures.catalogue import SHIPPED
+from procedures.questions import Confirm, Mounting
+from rig.drawings import Attitude, drawing_of, page, sketch
+from rig.drawings.named import NAMED
+from rig.drawings.rig_view import CAMERA_FROM
+from rig.drawings.solids import Camera, box, cylinder
+
+Rig = Callable[..., Any]
+SVG = "{http://www.w3.org/2000/svg}"
+ANGLES = product((-135.0, 0.0, 90.0, 180.0), (0.0, 200.0), (0.0, 45.0), (0, 1))
+EVERYWHERE = [*(Attitude(*angles) for angles in ANGLES), Attitude(45, 90, shaken=True)]
+
+
+def test_the_sensor_feels_what_the_geometry_says() -> None:
+    for alpha, beta in product((-150.0, 0.0, 45.0, 90.0), (-30.0, 0.0, 90.0, 210.0)):
+        a, b = np.radians([alpha, beta])
+        wanted = np.sin(a) * np.cos(b), np.sin(a) * np.sin(b), np.cos(a)
+        assert Attitude(alpha, beta).specific_force_g == pytest.approx(wanted, abs=1e-9)
+        x, y, z = wanted
+        assert Attitude(alpha, beta, flip=1).specific_force_g == pytest.approx((x, -y, -z), abs=1e-9)
+    assert Attitude(90, 30, mount_deg=60).specific_force_g == pytest.approx((0, 1, 0), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "attitude", EVERYWHERE, ids=lambda a: f"{a.alpha_deg:g}-{a.beta_deg:g}-{a.mount_deg:g}-{a.flip}"
+)
+def test_a_drawing_is_one_valid_file_within_its_frame(attitude: Attitude) -> None:
+    text = page(attitude)
+    root = ElementTree.fromstring(text)  # noqa: S314 our own text
+    assert root.tag == f"{SVG}svg"
+    assert not re.search(r"href|url\(|nan[ ,\"]", text)
+    _, _, width, height = (float(v) for v in root.attrib["viewBox"].split())
+    for shape in [*root.iterfind(f"{SVG}polygon"), *root.iterfind(f"{SVG}polyline")]:
+        for x, y in (pair.split(",") for pair in shape.attrib["points"].split()):
+            assert 0 <= float(x) <= width
+            assert 0 <= float(y) <= height
+    assert len(text) < 60_000
+
+
+def words(attitude: Attitude, title: str = "") -> list[str]:
+    root = ElementTree.fromstring(page(attitude, title))  # noqa: S314 our own text
+    return [str(e.text) for e in root.iter(f"{SVG}text")]
+
+
+def test_it_says_what_it_shows() -> None:
+    shown = words(Attitude(45, 90, 30, 1), "mount-30-down <&>")
+    assert shown[:2] == [
+        "mount-30-down <&>",
+        "alpha 45 deg, beta 90 deg, sensor face down, turned by 30 deg on the table",
+    ]
+    assert {"Alpha 45°, from the front", "Beta 90°, sensor turned by 30°", "gravity", "x", "y", "z"} <= set(shown)
+    assert f"{np.sin(np.pi / 4) * np.cos(np.radians(120)):+.3f} g" in shown
+
+
+def test_another_attitude_is_another_drawing() -> None:
+    assert len({page(a, "same") for a in EVERYWHERE}) == len(EVERYWHERE)
+    assert len({"".join(sketch(Attitude(0, 0, mount, flip))) for mount in (0, 30, 90, 180) for flip in (0, 1)}) == 8
+
+
+def test_only_faces_that_look_this_way_are_painted() -> None:
+    camera = Camera(CAMERA_FROM, 100, (0, 0))
+    assert len(list(box((0, 0, 0), (1, 1, 1), np.eye(3), "#888888").drawn(camera))) == 3
+    faces = list(cylinder(1, 0, 1, 2, np.eye(3), "#888888").drawn(camera))
+    assert len(faces) == 1 + 24  # its top, and half of those around
+
+
+def test_a_sketch_shows_pin_1_and_both_axes_where_they_are() -> None:
+    lines = sketch(Attitude())
+    column = {name: next(line.index(name) for line in lines if name in line) for name in "oxy"}
+    row = {name: next(k for k, line in enumerate(lines) if name in line) for name in "oxy"}
+    assert column["x"] > column["y"] > column["o"]
+    assert row["y"] < row["o"] < row["x"]
+    assert len({len(line) for line in lines}) == 1
+    flipped = sketch(Attitude(flip=1))
+    assert next(k for k, line in enumerate(flipped) if "y" in line) > row["x"]
+
+
+def test_questions_have_their_drawings() -> None:
+    assert drawing_of(Mounting.of(90.0, 1)) == Attitude(mount_deg=90.0, flip=1)
+    assert drawing_of(Confirm("m", "Up?", "face-up")) == Attitude()
+    assert drawing_of(Confirm("m", "Off?")) is None
+
+
+@pytest.mark.parametrize("path", sorted(SHIPPED.glob("*.py")), ids=lambda path: path.stem)
+def test_every_drawing_that_a_procedure_names_is_there(path: Path) -> None:
+    assert set(re.findall(r'drawing="([^"]+)"', path.read_text(encoding="utf-8"))) <= set(NAMED)
+
+
+def test_the_command_writes_the_file_and_says_what_the_sensor_feels(rig: Rig, tmp_path: Path) -> None:
+    out = tmp_path / "there.svg"
+    ended = rig("draw", "--alpha", "45", "--beta", "90", "--mount", "0", "--flip", "0", "--out", str(out))
+    assert ended.status == 0
+    assert out.read_text() == page(Attitude(45, 90))
+    assert "in g: x +0.0000, y +0.7071, z +0.7071" in ended.out
+    document = json.loads(rig("draw", "--alpha", "90", "--flip", "1", "--json").out)
+    assert document["specific_force_g"] == {"x": 1.0, "y": 0.0, "z": 0.0}
+    assert "o pin 1" in rig("draw").out
+
+
+def test_what_cannot_be_drawn_is_refused(rig: Rig, tmp_path: Path) -> None:
+    assert "nan is no angle" in rig("draw", "--alpha", "nan").err
+    ended = rig("draw", "--out", str(tmp_path / "no" / "such.svg"))
+    assert (ended.status, ended.out) == (2, "")
+    assert "name another file" in ended.err
