@@ -184,4 +184,4 @@ def _std_deg(taken: list[tuple[float, float]]) -> float:
 
 def connect(address: Address, links: Links, settings: Settings, name: str) -> Level:
     """The level at `address`, which falls silent. Raises LinkRefused when its wire cannot be opened."""
-    return Level(links.link(address.url), settings, name)
+    return Level(links.link(address.url, name), settings, name)

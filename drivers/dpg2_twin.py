@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from typing import Any, Protocol
-from weakref import WeakKeyDictionary
 
 from drivers.dpg2 import ONE_READING, STOP, VERSION, Settings
 from drivers.links.address import Address
@@ -35,7 +34,6 @@ class Inclinometer:
     def __init__(self, world: World, settings: Settings, port: Port) -> None:
         self._world, self._range_deg, self._port = world, settings.range_deg, port
         self._running, self._next_s = True, 0.0
-        self._given: WeakKeyDictionary[Connection, int] = WeakKeyDictionary()  # bytes so far
         port.answer = self._answer
 
     def advance(self, now_s: float) -> None:
@@ -90,14 +88,13 @@ class Inclinometer:
     def _heard_all(self, connection: Connection) -> bool:
         """Whether what was said before has gone out by now."""
         connection.emit(self._next_s)
-        return connection.emitted == self._given.get(connection, 0)
+        return not connection.is_behind(self._next_s)
 
     def _say(self, connection: Connection, lines: list[bytes], began_s: float) -> None:
         """Send line by line, each when its last character is through."""
         for line in lines:
             began_s += len(line) * self._port.timing.character_s
             connection.send(line, began_s)
-            self._given[connection] = self._given.get(connection, 0) + len(line)
 
 
 class LevelServer(Server):

@@ -216,4 +216,4 @@ def connect(address: Address, links: Links, settings: Settings, name: str) -> T7
     Raises LinkRefused when a port cannot be opened, and the errors of a first exchange.
     """
     stream_url = address.stream_url or f"tcp://{urlsplit(address.url).hostname}:{t7.STREAM_PORT}"
-    return T7(links.unit(address, name), links.link(stream_url), settings)
+    return T7(links.unit(address, name), links.link(stream_url, name), settings)

@@ -240,4 +240,4 @@ class Positioner:
 
 def connect(address: Address, links: Links, settings: Settings, name: str) -> Positioner:
     """The positioner at `address`. Raises LinkRefused when its wire cannot be opened, LinkTimeout when it is silent."""
-    return Positioner(Gcs(links.link(address.url), name, e727.explain), settings)
+    return Positioner(Gcs(links.link(address.url, name), name, e727.explain), settings)

@@ -14,6 +14,7 @@ from drivers.errors import BadFrame, LinkTimeout, Refused
 from drivers.links.link import Link
 
 TIMEOUT_S = 1.0  # of silence; the longest answers come in many pieces
+LONGEST_S = 300.0  # of one answer: all that a recorder holds, over a serial line
 QUIET_S = 0.02  # after which nothing more of an interrupted answer comes
 LATIN = "latin-1"  # one character is one byte
 REMEDY = "Check power and cable, and that no other program holds the controller"
@@ -25,6 +26,7 @@ class Gcs:
     def __init__(self, link: Link, name: str, explain: Callable[[int], tuple[str, str]]) -> None:
         self.name, self.link = name, link
         self._explain = explain
+        self._owed = False  # whether the answer to an earlier question may still come
 
     def tell(self, command: str) -> None:
         """Send a command that has no answer. Raises Refused with the controller's error."""
@@ -48,8 +50,8 @@ class Gcs:
         return self._lines(f"#{number}")[0]
 
     def tell_byte(self, number: int) -> None:
-        """Send a command of one byte that has no answer; an answer that it interrupts is thrown away."""
-        self._send(chr(number))
+        """Send a command of one byte that has no answer, at once; an answer that it interrupts is thrown away."""
+        self.link.write(bytes([number]))
         self.link.discard(QUIET_S)
 
     def error(self) -> int:
@@ -89,15 +91,17 @@ class Gcs:
             raise self._odd(question, text) from None
 
     def _send(self, text: str) -> None:
-        """Send `text`; what has come unasked is the late answer to something else."""
-        self.link.discard()
+        """Send `text`; what has come unasked, or comes too late, is the answer to something else."""
+        self.link.discard(TIMEOUT_S if self._owed else 0.0)
+        self._owed = False
         self.link.write(text.encode(LATIN))
 
     def _lines(self, question: str) -> list[str]:
-        data = b""
+        data, deadline = b"", self.link.clock.now() + LONGEST_S
         while not data.endswith(b"\n") or data.endswith(b" \n"):
             more = self.link.read(TIMEOUT_S)
-            if not more:
+            if not more or self.link.clock.now() > deadline:
+                self._owed = True
                 raise self._silent(question, data)
             data += more
         return [line.rstrip() for line in data.decode(LATIN).splitlines()]

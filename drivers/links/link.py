@@ -21,10 +21,15 @@ from drivers.links.url import Url
 
 CONNECT_TIMEOUT_S = 5.0
 DISCARD_S = 1.0
+LOST = (OSError, termios.error, serial.SerialException)  # what a dead connection raises
 
 
 class Port(Protocol):
-    """What a link needs of a socket or a serial line; a dead one raises OSError."""
+    """What a link needs of a socket or a serial line; a dead one raises one of LOST."""
+
+    @property
+    def key(self) -> str:
+        """Names the connection."""
 
     def fileno(self) -> int: ...
 
@@ -36,38 +41,50 @@ class Port(Protocol):
     def close(self) -> None: ...
 
 
-class Link(Wire):
-    """The controller's end of a wire. `key` names the connection, the same at both ends."""
+class Connected(Wire):
+    """An open connection. `key` names it, the same at both ends."""
 
-    def __init__(self, port: Port, key: str, url: str, clock: Clock) -> None:
-        self.key, self.url = key, url
+    def __init__(self, port: Port) -> None:
+        self.port, self.key = port, port.key
         self.sent = self.received = 0
-        self.clock = clock
-        self._port = port
-        clock.wait_readable(self, 0.0)  # a simulated clock takes its bearings before the first byte
 
     def fileno(self) -> int:
-        return self._port.fileno()
+        return self.port.fileno()
+
+
+class Link:
+    """The controller's end of a wire.
+
+    A connection that is lost is an error once; what is sent after that opens it anew, so that a stop can be sent.
+    """
+
+    def __init__(self, url: Url, clock: Clock, name: str = "") -> None:
+        """`name` is the instrument's, for its errors. Raises LinkRefused when nobody is there."""
+        self.url, self.clock = url.text, clock
+        self._parsed, self._place = url, f"{name}: {url.text}" if name else url.text
+        self._line: Connected | None = self._opened()
 
     def write(self, data: bytes) -> None:
         """Send all of `data`; raises LinkRefused when the connection is gone."""
+        line = self._connected()
         try:
-            self._port.write(data)
-        except (OSError, termios.error, serial.SerialException) as error:
+            line.port.write(data)
+        except LOST as error:
             raise self._lost(error) from error
-        self.sent += len(data)
+        line.sent += len(data)
 
     def read(self, timeout_s: float) -> bytes:
         """What arrives first, or nothing when `timeout_s` is over. Raises LinkRefused at the end."""
-        if not self.clock.wait_readable(self, timeout_s):
+        line = self._connected()
+        if not self.clock.wait_readable(line, timeout_s):
             return b""
         try:
-            data = self._port.read()
-        except (OSError, termios.error, serial.SerialException) as error:
+            data = line.port.read()
+        except LOST as error:
             raise self._lost(error) from error
         if not data:
             raise self._lost("the other side closed it")
-        self.received += len(data)
+        line.received += len(data)
         return data
 
     def discard(self, quiet_s: float = 0.0) -> int:
@@ -81,10 +98,28 @@ class Link(Wire):
         return count
 
     def close(self) -> None:
-        self._port.close()
+        if self._line is not None:
+            self._line.port.close()
+            self._line = None
+
+    def _connected(self) -> Connected:
+        if self._line is None:
+            self._line = self._opened()
+        return self._line
+
+    def _opened(self) -> Connected:
+        try:
+            line = Connected(_open_port(self._parsed))
+        except (*LOST, ValueError) as error:
+            raise LinkRefused(f"{self._place}: cannot be opened ({error})", _remedy(self._parsed)) from error
+        self.clock.wait_readable(line, 0.0)  # a simulated clock takes its bearings before the first byte
+        return line
 
     def _lost(self, why: object) -> LinkRefused:
-        return LinkRefused(f"{self.url}: the connection is lost ({why})", "Check cable and power, then connect again")
+        self.close()
+        return LinkRefused(
+            f"{self._place}: the connection is lost ({why})", "Check cable and power, then connect again"
+        )
 
 
 class SocketPort:
@@ -115,10 +150,14 @@ class SerialPort:
     """A serial line, 8 data bits, opened for one program alone."""
 
     def __init__(self, path: str, baud: int, parity: str, stop_bits: int) -> None:
-        self.key = path
+        self._path = path
         self._serial = serial.Serial(
             path, baud, parity=parity, stopbits=stop_bits, timeout=0, write_timeout=CONNECT_TIMEOUT_S, exclusive=True
         )
+
+    @property
+    def key(self) -> str:
+        return self._path
 
     def fileno(self) -> int:
         return int(self._serial.fileno())
@@ -138,14 +177,9 @@ def connection_key(client: tuple[str, int], server: tuple[str, int]) -> str:
     return f"{client[0]}:{client[1]} > {server[0]}:{server[1]}"
 
 
-def open_link(url: str, clock: Clock) -> Link:
+def open_link(url: str, clock: Clock, name: str = "") -> Link:
     """Open a wire. Raises LinkRefused when nobody is there, or the url is not one."""
-    parsed = Url.parse(url)
-    try:
-        port = _open_port(parsed)
-    except (OSError, termios.error, serial.SerialException, ValueError) as error:
-        raise LinkRefused(f"{url}: cannot be opened ({error})", _remedy(parsed)) from error
-    return Link(port, port.key, url, clock)
+    return Link(Url.parse(url), clock, name)
 
 
 def _open_port(url: Url) -> SocketPort | SerialPort:

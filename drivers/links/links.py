@@ -24,9 +24,9 @@ class Links:
             self._buses[address.url] = Bus(self.link(address.url))
         return Unit(self._buses[address.url], address.unit, name)
 
-    def link(self, url: str) -> Link:
-        """A wire of bytes that is not shared."""
-        self._links.append(open_link(url, self.clock))
+    def link(self, url: str, name: str = "") -> Link:
+        """A wire of bytes that is not shared; `name` is the instrument's."""
+        self._links.append(open_link(url, self.clock, name))
         return self._links[-1]
 
     def close(self) -> None:

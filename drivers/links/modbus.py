@@ -18,13 +18,15 @@ from pymodbus.pdu.register_message import (
     WriteSingleRegisterRequest,
 )
 
-from drivers.errors import BadFrame, LinkError, LinkTimeout, Refused, WrongUnit
+from drivers.errors import BadFrame, LinkError, LinkRefused, LinkTimeout, Refused, WrongUnit
 from drivers.links.link import Link
 from drivers.links.register import Register
 from drivers.links.url import Url
 
 TIMEOUT_S = 0.5  # for one answer; the slowest instrument needs a tenth of it
+LATE_S = 2 * TIMEOUT_S  # of quiet, after which no answer to an earlier request comes any more
 RETRIES = 2  # after silence, a bad frame or a wrong unit; every request of ours may be repeated
+WRITES = (WriteSingleCoilRequest, WriteSingleRegisterRequest, WriteMultipleRegistersRequest)
 REFUSALS = {
     1: ("it does not know the function", "Check that the model of the instrument is the one in the bench file"),
     2: ("it has no such register", "Check that the model of the instrument is the one in the bench file"),
@@ -43,6 +45,7 @@ class Bus:
         decoder = DecodePDU(is_server=False)
         self._framer = FramerRTU(decoder) if self._url.rtu else FramerSocket(decoder)
         self._transaction = 0
+        self._owed = False  # whether answers may still come to what was asked before
 
     def ask(self, request: ModbusPDU, unit: int, what: str) -> ModbusPDU:
         """The answer of `unit`; `what` begins every error, as in 'alpha: reading register 0x0080 (alarm)'.
@@ -50,12 +53,25 @@ class Bus:
         Raises Refused, or after the retries LinkTimeout, BadFrame or WrongUnit.
         """
         request.dev_id = unit
-        for _ in range(RETRIES):
-            try:
-                return self._attempt(request, what)
-            except (LinkTimeout, BadFrame, WrongUnit):
-                self.link.discard(self._url.gap_s)
-        return self._attempt(request, what)
+        self._let_late_answers_pass(request)
+        try:
+            for _ in range(RETRIES):
+                try:
+                    return self._attempt(request, what)
+                except (LinkTimeout, BadFrame, WrongUnit):
+                    self.link.discard(self._url.gap_s)
+            return self._attempt(request, what)
+        except LinkRefused as lost:
+            raise LinkRefused(f"{what}: {lost.what}", lost.remedy) from lost
+
+    def _let_late_answers_pass(self, request: ModbusPDU) -> None:
+        """RTU frames do not tell what they answer: one that comes too late must not be taken for the next question's.
+
+        The echo of a write names its register, so a write, which may be a stop, need not wait.
+        """
+        if self._owed and not isinstance(request, WRITES):
+            self.link.discard(LATE_S)
+            self._owed = False
 
     def _attempt(self, request: ModbusPDU, what: str) -> ModbusPDU:
         self._transaction = request.transaction_id = self._transaction % 0xFFFF + 1
@@ -79,12 +95,13 @@ class Bus:
         clock = self.link.clock
         deadline = clock.now() + TIMEOUT_S
         data = b""
-        while more := self.link.read(deadline - clock.now()):
+        while (left_s := deadline - clock.now()) > 0 and (more := self.link.read(left_s)):
             data += more
             used, answer = self._decode(data, what)
             if answer is not None:
                 return answer
             data = data[used:]
+        self._owed = self._url.rtu
         if data:
             raise _bad_frame(what, f"{len(data)} bytes came that are no answer ({data[:16].hex(' ')})")
         raise LinkTimeout(

@@ -16,6 +16,7 @@ from pymodbus.pdu import register_message as words
 
 from drivers.links.server import Connection, Port
 from drivers.links.url import Url
+from drivers.links.wire_faults import Wire
 
 ILLEGAL_FUNCTION, ILLEGAL_ADDRESS, ILLEGAL_VALUE, DEVICE_FAILURE = 1, 2, 3, 4
 
@@ -51,7 +52,27 @@ def modbus_port(listen: str, devices: Mapping[int, Device]) -> Port:
     """A port that answers for `devices`, by unit id."""
     port = Port(listen)
     port.answer = Responder(devices, port.timing).answer
+    port.wire = RTU if port.timing.rtu else TCP
     return port
+
+
+def _place(place: int) -> Callable[[bytes], int | None]:
+    """Reads the unit's number at its place in a frame."""
+    return lambda frame: frame[place] if len(frame) > place else None
+
+
+def _rtu_of_unit(frame: bytes, unit: int) -> bytes:
+    """The frame of another unit, with its checksum."""
+    body = bytes([unit % 256]) + frame[1:-2]
+    return body + FramerRTU.compute_CRC(body).to_bytes(2, "big")
+
+
+def _tcp_of_unit(frame: bytes, unit: int) -> bytes:
+    return frame[:6] + bytes([unit % 256]) + frame[7:]
+
+
+RTU = Wire(mends=False, unit_of=_place(0), of_unit=_rtu_of_unit)
+TCP = Wire(mends=True, unit_of=_place(6), of_unit=_tcp_of_unit)
 
 
 class Responder:

@@ -8,19 +8,24 @@ deterministic under a simulated clock and serves anybody's client in real time.
 from __future__ import annotations
 
 import contextlib
+import heapq
+import itertools
 import math
 import os
 import pty
 import socket
 import tty
-from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Protocol
 
 from drivers.links.address import Address
+from drivers.links.faults import Faults
 from drivers.links.link import connection_key
 from drivers.links.url import Url
+from drivers.links.wire_faults import Said, Wire, disturbed
 
+NO_FAULTS = Faults()
+FAULTS_OF = "faults of"
 SILENCE_S = 0.05  # ends an RTU frame: generous, since a computer sends a frame in pieces
 
 
@@ -43,11 +48,16 @@ class Twin(Protocol):
 class Connection:
     """One client: bytes that came, and bytes that go out when they are due."""
 
-    def __init__(self, fileno: int, key: str, close: Callable[[], None]) -> None:
+    def __init__(
+        self, fileno: int, key: str, close: Callable[[], None], leaving: Callable[[Said], Iterable[Said]]
+    ) -> None:
         self.fileno, self.key, self.close = fileno, key, close
         self.inbox = bytearray()
         self.received = self.emitted = 0
-        self._outbox: deque[tuple[float, bytes]] = deque()
+        self._leaving = leaving  # what becomes of a message on its way
+        self._outbox: list[tuple[float, int, bytes]] = []  # a heap: when, in which order, what
+        self._order = itertools.count()
+        self._last_s = -math.inf
         self._full = False
         self._heard_s = -math.inf
 
@@ -70,23 +80,29 @@ class Connection:
         return bool(data)
 
     def send(self, data: bytes, due_s: float) -> None:
-        """Send `data` at `due_s`, after all that was sent before."""
-        self._outbox.append((due_s, data))
+        """Send `data` at `due_s`, after all that was sent before; a fault of the wire may make it other data, later."""
+        self._last_s = max(self._last_s, due_s)
+        for said in self._leaving(Said(data, self._last_s)):
+            heapq.heappush(self._outbox, (said.due_s, next(self._order), said.data))
 
     def emit(self, now_s: float) -> None:
         """Write what is due, as far as the kernel takes it."""
         self._full = False
         while self._outbox and not self._full and self._outbox[0][0] <= now_s:
-            due_s, data = self._outbox.popleft()
+            due_s, order, data = heapq.heappop(self._outbox)
             written = self._write(data)
             self.emitted += written
             if written < len(data):
                 self._full = True
-                self._outbox.appendleft((due_s, data[written:]))
+                heapq.heappush(self._outbox, (due_s, order, data[written:]))
 
     def due_s(self) -> float:
         """When it must write next; never while the client does not read."""
         return self._outbox[0][0] if self._outbox and not self._full else math.inf
+
+    def is_behind(self, now_s: float) -> bool:
+        """Whether something that was due by `now_s` has not been written yet."""
+        return bool(self._outbox) and self._outbox[0][0] <= now_s
 
     def _write(self, data: bytes) -> int:
         try:
@@ -98,10 +114,15 @@ class Connection:
 
 
 class Port:
-    """A place to connect to. `answer` is called with a connection whenever bytes have come in on it."""
+    """A place to connect to. `answer` is called with a connection whenever bytes have come in on it.
+
+    `wire` is what faults have to know of it.
+    """
 
     def __init__(self, listen: str, answer: Callable[[Connection, float], None] | None = None) -> None:
         self.timing = Url.parse(listen)
+        self.wire = Wire(mends=self.timing.scheme == "tcp")
+        self._faults: dict[int, Faults] = {}  # by unit
         self.connections: dict[int, Connection] = {}
         self.answer = answer or _ignore
         self._socket: socket.socket | None = None
@@ -119,19 +140,51 @@ class Port:
             self._accept()
             return
         connection = self.connections[fileno]
-        if connection.read(now_s, SILENCE_S if self.timing.rtu else math.inf):
+        if not connection.read(now_s, SILENCE_S if self.timing.rtu else math.inf):
+            self._drop(connection)
+        elif self._hears(connection, now_s):
             self.answer(connection, now_s)
-        else:
-            del self.connections[fileno]
-            connection.close()
+
+    def afflict(self, unit: int, faults: Faults) -> None:
+        """Let the instrument of this number have `faults` of its wire."""
+        self._faults[unit] = faults
+
+    def hang_up(self) -> None:
+        """Close all connections."""
+        for connection in list(self.connections.values()):
+            self._drop(connection)
 
     def close(self) -> None:
-        for connection in self.connections.values():
-            connection.close()
-        self.connections.clear()
+        self.hang_up()
         if self._socket:
             self._socket.close()
             self._socket = None
+
+    def _drop(self, connection: Connection) -> None:
+        del self.connections[connection.fileno]
+        connection.close()
+
+    def _hears(self, connection: Connection, now_s: float) -> bool:
+        """Whether a request reaches the instrument."""
+        if not (faults := self._faults_of(bytes(connection.inbox))):
+            return True
+        faults.asked()
+        if faults.size("disconnect", now_s) is not None:
+            self._drop(connection)
+            return False
+        if faults.size("silence", now_s) is not None:
+            connection.inbox.clear()
+        return bool(connection.inbox)
+
+    def _leaving(self, said: Said) -> list[Said]:
+        return disturbed(said, self._faults_of(said.data), self.wire)
+
+    def _faults_of(self, message: bytes) -> Faults:
+        """Those of the unit that a message is to or from; on a wire of one instrument, its own."""
+        unit = self.wire.unit_of(message) if self._faults and message else None
+        if unit is None:
+            return next(iter(self._faults.values()), NO_FAULTS)
+        return self._faults.get(unit, NO_FAULTS)
 
     def _listen(self) -> str:
         self._socket = socket.create_server((self.timing.host, self.timing.port))
@@ -145,7 +198,7 @@ class Port:
             client.setblocking(False)
             client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             key = connection_key(peer, client.getsockname())
-            self.connections[client.fileno()] = Connection(client.fileno(), key, client.close)
+            self.connections[client.fileno()] = Connection(client.fileno(), key, client.close, self._leaving)
 
     def _open_pty(self) -> str:
         """A raw pseudo-terminal; its far end is kept open, so that clients may come and go."""
@@ -158,7 +211,7 @@ class Port:
             os.close(near)
             os.close(far)
 
-        self.connections[near] = Connection(near, path, close)
+        self.connections[near] = Connection(near, path, close, self._leaving)
         return f"serial:{path}"
 
 
@@ -168,11 +221,22 @@ class Server:
     def __init__(self, ports: Sequence[Port], twins: Mapping[str, Twin], addresses: Mapping[str, Address]) -> None:
         self.addresses = dict(addresses)
         self._ports, self._twins = list(ports), dict(twins)
+        self._faults: dict[str, Faults] = {}
 
     @property
     def url(self) -> str:
         """Where its first port listens."""
         return self._ports[0].url
+
+    def afflict(self, role: str, faults: Faults) -> None:
+        """Let the instrument in `role` have `faults` from now on, of its wires and of its own."""
+        self._faults[role] = faults
+        address, twin = self.addresses[role], self._twins[role]
+        for port in self._ports:
+            if port.url in (address.url, address.stream_url):
+                port.afflict(address.unit, faults)
+        if hasattr(twin, "faults"):
+            twin.faults = faults
 
     def filenos(self) -> list[int]:
         return [fileno for port in self._ports for fileno in port.filenos()]
@@ -203,13 +267,18 @@ class Server:
         return None
 
     def state(self) -> dict[str, Any]:
-        """The twins' states by role, JSON-able; taken between exchanges."""
-        return {role: twin.state() for role, twin in self._twins.items()}
+        """The twins' states by role, and those of their faults, JSON-able; taken between exchanges."""
+        twins = {role: twin.state() for role, twin in self._twins.items()}
+        faults = {f"{FAULTS_OF} {role}": faults.state() for role, faults in self._faults.items()}
+        return twins | faults
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Put every twin back into the `state` it had."""
+        """Put every twin back into the `state` it had; faults that are new since then have not happened yet."""
         for role, twin in self._twins.items():
             twin.restore(state[role])
+        for role, faults in self._faults.items():
+            if (kept := state.get(f"{FAULTS_OF} {role}")) is not None:
+                faults.restore(kept)
 
     def close(self) -> None:
         """Close all ports; clients see the end of their connections."""

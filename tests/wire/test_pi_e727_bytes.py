@@ -124,7 +124,7 @@ def test_silence_ends_and_names_the_instrument(positioner: Positioners, clock: S
     silent = positioner(("POS? 1\n", ""), ("ERR?\n", ""))
     with pytest.raises(LinkTimeout, match=r"positioner: no answer to ERR\? within 1 s on tcp://"):
         silent.position_um("x")
-    assert clock.now() < 3
+    assert clock.now() < 4  # the answer to POS? may yet come late, and must not be taken for that to ERR?
 
 
 @pytest.mark.parametrize(
