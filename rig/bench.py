@@ -21,6 +21,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 from calibrations.error_table import ErrorTable, Point, read_error_table
 from calibrations.errors import DataError
 from drivers.links.address import Address
+from drivers.links.faults import Fault
+from drivers.links.wire_faults import kinds_of
 from drivers.simulation.config import WorldConfig
 from drivers.simulation.errors import SimulationError
 from procedures.session import Limits
@@ -53,6 +55,7 @@ class Instrument(Strict):
     """One instrument: a driver's name, an address, and settings that the driver declares.
 
     `error_table` is a stage's own, as points or as a CSV file beside the bench file; `read_bench` leaves the points.
+    `faults` are what goes wrong with a simulated one.
     """
 
     driver: str
@@ -60,6 +63,7 @@ class Instrument(Strict):
     unit: int = 1
     stream_url: str | None = None
     settings: dict[str, Any] = {}
+    faults: tuple[Fault, ...] = ()
     certificate: Certificate | None = None
     error_table: tuple[Point, ...] | Path | None = None
 
@@ -142,8 +146,9 @@ class Bench(Strict):
         return self.model_dump(mode="json")
 
     def configuration(self, procedure: str, settings: Mapping[str, Any]) -> str:
-        """Hash of all that a run depends on: procedure, settings, bench."""
-        text = json.dumps([procedure, settings, self.document()])
+        """Hash of all that a run depends on: procedure, settings, bench. Faults are none of it: they can be repaired."""
+        bench = self.model_dump(mode="json", exclude={"instruments": {"__all__": {"faults"}}})
+        text = json.dumps([procedure, settings, bench])
         return hashlib.sha256(text.encode()).hexdigest()
 
 
@@ -192,7 +197,17 @@ def _checked_instrument(role: str, instrument: Instrument, path: Path) -> Instru
         where = ".".join(str(part) for part in fault["loc"])
         names = [field.name for field in dataclasses.fields(kind)]
         raise BenchError(f"{key}.{where}: {_fault(fault, names)}") from None
+    _check_faults(f"{key}.faults", instrument)
     return instrument.model_copy(update={"error_table": _error_table(role, instrument.error_table, path)})
+
+
+def _check_faults(key: str, instrument: Instrument) -> None:
+    """Raises BenchError for a fault that the twin cannot have, and for those of a real instrument."""
+    if instrument.faults and not instrument.simulated:
+        raise BenchError(f"{key}: a real instrument has its own; remove them, or write `url: simulated`")
+    for k, fault in enumerate(instrument.faults):
+        if fault.what not in (kinds := kinds_of(instrument.driver)):
+            raise BenchError(f"{key}.{k}.what: no fault {fault.what!r}.{did_you_mean(fault.what, kinds)}")
 
 
 def _error_table(role: str, given: tuple[Point, ...] | Path | None, path: Path) -> tuple[Point, ...] | None:
@@ -247,6 +262,8 @@ def _keys(model: Any, where: list[str]) -> list[str]:
     part = parts.get(where[0], model) if where else model
     if where and (where[0] == "certificates" or where[-1] == "certificate"):
         part = Certificate
+    if "faults" in where:
+        part = Fault
     if dataclasses.is_dataclass(part):
         return [field.name for field in dataclasses.fields(part)]
     return list(part.model_fields)

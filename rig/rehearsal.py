@@ -89,8 +89,9 @@ def rehearsing(bench: Bench, planned: Mapping[str, Any], ledger: Ledger) -> Iter
 
 
 def _simulated(bench: Bench) -> Bench:
-    """The same bench with a twin in every role."""
+    """The same bench with a sound twin in every role."""
     twins = {
-        role: part.model_copy(update={"url": SIMULATED, "stream_url": None}) for role, part in bench.instruments.items()
+        role: part.model_copy(update={"url": SIMULATED, "stream_url": None, "faults": ()})
+        for role, part in bench.instruments.items()
     }
     return bench.model_copy(update={"instruments": twins})

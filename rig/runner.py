@@ -107,9 +107,9 @@ def _resumed(record: Record, run_id: str, watch: Watch, bench: Bench | None = No
     run = record.run(run_id)
     if run.state == "complete":
         return Outcome(run)
-    own = Bench.model_validate(run.bench)
     if bench is not None and bench.configuration(run.procedure, run.settings) != run.configuration:
         raise RunMismatch(f"run {run_id} was begun with another bench; resume it without --bench, or with that file")
+    own = bench or Bench.model_validate(run.bench)  # the same, but for faults that have been repaired
     procedure = find(run.procedure, own.folders.procedures)
     with stoppable(), _held(record, run_id), connected(own) as rig:
         _same_instruments(run, rig)

@@ -21,6 +21,7 @@ from drivers.instrument import Instrument as Driver
 from drivers.links import Address, Links
 from drivers.links.person import PERSON
 from drivers.links.server import Server
+from drivers.links.wire_faults import faults_of
 from drivers.simulation.config import WorldConfig
 from drivers.simulation.world import World
 from rig.bench import Bench
@@ -84,7 +85,10 @@ def serve(bench: Bench, world: World) -> dict[str, Server]:
     for (driver, listen), roles in wires.items():
         twin = importlib.import_module(f"drivers.{driver}_twin")
         units = {role: (bench.instruments[role].unit, bench.instruments[role].typed_settings()) for role in roles}
-        servers[" ".join(roles)] = twin.serve(world, units, listen or twin.LISTEN)
+        server = servers[" ".join(roles)] = twin.serve(world, units, listen or twin.LISTEN)
+        for role in roles:
+            if faults := bench.instruments[role].faults:
+                server.afflict(role, faults_of(driver, faults))
     return servers
 
 
