@@ -7,16 +7,20 @@ that goes by what it measures is rehearsed on twins: its plan is that of one sim
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
+from calibrations.error_table import ErrorTable
+from calibrations.errors import DataError
 from procedures.catalogue import Procedure
-from procedures.session import Session
-from rig.bench import ROLES, Bench
+from procedures.session import Pose, Session
+from rig.bench import ROLES, TURNING, Bench
+from rig.errors import BenchError
 from rig.instruments import absent
 from rig.planned import (
+    Held,
     Ledger,
     PlanHost,
     PlannedAdc,
@@ -42,26 +46,38 @@ PLANNED = {
 
 @dataclass(frozen=True)
 class Plan:
-    """All that a procedure would do. `reach`: for each stage (lowest, highest) angle and its limits, in deg."""
+    """All that a procedure would do: `steps`, and the poses that it keeps, both in order.
+
+    `reach`: for each stage (lowest, highest) angle and its limits, in deg.
+    """
 
     procedure: str
     settings: Mapping[str, Any]
     steps: tuple[Step, ...]
     reach: Mapping[str, tuple[tuple[float, float], tuple[float, float]]]
     questions: tuple[str, ...]
-    poses: int
+    held: tuple[Held, ...]
     duration_s: float
     bytes: int
 
+    @property
+    def poses(self) -> int:
+        """How many are kept."""
+        return len(self.held)
+
 
 def plan(bench: Bench, procedure: Procedure, settings: Mapping[str, Any]) -> Plan:
-    """What `procedure` would do on `bench`. Raises what the run would: LimitError, SettingError, ProcedureError."""
+    """What `procedure` would do on `bench`. Raises what the run would: LimitError, SettingError, ProcedureError.
+
+    Raises BenchError for a pose at which a stage's error table has nothing.
+    """
     ledger = Ledger()
     parts = _parts(bench, ledger)
     dry = rehearsing if procedure.adaptive else _counting
     with dry(bench, parts, ledger) as session:
         session.reference()
         procedure.function(session, **settings)
+    _require_known_angles(bench, [held.pose for held in ledger.held])
     stages = {role: part for role, part in parts.items() if isinstance(part, PlannedStage)}
     return Plan(
         procedure=procedure.name,
@@ -69,9 +85,9 @@ def plan(bench: Bench, procedure: Procedure, settings: Mapping[str, Any]) -> Pla
         steps=tuple(ledger.steps),
         reach={role: (stage.reach, stage.limits) for role, stage in stages.items()},
         questions=tuple(ledger.questions),
-        poses=ledger.poses,
+        held=tuple(ledger.held),
         duration_s=ledger.now_s,
-        bytes=round(ledger.samples * BYTES_PER_SAMPLE + ledger.poses * BYTES_PER_POSE),
+        bytes=round(ledger.samples * BYTES_PER_SAMPLE + len(ledger.held) * BYTES_PER_POSE),
     )
 
 
@@ -80,6 +96,18 @@ def _counting(bench: Bench, parts: Mapping[str, Any], ledger: Ledger) -> Iterato
     """A session on instruments that only count."""
     limits = replace(bench.limits, temperature_c=(-math.inf, math.inf))  # nobody knows it yet
     yield Session(**parts, clock=ledger, host=PlanHost(ledger), limits=limits)
+
+
+def _require_known_angles(bench: Bench, poses: Sequence[Pose]) -> None:
+    """Better told now than when the run is evaluated."""
+    for role in TURNING:
+        part = bench.instruments.get(role)
+        if part is None or not isinstance(part.error_table, tuple):
+            continue
+        try:
+            ErrorTable(part.error_table).true_deg([getattr(pose, f"{role}_deg") for pose in poses])
+        except DataError as error:
+            raise BenchError(f"{role}: {error}") from None
 
 
 def _parts(bench: Bench, ledger: Ledger) -> dict[str, Any]:

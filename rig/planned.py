@@ -28,6 +28,14 @@ class Step:
     what: str
 
 
+@dataclass(frozen=True)
+class Held:
+    """A pose that is kept: its dwell begins at `start_s`."""
+
+    start_s: float
+    pose: Pose
+
+
 @dataclass
 class Ledger:
     """The planned clock, and the steps so far."""
@@ -35,7 +43,7 @@ class Ledger:
     now_s: float = 0.0
     steps: list[Step] = field(default_factory=list)
     questions: list[str] = field(default_factory=list)
-    poses: int = 0
+    held: list[Held] = field(default_factory=list)
     samples: int = 0
 
     def now(self) -> float:
@@ -226,7 +234,7 @@ class PlanHost:
         return ()
 
     def keep(self, pose: Pose, samples: Samples, temperature_c: float | None) -> None:  # noqa: ARG002
-        self.ledger.poses += 1
+        self.ledger.held.append(Held(samples.start_s, pose))
 
     def keep_readings(self, *readings: Reading) -> None:
         """A plan reads nothing."""

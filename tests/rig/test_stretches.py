@@ -1,0 +1,84 @@
+"""A plan in a few lines, and every move of it where it is wanted."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from procedures.catalogue import find, paths
+from procedures.session import Pose
+from procedures.settings import parse
+from rig.bench import read_bench
+from rig.plan import Plan, plan
+from rig.planned import Held, Step
+from rig.stretches import Stretch, stretches
+
+Rig = Callable[..., Any]
+
+
+def planned(name: str, **settings: str) -> Plan:
+    procedure = find(name)
+    return plan(read_bench(), procedure, parse(procedure, settings))
+
+
+def test_a_sweep_is_one_line_for_each_way_round() -> None:
+    found = stretches(planned("sweep"))
+    assert len(found) == 14
+    assert found[0].words == "alpha 90, beta 0 to 360 deg: 37 poses  A+ to B-"
+    assert found[1].words == "alpha 90, beta 360 to 0 deg: 37 poses  B+ to A-"
+    assert [stretch.start_s for stretch in found] == sorted(stretch.start_s for stretch in found)
+
+
+@pytest.mark.parametrize("name", paths())
+def test_every_pose_of_every_procedure_is_in_one_stretch(name: str) -> None:
+    whole = planned(name)
+    assert [pose for stretch in stretches(whole) for pose in stretch.poses] == [held.pose for held in whole.held]
+    assert all(0 <= held.start_s <= whole.duration_s for held in whole.held)
+    assert whole.duration_s > 0
+    assert {"alpha", "beta"} <= set(whole.reach)
+
+
+def test_what_is_done_besides_is_named_once_and_long_waits_are_added_up() -> None:
+    found = stretches(planned("temperature-cycle", temperatures_c="35,50"))
+    assert found[0].also == ("oven to 35 C", "oven on", "waiting for 3600 s")
+    assert found[0].words.endswith("8 poses  up 35 cycle 1")
+
+
+def test_poses_that_are_counted_are_one_stretch() -> None:
+    poses = [Pose(0, 0, 0, f"still {k}") for k in range(6)]
+    held = tuple(Held(float(k), pose) for k, pose in enumerate(poses))
+    assert [s.words for s in stretches(of(held))] == ["alpha 0, beta 0 deg: 6 poses  still 0 to 5"]
+
+
+def test_how_the_sensor_is_mounted_is_said_where_it_is_not_as_usual() -> None:
+    (other,) = stretches(of((Held(0.0, Pose(0, 0, mount_deg=90.0, flip=1)),)))
+    assert other.words == "alpha 0, beta 0 deg: 1 pose  mounted face down, turned by 90 deg"
+
+
+def of(held: tuple[Held, ...]) -> Plan:
+    return Plan("any", {}, (Step(0.0, 1.0, "wait 1 s"),), {}, (), held, 10.0, 0)
+
+
+def test_the_range_of_angles_is_said_whatever_their_order() -> None:
+    there_and_back = Stretch(0.0, tuple(Pose(90, beta) for beta in (0, 90, 180, 90, 0)), ())
+    assert there_and_back.words == "alpha 90, beta 0 .. 180 deg: 5 poses"
+
+
+def test_a_long_plan_is_summed_up_and_a_short_one_printed(rig: Rig) -> None:
+    summed, whole = rig("plan", "sweep").out, rig("plan", "sweep", "--moves").out
+    assert "  24:21  alpha 60, beta 0 to 360 deg: 37 poses  A+ to B-\n" in summed
+    assert len(summed.splitlines()) < 25
+    assert "--moves" in summed
+    document = json.loads(rig("plan", "sweep", "--json").out)
+    assert all(f"  {step['what']}\n" in whole for step in document["steps"])
+    assert [stretch["poses"] for stretch in document["stretches"]] == [37] * 14
+    assert "beta from 0 to 180 deg\n" in rig("plan", "level-check").out
+
+
+def test_of_very_many_stretches_the_middle_is_left_out(rig: Rig) -> None:
+    shown = rig("plan", "soak").out
+    assert "lines like these" in shown
+    assert len(shown.splitlines()) < 30
