@@ -38,7 +38,7 @@ OUTPUTS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 OPTIONAL = (
     "vy_v", "vz_v", "path", "t_s", "direction", "temperature_c", "supply_v", "mount_deg", "flip",
     "vx_std_v", "vy_std_v", "vz_std_v", "n", "ax_std", "ay_std", "az_std", "mx_std", "my_std", "mz_std",
-    "gx", "gy", "gz", "mx", "my", "mz",
+    "gx", "gy", "gz", "mx", "my", "mz", "alpha_set_deg", "beta_set_deg",
 )
 # fmt: on
 NUMBERS = {name for sets in KINDS.values() for wanted in sets for name in wanted} | set(OPTIONAL) - {"path"}

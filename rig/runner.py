@@ -215,7 +215,15 @@ class RunHost:
 
     def keep(self, pose: Pose, samples: Samples, temperature_c: float | None) -> None:
         middle_s = samples.start_s + len(samples.volts) / samples.rate_hz / 2
-        kept = Kept(pose, samples, middle_s - self._zero_s, temperature_c)
+        dials = self._rig.read_deg()
+        kept = Kept(
+            pose,
+            samples,
+            middle_s - self._zero_s,
+            temperature_c,
+            alpha_read_deg=dials.get("alpha"),
+            beta_read_deg=dials.get("beta"),
+        )
         self._record.keep(self._run, self._next, kept, self._state())
         self._next += 1
         self._poses.append(pose)

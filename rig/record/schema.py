@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sqlalchemy import JSON, Column, Float, ForeignKey, Index, Integer, LargeBinary, MetaData, String, Table
 
-SCHEMA = 2
+SCHEMA = 3
 metadata = MetaData()
 
 runs = Table(
@@ -40,6 +40,8 @@ poses = Table(
     Column("t_s", Float, nullable=False),  # middle of the dwell
     Column("temperature_c", Float),
     Column("excluded", String),  # why a person took it out of every analysis; it stays in the record
+    Column("alpha_read_deg", Float),  # what the dial of a stage that is turned by hand showed
+    Column("beta_read_deg", Float),
 )
 
 readings = Table(  # numbers that belong to a run and to none of its poses
@@ -94,4 +96,7 @@ events = Table(
 )
 
 # What brings an older file to the next version. Tables that are wholly new are made before.
-MIGRATIONS = {1: ("ALTER TABLE poses ADD COLUMN excluded VARCHAR",)}
+MIGRATIONS = {
+    1: ("ALTER TABLE poses ADD COLUMN excluded VARCHAR",),
+    2: tuple(f"ALTER TABLE poses ADD COLUMN {role}_read_deg FLOAT" for role in ("alpha", "beta")),
+}

@@ -33,6 +33,7 @@ from rig.record.values import Block, Event, Kept, Run
 
 FILE = "record.db"
 _POSE = ("alpha_deg", "beta_deg", "direction", "path", "mount_deg", "flip")
+_BESIDE = ("t_s", "temperature_c", "alpha_read_deg", "beta_read_deg")
 
 
 class Record:
@@ -92,7 +93,7 @@ class Record:
         samples |= {"channels": list(kept.samples.channels), "codec": codec.CODEC}
         samples |= {"samples": codec.encode(kept.samples.volts)}
         with self._engine.begin() as to:
-            to.execute(insert(poses), key | pose | {"t_s": kept.t_s, "temperature_c": kept.temperature_c})
+            to.execute(insert(poses), key | pose | {name: getattr(kept, name) for name in _BESIDE})
             to.execute(insert(blocks), key | samples)
             if state is not None:
                 _put_state(to, run, state)
@@ -263,6 +264,5 @@ def _kept(row: Row[Any]) -> Kept:
     except ValueError as error:
         raise RecordError(f"{where}: {error}; restore a copy of the record") from None
     pose = Pose(**{name: row._mapping[name] for name in _POSE})
-    return Kept(
-        pose, Block(volts, tuple(row.channels), row.rate_hz, row.start_s), row.t_s, row.temperature_c, row.excluded
-    )
+    block = Block(volts, tuple(row.channels), row.rate_hz, row.start_s)
+    return Kept(pose, block, excluded=row.excluded, **{name: row._mapping[name] for name in _BESIDE})

@@ -10,6 +10,7 @@ from calibrations.mean_noise import measured_inflation
 from calibrations.table import Array, Table
 from procedures.session import Samples
 from rig.errors import RecordError
+from rig.record.angles import as_they_were
 from rig.record.values import Kept, Run
 
 AXES = ("vx", "vy", "vz")  # channels whose scatter is kept; others are regressors
@@ -33,7 +34,8 @@ def poses_table(run: Run, poses: Iterable[Kept]) -> Table:
     names = [name for name in rows[0] if all(name in row for row in rows)]
     columns = {name: np.array([row[name] for row in rows]) for name in names}
     labels = {"path": tuple(paths)} if any(paths) else {}
-    constants = {**run.constants, "sample_rate_hz": blocks[0].rate_hz, **_inflations(blocks)}
+    columns, angle_stds = as_they_were(run, columns)
+    constants = {**run.constants, **angle_stds, "sample_rate_hz": blocks[0].rate_hz, **_inflations(blocks)}
     return Table.from_columns(run.kind, _useful(columns), constants, run.run, labels)
 
 
@@ -42,8 +44,8 @@ def _row(kept: Kept) -> dict[str, float]:
     pose, samples = kept.pose, kept.samples
     row: dict[str, float] = {"alpha_deg": pose.alpha_deg, "beta_deg": pose.beta_deg, "direction": pose.direction}
     row |= {"mount_deg": pose.mount_deg, "flip": pose.flip, "t_s": kept.t_s}
-    if kept.temperature_c is not None:
-        row["temperature_c"] = kept.temperature_c
+    beside = {name: getattr(kept, name) for name in ("temperature_c", "alpha_read_deg", "beta_read_deg")}
+    row |= {name: value for name, value in beside.items() if value is not None}
     means = samples.volts.mean(axis=0)
     row |= {f"{name}_v": float(mean) for name, mean in zip(samples.channels, means, strict=True)}
     if len(samples.volts) > 1:

@@ -55,6 +55,8 @@ class Kept:
     t_s: float
     temperature_c: float | None
     excluded: str | None = None  # why it is left out of every analysis
+    alpha_read_deg: float | None = None  # what the dial of a stage that is turned by hand showed
+    beta_read_deg: float | None = None
 
     @property
     def dwell(self) -> Dwell:

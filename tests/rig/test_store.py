@@ -167,13 +167,24 @@ def test_a_record_of_the_first_version_is_brought_up_to_date(tmp_path: Path) -> 
         run = begin(record)
         record.keep(run, 0, Kept(Pose(90, 0), block([[2.0, 1.0]]), 3.5, 21.5), None)
     with closing(sqlite3.connect(tmp_path / "record.db")) as connection:
-        connection.executescript("ALTER TABLE poses DROP COLUMN excluded; DROP TABLE readings; PRAGMA user_version = 1")
+        for column in ("excluded", "alpha_read_deg", "beta_read_deg"):
+            connection.execute(f"ALTER TABLE poses DROP COLUMN {column}")
+        connection.executescript("DROP TABLE readings; PRAGMA user_version = 1")
     with Record(tmp_path) as record:
         record.keep_readings(run, [Reading("level-x", 0.02, "deg", 0.001)], None)
         record.exclude(run, 0, "touched")
         assert [kept.excluded for kept in record.kept(run)] == ["touched"]
     with closing(sqlite3.connect(tmp_path / "record.db")) as connection:
         assert connection.execute("PRAGMA user_version").fetchone() == (SCHEMA,)
+
+
+def test_what_dials_showed_comes_back_beside_the_pose() -> None:
+    with Record() as record:
+        run = begin(record)
+        kept = Kept(Pose(90, 0), block([[2.0, 1.0]]), 3.5, 21.5, alpha_read_deg=90.083, beta_read_deg=-0.083)
+        record.keep(run, 0, kept, None)
+        (found,) = record.kept(run)
+        assert (found.alpha_read_deg, found.beta_read_deg, found.pose) == (90.083, -0.083, Pose(90, 0))
 
 
 def test_a_reading_is_replaced_by_one_of_its_name() -> None:
