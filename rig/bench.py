@@ -13,16 +13,18 @@ import json
 from collections.abc import Mapping
 from datetime import date
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model, field_validator
 
 from calibrations.error_table import ErrorTable, Point, read_error_table
 from calibrations.errors import DataError
 from drivers.links.address import Address
 from drivers.links.faults import Fault
 from drivers.links.wire_faults import kinds_of
+from drivers.philtec_d63 import SIMULATED as SIMULATED_CURVE
+from drivers.philtec_d63 import Curve
 from drivers.simulation.config import WorldConfig
 from drivers.simulation.errors import SimulationError
 from procedures.session import Limits
@@ -32,6 +34,7 @@ from rig.nearest import did_you_mean
 DEFAULT = Path(__file__).with_name("bench_default.yaml")
 SIMULATED = "simulated"
 UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
+D63 = "d63"  # the displacement sensor's channel
 ROLES = ("alpha", "beta", "adc", "oven", "level", "positioner")
 TURNING = ("alpha", "beta")
 
@@ -103,6 +106,23 @@ class Sensor(Strict):
         return {"sensor": said.pop("name"), **{key: value for key, value in said.items() if value != ""}}
 
 
+class Displacement(Strict):
+    """The D63 behind the channel `d63`: its calibration curve, which side of the optical peak it works on, and
+    whether the gap grows (1) or closes (-1) as the carriage moves towards the sensor's +x.
+
+    `curve` is a YAML file beside the bench file, `simulated`, or the curve itself, which `read_bench` leaves.
+    """
+
+    curve: Curve
+    side: Literal["near", "far"] = "near"
+    direction: Literal[1, -1] = 1
+
+    @field_validator("curve", mode="before")
+    @classmethod
+    def _shipped(cls, given: Any) -> Any:
+        return Curve.from_file(SIMULATED_CURVE) if given == SIMULATED else given
+
+
 class Folders(Strict):
     """The user's own effects and procedures."""
 
@@ -119,6 +139,7 @@ class Bench(Strict):
     sensor: Sensor = Sensor()
     sensors: dict[str, Sensor] = {}
     limits: Limits = Limits()
+    d63: Displacement | None = None
     certificates: dict[str, Certificate] = {}  # of what plays no role: a hand level, a displacement sensor's curve
     world: dict[str, Any] = {}
     folders: Folders = Folders()
@@ -127,6 +148,12 @@ class Bench(Strict):
     def simulated(self) -> bool:
         """Whether every instrument is a twin; then time is simulated too."""
         return all(instrument.simulated for instrument in self.instruments.values())
+
+    @property
+    def channels(self) -> Mapping[str, int]:
+        """The converter's channels by name."""
+        adc = self.instruments.get("adc")
+        return adc.typed_settings().channels if adc else {}
 
     @property
     def constants(self) -> dict[str, str | float]:
@@ -171,7 +198,7 @@ def read_bench(path: Path | None = None) -> Bench:
 
 def _checked(document: dict[str, Any], path: Path) -> Bench:
     try:
-        bench = Bench.model_validate(document)
+        bench = Bench.model_validate({**document, **_with_curve(document.get("d63"), path)})
     except ValidationError as error:
         raise BenchError(_told(error, path, Bench)) from None
     instruments = {role: _checked_instrument(role, part, path) for role, part in bench.instruments.items()}
@@ -179,6 +206,7 @@ def _checked(document: dict[str, Any], path: Path) -> Bench:
         WorldConfig.from_mapping(bench.world)
     except SimulationError as error:
         raise BenchError(f"{path}, key world: {error}") from None
+    _check_d63(bench, path)
     return bench.model_copy(update={"instruments": instruments, "folders": _beside(bench.folders, path)})
 
 
@@ -224,6 +252,25 @@ def _error_table(role: str, given: tuple[Point, ...] | Path | None, path: Path) 
         raise BenchError(f"{key}: {error}") from None
 
 
+def _with_curve(given: Any, path: Path) -> dict[str, Any]:
+    """The key d63 with the points of the curve that it names. Raises BenchError."""
+    if not isinstance(given, dict) or not isinstance(name := given.get("curve"), str) or name == SIMULATED:
+        return {}
+    try:
+        curve = Curve.from_file(path.parent / Path(name).expanduser())
+    except ValueError as error:
+        raise BenchError(f"{path}, key d63.curve: {error}") from None
+    return {"d63": {**given, "curve": dataclasses.asdict(curve)}}
+
+
+def _check_d63(bench: Bench, path: Path) -> None:
+    """What a run would find out when all is measured. Raises BenchError."""
+    if D63 in bench.channels and bench.d63 is None:
+        raise BenchError(f"{path}, key d63: is missing: the channel {D63} needs its calibration curve")
+    if bench.d63 and not getattr(bench.d63.curve, bench.d63.side):
+        raise BenchError(f"{path}, key d63.side: the curve has no {bench.d63.side} side")
+
+
 def drivers() -> list[str]:
     """The names of all drivers: the modules that have a `connect`."""
     folder = Path(importlib.import_module("drivers").__file__ or "").parent
@@ -258,7 +305,7 @@ def _fault(fault: Any, keys: list[str]) -> str:
 
 def _keys(model: Any, where: list[str]) -> list[str]:
     """The keys that are known at a place of the file."""
-    parts = {"instruments": Instrument, "sensor": Sensor, "folders": Folders, "limits": Limits}
+    parts = {"instruments": Instrument, "sensor": Sensor, "folders": Folders, "limits": Limits, "d63": Displacement}
     part = parts.get(where[0], model) if where else model
     if where and (where[0] == "certificates" or where[-1] == "certificate"):
         part = Certificate

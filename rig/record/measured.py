@@ -14,6 +14,7 @@ from procedures.session import Reading
 from rig.bench import Sensor
 from rig.errors import RecordError, UnknownRun
 from rig.nearest import did_you_mean
+from rig.record import displacement
 from rig.record.raw import samples_table
 from rig.record.store import Record
 from rig.record.tables import poses_table
@@ -53,17 +54,24 @@ class Measured:
     @property
     def constants(self) -> Mapping[str, str | float]:
         """What is known of the sensor, beside what holds for the bench."""
+        shaken = displacement.constants(self.run, self.sensor) if self.run.kind == "motion" else {}
         if self.sensor is None:
-            return self.run.constants
-        return {**self.run.constants, **Sensor.model_validate(self.run.bench["sensors"][self.sensor]).constants}
+            return {**self.run.constants, **shaken}
+        sensor = Sensor.model_validate(self.run.bench["sensors"][self.sensor])
+        return {**self.run.constants, **sensor.constants, **shaken}
 
     def table(self) -> Table:
         """A row for each pose or, in a run of another kind, for each sample. Raises RecordError where there is none."""
-        run = replace(self.run, run=self.name, constants=self.constants)
         numbers, labels = self.record.columns(self.run.run)
         if numbers:
-            return Table.from_columns(run.kind, numbers, run.constants, run.run, labels)
-        return (poses_table if run.kind == "poses" else samples_table)(run, self.kept())
+            return Table.from_columns(self.run.kind, numbers, self.run.constants, self.run.run, labels)
+        return self.part(self.run.kind)
+
+    def part(self, kind: str, path: str = "") -> Table:
+        """A table of another kind out of the run: of `poses` whose path begins with `path`. Raises RecordError."""
+        run = replace(self.run, run=self.name, constants=self.constants, kind=kind)
+        poses = (kept for kept in self.kept() if kept.pose.path.startswith(path))
+        return (poses_table if kind == "poses" else samples_table)(run, poses)
 
     @property
     def name(self) -> str:

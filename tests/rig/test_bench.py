@@ -17,7 +17,7 @@ ALPHA = {"driver": "oriental_az", "url": "simulated"}
 def test_the_simulated_rig_is_the_default() -> None:
     bench = read_bench()
     assert bench.simulated
-    assert set(bench.instruments) == {"alpha", "beta", "adc", "oven", "level"}
+    assert set(bench.instruments) == {"alpha", "beta", "adc", "oven", "level", "positioner"}
     assert bench.constants["sensor"] == "ADXL203"
     assert bench.constants["filter_corner_hz"] == 15.07
 
@@ -25,6 +25,39 @@ def test_the_simulated_rig_is_the_default() -> None:
 def test_a_bench_comes_back_from_its_document() -> None:
     bench = read_bench()
     assert Bench.model_validate(bench.document()) == bench
+
+
+CURVE = "serial: '63'\ndate: 2026-11-21\nnear: [[0, 0], [10, 1], [20, 2], [30, 3]]\n"
+
+
+def test_a_curve_beside_the_file_is_read_into_the_bench(bench_file: Callable[..., Path]) -> None:
+    path = bench_file({"d63": {"curve": "d63.yaml", "direction": -1}})
+    (path.parent / "d63.yaml").write_text(CURVE)
+    bench = read_bench(path)
+    assert bench.d63 is not None
+    assert (bench.d63.curve.serial, bench.d63.side) == ("63", "near")
+    (path.parent / "d63.yaml").unlink()  # a run keeps the curve that it was made with
+    assert Bench.model_validate(bench.document()) == bench
+
+
+@pytest.mark.parametrize(
+    ("d63", "said"),
+    [
+        (None, "key d63: is missing: the channel d63 needs its calibration curve"),
+        ({"curve": "none.yaml"}, "key d63.curve: "),
+        ({"curve": "d63.yaml", "side": "far"}, "key d63.side: the curve has no far side"),
+        ({"curve": "simulated", "side": "nearer"}, "key d63.side: Input should be 'near' or 'far'"),
+        ({"curve": "simulated", "sides": "far"}, "key d63.sides: no such key. Did you mean 'side'?"),
+    ],
+)
+def test_a_displacement_sensor_without_its_curve_is_refused(
+    d63: object, said: str, bench_file: Callable[..., Path]
+) -> None:
+    path = bench_file({"d63": d63})
+    (path.parent / "d63.yaml").write_text(CURVE)
+    with pytest.raises(BenchError) as error:
+        read_bench(path)
+    assert said in str(error.value)
 
 
 def test_every_driver_is_found_by_its_file() -> None:

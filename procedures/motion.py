@@ -1,0 +1,126 @@
+"""motion: shake the sensor along its x axis beside a displacement sensor.
+
+Excites   scale factor in motion, output filter, sampling delay; all that a model of the standing sensor misses.
+Blind to  motion along y and z, and frequencies other than the one that it is shaken with.
+Source    Ang V, Fig. 12: alpha = 45, beta = 90 deg, 60 um peak to peak at 10 Hz along x, which is horizontal.
+
+A short sweep of the same sensor comes first, so that the models that are judged are its own, and of this hour. Then
+beta swings about the attitude, each time by less, as one demagnetises: friction forgets from where the sensor came,
+and its springs stand between the branches of the hysteresis.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+from procedures.errors import ProcedureError, SettingError
+from procedures.level_check import levelled
+from procedures.session import Pose, Session
+from procedures.sweep import turn
+
+KIND = "motion"
+SWEEP = "sweep"  # paths of the poses begin with what they are for
+STILL = "still"
+DISPLACEMENT = "d63"  # the converter's channel
+ALPHA_DEG, BETA_DEG = 45.0, 90.0
+INCLINATIONS_DEG, STEP_DEG = (90.0, 45.0, 135.0), 45.0  # enough for the physical model, as a measurement showed
+SWINGS_DEG = tuple(90 * 0.7**k for k in range(12))  # down to 1.8: finer than the friction's reach, some 10 deg
+SHAKING_S = 1.0  # from the start of the motion on, until only the motion is left
+AXIS = "x"
+
+
+def motion(
+    rig: Session,
+    *,
+    peak_to_peak_um: float = 60.0,
+    frequency_hz: float = 10.0,
+    centre_um: float = 50.0,
+    duration_s: float = 60.0,
+    still_s: float = 20.0,
+    block_s: float = 10.0,
+    dwell_s: float = 2.0,
+    settle_s: float = 0.5,
+) -> None:
+    """Sweep, then record the sensor still for `still_s` and shaken for `duration_s`, without a gap in either."""
+    if min(peak_to_peak_um, frequency_hz, duration_s, still_s, block_s, dwell_s) <= 0 or settle_s < 0:
+        raise SettingError("motion: give widths, frequencies and times above 0, and a settle_s not below")
+    _require_displacement(rig)
+    rig.confirm(
+        "mounting",
+        "Is the sensor on the nano-positioner, face up and its x along the carriage's x, the tip of the displacement "
+        "sensor behind the carriage, and are both cables free to turn?",
+        drawing="face-up",
+    )
+    levelled(rig)
+    still, shaken = blocks(STILL, still_s, block_s), blocks(KIND, duration_s, block_s)
+    left = list(rig.missing([*sweep(), *still, *shaken]))
+    _stand(rig, centre_um)
+    for pose in _of(left, SWEEP):
+        rig.hold(pose, dwell_s, settle_s)
+    if not (_of(left, STILL) or _of(left, KIND)):
+        return
+    _settle_between_branches(rig)
+    rig.wait(settle_s)
+    if now := _of(left, STILL):
+        rig.host.doing(f"recording for {len(now) * block_s:g} s, still")
+        rig.keep_stretch(now, block_s)
+    if now := _of(left, KIND):
+        with _shaking(rig, peak_to_peak_um, frequency_hz, centre_um):
+            rig.keep_stretch(now, block_s)
+
+
+def sweep() -> Iterator[Pose]:
+    """The poses that the models are fitted to: full turns both ways at three inclinations."""
+    for alpha_deg in INCLINATIONS_DEG:
+        yield from turn(alpha_deg, 0, 360, STEP_DEG, f"{SWEEP} A+ to B-")
+        yield from turn(alpha_deg, 360, 0, STEP_DEG, f"{SWEEP} B+ to A-")
+
+
+def blocks(what: str, duration_s: float, block_s: float) -> list[Pose]:
+    """A record at the attitude of the motion, block by block."""
+    return [Pose(ALPHA_DEG, BETA_DEG, 0, f"{what} {k}") for k in range(max(1, round(duration_s / block_s)))]
+
+
+def _of(poses: Sequence[Pose], what: str) -> list[Pose]:
+    return [pose for pose in poses if pose.path.split()[0] == what]
+
+
+def _require_displacement(rig: Session) -> None:
+    """Raises ProcedureError before anything moves."""
+    if DISPLACEMENT not in rig.adc.acquire(0.1).channels:
+        raise ProcedureError(
+            f"motion: the adc has no channel {DISPLACEMENT} for the displacement sensor; name it in "
+            "the bench file's channels"
+        )
+
+
+def _stand(rig: Session, centre_um: float) -> None:
+    """Put the carriage to its centre, whatever an interrupted run left it doing."""
+    rig.host.doing(f"positioner to {centre_um:g} um")
+    rig.positioner.stop()
+    rig.positioner.servo(True)
+    rig.positioner.move_to(AXIS, centre_um)
+
+
+def _settle_between_branches(rig: Session) -> None:
+    """Turn to the attitude, beta swinging about it ever less."""
+    rig.host.doing(f"settling at alpha {ALPHA_DEG:g}, beta {BETA_DEG:g} deg in swings that fade")
+    rig.alpha.move_to(ALPHA_DEG)
+    for k, swing_deg in enumerate(SWINGS_DEG):
+        rig.beta.move_to(round(BETA_DEG + (swing_deg if k % 2 else -swing_deg), 1))
+    rig.beta.move_to(BETA_DEG)
+
+
+@contextmanager
+def _shaking(rig: Session, peak_to_peak_um: float, frequency_hz: float, centre_um: float) -> Iterator[None]:
+    """Inside, the carriage swings; however it ends, it stands still afterwards."""
+    try:
+        really_hz = rig.positioner.oscillate(
+            AXIS, peak_to_peak_um=peak_to_peak_um, frequency_hz=frequency_hz, centre_um=centre_um
+        )
+        rig.host.doing(f"shaking {AXIS} by {peak_to_peak_um:g} um peak to peak at {really_hz:.6g} Hz")
+        rig.wait(SHAKING_S)
+        yield
+    finally:
+        rig.positioner.stop()

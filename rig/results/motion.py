@@ -1,0 +1,25 @@
+"""motion: the linear and the physical model beside the displacement sensor, both fitted to the run's own sweep."""
+
+from __future__ import annotations
+
+from calibrations.motion import models
+from calibrations.motion.evaluate import MotionResult
+from calibrations.motion.evaluate import evaluate as judged
+from procedures.motion import SWEEP
+from rig.record.measured import Measured
+from rig.results.result import Result
+
+
+def evaluate(measured: Measured) -> dict[str, Result]:
+    """rmse-linear-x, rmse-physical-x, noise-limit-x and amplitude in mm/s^2, improvement-x, frequency in Hz.
+
+    Raises SensorFault where the displacement sensor left its curve, RecordError and DataError where a part is missing.
+    """
+    found = beside_displacement(measured).results
+    return {name: Result(q.value, "" if q.unit == "1" else q.unit, q.std) for name, q in found.items()}
+
+
+def beside_displacement(measured: Measured) -> MotionResult:
+    """Both models beside the displacement sensor, as in the paper's Fig. 12; raises as `evaluate`."""
+    sweep = measured.part("poses", SWEEP)
+    return judged(measured.table(), models.linear(sweep), models.physical(sweep), measured.part("still"))
