@@ -1,4 +1,7 @@
-"""A run as the table that analysis takes: the mean, std and number of every pose's samples."""
+"""A run as the table that analysis takes: the mean, std and number of every pose's samples.
+
+The displacement sensor is left out: of a carriage that stands still it tells nothing, and noise is no regressor.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +12,7 @@ import numpy as np
 from calibrations.mean_noise import measured_inflation
 from calibrations.table import Array, Table
 from procedures.session import Samples
+from rig.bench import D63
 from rig.errors import RecordError
 from rig.record.angles import as_they_were
 from rig.record.values import Kept, Run
@@ -47,7 +51,7 @@ def _row(kept: Kept) -> dict[str, float]:
     beside = {name: getattr(kept, name) for name in ("temperature_c", "alpha_read_deg", "beta_read_deg")}
     row |= {name: value for name, value in beside.items() if value is not None}
     means = samples.volts.mean(axis=0)
-    row |= {f"{name}_v": float(mean) for name, mean in zip(samples.channels, means, strict=True)}
+    row |= {f"{name}_v": float(m) for name, m in zip(samples.channels, means, strict=True) if name != D63}
     if len(samples.volts) > 1:
         stds = samples.volts.std(axis=0, ddof=1)
         row |= {f"{name}_std_v": float(s) for name, s in zip(samples.channels, stds, strict=True) if name in AXES}
