@@ -10,8 +10,11 @@
     │   └── Refused        the instrument understood and declined: a Modbus exception, a GCS error
     ├── InstrumentError    the instrument
     │   ├── StageAlarm     the drive stands still with an alarm
+    │   ├── StageLost      the stage does not know where it is any more
     │   ├── NotSettled     the stage did not arrive
     │   ├── StreamError    scans were lost, or packets are not what was asked for
+    │   ├── OverRange      the converter was at an end of its range
+    │   ├── OverTemperature  the oven is hotter than it may become
     │   └── SensorFault    the thermometer gives no temperature, the displacement sensor no distance
     └── ClockStuck         a simulated instrument's bytes never arrived: a bound in real time, a defect of ours
 
@@ -74,12 +77,26 @@ class StageAlarm(InstrumentError):
         self.code = code
 
 
+class StageLost(InstrumentError):
+    """The stage has lost its coordinates; it is not moved blindly."""
+
+
 class NotSettled(InstrumentError):
     """The stage is not in position."""
 
 
 class StreamError(InstrumentError):
     """The record has a gap, or is not the record that was asked for."""
+
+
+class OverRange(InstrumentError):
+    """Samples at an end of the converter's range: what they stand for is not known."""
+
+
+class OverTemperature(InstrumentError):
+    """The oven shows more than what is in it can bear."""
+
+    exit_status = 4  # a safety limit
 
 
 class SensorFault(InstrumentError):

@@ -7,10 +7,11 @@ is never cleared silently, and a stop can always be sent. Source: AZ function ma
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from drivers import oriental_az_table as az
-from drivers.errors import LimitError, NotSettled, StageAlarm
+from drivers.errors import LimitError, NotSettled, StageAlarm, StageLost
 from drivers.instrument import Check, Identity
 from drivers.links import Address, Links
 from drivers.links.modbus import Unit
@@ -21,12 +22,17 @@ POLL_S = 0.02
 PATIENCE_S = 2.0  # beyond the expected end of a move
 HOMING_S = 120.0  # a full turn at a drive's slowest usual homing speed
 STOPPING_S = 10.0
+BEATS = 4  # in a communication time-out, so that one lost answer is no silence
 WARM_C = 85.0  # the drive's own alarm limit [M]
 
 
 @dataclass(frozen=True)
 class Settings:
-    """One stage: gear and resolution, limits of the motor angle, how it moves, when it counts as settled.
+    """One stage: gear and resolution, limits of the motor angle and speed, how it moves, when it counts as settled.
+
+    With a `communication_timeout_s`, the drive stops by itself (alarm 85) when its controller falls silent for so long
+    in the middle of a move; 0 is off. It is off unless the bench file sets it, since the address of the drive's
+    parameter "Communication timeout (Modbus)", which counts ms, is from memory [M]: look it up first.
 
     Raises ValueError for what no stage can be.
     """
@@ -34,9 +40,12 @@ class Settings:
     steps_per_turn: int = 18000  # 1.2 arcmin a step [M]
     limits_deg: tuple[float, float] = (-400.0, 400.0)
     speed_deg_s: float = 30.0
+    speed_limit_deg_s: float = 1200.0  # 200 r/min of a DGII's table [M]; less for what stands on it
     acceleration_deg_s2: float = 60.0
     settle_deg: float = 0.05
     current_percent: float = 100.0
+    communication_timeout_s: float = 0.0
+    communication_timeout_register: int = 0x138A  # [M]
 
     def __post_init__(self) -> None:
         positive = ("steps_per_turn", "speed_deg_s", "acceleration_deg_s2", "settle_deg", "current_percent")
@@ -44,6 +53,15 @@ class Settings:
             raise ValueError(f"{', '.join(wrong)} must be positive")
         if not self.limits_deg[0] < self.limits_deg[1]:
             raise ValueError("limits_deg must be the lower limit, then the upper one")
+        if self.speed_deg_s > self.speed_limit_deg_s:
+            raise ValueError(f"speed_deg_s must be at most speed_limit_deg_s, {self.speed_limit_deg_s:g}")
+        if self.communication_timeout_s and not 0.5 <= self.communication_timeout_s <= 10:
+            raise ValueError("communication_timeout_s must be 0 for none, or 0.5 to 10")
+
+    @property
+    def communication_timeout(self) -> Register:
+        """The drive's own parameter."""
+        return Register(self.communication_timeout_register, "uint32", "communication time-out", "s", 0.001)
 
     def move_s(self, distance_deg: float) -> float:
         """How long a move takes: a trapezoid of speed, or a triangle when the way is short."""
@@ -104,7 +122,7 @@ class RotaryStage:
     def move_to(self, angle_deg: float) -> None:
         """Turn to `angle_deg` and return when it stands there.
 
-        Raises LimitError before anything is sent, StageAlarm, NotSettled, and the errors of the link.
+        Raises LimitError before anything is sent, StageAlarm, StageLost, NotSettled, and the errors of the link.
         """
         if self.start(angle_deg):
             self.wait()
@@ -112,14 +130,17 @@ class RotaryStage:
     def start(self, angle_deg: float) -> bool:
         """Start turning to `angle_deg` and return at once; False where it stands there already.
 
-        Raises LimitError before anything is sent, StageAlarm.
+        With a communication time-out, `wait` must follow within it. Raises LimitError before anything is sent,
+        StageAlarm, StageLost.
         """
         self._require_within_limits(angle_deg)
         outputs = self._status()
+        self._require_coordinates(outputs)
         distance_deg = abs(angle_deg - self.angle_deg())
         self._target_deg, self._expected_end_s = angle_deg, self._clock.now()
-        if _stands(outputs, az.HOME_END | az.IN_POSITION) and distance_deg < 180 / self.settings.steps_per_turn:
+        if _stands(outputs, az.IN_POSITION) and distance_deg < 180 / self.settings.steps_per_turn:
             return False
+        self._watch(True)
         asked_s = self._clock.now()
         self._unit.write_block(*self._direct_operation(angle_deg))
         begun_s = (asked_s + self._clock.now()) / 2  # it starts when it has the request, and then answers
@@ -128,8 +149,9 @@ class RotaryStage:
 
     def wait(self) -> None:
         """Return when the move that was started has ended where it should. Raises StageAlarm, NotSettled."""
-        self._clock.sleep(self._expected_end_s - self._clock.now())
+        self._until_expected_end()
         self._poll_until(az.IN_POSITION, PATIENCE_S, "is still moving, or not in position,")
+        self._watch(False)
         angle = self.angle_deg()
         if abs(angle - self._target_deg) > self.settings.settle_deg:
             raise NotSettled(
@@ -138,20 +160,27 @@ class RotaryStage:
                 "Free the stage of what holds it, check the load's balance, then repeat the move",
             )
 
-    def stop(self) -> None:
-        """Brake to a standstill, whatever the stage is doing."""
+    def halt(self) -> None:
+        """Let it brake, whatever it is doing, and return at once; `stop` must follow."""
         self._unit.write(az.INPUTS, az.STOP)
+
+    def stop(self) -> None:
+        """Brake to a standstill, whatever the stage is doing. An alarm is no reason to doubt a standstill."""
+        self.halt()
         try:
-            self._poll_until(0, STOPPING_S, "has not stopped")
+            self._poll_until(0, STOPPING_S, "has not stopped", self._outputs)
         finally:
             self._unit.write(az.INPUTS, 0)
+        self._watch(False)
 
     def home(self) -> None:
         """Seek the zero of the angle; needed once after power-on. Raises StageAlarm, NotSettled."""
         self._require_no_alarm(self.alarm())
+        self._watch(True)
         self._unit.write(az.INPUTS, az.ZHOME)
         self._unit.write(az.INPUTS, 0)
         self._poll_until(az.HOME_END, HOMING_S, "has not found its home")
+        self._watch(False)
 
     def _require_within_limits(self, angle_deg: float) -> None:
         low, high = self.settings.limits_deg
@@ -159,6 +188,13 @@ class RotaryStage:
             raise LimitError(
                 f"{self.name}: {angle_deg:g} deg is outside its limits {low:g} .. {high:g} deg; nothing was sent",
                 "Ask for an angle within the limits, or change them in the bench file after looking at the cables",
+            )
+
+    def _require_coordinates(self, outputs: int) -> None:
+        if not outputs & az.HOME_END:
+            raise StageLost(
+                f"{self.name}: does not know where it is; nothing was sent",
+                "Find out whether it was without power or was stopped while homing; it is homed when the run resumes",
             )
 
     def _require_no_alarm(self, alarm: Alarm | None) -> None:
@@ -179,6 +215,19 @@ class RotaryStage:
         values = (0, az.ABSOLUTE, angle_deg * per_deg, speed, rate, rate, percent, az.TRIGGER_ALL)
         return list(zip(az.DIRECT, values, strict=True))
 
+    def _watch(self, on: bool) -> None:
+        """Have the drive watch over its controller, or not: while it stands, nobody needs to talk to it."""
+        if self.settings.communication_timeout_s:
+            self._unit.write(self.settings.communication_timeout, on * self.settings.communication_timeout_s)
+
+    def _until_expected_end(self) -> None:
+        """Let the move take its time, and let the drive hear of its controller meanwhile if it watches over it."""
+        beat_s = self.settings.communication_timeout_s / BEATS or math.inf
+        while (left_s := self._expected_end_s - self._clock.now()) > beat_s:
+            self._clock.sleep(beat_s)
+            self._status()
+        self._clock.sleep(left_s)
+
     def _outputs(self) -> int:
         return int(self._unit.read(az.OUTPUTS))
 
@@ -188,11 +237,13 @@ class RotaryStage:
         self._require_no_alarm(az.alarm_of(code))
         return outputs
 
-    def _poll_until(self, wanted: int, timeout_s: float, complaint: str) -> None:
-        """Wait for a standstill with the `wanted` outputs on."""
+    def _poll_until(
+        self, wanted: int, timeout_s: float, complaint: str, outputs: Callable[[], int] | None = None
+    ) -> None:
+        """Wait for a standstill with the `wanted` outputs on; an alarm ends it unless only `outputs` are looked at."""
         deadline = self._clock.now() + timeout_s
         while True:
-            if _stands(self._status(), wanted):
+            if _stands((outputs or self._status)(), wanted):
                 return
             if self._clock.now() >= deadline:
                 remedy = "Look at the stage: is it blocked? Then home it and repeat"

@@ -58,6 +58,7 @@ class Alarm:
 
 
 COORDINATES_NOT_SET = 0x4A
+COMMUNICATION_TIMEOUT = 0x85
 BAD_OPERATION_DATA = 0x70
 _LIMITS = "Turn the stage by hand away from its limit, then home it"
 _POWER = "Switch the drive's power off, wait a minute and switch it on; if it returns, have the drive serviced"
@@ -80,7 +81,10 @@ _WORDS: dict[int, tuple[str, str]] = {
     0x67: ("software overtravel", _LIMITS),
     BAD_OPERATION_DATA: ("bad operation data", "Check speed and acceleration in the bench file"),
     0x84: ("RS-485 communication error", "Check shielding, termination, baud rate and parity of the line"),
-    0x85: ("RS-485 communication time-out", "The controller went silent; find out why, then reset the alarm"),
+    COMMUNICATION_TIMEOUT: (
+        "RS-485 communication time-out",
+        "The controller went silent; find out why, then reset the alarm",
+    ),
     0xF0: ("processor error", _POWER),
 }
 

@@ -9,6 +9,7 @@ from typing import Any, Protocol
 
 from drivers import oriental_az_table as az
 from drivers.links.address import Address
+from drivers.links.faults import Faults, Kind
 from drivers.links.modbus_server import modbus_port
 from drivers.links.register import Register
 from drivers.links.server import Server
@@ -20,6 +21,13 @@ HOMING_DEG_S = 20.0
 HOMING_DEG_S2 = 40.0
 IN_POSITION_DEG = 0.018  # the width of IN-POS around the command, +-
 THINKING_S = 0.003  # transmission waiting time of the drive
+FAULTS = {
+    "alarm": Kind("stops with the alarm of this code, once", 0x30),
+    "restart": Kind("is without power for a moment: stops, and does not know where it is any more, once"),
+    "stuck": Kind("does not turn, and finds itself in position"),
+    "busy": Kind("says that it moves, whatever it does"),
+    "lies": Kind("shows a position that is off by this", 1.0, "deg"),
+}
 TRIGGERS = dict(zip(range(-7, 0), (r.address for r in az.DIRECT[:-1]), strict=True))  # trigger -> starting item
 
 
@@ -40,15 +48,30 @@ class Drive:
     thinking_s = THINKING_S
 
     def __init__(self, world: World, axis: str, settings: Settings) -> None:
+        self.faults = Faults()
         self._world, self._axis = world, axis
         self._steps_per_deg = settings.steps_per_turn / 360
         self._plan = at_rest(world.motor_angle_deg(axis))
         self._words: dict[int, int] = {}
         self._alarm = 0
         self._referenced = self._homing = False
+        self._timeout = settings.communication_timeout
+        self._heard_s = 0.0
 
     def advance(self, now_s: float) -> None:
-        """A drive does nothing between exchanges that is not in its plan."""
+        """A drive does nothing between exchanges that is not in its plan, but for what befalls it.
+
+        The world's time is not touched: the converter may still be sampling.
+        """
+        timeout_s = self._value(self._timeout)
+        if timeout_s and now_s > self._heard_s + timeout_s and not self._alarm:
+            self._fail(az.COMMUNICATION_TIMEOUT, self._heard_s + timeout_s)
+        if strike := self.faults.once("alarm", now_s):
+            self._fail(int(strike.size), strike.at_s)
+        if strike := self.faults.once("restart", now_s):
+            self._fail(0, strike.at_s)
+            self._referenced = self._homing = False
+            self._words.clear()
 
     def due_s(self) -> float:
         return math.inf
@@ -59,11 +82,14 @@ class Drive:
             "alarm": self._alarm,
             "referenced": self._referenced,
             "homing": self._homing,
+            "heard_s": self._heard_s,
+            "words": [[address, word] for address, word in self._words.items()],
         }
 
     def restore(self, state: Mapping[str, Any]) -> None:
         self._plan = Trajectory(**state["plan"])
         self._alarm, self._referenced, self._homing = state["alarm"], state["referenced"], state["homing"]
+        self._heard_s, self._words = state["heard_s"], dict(state["words"])
 
     def read_words(self, address: int, count: int, now_s: float) -> list[int]:
         self._catch_up(now_s)
@@ -84,6 +110,8 @@ class Drive:
 
     def _catch_up(self, now_s: float) -> None:
         """Bring the world here; a homing that has run to its end sets the coordinates."""
+        self.advance(now_s)
+        self._heard_s = now_s
         self._world.advance(now_s)
         if self._homing and now_s >= self._plan.end_s:
             self._homing, self._referenced = False, self._plan.stop_s is None
@@ -97,14 +125,14 @@ class Drive:
             az.OUTPUTS: self._outputs(now_s),
             az.ALARM: self._alarm,
             az.COMMAND_POSITION: self._plan.angle_deg(now_s) * self._steps_per_deg,
-            az.FEEDBACK_POSITION: self._world.motor_angle_deg(self._axis) * self._steps_per_deg,
+            az.FEEDBACK_POSITION: (self._angle_deg() + (self.faults.size("lies", now_s) or 0.0)) * self._steps_per_deg,
             az.DRIVER_TEMPERATURE: 35.0,
             az.MOTOR_TEMPERATURE: 40.0,
         }
         return {r.address + i: word for r, value in values.items() for i, word in enumerate(r.encode(value))}
 
     def _outputs(self, now_s: float) -> int:
-        moving = now_s < self._plan.end_s
+        moving = now_s < self._plan.end_s or self.faults.size("busy", now_s) is not None
         near = abs(self._world.motor_angle_deg(self._axis) - self._plan.angle_deg(now_s)) <= IN_POSITION_DEG
         return (
             az.HOME_END * self._referenced
@@ -119,7 +147,7 @@ class Drive:
             self._follow(self._plan.stopped(now_s))
         elif rising & az.ZHOME and not self._alarm:
             self._homing, self._referenced = True, False
-            self._follow(Trajectory(now_s, self._angle_deg(), 0.0, HOMING_DEG_S, HOMING_DEG_S2))
+            self._turn(Trajectory(now_s, self._angle_deg(), 0.0, HOMING_DEG_S, HOMING_DEG_S2))
         elif rising & az.ALARM_RESET:
             self._reset()
 
@@ -150,11 +178,15 @@ class Drive:
             self._fail(az.COORDINATES_NOT_SET, now_s)
         else:
             target = origins[kind]() + self._value(az.POSITION) / self._steps_per_deg
-            self._follow(Trajectory(now_s, self._angle_deg(), target, speed, rate))
+            self._turn(Trajectory(now_s, self._angle_deg(), target, speed, rate))
 
-    def _fail(self, code: int, now_s: float) -> None:
+    def _fail(self, code: int, at_s: float) -> None:
         self._alarm = code
-        self._follow(self._plan.stopped(now_s))
+        self._follow(self._plan.stopped(max(at_s, self._plan.start_s)))
+
+    def _turn(self, way: Trajectory) -> None:
+        if self.faults.size("stuck", way.start_s) is None:
+            self._follow(way)
 
     def _follow(self, plan: Trajectory) -> None:
         self._plan = plan

@@ -65,7 +65,7 @@ def test_a_bench_of_which_a_part_is_real_runs_in_real_time(
     _, document = served
     instruments = yaml.safe_load(DEFAULT.read_text())["instruments"]
     for role in ("alpha", "beta"):
-        instruments[role]["settings"] |= {"speed_deg_s": 3600, "acceleration_deg_s2": 36000}
+        instruments[role]["settings"] |= {"speed_deg_s": 1200, "acceleration_deg_s2": 36000}
     instruments["oven"]["url"] = document["instruments"]["oven"]["url"]  # elsewhere, so real for this bench
     path = bench_file({"instruments": instruments})
     with connected(read_bench(path)) as mixed:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable
 
@@ -9,7 +10,7 @@ import pytest
 
 from drivers import oriental_az
 from drivers.clock import SimulatedClock
-from drivers.errors import LimitError, NotSettled, StageAlarm
+from drivers.errors import LimitError, NotSettled, StageAlarm, StageLost
 from drivers.links import Address, Links
 from drivers.oriental_az import RotaryStage, Settings
 
@@ -41,7 +42,7 @@ STANDING = "01 03 06 40 20 00 00 00 00 AE 72"  # IN-POS, READY, no alarm
 MOVING = "01 03 06 20 00 00 00 00 00 26 15"
 BLOCKED = "01 03 06 00 80 00 00 00 30 20 BF"  # ALM, alarm 30
 HOMED = "01 03 06 40 30 00 00 00 00 6F B1"  # IN-POS, READY, HOME-END
-START = [(ASK_STATUS, STANDING), (ASK_POSITION, AT_MINUS_4500), (MOVE_TO_8500, TAKEN)]
+START = [(ASK_STATUS, HOMED), (ASK_POSITION, AT_MINUS_4500), (MOVE_TO_8500, TAKEN)]
 Stages = Callable[[list[tuple[str, str]]], RotaryStage]
 
 
@@ -90,9 +91,28 @@ def test_with_an_alarm_no_move_is_started(stage: Stages) -> None:
         stage([(ASK_STATUS, "01 03 06 00 80 00 00 00 4A A1 5C")]).move_to(85.0)
 
 
+def test_without_coordinates_it_is_not_moved_blindly(stage: Stages) -> None:
+    with pytest.raises(StageLost, match=r"alpha: does not know where it is; nothing was sent\. Find out"):
+        stage([(ASK_STATUS, STANDING)]).move_to(85.0)
+
+
 def test_a_stop_holds_the_input_until_the_motor_stands(stage: Stages) -> None:
     on, off = "01 06 00 7D 00 20 18 0A", "01 06 00 7D 00 00 19 D2"
-    stage([(on, on), (ASK_STATUS, MOVING), (ASK_STATUS, STANDING), (off, off)]).stop()
+    ask, moving, alarmed = "01 03 00 7F 00 01 B5 D2", "01 03 02 20 00 A1 84", "01 03 02 00 80 B9 E4"
+    stage([(on, on), (ask, moving), (ask, alarmed), (off, off)]).stop()
+
+
+def test_the_drive_is_told_to_watch_over_its_controller_for_as_long_as_it_moves(
+    script: Callable[..., Address], links: Links, clock: SimulatedClock
+) -> None:
+    """1000 ms into the drive's parameter, the move, a status four times a second, then 0."""
+    told = "01 10 13 8A 00 02 64 A6"
+    on, off = "01 10 13 8A 00 02 04 00 00 03 E8 A2 3E", "01 10 13 8A 00 02 04 00 00 00 00 A2 80"
+    beats = [(ASK_STATUS, MOVING)] * 31
+    moved = [*START[:2], (on, told), START[2], *beats, (ASK_STATUS, STANDING), (off, told), (ASK_POSITION, AT_8500)]
+    watched = dataclasses.replace(SETTINGS, communication_timeout_s=1.0)
+    oriental_az.connect(script(moved), links, watched, "alpha").move_to(85.0)
+    assert clock.now() == pytest.approx(130 / 20 + 20 / 15, abs=0.01)
 
 
 def test_homing_is_a_pulse_and_waits_for_home_end(stage: Stages) -> None:
