@@ -46,6 +46,16 @@ class Settings:
         if wrong := [name for name in ("settle_um", "wave_points", "record_hz") if not getattr(self, name) > 0]:
             raise ValueError(f"{', '.join(wrong)} must be positive")
 
+    def wave(self, name: str, frequency_hz: float, cycle_s: float = e727.USUAL_CYCLE_S) -> Wave:
+        """How the controller `name` plays a frequency. Raises LimitError for one that it cannot play."""
+        fastest_hz = 1 / (FEWEST_POINTS * cycle_s)
+        if not 0 < frequency_hz <= fastest_hz:
+            raise LimitError(
+                f"{name}: no wave table plays {frequency_hz:g} Hz; nothing was moved",
+                f"Ask for a positive frequency of at most {fastest_hz:g} Hz",
+            )
+        return Wave.near(frequency_hz, cycle_s, self.wave_points)
+
 
 @dataclass(frozen=True, eq=False)
 class Recording:
@@ -207,13 +217,7 @@ class Positioner:
     def _wave(self, frequency_hz: float) -> Wave:
         """How the controller plays a frequency. Raises LimitError for one that it cannot play."""
         cycle_s = self._gcs.number(f"{e727.ASK_PARAMETER} 1 {e727.CYCLE_TIME}")
-        fastest_hz = 1 / (FEWEST_POINTS * cycle_s)
-        if not 0 < frequency_hz <= fastest_hz:
-            raise LimitError(
-                f"{self.name}: no wave table plays {frequency_hz:g} Hz; nothing was moved",
-                f"Ask for a positive frequency of at most {fastest_hz:g} Hz",
-            )
-        return Wave.near(frequency_hz, cycle_s, self.settings.wave_points)
+        return self.settings.wave(self.name, frequency_hz, cycle_s)
 
     def _write_wave(self, axis: str, wave: Wave, peak_to_peak_um: float, lowest_um: float) -> None:
         place, n = self._place(axis), wave.points

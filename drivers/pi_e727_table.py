@@ -34,6 +34,7 @@ RECORD_POINTS = 262144  # of one table
 # Parameters: SPA? item identifier, the identifier in decimal or as 0x hexadecimal.
 ASK_PARAMETER = "SPA?"
 CYCLE_TIME = 0x0E000200  # s
+USUAL_CYCLE_S = 50e-6  # of the servo: what a plan goes by before the controller can be asked
 
 NOT_REFERENCED, OUTSIDE, STOPPED, BAD_AXIS, ILLEGAL_AXIS = 5, 7, 10, 15, 23
 UNKNOWN_PARAMETER, WAVE_MEMORY, WAVE_RUNS, NO_WAVE = 54, 67, 73, 75

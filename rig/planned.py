@@ -42,7 +42,7 @@ class Ledger:
 
     now_s: float = 0.0
     steps: list[Step] = field(default_factory=list)
-    questions: list[str] = field(default_factory=list)
+    asked: list[Question] = field(default_factory=list)
     held: list[Held] = field(default_factory=list)
     samples: int = 0
 
@@ -194,9 +194,10 @@ class PlannedPositioner:
 
     def oscillate(self, axis: str, *, peak_to_peak_um: float, frequency_hz: float, centre_um: float) -> float:
         self._within(centre_um - peak_to_peak_um / 2, centre_um + peak_to_peak_um / 2)
-        what = f"{self._name} swings {axis} by {peak_to_peak_um:g} um peak to peak at {frequency_hz:g} Hz"
+        really_hz: float = self._settings.wave(self._name, frequency_hz).frequency_hz
+        what = f"{self._name} swings {axis} by {peak_to_peak_um:g} um peak to peak at {really_hz:g} Hz"
         self._ledger.add(what, EXCHANGE_S)
-        return frequency_hz
+        return really_hz
 
     def stop(self) -> None:
         self._ledger.add(f"{self._name} stops", EXCHANGE_S)
@@ -240,7 +241,7 @@ class PlanHost:
         """A plan reads nothing."""
 
     def ask(self, question: Question) -> str:
-        self.ledger.questions.append(f"{question.name}: {question.text}")
+        self.ledger.asked.append(question)
         return planned_answer(question)
 
     def doing(self, text: str) -> None:
