@@ -13,7 +13,7 @@ import json
 from collections.abc import Mapping
 from datetime import date
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model, field_validator
@@ -25,6 +25,7 @@ from drivers.links.faults import Fault
 from drivers.links.wire_faults import kinds_of
 from drivers.philtec_d63 import SIMULATED as SIMULATED_CURVE
 from drivers.philtec_d63 import Curve
+from drivers.simulation.batch import with_own
 from drivers.simulation.config import WorldConfig
 from drivers.simulation.errors import SimulationError
 from procedures.session import Limits
@@ -36,6 +37,7 @@ SIMULATED = "simulated"
 UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
 D63 = "d63"  # the displacement sensor's channel
 ROLES = ("alpha", "beta", "adc", "oven", "level", "positioner")
+SENSOR = "^[A-Za-z0-9_-]+$"  # name of a batch's sensor: part of channels and of RUN/SENSOR
 TURNING = ("alpha", "beta")
 
 
@@ -137,7 +139,7 @@ class Bench(Strict):
     seed: int = Field(default=1, ge=0)
     instruments: dict[str, Instrument]
     sensor: Sensor = Sensor()
-    sensors: dict[str, Sensor] = {}
+    sensors: dict[Annotated[str, Field(pattern=SENSOR)], Sensor] = {}
     limits: Limits = Limits()
     d63: Displacement | None = None
     certificates: dict[str, Certificate] = {}  # of what plays no role: a hand level, a displacement sensor's curve
@@ -148,6 +150,11 @@ class Bench(Strict):
     def simulated(self) -> bool:
         """Whether every instrument is a twin; then time is simulated too."""
         return all(instrument.simulated for instrument in self.instruments.values())
+
+    @property
+    def first_sensor(self) -> str | None:
+        """The one of a batch that adaptive procedures go by; None where there is no batch."""
+        return next(iter(self.sensors), None)
 
     @property
     def channels(self) -> Mapping[str, int]:
@@ -173,7 +180,7 @@ class Bench(Strict):
         return self.model_dump(mode="json")
 
     def configuration(self, procedure: str, settings: Mapping[str, Any]) -> str:
-        """Hash of all that a run depends on: procedure, settings, bench. Faults are none of it: they can be repaired."""
+        """Hash of all that a run depends on: procedure, settings, bench. Faults are not: they can be repaired."""
         bench = self.model_dump(mode="json", exclude={"instruments": {"__all__": {"faults"}}})
         text = json.dumps([procedure, settings, bench])
         return hashlib.sha256(text.encode()).hexdigest()
@@ -202,12 +209,38 @@ def _checked(document: dict[str, Any], path: Path) -> Bench:
     except ValidationError as error:
         raise BenchError(_told(error, path, Bench)) from None
     instruments = {role: _checked_instrument(role, part, path) for role, part in bench.instruments.items()}
-    try:
-        WorldConfig.from_mapping(bench.world)
-    except SimulationError as error:
-        raise BenchError(f"{path}, key world: {error}") from None
+    _check_worlds(bench, path)
+    _check_batch(bench, path)
     _check_d63(bench, path)
     return bench.model_copy(update={"instruments": instruments, "folders": _beside(bench.folders, path)})
+
+
+def _check_worlds(bench: Bench, path: Path) -> None:
+    key = f"{path}, key world"
+    try:
+        config = WorldConfig.from_mapping(bench.world)
+        for name, sensor in bench.sensors.items():
+            key = f"{path}, key sensors.{name}.world"
+            with_own(config, name, sensor.world)
+    except SimulationError as error:
+        raise BenchError(f"{key}: {error}") from None
+
+
+def _check_batch(bench: Bench, path: Path) -> None:
+    """Raises BenchError where sensors and channels do not fit together."""
+    if bench.sensors and "sensor" in bench.model_fields_set:
+        raise BenchError(f"{path}, key sensor: there is a batch in `sensors` too; leave one of them")
+    if bench.sensor.world:
+        raise BenchError(f"{path}, key sensor.world: only sensors of a batch differ from the bench's `world`; move it")
+    if "adc" not in bench.instruments:
+        return
+    named = {name.partition(".")[0] for name in bench.channels if "." in name}
+    for name in sorted(named - set(bench.sensors)):
+        key = f"{path}, key instruments.adc.settings.channels"
+        raise BenchError(f"{key}: no sensor {name!r} in `sensors`.{did_you_mean(name, bench.sensors)}")
+    for name in bench.sensors:
+        if f"{name}.vx" not in bench.channels:
+            raise BenchError(f"{path}, key sensors.{name}: no channel {name}.vx of the adc carries its output")
 
 
 def _checked_instrument(role: str, instrument: Instrument, path: Path) -> Instrument:

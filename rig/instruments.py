@@ -17,6 +17,7 @@ from drivers.instrument import Instrument as Driver
 from drivers.links.person import PersonLink
 from drivers.links.server import Server
 from drivers.manual_stage import ManualStage
+from drivers.simulation.batch import Batch
 from drivers.simulation.world import World
 from procedures.errors import ProcedureError
 from procedures.session import Host, Session
@@ -63,7 +64,7 @@ class Rig:
     bench: Bench
     drivers: Mapping[str, Driver]
     clock: Clock
-    world: World | None  # of the simulated instruments
+    world: World | Batch | None  # of the simulated instruments
     servers: tuple[Server, ...]
     person: PersonLink
 

@@ -18,6 +18,7 @@ from procedures.session import Dwell, Pose, Reading, Samples, Session
 from rig.bench import SIMULATED, Bench
 from rig.instruments import Rig, absent, connected
 from rig.planned import Held, Ledger, PlanHost
+from rig.record.measured import of_sensor
 from rig.record.values import Kept
 from rig.technician import answer
 
@@ -59,7 +60,8 @@ class RehearsalHost(PlanHost):
 
     def keep(self, pose: Pose, samples: Samples, temperature_c: float | None) -> None:
         self.ledger.held.append(Held(self.ledger.now_s, pose))  # the twins' clock shows another time
-        self.dwells.append(Kept(pose, samples, samples.start_s, temperature_c).dwell)
+        kept = Kept(pose, samples, samples.start_s, temperature_c)
+        self.dwells.append(of_sensor(kept, self.rig.bench.first_sensor).dwell)
 
     def keep_readings(self, *readings: Reading) -> None:
         self.read |= {reading.name: reading for reading in readings}

@@ -27,6 +27,7 @@ from rig.instruments import Rig, connected
 from rig.lease import lease
 from rig.plan import Plan, plan
 from rig.record import Kept, Record, Run
+from rig.record.measured import Measured, of_sensor
 from rig.results import Result, documents, evaluated, returned
 from rig.signals import stoppable
 from rig.technician import answer
@@ -195,6 +196,7 @@ class RunHost:
         self._record, self._rig, self._run, self._watch = record, rig, run.run, watch
         self._poses = record.poses(run.run)
         self._next = record.next_number(run.run)
+        self._measured = Measured(record, run, rig.bench.first_sensor)
         self._dwells: list[Dwell] | None = None  # read from the record only if the procedure asks for them
         self._answers = {e.what: e.text for e in record.events(run.run) if e.what.startswith("answer ")}
         self._zero_s = state["zero_s"] if state else _zero_s(rig, run)
@@ -204,7 +206,7 @@ class RunHost:
 
     def measured(self) -> Sequence[Dwell]:
         if self._dwells is None:
-            self._dwells = [kept.dwell for kept in self._record.kept(self._run) if kept.excluded is None]
+            self._dwells = [kept.dwell for kept in self._measured.kept()]
         return self._dwells
 
     def readings(self) -> Sequence[Reading]:
@@ -228,7 +230,7 @@ class RunHost:
         self._next += 1
         self._poses.append(pose)
         if self._dwells is not None:
-            self._dwells.append(kept.dwell)
+            self._dwells.append(of_sensor(kept, self._measured.sensor).dwell)
         self._watch.kept(kept)
 
     def keep_readings(self, *readings: Reading) -> None:

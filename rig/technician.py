@@ -8,6 +8,7 @@ from __future__ import annotations
 from functools import singledispatch
 
 from drivers.manual_stage_twin import Hand
+from drivers.simulation.batch import Batch
 from drivers.simulation.world import World
 from procedures.questions import Choice, Confirm, Dial, Mounting, Number, PowerCycle, Question, Remount
 from rig.instruments import Rig
@@ -22,35 +23,35 @@ def answer(question: Question, rig: Rig) -> str | None:
 
 
 @singledispatch
-def _done(question: Question, rig: Rig, world: World) -> str | None:  # noqa: ARG001
+def _done(question: Question, rig: Rig, world: World | Batch) -> str | None:  # noqa: ARG001
     """The answer, after what was asked for was done; each kind of question has its own."""
     return None
 
 
 @_done.register
-def _(question: Confirm, rig: Rig, world: World) -> str:  # noqa: ARG001
+def _(question: Confirm, rig: Rig, world: World | Batch) -> str:  # noqa: ARG001
     return "yes"
 
 
 @_done.register
-def _(question: Choice, rig: Rig, world: World) -> str:  # noqa: ARG001
+def _(question: Choice, rig: Rig, world: World | Batch) -> str:  # noqa: ARG001
     return question.choices[0]
 
 
 @_done.register
-def _(question: Mounting, rig: Rig, world: World) -> str:  # noqa: ARG001
+def _(question: Mounting, rig: Rig, world: World | Batch) -> str:  # noqa: ARG001
     world.mount_sensor(question.mount_deg, question.flip)
     return "yes"
 
 
 @_done.register
-def _(question: Remount, rig: Rig, world: World) -> str:  # noqa: ARG001
+def _(question: Remount, rig: Rig, world: World | Batch) -> str:  # noqa: ARG001
     world.mount_sensor()
     return "yes"
 
 
 @_done.register
-def _(question: PowerCycle, rig: Rig, world: World) -> str:
+def _(question: PowerCycle, rig: Rig, world: World | Batch) -> str:
     world.power(False)
     rig.clock.sleep(question.off_s)
     world.advance(rig.clock.now())
@@ -59,7 +60,7 @@ def _(question: PowerCycle, rig: Rig, world: World) -> str:
 
 
 @_done.register
-def _(question: Number, rig: Rig, world: World) -> str | None:  # noqa: ARG001
+def _(question: Number, rig: Rig, world: World | Batch) -> str | None:  # noqa: ARG001
     if not question.name.startswith("level-"):
         return None
     x_deg, y_deg = world.level_deg()
@@ -67,7 +68,7 @@ def _(question: Number, rig: Rig, world: World) -> str | None:  # noqa: ARG001
 
 
 @_done.register
-def _(question: Dial, rig: Rig, world: World) -> str:
+def _(question: Dial, rig: Rig, world: World | Batch) -> str:
     """Turn the stage where it does not stand yet, which takes its time; read the dial."""
     settings = rig.bench.instruments[question.stage].typed_settings()
     hand = Hand(world, question.stage, settings, rig.bench.seed)

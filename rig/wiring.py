@@ -22,6 +22,7 @@ from drivers.links import Address, Links
 from drivers.links.person import PERSON
 from drivers.links.server import Server
 from drivers.links.wire_faults import faults_of
+from drivers.simulation.batch import Batch
 from drivers.simulation.config import WorldConfig
 from drivers.simulation.world import World
 from rig.bench import Bench
@@ -37,7 +38,7 @@ class Wiring:
     bench: Bench
     clock: Clock
     links: Links
-    world: World
+    world: World | Batch
     servers: Mapping[str, Server]
 
     def connect(self, role: str) -> Driver:
@@ -64,7 +65,7 @@ def wired(bench: Bench) -> Iterator[Wiring]:
     with ExitStack() as stack:
         for url in sorted({i.url for i in bench.instruments.values() if not i.simulated} - {PERSON}):
             stack.enter_context(lease(home(), f"wire-{hashlib.sha256(url.encode()).hexdigest()[:16]}", url))
-        world = World(WorldConfig.from_mapping(bench.world), bench.seed)
+        world = world_of(bench)
         servers = serve(bench, world)
         for server in servers.values():
             stack.callback(server.close)
@@ -75,7 +76,15 @@ def wired(bench: Bench) -> Iterator[Wiring]:
         yield Wiring(bench, clock, links, world, servers)
 
 
-def serve(bench: Bench, world: World) -> dict[str, Server]:
+def world_of(bench: Bench) -> World | Batch:
+    """The simulated world that the bench file describes, with every sensor of a batch."""
+    config = WorldConfig.from_mapping(bench.world)
+    if not bench.sensors:
+        return World(config, bench.seed)
+    return Batch(config, bench.seed, {name: sensor.world for name, sensor in bench.sensors.items()})
+
+
+def serve(bench: Bench, world: World | Batch) -> dict[str, Server]:
     """The servers of all simulated instruments, each under the roles that it plays; one wire, one server."""
     wires = defaultdict(list)
     for role, instrument in bench.instruments.items():

@@ -13,18 +13,21 @@ from drivers.simulation.kernel import record
 from drivers.simulation.state import State
 
 
-def beginning(config: WorldConfig, numbers: WorldConfig, random: np.random.Generator) -> State:
-    """A record of the state; `numbers` is the record of `config`, `random` draws where slow noise stands."""
+def beginning(config: WorldConfig, numbers: WorldConfig, room: np.random.Generator, slow: np.random.Generator) -> State:
+    """A record of the state; `numbers` is the record of `config`.
+
+    Where slow noise stands is drawn from `room` for what all sensors share, from `slow` for the sensor's own.
+    """
     world = record(State())
     world.powered_ns = -round(1e9 * config.heat.powered_for_s)
     world.up = gravity.vertical(config.base)
     world.mount = gravity.mounting(config.sensor.package, 0.0, 0)
-    world.white = random.standard_normal(2)
-    world.flicker_v = config.noise.flicker_v * random.standard_normal(world.flicker_v.shape)
+    world.white = slow.standard_normal(2)
+    world.flicker_v = config.noise.flicker_v * slow.standard_normal(world.flicker_v.shape)
     world.slow_v = world.flicker_v.sum(axis=1)
-    world.supply_wander_v = config.supply.wander_v * random.standard_normal()
+    world.supply_wander_v = config.supply.wander_v * room.standard_normal()
     world.supply_v = config.supply.nominal_v + world.supply_wander_v
-    world.wander_k = config.heat.ambient_wander_k * random.standard_normal()
+    world.wander_k = config.heat.ambient_wander_k * room.standard_normal()
     world.charged = 1 - math.exp(-config.heat.powered_for_s / config.sensor.charging_s)
     _warm_up(world, config.heat)
     mechanics.update(world, numbers, 0)

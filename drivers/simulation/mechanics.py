@@ -28,15 +28,15 @@ REFERENCE_C = 25.0  # at which the factory trimmed the sensor
 
 
 @kernel
-def run_to(world: State, config: WorldConfig, t_ns: int, step_ns: int, random: Generator) -> None:
-    """Let everything due up to `t_ns` happen; what the ticks need of chance is drawn from `random`."""
+def run_to(world: State, config: WorldConfig, t_ns: int, step_ns: int, room: Generator, slow: Generator) -> None:
+    """Let everything due up to `t_ns` happen; ticks draw from `room` what all sensors share, the rest from `slow`."""
     event_ns = next_event_ns(world, step_ns)
     while event_ns <= t_ns:
         noise.charge(world, config.noise, 0, event_ns)
         noise.charge(world, config.noise, 1, event_ns)
         if event_ns == (world.ticks + 1) * TICK_NS:
             world.ticks += 1
-            tick(world, config, random)
+            tick(world, config, room, slow)
         update(world, config, event_ns)
         event_ns = next_event_ns(world, step_ns)
     world.now_ns = max(t_ns, world.now_ns)
@@ -65,14 +65,14 @@ def interrupt(world: State, config: WorldConfig) -> None:
 
 
 @kernel
-def tick(world: State, config: WorldConfig, random: Generator) -> None:
+def tick(world: State, config: WorldConfig, room: Generator, slow: Generator) -> None:
     """Advance the slow processes to the present tick."""
     t_s = world.ticks * TICK_S
-    heat.tick(world, config.heat, config.oven, t_s, TICK_S, random.standard_normal())
-    supply.tick(world, config.supply, t_s, TICK_S, random.standard_normal())
+    heat.tick(world, config.heat, config.oven, t_s, TICK_S, room.standard_normal())
+    supply.tick(world, config.supply, t_s, TICK_S, room.standard_normal())
     world.charged = heat.lagged(world.charged, world.powered, TICK_S, config.sensor.charging_s)
-    oddities.tick(world, config.oddities, TICK_S, random.standard_normal())
-    noise.tick(world, config.noise, TICK_S, random)
+    oddities.tick(world, config.oddities, TICK_S, slow.standard_normal())
+    noise.tick(world, config.noise, TICK_S, slow)
 
 
 @kernel

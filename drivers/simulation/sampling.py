@@ -23,32 +23,36 @@ KELVIN = 273.15
 
 @kernel
 def sample(
-    world: State, config: WorldConfig, channels: Ints, times_ns: Ints, slow: Generator, fast: Generator, volts: Floats
-) -> None:
-    """Fill `volts` (scans, channels); chance is drawn from `slow` tick by tick, from `fast` sample by sample."""
+    world: State, config: WorldConfig, channels: Ints, late_ns: Ints, times_ns: Ints,
+    room: Generator, slow: Generator, fast: Generator, volts: Floats,
+) -> None:  # fmt: skip
+    """Fill `volts` (scans, channels), each channel `late_ns` after its scan.
+
+    Chance is drawn from `room` and `slow` tick by tick, from `fast` sample by sample.
+    """
     done = 0
     while done < len(times_ns):
-        run_to(world, config, times_ns[done], STEP_NS, slow)
+        run_to(world, config, times_ns[done], STEP_NS, room, slow)
         event_ns, first = next_event_ns(world, STEP_NS), done
         while done < len(times_ns) and times_ns[done] < event_ns:
             done += 1
-        convert(world, config, channels, times_ns[first:done], fast, volts[first:done])
+        convert(world, config, channels, late_ns, times_ns[first:done], fast, volts[first:done])
         world.now_ns = max(times_ns[done - 1], world.now_ns)
 
 
 @kernel
 def convert(
-    world: State, config: WorldConfig, channels: Ints, times_ns: Ints, random: Generator, volts: Floats
+    world: State, config: WorldConfig, channels: Ints, late_ns: Ints, times_ns: Ints, random: Generator, volts: Floats
 ) -> None:
     """Fill `volts` with scans between which nothing happens: only filters and noise go on."""
-    skew_ns, steady = round(1e9 * config.converter.skew_s), steady_v(world)
+    steady = steady_v(world)
     for i in range(len(times_ns)):
         for k in range(len(channels)):
             if channels[k] < SUPPLY:
-                t_ns = times_ns[i] + k * skew_ns
+                t_ns = times_ns[i] + late_ns[k]
                 analog = noise.output_v(world, config.noise, channels[k], t_ns, random.standard_normal())
             elif channels[k] == D63:
-                analog = displacement_v(world, config, times_ns[i] + k * skew_ns, random.standard_normal())
+                analog = displacement_v(world, config, times_ns[i] + late_ns[k], random.standard_normal())
             else:
                 analog = steady[channels[k]]
             noisy = analog + config.converter.noise_v * random.standard_normal()

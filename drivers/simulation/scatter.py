@@ -24,12 +24,16 @@ class Spread:
     imperfection_fraction: float = 0.1  # of every imperfection of stages, base and sensor that is not 0
 
 
-def individual(config: WorldConfig, seed: int) -> WorldConfig:
-    """One rig drawn from `config.spread`; the same seed draws the same rig."""
+def individual(config: WorldConfig, seed: int, place: int = 0) -> WorldConfig:
+    """One rig drawn from `config.spread`, and the sensor at `place` of its table; the same seed draws the same."""
     random = np.random.default_rng([seed, 0])
     trims = random.standard_normal((2, 2))
     fraction = config.spread.imperfection_fraction
-    stages, base, sensor = (_scattered(part, fraction, random) for part in (config.stages, config.base, config.sensor))
+    stages, base = (_scattered(part, fraction, random) for part in (config.stages, config.base))
+    if place:
+        random = np.random.default_rng([seed, 0, place])
+        trims = random.standard_normal((2, 2))
+    sensor = _scattered(config.sensor, fraction, random)
     x, y = (_trimmed(axis, config.spread, *trim) for axis, trim in zip((sensor.x, sensor.y), trims, strict=True))
     return replace(config, stages=stages, base=base, sensor=replace(sensor, x=x, y=y))
 

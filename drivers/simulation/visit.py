@@ -101,22 +101,25 @@ def _nanoseconds(seconds: list[list[float]]) -> Ints:
 
 @kernel
 def visit(
-    world: State, config: WorldConfig, motions: Floats, rest_ns: Ints, dwell_ns: Ints, mounts: Floats, random: Generator
-) -> Floats:
-    """Run through a plan; the ticks draw from `random`. Means over the dwells, shape (n, MEANS)."""
+    world: State, config: WorldConfig, motions: Floats, rest_ns: Ints, dwell_ns: Ints, mounts: Floats,
+    room: Generator, slow: Generator,
+) -> Floats:  # fmt: skip
+    """Run through a plan; the ticks draw from `room` and `slow`. Means over the dwells, shape (n, MEANS)."""
     means = np.zeros((len(motions), MEANS))
     for i in range(len(means)):
         world.pieces[:] = motions[i]
         world.rest_ns[:] = rest_ns[i]
         world.mount[:] = mounts[i]
-        hold(world, config, dwell_ns[i, 0], dwell_ns[i, 1], random, means[i])
+        hold(world, config, dwell_ns[i, 0], dwell_ns[i, 1], room, slow, means[i])
     return means
 
 
 @kernel
-def hold(world: State, config: WorldConfig, start_ns: int, end_ns: int, random: Generator, means: Floats) -> None:
+def hold(
+    world: State, config: WorldConfig, start_ns: int, end_ns: int, room: Generator, slow: Generator, means: Floats
+) -> None:
     """Run to a dwell and through it, add up its `means` (MEANS,)."""
-    run_to(world, config, start_ns, STEP_NS, random)
+    run_to(world, config, start_ns, STEP_NS, room, slow)
     t_ns = start_ns
     while t_ns < end_ns:
         after_ns = min(next_event_ns(world, STEP_NS), end_ns)
@@ -126,5 +129,5 @@ def hold(world: State, config: WorldConfig, start_ns: int, end_ns: int, random: 
             means[2 + axis] += share * world.slow_v[axis]
         means[4] += share * world.thermocouple_c
         means[5] += share * world.supply_v * world.powered
-        run_to(world, config, after_ns, STEP_NS, random)
+        run_to(world, config, after_ns, STEP_NS, room, slow)
         t_ns = after_ns

@@ -22,15 +22,20 @@ from drivers.simulation.trajectory import Trajectory
 
 
 class World:
-    """A rig in simulated time, from `now_s` = 0 with both stages at motor angle 0."""
+    """A rig in simulated time, from `now_s` = 0 with both stages at motor angle 0.
 
-    def __init__(self, config: WorldConfig, seed: int) -> None:
-        self.config = individual(config, seed)
+    Worlds of one seed and different `place` are sensors on one table: the same rig, room and supply.
+    """
+
+    def __init__(self, config: WorldConfig, seed: int, place: int = 0) -> None:
+        self.config = individual(config, seed, place)
         self._numbers = record(self.config)
         self._seed = seed
-        self._slow = np.random.Generator(np.random.PCG64([seed, 1]))
-        self._fast = np.random.Generator(np.random.PCG64([seed, 2]))
-        self._world = beginning(self.config, self._numbers, self._slow)
+        own = [place] if place else []
+        self._slow, self._fast, self._room = (
+            np.random.Generator(np.random.PCG64(key)) for key in ([seed, 1, *own], [seed, 2, *own], [seed, 3])
+        )
+        self._world = beginning(self.config, self._numbers, self._room, self._slow)
 
     @property
     def now_s(self) -> float:
@@ -38,7 +43,7 @@ class World:
 
     def advance(self, t_s: float) -> None:
         """Let time pass until `t_s`. Raises TimeReversal."""
-        mechanics.run_to(self._world, self._numbers, self._later_ns(t_s), mechanics.STEP_NS, self._slow)
+        mechanics.run_to(self._world, self._numbers, self._later_ns(t_s), mechanics.STEP_NS, self._room, self._slow)
 
     def move_stage(self, axis: str, trajectory: Trajectory) -> None:
         """Let the motor of `axis` ("alpha" or "beta") follow `trajectory` from now on."""
@@ -103,11 +108,14 @@ class World:
         """What a level on the turntable shows now: how far the positive ends of its x and y axis are up, in deg."""
         return level.shown_deg(self._world, self._numbers, self._seed)
 
-    def adc_volts(self, inputs: Sequence[str], start_s: float, interval_s: float, n: int) -> Floats:
+    def adc_volts(
+        self, inputs: Sequence[str], start_s: float, interval_s: float, n: int, places: Sequence[int] | None = None
+    ) -> Floats:
         """Volts at the converter's inputs, shape (n, len(inputs)), before rounding to codes.
 
-        Scan i begins at `start_s + i * interval_s`; the k-th input follows k times the converter's skew later.
-        The world is at the last scan afterwards. Inputs: vx, vy, supply, thermistor, ground, d63.
+        Scan i begins at `start_s + i * interval_s`; an input follows as many times the converter's skew later as its
+        place in the scan says, which are 0, 1, .. unless given. The world is at the last scan afterwards. Inputs:
+        vx, vy, supply, thermistor, ground, d63.
 
         Raises:
             UnknownInput: an input of another name.
@@ -116,8 +124,10 @@ class World:
         channels = np.array([_place(name, sampling.INPUTS, "converter input") for name in inputs], dtype=np.int64)
         start_ns = self._later_ns(start_s)
         times_ns = start_ns + np.rint(1e9 * interval_s * np.arange(n)).astype(np.int64)
-        volts = np.empty((n, len(channels)))
-        sampling.sample(self._world, self._numbers, channels, times_ns, self._slow, self._fast, volts)
+        order = np.arange(len(channels)) if places is None else np.array(places, dtype=np.int64)
+        late_ns = order * round(1e9 * self.config.converter.skew_s)
+        volts, chance = np.empty((n, len(channels))), (self._room, self._slow, self._fast)
+        sampling.sample(self._world, self._numbers, channels, late_ns, times_ns, *chance, volts)
         return volts
 
     def dwell_mean(
@@ -142,7 +152,7 @@ class World:
         motors = self.motor_angle_deg("alpha"), self.motor_angle_deg("beta")
         plan = visit.plan(visited, pace, self.config.sensor.package, self.now_s, motors)
         motions = plan.motions, plan.rest_ns, plan.dwell_ns, plan.mounts
-        means = visit.visit(self._world, self._numbers, *motions, self._slow)
+        means = visit.visit(self._world, self._numbers, *motions, self._room, self._slow)
         middle_s = 1e-9 * plan.dwell_ns.mean(axis=1)
         random = None if noise_free else self._fast
         measured = dwell.columns(means, middle_s, self.config.noise, self.config.converter, pace, random)
@@ -150,7 +160,7 @@ class World:
 
     def state(self) -> dict[str, state.JSON]:
         """All that the world remembers, as JSON: restored, it continues sample for sample."""
-        generators: Any = [self._slow.bit_generator.state, self._fast.bit_generator.state]
+        generators: Any = [g.bit_generator.state for g in (self._slow, self._fast, self._room)]
         return {"world": state.to_json(self._world), "generators": generators}
 
     def restore(self, kept: dict[str, Any]) -> None:
@@ -160,7 +170,8 @@ class World:
             BadSetting: the state is of another version.
         """
         self._world = state.from_json(kept["world"])
-        self._slow.bit_generator.state, self._fast.bit_generator.state = kept["generators"]
+        for generator, where in zip((self._slow, self._fast, self._room), kept["generators"], strict=True):
+            generator.bit_generator.state = where
 
     def _later_ns(self, t_s: float) -> int:
         """`t_s` in ns; a nanosecond of rounding is forgiven."""

@@ -14,12 +14,10 @@ from drivers.clock import WallClock, serve_forever
 from drivers.links import Address
 from drivers.links.person import PERSON
 from drivers.links.server import Server
-from drivers.simulation.config import WorldConfig
-from drivers.simulation.world import World
 from rig.bench import Bench, read_bench
 from rig.cli.output import bench_option, columns, json_option, note
 from rig.errors import BenchError
-from rig.wiring import serve
+from rig.wiring import serve, world_of
 
 
 @click.command("simulate")
@@ -40,7 +38,7 @@ def command(bench_file: Path | None, as_json: bool) -> None:
     for each in (signal.SIGINT, signal.SIGTERM):
         signal.signal(each, end)
     clock = WallClock()
-    servers = serve(bench, World(WorldConfig.from_mapping(bench.world), bench.seed))
+    servers = serve(bench, world_of(bench))
     try:
         addresses = _served(bench, list(servers.values()))
         documents = {role: _document(bench, role, asdict(address)) for role, address in addresses.items()}
