@@ -43,7 +43,8 @@ def headline(found: Discovery) -> str:
 
 def summary(found: Discovery) -> str:
     """What adding the effects does to the error, in one or two sentences, and whether that can be trusted."""
-    return f"{_error(found)} But {found.caution}." if found.caution else _error(found)
+    doubts = [found.caution, found.start.table.constants.get("expired")]
+    return " ".join([_error(found), *(f"But {doubt}." for doubt in doubts if doubt)])
 
 
 def _error(found: Discovery) -> str:

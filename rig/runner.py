@@ -22,6 +22,7 @@ from procedures.questions import Question
 from procedures.session import Dwell, Pose, Reading, Samples
 from procedures.settings import parse
 from rig.bench import Bench
+from rig.certificates import EXPIRED, expired
 from rig.errors import RigError, RunMismatch, Stopped
 from rig.instruments import Rig, connected
 from rig.lease import lease
@@ -81,16 +82,19 @@ def start(record: Record, bench: Bench, procedure: Procedure, settings: Mapping[
 def _begun(record: Record, bench: Bench, procedure: Procedure, settings: Mapping[str, Any], watch: Watch) -> Outcome:
     with stoppable(), connected(bench) as rig:
         identities = {role: asdict(identity) for role, identity in rig.identities().items()}
+        faults = expired(bench, datetime.now(UTC).date())
         run = record.begin(
             procedure.name,
             _plain(settings),
             bench=bench.document(),
             configuration=bench.configuration(procedure.name, _plain(settings)),
-            constants=bench.constants,
+            constants=bench.constants | ({EXPIRED: "; ".join(faults)} if faults else {}),
             source=bench.name,
             identities=identities,
             kind=procedure.kind,
         )
+        for fault in faults:
+            record.note(run, EXPIRED, fault)
         with _held(record, run):
             return _carry_out(record, rig, record.run(run), procedure, watch)
 

@@ -1,18 +1,20 @@
-"""check: connect to every instrument of the bench, identify and test it."""
+"""check: connect to every instrument of the bench, identify and test it; when certificates are due."""
 
 from __future__ import annotations
 
 from dataclasses import asdict
+from datetime import UTC, datetime
 from pathlib import Path
 
 import click
 
 from drivers.instrument import Check, Identity
 from rig.bench import DEFAULT, read_bench
-from rig.cli.output import bench_option, columns, emit, json_option
+from rig.certificates import EXPIRED, certificates, expired
+from rig.cli.output import bench_option, columns, emit, json_option, notes
 from rig.instruments import checked
 
-FAILED = 3
+NOT_MET, FAILED = 1, 3
 
 
 @click.command("check")
@@ -20,18 +22,29 @@ FAILED = 3
 @click.option("--example", is_flag=True, help="Print the simulated rig's bench file, to begin your own with.")
 @json_option
 def command(bench_file: Path | None, example: bool, as_json: bool) -> int:
-    """Connect to every instrument of the bench, identify it and let it test itself."""
+    """Connect to every instrument of the bench, identify it and let it test itself.
+
+    Exit status 1: an instrument's certificate has expired. 3: an instrument does not answer, or fails its test.
+    """
     if example:
         click.echo(DEFAULT.read_text(encoding="utf-8"), nl=False)
         return 0
     bench = read_bench(bench_file)
-    found = checked(bench)
+    found, due = checked(bench), certificates(bench)
+    late = expired(bench, datetime.now(UTC).date())
     if as_json:
-        emit({"schema": "rig.check/1", "bench": bench.name, "instruments": _document(found)})
+        papers = {name: {"number": each.number, "due": each.due.isoformat()} for name, each in due.items()}
+        told = {"instruments": _document(found), "certificates": papers, EXPIRED: late}
+        emit({"schema": "rig.check/1", "bench": bench.name, **told})
     else:
         rows = [row for role, (identity, tests) in found.items() for row in _rows(role, identity, tests)]
         click.echo(columns(("role", "instrument", "check", "result", "detail"), rows))
-    return 0 if all(test.ok for _, tests in found.values() for test in tests) else FAILED
+        for name, each in due.items():
+            click.echo(f"{name}: certificate {each.number}, due {each.due}")
+        notes(f"{fault}; have it calibrated again" for fault in late)
+    if not all(test.ok for _, tests in found.values() for test in tests):
+        return FAILED
+    return NOT_MET if late else 0
 
 
 def _rows(role: str, identity: Identity | None, tests: list[Check]) -> list[tuple[str, ...]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import click
 
+from rig.certificates import EXPIRED
 from rig.cli.output import emit, json_option
 from rig.record import Event, Record, Run
 from rig.record.measured import table_of
@@ -29,6 +30,7 @@ def _lines(run: Run, events: list[Event], ranges: dict[str, tuple[float, float]]
     head = [f"{run.run}: {run.procedure}, {ended}, {run.rows} rows of {run.kind}", f"from {run.source}"]
     settings = [f"  {name} = {value}" for name, value in run.settings.items()]
     why = [run.message] if run.message else []
+    why += [f"But {run.constants[EXPIRED]}."] if EXPIRED in run.constants else []
     columns = [f"  {name:16}{low:12.6g} .. {high:.6g}" for name, (low, high) in ranges.items()]
     return [*head, *why, *settings, *columns, *(f"  {event.at}  {event.what}: {event.text}" for event in events)]
 
@@ -51,4 +53,5 @@ def _document(run: Run, events: list[Event], ranges: dict[str, tuple[float, floa
         "columns": {name: {"min": low, "max": high} for name, (low, high) in ranges.items()},
         "events": [{"at": event.at, "what": event.what, "text": event.text} for event in events],
         "results": run.results,
+        EXPIRED: run.constants.get(EXPIRED),
     }

@@ -14,6 +14,7 @@ import yaml
 from procedures.errors import BadAnswer, NoAnswer
 from procedures.questions import Question
 from procedures.session import Reading
+from rig.certificates import EXPIRED
 from rig.cli.output import emit, note, notes
 from rig.cli.verdicts import lines as results
 from rig.plan import Plan
@@ -98,9 +99,10 @@ def tell(outcome: Outcome, as_json: bool) -> int:
     run = outcome.run
     if as_json:
         head = {"schema": "rig.run/1", "run": run.run, "procedure": run.procedure, "state": run.state}
-        emit({**head, "poses": run.rows, "results": run.results})
+        emit({**head, "poses": run.rows, "results": run.results, EXPIRED: run.constants.get(EXPIRED)})
     else:
-        click.echo("\n".join([f"{run.run}: {run.state}, {run.rows} poses", *results(run.results)]))
+        mark = [f"But {run.constants[EXPIRED]}."] if EXPIRED in run.constants else []
+        click.echo("\n".join([f"{run.run}: {run.state}, {run.rows} poses", *results(run.results), *mark]))
     if outcome.error is not None:
         notes(outcome.moving)
         raise outcome.error
