@@ -18,6 +18,7 @@ from procedures.session import Pose, Reading, Session
 from procedures.tumbles import is_first, tumble
 
 REVERSAL, HOLD = "reversal", "hold"  # each with its number is a path
+DOUBLINGS = 4  # of the interval from the first to the longest
 POWER_ON = "power-on"  # the clock's reading when the sensor was switched on
 
 
@@ -35,7 +36,8 @@ def soak(
 ) -> None:
     """Hold the sensor level for `duration_s`, with a tumble before, after, and every `interval_s` in between.
 
-    The hold is kept without gaps, `block_s` at a time; the tumbles' time comes on top. It begins cold, `off_s` without
+    The hold is kept without gaps, `block_s` at a time; the tumbles' time comes on top. The first intervals are shorter
+    and double, as drift is quickest there. It begins cold, `off_s` without
     power and then on, where the bench has a line that switches it (0: as it is). `oven_c` keeps it in the oven from
     then on (0: none). `until_steady` ends it as soon as bias and scale factor have come to rest.
     """
@@ -69,12 +71,14 @@ def schedule(duration_s: float, interval_s: float, block_s: float) -> Iterator[P
 
     Level, both axes feel 0 g, so that the hold shows the drift of their bias between tumbles.
     """
-    blocks, each = max(1, round(duration_s / block_s)), max(1, round(interval_s / block_s))
-    starts = range(0, blocks, each)
-    for k, start in enumerate(starts):
-        yield from tumble(f"{REVERSAL} {k}")
-        yield from [Pose(0.0, 0.0, 0, f"{HOLD} {k}")] * min(each, blocks - start)
-    yield from tumble(f"{REVERSAL} {len(starts)}")
+    left, number = max(1, round(duration_s / block_s)), 0
+    longest = max(1, round(interval_s / block_s))
+    while left > 0:
+        blocks = min(left, longest, max(1, longest >> max(0, DOUBLINGS - number)))
+        yield from tumble(f"{REVERSAL} {number}")
+        yield from [Pose(0.0, 0.0, 0, f"{HOLD} {number}")] * blocks
+        left, number = left - blocks, number + 1
+    yield from tumble(f"{REVERSAL} {number}")
 
 
 def _cold_start(rig: Session, off_s: float) -> None:

@@ -5,7 +5,7 @@ All simulated, `state` and `restore` continue a rig where it was, sample for sam
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, cast
@@ -20,7 +20,7 @@ from drivers.manual_stage import ManualStage
 from drivers.simulation.batch import Batch
 from drivers.simulation.world import World
 from procedures.errors import ProcedureError
-from procedures.session import Host, Session
+from procedures.session import Dwell, Host, Session
 from rig.attended import AtTheRig
 from rig.bench import ROLES, Bench
 from rig.errors import InstrumentFailed
@@ -72,7 +72,7 @@ class Rig:
         """What a procedure is given; from now on `host` answers for the person at the rig."""
         self.person.attended_by = AtTheRig(host)
         parts: dict[str, Any] = {role: self.drivers.get(role) or absent(role) for role in ROLES}
-        return Session(**parts, clock=self.clock, host=host, limits=self.bench.limits)
+        return Session(**parts, clock=self.clock, host=host, limits=self.bench.limits, steady=_at_rest)
 
     def read_deg(self) -> dict[str, float]:
         """What the dials of stages that are turned by hand showed last, by role."""
@@ -123,6 +123,12 @@ class Rig:
         except DriverError as error:
             failed.append(f"oven may still heat: {error}")
         return failed
+
+
+def _at_rest(dwells: Sequence[Dwell]) -> bool:
+    from rig.results.soak import steady  # what it is judged by is only loaded where somebody asks
+
+    return steady(dwells)
 
 
 @contextmanager

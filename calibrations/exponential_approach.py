@@ -1,0 +1,204 @@
+"""Exponentials towards a final value, fitted beside noise that may be slow itself.
+
+    y(t) = y_end + sum A_k exp(-t / tau_k) + noise      none, one (a board's hours) or two (and a package's minutes)
+
+Noise is white and scatter alone, or with one Gauss-Markov process (the longest is a random walk), or with flicker, over
+a grid. How many exponentials there are is decided by likelihood, averaged over the noise, so that a wandering which a
+random walk explains is no exponential. Estimates and standard errors are averaged over the noise by its restricted
+likelihood: what cannot be known of the noise in a short record is in them.
+
+Source  Barshan and Durrant-Whyte, IEEE Trans. Robotics and Automation 11 (1995) 328: the model; Patterson and Thompson
+        (1971): restricted likelihood; JCGM 101, 6.4.9: few values; Hoeting et al., Statistical Science 14 (1999) 382: averaging over models.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrations.noise import correlated, rms
+from calibrations.table import Array
+
+TIMES = 40  # time constants that are tried
+APART = 3.0  # nearer than this factor, two time constants are one to any noise
+PROCESSES = 6  # of flicker noise, and time constants of the single process
+RATIOS = tuple(np.geomspace(0.5, 60.0, 8).tolist())  # of slow noise over fast
+WANDER = 2.0  # slow noise over fast, with a time constant beyond half of the record: a random walk
+STEPS = 30
+LONGEST_STEP = 0.5  # of a logarithm of a time constant
+ENOUGH = 1e-6  # of -2 log likelihood
+
+Point = tuple[float, tuple[float, ...]]  # slow noise over fast, and its time constants
+
+
+@dataclass(frozen=True)
+class Exponentials:
+    """A fit of `k` exponentials.
+
+    parameters   (y_end, A_1 .., ln tau_1 ..), slowest first, and their covariance
+    deviance     -2 log likelihood, averaged over the noise
+    noise        standard deviation of one value, slow noise included
+    wandering    probability that the noise is a random walk over the record
+    """
+
+    parameters: Array
+    covariance: Array
+    deviance: float
+    noise: float
+    wandering: float
+
+
+def decay(p: Array, t_s: Array) -> Array:
+    """What is left to come at times since t = 0, shape (n,); `p` as in `Exponentials`."""
+    k = (len(p) - 1) // 2
+    return np.asarray(np.exp(-t_s[:, None] / np.exp(p[1 + k :])) @ p[1 : 1 + k])
+
+
+def slopes(p: Array, t_s: Array) -> Array:
+    """Derivatives of the model by its parameters, shape (n, p)."""
+    k = (len(p) - 1) // 2
+    over = t_s[:, None] / np.exp(p[1 + k :])
+    return np.column_stack([np.ones(len(t_s)), np.exp(-over), p[1 : 1 + k] * np.exp(-over) * over])
+
+
+@dataclass(frozen=True)
+class Series:
+    """Values with white standard errors (0: not known), both in units of about their scatter, at times, s: (n,) each."""
+
+    t_s: Array
+    values: Array
+    stds: Array
+
+    def fitted(self, k: int) -> Exponentials:
+        """The most likely `k` exponentials."""
+        taus_s, point = self._likeliest(k)
+        p = self._descended(self._start(taus_s, point), point)
+        likelihood = [np.log(prior) - self._scored(p, each)[0] / 2 for each, prior in self.points.items()]
+        deviance = -2 * float(np.logaddexp.reduce(likelihood))
+        point = min(self.points, key=lambda each: self._scored(p, each)[1])
+        return self._averaged(_slowest_first(self._descended(p, point)), deviance)
+
+    @cached_property
+    def gap_s(self) -> Array:
+        return np.diff(self.t_s, prepend=self.t_s[0])
+
+    @cached_property
+    def known(self) -> bool:
+        """Whether the white noise is known: all noise is at least that."""
+        return bool(np.all(self.stds > 0))
+
+    @cached_property
+    def points(self) -> dict[Point, float]:
+        """Noise to try, and how likely it is beforehand: white, one process and flicker are equally so."""
+        span, gap = float(np.sum(self.gap_s)), float(np.median(self.gap_s[1:]))
+        single = [(float(tau),) for tau in np.geomspace(gap, 3 * span, PROCESSES)]
+        flicker = tuple(np.geomspace(gap / 2, 3 * span, PROCESSES).tolist())
+        kinds = ([(0.0, (1.0,))], [(r, taus) for taus in single for r in RATIOS], [(r, flicker) for r in RATIOS])
+        return {point: 1 / len(kind) / len(kinds) for kind in kinds for point in kind}
+
+    @cached_property
+    def _ln_taus(self) -> Array:
+        """Logarithms of the time constants that are tried, s: from half of the shortest gap to three records."""
+        return np.linspace(np.log(float(self.gap_s[1:].min()) / 2), np.log(3 * float(np.sum(self.gap_s))), TIMES)
+
+    def _whitened(self, columns: Array, point: Point) -> tuple[Array, float]:
+        fast = self.stds if self.known else np.ones(len(self.t_s))
+        return correlated(columns, self.gap_s, fast, point[0] * float(rms(fast)), point[1])
+
+    def _factor(self, square: float | Array, free: int) -> Array:
+        """The variance of the noise over that of the point."""
+        return np.maximum(np.asarray(square) / free, 1.0 if self.known else 1e-30)
+
+    def _likeliest(self, k: int) -> tuple[tuple[float, ...], Point]:
+        """Time constants and noise of greatest likelihood on the grid."""
+        taus, points = np.exp(self._ln_taus), list(self.points)
+        sets = [s for s in combinations(range(TIMES), k) if k < 2 or taus[s[1]] >= APART * taus[s[0]]]
+        chosen = np.array([[0, *(1 + i for i in s)] for s in sets])
+        columns = np.column_stack([np.ones(len(self.t_s)), np.exp(-self.t_s[:, None] / taus), self.values])
+        scores = np.array([self._deviances(columns, point, chosen) for point in points])
+        best, at = np.unravel_index(int(np.argmin(scores)), scores.shape)
+        return tuple(float(taus[i]) for i in sets[at]), points[best]
+
+    def _deviances(self, columns: Array, point: Point, chosen: NDArray[np.intp]) -> Array:
+        """-2 log likelihood of each choice of columns, shape (choices,); the last column is the values."""
+        out, logdet = self._whitened(columns, point)
+        gram, n = out.T @ out, len(out)
+        normal, right = gram[chosen[:, :, None], chosen[:, None, :]], gram[chosen, -1]
+        ridge = 1e-10 * gram[0, 0] * np.eye(chosen.shape[1])
+        solved = np.linalg.solve(normal + ridge, right[:, :, None])[:, :, 0]
+        square = np.maximum(gram[-1, -1] - np.sum(right * solved, axis=1), 0.0)
+        factor = self._factor(square, n)
+        return np.asarray(square / factor + n * np.log(factor) + logdet)
+
+    def _start(self, taus_s: tuple[float, ...], point: Point) -> Array:
+        columns = [np.ones(len(self.t_s)), *(np.exp(-self.t_s / tau) for tau in taus_s), self.values]
+        out, _ = self._whitened(np.column_stack(columns), point)
+        return np.concatenate([np.linalg.lstsq(out[:, :-1], out[:, -1], rcond=None)[0], np.log(taus_s)])
+
+    def _linearised(self, p: Array, point: Point) -> tuple[Array, Array, float]:
+        """Whitened derivatives (n, p) and residual (n,) at `p`, and log det of the noise."""
+        columns = np.column_stack([slopes(p, self.t_s), self.values - p[0] - decay(p, self.t_s)])
+        out, logdet = self._whitened(columns, point)
+        return out[:, :-1], out[:, -1], logdet
+
+    def _descended(self, p: Array, point: Point) -> Array:
+        """The best parameters beside the noise of `point` (Levenberg and Marquardt), from near ones."""
+        damping, k = 1e-3, (len(p) - 1) // 2
+        J, r, _ = self._linearised(p, point)
+        for _ in range(STEPS):
+            normal = J.T @ J
+            step = np.linalg.lstsq(normal + damping * np.diag(np.diag(normal)), J.T @ r, rcond=None)[0]
+            step[1 + k :] = self._within(p[1 + k :] + np.clip(step[1 + k :], -LONGEST_STEP, LONGEST_STEP)) - p[1 + k :]
+            tried = self._linearised(p + step, point)
+            gain = float(r @ r - tried[1] @ tried[1])
+            damping = damping / 10 if gain >= 0 else damping * 10
+            if gain >= 0:
+                p, (J, r, _) = p + step, tried
+            if 0 <= gain < ENOUGH:
+                break
+        return p
+
+    def _scored(self, p: Array, point: Point) -> tuple[float, float, Array, Array, float]:
+        """-2 log likelihood, the same restricted, the step from `p`, its covariance, the noise of a value."""
+        J, r, logdet = self._linearised(p, point)
+        n, free = len(r), len(r) - len(p)
+        inverse = np.linalg.pinv(J.T @ J, hermitian=True)
+        step = inverse @ (J.T @ r)
+        square = max(float(r @ r - step @ (J.T @ r)), 0.0)
+        whole, part = float(self._factor(square, n)), float(self._factor(square, free))
+        likelihood = square / whole + n * np.log(whole) + logdet
+        information = float(np.linalg.slogdet(J.T @ J + 1e-12 * np.eye(len(p)))[1])
+        restricted = square / part + free * np.log(part) + logdet + information
+        widened = part * free / max(free - 2, 1)  # Student's t
+        fast = float(rms(self.stds)) if self.known else 1.0
+        return likelihood, restricted, step, np.asarray(widened * inverse), float(np.sqrt(part) * fast * np.hypot(1.0, point[0]))
+
+    def _within(self, ln_taus: Array) -> Array:
+        return np.clip(ln_taus, self._ln_taus[0], self._ln_taus[-1])
+
+    def _averaged(self, p: Array, deviance: float) -> Exponentials:
+        """Parameters, covariance and noise over all points, each weighted by its restricted likelihood."""
+        scores = [self._scored(p, point) for point in self.points]
+        restricted = np.array([score[1] for score in scores])
+        weight = np.exp((restricted.min() - restricted) / 2) * np.array(list(self.points.values()))
+        weight /= weight.sum()
+        steps = np.array([score[2] for score in scores])
+        mean = weight @ steps
+        covariance = np.einsum("i,ijk->jk", weight, np.array([score[3] for score in scores]))
+        covariance += np.einsum("i,ij,ik->jk", weight, steps - mean, steps - mean)
+        noise = float(np.sqrt(weight @ np.array([score[4] for score in scores]) ** 2))
+        half = float(np.sum(self.gap_s)) / 2
+        walks = [len(taus) == 1 and ratio > WANDER and taus[0] > half for ratio, taus in self.points]
+        k = (len(p) - 1) // 2
+        p = np.concatenate([(p + mean)[: 1 + k], self._within((p + mean)[1 + k :])])
+        return Exponentials(p, covariance, deviance, noise, float(weight @ np.array(walks)))
+
+
+def _slowest_first(p: Array) -> Array:
+    k = (len(p) - 1) // 2
+    order = np.argsort(-p[1 + k :])
+    return np.concatenate([p[:1], p[1 : 1 + k][order], p[1 + k :][order]])

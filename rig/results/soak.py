@@ -1,0 +1,119 @@
+"""soak: when bias and scale factor come to rest, how far they drift until then, and how fast."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import groupby
+
+import numpy as np
+
+from calibrations.soak import AXES, HOUR_S, Course, Soak
+from calibrations.soak import soak as soak_of
+from calibrations.steady_state import COVERAGE, FEWEST, SteadyState
+from calibrations.table import Table
+from procedures.session import Dwell
+from procedures.soak import POWER_ON, REVERSAL
+from rig.record.measured import Measured
+from rig.results.result import Result
+
+SEEN = 3  # reversals after the steady state before a soak is ended by it
+FEWEST_AT_REST = 20  # reversals that show that nothing drifts from the beginning
+
+
+def evaluate(measured: Measured) -> dict[str, Result]:
+    """Of each axis, and of all:
+
+    steady-state           1 where it is reached within the soak, 0 where it is not
+    steady-state-time      h since power-on, where it is reached: the later one of bias and scale factor
+    bias-drift             V, the fitted bias at the last reversal less that at the first
+    scale-drift            the same of the scale factor, over its final value
+    bias-time-constant     h, of the slowest exponential, where there is one; so for the scale factor
+    bias-tolerance         V, within which a bias is called steady; so for the scale factor, over its final value
+    temperature-wander     K, peak to peak, of the temperature about the sensor's own warming
+    gap                    s, of which nothing was kept
+
+    A soak with too few reversals to tell drift from noise has its gaps only.
+    """
+    found = night(measured)
+    results: dict[str, Result] = {}
+    for axis in ("", *found.axes) if all(course.state for course in found.courses.values()) else ():
+        results |= _steady(found, axis)
+    for course in found.courses.values():
+        if course.state is not None:
+            results |= _drift(course, course.state)
+    if (wander_k := found.temperature_wander_k) is not None:
+        results["temperature-wander"] = Result(wander_k, "K")
+    return results | {"gap": Result(sum(gap.length_s for gap in found.gaps), "s")}
+
+
+def night(measured: Measured) -> Soak:
+    """The run as a soak; its times are counted from power-on, or from its beginning where that is not known."""
+    return soak_of(measured.table(), _power_on_s(measured))
+
+
+def steady(dwells: Sequence[Dwell]) -> bool:
+    """Whether every axis of every sensor has come to rest, seen for a while: what ends a soak early."""
+    reversals = [dwell for dwell in dwells if dwell.pose.path.startswith(REVERSAL)]
+    if len(list(groupby(reversals, lambda dwell: dwell.pose.path))) < FEWEST:
+        return False
+    sensors = dict.fromkeys(name.rpartition(".")[0] for name in dwells[0].means if name[-2:] in ("vx", "vy"))
+    return all(_at_rest(soak_of(_table(reversals, f"{sensor}." if sensor else ""))) for sensor in sensors)
+
+
+def _at_rest(found: Soak) -> bool:
+    for course in found.courses.values():
+        state, last_s = course.state, course.t_s[-1]
+        time = course.time_s
+        if (
+            state is None
+            or time is None
+            or time[0] + COVERAGE * time[1] > last_s
+            or np.sum(course.t_s > time[0]) < SEEN
+        ):
+            return False
+        if not state.terms and len(course.t_s) < FEWEST_AT_REST:
+            return False
+    return True
+
+
+def _table(dwells: Sequence[Dwell], prefix: str) -> Table:
+    """The dwells of one sensor as a table."""
+    columns: dict[str, list[float]] = {
+        "alpha_deg": [dwell.pose.alpha_deg for dwell in dwells],
+        "beta_deg": [dwell.pose.beta_deg for dwell in dwells],
+        "t_s": [dwell.t_s for dwell in dwells],
+        "n": [dwell.n for dwell in dwells],
+    }
+    for axis in AXES:
+        if (channel := f"{prefix}v{axis}") in dwells[0].means:
+            columns[f"v{axis}_v"] = [dwell.means[channel] for dwell in dwells]
+            columns[f"v{axis}_std_v"] = [dwell.stds[channel] for dwell in dwells]
+    return Table.from_columns("poses", columns, labels={"path": tuple(dwell.pose.path for dwell in dwells)})
+
+
+def _power_on_s(measured: Measured) -> float:
+    """On the run's clock: the reading is the bench's, and was taken before the first pose of the same process."""
+    read = next((reading.value for reading in measured.readings() if reading.name == POWER_ON), None)
+    if read is None:
+        return 0.0
+    first = next(measured.kept())
+    middle_s = first.samples.start_s + len(first.samples.volts) / first.samples.rate_hz / 2
+    return read - middle_s + first.t_s
+
+
+def _steady(found: Soak, axis: str) -> dict[str, Result]:
+    time, end = found.time_s(axis), f"-{axis}" if axis else ""
+    results = {f"steady-state{end}": Result(float(time is not None), "")}
+    if time is not None:
+        results[f"steady-state-time{end}"] = Result(time[0] / HOUR_S, "h", time[1] / HOUR_S)
+    return results
+
+
+def _drift(course: Course, state: SteadyState) -> dict[str, Result]:
+    unit, whole = ("V", 1.0) if course.quantity == "bias" else ("", abs(state.final[0]))
+    value, std = state.drift
+    results = {"drift": Result(value / whole, unit, std / whole), "tolerance": Result(state.tolerance / whole, unit)}
+    if state.terms:
+        tau_s, tau_std = state.terms[0].tau_s
+        results["time-constant"] = Result(tau_s / HOUR_S, "h", tau_std / HOUR_S)
+    return {f"{course.quantity}-{name}-{course.axis}": result for name, result in results.items()}
