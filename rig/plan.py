@@ -15,6 +15,7 @@ from typing import Any
 from calibrations.error_table import ErrorTable
 from calibrations.errors import DataError
 from procedures.catalogue import Procedure
+from procedures.questions import Question
 from procedures.session import Pose, Session
 from rig.bench import ROLES, TURNING, Bench
 from rig.errors import BenchError
@@ -55,7 +56,7 @@ class Plan:
     settings: Mapping[str, Any]
     steps: tuple[Step, ...]
     reach: Mapping[str, tuple[tuple[float, float], tuple[float, float]]]
-    questions: tuple[str, ...]
+    asked: tuple[Question, ...]
     held: tuple[Held, ...]
     duration_s: float
     bytes: int
@@ -64,6 +65,11 @@ class Plan:
     def poses(self) -> int:
         """How many are kept."""
         return len(self.held)
+
+    @property
+    def questions(self) -> tuple[str, ...]:
+        """What a person is asked, each with its name."""
+        return tuple(f"{question.name}: {question.text}" for question in self.asked)
 
 
 def plan(bench: Bench, procedure: Procedure, settings: Mapping[str, Any]) -> Plan:
@@ -84,7 +90,7 @@ def plan(bench: Bench, procedure: Procedure, settings: Mapping[str, Any]) -> Pla
         settings=settings,
         steps=tuple(ledger.steps),
         reach={role: (stage.reach, stage.limits) for role, stage in stages.items()},
-        questions=tuple(ledger.questions),
+        asked=tuple(ledger.asked),
         held=tuple(ledger.held),
         duration_s=ledger.now_s,
         bytes=round(ledger.samples * BYTES_PER_SAMPLE + len(ledger.held) * BYTES_PER_POSE),

@@ -42,9 +42,9 @@ def command(folder: Path, as_json: bool) -> None:
         raise click.UsageError(f"{folder}: cannot be made: {error.strerror}") from None
 
     note("1  Sweep: both stages turn a simulated ADXL203 through 518 poses, every byte over the instruments' wires.")
-    sweep = find("sweep", None)
-    with watching(sweep.name, False, None) as watch, Record() as record:
-        outcome = start(record, read_bench(None), sweep, parse(sweep, {}), watch)
+    sweep, bench = find("sweep"), read_bench()
+    with watching(sweep, bench, False, None) as watch, Record() as record:
+        outcome = start(record, bench, sweep, parse(sweep, {}), watch)
     if outcome.error is not None:
         raise outcome.error
     run = outcome.run.run

@@ -1,44 +1,59 @@
-"""The guided terminal: what happens now, progress, time left, live readings, and questions to a person."""
+"""The guided terminal: shown what will happen, what happens and how it is, asked what only a person can know."""
 
 from __future__ import annotations
 
+import statistics
 import time
-from collections.abc import Mapping
+from collections import defaultdict, deque
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
 from types import TracebackType
-from typing import Self
+from typing import Self, cast
 
-from rich.console import Console, Group
+from rich.console import Console, RenderableType
 from rich.live import Live
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from rich.prompt import Prompt
-from rich.table import Table
 from rich.text import Text
 
-from procedures.errors import BadAnswer
-from procedures.questions import Question
+from procedures.catalogue import Procedure
+from procedures.errors import BadAnswer, Declined, NoAnswer
+from procedures.questions import Choice, Question
 from procedures.session import Reading
-from rig.cli.output import duration
+from rig.bench import Bench
+from rig.cli.asked import write_whole
+from rig.cli.before import before, drawn, free_bytes, mounting
+from rig.cli.screen import Seen, screen
+from rig.drawings import Attitude, drawing_of, page
+from rig.home import home
 from rig.plan import Plan
 from rig.record import Kept
 from rig.runner import Outcome, Wish
+
+BEGIN = Choice("begin", "Begin?", choices=("go", "cancel"))
+GO_ON = Choice("interrupted", "What now?", choices=("resume", "repeat", "end"))
+REMEMBERED = 200  # dwells of a kind that say what scatter is usual
+FRAMES_HZ = 8
 
 
 class Guide:
     """Shows a run on standard error while it goes on."""
 
-    def __init__(self, procedure: str, answers: Mapping[str, str], console: Console | None = None) -> None:
-        self._answers = answers
+    def __init__(
+        self, procedure: Procedure, bench: Bench, answers: Mapping[str, str], console: Console | None = None
+    ) -> None:
+        self._procedure, self._bench, self._answers = procedure, bench, answers
         self._console = console or Console(stderr=True)
-        self._bar = Progress(
-            TextColumn("[bold]{task.description}"), BarColumn(), MofNCompleteColumn(), console=self._console
+        self._scatter: dict[tuple[str, str], deque[float]] = defaultdict(lambda: deque(maxlen=REMEMBERED))
+        self._drawn: Attitude | None = None
+        adc = bench.instruments.get("adc")
+        range_v = getattr(adc.typed_settings(), "range_v", None) if adc else None
+        self._seen = Seen(procedure.name, bench.limits, range_v, bench.simulated)
+        self._live = Live(
+            get_renderable=self._screen, console=self._console, refresh_per_second=FRAMES_HZ, transient=True
         )
-        self._task = self._bar.add_task(procedure, total=None)
-        self._now, self._left, self._readings = Text("connecting"), Text(""), Table.grid(padding=(0, 2))
-        self._first_done, self._began_s = 0, time.monotonic()
-        self._live = Live(self._page(), console=self._console, refresh_per_second=8)
 
     def __enter__(self) -> Self:
-        self._live.start()
         return self
 
     def __exit__(
@@ -47,65 +62,102 @@ class Guide:
         self._live.stop()
 
     def planned(self, plan: Plan) -> None:
-        """Nothing yet."""
+        """One screen of what will happen; raises Declined where the person cancels it."""
+        way = replace(self._seen.way, at_s=tuple(held.start_s for held in plan.held), end_s=plan.duration_s)
+        self._seen = replace(self._seen, way=way)
+        self._console.print(before(plan, self._procedure, self._bench, free_bytes(home())))
+        self._draw(mounting(plan), "mounting")
+        if self.ask(BEGIN, "go") == "cancel":
+            raise Declined("cancelled before it began; nothing was moved and nothing recorded")
 
     def begun(self, run: str) -> None:
-        self._console.print(f"run {run}; Ctrl-C stops the stages, `rig resume {run}` goes on", highlight=False)
+        """The run begins, or goes on."""
+        way = self._seen.way.begin(time.monotonic())
+        self._seen = replace(self._seen, title=f"{self._procedure.name}  {run}", way=way)
+        self._live.start()
 
     def doing(self, text: str) -> None:
-        self._now = Text(text)
-        self._live.update(self._page())
+        self._seen = replace(self._seen, now=text)
 
     def expect(self, total: int, done: int) -> None:
-        self._first_done, self._began_s = done, time.monotonic()
-        self._bar.update(self._task, total=total, completed=done)
+        self._seen = replace(self._seen, way=self._seen.way.expect(total, done))
 
     def kept(self, kept: Kept) -> None:
-        self._bar.advance(self._task)
-        self._left = Text(f"{duration(self._left_s())} left", style="dim")
-        self._readings = _readings(kept)
-        self._live.update(self._page())
+        """The last dwell's values, beside what was usual before it."""
+        kind = kept.pose.path.partition(" ")[0]
+        usual = {}
+        for name, std in kept.dwell.stds.items():
+            before_it = self._scatter[name, kind]
+            if before_it:
+                usual[name] = statistics.median(before_it)
+            before_it.append(std)
+        self._seen = replace(self._seen, kept=kept, usual_v=usual, way=self._seen.way.step(time.monotonic()))
 
     def read(self, reading: Reading) -> None:
+        self._seen = replace(self._seen, tilt={**self._seen.tilt, reading.name: reading.value})
         self._console.print(f"{reading.name} = {reading.value:g} {reading.unit}", highlight=False)
 
     def ask(self, question: Question, instead: str | None) -> str:
         """Asked until the answer makes sense; a simulated bench's answer is proposed."""
         if question.name in self._answers:
             return self._answers[question.name]
-        self._live.stop()
-        try:
+        with self._aside():
+            if (attitude := drawing_of(question)) is not None:
+                self._draw(attitude, question.name)
             return self._asked(question, instead)
-        finally:
-            self._live.start()
 
-    def interrupted(self, outcome: Outcome) -> Wish:  # noqa: ARG002
-        return "end"
+    def interrupted(self, outcome: Outcome) -> Wish:
+        """The menu of a run that stands still."""
+        with self._aside():
+            for complaint in outcome.moving:
+                self._console.print(complaint, style="bold red", highlight=False)
+            self._console.print(str(outcome.error), style="yellow", highlight=False)
+            self._console.print(_choices(self._seen.kept, outcome))
+            try:
+                return cast(Wish, self._asked(GO_ON, "resume"))
+            except NoAnswer:
+                return "end"
+
+    @contextmanager
+    def _aside(self) -> Iterator[None]:
+        """The live screen gives way to a question."""
+        shown = self._live.is_started
+        self._live.stop()
+        yield
+        if shown:
+            self._live.start()
 
     def _asked(self, question: Question, instead: str | None) -> str:
         text = f"{question.text} ({question.accepts})"
         while True:
-            given = Prompt.ask(Text(text), console=self._console, default=instead or "")
+            try:
+                given = Prompt.ask(Text(text), console=self._console, default=instead or "")
+            except EOFError:
+                raise NoAnswer(f'the terminal was closed at "{question.text}"; resume the run') from None
             try:
                 return question.checked(given)
             except BadAnswer as refused:
                 self._console.print(str(refused), style="yellow", highlight=False)
 
-    def _left_s(self) -> float:
-        task = self._bar.tasks[0]
-        done = task.completed - self._first_done
-        return (time.monotonic() - self._began_s) / done * ((task.total or 0) - task.completed)
+    def _draw(self, attitude: Attitude, name: str) -> None:
+        """How to mount the sensor, unless that is on the screen already; the whole drawing is a file in the home."""
+        if attitude == self._drawn:
+            return
+        folder = home() / "drawings"
+        folder.mkdir(parents=True, exist_ok=True)
+        write_whole(file := folder / f"{name}.svg", page(attitude, name))
+        self._console.print(drawn(attitude, file))
+        self._drawn = attitude
 
-    def _page(self) -> Group:
-        return Group(self._now, self._bar, self._left, self._readings)
+    def _screen(self) -> RenderableType:
+        return screen(self._seen, time.monotonic())
 
 
-def _readings(kept: Kept) -> Table:
-    """The last dwell: mean and scatter of every channel, and the temperature."""
-    table = Table.grid(padding=(0, 2))
-    volts = kept.samples.volts
-    for name, mean, std in zip(kept.samples.channels, volts.mean(axis=0), volts.std(axis=0), strict=True):
-        table.add_row(name, f"{mean:.5f} V", f"scatter {1e3 * std:.3f} mV")
-    if kept.temperature_c is not None:
-        table.add_row("sensor", f"{kept.temperature_c:.1f} C", f"t = {duration(kept.t_s)}")
-    return table
+def _choices(kept: Kept | None, outcome: Outcome) -> Text:
+    """What each answer means."""
+    last = "" if kept is None else f" (alpha {kept.pose.alpha_deg:g}, beta {kept.pose.beta_deg:g} deg)"
+    return Text(
+        "  resume  goes on with the pose that was under way\n"
+        f"  repeat  measures the last kept pose{last} once more too; the first stays in the record, excluded\n"
+        f"  end     leaves it for now: rig resume {outcome.run.run}"
+    )

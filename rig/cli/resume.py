@@ -6,11 +6,12 @@ from pathlib import Path
 
 import click
 
-from rig.bench import read_bench
+from procedures.catalogue import find
+from rig.bench import Bench, read_bench
 from rig.cli.output import bench_option, json_option
 from rig.cli.watch import tell, watch_options, watching
 from rig.record import Record
-from rig.runner import resume
+from rig.runner import Outcome, resume
 
 
 @click.command("resume")
@@ -24,6 +25,11 @@ def command(run: str, unattended: bool, answers: Path | None, bench_file: Path |
     With --bench the run goes on only if that file is still the same.
     """
     bench = read_bench(bench_file) if bench_file else None
-    with Record.to_find(run) as record, watching(record.run(run).procedure, unattended, answers) as watch:
-        outcome = resume(record, run, watch, bench)
+    with Record.to_find(run) as record:
+        found = record.run(run)
+        if found.state == "complete":
+            return tell(Outcome(found), as_json)
+        own = Bench.model_validate(found.bench)
+        with watching(find(found.procedure, own.folders.procedures), own, unattended, answers) as watch:
+            outcome = resume(record, run, watch, bench)
     return tell(outcome, as_json)

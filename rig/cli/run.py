@@ -39,6 +39,6 @@ def command(
     bench = read_bench(bench_file)
     found = find(procedure, bench.folders.procedures)
     settings = parse(found, read_settings(given, pairs))
-    with watching(found.name, unattended, answers) as watch, Record() as record:
+    with watching(found, bench, unattended, answers) as watch, Record() as record:
         outcome = start(record, bench, found, settings, watch)
     return tell(outcome, as_json)

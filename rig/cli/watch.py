@@ -11,9 +11,11 @@ from typing import Any
 import click
 import yaml
 
+from procedures.catalogue import Procedure
 from procedures.errors import BadAnswer, NoAnswer
 from procedures.questions import Question
 from procedures.session import Reading
+from rig.bench import Bench
 from rig.certificates import EXPIRED
 from rig.cli.output import emit, note, notes
 from rig.cli.verdicts import lines as results
@@ -68,7 +70,7 @@ class Quiet:
 
 
 @contextmanager
-def watching(procedure: str, unattended: bool, answers: Path | None) -> Iterator[Watch]:
+def watching(procedure: Procedure, bench: Bench, unattended: bool, answers: Path | None) -> Iterator[Watch]:
     """Who looks on: a person in a terminal, unless the run is unattended or nobody is there."""
     given = _answers(answers)
     if unattended or not (sys.stdin.isatty() and sys.stderr.isatty()):
@@ -76,7 +78,7 @@ def watching(procedure: str, unattended: bool, answers: Path | None) -> Iterator
         return
     from rig.cli.guide import Guide  # rich is only imported where somebody sees it
 
-    with Guide(procedure, given) as guide:
+    with Guide(procedure, bench, given) as guide:
         yield guide
 
 

@@ -1,63 +1,312 @@
-"""The guided terminal: what a person sees, and is asked."""
+"""The guided terminal: what a person sees before and during a run, and is asked."""
 
 from __future__ import annotations
 
 import io
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from rich.console import Console
+from rich.console import Console, RenderableType
 
-from procedures.errors import NoAnswer
-from procedures.questions import Confirm, Number
-from procedures.session import Pose
+from procedures.catalogue import find
+from procedures.errors import Declined, NoAnswer
+from procedures.questions import Choice, Confirm, Mounting, Number
+from procedures.session import Limits, Pose, Reading
+from rig.bench import Bench, read_bench
+from rig.cli.before import before, checks, free_bytes, mounting
+from rig.cli.gauge import WIDTH, gauge, nearness
 from rig.cli.guide import Guide
 from rig.cli.output import columns, duration, size
+from rig.cli.screen import Seen, screen
 from rig.cli.watch import Quiet, watching
+from rig.cli.way import Way
+from rig.drawings import Attitude, page
+from rig.errors import Stopped
+from rig.plan import Plan, plan
 from rig.record import Block, Kept
+from rig.runner import Outcome
+from tests.rig.rigging import POSES, small_sweep
+
+RUN = "20261121-093012-sweep-a1b"
+SWEEP = find("sweep")
 
 
-def kept(number: int) -> Kept:
-    block = Block(np.array([[2.4, 2.5], [2.6, 2.5]]), ("vx", "vy"), 1000.0, 0.0)
-    return Kept(Pose(90, 10.0 * number, 1), block, 3600.0, 28.3)
+def kept(number: int, noise: float = 0.1, path: str = "") -> Kept:
+    block = Block(np.array([[2.5 - noise, 2.5], [2.5 + noise, 2.5]]), ("vx", "vy"), 1000.0, 0.0)
+    return Kept(Pose(90, 10.0 * number, 1, path), block, 3600.0, 28.3)
+
+
+def shown(renderable: RenderableType) -> str:
+    """As a terminal of 120 columns shows it, without colour."""
+    console = Console(file=io.StringIO(), width=120)
+    console.print(renderable)
+    return console.file.getvalue()  # type: ignore[attr-defined, no-any-return]
+
+
+@pytest.fixture
+def said(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """What the person types, in order; then the terminal is closed."""
+
+    def say(*words: str) -> None:
+        typed = iter(words)
+
+        def answer(*prompt: object) -> str:
+            try:
+                return next(typed)
+            except StopIteration:
+                raise EOFError from None
+
+        monkeypatch.setattr("builtins.input", answer)
+
+    return say
+
+
+def guide(**answers: str) -> tuple[Guide, io.StringIO]:
+    told = io.StringIO()
+    return Guide(SWEEP, read_bench(), answers, Console(file=told, force_terminal=True, width=120)), told
+
+
+# before
+
+
+def planned(name: str = "sweep", bench: Bench | None = None) -> Plan:
+    procedure = find(name)
+    return plan(bench or read_bench(), procedure, procedure.defaults)
+
+
+def test_before_a_run_one_screen_says_all_of_it() -> None:
+    text = shown(before(planned(), SWEEP, read_bench(), 2_000_000_000))
+    for piece in (
+        "Hold the sensor at a grid of stage angles, each way round.",
+        "scale factor, bias, cross-axis, misalignment, hysteresis, stage errors.",
+        "518 poses",
+        "56:",
+        "alpha 90, beta 0 to 360 deg: 37 poses  A+ to B-",
+        "from -5 to 365 deg; its limits are -400 to 400 deg",
+        "not at -20 to 85 C; where the table is tilted by more than 0.3 deg",
+        "MB on the disk, where 2.0 GB are free",
+        "[ ] the cables are free to turn",
+        "[ ] the level lies on the table",
+        "of simulated time",
+    ):
+        assert piece in text
+    assert len(text.splitlines()) < 35
+
+
+def test_a_disk_that_is_too_small_is_said() -> None:
+    assert "there is not enough room" in shown(before(planned(), SWEEP, read_bench(), 1000))
+
+
+def test_what_to_check_follows_from_the_plan() -> None:
+    document = read_bench().document()
+    del document["instruments"]["level"]
+    assert any("you will read it" in line for line in checks(planned("sweep", Bench.model_validate(document))))
+    assert any("the oven is closed" in line for line in checks(planned("temperature-cycle")))
+    assert not any("oven" in line for line in checks(planned()))
+
+
+def test_the_drawing_before_a_run_is_that_of_its_first_mounting() -> None:
+    assert mounting(planned("noise-floor")) == Attitude()
+    asked = replace(planned(), asked=(Confirm("a", "b"), Mounting.of(90.0, 1)))
+    assert mounting(asked) == Attitude(mount_deg=90.0, flip=1)
+
+
+def test_room_is_measured_where_the_folder_will_be(tmp_path: Path) -> None:
+    assert free_bytes(tmp_path / "not" / "yet") > 0
+
+
+def test_a_run_begins_or_is_cancelled(said: Callable[..., None], rig_home: Path) -> None:
+    said("perhaps", "cancel")
+    with guide()[0] as shown_to, pytest.raises(Declined, match="cancelled before it began"):
+        shown_to.planned(planned())
+    said("go")
+    with guide()[0] as shown_to:
+        shown_to.planned(planned())
+    assert (rig_home / "drawings" / "mounting.svg").read_text() == page(Attitude(), "mounting")
+
+
+def test_a_file_of_answers_begins_it_too(said: Callable[..., None]) -> None:
+    said()
+    with guide(begin="go")[0] as shown_to:
+        shown_to.planned(planned())
+
+
+# during
 
 
 def test_it_shows_what_happens_progress_readings_and_time() -> None:
-    screen = io.StringIO()
-    with Guide("sweep", {}, Console(file=screen, force_terminal=True, width=120)) as guide:
-        guide.begun("20261121-093012-sweep-a1b")
-        guide.expect(4, 1)
-        guide.doing("moving to alpha 90, beta 10 deg")
-        guide.kept(kept(1))
-    shown = screen.getvalue()
-    assert "rig resume 20261121-093012-sweep-a1b" in shown
-    for piece in ("moving to alpha 90, beta 10 deg", "2/4", "2.50000 V", "scatter 100.000 mV", "28.3 C", "left"):
-        assert piece in shown
+    shown_to, told = guide()
+    with shown_to:
+        shown_to.begun(RUN)
+        shown_to.expect(4, 1)
+        shown_to.read(Reading("level-front-x", 0.25, "deg"))
+        shown_to.doing("moving to alpha 90, beta 10 deg")
+        shown_to.kept(kept(1))
+    text = told.getvalue()
+    for piece in (RUN, "moving to alpha 90, beta 10 deg", "2/4 poses", "2.50000 V", "scatter 141", "28.3 C", "left"):
+        assert piece in text
+    assert "level-front-x = 0.25 deg" in text
+    assert "Ctrl-C stops the stages" in text
 
 
-MOUNTED = Confirm("mounting", "Is it mounted?")
+def seen(**changes: Any) -> Seen:
+    return replace(Seen("sweep", Limits(level_deg=0.3), 10.0, False), **changes)
 
 
-def test_a_person_is_asked_unless_the_file_answers(monkeypatch: pytest.MonkeyPatch) -> None:
-    screen = Console(file=io.StringIO(), force_terminal=True, width=90)
-    monkeypatch.setattr("builtins.input", lambda *prompt: "no")
-    with Guide("sweep", {"known": "from the file"}, screen) as guide:
-        assert guide.ask(Confirm("known", "Is it known?"), "yes") == "from the file"
-        assert guide.ask(MOUNTED, "yes") == "no"
+def test_values_stand_between_their_limits_and_are_marked_near_them() -> None:
+    text = shown(screen(seen(kept=kept(1)), 0.0))
+    assert "near" not in text
+    assert "28.3 C     -20 ├" in text
+    hot = replace(kept(1), temperature_c=84.0)
+    assert "near its limit" in shown(screen(seen(kept=hot), 0.0))
+    assert "beyond its limit" in shown(screen(seen(kept=replace(hot, temperature_c=86.0)), 0.0))
+    assert "near its limit" in shown(screen(seen(kept=kept(1, noise=7.0)), 0.0))  # a sample at 9.5 of 10 V
 
 
-def test_a_person_is_asked_until_the_answer_makes_sense(monkeypatch: pytest.MonkeyPatch) -> None:
-    screen = Console(file=io.StringIO(), force_terminal=True, width=200)
-    said = iter(["much", "90", "0,2"])
-    monkeypatch.setattr("builtins.input", lambda *prompt: next(said))
-    with Guide("sweep", {}, screen) as guide:
-        assert guide.ask(Number("level-x", "What does it show?", unit="deg", low=-45, high=45), None) == "0.2"
-    assert "it takes a number from -45 to 45 deg" in screen.file.getvalue()  # type: ignore[attr-defined]
+def test_the_level_is_shown_when_it_was_read_both_ways_round() -> None:
+    one = {"level-front-x": 0.4, "level-front-y": 0.0}
+    assert "level x" not in shown(screen(seen(tilt=one), 0.0))
+    both = {**one, "level-back-x": -0.18, "level-back-y": 0.0}
+    text = shown(screen(seen(tilt=both), 0.0))
+    assert "0.290 deg" in text
+    assert "near its limit" in text
 
 
-def test_who_is_not_at_a_terminal_is_not_asked() -> None:
-    with watching("sweep", unattended=False, answers=None) as watch:
+def test_scatter_is_compared_with_what_is_usual_for_such_poses() -> None:
+    shown_to, _ = guide()
+    with shown_to:
+        shown_to.begun(RUN)
+        for number in range(3):
+            shown_to.kept(kept(number, 0.001, "still 1"))
+        assert "as usual" in shown(shown_to._screen())
+        shown_to.kept(kept(4, 0.005, "still 2"))
+        assert "5 x the usual" in shown(shown_to._screen())
+        shown_to.kept(kept(5, 0.5, "motion 1"))
+        assert "usual" not in shown(shown_to._screen())
+
+
+@pytest.mark.parametrize(
+    ("value", "near", "place"),
+    [(0.0, "", 12), (-1.0, "near its limit", 1), (0.85, "near its limit", 21), (3.0, "beyond its limit", 23)],
+)
+def test_a_gauge_has_its_mark_where_the_value_is(value: float, near: str, place: int) -> None:
+    bar = gauge(value, -1.0, 1.0).plain
+    assert (len(bar), bar.index("●")) == (WIDTH, place)
+    assert nearness(value, -1.0, 1.0) == near
+
+
+def test_what_is_no_number_is_beyond_its_limit() -> None:
+    assert nearness(float("nan"), -1.0, 1.0) == "beyond its limit"
+    assert gauge(float("nan"), -1.0, 1.0).plain.index("●") == WIDTH - 2
+
+
+# time left
+
+
+def test_time_left_is_that_of_the_plan_until_there_is_a_pace() -> None:
+    way = Way(at_s=(10.0, 20.0, 90.0), end_s=100.0).begin(0.0).expect(3, 0)
+    assert (way.planned_left_s(), way.left_s(5.0)) == (90.0, None)
+    one = way.step(2.0)  # ten planned seconds took two
+    assert one.left_s(2.0) == pytest.approx(16.0)
+    assert one.left_s(5.0) == pytest.approx(13.0)  # it counts down while nothing is kept
+    assert one.left_s(100.0) == 0.0
+    assert one.step(16.0).left_s(16.0) == pytest.approx(2.0)  # the long way before the last is known
+
+
+def test_without_a_plan_poses_are_all_alike() -> None:
+    way = Way().begin(0.0).expect(8, 4)
+    assert way.planned_left_s() is None
+    assert way.step(3.0).left_s(3.0) == pytest.approx(9.0)
+
+
+def test_a_procedure_that_expects_part_by_part_has_the_plans_total() -> None:
+    way = Way(at_s=(0.0,) * 10, end_s=1.0).begin(0.0).expect(4, 0)
+    assert way.total == 10
+    assert Way().begin(0.0).expect(4, 0).step(1.0).expect(10, 4).first == 0
+
+
+def test_simulated_time_is_said_to_be_that() -> None:
+    way = Way(at_s=(10.0,), end_s=60.0).expect(1, 0)
+    assert "0:50 left as planned" in shown(screen(seen(way=way), 0.0))
+    assert "0:50 of simulated time left as planned" in shown(screen(seen(way=way, simulated=True), 0.0))
+
+
+# questions
+
+MOUNTED = Confirm("mounting", "Is it mounted?", "face-up")
+
+
+def test_a_person_is_asked_unless_the_file_answers(said: Callable[..., None]) -> None:
+    said("no")
+    with guide(known="from the file")[0] as shown_to:
+        assert shown_to.ask(Confirm("known", "Is it known?"), "yes") == "from the file"
+        assert shown_to.ask(MOUNTED, "yes") == "no"
+
+
+def test_a_person_is_asked_until_the_answer_makes_sense(said: Callable[..., None]) -> None:
+    said("much", "90", "0,2")
+    shown_to, told = guide()
+    with shown_to:
+        assert shown_to.ask(Number("level-x", "What does it show?", unit="deg", low=-45, high=45), None) == "0.2"
+    assert "it takes a number from -45 to 45 deg" in told.getvalue()
+
+
+def test_a_question_has_its_drawing_once(said: Callable[..., None], rig_home: Path) -> None:
+    said("yes", "yes", "yes")
+    shown_to, told = guide()
+    with shown_to:
+        for question in (MOUNTED, MOUNTED, Mounting.of(90.0, 1)):
+            shown_to.ask(question, "yes")
+    assert told.getvalue().count("pin 1") == 2
+    assert (rig_home / "drawings" / "mount-90-down.svg").read_text() == page(Attitude(0, 0, 90, 1), "mount-90-down")
+
+
+def test_a_terminal_that_closes_is_nobody(said: Callable[..., None]) -> None:
+    said()
+    with guide()[0] as shown_to, pytest.raises(NoAnswer, match="terminal was closed"):
+        shown_to.ask(MOUNTED, "yes")
+
+
+@pytest.fixture
+def outcome() -> Iterator[Outcome]:
+    """A run that was stopped; alpha did not obey."""
+    from rig.record import Record
+
+    with Record() as record:
+        run = record.begin("sweep", {}, bench={}, identities={}, configuration="", constants={}, source="")
+        yield Outcome(record.run(run), Stopped("stopped by SIGINT"), ("alpha may still move: silence",))
+
+
+def test_the_menu_says_what_each_answer_means(said: Callable[..., None], outcome: Outcome) -> None:
+    said("go", "repeat")
+    shown_to, told = guide()
+    with shown_to:
+        shown_to.begun(RUN)
+        shown_to.kept(kept(1))
+        assert shown_to.interrupted(outcome) == "repeat"
+        assert shown_to.interrupted(outcome) == "end"  # the terminal is closed
+    text = told.getvalue()
+    for piece in (
+        "stopped by SIGINT",
+        "alpha may still move: silence",
+        "alpha 90, beta 10 deg",
+        "it takes one of resume",
+    ):
+        assert piece in text
+
+
+# nobody
+
+
+def test_who_is_not_at_a_terminal_is_not_asked(outcome: Outcome) -> None:
+    with watching(SWEEP, read_bench(), unattended=False, answers=None) as watch:
         assert isinstance(watch, Quiet)
+        watch.planned(planned())
+        assert watch.interrupted(outcome) == "end"
         assert watch.ask(MOUNTED, "yes") == "yes"
         with pytest.raises(
             NoAnswer, match=r'to answer "Is it mounted\?"; put `mounting: ...` \(yes or no\) into a file'
@@ -65,10 +314,18 @@ def test_who_is_not_at_a_terminal_is_not_asked() -> None:
             watch.ask(MOUNTED, None)
 
 
+# words
+
+
 def test_times_and_sizes_read_well() -> None:
     assert [duration(s) for s in (5, 750, 3750.4)] == ["0:05", "12:30", "1:02:30"]
-    assert [size(n) for n in (512, 3_400_000)] == ["0.5 kB", "3.4 MB"]
+    assert [size(n) for n in (512, 3_400_000, 80_700_000_000)] == ["0.5 kB", "3.4 MB", "80.7 GB"]
 
 
 def test_columns_stand_under_each_other() -> None:
     assert columns(("run", "poses"), [("a", 518), ("long", 2)]) == "run   poses\na     518\nlong  2"
+
+
+def test_the_small_sweep_of_other_tests_is_what_they_think() -> None:
+    assert plan(read_bench(), *small_sweep()).poses == POSES
+    assert Choice("begin", "Begin?", choices=("go", "cancel")).checked("go") == "go"

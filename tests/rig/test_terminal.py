@@ -1,24 +1,50 @@
-"""A person at a terminal: asked, shown, and able to stop."""
+"""A person at a terminal: shown what will happen, asked, and able to stop and to go on."""
 
 from __future__ import annotations
 
+import signal
 import sys
+from collections.abc import Callable
 
 import pexpect
 import pytest
 
-from rig.record import Record
+from rig.record import Record, Run
+from rig.runner import REPEATED
 from tests.rig.rigging import POSES, SMALL_ARGUMENTS
 
 pytestmark = pytest.mark.sockets
 
+LONG = ("--step-deg", "10", "--dwell-s", "0.2", "--inclinations-deg", "90,45")  # 148 poses: time to press a key
+
 
 def at_terminal(*arguments: str) -> pexpect.spawn[str]:
-    return pexpect.spawn(sys.executable, ["-m", "rig", *arguments], encoding="utf-8", timeout=30, dimensions=(40, 120))
+    return pexpect.spawn(sys.executable, ["-m", "rig", *arguments], encoding="utf-8", timeout=30, dimensions=(60, 120))
+
+
+def begun(*settings: str) -> pexpect.spawn[str]:
+    """A sweep that a person has begun."""
+    terminal = at_terminal("run", "sweep", *settings)
+    terminal.expect("Begin.*:")
+    terminal.sendline("go")
+    terminal.expect("Is the sensor mounted face up.*:")
+    terminal.sendline("yes")
+    return terminal
+
+
+def only_run() -> tuple[Run, list[str | None]]:
+    """The one run of the record, and which of its poses are excluded, and why."""
+    with Record() as record:
+        (run,) = record.runs()
+        return run, [kept.excluded for kept in record.kept(run.run)]
 
 
 def test_a_guided_run_asks_shows_and_ends() -> None:
     with at_terminal("run", "sweep", *SMALL_ARGUMENTS) as terminal:
+        terminal.expect("Check by hand")
+        terminal.expect("drawings/mounting.svg")
+        terminal.expect("Begin.*:")
+        terminal.sendline("go")
         terminal.expect("Is the sensor mounted face up.*:")
         terminal.sendline("perhaps")
         terminal.expect("it takes yes or no")
@@ -32,12 +58,78 @@ def test_a_guided_run_asks_shows_and_ends() -> None:
         assert [event.text for event in record.events(run.run)] == ["yes"]
 
 
-def test_ctrl_c_at_a_question_leaves_a_run_that_can_be_resumed() -> None:
+def test_a_cancelled_run_leaves_nothing() -> None:
     with at_terminal("run", "sweep", *SMALL_ARGUMENTS) as terminal:
-        terminal.expect("Is the sensor mounted face up.*:")
-        terminal.sendintr()
-        terminal.expect("rig resume .* goes on where it was")
+        terminal.expect("Begin.*:")
+        terminal.sendline("cancel")
+        terminal.expect("nothing was moved and nothing recorded")
         terminal.expect(pexpect.EOF)
     assert terminal.exitstatus == 4
     with Record() as record:
-        assert [run.state for run in record.runs()] == ["stopped"]
+        assert record.runs() == []
+
+
+@pytest.mark.parametrize(("wish", "excluded"), [("resume", []), ("repeat", [REPEATED])])
+def test_ctrl_c_stops_and_a_person_has_it_go_on(wish: str, excluded: list[str]) -> None:
+    with begun(*LONG) as terminal:
+        terminal.expect(r"holding alpha.*\d+/148 poses")
+        terminal.sendintr()
+        terminal.expect("stopped by SIGINT")
+        terminal.expect("What now.*:")
+        assert only_run()[0].state == "stopped"
+        terminal.sendline(wish)
+        terminal.expect(f"complete, {148 + len(excluded)} poses")
+        terminal.expect(pexpect.EOF)
+    assert terminal.exitstatus == 0
+    run, reasons = only_run()
+    assert (run.state, [reason for reason in reasons if reason]) == ("complete", excluded)
+
+
+def end_it(terminal: pexpect.spawn[str]) -> None:
+    terminal.sendline("end")
+
+
+@pytest.mark.parametrize(
+    "end",
+    [end_it, pexpect.spawn.sendintr, pexpect.spawn.sendeof, lambda terminal: terminal.kill(signal.SIGTERM)],
+    ids=["end", "ctrl-c", "ctrl-d", "sigterm"],
+)
+def test_the_menu_ends_a_run_that_can_be_resumed(end: Callable[[pexpect.spawn[str]], object]) -> None:
+    with begun(*LONG) as terminal:
+        terminal.expect(r"holding alpha.*\d+/148 poses")
+        terminal.sendintr()
+        terminal.expect("What now.*:")
+        end(terminal)
+        terminal.expect("rig resume .* goes on where it was")
+        terminal.expect(pexpect.EOF)
+    assert terminal.exitstatus == 4
+    run, _ = only_run()
+    assert run.state == "stopped"
+    assert 0 < run.rows < 148
+
+
+def test_sigterm_ends_a_guided_run_without_a_menu() -> None:
+    with begun(*LONG) as terminal:
+        terminal.expect(r"holding alpha.*\d+/148 poses")
+        terminal.kill(signal.SIGTERM)
+        terminal.expect("stopped by SIGTERM")
+        terminal.expect(pexpect.EOF)
+        assert "What now" not in (terminal.before or "")
+    assert terminal.exitstatus == 4
+    assert only_run()[0].state == "stopped"
+
+
+def test_a_refusal_is_no_end() -> None:
+    with at_terminal("run", "sweep", *SMALL_ARGUMENTS) as terminal:
+        terminal.expect("Begin.*:")
+        terminal.sendline("go")
+        terminal.expect("Is the sensor mounted face up.*:")
+        terminal.sendline("no")
+        terminal.expect("was answered with no")
+        terminal.expect("What now.*:")
+        terminal.sendline("resume")
+        terminal.expect("Is the sensor mounted face up.*:")
+        terminal.sendline("yes")
+        terminal.expect(f"complete, {POSES} poses")
+        terminal.expect(pexpect.EOF)
+    assert terminal.exitstatus == 0
