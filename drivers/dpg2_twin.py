@@ -8,9 +8,17 @@ from typing import Any, Protocol
 
 from drivers.dpg2 import ONE_READING, STOP, VERSION, Settings
 from drivers.links.address import Address
+from drivers.links.faults import Faults, Kind
 from drivers.links.server import Connection, Port, Server
 
 LISTEN = "pty:?baud=9600"
+FAULTS = {
+    "lies": Kind("shows this much more along x", 1.0, "deg"),
+    "stale": Kind("shows again and again what it showed"),
+    "out-of-range": Kind("shows that it is beyond its range"),
+    "deaf": Kind("talks on when it is told to stop"),
+    "restart": Kind("is without power for a moment: talks unasked, once"),
+}
 INTERVAL_S = 0.1  # from one pair of lines to the next [M]
 THINKING_S = 0.002  # [M]
 START = b"S"
@@ -32,12 +40,15 @@ class Inclinometer:
     """One level on a line of its own. Wakes talking; nobody hears what it says into an open line, or a full one."""
 
     def __init__(self, world: World, settings: Settings, port: Port) -> None:
+        self.faults = Faults()
         self._world, self._range_deg, self._port = world, settings.range_deg, port
         self._running, self._next_s = True, 0.0
         port.answer = self._answer
 
     def advance(self, now_s: float) -> None:
         """The level is the world's; it looks at it only when it speaks, since the converter may still be sampling."""
+        if strike := self.faults.once("restart", now_s):
+            self._running, self._next_s = True, max(strike.at_s, self._next_s)
 
     def speak(self, now_s: float) -> None:
         """Say what is due by `now_s`."""
@@ -66,7 +77,7 @@ class Inclinometer:
     def _obey(self, letter: bytes, connection: Connection, now_s: float) -> None:
         began_s = now_s + self._port.timing.character_s + THINKING_S
         if letter == STOP:
-            self._running = False
+            self._running = self.faults.size("deaf", now_s) is not None
             self._say(connection, [STOP], began_s)
         elif letter == START:
             self._running, self._next_s = True, began_s
@@ -78,9 +89,11 @@ class Inclinometer:
     def _reading(self, t_s: float) -> list[bytes]:
         """Both lines at `t_s`, or as soon after it as the world still can."""
         self._world.advance(max(t_s, self._world.now_s))
-        return [
-            f"{axis}={self._shown(deg)}\r\n".encode() for axis, deg in zip("XY", self._world.level_deg(), strict=True)
-        ]
+        x_deg, y_deg = self.faults.held("stale", t_s, list(self._world.level_deg()))
+        x_deg += self.faults.size("lies", t_s) or 0.0
+        if self.faults.size("out-of-range", t_s) is not None:
+            x_deg = 2 * self._range_deg
+        return [f"{axis}={self._shown(deg)}\r\n".encode() for axis, deg in (("X", x_deg), ("Y", y_deg))]
 
     def _shown(self, deg: float) -> str:
         return f"{deg:+07.3f}" if abs(deg) <= self._range_deg else 7 * "+-"[deg < 0]

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers import labjack_t7_table as t7
-from drivers.errors import LimitError, Refused, StreamError
+from drivers.errors import LimitError, OverRange, Refused, StreamError
 from drivers.instrument import Check, Identity
 from drivers.labjack_t7_reception import Reception
 from drivers.labjack_t7_stream import Calibration
@@ -132,7 +132,8 @@ class T7:
         samples are the same whatever `block_s` is. Take the next block within a few seconds, before the
         buffers of network and device are full. Closing the iterator ends the stream.
 
-        Raises StreamError when scans were lost, Refused when the device declines the settings, LinkTimeout.
+        Raises StreamError when scans were lost, OverRange when a channel was at an end of its range, LinkTimeout,
+        Refused when the device declines the settings.
         """
         channels, scans, block = tuple(self.settings.channels), self._scans(duration_s), self._scans(block_s)
         per_packet = _scans_per_packet(scans, len(channels))
@@ -145,9 +146,22 @@ class T7:
             reception = Reception(self._stream, self.name, start_s, rate_hz, len(channels), per_packet)
             for first in range(0, scans, block):
                 codes = reception.take(min(block, scans - first))
+                self._require_in_range(codes, channels)
                 yield Samples(self._volts[codes], channels, rate_hz, start_s + first / rate_hz)
         finally:
             self._stop()
+
+    def _require_in_range(self, codes: NDArray[np.uint16], channels: tuple[str, ...]) -> None:
+        """A sample at an end of the range stands for any voltage beyond it, and its mean for none at all."""
+        if codes.min() > 0 and codes.max() < t7.HIGHEST_CODE:
+            return
+        count = np.count_nonzero((codes == 0) | (codes == t7.HIGHEST_CODE), axis=0)
+        name, clipped = channels[int(np.argmax(count))], int(count.max())
+        raise OverRange(
+            f"{self.name}: {name} (AIN{self.settings.channels[name]}) was beyond its range of "
+            f"{self.settings.range_v:g} V in {clipped} of {len(codes)} samples",
+            "Check the sensor's supply and wiring, or set a wider range_v in the bench file",
+        )
 
     def _scans(self, duration_s: float) -> int:
         return max(1, round(duration_s * self.settings.rate_hz))

@@ -66,6 +66,7 @@ ACTUAL_RATE = Register(4494, "float32", "STREAM_ACTUAL_SCANRATE_HZ", "Hz")
 ENABLE = Register(4990, "uint32", "STREAM_ENABLE")
 TO_ETHERNET = 1  # of AUTO_TARGET: packets go to the stream port
 MOST_SAMPLES_PER_PACKET = 512
+HIGHEST_CODE = 65535  # like 0, for all voltages beyond the range
 LARGEST_BUFFER = 32768
 MOST_SAMPLES_PER_S = 100_000
 MOST_ADDRESSES = 128

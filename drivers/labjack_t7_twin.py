@@ -13,11 +13,15 @@ from numpy.typing import NDArray
 from drivers import labjack_t7_table as t7
 from drivers.labjack_t7 import Settings
 from drivers.labjack_t7_stream import FUNCTION, KIND, UNIT, Calibration, packet_type
+from drivers.labjack_t7_twin_faults import FAULTS, ends, spoilt
 from drivers.links.address import Address
+from drivers.links.faults import Faults
 from drivers.links.modbus_server import DEVICE_FAILURE, ILLEGAL_ADDRESS, ILLEGAL_VALUE, Refusal, modbus_port
 from drivers.links.register import Register
 from drivers.links.server import Port, Server
 from drivers.simulation.kernel import kernel
+
+__all__ = ["FAULTS", "LISTEN", "serve"]
 
 LISTEN = "tcp://127.0.0.1:0"
 SERIAL, FIRMWARE = 470012345, 1.0312
@@ -96,7 +100,7 @@ class Stream:
         channels: int, per_packet: int,
     ) -> None:  # fmt: skip
         self._scan, self._start_ns, self._interval_ns = scan, round(1e9 * start_s), interval_ns
-        self._channels, self._per_packet = channels, per_packet
+        self._channels, self.per_packet = channels, per_packet
         self._scans = self._packets = 0
         self._rest = np.empty(0, np.uint16)
 
@@ -108,19 +112,19 @@ class Stream:
         codes = self._scan(self._time_s(self._scans), 1e-9 * self._interval_ns, new)
         self._scans += new
         samples = np.concatenate([self._rest, codes.ravel()])
-        count = len(samples) // self._per_packet
-        self._rest = samples[count * self._per_packet :]
-        return self._pack(samples[: count * self._per_packet].reshape(count, self._per_packet))
+        count = len(samples) // self.per_packet
+        self._rest = samples[count * self.per_packet :]
+        return self._pack(samples[: count * self.per_packet].reshape(count, self.per_packet))
 
     def due_s(self) -> float:
         """When the next packet is full: at its last scan."""
-        return self._time_s(-(-(self._packets + 1) * self._per_packet // self._channels) - 1)
+        return self._time_s(-(-(self._packets + 1) * self.per_packet // self._channels) - 1)
 
     def _time_s(self, scan: int) -> float:
         return 1e-9 * (self._start_ns + scan * self._interval_ns)
 
     def _pack(self, samples: NDArray[np.uint16]) -> bytes:
-        layout = packet_type(self._per_packet)
+        layout = packet_type(self.per_packet)
         packets = np.zeros(len(samples), layout)
         packets["transaction"] = (self._packets + np.arange(len(samples))) % 65536
         packets["length"] = layout.itemsize - 6
@@ -137,15 +141,18 @@ class Converter:
     thinking_s = THINKING_S
 
     def __init__(self, world: World, settings: Settings, stream_port: Port) -> None:
+        self.faults = Faults()
+        self.ports = [stream_port]
         self._world, self._power_dio, self._port = world, settings.power_dio, stream_port
         self._inputs = Inputs(world, {number: name for name, number in settings.channels.items()})
         self._stream: Stream | None = None
         self._words = _initial_words()
 
     def advance(self, now_s: float) -> None:
+        if self.faults.once("restart", now_s):
+            self._restart()
         if self._stream and (packets := self._stream.packets_until(now_s)):
-            for connection in self._port.connections.values():
-                connection.send(packets, now_s)
+            self._send(spoilt(packets, self._stream.per_packet, self.faults, now_s) if self.faults else packets, now_s)
 
     def due_s(self) -> float:
         return self._stream.due_s() if self._stream else math.inf
@@ -175,12 +182,26 @@ class Converter:
             self._world.advance(now_s)
             self._world.power(bool(values[0]))
 
+    def _send(self, packets: bytes, now_s: float) -> None:
+        for connection in self._port.connections.values() if packets else ():
+            connection.send(packets, now_s)
+        if self.faults and self._stream and ends(packets, self._stream.per_packet):
+            self._stream = None
+
+    def _restart(self) -> None:
+        """As after power-on; the digital lines are high then."""
+        self._stream, self._words = None, _initial_words()
+        self._world.power(True)
+        for port in self.ports:
+            port.hang_up()
+
     def _enable(self, on: bool, now_s: float) -> None:
         if on and self._stream:
             self._fail(t7.STREAM_ACTIVE)
         if not on and not self._stream:
             self._fail(t7.NOT_RUNNING)
-        self._stream = self._new_stream(now_s) if on else None
+        if on or self.faults.size("endless", now_s) is None:
+            self._stream = self._new_stream(now_s) if on else None
 
     def _new_stream(self, now_s: float) -> Stream:
         """A stream as the registers ask for. Only endless ones are simulated."""
@@ -269,4 +290,5 @@ def serve(world: World, roles: Mapping[str, tuple[int, Settings]], listen: str =
     stream = Port(LISTEN)
     converter = Converter(world, settings, stream)
     port = modbus_port(listen, {unit: converter})
+    converter.ports.append(port)
     return Server([port, stream], {role: converter}, {role: Address(port.url, unit, stream.url)})

@@ -7,11 +7,21 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
 from drivers.links.address import Address
+from drivers.links.faults import Faults, Kind
 from drivers.links.modbus_server import ILLEGAL_ADDRESS, Refusal, modbus_port
 from drivers.links.server import Server
 from drivers.omega_cn7500 import CONTROL_METHOD, PROCESS_VALUE, RUN_BIT, SET_POINT, Settings
 
 LISTEN = "pty:?baud=9600"
+FAULTS = {
+    "lies": Kind("shows this much more", 100.0, "K"),
+    "stale": Kind("shows and goes by the temperature that it had"),
+    "no-temperature": Kind("shows the code of a fault", 0x8003),
+    "runaway": Kind("heats as much as it can, as long as it runs"),
+    "restart": Kind("is without power for a moment: stands still with its first set point, once"),
+}
+AT_POWER_ON = (25.0, False)
+FULL_C = 1000.0  # a set point that takes all power
 THINKING_S = 0.005
 
 
@@ -32,11 +42,16 @@ class Controller:
     thinking_s = THINKING_S
 
     def __init__(self, world: World) -> None:
+        self.faults = Faults()
         self._world = world
-        self._set_point_c, self._running = 25.0, False
+        self._set_point_c, self._running = AT_POWER_ON
 
     def advance(self, now_s: float) -> None:
-        """The oven is the world's; the controller's registers do not change by themselves."""
+        """The oven is the world's; the controller's registers do not change by themselves, but for what befalls it."""
+        if self.faults.once("restart", now_s):
+            self._set_point_c, self._running = AT_POWER_ON
+        if self.faults:
+            self._world.oven_set(self._goal_c(now_s), self._running)
 
     def due_s(self) -> float:
         return math.inf
@@ -60,7 +75,7 @@ class Controller:
     def read_words(self, address: int, count: int, now_s: float) -> list[int]:
         self._world.advance(now_s)
         words = {
-            PROCESS_VALUE.address: PROCESS_VALUE.encode(self._world.thermometer_c()),
+            PROCESS_VALUE.address: self._shown(now_s),
             SET_POINT.address: SET_POINT.encode(self._set_point_c),
             CONTROL_METHOD.address: [0],
         }
@@ -78,7 +93,24 @@ class Controller:
     def _control(self, set_point_c: float, running: bool, now_s: float) -> None:
         self._set_point_c, self._running = set_point_c, running
         self._world.advance(now_s)
-        self._world.oven_set(set_point_c, running)
+        self._world.oven_set(self._goal_c(now_s), running)
+
+    def _shown(self, now_s: float) -> list[int]:
+        if (code := self.faults.size("no-temperature", now_s)) is not None:
+            return [int(code)]
+        return PROCESS_VALUE.encode(self._temperature_c(now_s) + (self.faults.size("lies", now_s) or 0.0))
+
+    def _temperature_c(self, now_s: float) -> float:
+        """What the controller goes by."""
+        return float(self.faults.held("stale", now_s, self._world.thermometer_c()))
+
+    def _goal_c(self, now_s: float) -> float:
+        """What the heater is made to reach: without a fault the set point."""
+        if self.faults.size("runaway", now_s) is not None:
+            return FULL_C
+        if self.faults.size("stale", now_s) is not None:
+            return math.copysign(FULL_C, self._set_point_c - self._temperature_c(now_s))
+        return self._set_point_c
 
 
 def serve(world: World, roles: Mapping[str, tuple[int, Settings]], listen: str = LISTEN) -> Server:

@@ -8,6 +8,7 @@ from typing import Any
 
 from drivers import pi_e727_table as e727
 from drivers.links.address import Address
+from drivers.links.faults import Faults, Kind
 from drivers.links.gcs_server import OUT_OF_RANGE, UNKNOWN_COMMAND, Refusal, gcs_port, groups, lines, one_of, whole
 from drivers.links.server import Server
 from drivers.pi_e727 import Settings
@@ -16,6 +17,13 @@ from drivers.pi_e727_twin_recorder import Recorder
 from drivers.pi_e727_twin_waves import Waves
 
 LISTEN = "tcp://127.0.0.1:0"
+FAULTS = {
+    "restart": Kind("is without power for a moment: servo off, waves and record forgotten, once"),
+    "stuck": Kind("does not go where it is sent, and finds itself on target"),
+    "busy": Kind("says that it moves, whatever it does"),
+    "lies": Kind("shows a position that is off by this", 1.0, "um"),
+    "refuses": Kind("declines every command with this error", 17),
+}
 IDENTITY = "(c)2015 Physik Instrumente (PI) GmbH & Co. KG, E-727, 0117055412, 13.21.00.09"
 PARAMETERS = {  # identifier: (value, type, name), the same for every axis
     e727.CYCLE_TIME: (f"{CYCLE_S:.8e}", "FLOAT", "Servo Update Time"),
@@ -29,6 +37,17 @@ class Controller:
 
     def __init__(self, world: World, settings: Settings) -> None:
         self._axes = Axes(world, settings.axes)
+        self._power_on()
+
+    @property
+    def faults(self) -> Faults:
+        return self._axes.faults
+
+    @faults.setter
+    def faults(self, faults: Faults) -> None:
+        self._axes.faults = faults
+
+    def _power_on(self) -> None:
         self._recorder = Recorder(self._axes)
         self._waves = Waves(self._axes, self._recorder)
         self._error = 0
@@ -53,12 +72,17 @@ class Controller:
         try:
             if name.upper() not in self._handlers:
                 raise Refusal(UNKNOWN_COMMAND)
+            if (code := self.faults.size("refuses", now_s)) is not None and not name.endswith("?"):
+                raise Refusal(int(code))
             return self._handlers[name.upper()](arguments, now_s)
         except Refusal as refusal:
             self._error = refusal.code
             return None
 
     def advance(self, now_s: float) -> None:
+        if strike := self.faults.once("restart", now_s):
+            self._axes.restart(strike.at_s)
+            self._power_on()
         self._recorder.advance(now_s)
 
     def due_s(self) -> float:

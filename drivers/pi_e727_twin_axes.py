@@ -10,6 +10,7 @@ from typing import Any, Protocol
 from numpy.typing import ArrayLike
 
 from drivers import pi_e727_table as e727
+from drivers.links.faults import Faults
 from drivers.links.gcs_server import OUT_OF_RANGE, Refusal, groups, number, one_of, table, whole
 from drivers.simulation.kernel import Floats
 from drivers.simulation.positioner import Command, standing
@@ -37,6 +38,7 @@ class Axes:
     """Axes by the controller's identifier. They wake with the servo off, wherever they are."""
 
     def __init__(self, world: World, names: Mapping[str, str]) -> None:
+        self.faults = Faults()
         self._world = world
         self._names = {axis: name for name, axis in names.items()}
         self.ids = list(self._names)
@@ -52,7 +54,7 @@ class Axes:
             "VEL": self._set_velocity,
             "VEL?": lambda a, _: table((axis, f"{self._velocity_um_s[axis]:.6f}") for axis in self.asked(a)),
             "MOV?": lambda a, now_s: table((axis, f"{self.commanded_um(axis, now_s):.6f}") for axis in self.asked(a)),
-            "POS?": lambda a, now_s: table((axis, f"{self.measured_um(axis, now_s)[0]:.6f}") for axis in self.asked(a)),
+            "POS?": lambda a, now_s: table((axis, f"{self.shown_um(axis, now_s):.6f}") for axis in self.asked(a)),
             "ONT?": lambda a, now_s: table((axis, int(self._on_target(axis, now_s))) for axis in self.asked(a)),
             "TMN?": lambda a, _: table((axis, f"{TRAVEL_UM[0]:.6f}") for axis in self.asked(a)),
             "TMX?": lambda a, _: table((axis, f"{TRAVEL_UM[1]:.6f}") for axis in self.asked(a)),
@@ -91,6 +93,8 @@ class Axes:
 
     def go(self, axis: str, um: float, now_s: float) -> None:
         """Ramp the command from where it is to `um`."""
+        if self.faults.size("stuck", now_s) is not None:
+            return
         here, velocity = self.commanded_um(axis, now_s), self._velocity_um_s[axis]
         rate = velocity if um > here else -velocity
         self.follow(axis, Command(now_s, here, rate, end_s=now_s + (um - here) / rate), now_s)
@@ -105,6 +109,13 @@ class Axes:
         """Command the place where the axis is now."""
         self.follow(axis, standing(float(self.measured_um(axis, now_s)[0]), now_s), now_s)
 
+    def restart(self, at_s: float) -> None:
+        """Servo off, and every axis where it is. The world's time is not touched: the converter may be sampling."""
+        self._servo, self._velocity_um_s = dict.fromkeys(self.ids, False), dict.fromkeys(self.ids, VELOCITY_UM_S)
+        for axis, name in self._names.items():
+            self._commands[axis] = standing(float(self.measured_um(axis, at_s)[0]), at_s)
+            self._settled_s[axis] = self._world.move_positioner(name, self._commands[axis])
+
     def commanded_um(self, axis: str, t_s: float) -> float:
         return self._commands[axis].um(t_s)
 
@@ -113,7 +124,11 @@ class Axes:
 
     def moving(self, axis: str, now_s: float) -> bool:
         """Whether an axis has not settled yet."""
-        return now_s < self._settled_s[axis]
+        return now_s < self._settled_s[axis] or self.faults.size("busy", now_s) is not None
+
+    def shown_um(self, axis: str, now_s: float) -> float:
+        """What the controller says of its position."""
+        return float(self.measured_um(axis, now_s)[0]) + (self.faults.size("lies", now_s) or 0.0)
 
     def _on_target(self, axis: str, now_s: float) -> bool:
         return self._servo[axis] and not self.moving(axis, now_s)

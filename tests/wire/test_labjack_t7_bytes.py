@@ -9,7 +9,7 @@ import pytest
 
 from drivers import labjack_t7
 from drivers.clock import SimulatedClock
-from drivers.errors import LimitError, LinkTimeout, Refused, StreamError
+from drivers.errors import LimitError, LinkTimeout, OverRange, Refused, StreamError
 from drivers.labjack_t7 import T7, Settings
 from drivers.links import Address, Links
 from drivers.links.server import Port, Server
@@ -38,7 +38,7 @@ RATE = ("00 09 00 00 00 06 01 03 11 8E 00 02", "00 09 00 00 00 07 01 03 04 44 7A
 DISABLE = ("00 0A 00 00 00 0B 01 10 13 7E 00 02 04 00 00 00 00", "00 0A 00 00 00 06 01 10 13 7E 00 02")
 ACQUIRE = [*CONFIGURE, ENABLE, RATE, DISABLE]
 HEADER = "00 00 00 00 00 12 01 4C 10 00 00 00 00 00 00 00 "
-PACKET = HEADER + "82 F3 FF FF 00 00 92 93"
+PACKET = HEADER + "82 F3 FF FE 00 01 92 93"
 Converters = Callable[..., T7]
 
 
@@ -80,7 +80,7 @@ def converter(script: Callable[..., Address], links: Links, clock: SimulatedCloc
 
 def test_a_record_is_volts_by_the_devices_own_calibration(converter: Converters) -> None:
     samples = converter(ACQUIRE, PACKET).acquire(0.004)
-    expected = [0.0, (65535 - 33523) * SLOPE, -33523 * SLOPE, (0x9293 - 33523) * SLOPE]
+    expected = [0.0, (65534 - 33523) * SLOPE, (1 - 33523) * SLOPE, (0x9293 - 33523) * SLOPE]
     np.testing.assert_allclose(samples.volts, np.reshape(expected, (4, 1)), rtol=1e-6)
     assert (samples.channels, samples.rate_hz) == (("vx",), 1000.0)
 
@@ -88,6 +88,12 @@ def test_a_record_is_volts_by_the_devices_own_calibration(converter: Converters)
 def test_scans_beyond_the_duration_are_cut_off(converter: Converters) -> None:
     longer = PACKET + "00 01" + HEADER[5:] + "00 00 00 00 00 00 00 00"
     assert converter(ACQUIRE, longer).acquire(0.004).volts.shape == (4, 1)
+
+
+@pytest.mark.parametrize("end", ["FF FF", "00 00"])
+def test_a_sample_at_an_end_of_the_range_is_no_number(converter: Converters, end: str) -> None:
+    with pytest.raises(OverRange, match=r"adc: vx \(AIN3\) was beyond its range of 10 V in 1 of 4 samples. Check"):
+        converter(ACQUIRE, f"{HEADER}82 F3 {end} 00 01 92 93").acquire(0.004)
 
 
 def test_lost_scans_are_an_error_and_the_stream_is_stopped(converter: Converters) -> None:
