@@ -1,6 +1,7 @@
 """Exponentials towards a final value, fitted beside noise that may be slow itself.
 
-    y(t) = y_end + sum A_k exp(-t / tau_k) + noise      none, one (a board's hours) or two (and a package's minutes)
+    y(t) = y_end + sum A_k exp(-(t - t_0) / tau_k) + noise      none, one (a board's hours) or two (and a package's
+                                                              minutes), t_0 the first time
 
 Noise is white and scatter alone, or with one Gauss-Markov process (the longest is a random walk), or with flicker, over
 a grid. How many exponentials there are is decided by likelihood, averaged over the noise, so that a wandering which a
@@ -8,7 +9,8 @@ random walk explains is no exponential. Estimates and standard errors are averag
 likelihood: what cannot be known of the noise in a short record is in them.
 
 Source  Barshan and Durrant-Whyte, IEEE Trans. Robotics and Automation 11 (1995) 328: the model; Patterson and Thompson
-        (1971): restricted likelihood; JCGM 101, 6.4.9: few values; Hoeting et al., Statistical Science 14 (1999) 382: averaging over models.
+        (1971): restricted likelihood; JCGM 101, 6.4.9: few values; Hoeting et al., Statistical Science 14 (1999) 382:
+        averaging over models.
 """
 
 from __future__ import annotations
@@ -31,6 +33,7 @@ WANDER = 2.0  # slow noise over fast, with a time constant beyond half of the re
 STEPS = 30
 LONGEST_STEP = 0.5  # of a logarithm of a time constant
 ENOUGH = 1e-6  # of -2 log likelihood
+UNLIKELY = 0.01  # share of the likelihood of all noise, below which one is left out
 
 Point = tuple[float, tuple[float, ...]]  # slow noise over fast, and its time constants
 
@@ -39,7 +42,7 @@ Point = tuple[float, tuple[float, ...]]  # slow noise over fast, and its time co
 class Exponentials:
     """A fit of `k` exponentials.
 
-    parameters   (y_end, A_1 .., ln tau_1 ..), slowest first, and their covariance
+    parameters   (y_end, A_1 .., ln tau_1 ..), slowest first, the amplitudes at the first value; their covariance
     deviance     -2 log likelihood, averaged over the noise
     noise        standard deviation of one value, slow noise included
     wandering    probability that the noise is a random walk over the record
@@ -53,7 +56,7 @@ class Exponentials:
 
 
 def decay(p: Array, t_s: Array) -> Array:
-    """What is left to come at times since t = 0, shape (n,); `p` as in `Exponentials`."""
+    """What is left to come at times since the first value, s: shape (n,); `p` as in `Exponentials`."""
     k = (len(p) - 1) // 2
     return np.asarray(np.exp(-t_s[:, None] / np.exp(p[1 + k :])) @ p[1 : 1 + k])
 
@@ -67,7 +70,7 @@ def slopes(p: Array, t_s: Array) -> Array:
 
 @dataclass(frozen=True)
 class Series:
-    """Values with white standard errors (0: not known), both in units of about their scatter, at times, s: (n,) each."""
+    """Values at times from 0, s, with white standard errors (0: not known), both over about their scatter; (n,) each."""
 
     t_s: Array
     values: Array
@@ -162,40 +165,44 @@ class Series:
                 break
         return p
 
-    def _scored(self, p: Array, point: Point) -> tuple[float, float, Array, Array, float]:
-        """-2 log likelihood, the same restricted, the step from `p`, its covariance, the noise of a value."""
+    def _scored(self, p: Array, point: Point) -> tuple[float, float, Array, float]:
+        """-2 log likelihood, the same restricted, the covariance of `p`, the noise of a value; to first order."""
         J, r, logdet = self._linearised(p, point)
         n, free = len(r), len(r) - len(p)
         inverse = np.linalg.pinv(J.T @ J, hermitian=True)
-        step = inverse @ (J.T @ r)
-        square = max(float(r @ r - step @ (J.T @ r)), 0.0)
+        square = max(float(r @ r - (J.T @ r) @ inverse @ (J.T @ r)), 0.0)
         whole, part = float(self._factor(square, n)), float(self._factor(square, free))
         likelihood = square / whole + n * np.log(whole) + logdet
         information = float(np.linalg.slogdet(J.T @ J + 1e-12 * np.eye(len(p)))[1])
         restricted = square / part + free * np.log(part) + logdet + information
         widened = part * free / max(free - 2, 1)  # Student's t
         fast = float(rms(self.stds)) if self.known else 1.0
-        return likelihood, restricted, step, np.asarray(widened * inverse), float(np.sqrt(part) * fast * np.hypot(1.0, point[0]))
+        return (
+            likelihood,
+            restricted,
+            np.asarray(widened * inverse),
+            float(np.sqrt(part) * fast * np.hypot(1.0, point[0])),
+        )
 
     def _within(self, ln_taus: Array) -> Array:
         return np.clip(ln_taus, self._ln_taus[0], self._ln_taus[-1])
 
     def _averaged(self, p: Array, deviance: float) -> Exponentials:
         """Parameters, covariance and noise over all points, each weighted by its restricted likelihood."""
-        scores = [self._scored(p, point) for point in self.points]
-        restricted = np.array([score[1] for score in scores])
-        weight = np.exp((restricted.min() - restricted) / 2) * np.array(list(self.points.values()))
-        weight /= weight.sum()
-        steps = np.array([score[2] for score in scores])
-        mean = weight @ steps
-        covariance = np.einsum("i,ijk->jk", weight, np.array([score[3] for score in scores]))
-        covariance += np.einsum("i,ij,ik->jk", weight, steps - mean, steps - mean)
-        noise = float(np.sqrt(weight @ np.array([score[4] for score in scores]) ** 2))
+        prior = np.array(list(self.points.values()))
+        restricted = np.array([self._scored(p, point)[1] for point in self.points])
+        weight = np.exp((restricted.min() - restricted) / 2) * prior
+        likely = [point for point, w in zip(self.points, weight, strict=True) if w > UNLIKELY * weight.sum()]
+        weight = weight[weight > UNLIKELY * weight.sum()] / weight[weight > UNLIKELY * weight.sum()].sum()
+        each = np.array([self._descended(p, point) for point in likely])
+        scores = [self._scored(q, point) for q, point in zip(each, likely, strict=True)]
+        mean = weight @ each
+        covariance = np.einsum("i,ijk->jk", weight, np.array([score[2] for score in scores]))
+        covariance += np.einsum("i,ij,ik->jk", weight, each - mean, each - mean)
+        noise = float(np.sqrt(weight @ np.array([score[3] for score in scores]) ** 2))
         half = float(np.sum(self.gap_s)) / 2
-        walks = [len(taus) == 1 and ratio > WANDER and taus[0] > half for ratio, taus in self.points]
-        k = (len(p) - 1) // 2
-        p = np.concatenate([(p + mean)[: 1 + k], self._within((p + mean)[1 + k :])])
-        return Exponentials(p, covariance, deviance, noise, float(weight @ np.array(walks)))
+        walks = [len(taus) == 1 and ratio > WANDER and taus[0] > half for ratio, taus in likely]
+        return Exponentials(mean, covariance, deviance, noise, float(weight @ np.array(walks)))
 
 
 def _slowest_first(p: Array) -> Array:

@@ -28,6 +28,7 @@ REVERSAL, HOLD = "reversal", "hold"
 AXES = "xy"
 HOUR_S = 3600.0
 LONGEST_MOVE_S = 120.0  # between poses: more is a gap
+REACHED_K = 1.0  # from the set point: an oven that is further away is still heating
 GAP_SAMPLES = 2.0  # within a hold: more is a gap
 
 
@@ -97,11 +98,12 @@ class Soak:
 
     @property
     def temperature_wander_k(self) -> float | None:
-        """Peak to peak of what the sensor's own warming does not explain of the temperature: the room's, or the oven's."""
+        """Peak to peak of what the sensor's own warming does not explain of the temperature: the room's, the oven's."""
         if self.temperature is None:
             return None
         t_s = self.holds.time_s - self.power_on_s
-        return float(np.ptp(self.holds.column("temperature_c") - self.temperature.at(t_s)))
+        left = self.holds.column("temperature_c") - self.temperature.at(t_s)
+        return float(np.ptp(left[t_s >= self.temperature.span_s[0]]))
 
     def noise_of_hours(self, axis: str) -> tuple[Array, Array]:
         """(middles of hours, s; rms noise of single samples within blocks, V)."""
@@ -119,14 +121,20 @@ class Soak:
         return allan_deviation(means, float(np.median(step)))
 
 
-def soak(table: Table, power_on_s: float = 0.0) -> Soak:
+def soak(table: Table, power_on_s: float = 0.0, oven_c: float = 0.0) -> Soak:
     """Bias and scale factor over time. `power_on_s`: the table's time when the sensor was switched on.
+
+    In an oven at `oven_c` (0: none) the approach begins when that is reached: what is measured while it heats and
+    overshoots is left out.
 
     Raises TooFewRows where it holds no whole tumble.
     """
     gaps = _gaps(table, power_on_s)
     broken = {gap.path for gap in gaps}
     whole = np.array([path.startswith(REVERSAL) and path not in broken for path in table.labels["path"]])
+    if oven_c and "temperature_c" in table:
+        away = np.flatnonzero(np.abs(table.column("temperature_c") - oven_c) > REACHED_K)
+        whole[: away[-1] + 1 if len(away) else 0] = False
     if not whole.any():
         raise TooFewRows(f"{table.source}: holds no reversal; resume the run")
     reversals = table.rows(_complete(table, whole))

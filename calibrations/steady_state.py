@@ -31,7 +31,7 @@ Quantity = tuple[float, float]  # a value and its standard error
 
 @dataclass(frozen=True)
 class Exponential:
-    """One exponential: amplitude at t = 0, in the unit of the values, and time constant, s."""
+    """One exponential: amplitude at the first value, in the unit of the values, and time constant, s."""
 
     amplitude: Quantity
     tau_s: Quantity
@@ -81,20 +81,23 @@ class SteadyState:
     @property
     def drift(self) -> Quantity:
         """Change of the fitted value from the first time of the record to the last."""
-        first, last = slopes(self.parameters, np.array(self.span_s))
+        first, last = slopes(self.parameters, np.array(self.span_s) - self.span_s[0])
         before, after = self.at(np.array(self.span_s))
         return float(after - before), float(np.sqrt((last - first) @ self.covariance @ (last - first)))
 
     @property
     def time_s(self) -> Quantity | None:
-        """Steady-state time since power-on; the start of the record where nothing drifts, None where not reached.
+        """Steady-state time since power-on; None where it is not reached.
 
-        Its standard error is that of the exponentials, and of the noise that sets the tolerance.
+        Its standard error is that of the exponentials, and of the noise that sets the tolerance. Where nothing drifts
+        it is the record's start, at the latest: rectangular since power-on.
         """
         at = np.log(self.tolerance)
         value = self._last_beyond(self.parameters, at)
         if self.wanders or value > self.span_s[1]:
             return None
+        if value == self.span_s[0]:
+            return value, value / np.sqrt(12.0)
         nudges = NUDGE * np.diag(np.where(self.parameters == 0, 1.0, np.abs(self.parameters)))
         by = np.array(
             [
@@ -110,11 +113,11 @@ class SteadyState:
 
     def at(self, t_s: Array) -> Array:
         """The fitted value at times since power-on, shape (n,)."""
-        return np.asarray(self.parameters[0] + decay(self.parameters, t_s))
+        return np.asarray(self.parameters[0] + decay(self.parameters, t_s - self.span_s[0]))
 
     def std_at(self, t_s: Array) -> Array:
         """Its standard error, shape (n,)."""
-        by = slopes(self.parameters, t_s)
+        by = slopes(self.parameters, t_s - self.span_s[0])
         return np.asarray(np.sqrt(np.einsum("ni,ij,nj->n", by, self.covariance, by)))
 
     def _last_beyond(self, p: Array, ln_tolerance: float) -> float:
@@ -123,8 +126,8 @@ class SteadyState:
         if not k:
             return start
         lengths = np.exp(p[1 + k :]) * (np.log(k * np.abs(p[1 : 1 + k])) - ln_tolerance)
-        t_s = np.linspace(start, max(end, float(lengths.max())), POINTS)
-        over = np.log(np.abs(decay(p, t_s)) + 1e-300) - ln_tolerance
+        t_s = np.linspace(start, max(end, start + float(lengths.max())), POINTS)
+        over = np.log(np.abs(decay(p, t_s - start)) + 1e-300) - ln_tolerance
         above = np.flatnonzero(over > 0)
         if not len(above):
             return start
@@ -135,20 +138,16 @@ class SteadyState:
 def steady_state(t_s: Array, values: Array, stds: Array) -> SteadyState:
     """The approach of `values` with white standard errors `stds` (0: not known) at times since power-on, shape (n,).
 
-    An exponential is added where it brings GAIN. Raises TooFewRows for fewer than FEWEST values.
+    Each exponential must bring GAIN. Raises TooFewRows for fewer than FEWEST values.
     """
     if len(t_s) < FEWEST:
         raise TooFewRows(f"{len(t_s)} reversals tell no drift from noise; at least {FEWEST} are needed")
     middle, unit = float(values.mean()), float(values.std()) or 1.0
-    series = Series(t_s, (values - middle) / unit, stds / unit)
-    best = series.fitted(0)
-    for k in range(1, MOST + 1):
-        if len(t_s) < 1 + 2 * k + FREE:
-            break
-        more = series.fitted(k)
-        if best.deviance - more.deviance < GAIN:
-            break
-        best = more
+    series = Series(t_s - t_s[0], (values - middle) / unit, stds / unit)
+    most = min(MOST, (len(t_s) - 1 - FREE) // 2)
+    best = min(
+        (series.fitted(k) for k in range(most + 1)), key=lambda fit: fit.deviance + GAIN * (len(fit.parameters) // 2)
+    )
     k = (len(best.parameters) - 1) // 2
     size = np.array([unit] * (1 + k) + [1.0] * k)
     parameters = best.parameters * size

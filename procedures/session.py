@@ -186,14 +186,17 @@ class Host(Protocol):
         """What happens now, for people."""
 
 
-def never(dwells: Sequence[Dwell]) -> bool:  # noqa: ARG001
+def never(dwells: Sequence[Dwell], oven_c: float) -> bool:  # noqa: ARG001
     """A plan's answer to whether what was measured has come to rest: it is that of the longest run."""
     return False
 
 
 @dataclass(frozen=True)
 class Session:
-    """The bench as a procedure sees it. `steady` judges whether bias and scale factor of dwells have come to rest."""
+    """The bench as a procedure sees it.
+
+    `steady` judges whether bias and scale factor of dwells have come to rest, in an oven of so many C (0: in none).
+    """
 
     alpha: Stage
     beta: Stage
@@ -204,7 +207,7 @@ class Session:
     clock: Clock
     host: Host
     limits: Limits = Limits()
-    steady: Callable[[Sequence[Dwell]], bool] = never
+    steady: Callable[[Sequence[Dwell], float], bool] = never
 
     def missing(self, poses: Iterable[Pose]) -> Iterator[Pose]:
         """Those of `poses` that the record does not hold yet, in order; a pose named twice is kept twice."""

@@ -50,7 +50,7 @@ def soak(
     levelled(rig)
     for path, group in groupby(rig.missing(schedule(duration_s, interval_s, block_s)), key=lambda pose: pose.path):
         poses = list(group)
-        if until_steady and path.startswith(HOLD) and rig.steady(rig.measured()):
+        if until_steady and path.startswith(HOLD) and rig.steady(rig.measured(), oven_c):
             break
         if off_s and path == f"{REVERSAL} 0" and is_first(poses[0]):
             _cold_start(rig, off_s)

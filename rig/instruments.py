@@ -5,7 +5,7 @@ All simulated, `state` and `restore` continue a rig where it was, sample for sam
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, cast
@@ -103,32 +103,46 @@ class Rig:
             server.restore(kept)
         self.clock.restore(state["clock_s"])
 
+    def require_steady(self) -> None:
+        """Raises the error of a stage that stands no longer where it was sent, or of an oscillation that has ended."""
+        for driver in self._moving():
+            getattr(driver, "require_steady", _nothing)()
+
     def stop(self) -> list[str]:
         """Stop all that moves, at once and whatever else is wrong, then the oven's heat; what could not be stopped.
 
-        The limits of temperature are looked at by a run only: without one, nobody watches the oven.
+        All are told to stop before the first is waited for. The limits of temperature are looked at by a run only:
+        without one, nobody watches the oven.
         """
-        failed = []
-        for role in MOVING:
-            mover = cast(Any, self.drivers.get(role))
-            try:
-                if mover is not None:
-                    mover.stop()
-            except DriverError as error:
-                failed.append(f"{role} may still move: {error}")
-        oven = cast(Any, self.drivers.get("oven"))
-        try:
-            if oven is not None:
-                oven.run(False)
-        except DriverError as error:
-            failed.append(f"oven may still heat: {error}")
-        return failed
+        movers, oven = self._moving(), cast(Any, self.drivers.get("oven"))
+        for mover in movers:
+            _failure(getattr(mover, "halt", _nothing))
+        failed = [(f"{mover.name} may still move", _failure(mover.stop)) for mover in movers]
+        if oven is not None:
+            failed.append((f"{oven.name} may still heat", _failure(lambda: oven.run(False))))
+        return [f"{what}: {failure}" for what, failure in failed if failure is not None]
+
+    def _moving(self) -> list[Any]:
+        return [self.drivers[role] for role in MOVING if role in self.drivers]
 
 
-def _at_rest(dwells: Sequence[Dwell]) -> bool:
+def _failure(act: Callable[[], object]) -> Exception | None:
+    """What went wrong in `act`. Whatever it is, the others must be stopped as well."""
+    try:
+        act()
+    except Exception as failure:
+        return failure
+    return None
+
+
+def _nothing() -> None:
+    """What an instrument does that has no such thing to do."""
+
+
+def _at_rest(dwells: Sequence[Dwell], oven_c: float) -> bool:
     from rig.results.soak import steady  # what it is judged by is only loaded where somebody asks
 
-    return steady(dwells)
+    return steady(dwells, oven_c)
 
 
 @contextmanager

@@ -48,16 +48,19 @@ def evaluate(measured: Measured) -> dict[str, Result]:
 
 def night(measured: Measured) -> Soak:
     """The run as a soak; its times are counted from power-on, or from its beginning where that is not known."""
-    return soak_of(measured.table(), _power_on_s(measured))
+    return soak_of(measured.table(), _power_on_s(measured), measured.run.settings["oven_c"])
 
 
-def steady(dwells: Sequence[Dwell]) -> bool:
-    """Whether every axis of every sensor has come to rest, seen for a while: what ends a soak early."""
+def steady(dwells: Sequence[Dwell], oven_c: float) -> bool:
+    """Whether every axis of every sensor has come to rest, seen for a while: what ends a soak early.
+
+    `oven_c` is the temperature of the oven that it is in (0: none).
+    """
     reversals = [dwell for dwell in dwells if dwell.pose.path.startswith(REVERSAL)]
     if len(list(groupby(reversals, lambda dwell: dwell.pose.path))) < FEWEST:
         return False
     sensors = dict.fromkeys(name.rpartition(".")[0] for name in dwells[0].means if name[-2:] in ("vx", "vy"))
-    return all(_at_rest(soak_of(_table(reversals, f"{sensor}." if sensor else ""))) for sensor in sensors)
+    return all(_at_rest(soak_of(_table(reversals, f"{sensor}." if sensor else ""), 0.0, oven_c)) for sensor in sensors)
 
 
 def _at_rest(found: Soak) -> bool:
@@ -84,6 +87,9 @@ def _table(dwells: Sequence[Dwell], prefix: str) -> Table:
         "t_s": [dwell.t_s for dwell in dwells],
         "n": [dwell.n for dwell in dwells],
     }
+    temperatures_c = [dwell.temperature_c for dwell in dwells if dwell.temperature_c is not None]
+    if len(temperatures_c) == len(dwells):
+        columns["temperature_c"] = temperatures_c
     for axis in AXES:
         if (channel := f"{prefix}v{axis}") in dwells[0].means:
             columns[f"v{axis}_v"] = [dwell.means[channel] for dwell in dwells]
