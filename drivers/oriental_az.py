@@ -160,6 +160,14 @@ class RotaryStage:
                 "Free the stage of what holds it, check the load's balance, then repeat the move",
             )
 
+    def require_steady(self) -> None:
+        """Raises StageAlarm, StageLost or NotSettled where it does not stand in position any more."""
+        outputs = self._status()
+        self._require_coordinates(outputs)
+        if not _stands(outputs, az.IN_POSITION):
+            remedy = "Find out what moves it: the load's balance, a hand, the drive's current; then resume the run"
+            raise NotSettled(f"{self.name}: has not stood still", remedy)
+
     def halt(self) -> None:
         """Let it brake, whatever it is doing, and return at once; `stop` must follow."""
         self._unit.write(az.INPUTS, az.STOP)

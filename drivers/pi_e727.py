@@ -92,6 +92,7 @@ class Positioner:
         self.name = gcs.name
         self.settings = settings
         self._gcs, self._clock = gcs, gcs.link.clock
+        self._swinging: str | None = None  # the axis that it was told to swing
         self._gcs.error()  # what went wrong before is not ours
 
     def identify(self) -> Identity:
@@ -160,6 +161,7 @@ class Positioner:
         self._write_wave(axis, wave, peak_to_peak_um, centre_um - half_um)
         self._arm_recorder(axis, wave.cycle_s)
         self._gcs.tell(f"{e727.PLAY} {self._place(axis)} {e727.FROM_THE_START}")
+        self._swinging = axis
         return wave.frequency_hz
 
     def recorded(self, axis: str) -> Recording:
@@ -175,9 +177,25 @@ class Positioner:
             raise StreamError(what, "Let no other program use the controller, then repeat")
         return Recording(np.array(rows)[:, 0], float(header["SAMPLE_TIME"]))
 
+    def require_steady(self) -> None:
+        """Raises StreamError where an oscillation that was begun has ended by itself."""
+        if self._swinging is None:
+            return
+        playing = int(self._gcs.ask_byte(e727.WAVES), 16)
+        if not playing >> (self._place(self._swinging) - 1) & 1:
+            raise StreamError(
+                f"{self.name}: the oscillation of {self._swinging} has ended by itself",
+                "Find out whether the controller was without power or somebody stopped it, then resume the run",
+            )
+
+    def halt(self) -> None:
+        """Stop all axes and waves and return at once; `stop` must follow."""
+        self._swinging = None
+        self._gcs.tell_byte(e727.STOP)
+
     def stop(self) -> None:
         """Stop all axes and waves at once, whatever they are doing, and return when nothing moves."""
-        self._gcs.tell_byte(e727.STOP)
+        self.halt()
         self._gcs.error()  # 10, stopped: that is what was asked for
         self._poll_until(self._still, STOPPING_S, "an axis still moves after a stop")
 

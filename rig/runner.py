@@ -220,6 +220,7 @@ class RunHost:
         self._watch.expect(missing + len(self._poses), len(self._poses))
 
     def keep(self, pose: Pose, samples: Samples, temperature_c: float | None) -> None:
+        self._rig.require_steady()  # else it was measured somewhere else than at `pose`
         middle_s = samples.start_s + len(samples.volts) / samples.rate_hz / 2
         dials = self._rig.read_deg()
         kept = Kept(

@@ -62,6 +62,7 @@ class Link:
         """`name` is the instrument's, for its errors. Raises LinkRefused when nobody is there."""
         self.url, self.clock = url.text, clock
         self._parsed, self._place = url, f"{name}: {url.text}" if name else url.text
+        self._closed = False
         self._line: Connected | None = self._opened()
 
     def write(self, data: bytes) -> None:
@@ -98,14 +99,21 @@ class Link:
         return count
 
     def close(self) -> None:
-        if self._line is not None:
-            self._line.port.close()
-            self._line = None
+        """For good."""
+        self._closed = True
+        self._drop()
 
     def _connected(self) -> Connected:
+        if self._closed:
+            raise LinkRefused(f"{self._place}: is closed", "Connect again")
         if self._line is None:
             self._line = self._opened()
         return self._line
+
+    def _drop(self) -> None:
+        if self._line is not None:
+            self._line.port.close()
+            self._line = None
 
     def _opened(self) -> Connected:
         try:
@@ -116,7 +124,7 @@ class Link:
         return line
 
     def _lost(self, why: object) -> LinkRefused:
-        self.close()
+        self._drop()
         return LinkRefused(
             f"{self._place}: the connection is lost ({why})", "Check cable and power, then connect again"
         )
