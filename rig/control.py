@@ -1,0 +1,80 @@
+"""The control charts of a record: every complete check-standard run, in the order of time, a chart for each quantity.
+
+A chart belongs to one sensor, by its serial number: another sensor's values are not comparable.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from calibrations.control_chart import BASELINE, Chart, control_chart
+from rig.errors import RecordError, UnknownRun
+from rig.nearest import did_you_mean
+from rig.record import Run
+
+PROCEDURE = "check-standard"
+
+
+@dataclass(frozen=True)
+class Controlled:
+    """One quantity of one check standard: its chart, and the runs that its values are of, in order."""
+
+    sensor: str
+    quantity: str
+    unit: str
+    runs: tuple[str, ...]
+    chart: Chart
+
+
+def controlled(
+    runs: Iterable[Run], sensor: str | None = None, baseline: int = BASELINE, since: str | None = None
+) -> list[Controlled]:
+    """The charts of `runs` (newest first, as the record gives them), of one `sensor` or of all; from run `since` on.
+
+    Raises RecordError where there is nothing to chart, UnknownRun where `since` is none of the check-standard runs.
+    """
+    checks = [run for run in reversed(list(runs)) if run.procedure == PROCEDURE and run.state == "complete"]
+    points = [point for run in _since(checks, since) for point in _points(run)]
+    known = list(dict.fromkeys(point.sensor for point in points))
+    if sensor is not None and sensor not in known:
+        raise RecordError(f"no check-standard run of the sensor {sensor!r}.{did_you_mean(sensor, known)}")
+    chosen = dict.fromkeys((p.sensor, p.quantity) for p in points if sensor in (None, p.sensor))
+    if not chosen:
+        raise RecordError("no check-standard run is complete yet; `rig run check-standard` makes one")
+    return [_controlled(*key, [p for p in points if (p.sensor, p.quantity) == key], baseline) for key in chosen]
+
+
+@dataclass(frozen=True)
+class _Point:
+    """One result of one run."""
+
+    sensor: str
+    quantity: str
+    run: str
+    result: Mapping[str, Any]
+
+
+def _since(checks: list[Run], since: str | None) -> list[Run]:
+    names = [run.run for run in checks]
+    if since is not None and since not in names:
+        raise UnknownRun(f"no complete check-standard run {since!r}.{did_you_mean(since, names[-20:])}")
+    return checks if since is None else checks[names.index(since) :]
+
+
+def _points(run: Run) -> Iterator[_Point]:
+    """The results of a run, each under its sensor's serial number; those of a batch are named `a1/bias-x`."""
+    for name, result in run.results.items():
+        member, _, quantity = name.rpartition("/")
+        said = run.bench["sensors"][member] if member else run.bench["sensor"]
+        yield _Point(said.get("serial") or said["name"], quantity, run.run, result)
+
+
+def _controlled(sensor: str, quantity: str, points: list[_Point], baseline: int) -> Controlled:
+    stds = [point.result["std"] or 0.0 for point in points]
+    least_sigma = float(np.sqrt(np.mean(np.square(stds[:baseline]))))
+    chart = control_chart([point.result["value"] for point in points], baseline, least_sigma)
+    return Controlled(sensor, quantity, points[0].result["unit"], tuple(point.run for point in points), chart)

@@ -1,0 +1,104 @@
+"""The check standard from its measurement to its control charts."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rig.record import Record
+
+Rig = Callable[..., Any]
+QUIET = [2.50001, 2.49999] * 5
+ONE = {"sensor": {"name": "ADXL203", "serial": "CS-1"}}
+
+
+def checks(
+    values: Sequence[float], bench: dict[str, Any] = ONE, name: str = "bias-x", state: str = "complete"
+) -> list[str]:
+    """Check-standard runs with these results, oldest first."""
+    names = []
+    with Record() as record:
+        for value in values:
+            about: dict[str, Any] = {"identities": {}, "configuration": "", "constants": {}, "source": "bench"}
+            names.append(record.begin("check-standard", {}, bench=bench, **about))
+            record.set_state(names[-1], state, None, {name: {"value": value, "std": 2e-6, "unit": "V"}})
+    return names
+
+
+@pytest.mark.sockets
+def test_a_check_standard_is_measured_and_begins_its_baseline(rig: Rig) -> None:
+    for _ in range(2):
+        ended = rig("run", "check-standard", "--dwell-s", "1", "--unattended", "--json")
+    document = json.loads(ended.out)
+    results = document["results"]
+    assert (ended.status, document["poses"], set(results)) == (0, 8, {"bias-x", "scale-x", "bias-y", "scale-y"})
+    assert (results["bias-x"]["unit"], results["scale-x"]["unit"]) == ("V", "V/g")
+    assert results["scale-x"]["value"] == pytest.approx(1.0, abs=0.03)
+    assert 0 < results["bias-x"]["std"] < 1e-3
+    charted = rig("control", "simulated")
+    assert charted.status == 0
+    assert charted.out.count("2 of 20") == 4
+    assert charted.out.endswith("\nbaseline\n")
+
+
+def test_a_jump_is_out_of_control_and_named(rig: Rig) -> None:
+    runs = checks([*QUIET, 2.5, 2.5001, 2.5])
+    ended = rig("control", "--baseline", "10")
+    assert ended.status == 1
+    assert f"{runs[11]}: CS-1 bias-x is +" in ended.out
+    assert ended.out.endswith("out of control\n")
+    document = json.loads(rig("control", "CS-1", "--baseline", "10", "--json").out)
+    (chart,) = document["charts"]
+    assert (document["schema"], document["verdict"], chart["sensor"]) == ("rig.control/1", "out of control", "CS-1")
+    assert {"chart": "individuals", "run": runs[11]} in chart["signals"]
+    assert chart["limits"] == pytest.approx([2.5 - 3 * 2e-5 / 1.128, 2.5 + 3 * 2e-5 / 1.128], abs=1e-7)
+    assert (chart["runs"], len(chart["ewma"]), len(chart["ewma_limits"])) == (runs, 13, 13)
+
+
+def test_after_a_repair_a_new_baseline_is_begun(rig: Rig) -> None:
+    checks([*QUIET, 2.6])
+    repaired = checks([value + 0.1 for value in [*QUIET, *QUIET]])
+    assert rig("control", "--baseline", "10").status == 1
+    ended = rig("control", "--baseline", "10", "--since", repaired[0])
+    assert (ended.status, ended.out.splitlines()[-1]) == (0, "in control")
+
+
+def test_a_chart_belongs_to_one_sensor(rig: Rig) -> None:
+    checks(QUIET)
+    checks(["x"], state="failed")
+    batch = {
+        "sensor": {"name": "sensor"},
+        "sensors": {"a1": {"name": "ADXL203", "serial": "CS-2"}, "a2": {"name": "A2"}},
+    }
+    checks([2.4, 2.4001], batch, "a1/bias-x")
+    checks([2.3, 2.3001], batch, "a2/bias-x")
+    document = json.loads(rig("control", "--json").out)
+    assert [(chart["sensor"], len(chart["runs"])) for chart in document["charts"]] == [
+        ("CS-1", 10),
+        ("CS-2", 2),
+        ("A2", 2),
+    ]
+    assert len(json.loads(rig("control", "CS-2", "--json").out)["charts"]) == 1
+
+
+def test_its_pictures_are_files_of_each_sensor(rig: Rig, tmp_path: Path) -> None:
+    checks([*QUIET, 2.5001])
+    ended = rig("control", "--baseline", "10", "--pictures", str(tmp_path / "charts"), "--format", "svg")
+    picture = (tmp_path / "charts" / "control-CS-1.svg").read_text()
+    assert f"written: {tmp_path / 'charts' / 'control-CS-1.svg'}" in ended.out
+    assert all(
+        words in picture for words in ("individuals", "moving range", "EWMA", "bias-x less 2.5 V", "out of control")
+    )
+
+
+def test_what_cannot_be_charted_is_said(rig: Rig) -> None:
+    assert "no check-standard run is complete yet" in rig("control").err
+    checks(QUIET[:1])
+    assert "a control chart needs 2 runs at least, there are 1" in rig("control").err
+    assert "no check-standard run of the sensor 'CS-3'. Did you mean 'CS-1'?" in rig("control", "CS-3").err
+    ended = rig("control", "--since", "yesterday")
+    assert (ended.status, "no complete check-standard run 'yesterday'" in ended.err) == (2, True)
