@@ -108,11 +108,6 @@ class Rig:
         for driver in self._moving():
             getattr(driver, "require_steady", _nothing)()
 
-    def require_steady(self) -> None:
-        """Raises the error of a stage that stands no longer where it was sent, or of an oscillation that has ended."""
-        for driver in self._moving():
-            getattr(driver, "require_steady", _nothing)()
-
     def stop(self) -> list[str]:
         """Stop all that moves, at once and whatever else is wrong, then the oven's heat; what could not be stopped.
 
@@ -129,19 +124,6 @@ class Rig:
 
     def _moving(self) -> list[Any]:
         return [self.drivers[role] for role in MOVING if role in self.drivers]
-
-
-def _failure(act: Callable[[], object]) -> Exception | None:
-    """What went wrong in `act`. Whatever it is, the others must be stopped as well."""
-    try:
-        act()
-    except Exception as failure:
-        return failure
-    return None
-
-
-def _nothing() -> None:
-    """What an instrument does that has no such thing to do."""
 
 
 def _failure(act: Callable[[], object]) -> Exception | None:

@@ -1,12 +1,19 @@
-"""Who works on a run or holds a wire: a lock on a file, which the kernel gives back however its holder ends."""
+"""Who works on a run or holds a wire: a lock on a file, which the kernel gives back however its holder ends.
+
+The file says who holds it, for whoever is refused: {"pid": 4711, "what": "run 20240502-...", "since": "14:03:22"}.
+"""
 
 from __future__ import annotations
 
 import fcntl
+import json
+import os
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from datetime import datetime
 from pathlib import Path
+from typing import Any
 
 from rig.errors import Busy
 
@@ -19,8 +26,13 @@ def lease(folder: Path, name: str, what: str) -> Iterator[None]:
     """Hold `name`, for people `what`, among all processes that use `folder`. Raises Busy when another holds it."""
     path = _path(folder, name)
     path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("w") as file:
-        _lock(file.fileno(), what)
+    with path.open("a+", encoding="utf-8") as file:
+        if not _locked(file.fileno()):
+            raise Busy(f"{_who(path)} works on {what}; let it finish, or stop it with Ctrl-C")
+        since = datetime.now().astimezone()
+        file.truncate(0)
+        json.dump({"pid": os.getpid(), "what": what, "since": f"{since:%Y-%m-%d %H:%M:%S}"}, file)
+        file.flush()
         yield  # the file stays: were it removed, two could hold a lock of its name
 
 
@@ -36,16 +48,35 @@ def is_held(folder: Path, name: str) -> bool:
     return False
 
 
-def _lock(fileno: int, what: str) -> None:
+def _locked(fileno: int) -> bool:
+    """Whether the lock could be had."""
     for attempt in range(ATTEMPTS):
-        try:
+        with suppress(BlockingIOError):
             fcntl.flock(fileno, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            if attempt + 1 < ATTEMPTS:
-                time.sleep(PAUSE_S)
-        else:
-            return
-    raise Busy(f"another process works on {what}; let it finish, or stop it with Ctrl-C")
+            return True
+        if attempt + 1 < ATTEMPTS:
+            time.sleep(PAUSE_S)
+    return False
+
+
+def _who(path: Path) -> str:
+    """The holder of a lock: its process, since when, and the run that it is at."""
+    holder = _holder(path)
+    if not holder:
+        return "another process"
+    others = [_holder(other) for other in sorted(path.parent.glob("*.lock")) if other != path]
+    runs = [str(o["what"]) for o in others if o.get("pid") == holder["pid"] and str(o["what"]).startswith("run ")]
+    at = f", with {runs[-1]}" if runs else ""
+    return f"another process ({holder['pid']}, since {holder['since']}{at})"
+
+
+def _holder(path: Path) -> dict[str, Any]:
+    """What a lock's file says of who held it last; nothing where it cannot be read."""
+    with suppress(OSError, ValueError):
+        document = json.loads(path.read_text(encoding="utf-8"))
+        if isinstance(document, dict) and {"pid", "what", "since"} <= document.keys():
+            return document
+    return {}
 
 
 def _path(folder: Path, name: str) -> Path:
