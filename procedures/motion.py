@@ -4,9 +4,9 @@ Excites   scale factor in motion, output filter, sampling delay; all that a mode
 Blind to  motion along y and z, and frequencies other than the one that it is shaken with.
 Source    Ang V, Fig. 12: alpha = 45, beta = 90 deg, 60 um peak to peak at 10 Hz along x, which is horizontal.
 
-A short sweep of the same sensor comes first, so that the models that are judged are its own, and of this hour. Then
-beta swings about the attitude, each time by less, as one demagnetises: friction forgets from where the sensor came,
-and its springs stand between the branches of the hysteresis.
+A short sweep of the same sensor comes first, so that the models that are judged are its own, and of this hour. Before
+the sweep and before the motion a stage swings about its place, each time by less, as one demagnetises: friction forgets
+from where the sensor came, and its springs stand between the branches of their hysteresis.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from contextlib import contextmanager
 
 from procedures.errors import ProcedureError, SettingError
 from procedures.level_check import levelled
-from procedures.session import Pose, Session
+from procedures.session import Pose, Session, Stage
 from procedures.sweep import turn
 
 KIND = "motion"
@@ -25,7 +25,7 @@ STILL = "still"
 DISPLACEMENT = "d63"  # the converter's channel
 ALPHA_DEG, BETA_DEG = 45.0, 90.0
 INCLINATIONS_DEG, STEP_DEG = (90.0, 45.0, 135.0), 45.0  # enough for the physical model, as a measurement showed
-SWINGS_DEG = tuple(90 * 0.7**k for k in range(12))  # down to 1.8: finer than the friction's reach, some 10 deg
+SWINGS_DEG = tuple(90 * 0.85**k for k in range(24))  # 60 deg, or steps of 0.7, leave 2 mm/s^2 of hysteresis: measured
 SHAKING_S = 1.0  # from the start of the motion on, until only the motion is left
 AXIS = "x"
 
@@ -37,7 +37,7 @@ def motion(
     frequency_hz: float = 10.0,
     centre_um: float = 50.0,
     duration_s: float = 60.0,
-    still_s: float = 20.0,
+    still_s: float = 30.0,
     block_s: float = 10.0,
     dwell_s: float = 2.0,
     settle_s: float = 0.5,
@@ -53,9 +53,12 @@ def motion(
         drawing="face-up",
     )
     levelled(rig)
+    calibration = list(sweep())
     still, shaken = blocks(STILL, still_s, block_s), blocks(KIND, duration_s, block_s)
-    left = list(rig.missing([*sweep(), *still, *shaken]))
+    left = list(rig.missing([*calibration, *still, *shaken]))
     _stand(rig, centre_um)
+    if len(_of(left, SWEEP)) == len(calibration):
+        _start_without_history(rig)
     for pose in _of(left, SWEEP):
         rig.hold(pose, dwell_s, settle_s)
     if not (_of(left, STILL) or _of(left, KIND)):
@@ -103,13 +106,25 @@ def _stand(rig: Session, centre_um: float) -> None:
     rig.positioner.move_to(AXIS, centre_um)
 
 
+def _start_without_history(rig: Session) -> None:
+    """Home, both axes swung alike: from here on, the way of the sensor is known."""
+    rig.host.doing("swinging alpha ever less, so that the sensor forgets where it was")
+    rig.beta.move_to(45.0)
+    _fade(rig.alpha, 0.0)
+    rig.beta.move_to(0.0)
+
+
 def _settle_between_branches(rig: Session) -> None:
-    """Turn to the attitude, beta swinging about it ever less."""
-    rig.host.doing(f"settling at alpha {ALPHA_DEG:g}, beta {BETA_DEG:g} deg in swings that fade")
+    """At the attitude of the motion."""
+    rig.host.doing(f"swinging beta ever less about {BETA_DEG:g} deg, so that the sensor forgets from where it came")
     rig.alpha.move_to(ALPHA_DEG)
+    _fade(rig.beta, BETA_DEG)
+
+
+def _fade(stage: Stage, about_deg: float) -> None:
     for k, swing_deg in enumerate(SWINGS_DEG):
-        rig.beta.move_to(round(BETA_DEG + (swing_deg if k % 2 else -swing_deg), 1))
-    rig.beta.move_to(BETA_DEG)
+        stage.move_to(round(about_deg + (swing_deg if k % 2 else -swing_deg), 1))
+    stage.move_to(about_deg)
 
 
 @contextmanager
