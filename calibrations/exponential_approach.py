@@ -70,7 +70,7 @@ def slopes(p: Array, t_s: Array) -> Array:
 
 @dataclass(frozen=True)
 class Series:
-    """Values at times from 0, s, with white standard errors (0: not known), both over about their scatter; (n,) each."""
+    """Values at times from 0, s, with white standard errors (0: not known), in units of their scatter; (n,) each."""
 
     t_s: Array
     values: Array

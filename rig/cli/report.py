@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from rig.cli.night import Page, night_of
 from rig.cli.output import bench_option, emit, json_option, model_option
 
 
@@ -28,25 +29,34 @@ def command(
 ) -> None:
     """Write a page on DATA (a file or a run) and a model: what the model misses, and the model with it.
 
-    The page is one file that needs no network. --pictures writes its pictures, with or without the page.
+    The page is one file that needs no network. Of a soak it shows the night, unless a model is named. --pictures
+    writes its pictures, with or without the page.
     """
     if out is None and folder is None:
         raise click.UsageError("nothing to write: give --out FILE.html, --pictures FOLDER, or both")
-    from calibrations.compare import compare
-    from calibrations.discover import discover
-    from calibrations.pictures.album import album
     from calibrations.pictures.save import save_all
-    from calibrations.report import report
-    from rig.cli.asked import asked, program, today, write_whole
+    from rig.cli.asked import program, today, write_whole
 
-    table, start, effects = asked(data, model, bench_file, out)
-    found, beside = discover(table, start, effects), compare(table, start)
-    pictures = album(found, beside)
+    asked_for = night_of(data, today(), program()) if model is None else None
+    pictures, page = asked_for or _on_a_model(data, model, bench_file, out)
     if out is not None:
-        write_whole(out, report(found, beside, today(), program(), pictures))
+        write_whole(out, page())
     written = save_all({picture.name: picture.figure for picture in pictures}, folder, form) if folder else []
     if as_json:
         emit({"schema": "rig.report/1", "out": str(out) if out else None, "pictures": [str(p) for p in written]})
     else:
         for path in [*([out] if out else []), *written]:
             click.echo(f"written: {path}")
+
+
+def _on_a_model(data: str, model: str | None, bench_file: Path | None, out: Path | None) -> Page:
+    from calibrations.compare import compare
+    from calibrations.discover import discover
+    from calibrations.pictures.album import album
+    from calibrations.report import report
+    from rig.cli.asked import asked, program, today
+
+    table, start, effects = asked(data, model, bench_file, out)
+    found, beside = discover(table, start, effects), compare(table, start)
+    pictures = album(found, beside)
+    return pictures, lambda: report(found, beside, today(), program(), pictures)

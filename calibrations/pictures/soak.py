@@ -1,0 +1,151 @@
+"""Pictures of a soak: bias and scale factor over the hours, what surrounded them, and the still record's noise."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from calibrations.pictures.album import Picture
+from calibrations.pictures.style import AMBER, BAND, BLUE, FAINT, GREEN, INK, QUIET, VERMILION, panels, styled
+from calibrations.soak import HOUR_S, Course, Soak
+from calibrations.table import Array
+
+COLOURS = {"x": BLUE, "y": VERMILION}
+SHOWN = 600  # means of the still record that a line is drawn through, at most
+CURVE = 400  # points of a fitted curve
+COVERAGE = 2.0
+
+
+def soak_album(found: Soak) -> list[Picture]:
+    """All pictures of a soak, with words for a page."""
+    course = (
+        "Dots are reversals, with their standard errors; the line is the exponential approach with its standard error. "
+        "Within the grey band, the expanded uncertainty of one reversal about the final value, the rest of the drift "
+        "is told from noise by no measurement: the broken line is the time from which it stays there. The thin grey "
+        "line is the record of the level sensor between reversals, shifted onto the bias."
+    )
+    around = (
+        "What the night was like: the sensor's temperature, its supply, and the noise of single samples hour by hour."
+    )
+    noise = (
+        "How much neighbouring means of the still record differ, over the time that each is taken over: white noise "
+        "falls with the square root of time, drift rises with it."
+    )
+    pictures = [
+        Picture("drift", "Bias and scale factor since power-on", course, drift(found)),
+        Picture("night", "Temperature, supply and noise", around, surroundings(found)),
+    ]
+    times_s, _ = found.allan(found.axes[0])
+    return [*pictures, Picture("allan", "Allan deviation", noise, allan(found))] if len(times_s) else pictures
+
+
+@styled
+def drift(found: Soak) -> Figure:
+    """A column for each axis: bias above, scale factor below, as change from the final value."""
+    figure, axes = panels(2, len(found.axes), 2.9, sharex=True)
+    for k, axis in enumerate(found.axes):
+        _course(axes[0, k], found, found.courses[f"bias-{axis}"], 1e3, "bias less final value (mV)")
+        scale = found.courses[f"scale-{axis}"]
+        _course(axes[1, k], found, scale, 1e6 / _final(scale), "scale factor less final value (ppm)")
+        axes[0, k].set_title(f"axis {axis}")
+        axes[1, k].set_xlabel("time since power-on (h)")
+    return figure
+
+
+@styled
+def surroundings(found: Soak) -> Figure:
+    """Temperature, supply and noise over the hours, those of them that were measured."""
+    holds = found.holds
+    rows = [name for name in ("temperature_c", "supply_v") if name in holds]
+    figure, axes = panels(len(rows) + 1, 1, 1.6, sharex=True)
+    labels = {"temperature_c": "sensor (°C)", "supply_v": "supply (V)"}
+    for ax, name in zip(axes[:, 0], rows, strict=False):
+        ax.plot(
+            *_thinned(_hours(found, holds.time_s), holds.column(name)), color=GREEN if name == "supply_v" else AMBER
+        )
+        ax.set_ylabel(labels[name])
+        _mark(ax, found)
+    ax = axes[-1, 0]
+    for axis in found.axes:
+        times_s, rms = found.noise_of_hours(axis)
+        ax.plot(times_s / HOUR_S, 1e3 * rms, "o-", color=COLOURS[axis], label=f"axis {axis}")
+    ax.set(ylabel="noise, rms (mV)", xlabel="time since power-on (h)", xlim=(0, None))
+    ax.margins(y=0.3)
+    ax.legend(loc="upper right", ncols=len(found.axes))
+    _mark(ax, found)
+    figure.align_ylabels()
+    return figure
+
+
+@styled
+def allan(found: Soak) -> Figure:
+    """Allan deviation of each axis on logarithmic axes, beside the slope of white noise."""
+    figure, axes = panels(1, 1, 3.0)
+    ax = axes[0, 0]
+    for axis in found.axes:
+        times_s, deviations = found.allan(axis)
+        ax.loglog(times_s, 1e6 * deviations, "o-", color=COLOURS[axis], label=f"axis {axis}")
+    ax.loglog(times_s, 1e6 * deviations[0] * np.sqrt(times_s[0] / times_s), color=QUIET, ls=":", label="white noise")
+    ax.set(xlabel="time of a mean (s)", ylabel="Allan deviation (µV)")
+    ax.legend()
+    return figure
+
+
+def _course(ax: Axes, found: Soak, course: Course, factor: float, label: str) -> None:
+    """One quantity as change from its final value, times `factor`."""
+    state, final, colour = course.state, _final(course), COLOURS[course.axis]
+    if course.quantity == "bias":
+        line = _still(found, course)
+        ax.plot(line[0] / HOUR_S, factor * (line[1] - final), color=BAND, lw=0.8, zorder=0.8)
+    if state is not None:
+        ax.axhspan(-factor * state.tolerance, factor * state.tolerance, color=FAINT, lw=0, zorder=0.4)
+        t_s = np.linspace(*state.span_s, CURVE)
+        curve, std = factor * (state.at(t_s) - final), factor * state.std_at(t_s)
+        ax.fill_between(t_s / HOUR_S, curve - std, curve + std, color=colour, alpha=0.25, lw=0)
+        ax.plot(t_s / HOUR_S, curve, color=colour, lw=1.4)
+    ax.errorbar(course.t_s / HOUR_S, factor * (course.values - final), factor * course.stds, fmt="o", color=INK,
+                mfc="white", mew=0.7, elinewidth=0.7, ms=3.0, zorder=2)  # fmt: skip
+    ax.set_ylabel(label)
+    ax.set_xlim(0, None)
+    _mark(ax, found)
+    _mark_steady(ax, course)
+
+
+def _mark_steady(ax: Axes, course: Course) -> None:
+    time = course.time_s
+    words = "steady state not reached"
+    if time is not None:
+        ax.axvline(time[0] / HOUR_S, color=INK, ls="--", lw=0.9)
+        words = f"steady after {time[0] / HOUR_S:.1f} ± {time[1] / HOUR_S:.1f} h"
+    up = course.values[0] > course.values[-1]
+    ax.annotate(words, (1, 1 if up else 0), xycoords="axes fraction", xytext=(-4, -4 if up else 6),
+                textcoords="offset points", ha="right", va="top" if up else "bottom")  # fmt: skip
+
+
+def _mark(ax: Axes, found: Soak) -> None:
+    """Gaps as shaded time."""
+    for gap in found.gaps:
+        ends = gap.start_s / HOUR_S, (gap.start_s + gap.length_s) / HOUR_S
+        ax.axvspan(*ends, color=VERMILION, alpha=0.25, lw=0.8)
+
+
+def _final(course: Course) -> float:
+    return course.state.final[0] if course.state else float(course.values[-1])
+
+
+def _hours(found: Soak, t_s: Array) -> Array:
+    return np.asarray((t_s - found.power_on_s) / HOUR_S)
+
+
+def _still(found: Soak, course: Course) -> tuple[Array, Array]:
+    """The still record at 0 g, shifted onto the bias: what differs there is load along z."""
+    t_s, volts = _thinned(found.holds.time_s - found.power_on_s, found.holds.column(f"v{course.axis}_v"))
+    return t_s, volts - np.median(volts - np.interp(t_s, course.t_s, course.values))
+
+
+def _thinned(t: Array, values: Array) -> tuple[Array, Array]:
+    """Means of neighbours, SHOWN at most."""
+    step = 1 + len(t) // SHOWN
+    n = len(t) // step * step
+    return t[:n].reshape(-1, step).mean(axis=1), values[:n].reshape(-1, step).mean(axis=1)
