@@ -28,8 +28,8 @@ def command(run: str, unattended: bool, answers: Path | None, bench_file: Path |
     with Record.to_find(run) as record:
         found = record.run(run)
         if found.state == "complete":
-            return tell(Outcome(found), as_json)
+            return tell(record, Outcome(found), as_json)
         own = Bench.model_validate(found.bench)
         with watching(find(found.procedure, own.folders.procedures), own, unattended, answers) as watch:
             outcome = resume(record, run, watch, bench)
-    return tell(outcome, as_json)
+        return tell(record, outcome, as_json)

@@ -33,12 +33,13 @@ def command(
 ) -> int:
     """Run PROCEDURE on the bench into the record.
 
-    Settings of the procedure are options: `rig run sweep --step-deg 30`. Ctrl-C stops the stages at once;
-    `rig resume` then goes on where the run was.
+    Settings of the procedure are options: `rig run sweep --step-deg 30`. Ctrl-C stops the stages at once, and asks
+    in a terminal whether to go on; `rig resume` goes on later.
     """
     bench = read_bench(bench_file)
     found = find(procedure, bench.folders.procedures)
     settings = parse(found, read_settings(given, pairs))
-    with watching(found, bench, unattended, answers) as watch, Record() as record:
-        outcome = start(record, bench, found, settings, watch)
-    return tell(outcome, as_json)
+    with Record() as record:
+        with watching(found, bench, unattended, answers) as watch:
+            outcome = start(record, bench, found, settings, watch)
+        return tell(record, outcome, as_json)

@@ -2,40 +2,113 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
 import click
 
+from calibrations.errors import CalibrationError
 from rig.certificates import EXPIRED
-from rig.cli.output import emit, json_option
-from rig.record import Event, Record, Run
-from rig.record.measured import table_of
+from rig.cli.output import columns, duration, emit, json_option
+from rig.cli.verdicts import lines as results
+from rig.cli.verdicts import next_steps
+from rig.errors import RecordError
+from rig.record import Event, Kept, Record, Run
+from rig.record.measured import Measured, sensors_of
+
+Ranges = Mapping[str, tuple[float, float]]
 
 
 @click.command("show")
 @click.argument("run")
+@click.option("--poses", is_flag=True, help="List every pose with its number, and why it is left out where it is.")
 @json_option
-def command(run: str, as_json: bool) -> None:
-    """Show how RUN was made, how it ended, and the range of each of its columns."""
+def command(run: str, poses: bool, as_json: bool) -> None:
+    """Show how RUN was made, how it ended, its results, and the range of each of its columns."""
     with Record.to_find(run) as record:
-        found, events = record.run(run), record.events(run)
-        table = table_of(record, run) if found.rows else None
-    ranges = {name: (float(v.min()), float(v.max())) for name, v in table.columns.items()} if table else {}
+        found, events, left_out = record.run(run), record.events(run), record.excluded(run)
+        ranges = _ranges(record, found)
+        listed = [_pose(number, kept) for number, kept in enumerate(record.kept(run))] if poses else None
     if as_json:
-        emit(_document(found, events, ranges))
+        emit(_document(found, events, ranges) | ({"kept": listed} if poses else {}))
     else:
-        click.echo("\n".join(_lines(found, events, ranges)))
+        after = [*results(found.results), *next_steps(found, left_out)]
+        told = [_event(event) for event in events]
+        parts = (_head(found), after, _columns(ranges), told, _listed(listed or []))
+        click.echo("\n\n".join("\n".join(part) for part in parts if part))
 
 
-def _lines(run: Run, events: list[Event], ranges: dict[str, tuple[float, float]]) -> list[str]:
+def _ranges(record: Record, run: Run) -> Ranges:
+    """The least and greatest value of each column; nothing where the poses make no table yet."""
+    found: dict[str, tuple[float, float]] = {}
+    sensors: list[str | None] = [*sensors_of(run)]
+    for sensor in sensors or [None]:
+        try:
+            table = Measured(record, run, sensor).table()
+        except (RecordError, CalibrationError):
+            continue
+        prefix = f"{sensor}." if sensor else ""
+        found |= {prefix + name: (float(v.min()), float(v.max())) for name, v in table.columns.items()}
+    return found
+
+
+def _pose(number: int, kept: Kept) -> dict[str, Any]:
+    """One pose as JSON; its outputs are means, V."""
+    angles = {name: getattr(kept.pose, name) for name in ("alpha_deg", "beta_deg", "direction", "mount_deg", "flip")}
+    about = {"t_s": kept.t_s, "temperature_c": kept.temperature_c, "excluded": kept.excluded}
+    return {"pose": number, "path": kept.pose.path, **angles, **about, "means_v": dict(kept.dwell.means)}
+
+
+def _head(run: Run) -> list[str]:
     ended = f"{run.state} {run.ended or ''}".strip()
     head = [f"{run.run}: {run.procedure}, {ended}, {run.rows} rows of {run.kind}", f"from {run.source}"]
-    settings = [f"  {name} = {value}" for name, value in run.settings.items()]
     why = [run.message] if run.message else []
     why += [f"But {run.constants[EXPIRED]}."] if EXPIRED in run.constants else []
-    columns = [f"  {name:16}{low:12.6g} .. {high:.6g}" for name, (low, high) in ranges.items()]
-    return [*head, *why, *settings, *columns, *(f"  {event.at}  {event.what}: {event.text}" for event in events)]
+    return [*head, *why, *_settings(run.settings)]
 
 
-def _document(run: Run, events: list[Event], ranges: dict[str, tuple[float, float]]) -> dict[str, object]:
+def _settings(settings: Mapping[str, Any]) -> Iterator[str]:
+    """Each setting in a line; of a mapping, such as that of an imported file's columns, each entry."""
+    for name, value in settings.items():
+        if isinstance(value, Mapping):
+            yield from (f"  {name}: {key} = {each}" for key, each in value.items())
+        elif isinstance(value, list):
+            yield f"  {name} = {', '.join(f'{each:g}' if isinstance(each, float) else str(each) for each in value)}"
+        else:
+            yield f"  {name} = {value}"
+
+
+def _columns(ranges: Ranges) -> list[str]:
+    return [f"  {name:16}{low:12.6g} .. {high:.6g}" for name, (low, high) in ranges.items()]
+
+
+def _event(event: Event) -> str:
+    return f"  {event.at[:19].replace('T', ' ')}  {event.what}: {event.text}"
+
+
+def _listed(poses: Sequence[Mapping[str, Any]]) -> list[str]:
+    """The poses as a table."""
+    if not poses:
+        return []
+    channels = list(poses[0]["means_v"])
+    rows = [
+        (
+            pose["pose"],
+            f"{pose['alpha_deg']:g}",
+            f"{pose['beta_deg']:g}",
+            pose["path"],
+            duration(pose["t_s"]),
+            *(f"{pose['means_v'][name]:.5f}" if name in pose["means_v"] else "" for name in channels),
+            "" if pose["temperature_c"] is None else f"{pose['temperature_c']:.1f}",
+            pose["excluded"] or "",
+        )
+        for pose in poses
+    ]
+    head = ("pose", "alpha", "beta", "path", "t", *(f"{name} V" for name in channels), "C", "left out because")
+    return columns(head, rows).splitlines()
+
+
+def _document(run: Run, events: list[Event], ranges: Ranges) -> dict[str, object]:
     return {
         "schema": "rig.show/1",
         "run": run.run,

@@ -19,8 +19,9 @@ from rig.bench import Bench
 from rig.certificates import EXPIRED
 from rig.cli.output import emit, note, notes
 from rig.cli.verdicts import lines as results
+from rig.cli.verdicts import next_steps
 from rig.plan import Plan
-from rig.record import Kept
+from rig.record import Kept, Record
 from rig.runner import Outcome, Watch, Wish
 
 
@@ -96,7 +97,7 @@ def _answers(path: Path | None) -> dict[str, str]:
     return {str(name): str(answer) for name, answer in document.items()}
 
 
-def tell(outcome: Outcome, as_json: bool) -> int:
+def tell(record: Record, outcome: Outcome, as_json: bool) -> int:
     """The end of a run, and its exit status: 1 where a result is beyond its limit. Raises what stopped the run."""
     run = outcome.run
     if as_json:
@@ -104,7 +105,8 @@ def tell(outcome: Outcome, as_json: bool) -> int:
         emit({**head, "poses": run.rows, "results": run.results, EXPIRED: run.constants.get(EXPIRED)})
     else:
         mark = [f"But {run.constants[EXPIRED]}."] if EXPIRED in run.constants else []
-        click.echo("\n".join([f"{run.run}: {run.state}, {run.rows} poses", *results(run.results), *mark]))
+        after = next_steps(run, record.excluded(run.run))
+        click.echo("\n".join([f"{run.run}: {run.state}, {run.rows} poses", *results(run.results), *mark, *after]))
     if outcome.error is not None:
         notes(outcome.moving)
         raise outcome.error

@@ -181,6 +181,13 @@ class Record:
         with self._engine.connect() as at:
             return [Pose(**row._mapping) for row in at.execute(query)]
 
+    def excluded(self, run: str) -> dict[int, str]:
+        """Why each pose that is left out of every analysis is, by its number."""
+        chosen = (poses.c.run == run) & poses.c.excluded.is_not(None)
+        query = select(poses.c.number, poses.c.excluded).where(chosen).order_by(poses.c.number)
+        with self._engine.connect() as at:
+            return {row.number: row.excluded for row in at.execute(query)}
+
     def next_number(self, run: str) -> int:
         """The number of the next pose to be kept; excluded ones keep theirs."""
         with self._engine.connect() as at:

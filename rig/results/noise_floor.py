@@ -16,7 +16,7 @@ UPRIGHT_DEG = {"x": (0.0, 180.0), "y": (90.0, 270.0)}  # beta at +1 g and at -1 
 
 
 def evaluate(measured: Measured) -> dict[str, Result]:
-    """V, and deg for the inclination. Raises DataError where the still record is missing."""
+    """V, and deg for the inclination. Raises DataError where the still record, or a pose at +-1 g, is missing."""
     upright: list[Kept] = []
     still: list[Kept] = []
     for kept in measured.kept():
@@ -29,9 +29,16 @@ def evaluate(measured: Measured) -> dict[str, Result]:
             continue
         k = first.channels.index(channel)
         value, std = rms([kept.samples.volts[:, k] for kept in still])
-        plus, minus = (np.mean([u.dwell.means[channel] for u in upright if u.pose.beta_deg == b]) for b in betas)
-        inclination = hidden_inclination_deg(PEAK_TO_PEAK * value, float(plus - minus) / 2)
+        plus, minus = (_output(upright, channel, beta_deg) for beta_deg in betas)
+        inclination = hidden_inclination_deg(PEAK_TO_PEAK * value, (plus - minus) / 2)
         results[f"noise-rms-{axis}"] = Result(value, "V", std)
         results[f"noise-pp-{axis}"] = Result(PEAK_TO_PEAK * value, "V", PEAK_TO_PEAK * std)
         results[f"inclination-{axis}"] = Result(inclination, "deg", inclination * std / value if value else None)
     return results
+
+
+def _output(upright: list[Kept], channel: str, beta_deg: float) -> float:
+    found = [kept.dwell.means[channel] for kept in upright if kept.pose.beta_deg == beta_deg]
+    if not found:
+        raise DataError(f"there is no pose at alpha 90, beta {beta_deg:g} deg; `rig show RUN --poses` lists those kept")
+    return float(np.mean(found))

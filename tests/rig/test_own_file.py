@@ -48,7 +48,7 @@ def test_the_mapping_is_kept_with_the_run(rig: Rig) -> None:
         "columns": {"alpha_deg": "tilt", "beta_deg": "table", "vx_v": "Ux [mV]:mV"},
         "constants": {"sensor": "A7"},
     }
-    assert "'vx_v': 'Ux [mV]:mV'" in rig("show", run).out
+    assert "columns: vx_v = Ux [mV]:mV\n" in rig("show", run).out
 
 
 @pytest.mark.usefixtures("folder")

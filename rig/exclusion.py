@@ -1,0 +1,41 @@
+"""A person takes a pose out of every analysis, or in again: the pose stays, with the reason; results are made anew."""
+
+from __future__ import annotations
+
+from calibrations.errors import CalibrationError
+from rig.bench import Bench
+from rig.errors import RecordError
+from rig.lease import lease
+from rig.record import Record, Run
+from rig.results import documents, evaluated
+
+RESULTS = "results"  # the event that says how they were made anew
+
+
+def exclude(record: Record, run_id: str, number: int, reason: str | None) -> Run:
+    """Leave pose `number` out, with a reason; None takes it in again. The run as it is then.
+
+    Results of a complete run are evaluated again. Raises UnknownRun, RecordError for a pose that is not there, Busy
+    while a process works on the run.
+    """
+    run = record.run(run_id)
+    with lease(record.folder, run_id, f"run {run_id}"):
+        record.exclude(run_id, number, reason)
+        if run.state == "complete":
+            _evaluate_again(record, run)
+    return record.run(run_id)
+
+
+def _evaluate_again(record: Record, run: Run) -> None:
+    """The results of the poses that are left; none, and why, where they do not determine them."""
+    try:
+        found = evaluated(record, run)
+    except (CalibrationError, RecordError) as error:
+        record.set_results(run.run, {})
+        record.note(run.run, RESULTS, f"none: {error}")
+        return
+    if found:
+        record.set_results(run.run, documents(found, Bench.model_validate(run.bench).result_limits))
+        record.note(run.run, RESULTS, "evaluated again")
+    elif run.results:
+        record.note(run.run, RESULTS, "given by the procedure itself, which knew all poses; not evaluated again")

@@ -1,0 +1,147 @@
+"""A pose that is left out: it stays, with a reason and a date; results and tables are those of the others."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rig.exclusion import RESULTS, exclude
+from rig.lease import lease
+from rig.record import Record
+from rig.record.measured import table_of
+from rig.runner import resume, start
+from tests.rig.rigging import POSES, Onlooker, in_own_process, signal_at, small_sweep
+
+Rig = Callable[..., Any]
+pytestmark = pytest.mark.sockets
+
+NOISE = ("run", "noise-floor", "--duration-s", "3", "--block-s", "1", "--dwell-s", "0.2", "--unattended", "--json")
+
+
+@pytest.fixture
+def run(rig: Rig) -> str:
+    """A small noise floor: poses 0 to 3 at +-1 g, 4 to 6 the still record."""
+    return str(json.loads(rig(*NOISE).out)["run"])
+
+
+def results(run: str) -> dict[str, Any]:
+    with Record() as record:
+        return dict(record.run(run).results)
+
+
+def events(run: str) -> list[tuple[str, str]]:
+    with Record() as record:
+        return [(event.what, event.text) for event in record.events(run)]
+
+
+def test_results_are_those_of_the_other_poses_and_come_back(rig: Rig, run: str) -> None:
+    before = results(run)
+    ended = rig("exclude", run, "5", "--reason", "a lorry passed", "--json")
+    document = json.loads(ended.out)
+    assert ended.status == 0
+    assert {k: document[k] for k in ("schema", "run", "pose", "excluded")} == {
+        "schema": "rig.exclude/1",
+        "run": run,
+        "pose": 5,
+        "excluded": "a lorry passed",
+    }
+    assert document["results"] == results(run) != before
+    assert ("pose 5 excluded", "a lorry passed") in events(run)
+    assert (RESULTS, "evaluated again") in events(run)
+    assert json.loads(rig("exclude", run, "5", "--include", "--json").out)["excluded"] is None
+    assert results(run) == before
+
+
+def test_it_is_said_in_words(rig: Rig, run: str) -> None:
+    text = rig("exclude", run, "5", "--reason", "a lorry passed").out
+    assert f"{run}: pose 5 is left out: a lorry passed\nresults: evaluated again" in text
+    assert "noise-rms-x" in text
+    shown = rig("show", run, "--poses").out
+    assert "Left out: pose 5 (a lorry passed)" in shown
+    assert shown.rstrip().splitlines()[-2].endswith("a lorry passed")
+    assert rig("exclude", run, "5", "--include").out.startswith(f"{run}: pose 5 is taken in again")
+
+
+def test_poses_that_do_not_determine_the_results_leave_none(rig: Rig, run: str) -> None:
+    assert "results: none: there is no pose at alpha 90, beta 0 deg" in rig("exclude", run, "0", "--reason", "x").out
+    assert results(run) == {}
+    assert rig("show", run).status == 0
+
+
+def test_even_without_any_pose_it_can_be_shown(rig: Rig) -> None:
+    with Record() as record:
+        run = start(record, *_small()).run.run
+        for number in range(POSES):
+            exclude(record, run, number, "all wrong")
+    assert json.loads(rig("show", run, "--json").out)["columns"] == {}
+    assert len(json.loads(rig("show", run, "--poses", "--json").out)["kept"]) == POSES
+
+
+def _small() -> tuple[Any, ...]:
+    from rig.bench import read_bench
+
+    return read_bench(), *small_sweep(), Onlooker()
+
+
+def test_a_stopped_run_measures_the_pose_again(rig: Rig) -> None:
+    in_own_process("run", "sweep", "--step-deg", "90", "--dwell-s", "0.2", harm=signal_at("poses", 5, "SIGTERM"))
+    with Record() as record:
+        (stopped,) = record.runs()
+        number = stopped.rows - 1
+        text = rig("exclude", stopped.run, str(number), "--reason", "touched").out
+        assert "Next: rig resume" in text
+        pose = list(record.kept(stopped.run))[number].pose
+        done = resume(record, stopped.run, Onlooker())
+        again = [kept for kept in record.kept(stopped.run) if kept.pose == pose]
+        assert [kept.excluded for kept in again][:2] == ["touched", None]
+        assert table_of(record, stopped.run).n == done.run.rows - 1
+
+
+def test_what_the_procedure_gave_itself_stays(tmp_path: Path) -> None:
+    from procedures.catalogue import find
+    from rig.bench import read_bench
+
+    (tmp_path / "weigh.py").write_text(
+        '"""weigh: a result."""\nfrom procedures.session import Pose\n\n'
+        "def weigh(rig):\n    rig.hold(Pose(0, 0), 0.1, 0)\n"
+        '    return {"mass": {"value": 2.0, "unit": "g"}}\n'
+    )
+    with Record() as record:
+        run = start(record, read_bench(), find("weigh", tmp_path), {}, Onlooker()).run.run
+        assert exclude(record, run, 0, "why not").results["mass"]["value"] == 2.0
+    assert events(run)[-1][0] == RESULTS
+
+
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        (("99", "--reason", "x"), "has no pose 99; `rig show .* --poses` lists"),
+        (("1",), "say why the pose is left out"),
+        (("1", "--reason", " "), "say why"),
+        (("1", "--reason", "x", "--include"), "say why"),
+        (("one", "--reason", "x"), "'one' is not a valid integer"),
+    ],
+)
+def test_what_cannot_be_is_refused(rig: Rig, run: str, words: tuple[str, ...], why: str) -> None:
+    import re
+
+    before = events(run)
+    ended = rig("exclude", run, *words)
+    assert (ended.status, ended.out) == (2, "")
+    assert re.search(why, ended.err)
+    assert events(run) == before
+
+
+def test_an_unknown_run_is_named(rig: Rig, run: str) -> None:
+    assert f"Did you mean '{run}'" in rig("exclude", run[:-1], "1", "--reason", "x").err
+
+
+def test_a_run_that_goes_on_is_left_alone(rig: Rig, run: str) -> None:
+    with Record() as record, lease(record.folder, run, "it"):
+        ended = rig("exclude", run, "1", "--reason", "x")
+    assert ended.status == 2
+    assert f"works on run {run}; let it finish" in ended.err

@@ -1,0 +1,94 @@
+"""After a run: what each verdict asks for, which poses are left out, and what is called next."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rig.cli.verdicts import REMEDIES, lines, next_steps
+from rig.record import Run
+
+RUN = Run("r1", "poses", "sweep", "complete", {}, {}, {}, "", {}, "", "", None, None, {}, 20)
+
+
+def result(verdict: str | None, limit: float | None = 1.0) -> dict[str, Any]:
+    return {"value": 1.0, "std": 0.1, "unit": "V", "limit": limit, "verdict": verdict}
+
+
+def steps(run: Run = RUN, excluded: dict[int, str] | None = None, **results: dict[str, Any]) -> str:
+    named = {name.replace("_", "-"): each for name, each in results.items()}
+    return "\n".join(next_steps(replace(run, results=named), excluded or {}))
+
+
+def test_a_failure_says_what_to_check_once_for_all_of_a_kind() -> None:
+    text = steps(noise_rms_x=result("fail"), noise_pp_x=result("fail"), level_x=result("fail"), fine=result("pass"))
+    assert "Fail: noise-rms-x and noise-pp-x: look for vibration" in text
+    assert "Fail: level-x: level the base" in text
+    assert "fine" not in text
+
+
+def test_a_remedy_names_its_run_and_sensors_are_one_kind() -> None:
+    text = steps(**{"a1/rmse-linear-x": result("fail"), "a2/rmse-linear-x": result("fail")})
+    assert "Fail: a1/rmse-linear-x and a2/rmse-linear-x: see where the model fails: rig compare r1" in text
+
+
+def test_something_unheard_of_is_looked_for_among_the_poses() -> None:
+    assert "Fail: mass: look for poses unlike the others: rig show r1 --poses" in steps(mass=result("fail"))
+
+
+@pytest.mark.parametrize(
+    ("settings", "hint"),
+    [
+        ({"duration_s": 60.0, "dwell_s": 2.0}, " (--duration-s 240)"),
+        ({"times": 5, "dwell_s": 2.0}, " (--times 20)"),
+        ({"dwell_s": 5.0}, " (--dwell-s 20)"),
+        ({}, ""),
+    ],
+)
+def test_what_is_marginal_is_measured_longer(settings: dict[str, Any], hint: str) -> None:
+    text = steps(replace(RUN, settings=settings), noise_rms_x=result("marginal"))
+    assert (
+        f"Marginal: noise-rms-x reaches across the limit with its uncertainty: measuring 4 times as long{hint} halves"
+        in text
+    )
+
+
+def test_results_without_a_limit_say_where_limits_are_set() -> None:
+    assert "limits.results of the bench file takes them, such as `amplitude: ...`" in steps(
+        amplitude=result(None, None)
+    )
+    assert "limits.results" not in steps(amplitude=result("pass"))
+
+
+def test_the_next_command_is_named() -> None:
+    assert steps().endswith("Next: rig compare r1, rig discover r1, rig report r1 --out report.html")
+    assert steps(replace(RUN, state="stopped")) == "Next: rig resume r1"
+    assert steps(replace(RUN, kind="still")) == ""
+    assert "rig compare r1/a1," in steps(replace(RUN, bench={"sensors": {"a1": {}, "a2": {}}}))
+
+
+def test_poses_that_are_left_out_are_named_with_their_reasons() -> None:
+    assert "Left out: pose 6 (repeated by hand); pose 9 (a lorry)" in steps(
+        excluded={6: "repeated by hand", 9: "a lorry"}
+    )
+
+
+def test_every_command_that_a_remedy_names_is_there() -> None:
+    named = {name for text in REMEDIES.values() for name in re.findall(r"rig ([a-z]+)", text)}
+    there = {path.stem for path in Path(__file__).parents[2].glob("rig/cli/*.py")}
+    assert named <= there
+
+
+def test_results_are_a_table() -> None:
+    both = {"a": result("fail", 1.0), "b": {**result("pass"), "limit": [0.0, 2.0]}, "c": result(None, None)}
+    assert [line.split() for line in lines(both)] == [
+        ["result", "value", "limit", "verdict"],
+        ["a", "1.00(10)", "V", "+-1", "fail"],
+        ["b", "1.00(10)", "V", "0", "..", "2", "pass"],
+        ["c", "1.00(10)", "V", "-"],
+    ]
+    assert lines({}) == []
