@@ -92,7 +92,7 @@ class Number(Question):
 
 @dataclass(frozen=True)
 class Dial(Number):
-    """What a person reads after setting `stage` to `expected`, which yes or nothing stands for; None: a reading only."""
+    """What a person reads on `stage`, set to `expected` before, which yes or nothing stands for; None: only read."""
 
     repeated: bool = True
     stage: str = ""

@@ -10,6 +10,7 @@ from __future__ import annotations
 from drivers.errors import LimitError
 from procedures.errors import SettingError
 from procedures.level_check import levelled
+from procedures.questions import PowerCycle, Remount
 from procedures.session import Session
 from procedures.tumbles import is_first, tumble
 
@@ -50,7 +51,8 @@ def _power_cycle(rig: Session, number: str, off_s: float, warm_s: float) -> None
     try:
         rig.adc.power(False)
     except LimitError:  # no line does it
-        rig.confirm(f"power-cycle-{number}", f"Have you switched the sensor off for {off_s:g} s, and on again?")
+        text = f"Have you switched the sensor off for {off_s:g} s, and on again?"
+        rig.have_done(PowerCycle(f"power-cycle-{number}", text, off_s=off_s))
     else:
         rig.wait(off_s)
         rig.adc.power(True)
@@ -61,4 +63,4 @@ def _remount(rig: Session, number: str) -> None:
     """At alpha = 0, where the sensor lies flat."""
     rig.alpha.move_to(0.0)
     text = "Have you taken the sensor off the table, and mounted it again the same way, face up?"
-    rig.confirm(f"remount-{number}", text, drawing="face-up")
+    rig.have_done(Remount(f"remount-{number}", text, drawing="face-up"))

@@ -286,8 +286,13 @@ class Session:
 
     def confirm(self, name: str, text: str, drawing: str = "") -> None:
         """A person confirms `text`; `name` is its key in a file of answers. Raises Declined, NoAnswer."""
-        if self.host.ask(Confirm(name, text, drawing)) == "no":
-            raise Declined(f'{name}: "{text}" was answered with no; put it right, then resume the run')
+        self.have_done(Confirm(name, text, drawing))
+
+    def have_done(self, question: Confirm) -> None:
+        """A person does what `question` says, and confirms it. Raises Declined, NoAnswer."""
+        if self.host.ask(question) == "no":
+            asked = f'{question.name}: "{question.text}"'
+            raise Declined(f"{asked} was answered with no; put it right, then resume the run")
 
     def number(self, name: str, text: str, unit: str, low: float, high: float) -> float:
         """A number that a person reads off and types. Raises NoAnswer."""

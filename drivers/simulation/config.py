@@ -24,6 +24,7 @@ from drivers.simulation.oddities import Oddities
 from drivers.simulation.plates import Plates
 from drivers.simulation.positioner import Positioner
 from drivers.simulation.scatter import Spread
+from drivers.simulation.seating import Seating
 from drivers.simulation.springs import Springs
 from drivers.simulation.stage import Stage
 from drivers.simulation.supply import Supply
@@ -65,6 +66,7 @@ class WorldConfig:
 
     stages: Stages = field(default_factory=Stages)
     base: Base = field(default_factory=Base)
+    seating: Seating = field(default_factory=Seating)
     sensor: Sensor = field(default_factory=Sensor)
     heat: Heat = field(default_factory=Heat)
     oven: Oven = field(default_factory=Oven)
@@ -140,6 +142,7 @@ ADXL203: dict[str, Any] = {
         "beta": {"zero_offset_deg": 0.05, "play_deg": 0.02, "wobble_deg": 0.03, "wobble_phase_deg": 40.0},
     },
     "base": {"tilt_x_deg": 0.04, "tilt_y_deg": -0.03},
+    "seating": {"tilt_deg": 0.02, "grip_pm": 1.0},
     "sensor": {
         "package": {"turn_x_deg": 0.75, "turn_y_deg": -1.3, "turn_z_deg": 0.33, "beams_off_square_deg": 0.17},
         "x": {

@@ -123,8 +123,8 @@ def displaced_nm(
     x, y = springs.balanced_nm(sx.springs, sy.springs, gx, gy, heat.die_c(world) - REFERENCE_C)
     sag = gz * springs.per_g_nm(config.sensor.sag_resonance_hz)
     fault = oddities.displacement_nm(world, odd, world.table_deg[1], t_s)
-    moved_x = fault + moved_nm(world, sx, odd, world.seats_nm[0], x, y, gy, sag)
-    moved_y = fault + moved_nm(world, sy, odd, world.seats_nm[1], y, x, gx, sag)
+    moved_x = fault + world.grip_nm[0] + moved_nm(world, sx, odd, world.seats_nm[0], x, y, gy, sag)
+    moved_y = fault + world.grip_nm[1] + moved_nm(world, sy, odd, world.seats_nm[1], y, x, gx, sag)
     return moved_x, moved_y, sag
 
 

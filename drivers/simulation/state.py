@@ -33,6 +33,7 @@ class State:
     table_deg: Floats = field(default_factory=zeros(2))  # behind the gear play
     up: Floats = field(default_factory=zeros(3))  # the vertical in the base
     mount: Floats = field(default_factory=zeros(3, 3))  # package from table
+    grip_nm: Floats = field(default_factory=zeros(2))  # displacement by the clamp that holds the package
     carriage: Floats = field(default_factory=zeros(3, positioner.PIECES, positioner.TERMS))  # its motion in x, y, z
     carriage_rest_ns: Ints = field(default_factory=zeros(3, dtype=int))  # when it has settled
 

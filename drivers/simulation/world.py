@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from drivers.simulation import dwell, gravity, level, mechanics, positioner, sampling, stage, state, visit
+from drivers.simulation import dwell, gravity, level, mechanics, positioner, sampling, seating, stage, state, visit
 from drivers.simulation.beginning import beginning
 from drivers.simulation.config import WorldConfig
 from drivers.simulation.errors import TimeReversal, UnknownInput, nearest
@@ -30,7 +30,7 @@ class World:
     def __init__(self, config: WorldConfig, seed: int, place: int = 0) -> None:
         self.config = individual(config, seed, place)
         self._numbers = record(self.config)
-        self._seed = seed
+        self._seed, self._number = seed, place
         own = [place] if place else []
         self._slow, self._fast, self._room = (
             np.random.Generator(np.random.PCG64(key)) for key in ([seed, 1, *own], [seed, 2, *own], [seed, 3])
@@ -79,11 +79,13 @@ class World:
         return positioner.read_um(self._numbers.positioner, self._world.carriage[number], times, salt)
 
     def mount_sensor(self, mount_deg: float = 0.0, flip: int = 0) -> None:
-        """Put the sensor on the table turned by `mount_deg` about its z axis, face down if `flip`.
+        """Put the sensor on the table turned by `mount_deg` about its z axis, face down if `flip`; see seating.
 
         Like `power`, it shows in the outputs from the next tick on, within 0.1 s.
         """
-        self._world.mount = gravity.mounting(self.config.sensor.package, mount_deg, flip)
+        tilt, grip_nm = seating.seated(self.config.seating, self._seed, self._number, int(self._world.now_ns))
+        self._world.mount = gravity.mounting(self.config.sensor.package, mount_deg, flip) @ tilt
+        self._world.grip_nm = grip_nm
 
     def power(self, on: bool) -> None:
         """Switch the sensor's supply. Without it the outputs fall to 0 V and the sensor cools."""

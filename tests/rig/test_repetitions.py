@@ -93,6 +93,24 @@ def test_repetitions_of_every_kind_are_in_the_budget(rig: Rig, with_line: str) -
     assert all(each["std"] > 0 for each in found.values())
 
 
+@pytest.mark.sockets
+def test_what_the_technician_does_by_hand_is_in_the_budget(rig: Rig, tmp_path: Path) -> None:
+    document = bench({})
+    document["world"] = {"preset": "ideal", "noise": {"white_v": 1e-5}, "seating": {"tilt_deg": 0.02, "grip_pm": 20.0}}
+    path = tmp_path / "bench.yaml"
+    path.write_text(yaml.safe_dump(document))
+    ended = rig("run", "repeat", "--times", "6", "--off-s", "30", "--warm-s", "5", "--bench", str(path), *FAST)
+    ended = json.loads(ended.out)
+    found, moved_v = ended["results"], 0.020 / 8.2  # 20 pm of the 8.2 nm that 1 g displaces
+    assert found["bias-as-is-x"]["value"] < 1e-5
+    assert 0.4 * moved_v < found["bias-mount-x"]["value"] < 1.7 * moved_v  # of six mountings
+    with Record() as record:
+        state: Any = record.state(ended["run"])
+        asked = [event.what for event in record.events(ended["run"]) if event.what.startswith("answer ")]
+    assert state["rig"]["world"]["world"]["powered_ns"] > 30e9
+    assert [what for what in asked if "-3" in what] == ["answer power-cycle-3", "answer remount-3"]
+
+
 def test_a_plan_says_who_switches_the_power(with_line: str) -> None:
     repeat = find("repeat")
     settings = parse(repeat, {"times": "2", "mount": "false"})
