@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers import labjack_t7_table as t7
-from drivers.errors import LimitError, OverRange, Refused, StreamError
+from drivers.errors import DriverError, LimitError, OverRange, Refused, StreamError
 from drivers.instrument import Check, Identity
 from drivers.labjack_t7_reception import Reception
 from drivers.labjack_t7_stream import Calibration
@@ -117,10 +117,10 @@ class T7:
 
     def acquire_with(self, duration_s: float, reading: Callable[[], Read]) -> tuple[Samples, Read]:
         """The same, and what `reading` gives in the middle of it, while the device records on."""
-        stream = self.stream(duration_s, duration_s / 2)
-        blocks = [next(stream)]
-        read = reading()
-        blocks += stream
+        with contextlib.closing(self.stream(duration_s, duration_s / 2)) as stream:
+            blocks = [next(stream)]
+            read = reading()
+            blocks += stream
         first = blocks[0]
         volts = np.concatenate([block.volts for block in blocks])
         return Samples(volts, first.channels, first.rate_hz, first.start_s), read
@@ -148,8 +148,11 @@ class T7:
                 codes = reception.take(min(block, scans - first))
                 self._require_in_range(codes, channels)
                 yield Samples(self._volts[codes], channels, rate_hz, start_s + first / rate_hz)
-        finally:
-            self._stop()
+        except BaseException:
+            with contextlib.suppress(DriverError):  # what went wrong first is to be told
+                self._stop()
+            raise
+        self._stop()
 
     def _require_in_range(self, codes: NDArray[np.uint16], channels: tuple[str, ...]) -> None:
         """A sample at an end of the range stands for any voltage beyond it, and its mean for none at all."""

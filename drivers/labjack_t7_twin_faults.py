@@ -12,7 +12,7 @@ FAULTS = {
     "overflow": Kind("skips so many scans and says so, once", 50, "scan"),
     "buffer-full": Kind("says that its buffer ran over, and streams no more, once"),
     "stall": Kind("streams nothing, though it was started"),
-    "lost-packet": Kind("leaves out a packet, once"),
+    "lost-packet": Kind("leaves out the second packet of a stream"),
     "over-range": Kind("has the first input beyond its range now and then"),
     "endless": Kind("streams on when it is told to stop"),
     "restart": Kind("is without power for a moment: forgets all, and drops its connections, once"),
@@ -30,7 +30,8 @@ def spoilt(data: bytes, samples: int, faults: Faults, now_s: float) -> bytes:
         packets["status"][0], packets["additional"][0] = RECOVERED, strike.size
     if faults.once("buffer-full", now_s):
         packets["status"][-1] = BUFFER_FULL
-    return packets[1 if faults.once("lost-packet", now_s) else 0 :].tobytes()
+    lost = faults.size("lost-packet", now_s) is not None
+    return bytes(packets[packets["transaction"] != 1].tobytes() if lost else packets.tobytes())
 
 
 def ends(data: bytes, samples: int) -> bool:

@@ -150,7 +150,7 @@ class RotaryStage:
     def wait(self) -> None:
         """Return when the move that was started has ended where it should. Raises StageAlarm, NotSettled."""
         self._until_expected_end()
-        self._poll_until(az.IN_POSITION, PATIENCE_S, "is still moving, or not in position,")
+        self._require_coordinates(self._poll_until(az.IN_POSITION, PATIENCE_S, "is still moving, or not in position,"))
         self._watch(False)
         angle = self.angle_deg()
         if abs(angle - self._target_deg) > self.settings.settle_deg:
@@ -170,11 +170,11 @@ class RotaryStage:
 
     def halt(self) -> None:
         """Let it brake, whatever it is doing, and return at once; `stop` must follow."""
-        self._unit.write(az.INPUTS, az.STOP)
+        self._unit.write(az.INPUTS, az.STOP, retries=0)  # others wait to be told
 
     def stop(self) -> None:
         """Brake to a standstill, whatever the stage is doing. An alarm is no reason to doubt a standstill."""
-        self.halt()
+        self._unit.write(az.INPUTS, az.STOP)
         try:
             self._poll_until(0, STOPPING_S, "has not stopped", self._outputs)
         finally:
@@ -201,7 +201,7 @@ class RotaryStage:
     def _require_coordinates(self, outputs: int) -> None:
         if not outputs & az.HOME_END:
             raise StageLost(
-                f"{self.name}: does not know where it is; nothing was sent",
+                f"{self.name}: does not know where it is, and is not sent anywhere",
                 "Find out whether it was without power or was stopped while homing; it is homed when the run resumes",
             )
 
@@ -247,12 +247,12 @@ class RotaryStage:
 
     def _poll_until(
         self, wanted: int, timeout_s: float, complaint: str, outputs: Callable[[], int] | None = None
-    ) -> None:
-        """Wait for a standstill with the `wanted` outputs on; an alarm ends it unless only `outputs` are looked at."""
+    ) -> int:
+        """The outputs at a standstill with the `wanted` ones on; an alarm ends it unless `outputs` passes over it."""
         deadline = self._clock.now() + timeout_s
         while True:
-            if _stands((outputs or self._status)(), wanted):
-                return
+            if _stands(now := (outputs or self._status)(), wanted):
+                return now
             if self._clock.now() >= deadline:
                 remedy = "Look at the stage: is it blocked? Then home it and repeat"
                 raise NotSettled(f"{self.name}: {complaint} after {timeout_s:g} s", remedy)

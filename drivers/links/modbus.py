@@ -6,6 +6,7 @@ Every failure is raised with the instrument, the register and a remedy (see driv
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 
 from pymodbus.exceptions import ModbusException
@@ -22,6 +23,8 @@ from drivers.errors import BadFrame, LinkError, LinkRefused, LinkTimeout, Refuse
 from drivers.links.link import Link
 from drivers.links.register import Register
 from drivers.links.url import Url
+
+logging.getLogger("pymodbus").addHandler(logging.NullHandler())  # what it says of a bad frame, our errors say better
 
 TIMEOUT_S = 0.5  # for one answer; the slowest instrument needs a tenth of it
 LATE_S = 2 * TIMEOUT_S  # of quiet, after which no answer to an earlier request comes any more
@@ -47,7 +50,7 @@ class Bus:
         self._transaction = 0
         self._owed = False  # whether answers may still come to what was asked before
 
-    def ask(self, request: ModbusPDU, unit: int, what: str) -> ModbusPDU:
+    def ask(self, request: ModbusPDU, unit: int, what: str, retries: int = RETRIES) -> ModbusPDU:
         """The answer of `unit`; `what` begins every error, as in 'alpha: reading register 0x0080 (alarm)'.
 
         Raises Refused, or after the retries LinkTimeout, BadFrame or WrongUnit.
@@ -55,7 +58,7 @@ class Bus:
         request.dev_id = unit
         self._let_late_answers_pass(request)
         try:
-            for _ in range(RETRIES):
+            for _ in range(retries):
                 try:
                     return self._attempt(request, what)
                 except (LinkTimeout, BadFrame, WrongUnit):
@@ -142,24 +145,24 @@ class Unit:
         request = ReadHoldingRegistersRequest(address=address, count=count)
         return self._bus.ask(request, self._unit, f"{self.name}: reading {doc}").registers
 
-    def write(self, register: Register, value: float) -> None:
+    def write(self, register: Register, value: float, retries: int = RETRIES) -> None:
         """Set one register; one word goes as function 06, two as 10h."""
         words = register.encode(value)
         if len(words) > 1:
-            self.write_words(register.address, words, str(register))
+            self.write_words(register.address, words, str(register), retries)
         else:
             request = WriteSingleRegisterRequest(address=register.address, registers=words)
-            self._bus.ask(request, self._unit, f"{self.name}: writing {register}")
+            self._bus.ask(request, self._unit, f"{self.name}: writing {register}", retries)
 
     def write_block(self, *values: tuple[Register, float]) -> None:
         """Set registers that follow each other without a gap, in one exchange."""
         words = [word for register, value in values for word in register.encode(value)]
         self.write_words(values[0][0].address, words, str(values[0][0]))
 
-    def write_words(self, address: int, words: Sequence[int], doc: str) -> None:
+    def write_words(self, address: int, words: Sequence[int], doc: str, retries: int = RETRIES) -> None:
         """Set neighbouring words as they are on the wire."""
         request = WriteMultipleRegistersRequest(address=address, registers=words)
-        self._bus.ask(request, self._unit, f"{self.name}: writing {doc}")
+        self._bus.ask(request, self._unit, f"{self.name}: writing {doc}", retries)
 
     def read_bit(self, address: int, doc: str, coil: bool = False) -> bool:
         """One discrete input (function 02), or one coil (01)."""

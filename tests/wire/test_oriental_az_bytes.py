@@ -56,7 +56,7 @@ def test_angle_is_the_feedback_position(stage: Stages) -> None:
 
 
 def test_a_move_is_one_block_and_sleeps_through_its_duration(stage: Stages, clock: SimulatedClock) -> None:
-    stage([*START, (ASK_STATUS, STANDING), (ASK_POSITION, AT_8500)]).move_to(85.0)
+    stage([*START, (ASK_STATUS, HOMED), (ASK_POSITION, AT_8500)]).move_to(85.0)
     assert clock.now() == pytest.approx(130 / 20 + 20 / 15, abs=0.01)  # 130 deg: a trapezoid of speed
 
 
@@ -65,7 +65,7 @@ def test_where_it_stands_already_it_is_not_sent(stage: Stages) -> None:
 
 
 def test_a_move_that_lasts_longer_is_polled(stage: Stages) -> None:
-    stage([*START, (ASK_STATUS, MOVING), (ASK_STATUS, STANDING), (ASK_POSITION, AT_8500)]).move_to(85.0)
+    stage([*START, (ASK_STATUS, MOVING), (ASK_STATUS, HOMED), (ASK_POSITION, AT_8500)]).move_to(85.0)
 
 
 @pytest.mark.parametrize("angle", [100.01, -90.01, math.inf, math.nan])
@@ -75,7 +75,7 @@ def test_outside_its_limits_nothing_is_sent(stage: Stages, angle: float) -> None
 
 
 def test_arrival_is_measured_not_assumed(stage: Stages) -> None:
-    exchanges = [*START, (ASK_STATUS, STANDING), (ASK_POSITION, AT_8400)]
+    exchanges = [*START, (ASK_STATUS, HOMED), (ASK_POSITION, AT_8400)]
     with pytest.raises(NotSettled, match=r"alpha: stands at 84.000 deg instead of 85.000 deg"):
         stage(exchanges).move_to(85.0)
 
@@ -92,7 +92,7 @@ def test_with_an_alarm_no_move_is_started(stage: Stages) -> None:
 
 
 def test_without_coordinates_it_is_not_moved_blindly(stage: Stages) -> None:
-    with pytest.raises(StageLost, match=r"alpha: does not know where it is; nothing was sent\. Find out"):
+    with pytest.raises(StageLost, match=r"alpha: does not know where it is, and is not sent anywhere\. Find out"):
         stage([(ASK_STATUS, STANDING)]).move_to(85.0)
 
 
@@ -109,7 +109,7 @@ def test_the_drive_is_told_to_watch_over_its_controller_for_as_long_as_it_moves(
     told = "01 10 13 8A 00 02 64 A6"
     on, off = "01 10 13 8A 00 02 04 00 00 03 E8 A2 3E", "01 10 13 8A 00 02 04 00 00 00 00 A2 80"
     beats = [(ASK_STATUS, MOVING)] * 31
-    moved = [*START[:2], (on, told), START[2], *beats, (ASK_STATUS, STANDING), (off, told), (ASK_POSITION, AT_8500)]
+    moved = [*START[:2], (on, told), START[2], *beats, (ASK_STATUS, HOMED), (off, told), (ASK_POSITION, AT_8500)]
     watched = dataclasses.replace(SETTINGS, communication_timeout_s=1.0)
     oriental_az.connect(script(moved), links, watched, "alpha").move_to(85.0)
     assert clock.now() == pytest.approx(130 / 20 + 20 / 15, abs=0.01)
