@@ -19,15 +19,15 @@ def level_check(rig: Session, *, settle_s: float = 2.0) -> None:
 
     Other procedures begin with it where the bench has limits.level_deg. Raises SafetyLimit.
     """
+    again = all(_is_read(rig, side) for side, _ in HALF_TURN) and _refused(rig)  # the base was levelled since
     for side, beta_deg in HALF_TURN:
-        if rig.reading(f"level-{side}-y") is None:
+        if again or not _is_read(rig, side):
             _read(rig, side, beta_deg, settle_s)
-    x_deg, y_deg = tilt_deg(rig)
-    limit = rig.limits.level_deg
-    if limit is not None and max(abs(x_deg), abs(y_deg)) > limit:
+    if _refused(rig):
+        x_deg, y_deg = tilt_deg(rig)
         raise SafetyLimit(
             f"the table is tilted by {x_deg:.3f} deg along x and {y_deg:.3f} deg along y, more than "
-            f"limits.level_deg = {limit:g}; level the base and the zero of alpha, then start a new run"
+            f"limits.level_deg = {rig.limits.level_deg:g}; level the base and the zero of alpha, then resume the run"
         )
 
 
@@ -48,6 +48,16 @@ def tilt_deg(rig: Session) -> tuple[float, float]:
 def reversal(front_deg: float, back_deg: float) -> tuple[float, float]:
     """(tilt, the level's own offset) from its readings before and after half a turn, deg."""
     return (front_deg - back_deg) / 2, (front_deg + back_deg) / 2
+
+
+def _is_read(rig: Session, side: str) -> bool:
+    return rig.reading(f"level-{side}-y") is not None
+
+
+def _refused(rig: Session) -> bool:
+    """Whether the table, as it was read, is not level enough to go on."""
+    limit = rig.limits.level_deg
+    return limit is not None and max(map(abs, tilt_deg(rig))) > limit
 
 
 def _read(rig: Session, side: str, beta_deg: float, settle_s: float) -> None:

@@ -295,8 +295,8 @@ class Session:
             raise Declined(f"{asked} was answered with no; put it right, then resume the run")
 
     def number(self, name: str, text: str, unit: str, low: float, high: float) -> float:
-        """A number that a person reads off and types. Raises NoAnswer."""
-        return float(self.host.ask(Number(name, text, unit=unit, low=low, high=high)))
+        """A number that a person reads off and types, anew each time. Raises NoAnswer."""
+        return float(self.host.ask(Number(name, text, unit=unit, low=low, high=high, repeated=True)))
 
     def wait(self, seconds: float) -> None:
         """Let time pass."""
