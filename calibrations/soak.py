@@ -79,6 +79,12 @@ class Soak:
     def axes(self) -> tuple[str, ...]:
         return tuple(dict.fromkeys(course.axis for course in self.courses.values()))
 
+    @property
+    def left_out(self) -> int:
+        """How many reversals are in no course."""
+        all_of = {path for path in self.table.labels["path"] if path.startswith(REVERSAL)}
+        return len(all_of) - len(next(iter(self.courses.values())).t_s)
+
     def time_s(self, axis: str = "") -> Quantity | None:
         """Steady-state time of an axis, or of all: the latest of its quantities; None where one is not reached."""
         times = [course.time_s for course in self.courses.values() if course.axis.startswith(axis)]

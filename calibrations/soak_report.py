@@ -71,6 +71,8 @@ def _summary(found: Soak) -> str:
             f" The temperature wandered by {plain(wander_k, 2)} K beside the sensor's own warming: this is no soak at "
             "constant ambient, and the drift is in part the room's."
         )
+    if found.left_out:
+        text += f" {found.left_out} reversals are left out, interrupted or before the oven was warm."
     if found.gaps:
         text += f" It was interrupted {len(found.gaps)} times, for {_length(sum(gap.length_s for gap in found.gaps))}"
         text += " in all: the fit takes the sensor to have stayed powered."
@@ -83,7 +85,8 @@ def _figures(found: Soak) -> list[tuple[str, str, str]]:
     for axis in found.axes:
         time, bias = found.time_s(axis), found.courses[f"bias-{axis}"]
         if bias.state is not None:
-            drift = f"bias drifts by {_signed(1e3 * bias.state.drift[0])} mV"
+            change = f"{_signed(1e3 * bias.state.drift[0])} mV"
+            drift = f"bias drifts by {change}" if bias.state.terms else "no drift of the bias told from noise"
             shown.append((f"steady state, axis {axis}", f"{_hours(time)} h" if time else "not reached", drift))
     wander_k = found.temperature_wander_k
     if wander_k is not None:
@@ -105,13 +108,13 @@ def _course(course: Course) -> dict[str, Any]:
             "tau": "–",
             "time": "–",
         }
-    taus = [f"{measured(*(each / HOUR_S for each in term.tau_s))} h" for term in state.terms]
+    taus = [measured(*(each / HOUR_S for each in term.tau_s)) for term in state.terms]
     return row | {
         "final": measured(*(1e3 * each for each in state.final)),
         "drift": measured(*(1e3 * each for each in state.drift)) if state.terms else "none told from noise",
         "tolerance": plain(1e3 * state.tolerance, 2),
         "tau": joined(taus) if taus else "–",
-        "time": f"{_hours(course.time_s)} h" if course.time_s else "not reached",
+        "time": _hours(course.time_s) if course.time_s else "not reached",
     }
 
 

@@ -1,4 +1,4 @@
-"""soak: hours of warm-up, held still, every sample kept; bias and scale factor from reversals in between.
+"""soak: hours of warm-up held still; bias and scale factor from reversals.
 
 Excites   warm-up and other slow drift of bias and scale factor; noise of every time scale up to hours.
 Blind to  drift that is over before the second reversal; the room's temperature, which drifts like the sensor.

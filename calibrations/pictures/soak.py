@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
 
 from calibrations.pictures.album import Picture
-from calibrations.pictures.style import AMBER, BAND, BLUE, FAINT, GREEN, INK, QUIET, VERMILION, panels, styled
+from calibrations.pictures.style import AMBER, BAND, BLUE, GREEN, INK, QUIET, VERMILION, panels, styled
 from calibrations.soak import HOUR_S, Course, Soak
 from calibrations.table import Array
 
@@ -88,6 +89,9 @@ def allan(found: Soak) -> Figure:
         ax.loglog(times_s, 1e6 * deviations, "o-", color=COLOURS[axis], label=f"axis {axis}")
     ax.loglog(times_s, 1e6 * deviations[0] * np.sqrt(times_s[0] / times_s), color=QUIET, ls=":", label="white noise")
     ax.set(xlabel="time of a mean (s)", ylabel="Allan deviation (µV)")
+    for side in (ax.xaxis, ax.yaxis):
+        side.set_major_formatter(FuncFormatter(_plainly))
+        side.set_minor_formatter(FuncFormatter(_plainly))
     ax.legend()
     return figure
 
@@ -97,17 +101,18 @@ def _course(ax: Axes, found: Soak, course: Course, factor: float, label: str) ->
     state, final, colour = course.state, _final(course), COLOURS[course.axis]
     if course.quantity == "bias":
         line = _still(found, course)
-        ax.plot(line[0] / HOUR_S, factor * (line[1] - final), color=BAND, lw=0.8, zorder=0.8)
+        ax.plot(line[0] / HOUR_S, factor * (line[1] - final), color=QUIET, alpha=0.45, lw=0.7, zorder=0.8)
     if state is not None:
-        ax.axhspan(-factor * state.tolerance, factor * state.tolerance, color=FAINT, lw=0, zorder=0.4)
+        ax.axhspan(-factor * state.tolerance, factor * state.tolerance, color=BAND, lw=0, zorder=0.4)
         t_s = np.linspace(*state.span_s, CURVE)
         curve, std = factor * (state.at(t_s) - final), factor * state.std_at(t_s)
         ax.fill_between(t_s / HOUR_S, curve - std, curve + std, color=colour, alpha=0.25, lw=0)
         ax.plot(t_s / HOUR_S, curve, color=colour, lw=1.4)
     ax.errorbar(course.t_s / HOUR_S, factor * (course.values - final), factor * course.stds, fmt="o", color=INK,
                 mfc="white", mew=0.7, elinewidth=0.7, ms=3.0, zorder=2)  # fmt: skip
-    ax.set_ylabel(label)
-    ax.set_xlim(0, None)
+    seen = factor * (np.append(course.values, final) - final)
+    room = 0.12 * np.ptp(seen) + factor * (state.tolerance if state else 0.0)
+    ax.set(ylabel=label, xlim=(0, None), ylim=(seen.min() - room, seen.max() + room))
     _mark(ax, found)
     _mark_steady(ax, course)
 
@@ -117,6 +122,9 @@ def _mark_steady(ax: Axes, course: Course) -> None:
     words = "steady state not reached"
     if time is not None:
         ax.axvline(time[0] / HOUR_S, color=INK, ls="--", lw=0.9)
+    if course.state and not course.state.terms and time:
+        words = "steady from the first reversal on"
+    elif time is not None:
         words = f"steady after {time[0] / HOUR_S:.1f} ± {time[1] / HOUR_S:.1f} h"
     up = course.values[0] > course.values[-1]
     ax.annotate(words, (1, 1 if up else 0), xycoords="axes fraction", xytext=(-4, -4 if up else 6),
@@ -128,6 +136,11 @@ def _mark(ax: Axes, found: Soak) -> None:
     for gap in found.gaps:
         ends = gap.start_s / HOUR_S, (gap.start_s + gap.length_s) / HOUR_S
         ax.axvspan(*ends, color=VERMILION, alpha=0.25, lw=0.8)
+
+
+def _plainly(value: float, _: int | None = None) -> str:
+    """A mark of a logarithmic axis: numbers that begin with 1, 2 or 5."""
+    return f"{value:g}" if f"{value:e}"[0] in "125" else ""
 
 
 def _final(course: Course) -> float:

@@ -39,7 +39,7 @@ def command(
     """
     bench = read_bench(bench_file)
     found = find(procedure, bench.folders.procedures)
-    planned = plan(bench, found, parse(found, read_settings(given, pairs)))
+    planned = plan(bench, found, parse(found, read_settings(given, pairs, found.defaults)))
     if as_json:
         emit(_document(planned))
         return

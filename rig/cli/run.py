@@ -38,7 +38,7 @@ def command(
     """
     bench = read_bench(bench_file)
     found = find(procedure, bench.folders.procedures)
-    settings = parse(found, read_settings(given, pairs))
+    settings = parse(found, read_settings(given, pairs, found.defaults))
     with Record() as record:
         with watching(found, bench, unattended, answers) as watch:
             outcome = start(record, bench, found, settings, watch)

@@ -1,8 +1,8 @@
-"""A procedure's settings on the command line: `--step-deg 30`, `--step-deg=30` or `--set step_deg=30`."""
+"""A procedure's settings on the command line: `--step-deg 30`, `--set step_deg=30`; `--until-steady` alone for yes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import click
@@ -19,8 +19,11 @@ def settings_arguments(function: Callable[..., Any]) -> Callable[..., Any]:
 PASS_ON = {"ignore_unknown_options": True}  # of a command whose procedure has options of its own
 
 
-def read_settings(given: Sequence[str], pairs: Sequence[str]) -> dict[str, str]:
-    """Settings by name, as text. Raises UsageError for a line that is not made of `--name value`."""
+def read_settings(given: Sequence[str], pairs: Sequence[str], defaults: Mapping[str, Any]) -> dict[str, str]:
+    """Settings by name, as text; one that is yes or no by its default means yes where no value follows.
+
+    Raises UsageError for a line that is not made of `--name value`.
+    """
     settings = dict(_pair(pair) for pair in pairs)
     rest = list(given)
     while rest:
@@ -28,11 +31,14 @@ def read_settings(given: Sequence[str], pairs: Sequence[str]) -> dict[str, str]:
         if not word.startswith("--"):
             raise click.UsageError(f"{word!r} is not expected here; a setting is --name value")
         name, equals, value = word.removeprefix("--").partition("=")
-        if not equals:
+        key = name.replace("-", "_")
+        if not equals and isinstance(defaults.get(key), bool) and (not rest or rest[0].startswith("--")):
+            value = "yes"
+        elif not equals:
             if not rest:
                 raise click.UsageError(f"--{name} needs a value")
             value = rest.pop(0)
-        settings[name.replace("-", "_")] = value
+        settings[key] = value
     return settings
 
 
