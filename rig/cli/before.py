@@ -6,6 +6,7 @@ import re
 import shutil
 from collections import Counter
 from collections.abc import Iterator
+from datetime import date
 from pathlib import Path
 
 from rich.console import Group, RenderableType
@@ -15,6 +16,7 @@ from rich.text import Text
 
 from procedures.catalogue import Procedure
 from rig.bench import Bench
+from rig.certificates import expired
 from rig.cli.output import duration, size
 from rig.drawings import Attitude, drawing_of, sketch
 from rig.plan import Plan
@@ -24,11 +26,13 @@ FACTS = re.compile(r"^(Excites|Blind to)\s+(.*(?:\n\s+.*)*)", re.MULTILINE)
 MOST_STRETCHES = 6
 
 
-def before(plan: Plan, procedure: Procedure, bench: Bench, free_bytes: int) -> RenderableType:
+def before(plan: Plan, procedure: Procedure, bench: Bench, free_bytes: int, today: date) -> RenderableType:
     """The whole screen; `free_bytes` is the room on the record's disk."""
     facts = Table.grid(padding=(0, 2))
     for name, text in _facts(plan, procedure, bench, free_bytes):
         facts.add_row(Text(name, style="bold"), text)
+    for text in expired(bench, today):
+        facts.add_row(Text("Expired", style="bold yellow"), f"{text}: the run will be marked")
     summary = Text(procedure.summary[:1].upper() + procedure.summary[1:] + ".")
     check = Text("\n".join(f"[ ] {line}" for line in checks(plan)))
     by_hand = Group(Text("\nCheck by hand", style="bold"), check)

@@ -8,6 +8,7 @@ from collections import defaultdict, deque
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
+from datetime import UTC, datetime
 from types import TracebackType
 from typing import Self, cast
 
@@ -65,7 +66,7 @@ class Guide:
         """One screen of what will happen; raises Declined where the person cancels it."""
         way = replace(self._seen.way, at_s=tuple(held.start_s for held in plan.held), end_s=plan.duration_s)
         self._seen = replace(self._seen, way=way)
-        self._console.print(before(plan, self._procedure, self._bench, free_bytes(home())))
+        self._console.print(before(plan, self._procedure, self._bench, free_bytes(home()), datetime.now(UTC).date()))
         self._draw(mounting(plan), "mounting")
         if self.ask(BEGIN, "go") == "cancel":
             raise Declined("cancelled before it began; nothing was moved and nothing recorded")
@@ -108,15 +109,15 @@ class Guide:
 
     def interrupted(self, outcome: Outcome) -> Wish:
         """The menu of a run that stands still."""
-        with self._aside():
-            for complaint in outcome.moving:
-                self._console.print(complaint, style="bold red", highlight=False)
-            self._console.print(str(outcome.error), style="yellow", highlight=False)
-            self._console.print(_choices(self._seen.kept, outcome))
-            try:
-                return cast(Wish, self._asked(GO_ON, "resume"))
-            except NoAnswer:
-                return "end"
+        self._live.stop()
+        for complaint in outcome.moving:
+            self._console.print(complaint, style="bold red", highlight=False)
+        self._console.print(str(outcome.error), style="yellow", highlight=False)
+        self._console.print(_choices(self._seen.kept, outcome))
+        try:
+            return cast(Wish, self._asked(GO_ON, "resume"))
+        except NoAnswer:
+            return "end"
 
     @contextmanager
     def _aside(self) -> Iterator[None]:

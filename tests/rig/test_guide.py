@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,7 @@ from rig.record import Block, Kept
 from rig.runner import Outcome
 from tests.rig.rigging import POSES, small_sweep
 
+TODAY = date(2026, 11, 21)
 RUN = "20261121-093012-sweep-a1b"
 SWEEP = find("sweep")
 
@@ -79,7 +81,7 @@ def planned(name: str = "sweep", bench: Bench | None = None) -> Plan:
 
 
 def test_before_a_run_one_screen_says_all_of_it() -> None:
-    text = shown(before(planned(), SWEEP, read_bench(), 2_000_000_000))
+    text = shown(before(planned(), SWEEP, read_bench(), 2_000_000_000, TODAY))
     for piece in (
         "Hold the sensor at a grid of stage angles, each way round.",
         "scale factor, bias, cross-axis, misalignment, hysteresis, stage errors.",
@@ -98,7 +100,14 @@ def test_before_a_run_one_screen_says_all_of_it() -> None:
 
 
 def test_a_disk_that_is_too_small_is_said() -> None:
-    assert "there is not enough room" in shown(before(planned(), SWEEP, read_bench(), 1000))
+    assert "there is not enough room" in shown(before(planned(), SWEEP, read_bench(), 1000, TODAY))
+
+
+def test_a_certificate_that_is_expired_is_said() -> None:
+    document = read_bench().document()
+    document["certificates"] = {"hand level": {"number": "L-7", "due": "2026-11-20"}}
+    text = shown(before(planned(), SWEEP, Bench.model_validate(document), 10**9, TODAY))
+    assert "hand level's certificate L-7 expired on 2026-11-20" in text
 
 
 def test_what_to_check_follows_from_the_plan() -> None:
