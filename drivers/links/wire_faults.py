@@ -14,6 +14,7 @@ from random import Random
 from typing import NamedTuple
 
 from drivers.links.faults import Fault, Faults, Kind
+from drivers.links.person import PERSON
 
 MENDED_S = 0.2  # until TCP sends a spoilt segment again
 BABBLE_S = 60.0  # how long it babbles for one message
@@ -100,9 +101,10 @@ def disturbed(said: Said, faults: Faults, wire: Wire) -> list[Said]:
 
 
 def kinds_of(driver: str) -> dict[str, Kind]:
-    """All faults that the twin of a driver can have, by name."""
-    own: dict[str, Kind] = getattr(importlib.import_module(f"drivers.{driver}_twin"), "FAULTS", {})
-    return {what: kind for what, (kind, _) in EFFECTS.items()} | own
+    """All faults that the twin of a driver can have, by name; those of a wire where it has one."""
+    twin = importlib.import_module(f"drivers.{driver}_twin")
+    own: dict[str, Kind] = getattr(twin, "FAULTS", {})
+    return own if twin.LISTEN == PERSON else {what: kind for what, (kind, _) in EFFECTS.items()} | own
 
 
 def faults_of(driver: str, faults: Iterable[Fault]) -> Faults:

@@ -28,6 +28,8 @@ def as_they_were(run: Run, columns: Columns) -> tuple[dict[str, Array], dict[str
     """
     found, constants = dict(columns), {}
     for role in TURNING:
+        if f"{role}_deg" not in found:
+            continue
         read_deg = found.pop(f"{role}_read_deg", None)
         part = run.bench.get("instruments", {}).get(role)
         points = part and part.get("error_table")

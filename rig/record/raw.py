@@ -13,6 +13,7 @@ import numpy as np
 from calibrations.table import Array, Table
 from rig.bench import D63
 from rig.errors import RecordError
+from rig.record.angles import as_they_were
 from rig.record.displacement import displacement_m
 from rig.record.values import Kept, Run
 
@@ -28,7 +29,8 @@ def samples_table(run: Run, poses: Iterable[Kept]) -> Table:
     columns |= {f"{name}_v": volts[:, k] for k, name in enumerate(names)}
     if run.kind == "motion":
         columns |= _attitude(stretches) | {"displacement_m": displacement_m(run, columns.pop(f"{D63}_v"))}
-    constants = {**run.constants, "sample_rate_hz": stretches[0].samples.rate_hz}
+    columns, angle_stds = as_they_were(run, columns)
+    constants = {**run.constants, **angle_stds, "sample_rate_hz": stretches[0].samples.rate_hz}
     return Table.from_columns(run.kind, columns, constants, run.run)
 
 
@@ -38,6 +40,8 @@ def _attitude(stretches: Sequence[Kept]) -> dict[str, Array]:
     each: dict[str, list[float | None]] = {
         "alpha_deg": [kept.pose.alpha_deg for kept in stretches],
         "beta_deg": [kept.pose.beta_deg for kept in stretches],
+        "alpha_read_deg": [kept.alpha_read_deg for kept in stretches],
+        "beta_read_deg": [kept.beta_read_deg for kept in stretches],
         "temperature_c": [kept.temperature_c for kept in stretches],
     }
     return {name: np.repeat(np.array(v, dtype=float), lengths) for name, v in each.items() if None not in v}

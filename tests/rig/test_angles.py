@@ -15,6 +15,7 @@ from calibrations.error_table import ErrorTable
 from calibrations.read_csv import read_csv
 from rig.bench import DEFAULT
 from rig.record import Record
+from rig.record.angles import as_they_were
 from rig.record.measured import table_of
 
 WOBBLE_DEG, PHASE_DEG = 0.07, 30.0
@@ -84,3 +85,18 @@ def test_a_sweep_beyond_a_partial_table_is_refused_before_anything_moves(rig: Ri
     assert "beta: at 100 deg the stage's error table has no point between 90 and 270 deg" in ended.err
     with Record() as record:
         assert record.runs() == []
+
+
+def test_every_row_of_a_motion_has_the_true_attitude_and_a_still_record_needs_none() -> None:
+    document = yaml.safe_load(DEFAULT.read_text())
+    document["instruments"]["alpha"]["error_table"] = [[a, 0.1, 0.02] for a in range(0, 360, 30)]
+    with Record() as record:
+        about: dict[str, Any] = {"identities": {}, "configuration": "", "constants": {}, "source": "bench"}
+        run = record.run(record.begin("motion", {}, bench=document, **about))
+    columns = {"alpha_deg": np.full(3, 45.0), "beta_deg": np.full(3, 90.0), "vx_v": np.arange(3.0)}
+    found, stds = as_they_were(run, columns)
+    np.testing.assert_allclose(found["alpha_deg"], 45.1)
+    np.testing.assert_array_equal(found["alpha_set_deg"], 45.0)
+    assert stds == {"alpha_std_deg": pytest.approx(0.02)}
+    still = {"t_s": np.arange(3.0)}
+    assert as_they_were(run, still) == (still, {})

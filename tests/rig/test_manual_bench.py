@@ -16,7 +16,8 @@ from procedures.catalogue import find
 from procedures.errors import NoAnswer
 from procedures.questions import Question
 from procedures.settings import parse
-from rig.bench import DEFAULT, Bench
+from rig.bench import DEFAULT, Bench, read_bench
+from rig.errors import BenchError
 from rig.plan import plan
 from rig.record import Record
 from rig.record.measured import table_of
@@ -147,6 +148,13 @@ def test_its_plan_takes_as_long_as_the_technician() -> None:
     search = find("misalignment")
     rehearsed = plan(bench, search, parse(search, {"dwell_s": "0.2", "most_rounds": "1"}))
     assert (rehearsed.poses, len(rehearsed.questions)) == (22, 5)  # mounting, and two axes of the level twice
+
+
+def test_a_wire_that_is_a_person_has_no_faults_of_a_wire(file: Callable[..., str]) -> None:
+    document = manual()
+    document["instruments"]["beta"]["faults"] = [{"what": "silence"}]
+    with pytest.raises(BenchError, match=r"instruments\.beta\.faults\.0\.what: no fault 'silence'"):
+        read_bench(Path(file(document)))
 
 
 def test_only_what_has_a_wire_is_served(rig: Rig, file: Callable[..., str]) -> None:
