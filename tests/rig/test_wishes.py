@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import signal
 from collections.abc import Callable
+from typing import Any, cast
 
 import pytest
 
 from drivers.errors import StageAlarm
+from procedures.catalogue import find
 from procedures.errors import Declined
 from procedures.session import Limits
+from procedures.settings import parse
 from rig.bench import read_bench
 from rig.errors import InstrumentFailed
+from rig.instruments import Rig
 from rig.plan import Plan
 from rig.record import Kept, Record
 from rig.runner import REPEATED, Outcome, Wish, start
@@ -148,3 +152,35 @@ def test_a_run_that_is_not_wanted_leaves_nothing() -> None:
         with pytest.raises(Declined):
             start(record, read_bench(), *small_sweep(), watch)
         assert record.runs() == []
+
+
+class DisturbedMotion(Onlooker):
+    """Presses Ctrl-C in the middle of the stream in which the sensor is shaken, once."""
+
+    def kept(self, kept: Kept) -> None:
+        super().kept(kept)
+        if kept.pose.path.startswith("motion") and not self.outcomes:
+            interrupt()
+
+
+def test_positioner_and_stream_stop_at_once_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    moved_um: list[float] = []
+    stop = Rig.stop
+
+    def watched(rig: Rig) -> list[str]:
+        complaints, positioner = stop(rig), cast(Any, rig.drivers["positioner"])
+        before_um = positioner.position_um("x")
+        rig.clock.sleep(0.03)
+        moved_um.append(abs(positioner.position_um("x") - before_um))
+        return complaints
+
+    monkeypatch.setattr(Rig, "stop", watched)
+    motion = find("motion")
+    settings = parse(motion, {"duration_s": "5", "still_s": "2", "block_s": "1", "dwell_s": "0.1"})
+    watch = DisturbedMotion(wishes=["resume"])
+    with Record() as record:
+        outcome = start(record, read_bench(), motion, settings, watch)
+        paths = [kept.pose.path for kept in record.kept(outcome.run.run) if kept.pose.path.startswith("motion")]
+    assert (outcome.run.state, len(watch.outcomes), watch.outcomes[0].moving) == ("complete", 1, ())
+    assert moved_um[0] < 0.1  # it swings by 60 um
+    assert len(set(paths)) == len(paths) == 5
