@@ -74,5 +74,5 @@ def test_what_all_share_cannot_be_a_sensors_own() -> None:
 
 
 def test_an_input_of_no_sensor_is_refused_with_the_nearest() -> None:
-    with pytest.raises(UnknownInput, match="no sensor 'bb' for the input 'bb.vx'. Did you mean 'b'"):
+    with pytest.raises(UnknownInput, match=r"no sensor 'bb' for the input 'bb\.vx'\. Did you mean 'b'"):
         batch().adc_volts(("bb.vx",), 0.0, 1e-3, 1)
