@@ -112,6 +112,11 @@ def test_the_command_writes_the_file_and_says_what_the_sensor_feels(rig: Rig, tm
     assert "o pin 1" in rig("draw").out
 
 
+def test_the_drawing_in_the_readme_is_todays() -> None:
+    shown = Path(__file__).parents[2] / "docs" / "attitude.svg"
+    assert shown.read_text() == page(Attitude(45, 90)), "rig draw --alpha 45 --beta 90 --out docs/attitude.svg"
+
+
 def test_what_cannot_be_drawn_is_refused(rig: Rig, tmp_path: Path) -> None:
     assert "nan is no angle" in rig("draw", "--alpha", "nan").err
     ended = rig("draw", "--out", str(tmp_path / "no" / "such.svg"))
