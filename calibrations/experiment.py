@@ -9,7 +9,7 @@ from calibrations.candidates import Candidate
 
 LEVELS = {"stage-zero-offset", "base-tilt"}
 DELAYS = {"output-filter", "sampling-delay"}
-OTHER_HZ = 4.0  # well below the usual 10 Hz, and at the same stroke still above the noise
+TWO_HZ = "10,4"  # the usual one, and one well below that is at the same stroke still above the noise
 SQUARES = {"bias", "quadratic-nonlinearity", "cross-axis-bias", "z-axis-bias"}
 
 
@@ -35,7 +35,7 @@ def separating(best: Candidate) -> Experiment | None:
         return Experiment("motion", {}, pairs, why)
     if names <= DELAYS:
         why = "a corner changes the size of an oscillation with its frequency, a delay only its phase"
-        return Experiment("motion", {"frequency_hz": OTHER_HZ}, pairs, why)
+        return Experiment("motion", {"frequency_hz": TWO_HZ}, pairs, why)
     if names <= LEVELS:
         why = "an offset of alpha and a tilt of the base turn gravity alike at every pose; a digital level tells them"
         return Experiment("level-check", {}, pairs, why)

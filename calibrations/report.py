@@ -21,10 +21,12 @@ from calibrations.discover import Added, Discovery
 from calibrations.fit import Fit
 from calibrations.held_out import held_out_excess
 from calibrations.model import Estimate, Model
+from calibrations.motion.evaluate import MotionResult
 from calibrations.numerals import chance, measured, minus, plain, unit
 from calibrations.pictures.album import Picture, album
 from calibrations.pictures.inline import inline
-from calibrations.pictures.view import mg, pooled_mg
+from calibrations.pictures.view import mg, pooled_mg, rows_of
+from calibrations.report_motion import section
 from calibrations.report_words import VERDICTS, capital, headline, key_figures, next_words, state, summary, unbroken
 
 EXPLAINED = 6  # candidates shown with formula and symptom, at most; the others in numbers only
@@ -32,18 +34,24 @@ SURE = 0.999  # probabilities beyond, on either side, are not told to more digit
 
 
 def report(
-    found: Discovery, beside: Comparison, date: str, program: str, pictures: Iterable[Picture] | None = None
+    found: Discovery,
+    beside: Comparison,
+    date: str,
+    program: str,
+    pictures: Iterable[Picture] | None = None,
+    motion: MotionResult | None = None,
 ) -> str:
     """The page as HTML text. `beside` sets the model that was given beside the data; `pictures` are those of `album`.
 
+    `motion` is what a run of that procedure found beside the displacement sensor.
     `date` and `program` (name and version) stand in the provenance: the same arguments give the same page.
     """
-    shown = {p.name: _figure(p) for p in (album(found, beside) if pictures is None else pictures)}
+    shown = {p.name: _figure(p) for p in (album(found, beside, motion) if pictures is None else pictures)}
     return _template().render(
         headline=headline(found),
         verdict=VERDICTS[state(found)],
         state=state(found),
-        kind=found.start.table.kind,
+        kind=rows_of(found.start.table),
         summary=unbroken(summary(found)),
         figures=key_figures(found),
         steps=[_first(found), *(_step(step, found) for step in found.steps)],
@@ -61,6 +69,7 @@ def report(
         next=next_words(found.next_experiment) if found.next_experiment else "",
         structure=found.residual_structure,
         provenance=_provenance(found, date, program),
+        motion=section(motion) if motion else None,
         pictures=shown,
         curves=[figure for name, figure in shown.items() if name.startswith("effect-")],
     )
@@ -160,7 +169,7 @@ def _provenance(found: Discovery, date: str, program: str) -> list[tuple[str, st
     table, model = found.start.table, found.start.model
     facts: dict[str, object] = {
         "data": _name(table.source),
-        "kind and size": f"{table.n} {table.kind}; columns {', '.join(table.columns)}",
+        "kind and size": f"{table.n} {rows_of(table)}; columns {', '.join(table.columns)}",
         "SHA-256 of the data": table.digest,
         "local gravity": f"{table.gravity_m_s2:g} m/s²",
         **{f"constant {name}": value for name, value in table.constants.items() if name != "gravity_m_s2"},

@@ -10,7 +10,7 @@ from calibrations.experiment import Experiment
 from calibrations.fit import Fit
 from calibrations.held_out import held_out_excess
 from calibrations.numerals import plain
-from calibrations.pictures.view import pooled_mg
+from calibrations.pictures.view import pooled_mg, rows_of
 
 MOST_NAMED = 3  # effects in the headline
 VERDICTS = {
@@ -48,7 +48,7 @@ def summary(found: Discovery) -> str:
 
 
 def _error(found: Discovery) -> str:
-    kind, (error, floor) = found.start.table.kind, pooled_mg(found.start)
+    kind, (error, floor) = rows_of(found.start.table), pooled_mg(found.start)
     rows = f"{found.start.table.n} {kind}"
     if not found.steps:
         left = f" Left over: {found.residual_structure}." if found.residual_structure else ""
@@ -79,7 +79,7 @@ def key_figures(found: Discovery) -> list[tuple[str, str, str]]:
 
 
 def _over_floor(fit: Fit, unseen: float) -> str:
-    return f"{plain(fit.pooled_excess)} × the floor; {plain(unseen)} × on unseen {fit.table.kind}"
+    return f"{plain(fit.pooled_excess)} × the floor; {plain(unseen)} × on unseen {rows_of(fit.table)}"
 
 
 def next_words(e: Experiment) -> str:

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from itertools import chain
 
 from procedures.errors import ProcedureError, SettingError
 from procedures.level_check import levelled
@@ -20,8 +21,7 @@ from procedures.session import Pose, Session, Stage
 from procedures.sweep import turn
 
 KIND = "motion"
-SWEEP = "sweep"  # paths of the poses begin with what they are for
-STILL = "still"
+SWEEP, STILL = "sweep", "still"  # paths of the poses begin with what they are for
 DISPLACEMENT = "d63"  # the converter's channel
 ALPHA_DEG, BETA_DEG = 45.0, 90.0
 INCLINATIONS_DEG, STEP_DEG = (90.0, 45.0, 135.0), 45.0  # enough for the physical model, as a measurement showed
@@ -34,7 +34,7 @@ def motion(
     rig: Session,
     *,
     peak_to_peak_um: float = 60.0,
-    frequency_hz: float = 10.0,
+    frequency_hz: tuple[float, ...] = (10.0,),
     centre_um: float = 50.0,
     duration_s: float = 60.0,
     still_s: float = 30.0,
@@ -42,9 +42,14 @@ def motion(
     dwell_s: float = 2.0,
     settle_s: float = 0.5,
 ) -> None:
-    """Sweep, then record the sensor still for `still_s` and shaken for `duration_s`, without a gap in either."""
-    if min(peak_to_peak_um, frequency_hz, duration_s, still_s, block_s, dwell_s) <= 0 or settle_s < 0:
-        raise SettingError("motion: give widths, frequencies and times above 0, and a settle_s not below")
+    """Sweep, then record the sensor still for `still_s` and shaken for `duration_s`, without a gap in either.
+
+    Shaken at several frequencies, one after the other, it also tells a corner of the output filter from a delay; the
+    models are judged at the first.
+    """
+    widths_and_times = (peak_to_peak_um, *frequency_hz, duration_s, still_s, block_s, dwell_s)
+    if not frequency_hz or min(widths_and_times) <= 0 or settle_s < 0:
+        raise SettingError("motion: give a width, frequencies and times above 0, and a settle_s not below")
     _require_displacement(rig)
     rig.confirm(
         "mounting",
@@ -53,24 +58,23 @@ def motion(
         drawing="face-up",
     )
     levelled(rig)
-    calibration = list(sweep())
-    still, shaken = blocks(STILL, still_s, block_s), blocks(KIND, duration_s, block_s)
-    left = list(rig.missing([*calibration, *still, *shaken]))
+    calibration, still = list(sweep()), blocks(STILL, still_s, block_s)
+    shaken = {hz: blocks(f"{KIND} {hz:g} Hz", duration_s, block_s) for hz in frequency_hz}
+    left = list(rig.missing([*calibration, *still, *chain(*shaken.values())]))
     _stand(rig, centre_um)
-    if len(_of(left, SWEEP)) == len(calibration):
+    if calibration[0] in left:
         _start_without_history(rig)
-    for pose in _of(left, SWEEP):
+    for pose in _of(left, calibration):
         rig.hold(pose, dwell_s, settle_s)
-    if not (_of(left, STILL) or _of(left, KIND)):
-        return
     _settle_between_branches(rig)
     rig.wait(settle_s)
-    if now := _of(left, STILL):
+    if now := _of(left, still):
         rig.host.doing(f"recording for {len(now) * block_s:g} s, still")
         rig.keep_stretch(now, block_s)
-    if now := _of(left, KIND):
-        with _shaking(rig, peak_to_peak_um, frequency_hz, centre_um):
-            rig.keep_stretch(now, block_s)
+    for hz, poses in shaken.items():
+        if now := _of(left, poses):
+            with _shaking(rig, peak_to_peak_um, hz, centre_um):
+                rig.keep_stretch(now, block_s)
 
 
 def sweep() -> Iterator[Pose]:
@@ -85,8 +89,9 @@ def blocks(what: str, duration_s: float, block_s: float) -> list[Pose]:
     return [Pose(ALPHA_DEG, BETA_DEG, 0, f"{what} {k}") for k in range(max(1, round(duration_s / block_s)))]
 
 
-def _of(poses: Sequence[Pose], what: str) -> list[Pose]:
-    return [pose for pose in poses if pose.path.split()[0] == what]
+def _of(left: Sequence[Pose], part: Sequence[Pose]) -> list[Pose]:
+    """What is left of a part."""
+    return [pose for pose in left if pose in part]
 
 
 def _require_displacement(rig: Session) -> None:

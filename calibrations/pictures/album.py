@@ -8,7 +8,9 @@ from matplotlib.figure import Figure
 
 from calibrations.compare import Comparison
 from calibrations.discover import Added, Discovery
-from calibrations.pictures import candidate, failure, measurement, residual, waterfall
+from calibrations.motion.evaluate import MotionResult
+from calibrations.pictures import candidate, failure, measurement, motion, residual, waterfall
+from calibrations.pictures.view import rows_of
 
 MOST_CURVES = 4
 POSES = (
@@ -35,23 +37,37 @@ class Picture:
     figure: Figure
 
 
-def album(found: Discovery, beside: Comparison) -> list[Picture]:
-    """The falling error, the model given beside its data and where it fails, then each effect's curve."""
+def album(found: Discovery, beside: Comparison, shaken: MotionResult | None = None) -> list[Picture]:
+    """The falling error, the model given beside its data and where it fails, then each effect's curve.
+
+    Before them stands what a run of the procedure motion found, if it is given.
+    """
     fit = beside.fit
-    model, kind = fit.model.name, fit.table.kind
+    model, kind, rows = fit.model.name, fit.table.kind, rows_of(fit.table)
     shown, mapped = {"poses": POSES, "motion": MOTION}.get(kind, POSITIONS)
     fall = (
         "Error of the model before and after each effect, as a multiple of the noise floor: "
-        f"bars on the {kind} that the fit used, diamonds on {kind} that it did not see."
+        f"bars on the {rows} that the fit used, diamonds on {rows} that it did not see."
     )
     left = f"Measured less the model {model}. The grey band is the noise floor, one standard deviation each way."
     return [
+        *(_beside_displacement(each) for each in (shaken,) if each),
         Picture("waterfall", "The falling error", fall, waterfall.picture(found)),
         Picture("measurement", "Measurement beside model", shown.format(model), measurement.picture(fit)),
         Picture("residual", "What the model leaves", left, residual.picture(fit)),
         Picture("failure", "Where it fails", mapped.format(model), failure.picture(fit)),
         *(_curve(step, found) for step in tried(found)),
     ]
+
+
+def _beside_displacement(shaken: MotionResult) -> Picture:
+    """Fig. 12 of the paper."""
+    caption = (
+        "Above: acceleration along x by the sensor (full line) and by the displacement sensor (dotted), over the first "
+        "half second. Below: the difference; the grey band is what the sensor's noise alone leaves, one standard "
+        "deviation each way. Both sides in the paper's band, a second-order low-pass at 20 Hz (Ang, Fig. 12)."
+    )
+    return Picture("evaluation", "Both models beside the displacement sensor", caption, motion.evaluation(shaken))
 
 
 def tried(found: Discovery) -> tuple[Added, ...]:

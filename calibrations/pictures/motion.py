@@ -10,6 +10,7 @@ from calibrations.fit import Fit
 from calibrations.motion.evaluate import MotionResult, Quantity
 from calibrations.motion.stretches import Stretches, stretches
 from calibrations.noise import rms
+from calibrations.numerals import measured as written
 from calibrations.pictures.style import BLUE, INK, VERMILION, floor_band, panels, quarters, styled
 from calibrations.table import Array
 
@@ -28,7 +29,7 @@ def evaluation(result: MotionResult) -> Figure:
         above, below = axes[:, k]
         above.plot(t, values[shown], color=(VERMILION, BLUE)[k], lw=1.4, label=f"sensor, {name} model")
         above.plot(t, result.reference[shown], color=INK, ls=":", lw=1.4, label="displacement sensor")
-        above.set_title(f"{'ab'[k]}  {name} model: rmse {error.value:.4g} ± {error.std:.2g} mm/s²")
+        above.set_title(f"{'ab'[k]}  {name} model: rmse {written(error.value, error.std)} mm/s²")
         above.margins(y=0.2)
         above.legend(loc="upper right", ncols=2)
         floor_band(below, result.noise_limit.value)

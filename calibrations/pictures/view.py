@@ -23,7 +23,13 @@ from calibrations.pictures.style import BLUE, GREEN, INCLINATION, INK, MARKER, V
 from calibrations.table import Array, Table
 
 MOST_KEYS = 16
+ROWS = {"motion": "stretches"}  # what the rows of a kind of table are called, where not as the kind
 KEYS_IN_A_ROW = 10
+
+
+def rows_of(table: Table) -> str:
+    """What its rows are called."""
+    return ROWS.get(table.kind, table.kind)
 
 
 @dataclass(frozen=True)

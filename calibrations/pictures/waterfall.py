@@ -15,7 +15,7 @@ from calibrations.fit import Fit
 from calibrations.held_out import held_out_excess
 from calibrations.numerals import plain
 from calibrations.pictures.style import AMBER, BAND, BLUE, GREEN, INK, QUIET, VERMILION, panels, styled
-from calibrations.pictures.view import pooled_mg
+from calibrations.pictures.view import pooled_mg, rows_of
 
 LARGE_FALL = 8.0  # from first to last: beyond this the last bars would vanish on a linear scale
 BAR = 0.62
@@ -46,7 +46,7 @@ def _mg(fit: Fit) -> float:
 @styled
 def picture(found: Discovery) -> Figure:
     """Bars from the error before to the error after each effect; diamonds for unseen poses; the noise floor."""
-    steps, kind = levels(found), found.start.table.kind
+    steps, kind = levels(found), rows_of(found.start.table)
     figure, axes = panels(1, 1, 4.2)
     ax: Axes = axes[0, 0]
     seen, unseen = [level.seen for level in steps], [level.unseen for level in steps]

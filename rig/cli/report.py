@@ -55,8 +55,10 @@ def _on_a_model(data: str, model: str | None, bench_file: Path | None, out: Path
     from calibrations.pictures.album import album
     from calibrations.report import report
     from rig.cli.asked import asked, program, today
+    from rig.cli.shaken import shaken_of
 
     table, start, effects = asked(data, model, bench_file, out)
     found, beside = discover(table, start, effects), compare(table, start)
-    pictures = album(found, beside)
-    return pictures, lambda: report(found, beside, today(), program(), pictures)
+    shaken = shaken_of(data)
+    pictures = album(found, beside, shaken)
+    return pictures, lambda: report(found, beside, today(), program(), pictures, shaken)

@@ -275,7 +275,7 @@ def test_the_album_holds_every_picture_once() -> None:
 def test_only_the_greatest_falls_are_drawn() -> None:
     (step,) = warm().steps
     idle = [Added(f"e{k}", step.after, step.after) for k in range(MOST_CURVES)]
-    found = Discovery(**{**vars(warm()), "steps": (*idle[:2], step, *idle[2:])})
+    found = replace(warm(), steps=(*idle[:2], step, *idle[2:]))
     shown = tried(found)
     assert step in shown
 
@@ -301,7 +301,7 @@ def test_compact_cuts_digits_of_places_and_none_of_words() -> None:
 
 def test_words_of_users_are_not_taken_for_formulas() -> None:
     model = Model("a$b$ & <c>", warm().start.model.terms)
-    found = Discovery(**{**vars(warm()), "start": fit(model, warm_table())})
+    found = replace(warm(), start=fit(model, warm_table()))
     assert b"a$b$ &amp; &lt;c&gt;" in svg(waterfall.picture(found))
 
 
