@@ -207,7 +207,11 @@ class RotaryStage:
 
     def _require_no_alarm(self, alarm: Alarm | None) -> None:
         if alarm is not None:
-            how = "then reset the alarm" if alarm.resettable else "the alarm needs a power cycle"
+            how = (
+                "then reset the alarm, or switch the drive off and on"
+                if alarm.resettable
+                else "the alarm needs a power cycle"
+            )
             raise StageAlarm(
                 f"{self.name}: stands still with alarm {alarm.code:02X}, {alarm.text}",
                 f"{alarm.remedy}; {how}",

@@ -79,7 +79,6 @@ class Drive:
     def state(self) -> dict[str, Any]:
         return {
             "plan": asdict(self._plan),
-            "alarm": self._alarm,
             "referenced": self._referenced,
             "homing": self._homing,
             "heard_s": self._heard_s,
@@ -87,8 +86,9 @@ class Drive:
         }
 
     def restore(self, state: Mapping[str, Any]) -> None:
+        """Without its alarm: who goes on with a run has reset it."""
         self._plan = Trajectory(**state["plan"])
-        self._alarm, self._referenced, self._homing = state["alarm"], state["referenced"], state["homing"]
+        self._alarm, self._referenced, self._homing = 0, state["referenced"], state["homing"]
         self._heard_s, self._words = state["heard_s"], dict(state["words"])
 
     def read_words(self, address: int, count: int, now_s: float) -> list[int]:

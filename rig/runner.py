@@ -220,7 +220,6 @@ class RunHost:
         self._watch.expect(missing + len(self._poses), len(self._poses))
 
     def keep(self, pose: Pose, samples: Samples, temperature_c: float | None) -> None:
-        self._rig.require_steady()  # else it was measured somewhere else than at `pose`
         middle_s = samples.start_s + len(samples.volts) / samples.rate_hz / 2
         dials = self._rig.read_deg()
         kept = Kept(
@@ -262,6 +261,8 @@ class RunHost:
         self._watch.doing(text)
 
     def _state(self) -> dict[str, Any] | None:
+        """What is kept with all that is kept: of a bench that stands as it was told, else it was measured elsewhere."""
+        self._rig.require_steady()
         rig = self._rig.state()
         return None if rig is None else {"rig": rig, "zero_s": self._zero_s}
 

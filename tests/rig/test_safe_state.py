@@ -1,0 +1,176 @@
+"""Every limit is crossed by an instrument that misbehaves: motion stops first, the message helps, the run goes on."""
+
+from __future__ import annotations
+
+import random
+import zlib
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import pytest
+
+from drivers.errors import DriverError
+from drivers.links.faults import Fault
+from drivers.links.wire_faults import EFFECTS, kinds_of
+from procedures.errors import ProcedureError
+from procedures.session import Limits
+from rig.bench import read_bench
+from rig.cli.failure import status_of
+from rig.record import Record
+from rig.runner import resume
+from tests.rig.misbehaving import SHORT, Aftermath, afflicted, digest, looking_on, short, watched_bench
+from tests.rig.rigging import Onlooker
+
+pytestmark = pytest.mark.sockets
+BENCH = watched_bench()
+FAULTS = [(role, what) for role, part in BENCH.instruments.items() for what in kinds_of(part.driver)]
+OTHER_NOISE = {"delay", "endless"}  # after which a run may go on, at other times: as good, but not the same
+
+
+@cache
+def undisturbed(procedure: str) -> tuple[list[Any], float]:
+    """What a procedure measures on the sound bench, and when it has ended."""
+    with Record() as record:
+        run = short(record, BENCH, procedure).run
+        state = record.state(run.run)
+        assert run.state == "complete"
+        assert state
+        return digest(record, run.run), state["rig"]["clock_s"]
+
+
+@pytest.fixture
+def aftermath() -> Iterator[Aftermath]:
+    with looking_on() as found:
+        yield found
+
+
+def endures(procedure: str, role: str, fault: Fault, aftermath: Aftermath) -> None:
+    """The run is complete, or is stopped in a safe state and then goes on to the same end without the fault."""
+    with Record() as record:
+        outcome = short(record, afflicted(BENCH, role, fault), procedure)
+        if outcome.error is None:
+            assert outcome.run.state == "complete"
+            assert outcome.run.rows == sum(1 for _ in record.kept(outcome.run.run))
+            return
+        assert role in str(outcome.error), "names the instrument"
+        assert isinstance(outcome.error, (DriverError, ProcedureError))
+        assert status_of(outcome.error) in (3, 4)
+        assert str(outcome.error).count(". ") >= 1, "says what to do"
+        assert not aftermath.turning
+        assert not aftermath.swinging or any(said.startswith("positioner may") for said in aftermath.complaints)
+        assert not aftermath.heating or any(said.startswith("oven may still heat") for said in aftermath.complaints)
+        assert {said.split()[0] for said in aftermath.complaints} <= {role, *_beside(role, fault)}
+        done = resume(record, outcome.run.run, Onlooker(), BENCH)
+        assert (done.run.state, done.error) == ("complete", None)
+        if fault.what not in OTHER_NOISE:
+            assert digest(record, done.run.run) == undisturbed(procedure)[0]
+
+
+def _beside(role: str, fault: Fault) -> set[str]:
+    """Who else cannot be reached: noise and a lost connection are felt by all on the wire."""
+    shared = {"alpha", "beta"}
+    return shared if role in shared and fault.what in ("disconnect", "babble", "delay") else set()
+
+
+def moment(procedure: str, role: str, what: str) -> float:
+    """Some time of the run, the same in every test."""
+    luck = random.Random(zlib.crc32(f"{procedure} {role} {what}".encode()))
+    return round(luck.uniform(0.02, 0.95) * undisturbed(procedure)[1], 3)
+
+
+@pytest.mark.parametrize(("role", "what"), FAULTS)
+def test_a_sweep_endures_every_fault(role: str, what: str, aftermath: Aftermath) -> None:
+    endures("sweep", role, Fault(what, at_s=moment("sweep", role, what)), aftermath)
+
+
+@pytest.mark.parametrize("procedure", sorted(SHORT.keys() - {"sweep"}))
+@pytest.mark.parametrize("role", ["alpha", "beta", "adc", "oven"])
+def test_every_procedure_endures_some_fault_of_every_instrument(
+    procedure: str, role: str, aftermath: Aftermath
+) -> None:
+    kinds = list(kinds_of(BENCH.instruments[role].driver))
+    what = kinds[zlib.crc32(f"{procedure} {role}".encode()) % len(kinds)]
+    endures(procedure, role, Fault(what, at_s=moment(procedure, role, what)), aftermath)
+
+
+LIMITS = [  # a fault of an instrument, the exit status, and what is said
+    ("sweep", "alpha", Fault("alarm", at_s=25.0), 3, "alpha: stands still with alarm 30, overload. Free the stage"),
+    ("sweep", "beta", Fault("alarm", at_s=27.0, size=0x28), 3, "the alarm needs a power cycle"),
+    ("sweep", "beta", Fault("stuck", at_s=25.0), 3, "beta: stands at"),
+    ("sweep", "beta", Fault("lies", at_s=25.0, size=0.2), 3, "more than 0.05 deg away. Free the stage"),
+    ("sweep", "beta", Fault("busy", at_s=24.0), 3, "beta: is still moving, or not in position, after 2 s. Look"),
+    ("sweep", "alpha", Fault("busy", at_s=26.3), 3, "alpha: has not stood still. Find out what moves it"),
+    ("sweep", "alpha", Fault("restart", at_s=26.0), 3, "alpha: does not know where it is, and is not sent anywhere"),
+    ("sweep", "beta", Fault("restart", at_s=33.0), 3, "beta: does not know where it is, and is not sent anywhere"),
+    ("sweep", "alpha", Fault("silence", at_s=25.0), 3, "alpha: reading register 0x007F (driver output status): no"),
+    ("sweep", "alpha", Fault("wrong-unit", at_s=25.0, size=4), 3, "unit 5 answered instead of unit 1. Give every"),
+    ("sweep", "alpha", Fault("delay", at_s=25.0, size=9.0), 3, "no answer within 0.5 s"),
+    ("sweep", "adc", Fault("overflow", at_s=25.0, size=7), 3, "adc: its buffer ran over and it skipped 7 scans"),
+    ("sweep", "adc", Fault("buffer-full", at_s=25.0), 3, "adc: its buffer ran over and the stream stopped"),
+    ("sweep", "adc", Fault("lost-packet", at_s=25.0), 3, "adc: packets are missing after packet 0 of the record"),
+    ("sweep", "adc", Fault("stall", at_s=25.0), 3, "adc: the stream fell silent after 0 of"),
+    ("sweep", "adc", Fault("over-range", at_s=25.0), 3, "adc: vx (AIN0) was beyond its range of 10 V in 1 of 100"),
+    ("sweep", "adc", Fault("restart", at_s=25.9), 3, "the connection is lost (the other side closed it). Check"),
+    ("sweep", "adc", Fault("endless", at_s=25.0), 3, "a stream is running already"),
+    ("sweep", "oven", Fault("no-temperature", at_s=25.0), 3, "oven: no thermocouple is connected. Check"),
+    ("sweep", "oven", Fault("lies", at_s=25.0), 4, "C, more than 10 K above its limit 85 C. Switch the heater off"),
+    ("sweep", "level", Fault("stale", at_s=1.0), 3, "came 30 times in a row. Switch the level off and on"),
+    ("sweep", "level", Fault("out-of-range", at_s=1.0), 3, "level: the x axis is beyond its range of 30 deg"),
+    ("sweep", "level", Fault("lies", at_s=6.0), 4, "the table is tilted by -0.4"),
+    ("temperature-cycle", "oven", Fault("stale", at_s=30.0), 3, "C for 600 s on its way to 40 C. Check that the"),
+    ("temperature-cycle", "oven", Fault("runaway", at_s=700.0), 4, "oven: shows "),
+]
+
+
+@pytest.mark.parametrize(("procedure", "role", "fault", "status", "said"), LIMITS)
+def test_a_limit_that_is_passed(
+    procedure: str, role: str, fault: Fault, status: int, said: str, aftermath: Aftermath
+) -> None:
+    with Record() as record:
+        outcome = short(record, afflicted(BENCH, role, fault), procedure)
+        assert outcome.error
+        assert said in str(outcome.error)
+        assert status_of(outcome.error) == status
+        assert outcome.run.state == ("stopped" if isinstance(outcome.error, ProcedureError) else "failed")
+        assert outcome.run.message == str(outcome.error)
+    assert aftermath.stops == 1
+    assert (aftermath.turning, aftermath.swinging, aftermath.heating) == ([], [], False)
+
+
+def test_the_sensors_own_limit_of_temperature(aftermath: Aftermath) -> None:
+    """The oven's is further away."""
+    bench = afflicted(BENCH, "oven", Fault("lies", at_s=25.0, size=20.0))
+    with Record() as record:
+        outcome = short(record, bench.model_copy(update={"limits": Limits(temperature_c=(0.0, 40.0))}), "sweep")
+    assert status_of(outcome.error or Exception()) == 4
+    assert "outside the bench's limits of 0 to 40 C; let it come back" in str(outcome.error)
+    assert not aftermath.turning
+
+
+def test_a_late_answer_is_not_taken_for_the_next_one(aftermath: Aftermath) -> None:
+    """Every answer of alpha comes after its time-out: slow, but each is that to its own question."""
+    with Record() as record:
+        outcome = short(record, afflicted(BENCH, "alpha", Fault("delay", at_s=25.0, for_s=8.0)), "sweep")
+        assert outcome.error is None
+        poses = [k.pose for k in record.kept(outcome.run.run)]
+        volts = [k.dwell.means["vx"] for k in record.kept(outcome.run.run)]
+        assert poses == [entry[0] for entry in undisturbed("sweep")[0][: len(poses)]]
+    with Record() as record:
+        sound = [k.dwell.means["vx"] for k in record.kept(short(record, BENCH, "sweep").run.run)]
+    assert volts == pytest.approx(sound, abs=2e-3)
+
+
+def test_faults_are_no_part_of_what_a_run_depends_on() -> None:
+    bench = read_bench()
+    broken = afflicted(bench, "alpha", Fault("alarm", at_s=3.0))
+    assert broken.configuration("sweep", {}) == bench.configuration("sweep", {})
+    assert broken.document()["instruments"]["alpha"]["faults"][0]["what"] == "alarm"  # the record tells
+
+
+def test_every_kind_of_fault_is_looked_at() -> None:
+    assert set(EFFECTS) <= {what for _, what in FAULTS}
+    assert len({what for _, what in FAULTS}) > len(EFFECTS)
+    with pytest.raises(ValueError, match="must not be negative"):
+        replace(Fault("alarm"), at_s=-1.0)
