@@ -146,7 +146,7 @@ class Guide:
             return
         folder = home() / "drawings"
         folder.mkdir(parents=True, exist_ok=True)
-        write_whole(file := folder / f"{name}.svg", page(attitude, name))
+        write_whole(file := folder / f"{name}.svg", page(attitude))
         self._console.print(drawn(attitude, file))
         self._drawn = attitude
 

@@ -14,14 +14,13 @@ from rig.drawings.table_view import table_view
 WIDTH, HEIGHT = 960, 640
 
 
-def page(attitude: Attitude, title: str = "") -> str:
-    """One SVG file; `title` in place of the attitude in words, which then stands below it."""
-    return svg.document(WIDTH, HEIGHT, title or attitude.words, _content(attitude, title))
+def page(attitude: Attitude) -> str:
+    """One SVG file, headed by the attitude in words."""
+    return svg.document(WIDTH, HEIGHT, attitude.words, _content(attitude))
 
 
-def _content(attitude: Attitude, title: str) -> Iterator[str]:
-    yield svg.text((32, 38), title or attitude.words, 18, anchor="start", bold=True)
-    yield svg.text((32, 64), attitude.words if title else "", 13, svg.QUIET, "start")
+def _content(attitude: Attitude) -> Iterator[str]:
+    yield svg.text((32, 38), attitude.words, 18, anchor="start", bold=True)
     yield from rig_view(attitude, (285, 265), 128)
     yield _heading((32, 536), "At rest the sensor feels")
     yield from force_view(attitude, (32, 552), 420)

@@ -30,8 +30,10 @@ def rig_view(attitude: Attitude, centre: tuple[float, float], scale: float) -> I
     stack = _stack(attitude)
     for solid in stack if faces_us else stack[::-1]:
         yield from solid.drawn(camera)
-        if solid is stack[-1]:
-            yield from _mark(attitude, camera)
+        if faces_us and solid.colour == BOARD:
+            yield from _screws(attitude, camera)
+    if faces_us and not attitude.flip:
+        yield _pin(attitude, camera)
     if not faces_us:
         yield _hidden(attitude, camera)
     yield from _axes(attitude, camera)
@@ -89,17 +91,18 @@ def _on_table(attitude: Attitude) -> Vectors:
     return Attitude(attitude.alpha_deg, attitude.beta_deg, attitude.mount_deg).sensor
 
 
-def _mark(attitude: Attitude, camera: Camera) -> Iterator[str]:
-    """Pin 1 on the package, where it can be seen; screws of the board."""
-    frame = _on_table(attitude)
-    seen = bool(attitude.tilted[2] @ camera.toward > 0.05)
-    if seen and not attitude.flip:
-        pin = np.array([-0.13, 0.13, foot_of(attitude) + 0.17]) @ frame
-        yield svg.circle(camera.project(pin)[0], 0.035 * camera.scale, "#f7c948", "none", 0)
-    height = foot_of(attitude) + (0.17 if attitude.flip else 0.05)
-    for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1)) if seen else ():
-        screw = np.array([0.82 * x * BOARD_HALF, 0.82 * y * BOARD_HALF, height]) @ frame
-        yield svg.circle(camera.project(screw)[0], 0.025 * camera.scale, "#e8edf2", "none", 0)
+def _screws(attitude: Attitude, camera: Camera) -> Iterator[str]:
+    """Those of the board, at its corners."""
+    high, place = foot_of(attitude) + (0.17 if attitude.flip else 0.05), 0.82 * BOARD_HALF
+    corners = np.array([[x, y, high] for x in (-place, place) for y in (-place, place)])
+    for at in camera.project(corners @ _on_table(attitude)):
+        yield svg.circle(at, 0.025 * camera.scale, "#e8edf2", "none", 0)
+
+
+def _pin(attitude: Attitude, camera: Camera) -> str:
+    """The mark of pin 1 on the package."""
+    at = camera.project(np.array([-0.13, 0.13, foot_of(attitude) + 0.17]) @ _on_table(attitude))[0]
+    return svg.circle(at, 0.035 * camera.scale, "#f7c948", "none", 0)
 
 
 def _hidden(attitude: Attitude, camera: Camera) -> str:

@@ -135,7 +135,7 @@ def test_a_run_begins_or_is_cancelled(said: Callable[..., None], rig_home: Path)
     said("go")
     with guide()[0] as shown_to:
         shown_to.planned(planned())
-    assert (rig_home / "drawings" / "mounting.svg").read_text() == page(Attitude(), "mounting")
+    assert (rig_home / "drawings" / "mounting.svg").read_text() == page(Attitude())
 
 
 def test_a_file_of_answers_begins_it_too(said: Callable[..., None]) -> None:
@@ -271,7 +271,7 @@ def test_a_question_has_its_drawing_once(said: Callable[..., None], rig_home: Pa
         for question in (MOUNTED, MOUNTED, Mounting.of(90.0, 1)):
             shown_to.ask(question, "yes")
     assert told.getvalue().count("pin 1") == 2
-    assert (rig_home / "drawings" / "mount-90-down.svg").read_text() == page(Attitude(0, 0, 90, 1), "mount-90-down")
+    assert (rig_home / "drawings" / "mount-90-down.svg").read_text() == page(Attitude(0, 0, 90, 1))
 
 
 def test_a_terminal_that_closes_is_nobody(said: Callable[..., None]) -> None:
