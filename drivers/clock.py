@@ -24,7 +24,6 @@ from drivers.errors import ClockStuck
 
 STUCK_S = 10.0  # real seconds after which bytes in flight are taken for lost
 SLICE_S = 10.0  # longest simulated step while a stream runs: bounds what its server must hold
-CHUNK = 1 << 15  # most bytes that one read takes: less than any socket's window
 TICK_S = 0.02  # how often `serve_forever` looks whether it shall end
 
 
@@ -34,6 +33,7 @@ class Wire(Protocol):
     key: str  # names the connection; its server knows the same name
     sent: int  # bytes written so far
     received: int  # bytes read so far
+    chunk: int  # so many bytes the kernel surely holds for one read
 
     def fileno(self) -> int: ...
 
@@ -150,7 +150,7 @@ class SimulatedClock:
         A backlog that is longer than one read comes as the kernel has room. Of a connection that has ended nothing is
         to come.
         """
-        while count > 0 and _pending(wire.fileno()) < (count if count <= CHUNK else 1):
+        while count > 0 and _pending(wire.fileno()) < (count if count <= wire.chunk else 1):
             time.sleep(0)
             if time.monotonic() - started > STUCK_S:
                 raise ClockStuck(f"{wire.key}: the simulated answer did not arrive", "Report this defect")

@@ -15,7 +15,7 @@ from typing import Protocol
 
 import serial
 
-from drivers.clock import CHUNK, Clock, Wire
+from drivers.clock import Clock, Wire
 from drivers.errors import LinkRefused
 from drivers.links.url import Url
 
@@ -25,7 +25,12 @@ LOST = (OSError, termios.error, serial.SerialException)  # what a dead connectio
 
 
 class Port(Protocol):
-    """What a link needs of a socket or a serial line; a dead one raises one of LOST."""
+    """What a link needs of a socket or a serial line; a dead one raises one of LOST.
+
+    `chunk` is the most that one read takes, and less than the kernel can hold.
+    """
+
+    chunk: int
 
     @property
     def key(self) -> str:
@@ -45,7 +50,7 @@ class Connected(Wire):
     """An open connection. `key` names it, the same at both ends."""
 
     def __init__(self, port: Port) -> None:
-        self.port, self.key = port, port.key
+        self.port, self.key, self.chunk = port, port.key, port.chunk
         self.sent = self.received = 0
 
     def fileno(self) -> int:
@@ -133,6 +138,8 @@ class Link:
 class SocketPort:
     """A connected TCP socket, without Nagle's delay."""
 
+    chunk = 1 << 15
+
     def __init__(self, host: str, number: int) -> None:
         self._socket = socket.create_connection((host, number), CONNECT_TIMEOUT_S)
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -145,7 +152,7 @@ class SocketPort:
         return self._socket.fileno()
 
     def read(self) -> bytes:
-        return self._socket.recv(CHUNK)
+        return self._socket.recv(self.chunk)
 
     def write(self, data: bytes) -> None:
         self._socket.sendall(data)
@@ -156,6 +163,8 @@ class SocketPort:
 
 class SerialPort:
     """A serial line, 8 data bits, opened for one program alone."""
+
+    chunk = 4095
 
     def __init__(self, path: str, baud: int, parity: str, stop_bits: int) -> None:
         self._path = path
@@ -171,7 +180,7 @@ class SerialPort:
         return int(self._serial.fileno())
 
     def read(self) -> bytes:
-        return bytes(self._serial.read(4096))
+        return bytes(self._serial.read(self.chunk))
 
     def write(self, data: bytes) -> None:
         self._serial.write(data)
