@@ -30,6 +30,7 @@ APART = 3.0  # nearer than this factor, two time constants are one to any noise
 PROCESSES = 6  # of flicker noise, and time constants of the single process
 RATIOS = tuple(np.geomspace(0.5, 60.0, 8).tolist())  # of slow noise over fast
 WANDER = 2.0  # slow noise over fast, with a time constant beyond half of the record: a random walk
+BEFOREHAND = (0.2, 0.2, 0.6)  # probability of white noise, one process, and flicker, which electronics has
 STEPS = 30
 LONGEST_STEP = 0.5  # of a logarithm of a time constant
 ENOUGH = 1e-6  # of -2 log likelihood
@@ -40,17 +41,15 @@ Point = tuple[float, tuple[float, ...]]  # slow noise over fast, and its time co
 
 @dataclass(frozen=True)
 class Exponentials:
-    """A fit of `k` exponentials.
+    """Fitted exponentials.
 
     parameters   (y_end, A_1 .., ln tau_1 ..), slowest first, the amplitudes at the first value; their covariance
-    deviance     -2 log likelihood, averaged over the noise
     noise        standard deviation of one value, slow noise included
     wandering    probability that the noise is a random walk over the record
     """
 
     parameters: Array
     covariance: Array
-    deviance: float
     noise: float
     wandering: float
 
@@ -76,14 +75,30 @@ class Series:
     values: Array
     stds: Array
 
-    def fitted(self, k: int) -> Exponentials:
-        """The most likely `k` exponentials."""
-        taus_s, point = self._likeliest(k)
+    def likeliest(self, k: int) -> tuple[Array, float]:
+        """The most likely `k` exponentials, and their -2 log likelihood averaged over the noise."""
+        taus_s, point = self._on_grid(k)
         p = self._descended(self._start(taus_s, point), point)
         likelihood = [np.log(prior) - self._scored(p, each)[0] / 2 for each, prior in self.points.items()]
-        deviance = -2 * float(np.logaddexp.reduce(likelihood))
-        point = min(self.points, key=lambda each: self._scored(p, each)[1])
-        return self._averaged(_slowest_first(self._descended(p, point)), deviance)
+        return _slowest_first(p), -2 * float(np.logaddexp.reduce(likelihood))
+
+    def averaged(self, p: Array) -> Exponentials:
+        """Parameters from near `p`, covariance and noise over all kinds, weighted by restricted likelihood."""
+        p = self._descended(p, min(self.points, key=lambda point: self._scored(p, point)[1]))
+        restricted = np.array([self._scored(p, point)[1] for point in self.points])
+        weight = np.exp((restricted.min() - restricted) / 2) * np.array(list(self.points.values()))
+        chosen = np.flatnonzero(weight > UNLIKELY * weight.sum())
+        likely, weight = [list(self.points)[i] for i in chosen], weight[chosen] / weight[chosen].sum()
+        each = np.array([self._descended(p, point) for point in likely])
+        _, _, covariances, noise = zip(*map(self._scored, each, likely), strict=True)
+        mean = weight @ each
+        covariance = np.einsum("i,ijk->jk", weight, np.array(covariances))
+        covariance += np.einsum("i,ij,ik->jk", weight, each - mean, each - mean)
+        half = float(np.sum(self.gap_s)) / 2
+        walks = [len(taus) == 1 and ratio > WANDER and taus[0] > half for ratio, taus in likely]
+        return Exponentials(
+            mean, covariance, float(np.sqrt(weight @ np.square(noise))), float(weight @ np.array(walks))
+        )
 
     @cached_property
     def gap_s(self) -> Array:
@@ -96,12 +111,12 @@ class Series:
 
     @cached_property
     def points(self) -> dict[Point, float]:
-        """Noise to try, and how likely it is beforehand: white, one process and flicker are equally so."""
+        """Noise to try, and how likely it is beforehand."""
         span, gap = float(np.sum(self.gap_s)), float(np.median(self.gap_s[1:]))
         single = [(float(tau),) for tau in np.geomspace(gap, 3 * span, PROCESSES)]
         flicker = tuple(np.geomspace(gap / 2, 3 * span, PROCESSES).tolist())
         kinds = ([(0.0, (1.0,))], [(r, taus) for taus in single for r in RATIOS], [(r, flicker) for r in RATIOS])
-        return {point: 1 / len(kind) / len(kinds) for kind in kinds for point in kind}
+        return {point: w / len(kind) for kind, w in zip(kinds, BEFOREHAND, strict=True) for point in kind}
 
     @cached_property
     def _ln_taus(self) -> Array:
@@ -116,7 +131,7 @@ class Series:
         """The variance of the noise over that of the point."""
         return np.maximum(np.asarray(square) / free, 1.0 if self.known else 1e-30)
 
-    def _likeliest(self, k: int) -> tuple[tuple[float, ...], Point]:
+    def _on_grid(self, k: int) -> tuple[tuple[float, ...], Point]:
         """Time constants and noise of greatest likelihood on the grid."""
         taus, points = np.exp(self._ln_taus), list(self.points)
         sets = [s for s in combinations(range(TIMES), k) if k < 2 or taus[s[1]] >= APART * taus[s[0]]]
@@ -186,23 +201,6 @@ class Series:
 
     def _within(self, ln_taus: Array) -> Array:
         return np.clip(ln_taus, self._ln_taus[0], self._ln_taus[-1])
-
-    def _averaged(self, p: Array, deviance: float) -> Exponentials:
-        """Parameters, covariance and noise over all points, each weighted by its restricted likelihood."""
-        prior = np.array(list(self.points.values()))
-        restricted = np.array([self._scored(p, point)[1] for point in self.points])
-        weight = np.exp((restricted.min() - restricted) / 2) * prior
-        likely = [point for point, w in zip(self.points, weight, strict=True) if w > UNLIKELY * weight.sum()]
-        weight = weight[weight > UNLIKELY * weight.sum()] / weight[weight > UNLIKELY * weight.sum()].sum()
-        each = np.array([self._descended(p, point) for point in likely])
-        scores = [self._scored(q, point) for q, point in zip(each, likely, strict=True)]
-        mean = weight @ each
-        covariance = np.einsum("i,ijk->jk", weight, np.array([score[2] for score in scores]))
-        covariance += np.einsum("i,ij,ik->jk", weight, each - mean, each - mean)
-        noise = float(np.sqrt(weight @ np.array([score[3] for score in scores]) ** 2))
-        half = float(np.sum(self.gap_s)) / 2
-        walks = [len(taus) == 1 and ratio > WANDER and taus[0] > half for ratio, taus in likely]
-        return Exponentials(mean, covariance, deviance, noise, float(weight @ np.array(walks)))
 
 
 def _slowest_first(p: Array) -> Array:

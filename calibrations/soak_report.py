@@ -56,6 +56,8 @@ def _headline(found: Soak) -> str:
     time = found.time_s()
     if time is not None:
         return f"Bias and scale factor are steady {_hours(time)} h after power-on."
+    if any(course.state is None for course in found.courses.values()):
+        return "Whether bias and scale factor are steady cannot be told from so few reversals."
     waiting = [name.replace("-", " of ") for name, course in found.courses.items() if course.time_s is None]
     return f"Steady state is not reached within {_span_h(found)} h: {joined(waiting)} still drift."
 

@@ -80,7 +80,9 @@ class SteadyState:
 
     @property
     def drift(self) -> Quantity:
-        """Change of the fitted value from the first time of the record to the last."""
+        """Change of the fitted value from the first time to the last; none, to the noise, where nothing stands out."""
+        if not self.terms:
+            return 0.0, float(np.sqrt(2) * self.noise)
         first, last = slopes(self.parameters, np.array(self.span_s) - self.span_s[0])
         before, after = self.at(np.array(self.span_s))
         return float(after - before), float(np.sqrt((last - first) @ self.covariance @ (last - first)))
@@ -145,9 +147,9 @@ def steady_state(t_s: Array, values: Array, stds: Array) -> SteadyState:
     middle, unit = float(values.mean()), float(values.std()) or 1.0
     series = Series(t_s - t_s[0], (values - middle) / unit, stds / unit)
     most = min(MOST, (len(t_s) - 1 - FREE) // 2)
-    best = min(
-        (series.fitted(k) for k in range(most + 1)), key=lambda fit: fit.deviance + GAIN * (len(fit.parameters) // 2)
-    )
+    candidates = [series.likeliest(k) for k in range(most + 1)]
+    chosen, _ = min(candidates, key=lambda each: each[1] + GAIN * (len(each[0]) // 2))
+    best = series.averaged(chosen)
     k = (len(best.parameters) - 1) // 2
     size = np.array([unit] * (1 + k) + [1.0] * k)
     parameters = best.parameters * size

@@ -1,0 +1,134 @@
+"""A soak's table: courses, gaps, what is left out; and the night's page on it."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+
+from calibrations.errors import TooFewRows
+from calibrations.pictures.soak import soak_album
+from calibrations.soak import soak
+from calibrations.soak_report import soak_report
+from tests.calibrations.soaks import BLOCK_S, soak_table
+
+FACTS = {"sensor": "a <sensor>", "run": "a night"}
+
+
+def page(found: Any, results: Any = None) -> str:
+    return re.sub(r"\s+", " ", soak_report(found, results or {}, FACTS))
+
+
+def test_bias_and_scale_factor_come_to_rest() -> None:
+    found = soak(soak_table())
+    assert list(found.courses) == ["bias-x", "scale-x", "bias-y", "scale-y"]
+    for course in found.courses.values():
+        assert course.state is not None
+        assert course.state.terms[0].tau_s[0] == pytest.approx(5400, abs=3 * course.state.terms[0].tau_s[1])
+    time = found.time_s()
+    assert time is not None
+    assert time == max(found.time_s("x") or (0, 0), found.time_s("y") or (0, 0))
+    assert found.temperature_wander_k == pytest.approx(0.0, abs=1e-4)
+    assert found.gaps == ()
+
+
+def test_times_count_from_power_on() -> None:
+    late, early = soak(soak_table(), power_on_s=-3600.0), soak(soak_table())
+    assert late.courses["bias-x"].t_s == pytest.approx(early.courses["bias-x"].t_s + 3600)
+    times = late.time_s(), early.time_s()
+    assert times[0] is not None
+    assert times[1] is not None
+    assert times[0][0] == pytest.approx(times[1][0] + 3600)
+
+
+def test_a_gap_is_marked_and_the_fit_goes_by_real_time() -> None:
+    found = soak(soak_table(cut_s=5000.0))
+    (gap,) = found.gaps
+    assert (gap.path, gap.length_s) == ("hold 10", pytest.approx(5000.0))
+    state = found.courses["bias-x"].state
+    assert state is not None
+    assert state.terms[0].tau_s[0] == pytest.approx(5400, abs=3 * state.terms[0].tau_s[1])
+    assert "1.39 h at" in page(found)
+    assert "interrupted 1 times" in page(found)
+
+
+def test_a_reversal_that_was_interrupted_is_left_out() -> None:
+    table = soak_table()
+    rows = [k for k, path in enumerate(table.labels["path"]) if path == "reversal 10"]
+    late = np.where(np.arange(table.n) > rows[3], 4000.0, 0.0)
+    cut = type(table).from_columns(
+        "poses", {**table.columns, "t_s": table.time_s + late}, table.constants, "", table.labels
+    )
+    found = soak(cut)
+    assert [gap.path for gap in found.gaps] == ["reversal 10"]
+    assert found.left_out == 1
+    assert len(found.courses["bias-x"].t_s) == len(soak(table).courses["bias-x"].t_s) - 1
+
+
+def test_a_reversal_that_is_not_complete_yet_is_left_out() -> None:
+    table = soak_table()
+    assert soak(table.rows(np.arange(table.n - 3))).left_out == 1
+
+
+def test_in_an_oven_the_approach_begins_when_it_is_warm() -> None:
+    whole, warm = soak(soak_table()), soak(soak_table(), oven_c=28.0)
+    assert warm.left_out > whole.left_out == 0
+    assert warm.courses["bias-x"].t_s[0] > 5400 * np.log(6)
+
+
+def test_a_short_soak_has_courses_and_no_verdict_on_steady_state() -> None:
+    found = soak(soak_table(120.0))
+    assert all(course.state is None for course in found.courses.values())
+    assert found.time_s() is None
+    assert found.temperature_wander_k is None
+    assert "cannot be told" in page(found)
+
+
+def test_without_a_whole_reversal_there_is_nothing() -> None:
+    table = soak_table()
+    with pytest.raises(TooFewRows, match="holds no reversal"):
+        soak(table.rows(np.char.startswith(np.array(table.labels["path"]), "hold")))
+
+
+def test_noise_of_hours_and_allan_deviation_are_those_of_the_still_record() -> None:
+    found = soak(soak_table())
+    hours_s, rms = found.noise_of_hours("x")
+    assert hours_s[0] == 1800.0
+    assert rms == pytest.approx(0.8e-3)
+    times_s, deviations = found.allan("x")
+    assert times_s.tolist() == [BLOCK_S, 2 * BLOCK_S, 4 * BLOCK_S]
+    assert deviations[0] == pytest.approx(0.8e-3 * np.sqrt(20 / 60_000), rel=0.2)
+
+
+def test_the_page_tells_the_night_without_a_network() -> None:
+    found = soak(soak_table())
+    limited = {"value": 3.0, "std": 0.1, "unit": "h", "limit": [0, 7], "verdict": "pass"}
+    text = page(found, {"steady-state-time": limited, "gap": {**limited, "limit": None, "verdict": None}})
+    assert re.search(r"Bias and scale factor are steady [\d.]+ ± [\d.]+ h after power-on", text)
+    assert "12.0 h held still, every sample kept, with 53 reversals" in text
+    assert "0 to 7" in text
+    assert "None: every sample" in text
+    assert "a &lt;sensor&gt;" in text
+    assert not re.search(r'(src|href)="https?:', text)
+    assert text == page(found, {"steady-state-time": limited})
+
+
+def test_the_page_says_what_is_not_reached() -> None:
+    text = page(soak(soak_table(7200.0, drift_v=0.02)))
+    assert "Steady state is not reached within" in text
+    assert "steady state not reached" in text
+
+
+def test_a_room_that_wandered_is_told() -> None:
+    table = soak_table()
+    wandering = table.column("temperature_c") + 2 * np.sin(table.time_s / 3000)
+    warm = type(table).from_columns(
+        "poses", {**table.columns, "temperature_c": wandering}, table.constants, "", table.labels
+    )
+    assert "no soak at constant ambient" in page(soak(warm))
+
+
+def test_pictures_are_named() -> None:
+    assert [picture.name for picture in soak_album(soak(soak_table()))] == ["drift", "night", "allan"]
