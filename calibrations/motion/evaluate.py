@@ -149,7 +149,7 @@ def _noise_limit(
     above = f > 1.5 * record.rate_hz / part.n  # slower than the record is its mean
     size = np.abs(undone(part, model, 0, band)(f)) * 1e3 * part.gravity_m_s2 / _per_g(model)
     power = density[above] * size[above] ** 2 * f[1]
-    limit = float(np.sqrt(power.sum()))
+    limit = max(float(np.sqrt(power.sum())), np.finfo(float).tiny)  # a converter may see no noise at all
     # a line of a spectrum is known to its own size; Hann's window makes neighbours alike: 1.5 lines in one
     return Quantity(limit, float(np.sqrt(1.5 * np.sum(power**2))) / (2 * limit), "mm/s^2")
 
