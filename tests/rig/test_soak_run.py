@@ -1,0 +1,130 @@
+"""Soaks through the whole program in simulated time: a night, an oven, an early end, kills, and the report on them."""
+
+from __future__ import annotations
+
+import json
+import random
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from procedures.soak import schedule
+from rig.bench import DEFAULT
+from rig.record import Record
+from rig.record.measured import Measured
+from rig.results.soak import night
+from tests.rig.nursery import Harm, Nursery
+
+pytestmark = pytest.mark.sockets
+Rig = Callable[..., Any]
+NIGHT = ("--block-s", "450", "--unattended", "--json")
+SHORT = {"duration_s": 60.0, "interval_s": 20.0, "block_s": 5.0}
+SHORT_RUN = ("soak", "--duration-s", "60", "--interval-s", "20", "--dwell-s", "0.2", "--settle-s", "0", "--unattended")
+
+
+@pytest.fixture
+def cold(tmp_path: Path) -> str:
+    """A bench whose converter switches the sensor's power, and samples slowly: a night in seconds."""
+    document = yaml.safe_load(DEFAULT.read_text())
+    document["instruments"]["adc"]["settings"] |= {"power_dio": 0, "rate_hz": 100}
+    document["limits"]["results"] = {"steady-state": [1, 1], "steady-state-time": [0, 12]}
+    path = tmp_path / "cold.yaml"
+    path.write_text(yaml.safe_dump(document))
+    return str(path)
+
+
+def test_a_night_reaches_its_steady_state_after_hours_and_is_told_on_one_page(
+    rig: Rig, cold: str, tmp_path: Path
+) -> None:
+    ended = rig("run", "soak", "--bench", cold, "--off-s", "36000", *NIGHT)
+    document = json.loads(ended.out)
+    found = document["results"]
+    assert (ended.status, document["state"]) == (0, "complete"), ended.err
+    assert found["steady-state"]["verdict"] == found["steady-state-time"]["verdict"] == "pass"
+    assert 2.0 < found["steady-state-time"]["value"] < 12.0
+    assert found["bias-time-constant-x"]["value"] == pytest.approx(1.5, abs=4 * found["bias-time-constant-x"]["std"])
+    assert abs(found["bias-drift-x"]["value"]) > 1e-3
+    page = tmp_path / "night.html"
+    assert rig("report", document["run"], "--out", str(page)).status == 0
+    text = page.read_text(encoding="utf-8")
+    assert "are steady" in text
+    assert "steady-state-time" in text
+    assert str(tmp_path) not in text
+
+
+def test_in_an_oven_it_is_steady_within_an_hour(rig: Rig, cold: str) -> None:
+    ended = rig("run", "soak", "--bench", cold, "--oven-c", "45", "--off-s", "36000", "--duration-s", "21600", *NIGHT)
+    found = json.loads(ended.out)["results"]
+    assert found["steady-state-time"]["value"] < 1.0
+
+
+def test_until_steady_it_ends_early_and_says_when(rig: Rig, cold: str) -> None:
+    ended = rig("run", "soak", "--until-steady", "--bench", cold, "--off-s", "36000", *NIGHT)
+    document = json.loads(ended.out)
+    assert (ended.status, document["state"]) == (0, "complete"), ended.err
+    assert document["poses"] < len(list(schedule(43200.0, 900.0, 450.0)))
+    assert document["results"]["steady-state"]["value"] == 1.0
+    with Record() as record:
+        last_h = night(Measured.named(record, document["run"])).courses["bias-x"].t_s[-1] / 3600
+    assert document["results"]["steady-state-time"]["value"] < last_h < 12
+
+
+def test_the_result_does_not_depend_on_the_blocks(rig: Rig) -> None:
+    words = ("--duration-s", "96", "--interval-s", "32", "--json")
+    volts, runs = [], [json.loads(rig("run", *SHORT_RUN, *words, "--block-s", s).out)["run"] for s in ("2", "1")]
+    with Record() as record:
+        for run in runs:
+            kept = [each for each in record.kept(run) if each.pose.path in ("hold 5", "reversal 6")]
+            assert {each.pose.path for each in kept} == {"hold 5", "reversal 6"}
+            volts.append(np.concatenate([each.samples.volts for each in kept]))
+    assert volts[0].shape == volts[1].shape
+    assert np.array_equal(*volts)
+
+
+def test_killed_at_random_moments_it_ends_with_every_block_once(tmp_path: Path) -> None:
+    luck, words = random.Random(1), ("run", *SHORT_RUN, "--block-s", "5")
+    with Nursery() as nursery:
+        whole = nursery.run(tmp_path / "whole", *words)
+        for seed in range(4):
+            home, run = tmp_path / f"{seed}", ""
+            for _ in range(3):
+                harm = Harm("sql", luck.randint(1, whole.points["sql"] // 2))
+                nursery.run(home, *(("resume", run, "--unattended") if run else words), harm=harm)
+                with Record(home) as record:
+                    run = "".join(each.run for each in record.runs())
+            last = ("resume", run, "--unattended") if run else words
+            assert nursery.run(home, *last).status == 0
+            with Record(home) as record:
+                run = record.runs()[0].run
+                assert Counter(kept.pose for kept in record.kept(run)) == Counter(schedule(**SHORT))
+                assert record.run(run).state == "complete"
+
+
+def test_a_kill_in_a_hold_is_a_gap_in_the_results(rig_home: Path) -> None:
+    with Nursery() as nursery:
+        killed = nursery.run(rig_home, "run", *SHORT_RUN, "--block-s", "5", harm=Harm("INSERT INTO blocks", 48))
+        assert killed.status < 0
+        with Record(rig_home) as record:
+            run = record.runs()[0].run
+        assert nursery.run(rig_home, "resume", run, "--unattended").status == 0
+    with Record(rig_home) as record:
+        (gap,) = night(Measured.named(record, run)).gaps
+        assert gap.path == "hold 4"
+        assert 0 < gap.length_s == pytest.approx(record.run(run).results["gap"]["value"])
+
+
+def test_the_plan_of_a_night_is_quick_and_whole(rig: Rig) -> None:
+    document = json.loads(rig("plan", "soak", "--until-steady", "--json").out)
+    assert document["settings"]["until_steady"] is True
+    assert document["poses"] == len(list(schedule(43200.0, 900.0, 10.0)))
+    assert 12 * 3600 < document["duration_s"] < 14 * 3600
+
+
+def test_a_switch_may_have_a_value_too(rig: Rig) -> None:
+    assert json.loads(rig("plan", "soak", "--until-steady", "no", "--json").out)["settings"]["until_steady"] is False
+    assert "true or false" in rig("plan", "soak", "--until-steady", "maybe").err
