@@ -76,8 +76,8 @@ def _summary(found: Soak) -> str:
     if found.left_out:
         text += f" {found.left_out} reversals are left out, interrupted or before the oven was warm."
     if found.gaps:
-        text += f" It was interrupted {len(found.gaps)} times, for {_length(sum(gap.length_s for gap in found.gaps))}"
-        text += " in all: the fit takes the sensor to have stayed powered."
+        lost, plural = _length(sum(gap.length_s for gap in found.gaps)), "s" if len(found.gaps) > 1 else ""
+        text += f" {lost} are lost in {len(found.gaps)} gap{plural}: the fit takes the sensor to have stayed powered."
     return text
 
 

@@ -51,7 +51,7 @@ def test_a_gap_is_marked_and_the_fit_goes_by_real_time() -> None:
     assert state is not None
     assert state.terms[0].tau_s[0] == pytest.approx(5400, abs=3 * state.terms[0].tau_s[1])
     assert "1.39 h at" in page(found)
-    assert "interrupted 1 times" in page(found)
+    assert "1.39 h are lost in 1 gap:" in page(found)
 
 
 def test_a_reversal_that_was_interrupted_is_left_out() -> None:
