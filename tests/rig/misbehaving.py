@@ -18,12 +18,15 @@ from rig.runner import Outcome, start
 from tests.rig.rigging import Onlooker
 
 STAGES = ("alpha", "beta")
+STRETCHES = {"noise-floor", "soak", "motion"}  # record without a gap: where the run goes on, a new one begins
 LONGEST_STOP_S = 1.5  # a stage brakes in half a second, and by itself a second after its controller fell silent
 SHORT: dict[str, dict[str, str]] = {  # settings with which a procedure is short
     "sweep": {"dwell_s": "0.2", "step_deg": "180", "inclinations_deg": "90,45"},
     "noise-floor": {"duration_s": "3", "block_s": "1", "dwell_s": "0.2", "settle_s": "0.1"},
     "misalignment": {"dwell_s": "0.2", "most_rounds": "1"},
     "temperature-cycle": {"dwell_s": "0.2", "temperatures_c": "40,50", "soak_s": "600"},
+    "soak": {"duration_s": "1200", "interval_s": "600", "block_s": "60", "dwell_s": "0.2", "settle_s": "0.1"},
+    "motion": {"duration_s": "4", "still_s": "4", "block_s": "2", "dwell_s": "0.1", "settle_s": "0"},
     "repeat": {"times": "2", "dwell_s": "0.2", "power": "false", "mount": "false"},
 }
 
