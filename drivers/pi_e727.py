@@ -34,6 +34,7 @@ class Settings:
 
     axes: Mapping[str, str] = field(default_factory=lambda: {"x": "1", "y": "2", "z": "3"})
     limits_um: tuple[float, float] = (0.0, 100.0)
+    limit_hz: float = 100.0  # of an oscillation: well below the loaded stage's resonance [M]
     settle_um: float = 0.05
     wave_points: int = e727.WAVE_POINTS
     record_hz: float = 1000.0  # at least; whole servo cycles
@@ -43,7 +44,9 @@ class Settings:
             raise ValueError("axes must name the controller's axes, each once, and at least one")
         if not self.limits_um[0] < self.limits_um[1]:
             raise ValueError("limits_um must be the lower limit, then the upper one")
-        if wrong := [name for name in ("settle_um", "wave_points", "record_hz") if not getattr(self, name) > 0]:
+        if wrong := [
+            name for name in ("settle_um", "wave_points", "record_hz", "limit_hz") if not getattr(self, name) > 0
+        ]:
             raise ValueError(f"{', '.join(wrong)} must be positive")
 
     def wave(self, name: str, frequency_hz: float, cycle_s: float = e727.USUAL_CYCLE_S) -> Wave:
@@ -53,6 +56,11 @@ class Settings:
             raise LimitError(
                 f"{name}: no wave table plays {frequency_hz:g} Hz; nothing was moved",
                 f"Ask for a positive frequency of at most {fastest_hz:g} Hz",
+            )
+        if frequency_hz > self.limit_hz:
+            raise LimitError(
+                f"{name}: {frequency_hz:g} Hz is above its limit of {self.limit_hz:g} Hz; nothing was moved",
+                "Ask for a lower frequency, or change limit_hz in the bench file after looking at what is mounted",
             )
         return Wave.near(frequency_hz, cycle_s, self.wave_points)
 

@@ -191,6 +191,11 @@ def test_an_oscillation_stays_within_the_limits(
         positioner().oscillate("x", peak_to_peak_um=width_um, frequency_hz=10.0, centre_um=centre_um)
 
 
+def test_a_frequency_above_the_limit_moves_nothing(positioner: Positioners) -> None:
+    with pytest.raises(LimitError, match=r"positioner: 100.1 Hz is above its limit of 100 Hz; nothing was moved. Ask"):
+        positioner(*told(*CYCLE)).oscillate("x", peak_to_peak_um=1.0, frequency_hz=100.1, centre_um=50.0)
+
+
 @pytest.mark.parametrize("frequency_hz", [0.0, -1.0, 1000.1, math.inf, math.nan])
 def test_a_frequency_that_no_wave_table_plays(positioner: Positioners, frequency_hz: float) -> None:
     with pytest.raises(LimitError, match=r"no wave table plays .* at most 1000 Hz"):
