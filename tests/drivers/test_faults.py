@@ -232,6 +232,15 @@ def test_a_positioner_that_does_not_do_as_it_was_told(
         positioner.move_to("x", 20.0)
 
 
+def test_a_late_answer_of_a_positioner_is_not_that_to_the_next_question(afflicted: Callable[..., Any]) -> None:
+    """POS? is answered after its time-out, when ERR? has been asked."""
+    positioner, clock = at_fifty(afflicted, Fault("delay", at_s=5.0, for_s=1.2, size=1.3))
+    with pytest.raises(LinkTimeout, match=r"alpha: no answer to POS\? 1 within 1 s"):
+        positioner.position_um("x")
+    assert positioner.position_um("x") == pytest.approx(50.0, abs=0.01)
+    assert clock.now() < 9.0
+
+
 def test_an_oscillation_that_ends_by_itself_is_noticed_and_a_stop_is_none(afflicted: Callable[..., Any]) -> None:
     positioner, clock = at_fifty(afflicted, Fault("restart", at_s=8.0))
     positioner.require_steady()

@@ -11,13 +11,16 @@ from typing import Any
 
 import pytest
 
+from drivers.clock import SimulatedClock
 from drivers.errors import DriverError
 from drivers.links.faults import Fault
+from drivers.links.person import PersonLink
 from drivers.links.wire_faults import EFFECTS, kinds_of
 from procedures.errors import ProcedureError
 from procedures.session import Limits
 from rig.bench import read_bench
 from rig.cli.failure import status_of
+from rig.instruments import Rig
 from rig.record import Record
 from rig.runner import resume
 from tests.rig.misbehaving import SHORT, STRETCHES, Aftermath, afflicted, digest, looking_on, short, watched_bench
@@ -165,6 +168,35 @@ def test_a_late_answer_is_not_taken_for_the_next_one(aftermath: Aftermath) -> No
     with Record() as record:
         sound = [k.dwell.means["vx"] for k in record.kept(short(record, BENCH, "sweep").run.run)]
     assert volts == pytest.approx(sound, abs=2e-3)
+
+
+class Mover:
+    """Writes down what it is told; fails at `fails`."""
+
+    def __init__(self, name: str, log: list[str], fails: str = "") -> None:
+        self.name, self._log, self._fails = name, log, fails
+
+    def _told(self, what: str) -> None:
+        self._log.append(f"{self.name} {what}")
+        if what == self._fails:
+            raise ZeroDivisionError("whatever it is")
+
+    def halt(self) -> None:
+        self._told("halt")
+
+    def stop(self) -> None:
+        self._told("stop")
+
+    def run(self, on: bool) -> None:
+        self._told(f"run {on}")
+
+
+def test_all_are_told_to_stop_before_the_first_is_waited_for() -> None:
+    log: list[str] = []
+    movers: dict[str, Any] = {"alpha": Mover("alpha", log, "halt"), "beta": Mover("beta", log, "stop")}
+    rig = Rig(BENCH, movers | {"oven": Mover("oven", log)}, SimulatedClock(), None, (), PersonLink())
+    assert rig.stop() == ["beta may still move: whatever it is"]
+    assert log == ["alpha halt", "beta halt", "alpha stop", "beta stop", "oven run False"]
 
 
 def test_faults_are_no_part_of_what_a_run_depends_on() -> None:
