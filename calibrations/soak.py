@@ -91,6 +91,11 @@ class Soak:
         reached = [time for time in times if time is not None]
         return max(reached) if len(reached) == len(times) else None
 
+    def from_start(self, axis: str = "") -> bool:
+        """Whether an axis, or all, were steady at the first reversal already."""
+        states = [course.state for course in self.courses.values() if course.axis.startswith(axis)]
+        return all(state is not None and state.from_start for state in states)
+
     @cached_property
     def temperature(self) -> SteadyState | None:
         """The approach of the temperature; None where it is not known."""

@@ -54,6 +54,10 @@ def _template() -> Template:
 
 def _headline(found: Soak) -> str:
     time = found.time_s()
+    if time is not None and found.from_start():
+        return (
+            f"Bias and scale factor were steady from the first reversal on, {plain(time[0] / HOUR_S)} h after power-on."
+        )
     if time is not None:
         return f"Bias and scale factor are steady {_hours(time)} h after power-on."
     if any(course.state is None for course in found.courses.values()):
@@ -89,7 +93,8 @@ def _figures(found: Soak) -> list[tuple[str, str, str]]:
         if bias.state is not None:
             change = f"{_signed(1e3 * bias.state.drift[0])} mV"
             drift = f"bias drifts by {change}" if bias.state.terms else "no drift of the bias told from noise"
-            shown.append((f"steady state, axis {axis}", f"{_hours(time)} h" if time else "not reached", drift))
+            reached = "from the start" if found.from_start(axis) else f"{_hours(time)} h" if time else "not reached"
+            shown.append((f"steady state, axis {axis}", reached, drift))
     wander_k = found.temperature_wander_k
     if wander_k is not None:
         low, high = (float(f(found.holds.column("temperature_c"))) for f in (np.min, np.max))

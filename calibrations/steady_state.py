@@ -88,6 +88,11 @@ class SteadyState:
         return float(after - before), float(np.sqrt((last - first) @ self.covariance @ (last - first)))
 
     @property
+    def from_start(self) -> bool:
+        """Whether nothing is left to come at the first value already."""
+        return self.time_s is not None and self.time_s[0] == self.span_s[0]
+
+    @property
     def time_s(self) -> Quantity | None:
         """Steady-state time since power-on; None where it is not reached.
 

@@ -71,7 +71,7 @@ def surroundings(found: Soak) -> Figure:
     for axis in found.axes:
         times_s, rms = found.noise_of_hours(axis)
         ax.plot(times_s / HOUR_S, 1e3 * rms, "o-", color=COLOURS[axis], label=f"axis {axis}")
-    ax.set(ylabel="noise, rms (mV)", xlabel="time since power-on (h)", xlim=(0, None))
+    ax.set(ylabel="noise, rms (mV)", xlabel="time since power-on (h)", xlim=(_begin_h(found), None))
     ax.margins(y=0.3)
     ax.legend(loc="upper right", ncols=len(found.axes))
     _mark(ax, found)
@@ -112,9 +112,21 @@ def _course(ax: Axes, found: Soak, course: Course, factor: float, label: str) ->
                 mfc="white", mew=0.7, elinewidth=0.7, ms=3.0, zorder=2)  # fmt: skip
     seen = factor * (np.append(course.values, final) - final)
     room = 0.12 * np.ptp(seen) + factor * (state.tolerance if state else 0.0)
-    ax.set(ylabel=label, xlim=(0, None), ylim=(seen.min() - room, seen.max() + room))
+    ax.set(ylabel=label, xlim=(_begin_h(found), None), ylim=(seen.min() - room, seen.max() + room))
     _mark(ax, found)
     _mark_steady(ax, course)
+
+
+def _begin_h(found: Soak) -> float | None:
+    """Left end of the axes of time: power-on, unless the record began long after it."""
+    first, last = (t / HOUR_S for t in _span_s(found))
+    return 0.0 if first < last - first else None
+
+
+def _span_s(found: Soak) -> tuple[float, float]:
+    """First and last time of the table, since power-on, s."""
+    times_s = found.table.time_s - found.power_on_s
+    return float(times_s.min()), float(times_s.max())
 
 
 def _mark_steady(ax: Axes, course: Course) -> None:

@@ -27,7 +27,8 @@ def evaluate(measured: Measured) -> dict[str, Result]:
     steady-state-time      h since power-on, where it is reached: the later one of bias and scale factor
     bias-drift             V, the fitted bias at the last reversal less that at the first
     scale-drift            the same of the scale factor, over its final value
-    bias-time-constant     h, of the slowest exponential, where there is one; so for the scale factor
+    time-constant          h, of the slowest exponential of the bias, where there is one
+    scale-time-constant    the same of the scale factor
     bias-tolerance         V, within which a bias is called steady; so for the scale factor, over its final value
     temperature-wander     K, peak to peak, of the temperature about the sensor's own warming
     gap                    s, of which nothing was kept
@@ -119,7 +120,9 @@ def _drift(course: Course, state: SteadyState) -> dict[str, Result]:
     unit, whole = ("V", 1.0) if course.quantity == "bias" else ("", abs(state.final[0]))
     value, std = state.drift
     results = {"drift": Result(value / whole, unit, std / whole), "tolerance": Result(state.tolerance / whole, unit)}
+    found = {f"{course.quantity}-{name}-{course.axis}": result for name, result in results.items()}
     if state.terms:
         tau_s, tau_std = state.terms[0].tau_s
-        results["time-constant"] = Result(tau_s / HOUR_S, "h", tau_std / HOUR_S)
-    return {f"{course.quantity}-{name}-{course.axis}": result for name, result in results.items()}
+        name = "time-constant" if course.quantity == "bias" else "scale-time-constant"
+        found[f"{name}-{course.axis}"] = Result(tau_s / HOUR_S, "h", tau_std / HOUR_S)
+    return found

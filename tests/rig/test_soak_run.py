@@ -47,7 +47,7 @@ def test_a_night_reaches_its_steady_state_after_hours_and_is_told_on_one_page(
     assert (ended.status, document["state"]) == (0, "complete"), ended.err
     assert found["steady-state"]["verdict"] == found["steady-state-time"]["verdict"] == "pass"
     assert 2.0 < found["steady-state-time"]["value"] < 12.0
-    assert found["bias-time-constant-x"]["value"] == pytest.approx(1.5, abs=4 * found["bias-time-constant-x"]["std"])
+    assert found["time-constant-x"]["value"] == pytest.approx(1.5, abs=4 * found["time-constant-x"]["std"])
     assert abs(found["bias-drift-x"]["value"]) > 1e-3
     page = tmp_path / "night.html"
     assert rig("report", document["run"], "--out", str(page)).status == 0
