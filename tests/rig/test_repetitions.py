@@ -29,14 +29,11 @@ def bench(changes: dict[str, Any]) -> dict[str, Any]:
     return document
 
 
-@pytest.fixture
-def with_line(tmp_path: Path) -> str:
-    """A bench whose converter switches the sensor's power."""
+def by_hand() -> dict[str, Any]:
+    """The document of a bench whose converter does not switch the sensor's power."""
     document = bench({})
-    document["instruments"]["adc"]["settings"]["power_dio"] = 0
-    path = tmp_path / "bench.yaml"
-    path.write_text(yaml.safe_dump(document))
-    return str(path)
+    del document["instruments"]["adc"]["settings"]["power_dio"]
+    return document
 
 
 @pytest.mark.sockets
@@ -84,8 +81,8 @@ def test_an_overheated_sensor_stops_the_run(rig: Rig, tmp_path: Path) -> None:
 
 
 @pytest.mark.sockets
-def test_repetitions_of_every_kind_are_in_the_budget(rig: Rig, with_line: str) -> None:
-    ended = rig("run", "repeat", "--times", "2", "--warm-s", "20", "--bench", with_line, *FAST)
+def test_repetitions_of_every_kind_are_in_the_budget(rig: Rig) -> None:
+    ended = rig("run", "repeat", "--times", "2", "--warm-s", "20", *FAST)
     found = json.loads(ended.out)["results"]
     assert ended.status == 0
     assert set(found) == {f"{q}-{k}-{a}" for q in ("bias", "scale") for k in ("as-is", "power", "mount") for a in "xy"}
@@ -95,7 +92,7 @@ def test_repetitions_of_every_kind_are_in_the_budget(rig: Rig, with_line: str) -
 
 @pytest.mark.sockets
 def test_what_the_technician_does_by_hand_is_in_the_budget(rig: Rig, tmp_path: Path) -> None:
-    document = bench({})
+    document = by_hand()
     document["world"] = {"preset": "ideal", "noise": {"white_v": 1e-5}, "seating": {"tilt_deg": 0.02, "grip_pm": 20.0}}
     path = tmp_path / "bench.yaml"
     path.write_text(yaml.safe_dump(document))
@@ -111,12 +108,12 @@ def test_what_the_technician_does_by_hand_is_in_the_budget(rig: Rig, tmp_path: P
     assert [what for what in asked if "-3" in what] == ["answer power-cycle-3", "answer remount-3"]
 
 
-def test_a_plan_says_who_switches_the_power(with_line: str) -> None:
+def test_a_plan_says_who_switches_the_power() -> None:
     repeat = find("repeat")
     settings = parse(repeat, {"times": "2", "mount": "false"})
-    by_hand = plan(Bench.model_validate(bench({})), repeat, settings)
-    by_line = plan(Bench.model_validate(yaml.safe_load(Path(with_line).read_text())), repeat, settings)
-    assert any(question.startswith("power-cycle-1: ") for question in by_hand.questions)
+    asking = plan(Bench.model_validate(by_hand()), repeat, settings)
+    by_line = plan(Bench.model_validate(bench({})), repeat, settings)
+    assert any(question.startswith("power-cycle-1: ") for question in asking.questions)
     assert len(by_line.questions) == 1
     assert [s.what for s in by_line.steps].count("adc switches the sensor off") == 2
 
