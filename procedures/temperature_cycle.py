@@ -13,7 +13,7 @@ from procedures.level_check import levelled
 from procedures.session import Session
 from procedures.tumbles import is_first, tumble
 
-SLICE_S = 600.0  # of a soak: how often the limits of temperature are looked at meanwhile
+SLICE_S = 60.0  # of a soak: how often the limits of temperature are looked at meanwhile
 DRIFTED_K = 3.0  # from the set point: an oven that stood still in an interruption
 
 

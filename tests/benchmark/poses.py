@@ -87,13 +87,16 @@ def sweep(bench: Bench, poses: int, dwell_s: float) -> dict[str, float]:
         done("settling")
         bench.adc.acquire_with(dwell_s, bench.oven.temperature_c)
         done("dwell")
+        bench.alpha.require_steady()
+        bench.beta.require_steady()
+        done("standing")
     return took
 
 
 def needed(dwell_s: float) -> dict[str, float]:
     """What the parts of one pose need, in s."""
     move_s = Trajectory(0.0, 0.0, STEP_DEG, STAGE.speed_deg_s, STAGE.acceleration_deg_s2).end_s
-    return {"alpha": 0.0, "beta": move_s, "settling": SETTLE_S, "dwell": dwell_s}
+    return {"alpha": 0.0, "beta": move_s, "settling": SETTLE_S, "dwell": dwell_s, "standing": 0.0}
 
 
 def main(poses: str, dwell: str) -> None:

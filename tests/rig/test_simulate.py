@@ -69,7 +69,7 @@ def test_a_bench_of_which_a_part_is_real_runs_in_real_time(
     instruments["oven"]["url"] = document["instruments"]["oven"]["url"]  # elsewhere, so real for this bench
     path = bench_file({"instruments": instruments})
     with connected(read_bench(path)) as mixed:
-        with pytest.raises(Busy, match="another process .* works on "), connected(read_bench(path)):
+        with pytest.raises(Busy, match=r"another process .* works on "), connected(read_bench(path)):
             pass  # its connecting would disturb who measures
         assert mixed.state() is None
         assert mixed.power_on_s() is None
