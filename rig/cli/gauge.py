@@ -6,7 +6,7 @@ import math
 
 from rich.text import Text
 
-WIDTH = 25  # characters, the ends included
+WIDTH = 15  # characters, the ends included
 NEAR = 0.1  # of the span: so near to a limit, a value is marked
 STYLES = {"": "green", "near its limit": "yellow", "beyond its limit": "bold red"}
 

@@ -102,7 +102,7 @@ def _bar(value: float, low: float, high: float) -> Text:
 
 def _channel(name: str, mean: float, std: float, farthest: float, seen: Seen) -> Row:
     """A channel in V; its bar is the converter's range, in which its sample that is farthest out is marked."""
-    scatter = f"scatter {1e3 * std:.3f} mV"
+    scatter = f"rms {1e3 * std:.3f} mV"
     if usual_v := seen.usual_v.get(name):
         ratio = std / usual_v
         scatter += f", {ratio:.2g} x the usual" if not 1 / UNUSUAL <= ratio <= UNUSUAL else ", as usual"

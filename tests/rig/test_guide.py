@@ -156,7 +156,7 @@ def test_it_shows_what_happens_progress_readings_and_time() -> None:
         shown_to.doing("moving to alpha 90, beta 10 deg")
         shown_to.kept(kept(1))
     text = told.getvalue()
-    for piece in (RUN, "moving to alpha 90, beta 10 deg", "2/4 poses", "2.50000 V", "scatter 141", "28.3 C", "left"):
+    for piece in (RUN, "moving to alpha 90, beta 10 deg", "2/4 poses", "2.50000 V", "rms 141", "28.3 C", "left"):
         assert piece in text
     assert "level-front-x = 0.25 deg" in text
     assert "Ctrl-C stops the stages" in text
@@ -174,6 +174,13 @@ def test_values_stand_between_their_limits_and_are_marked_near_them() -> None:
     assert "near its limit" in shown(screen(seen(kept=hot), 0.0))
     assert "beyond its limit" in shown(screen(seen(kept=replace(hot, temperature_c=86.0)), 0.0))
     assert "near its limit" in shown(screen(seen(kept=kept(1, noise=7.0)), 0.0))  # a sample at 9.5 of 10 V
+
+
+def test_it_fits_a_terminal_of_80_columns() -> None:
+    console = Console(file=io.StringIO(), width=80)
+    console.print(screen(seen(kept=kept(1), usual_v={"vx": 0.14, "vy": 0.1}), 0.0))
+    (line,) = [line for line in console.file.getvalue().splitlines() if "vx" in line]  # type: ignore[attr-defined]
+    assert line.rstrip(" │").endswith("rms 141.421 mV, as usual")
 
 
 def test_the_level_is_shown_when_it_was_read_both_ways_round() -> None:
@@ -200,7 +207,7 @@ def test_scatter_is_compared_with_what_is_usual_for_such_poses() -> None:
 
 @pytest.mark.parametrize(
     ("value", "near", "place"),
-    [(0.0, "", 12), (-1.0, "near its limit", 1), (0.85, "near its limit", 21), (3.0, "beyond its limit", 23)],
+    [(0.0, "", 7), (-1.0, "near its limit", 1), (0.85, "near its limit", 12), (3.0, "beyond its limit", 13)],
 )
 def test_a_gauge_has_its_mark_where_the_value_is(value: float, near: str, place: int) -> None:
     bar = gauge(value, -1.0, 1.0).plain

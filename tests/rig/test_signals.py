@@ -1,6 +1,8 @@
 """A signal ends a run once; a terminal that closes does not end what nohup started."""
 
 import signal
+from threading import Event
+from types import FunctionType
 
 import pytest
 
@@ -29,3 +31,20 @@ def test_nohup_is_respected() -> None:
             signal.raise_signal(signal.SIGHUP)
     finally:
         signal.signal(signal.SIGHUP, before)
+
+
+def test_the_simulated_worlds_compiled_code_is_not_interrupted() -> None:
+    def compute() -> str:
+        signal.raise_signal(signal.SIGINT)
+        return "whole"
+
+    world = {"signal": signal, "__name__": "drivers.simulation.world"}
+    computed: list[str] = []
+
+    def compute_and_wait() -> None:
+        computed.append(FunctionType(compute.__code__, world)())
+        Event().wait(30)  # the signal ends it
+
+    with pytest.raises(KeyboardInterrupt, match="SIGINT"), stoppable():
+        compute_and_wait()
+    assert computed == ["whole"]
