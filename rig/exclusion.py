@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from calibrations.errors import CalibrationError
-from rig.bench import Bench
-from rig.errors import RecordError
 from rig.lease import lease
 from rig.record import Record, Run
-from rig.results import documents, evaluated
+from rig.results import judged
 
 RESULTS = "results"  # the event that says how they were made anew
 
@@ -28,14 +25,9 @@ def exclude(record: Record, run_id: str, number: int, reason: str | None) -> Run
 
 def _evaluate_again(record: Record, run: Run) -> None:
     """The results of the poses that are left; none, and why, where they do not determine them."""
-    try:
-        found = evaluated(record, run)
-    except (CalibrationError, RecordError) as error:
-        record.set_results(run.run, {})
-        record.note(run.run, RESULTS, f"none: {error}")
-        return
-    if found:
-        record.set_results(run.run, documents(found, Bench.model_validate(run.bench).result_limits))
-        record.note(run.run, RESULTS, "evaluated again")
+    results, why = judged(record, run)
+    if results or why:
+        record.set_results(run.run, results)
+        record.note(run.run, RESULTS, f"none: {why}" if why else "evaluated again")
     elif run.results:
         record.note(run.run, RESULTS, "given by the procedure itself, which knew all poses; not evaluated again")

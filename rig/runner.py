@@ -29,7 +29,7 @@ from rig.lease import lease
 from rig.plan import Plan, plan
 from rig.record import Kept, Record, Run
 from rig.record.measured import Measured, of_sensor
-from rig.results import Result, documents, evaluated, returned
+from rig.results import Result, documents, judged, returned
 from rig.signals import stoppable
 from rig.technician import answer
 
@@ -155,7 +155,6 @@ def _carry_out(record: Record, rig: Rig, run: Run, procedure: Procedure, watch: 
     watch.begun(run.run)
     try:
         own = _perform(record, rig, run, procedure, watch)
-        results = documents(own or evaluated(record, run), rig.bench.result_limits)
     except BaseException as failure:
         complaints = _stop(rig)
         error = _told(failure, run)
@@ -165,7 +164,8 @@ def _carry_out(record: Record, rig: Rig, run: Run, procedure: Procedure, watch: 
         if isinstance(failure, Exception) and error is not failure:
             raise  # a fault of the program is not the run's
         return Outcome(record.run(run.run), error, tuple(complaints))
-    record.set_state(run.run, "complete", None, results)
+    results, why = (documents(own, rig.bench.result_limits), None) if own else judged(record, run)
+    record.set_state(run.run, "complete", why and f"no results: {why}", results)
     return Outcome(record.run(run.run))
 
 

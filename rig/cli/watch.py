@@ -98,7 +98,7 @@ def _answers(path: Path | None) -> dict[str, str]:
 
 
 def tell(record: Record, outcome: Outcome, as_json: bool) -> int:
-    """The end of a run, and its exit status: 1 where a result is beyond its limit. Raises what stopped the run."""
+    """The end of a run, and its exit status: 1 without results, or with one beyond its limit. Raises its error."""
     run = outcome.run
     if as_json:
         head = {"schema": "rig.run/1", "run": run.run, "procedure": run.procedure, "state": run.state}
@@ -110,4 +110,6 @@ def tell(record: Record, outcome: Outcome, as_json: bool) -> int:
     if outcome.error is not None:
         notes(outcome.moving)
         raise outcome.error
-    return int(any(result["verdict"] == "fail" for result in run.results.values()))
+    if run.message:
+        note(run.message)
+    return int(bool(run.message) or any(result["verdict"] == "fail" for result in run.results.values()))

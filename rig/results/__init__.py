@@ -4,7 +4,7 @@
 user's own may return its results instead, as such a mapping.
 """
 
-from rig.results.evaluate import evaluated
+from rig.results.evaluate import judged
 from rig.results.result import Result, documents, returned
 
-__all__ = ["Result", "documents", "evaluated", "returned"]
+__all__ = ["Result", "documents", "judged", "returned"]

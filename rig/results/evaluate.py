@@ -4,10 +4,24 @@ from __future__ import annotations
 
 import importlib
 from pathlib import Path
+from typing import Any
 
+from calibrations.errors import CalibrationError
+from drivers.errors import DriverError
+from rig.bench import Bench
+from rig.errors import RecordError
 from rig.record import Record, Run
 from rig.record.measured import Measured, sensors_of
-from rig.results.result import Result
+from rig.results.result import Result, documents
+
+
+def judged(record: Record, run: Run) -> tuple[dict[str, Any], str | None]:
+    """The run's results as documents, judged by the limits of its bench; where there are none, why."""
+    try:
+        found = evaluated(record, run)
+    except (CalibrationError, RecordError, DriverError) as error:
+        return {}, str(error)
+    return documents(found, Bench.model_validate(run.bench).result_limits), None
 
 
 def evaluated(record: Record, run: Run) -> dict[str, Result]:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
+from calibrations.errors import DataError
 from procedures.errors import ProcedureError
 from rig.bench import DEFAULT
 from rig.record import Record
@@ -123,3 +124,16 @@ def test_a_bench_without_a_level_has_it_read_and_typed(rig: Rig, tmp_path: Path)
     assert results["level-y"]["value"] == pytest.approx(0.10)
     assert results["level-offset-y"]["value"] == pytest.approx(0.01)
     assert results["level-x"]["std"] is None
+
+
+@pytest.mark.sockets
+def test_what_was_measured_is_complete_even_if_nothing_comes_of_it(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+    def cannot(measured: object) -> None:
+        raise DataError("the stretches are too short; measure longer")
+
+    monkeypatch.setattr("rig.results.level_check.evaluate", cannot)
+    ended = rig("run", "level-check", "--unattended", "--json")
+    document = json.loads(ended.out)
+    assert (ended.status, document["state"], document["results"]) == (1, "complete", {})
+    assert "no results: the stretches are too short" in ended.err
+    assert "no results: the stretches are too short" in rig("show", document["run"]).out
