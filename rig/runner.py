@@ -155,6 +155,7 @@ def _carry_out(record: Record, rig: Rig, run: Run, procedure: Procedure, watch: 
     watch.begun(run.run)
     try:
         own = _perform(record, rig, run, procedure, watch)
+        results, why = (documents(own, rig.bench.result_limits), None) if own else judged(record, run)
     except BaseException as failure:
         complaints = _stop(rig)
         error = _told(failure, run)
@@ -164,7 +165,6 @@ def _carry_out(record: Record, rig: Rig, run: Run, procedure: Procedure, watch: 
         if isinstance(failure, Exception) and error is not failure:
             raise  # a fault of the program is not the run's
         return Outcome(record.run(run.run), error, tuple(complaints))
-    results, why = (documents(own, rig.bench.result_limits), None) if own else judged(record, run)
     record.set_state(run.run, "complete", why and f"no results: {why}", results)
     return Outcome(record.run(run.run))
 

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from calibrations.errors import CalibrationError
-from drivers.errors import DriverError
 from rig.bench import Bench
 from rig.errors import RecordError
 from rig.record import Record, Run
@@ -16,10 +15,13 @@ from rig.results.result import Result, documents
 
 
 def judged(record: Record, run: Run) -> tuple[dict[str, Any], str | None]:
-    """The run's results as documents, judged by the limits of its bench; where there are none, why."""
+    """The run's results as documents, judged by the limits of its bench; where what was measured gives none, why.
+
+    An instrument's fault that shows only now is raised: SensorFault.
+    """
     try:
         found = evaluated(record, run)
-    except (CalibrationError, RecordError, DriverError) as error:
+    except (CalibrationError, RecordError) as error:
         return {}, str(error)
     return documents(found, Bench.model_validate(run.bench).result_limits), None
 
