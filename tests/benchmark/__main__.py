@@ -21,6 +21,7 @@ TARGET_S = {
     "help": 0.3,
     "diagnose, warm: one defect": 2.0,
     "diagnose, warm: the default rig": 2.0,
+    "night": 60.0,  # the soak's procedure as a command: reversals, every check, results
     "soak": 60.0,  # 12 h x 4 channels x 1 kHz through the sockets into a record
 }
 LEAST_TIMES_FASTER = 4.0  # samples of the simulated rig, against the same content out of numpy and scipy
@@ -53,6 +54,7 @@ def _figures(folder: Path) -> Iterator[tuple[str, Figure]]:
     yield "dwell means of 518 poses", _inside("", subject(folder, "dwells"))
     yield "screen of candidates", _inside("", subject(folder, "screening", file))
     yield "soak", _inside("soak", subject(folder, "soak", "12"))
+    yield "night", _commands("night", folder, 1, "run", "soak", "--off-s", "0", "--unattended", "--json")
     yield "generation", _generation(folder)
     yield "poses in real time", _overhead(folder)
     yield "100 kills", _inside("", subject(folder, "kills", "100"))
