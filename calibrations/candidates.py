@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import fdtrc
 
 from calibrations.effect import Effect
@@ -56,7 +57,7 @@ def candidates(before: Fit, effects: Mapping[str, Effect]) -> list[Candidate]:
     tried = [
         (effect, *_columns(screen, effect))
         for effect in effects.values()
-        if not before.model.holds(effect.name) and effect.excluded(before.table) is None and _fits(before, effect)
+        if _applies(effect, before) and _fits(before, effect)
     ]
     tried = [each for each in tried if each[3].shape[1]]
     search = Search(screen, [basis for *_, basis in tried])
@@ -100,12 +101,19 @@ def added(before: Fit, c: Candidate) -> Fit:
     return refit(before, before.model.with_effect(c.effect), c.start)
 
 
+def _applies(effect: Effect, before: Fit) -> bool:
+    """Whether the model can miss it, and the data can have it."""
+    model = before.model
+    known = set(effect.after) <= set(model.effects)
+    return known and not model.holds(effect.name) and effect.excluded(before.table) is None
+
+
 def _fits(before: Fit, *added: Effect) -> bool:
     """Whether there are more rows than parameters with these effects."""
     model = before.model
     for effect in added:
         model = model.with_effect(effect)
-    return before.residual.size > len(Layout.of(model, before.table).slots)
+    return before.residual.size > len(Layout.of(model.for_table(before.table), before.table).slots)
 
 
 def _columns(screen: Screen, effect: Effect) -> tuple[Array, Array, Array]:
@@ -115,16 +123,31 @@ def _columns(screen: Screen, effect: Effect) -> tuple[Array, Array, Array]:
     problem = Problem.of(model, before.table)
     mine = problem.layout.of_effect(effect.name)
     best = (np.zeros(0), np.zeros((*before.residual.shape, 0)), np.zeros((before.residual.size, 0)))
-    for theta in problem.layout.starts():
+    for theta in _starts(before, problem, effect):
         columns = problem.jacobian(theta, mine)
+        if effect.searched(before.table) > 1:
+            columns = np.concatenate([_contribution(before, problem, theta, mine), columns], axis=2)
         basis = screen.basis(columns)
         if not best[2].shape[1] or screen.statistic(basis) > screen.statistic(best[2]):
             best = (theta, columns, basis)
     return best
 
 
+def _starts(before: Fit, problem: Problem, effect: Effect) -> list[Array]:
+    """Where the effect's derivatives are taken: near nothing or, where it was searched for in the data, at its fit."""
+    if effect.searched(before.table) > 1:
+        return [refit(before, problem.layout.model).theta]
+    return problem.layout.starts()
+
+
+def _contribution(before: Fit, problem: Problem, theta: Array, mine: NDArray[np.bool_]) -> Array:
+    """What the effect changes of the residual, shape (channels, n, 1)."""
+    return (before.problem.residual(theta[~mine]) - problem.residual(theta))[:, :, None]
+
+
 def _gains(before: Fit, extras: list[Array]) -> list[float]:
-    return gains(before.noise, before.residual, before.jacobian, extras, before.problem.smooth)
+    scaled = [e / np.maximum(np.sqrt(np.sum(e**2, axis=(0, 1))), np.finfo(float).tiny) for e in extras]
+    return gains(before.noise, before.residual, before.jacobian, scaled, before.problem.smooth)
 
 
 def _judge(
@@ -138,13 +161,13 @@ def _judge(
     )
     p_score = float(fdtrc(rank, free, score / rank)) if smooth else 1.0
     p_refitted = _tail(refitted, before.residual.size, rank, free)
-    tests = 2 if smooth else 1
+    tests, searched = 2 if smooth else 1, effect.searched(before.table)
     after = before.residual - np.concatenate([before.jacobian, columns], axis=2) @ _change(before, columns)
     return Candidate(
         effect=effect,
         rank=rank,
-        gain=max(score if smooth else 0.0, refitted),
-        p_value=float(of_search(min(p_score, p_refitted), tests * trials)),
+        gain=max(score if smooth else 0.0, refitted) - 2 * float(np.log(searched)),
+        p_value=float(of_search(min(p_score, p_refitted), tests * trials * searched)),
         excess_after=float(np.sqrt(np.mean((rms(after) / before.noise.floor) ** 2))),
         held_out_after=held_out_excess(before, columns),
         probability=0.0,

@@ -22,11 +22,12 @@ from calibrations.held_out import held_out_excess
 from calibrations.model import Model
 from calibrations.path import MATERIAL, Path, find_path, share_left
 from calibrations.patterns import patterns
+from calibrations.plainer import plainer
 from calibrations.screen import Screen, Search
 from calibrations.table import Table
 
 MOST_NOISE = 2.5  # times the noise floor: more than white and slow noise of a sensor alone
-MOST_LEFT = 1 / 3  # of the excess variance: more left than this, and the catalogue has not explained it
+MOST_LEFT = 1 / 5  # of the excess variance: more left than this, and the catalogue has not explained it
 
 
 @dataclass(frozen=True)
@@ -51,9 +52,10 @@ class Diagnosis:
 def diagnose(table: Table, model: Model, effects: Mapping[str, Effect] | None = None) -> Diagnosis:
     """Fit `model` to `table` and find what it misses. Raises what `fit` raises."""
     path = find_path(model, table, catalogue() if effects is None else effects, enough=MOST_LEFT)
-    structure = structure_of(path.end)
+    better = plainer(path)
+    structure = better or structure_of(path.end)
     left = path.left
-    verdict, caution = verdict_of(path, structure), undetermined(path.start)
+    verdict, caution = _verdict_of(path, structure, better is not None), undetermined(path.start)
     if verdict == "adequate" and caution:
         verdict = "ambiguous"
     return Diagnosis(
@@ -68,9 +70,10 @@ def diagnose(table: Table, model: Model, effects: Mapping[str, Effect] | None = 
     )
 
 
-def verdict_of(path: Path, structure: str | None) -> str:
+def _verdict_of(path: Path, structure: str | None, plainer_wins: bool) -> str:
     """The verdict on the model at the start of `path`, given what is left at its end."""
-    if structure is not None and _share_left(path) > MOST_LEFT and path.end.pooled_excess > MATERIAL:
+    not_explained = plainer_wins or _share_left(path) > MOST_LEFT
+    if structure is not None and not_explained and path.end.pooled_excess > MATERIAL:
         return "unexplained"
     if not path.steps:
         return "adequate"

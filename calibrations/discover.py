@@ -22,6 +22,7 @@ from calibrations.fit import Fit, fit, refit
 from calibrations.held_out import held_out_excess
 from calibrations.model import Model
 from calibrations.path import MATERIAL, Path, find_path, share_left
+from calibrations.plainer import plainer
 from calibrations.screen import chance
 from calibrations.table import Table
 
@@ -100,9 +101,10 @@ def discover(table: Table, model: Model, effects: Mapping[str, Effect] | None = 
     """All effects that `model` misses on `table`. Raises what `fit` raises."""
     effects = catalogue() if effects is None else effects
     path = find_path(model, table, effects)
-    structure = structure_of(path.end)
+    better = plainer(path)
+    structure = better or structure_of(path.end)
     left = path.end.pooled_excess > MATERIAL and structure is not None
-    if left and (not path.steps or share_left(path.start, path.end) > MOST_LEFT):
+    if left and (not path.steps or better or share_left(path.start, path.end) > MOST_LEFT):
         return Discovery(path.start, (), "unexplained", (), (), {}, structure, None, path)
     kept = _needed(path)
     steps = _in_order(path, kept, effects)

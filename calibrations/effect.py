@@ -20,8 +20,10 @@ a tuple PARAMETERS, and at least one of four functions, named by where in the si
     output(v, table, p) -> (n, 3)             what becomes of the output
 
 `p` maps a parameter's name to its value: shape (3,) if per axis, else a float. Optional are
-NEEDS (columns), KINDS (of tables), CONSTANTS: name -> function of the table, for reference values that are
-kept with the model and not fitted, and STARTS: name -> function of the table, for a start from the data, (axes,).
+NEEDS (columns), KINDS (of tables), AFTER (effects without which in a model it means nothing); CONSTANTS: name ->
+function of the table, for reference values that are kept with the model and not fitted; STARTS: name -> function of
+the table, for starts from the data, (axes,) or (starts, axes); and SEARCHED, a function of the table: how many starts
+that look different STARTS is the best of.
 """
 
 from __future__ import annotations
@@ -55,7 +57,7 @@ class Parameter:
 
     `typical` is the magnitude that a sensor may show (in g where the unit holds {out}, else in `unit`): the step
     of numerical derivatives follows from it, and an estimate no better than this tells nothing new. `measured` names
-    an axis without which it does not exist.
+    an axis without which it does not exist, `where` one of the effect's CONSTANTS that is 0 where it does not.
     """
 
     name: str
@@ -66,6 +68,7 @@ class Parameter:
     low: float = -np.inf
     high: float = np.inf
     measured: str = ""
+    where: str = ""
     doc: str = ""
 
     def __post_init__(self) -> None:
@@ -84,6 +87,11 @@ class Sections(TypedDict):
     source: str
 
 
+def _one(table: Table) -> float:  # noqa: ARG001
+    """Nothing is searched for in the data."""
+    return 1.0
+
+
 @dataclass(frozen=True)
 class Effect:
     """One physical effect, as read from its module."""
@@ -98,8 +106,10 @@ class Effect:
     source: str
     needs: tuple[str, ...] = ()
     kinds: tuple[str, ...] = KINDS
+    after: tuple[str, ...] = ()
     constants: Mapping[str, Callable[[Table], float]] = field(default_factory=dict)
     starts: Mapping[str, Callable[[Table], Array]] = field(default_factory=dict)
+    searched: Callable[[Table], float] = _one
     pose: Callable[..., Any] | None = None
     force: Callable[..., Array] | None = None
     transduction: Callable[..., Array] | None = None
@@ -182,8 +192,10 @@ def _from_module(module: ModuleType, path: Path) -> Effect:
         parameters=tuple(parameters),
         needs=_words(module, "NEEDS", (), path),
         kinds=_words(module, "KINDS", KINDS, path),
+        after=_words(module, "AFTER", (), path),
         constants=dict(getattr(module, "CONSTANTS", {})),
         starts=dict(getattr(module, "STARTS", {})),
+        searched=getattr(module, "SEARCHED", _one),
         pose=hooks.get("pose"),
         force=hooks.get("force"),
         transduction=hooks.get("transduction"),

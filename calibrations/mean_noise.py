@@ -13,16 +13,22 @@ import numpy as np
 from calibrations.table import OUTPUTS, Array, Table
 
 WINDOW = 6.0  # lags summed, at least, and in correlation times: exp(-6) of an exponential's sum is left out
+NOTHING = 1e-3  # of the usual scatter: less is none, but for rounding
 
 
 def white_std(table: Table) -> Array | None:
-    """Standard deviation of each mean, in the output's unit, shape (n, axes); None where it is not known."""
+    """Standard deviation of each mean, in the output's unit, shape (n, axes); None where it is not known.
+
+    Samples that a coarse converter all gave one code say nothing of their noise: it is taken as that of the others.
+    """
     names = [_std_name(name) for name in OUTPUTS[table.kind] if name in table]
     if "n" not in table or not all(name in table for name in names):
         return None
     std = np.column_stack([table.column(name) for name in names])
-    if not np.all(std > 0):
+    usual = np.median(std, axis=0)
+    if not np.all(usual > 0):
         return None
+    std = np.where(std > NOTHING * usual, std, usual)
     factors = np.array([inflation(table, axis) for axis in table.axes])
     mean: Array = std * np.sqrt(factors / table.column("n")[:, None])
     return mean

@@ -81,6 +81,8 @@ def _row(p: Parameter) -> str:
     values = "one per axis" if p.per_axis else "one"
     if p.measured:
         values += f", if the {p.measured} axis is measured"
+    if p.where:
+        values += f", where {p.where}"
     span = "any" if np.isinf(p.low) and np.isinf(p.high) else f"{p.low:g} to {p.high:g}"
     return f"| `{p.name}` | {p.unit} | {values} | {span} | {p.doc or '-'} |"
 

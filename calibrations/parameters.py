@@ -34,7 +34,7 @@ class Layout:
     slots: tuple[Slot, ...]
     unit: str
     nominal: float  # output per g, to give parameters in the output's unit a size
-    from_data: Mapping[tuple[int, str, str], float]  # starts that effects take from the table
+    from_data: Mapping[tuple[int, str, str], tuple[float, ...]]  # starts that effects take from the table
 
     @staticmethod
     def of(model: Model, table: Table) -> Layout:
@@ -69,7 +69,7 @@ class Layout:
     def _declared(self, slot: Slot) -> tuple[float, ...]:
         key = (slot.term, slot.parameter.name, slot.axis)
         if key in self.from_data:
-            return (self.from_data[key],)
+            return self.from_data[key]
         return tuple(value * self._size(slot.parameter) for value in slot.parameter.starts)
 
     def _shared_choices(self, choices: Sequence[tuple[float, ...]]) -> list[Array]:
@@ -119,20 +119,21 @@ class Layout:
         return np.array([self.model.terms[s.term].name == name for s in self.slots], dtype=bool)
 
 
-def _from_data(model: Model, table: Table) -> dict[tuple[int, str, str], float]:
-    starts: dict[tuple[int, str, str], float] = {}
+def _from_data(model: Model, table: Table) -> dict[tuple[int, str, str], tuple[float, ...]]:
+    """Starts that effects take from the table, by term, parameter and axis; the mean of all axes for none."""
+    starts: dict[tuple[int, str, str], tuple[float, ...]] = {}
     for i, term in enumerate(model.terms):
         for name, start in term.effect.starts.items():
-            values = start(table)
-            starts |= {(i, name, axis): float(v) for axis, v in zip(table.axes, values, strict=True)}
-            starts[i, name, ""] = float(np.mean(values))
+            values = np.atleast_2d(start(table))  # (starts, axes)
+            starts |= {(i, name, axis): tuple(map(float, v)) for axis, v in zip(table.axes, values.T, strict=True)}
+            starts[i, name, ""] = tuple(map(float, values.mean(axis=1)))
     return starts
 
 
 def _slots(i: int, term: Term, table: Table) -> list[Slot]:
     slots = []
     for p in term.effect.parameters:
-        if p.measured and p.measured not in table.axes:
+        if (p.measured and p.measured not in table.axes) or (p.where and not term.constants.get(p.where)):
             continue
         axes = table.axes if p.per_axis and not term.tied else ("",)
         slots += [Slot(i, p, axis) for axis in axes]

@@ -18,6 +18,7 @@ from calibrations.table import Table
 
 Rows = NDArray[np.intp]
 OWN = {"x": 0, "y": 1}
+QUARTER_DEG = 90.0
 
 
 @dataclass(frozen=True)
@@ -34,23 +35,38 @@ class Tumble:
 
 
 def tumbles(table: Table, axis: str) -> list[Tumble]:
-    """Every complete tumble in the order of time. Raises DataError where there is none."""
+    """Every complete tumble in the order of time. Raises DataError where there is none.
+
+    One without a pose is left out: hysteresis drops out of four positions only where each was reached from both sides.
+    """
     paths = np.array(table.labels.get("path", ()))
-    found = [
-        _tumble(table, axis, name, np.flatnonzero(paths == name))
-        for name in dict.fromkeys(paths.tolist())
-        if " " in name
-    ]
-    if not found:
+    begun = {name: np.flatnonzero(paths == name) for name in dict.fromkeys(paths.tolist()) if " " in name}
+    if not begun:
         raise DataError(f"{table.source}: holds no tumble yet; resume the run")
-    return found
+    missing = {name: _missing(table, rows) for name, rows in begun.items()}
+    if all(missing.values()):
+        name, where = next(iter(missing.items()))
+        raise DataError(f"{table.source}: no tumble is complete: {name!r} is without {where}; measure it again")
+    return [_tumble(table, axis, name, rows) for name, rows in begun.items() if not missing[name]]
+
+
+def _missing(table: Table, rows: Rows) -> str:
+    """The first position that a tumble was not held in, "" where it is complete."""
+    set_deg = table.column("beta_set_deg" if "beta_set_deg" in table else "beta_deg")
+    quarters = np.round(set_deg[rows] / QUARTER_DEG) % 4
+    directions = table.optional("direction", 0.0)[rows]
+    held = set(zip(quarters.tolist(), directions.tolist(), strict=True))
+    for direction in sorted(set(directions.tolist()), reverse=True) or [0.0]:
+        for quarter in range(4):
+            if (float(quarter), direction) not in held:
+                side = {1.0: ", reached from below", -1.0: ", reached from above"}.get(direction, "")
+                return f"beta {quarter * QUARTER_DEG:g} deg{side}"
+    return ""
 
 
 def _tumble(table: Table, axis: str, path: str, rows: Rows) -> Tumble:
     volts, beta = table.column(f"v{axis}_v")[rows], np.radians(table.column("beta_deg")[rows])
     columns = np.column_stack([np.cos(beta), np.sin(beta), np.ones(len(beta))])
-    if np.linalg.matrix_rank(columns) < 3:
-        raise DataError(f"{table.source}: the tumble {path!r} is not complete; resume the run")
     inverse = np.linalg.pinv(columns)
     factors = inverse @ volts
     white = white_std(table)

@@ -8,6 +8,7 @@ Source    Ang III.A; inclinations out of order, so that height does not follow t
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Literal
 
 from procedures.errors import SettingError
@@ -17,6 +18,8 @@ from procedures.session import Pose, Session
 INCLINATIONS_DEG = (90.0, 30.0, 150.0, 60.0, 120.0, 45.0, 135.0)
 REFERENCE = Pose(90.0, 45.0, 1, "reference")  # both axes feel gravity, always approached from the same side
 Paths = Literal["grid", "ang"]
+Face = Literal["up", "down", "both"]
+FLIPS = {"up": (0,), "down": (1,), "both": (0, 1)}
 
 
 def sweep(
@@ -28,18 +31,24 @@ def sweep(
     settle_s: float = 0.5,
     paths: Paths = "grid",
     reference_every: int = 0,
+    face: Face = "up",
 ) -> None:
     """Record `dwell_s` seconds at every angle of the grid, clockwise then anticlockwise.
 
     `paths="ang"` adds every inclination's negative, and the half turns to each side at 90 deg. `reference_every` other
-    poses, one reference pose comes again, which tells drift from everything else; 0 for none.
+    poses, one reference pose comes again, which tells drift from everything else; 0 for none. `face="both"`
+    has the sensor turned over half way: what is the sensor's own turns with it, and what is the stages' does not.
     """
     if dwell_s <= 0 or settle_s < 0:
         raise SettingError(f"sweep: dwell_s is {dwell_s:g}, settle_s is {settle_s:g}: give times above 0")
     if reference_every < 0:
         raise SettingError(f"sweep: reference_every is {reference_every}; give a number of poses, or 0 for none")
-    poses = referenced(list(grid(inclinations_deg, step_deg, paths)), reference_every)
-    rig.confirm("mounting", "Is the sensor mounted face up on the table, its cable free to turn?", drawing="face-up")
+    once = referenced(list(grid(inclinations_deg, step_deg, paths)), reference_every)
+    poses = [replace(pose, flip=flip) for flip in FLIPS[face] for pose in once]
+    if face != "down":
+        rig.confirm(
+            "mounting", "Is the sensor mounted face up on the table, its cable free to turn?", drawing="face-up"
+        )
     levelled(rig)
     for pose in rig.missing(poses):
         rig.hold(pose, dwell_s, settle_s)

@@ -16,7 +16,7 @@ def evaluate(measured: Measured) -> dict[str, Result]:
     """Trend of the outputs at the reference pose, V/h, with the standard error that its scatter gives."""
     if not measured.run.settings.get("reference_every"):
         return {}
-    visits = [kept.dwell for kept in measured.kept() if kept.pose == REFERENCE]
+    visits = [kept.dwell for kept in measured.kept() if kept.pose.path == REFERENCE.path]
     if len(visits) < FEWEST:
         return {}
     hours = np.array([dwell.t_s for dwell in visits]) / HOUR_S

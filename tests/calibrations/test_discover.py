@@ -64,7 +64,7 @@ def test_scales_and_angles_of_a_triad_are_found_on_positions() -> None:
 @pytest.mark.parametrize(("cubic", "causes"), [(3e-3, 2), (5e-4, 1)])
 def test_a_small_correction_of_the_form_is_a_refinement(cubic: float, causes: int) -> None:
     x, y, _ = components(turns())
-    vx, vy = (2.5 + a + 0.01 * a**2 + cubic * a**3 for a in (x, y))
+    vx, vy = 2.5 + x + 0.01 * x**2 + cubic * x**3, 2.5 + y - 0.01 * y**2 - cubic * y**3
     found = discover(poses(turns(), vx, vy), LINEAR)
     both = ("quadratic-nonlinearity", "cubic-nonlinearity")
     assert names(found) == list(both)
@@ -114,7 +114,7 @@ def test_a_turned_sensor_and_a_turned_stage_are_told_apart_face_down() -> None:
     (cause,) = found.causes
     assert {"axis-misalignment", "stage-zero-offset"} <= {cause, *found.alternatives[cause]}
     assert found.next_experiment is not None
-    assert (found.next_experiment.procedure, found.next_experiment.settings) == ("sweep", {"flip": 1})
+    assert (found.next_experiment.procedure, found.next_experiment.settings) == ("sweep", {"face": "both"})
 
 
 def test_what_no_effect_describes_is_unexplained() -> None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from scipy.stats import norm
 
 from calibrations.effect import catalogue
 from calibrations.fit import fit
@@ -186,6 +187,61 @@ def _ways(columns: Columns) -> Iterator[Array]:
         betas = np.radians(np.concatenate([np.full(200, before[1]), before[1] + u * (beta - before[1])]))
         yield np.column_stack([np.sin(alphas) * np.cos(betas), np.sin(alphas) * np.sin(betas)])
         before = alpha, beta
+
+
+@made("dead-zone", width__x=0.02, width__y=0.05)
+def _dead_zone(columns: Columns, a: Array) -> Array:
+    width = np.array([[0.02], [0.05]])
+    return linear(np.sign(a[:2]) * np.maximum(np.abs(a[:2]) - width, 0.0))
+
+
+@made("saturation", high__x=3.3, high__y=3.25, low__x=1.7, low__y=1.8, loss=1.0)
+def _saturation(columns: Columns, a: Array) -> Array:
+    return np.clip(linear(a), [[1.7], [1.8]], [[3.3], [3.25]])
+
+
+@made("warm-up-bias", amplitude__x=0.004, amplitude__y=-0.003, time_constant=300.0)
+def _warm_up_bias(columns: Columns, a: Array) -> Array:
+    left = np.exp(-(columns["t_s"] - columns["t_s"][0]) / 300.0)
+    return linear(a) + np.array([0.004, -0.003])[:, None] * left
+
+
+@made("warm-up-scale", amplitude__x=0.004, amplitude__y=-0.003, time_constant=500.0)
+def _warm_up_scale(columns: Columns, a: Array) -> Array:
+    left = np.exp(-(columns["t_s"] - columns["t_s"][0]) / 500.0)
+    return linear(a) + np.array([0.004, -0.003])[:, None] * left * a[:2]
+
+
+@made("bias-drift", slope__x=0.002, slope__y=-0.001)
+def _bias_drift(columns: Columns, a: Array) -> Array:
+    hours = (columns["t_s"] - columns["t_s"].mean()) / 3600
+    return linear(a) + np.array([0.002, -0.001])[:, None] * hours
+
+
+@made("adc-nonlinearity", bow=0.003, bend=0.002)
+def _adc(columns: Columns, a: Array) -> Array:
+    """Ends of the range are taken from the data, which this bends a little: hence the small coefficients."""
+    v = linear(a)
+    u = (v - (v.min() + v.max()) / 2) / (np.ptp(v) / 2)
+    return v + 0.003 * u**2 + 0.002 * u**3
+
+
+@made("temperature-hysteresis", slope__x=0.002, slope__y=-0.001, play=0.8)
+def _temperature_hysteresis(columns: Columns, a: Array) -> Array:
+    held, lagging = columns["temperature_c"][0], []
+    for c in columns["temperature_c"]:
+        held = np.clip(held, c - 0.8, c + 0.8)
+        lagging.append(held)
+    lag = np.array(lagging) - columns["temperature_c"].mean()
+    return linear(a) + np.array([0.002, -0.001])[:, None] * lag
+
+
+@made("quantisation", step=0.02, offset=0.005, noise=0.004)
+def _quantisation(columns: Columns, a: Array) -> Array:
+    """The mean of codes, each as likely as normal noise makes it."""
+    codes = 0.005 + 0.02 * np.arange(-20, 260)[:, None, None]
+    reached = norm.cdf((codes + 0.01 - linear(a)) / 0.004) - norm.cdf((codes - 0.01 - linear(a)) / 0.004)
+    return np.asarray(np.sum(codes * reached, axis=0))
 
 
 @pytest.mark.parametrize("name", MADE)

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from calibrations.effect import HOOKS, Effect, catalogue, find
 from calibrations.errors import ModelError, UnknownName
+from calibrations.fit import fit
 from calibrations.model_file import read_model
 from calibrations.problem import Problem
 from calibrations.table import Table
@@ -30,6 +31,7 @@ def table_for(effect: Effect, kind: str) -> Table:
         needed = {name: np.linspace(4.9, 5.1, moved.n) for name in effect.needs if name not in moved}
         return Table.from_columns("motion", {**moved.columns, **needed}, moved.constants)
     turned = Rotation.random(len(a), rng=np.random.default_rng(0)).as_matrix()[:, 0]
+    needed |= {"t_s": columns["t_s"]}
     return Table.from_columns(kind, dict(zip(("ax", "ay", "az"), turned.T, strict=True)) | needed)
 
 
@@ -38,14 +40,14 @@ def test_every_parameter_changes_the_residual_smoothly(effect: Effect) -> None:
     for kind in effect.kinds:
         table = table_for(effect, kind)
         assert effect.excluded(table) is None
-        model = read_model("linear")
+        model = fit(read_model("linear"), table).model
         if kind == "motion":  # turned, so that y moves as well
             model = model.with_effect(catalogue()["axis-misalignment"])
         problem = Problem.of(model.with_effect(effect), table)
         mine = problem.layout.of_effect(effect.name)
         assert mine.any()
-        start = problem.layout.starts()[0]
-        jacobian = problem.jacobian(start + 0.3 * problem.layout.typical, mine)
+        start = problem.layout.starts()[-1]
+        jacobian = problem.jacobian(start + 0.01 * problem.layout.typical, mine)
         assert np.all(np.isfinite(problem.residual(start)))
         assert np.all(np.isfinite(jacobian))
         assert np.all(jacobian.any(axis=(0, 1)))

@@ -34,9 +34,16 @@ def test_without_a_filter_samples_are_independent() -> None:
 
 def test_not_known_without_count_or_spread() -> None:
     assert white_std(Table.from_columns("poses", POSE)) is None
-    assert white_std(Table.from_columns("poses", {**POSE, "vx_std_v": [1.0, 0.0]})) is None
+    assert white_std(Table.from_columns("poses", {**POSE, "vx_std_v": [0.0, 0.0]})) is None
     both = {**POSE, "vy_v": [1.0, 1.0], "vx_std_v": [1.0, 1.0]}
     assert white_std(Table.from_columns("poses", both)) is None
+
+
+def test_samples_on_one_code_have_the_noise_of_the_others() -> None:
+    columns = {"alpha_deg": [90.0] * 3, "beta_deg": [0.0, 1.0, 2.0], "vx_v": [1.0] * 3, "n": [100.0] * 3}
+    std = white_std(Table.from_columns("poses", {**columns, "vx_std_v": [2.0, 1e-16, 2.0]}))
+    assert std is not None
+    assert std[1, 0] == pytest.approx(std[0, 0])
 
 
 def test_magnitude_takes_the_noise_along_itself() -> None:

@@ -46,7 +46,7 @@ def test_its_standard_errors_are_true() -> None:
 
 
 def test_an_incomplete_tumble_is_refused() -> None:
-    with pytest.raises(DataError, match="'as-is 1' is not complete"):
+    with pytest.raises(DataError, match="no tumble is complete: 'as-is 1' is without beta 180 deg"):
         tumbles(table(["as-is 1"], last=2), "x")
     with pytest.raises(DataError, match="holds no tumble"):
         tumbles(table(["reference"]), "x")

@@ -20,7 +20,8 @@ SEEDS = (1, 2, 3)
 # mechanism -> the effects that describe it; the second is its equivalent on this data
 NAMES = {
     "plate mismatch": {"quadratic-nonlinearity"},
-    "bowed converter": {"quadratic-nonlinearity"},
+    "bowed converter": {"adc-nonlinearity", "quadratic-nonlinearity"},
+    "blind amplifier": {"dead-zone"},
     "foreshortened beams": {"cross-axis-bias"},
     "foreshortened by sag": {"z-axis-bias"},
     "overlap lost by sag": {"z-axis-scale"},
@@ -29,6 +30,8 @@ NAMES = {
     "slipping contacts": {"hysteresis"},
     "package stress": {"temperature-bias"},
     "softening by heat": {"temperature-scale"},
+    "creeping glue": {"temperature-hysteresis"},
+    "creeping charge": {"warm-up-bias"},
     "hardening springs": {"cubic-nonlinearity"},
     "one-sided springs": {"scale-factor-asymmetry"},
     "sliding overlap": {"cross-axis-scale"},
@@ -110,7 +113,11 @@ def test_bias_and_scale_factor_are_missed_like_any_other(missing: str) -> None:
 
 
 TWINS = [
-    ({"sensor": {"package": {"turn_z_deg": 0.05}}}, {"axis-misalignment", "stage-zero-offset"}, ("sweep", {"flip": 1})),
+    (
+        {"sensor": {"package": {"turn_z_deg": 0.05}}},
+        {"axis-misalignment", "stage-zero-offset"},
+        ("sweep", {"face": "both"}),
+    ),
     ({"base": {"tilt_y_deg": 0.05}}, {"base-tilt", "stage-zero-offset"}, ("level-check", {})),
 ]
 

@@ -1,0 +1,51 @@
+"""Hidden causes of another generator, sample by sample: the right effect is named though its formula is not theirs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from calibrations.diagnose import diagnose
+from calibrations.model_file import read_model
+from tests.hidden import sampled
+
+# effect -> what makes it, weak to strong
+CAUSES: dict[str, list[dict[str, Any]]] = {
+    "quantisation": [
+        {"converter": sampled.rounded(3e-3), "noise_v": 0.6e-3},
+        {"converter": sampled.rounded(5e-3)},
+        {"converter": sampled.rounded(20e-3), "noise_v": 1e-3},
+    ],
+    "saturation": [
+        {"cause": sampled.clipped(3.49, 0.004)},
+        {"cause": sampled.clipped(3.4, 0.01)},
+        {"cause": sampled.clipped(3.3, 0.02)},
+    ],
+    "bias-drift": [
+        {"cause": sampled.ramp(2e-4)},
+        {"cause": sampled.ramp(1e-2)},
+        {"cause": sampled.kicks(2e-3)},
+        {"cause": sampled.kicks(1e-2)},
+    ],
+    "warm-up-scale": [{"cause": sampled.settling_gain(fraction)} for fraction in (5e-4, 2e-3, 1e-2)],
+    "temperature-hysteresis": [{"cause": sampled.lagging_stress(slope)} for slope in (2e-4, 1e-3, 5e-3)],
+    "dead-zone": [{"cause": sampled.threshold(width)} for width in (3e-4, 2e-3, 2e-2)],
+}
+CASES = [(name, k) for name, causes in CAUSES.items() for k in range(len(causes))]
+
+
+@pytest.mark.parametrize(("name", "k"), CASES)
+def test_the_cause_is_named(name: str, k: int) -> None:
+    for seed in (1, 2):
+        found = diagnose(sampled.measured(seed, **CAUSES[name][k]), read_model("linear"))
+        told = f"{name} {k}, seed {seed}: {found.verdict}, {[s.taken.name for s in found.path.steps]}"
+        assert found.verdict in ("effect-missing", "ambiguous"), told
+        named = found.path.steps[0].taken
+        assert name in (named.name, *named.indistinguishable_from), told
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_nothing_is_named_where_nothing_is_hidden(seed: int) -> None:
+    found = diagnose(sampled.measured(seed), read_model("linear"))
+    assert (found.verdict, found.path.steps) == ("adequate", ())
