@@ -63,7 +63,7 @@ def _headline(found: Soak) -> str:
     if any(course.state is None for course in found.courses.values()):
         return "Whether bias and scale factor are steady cannot be told from so few reversals."
     waiting = [name.replace("-", " of ") for name, course in found.courses.items() if course.time_s is None]
-    return f"Steady state is not reached within {_span_h(found)} h: {joined(waiting)} still drift."
+    return f"Steady state is not shown within {_span_h(found)} h: {joined(waiting)} may still drift."
 
 
 def _summary(found: Soak) -> str:

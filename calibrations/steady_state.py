@@ -19,6 +19,7 @@ from calibrations.table import Array
 
 COVERAGE = 2.0
 FEWEST = 8  # values that tell an approach from noise
+FEWEST_AT_REST = 20  # values that show that nothing drifts: fewer take a drift for slow noise
 FREE = 4  # values beyond parameters that another exponential needs
 GAIN = 24.0  # of twice the log-likelihood that another exponential must bring: a random walk seldom does
 MOST = 2  # exponentials
@@ -94,14 +95,15 @@ class SteadyState:
 
     @property
     def time_s(self) -> Quantity | None:
-        """Steady-state time since power-on; None where it is not reached.
+        """Steady-state time since power-on; None where it is not reached, or where too few values would show it.
 
         Its standard error is that of the exponentials, and of the noise that sets the tolerance. Where nothing drifts
         it is the record's start, at the latest: rectangular since power-on.
         """
         at = np.log(self.tolerance)
         value = self._last_beyond(self.parameters, at)
-        if self.wanders or value > self.span_s[1]:
+        too_few = not self.terms and self.freedom + 1 < FEWEST_AT_REST
+        if self.wanders or too_few or value > self.span_s[1]:
             return None
         if value == self.span_s[0]:
             return value, value / np.sqrt(12.0)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from calibrations.control_chart import BASELINE, Chart, control_chart
+from calibrations.control_chart import BASELINE, FEWEST, Chart, control_chart
 from rig.errors import RecordError, UnknownRun
 from rig.nearest import did_you_mean
 from rig.record import Run
@@ -45,7 +45,12 @@ def controlled(
     chosen = dict.fromkeys((p.sensor, p.quantity) for p in points if sensor in (None, p.sensor))
     if not chosen:
         raise RecordError("no check-standard run is complete yet; `rig run check-standard` makes one")
-    return [_controlled(*key, [p for p in points if (p.sensor, p.quantity) == key], baseline) for key in chosen]
+    of = {key: [p for p in points if (p.sensor, p.quantity) == key] for key in chosen}
+    charted = {key: mine for key, mine in of.items() if len(mine) >= FEWEST}
+    if not charted:
+        names = ", ".join(dict.fromkeys(sensor for sensor, _ in chosen))
+        raise RecordError(f"{names}: {FEWEST} check-standard runs at least make a chart; there is one so far")
+    return [_controlled(*key, mine, baseline) for key, mine in charted.items()]
 
 
 @dataclass(frozen=True)

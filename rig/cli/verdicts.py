@@ -95,6 +95,11 @@ def _commands(run: Run) -> Iterator[str]:
     """What is usually called next."""
     if run.state != "complete":
         yield f"Next: rig resume {run.run}"
+    elif run.procedure == "check-standard":
+        yield "Next: rig control"
     elif run.rows and run.kind in ("poses", "motion"):
         data = f"{run.run}/{next(iter(sensors))}" if (sensors := run.bench.get("sensors")) else run.run
+        if run.procedure == "soak":
+            yield f"Next: rig report {data} --out night.html"
+            return
         yield f"Next: rig compare {data}, rig discover {data}, rig report {data} --out report.html"

@@ -242,9 +242,11 @@ def _now() -> str:
 
 def _new_run(to: Connection, values: Mapping[str, Any]) -> str:
     """Its id sorts by time and reads well: 20261121-093012-sweep-a1b."""
-    run = f"{datetime.now(UTC):%Y%m%d-%H%M%S}-{values['procedure']}-{secrets.token_hex(2)[:3]}"
-    to.execute(insert(runs), {"results": {}, "identities": {}, **values, "run": run, "created": _now()})
-    return run
+    while True:
+        run = f"{datetime.now(UTC):%Y%m%d-%H%M%S}-{values['procedure']}-{secrets.token_hex(2)[:3]}"
+        row = {"results": {}, "identities": {}, **values, "run": run, "created": _now()}
+        if to.execute(insert_or(runs).values(row).on_conflict_do_nothing()).rowcount:
+            return run  # else another of the same second has it: draw again
 
 
 def _put_state(to: Connection, run: str, state: Mapping[str, Any]) -> None:

@@ -117,7 +117,7 @@ def test_the_page_tells_the_night_without_a_network() -> None:
 
 def test_the_page_says_what_is_not_reached() -> None:
     text = page(soak(soak_table(7200.0, drift_v=0.02)))
-    assert "Steady state is not reached within" in text
+    assert "Steady state is not shown within" in text
     assert "steady state not reached" in text
 
 

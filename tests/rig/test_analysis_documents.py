@@ -156,7 +156,7 @@ def test_diagnose(rig: Rig, clean: str, bent: str) -> None:
 def test_rivals_come_with_the_experiment_that_separates_them(rig: Rig, tmp_path: Path) -> None:
     columns = turns((90,), step_deg=5.0)
     x, y, _ = components(columns)
-    write_csv(poses(columns, 2.5 + x + 0.002 * x**2, 2.5 + y + 0.002 * y**2), tmp_path / "square.csv")
+    write_csv(poses(columns, 2.5 + x + 0.002 * x**2, 2.5 + y - 0.002 * y**2), tmp_path / "square.csv")
     found = document(rig("diagnose", str(tmp_path / "square.csv"), "--model", "linear", "--json"), "rig.diagnosis/1")
     assert found["verdict"] == "ambiguous"
     check(found["next_experiment"], EXPERIMENT)

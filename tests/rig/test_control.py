@@ -95,10 +95,17 @@ def test_its_pictures_are_files_of_each_sensor(rig: Rig, tmp_path: Path) -> None
     )
 
 
+def test_a_standard_that_was_measured_once_keeps_no_other_from_its_chart(rig: Rig) -> None:
+    checks(QUIET)
+    checks(QUIET[:1], ONE | {"sensor": {"name": "ADXL203", "serial": "CS-9"}})
+    ended = rig("control", "--json")
+    assert {chart["sensor"] for chart in json.loads(ended.out)["charts"]} == {"CS-1"}
+
+
 def test_what_cannot_be_charted_is_said(rig: Rig) -> None:
     assert "no check-standard run is complete yet" in rig("control").err
     checks(QUIET[:1])
-    assert "a control chart needs 2 runs at least, there are 1" in rig("control").err
+    assert "CS-1: 2 check-standard runs at least make a chart; there is one so far" in rig("control").err
     assert "no check-standard run of the sensor 'CS-3'. Did you mean 'CS-1'?" in rig("control", "CS-3").err
     ended = rig("control", "--since", "yesterday")
     assert (ended.status, "no complete check-standard run 'yesterday'" in ended.err) == (2, True)

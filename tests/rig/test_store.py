@@ -211,3 +211,10 @@ def test_an_excluded_pose_stays_with_its_reason_and_is_left_out() -> None:
         assert len(record.poses(run)) == 3
         with pytest.raises(RecordError, match=f"run {run} has no pose 7"):
             record.exclude(run, 7, "nothing")
+
+
+def test_two_runs_of_one_second_do_not_share_a_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn = iter(["aaa0", "aaa1", "bbb0"])
+    monkeypatch.setattr("rig.record.store.secrets.token_hex", lambda _: next(drawn))
+    with Record() as record:
+        assert begin(record) != begin(record)
