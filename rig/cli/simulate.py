@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import signal
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from types import FrameType
@@ -30,23 +32,32 @@ def command(bench_file: Path | None, as_json: bool) -> None:
     pseudo-terminal.
     """
     bench = read_bench(bench_file)
-    ended: list[int] = []
-
-    def end(number: int, frame: FrameType | None) -> None:  # noqa: ARG001
-        ended.append(number)
-
-    for each in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(each, end)
-    clock = WallClock()
-    servers = serve(bench, world_of(bench))
-    try:
-        addresses = _served(bench, list(servers.values()))
+    with ExitStack() as stack:
+        ended = stack.enter_context(_signalled())
+        clock = WallClock()
+        servers = list(serve(bench, world_of(bench)).values())
+        for server in servers:
+            stack.callback(server.close)
+        addresses = _served(bench, servers)
         documents = {role: _document(bench, role, asdict(address)) for role, address in addresses.items()}
         _tell(documents, as_json)
-        serve_forever(list(servers.values()), lambda: bool(ended), clock)
+        serve_forever(servers, lambda: bool(ended), clock)
+
+
+@contextmanager
+def _signalled() -> Iterator[list[int]]:
+    """The signals that asked for the end so far; inside, none of them ends the process by itself."""
+    came: list[int] = []
+
+    def end(number: int, frame: FrameType | None) -> None:  # noqa: ARG001
+        came.append(number)
+
+    before = {each: signal.signal(each, end) for each in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield came
     finally:
-        for server in servers.values():
-            server.close()
+        for each, handler in before.items():
+            signal.signal(each, handler)
 
 
 def _served(bench: Bench, servers: list[Server]) -> dict[str, Address]:

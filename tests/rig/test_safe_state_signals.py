@@ -48,7 +48,7 @@ def signal_at(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, int], list[int]
     return arrange
 
 
-@pytest.mark.parametrize("procedure", sorted(SHORT.keys() - {"motion", "repeat", "misalignment"}))
+@pytest.mark.parametrize("procedure", sorted(SHORT.keys() - {"motion", "repeat"}))
 @pytest.mark.parametrize(("method", "share"), [("sleep", 0.4), ("wait_readable", 0.7)])
 def test_wherever_it_waits(
     procedure: str, method: str, share: float, signal_at: Callable[[str, int], list[int]]
