@@ -7,13 +7,10 @@ words and numbers are made.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from functools import cache
 from pathlib import PurePath, PureWindowsPath
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined, Template
-from markupsafe import Markup
 
 from calibrations.candidates import SIGNIFICANT, Candidate
 from calibrations.compare import Comparison
@@ -24,9 +21,9 @@ from calibrations.model import Estimate, Model
 from calibrations.motion.evaluate import MotionResult
 from calibrations.numerals import chance, measured, minus, plain, unit
 from calibrations.pictures.album import Picture, album
-from calibrations.pictures.inline import inline
 from calibrations.pictures.view import mg, pooled_mg, rows_of
 from calibrations.report_motion import section
+from calibrations.report_page import figure, page
 from calibrations.report_words import VERDICTS, capital, headline, key_figures, next_words, state, summary, unbroken
 
 EXPLAINED = 6  # candidates shown with formula and symptom, at most; the others in numbers only
@@ -46,11 +43,13 @@ def report(
     `motion` is what a run of that procedure found beside the displacement sensor.
     `date` and `program` (name and version) stand in the provenance: the same arguments give the same page.
     """
-    shown = {p.name: _figure(p) for p in (album(found, beside, motion) if pictures is None else pictures)}
-    return _template().render(
+    shown = {p.name: figure(p) for p in (album(found, beside, motion) if pictures is None else pictures)}
+    return page(
+        "report.html",
         headline=headline(found),
         verdict=VERDICTS[state(found)],
         state=state(found),
+        what=f"Calibration report, model {beside.fit.model.name}",
         kind=rows_of(found.start.table),
         summary=unbroken(summary(found)),
         figures=key_figures(found),
@@ -71,20 +70,8 @@ def report(
         provenance=_provenance(found, date, program),
         motion=section(motion) if motion else None,
         pictures=shown,
-        curves=[figure for name, figure in shown.items() if name.startswith("effect-")],
+        curves=[drawn for name, drawn in shown.items() if name.startswith("effect-")],
     )
-
-
-@cache
-def _template() -> Template:
-    pages = Environment(
-        loader=PackageLoader("calibrations", "."),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    return pages.get_template("report.html")
 
 
 def spread_of_excess(fit: Fit) -> str:
@@ -165,7 +152,7 @@ def _estimate(e: Estimate) -> dict[str, str]:
     return row | {"value": measured(e.value, e.std), "unit": unit(e.unit)}
 
 
-def _provenance(found: Discovery, date: str, program: str) -> list[tuple[str, str]]:
+def _provenance(found: Discovery, date: str, program: str) -> dict[str, str]:
     table, model = found.start.table, found.start.model
     facts: dict[str, object] = {
         "data": _name(table.source),
@@ -178,7 +165,7 @@ def _provenance(found: Discovery, date: str, program: str) -> list[tuple[str, st
         "program": program,
         "date": date,
     }
-    return [(name, str(value)) for name, value in facts.items()]
+    return {name: str(value) for name, value in facts.items()}
 
 
 def _named(provenance: Mapping[str, str | float]) -> dict[str, str | float]:
@@ -190,8 +177,3 @@ def _name(source: str) -> str:
     if PurePath(source).is_absolute() or PureWindowsPath(source).is_absolute():
         return PureWindowsPath(source).name
     return source
-
-
-def _figure(picture: Picture) -> dict[str, Any]:
-    drawn = Markup(inline(picture.figure, picture.name, f"{picture.title}. {picture.caption}"))  # noqa: S704 made here
-    return {"svg": drawn, "title": picture.title, "caption": picture.caption}

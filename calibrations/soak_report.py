@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from functools import cache
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined, Template
-from markupsafe import Markup
 
 from calibrations.numerals import measured, minus, plain
 from calibrations.pictures.album import Picture
-from calibrations.pictures.inline import inline
 from calibrations.pictures.soak import soak_album
+from calibrations.report_page import figure, page
 from calibrations.report_words import joined
 from calibrations.soak import HOUR_S, Course, Gap, Soak
 
@@ -27,29 +24,21 @@ def soak_report(
     its provenance. The same arguments give the same page.
     """
     shown = soak_album(found) if pictures is None else pictures
-    return _template().render(
+    steady = found.time_s() is not None
+    return page(
+        "soak_report.html",
         headline=_headline(found),
-        steady=found.time_s() is not None,
+        verdict="steady" if steady else "not steady",
+        state="adequate" if steady else "ambiguous",
+        what=f"Soak, {facts['sensor']}",
         summary=_summary(found),
         figures=_figures(found),
-        pictures=[_figure(picture) for picture in shown],
+        pictures=[figure(picture) for picture in shown],
         courses=[_course(course) for course in found.courses.values()],
         verdicts=[_verdict(name, result) for name, result in results.items() if result["limit"] is not None],
         gaps=[_gap(gap) for gap in found.gaps],
-        facts=facts,
+        provenance=facts,
     )
-
-
-@cache
-def _template() -> Template:
-    pages = Environment(
-        loader=PackageLoader("calibrations", "."),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    return pages.get_template("soak_report.html")
 
 
 def _headline(found: Soak) -> str:
@@ -136,11 +125,6 @@ def _gap(gap: Gap) -> dict[str, str]:
     where = gap.path or "between two poses"
     left_out = "; this reversal is left out" if gap.path.startswith("reversal") else ""
     return {"at": f"{plain(gap.start_s / HOUR_S, 4)} h", "length": _length(gap.length_s), "where": where + left_out}
-
-
-def _figure(picture: Picture) -> dict[str, Any]:
-    drawn = Markup(inline(picture.figure, picture.name, f"{picture.title}. {picture.caption}"))  # noqa: S704 made here
-    return {"svg": drawn, "title": picture.title, "caption": picture.caption}
 
 
 def _hours(time: tuple[float, float] | None) -> str:
