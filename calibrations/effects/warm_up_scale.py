@@ -8,22 +8,19 @@ Confused with  temperature-scale while the sensor warms, which a hold at constan
 Source    Ang III.B; Barshan and Durrant-Whyte (1995); IEEE Std 528, warm-up time.
 """
 
-import numpy as np
-
 from calibrations.effect import Parameter, Values
 from calibrations.table import Array, Table
+from calibrations.warm_up import TIME_CONSTANT, begin_s, left, time_constants_s
 
 KINDS = ("poses", "positions")
 NEEDS = ("t_s",)
 PARAMETERS = (
     Parameter("amplitude", "{out}/g", typical=0.01, doc="scale factor at the record's beginning less the final one"),
-    Parameter("time_constant", "s", typical=600.0, per_axis=False, starts=(600.0,), low=1e-3, doc="of the exponential"),
+    TIME_CONSTANT,
 )
-PARTS = (0.05, 0.2, 0.6)  # of the record's length: time constants to begin with
-STARTS = {"time_constant": lambda table: np.outer(PARTS, np.full(len(table.axes), np.ptp(table.time_s)))}
-CONSTANTS = {"begin_s": lambda table: float(np.min(table.time_s))}
+STARTS = {"time_constant": time_constants_s}
+CONSTANTS = {"begin_s": begin_s}
 
 
 def transduction(a: Array, table: Table, p: Values) -> Array:
-    left = np.exp(-(table.time_s - p["begin_s"]) / p["time_constant"])
-    return left[:, None] * a * p["amplitude"]
+    return left(table, p)[:, None] * a * p["amplitude"]
