@@ -1,0 +1,100 @@
+"""How far apart two explanations will lie in data that nobody has measured yet: T-optimality.
+
+    lambda = min over theta of |W (f_best - f_rival(theta))|^2        W makes the noise white
+
+It is the noncentrality of the test between them. Where the best is right, twice the logarithm of the likelihood ratio
+scatters about lambda with the standard deviation 2 sqrt(lambda); sqrt(lambda) is their distance in standard deviations.
+
+Source  Atkinson and Fedorov, Biometrika 62 (1975), 57-70; Dette, Melas and Guchenko, Ann. Statist. 43 (2015), 1959-1985.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.special import ndtr
+
+from calibrations.candidates import NOT_TOLD_APART
+from calibrations.fit import Fit
+from calibrations.joined import joined
+from calibrations.noise import Noise, rms
+from calibrations.problem import Problem
+from calibrations.table import Array, Table
+
+CERTAIN = 0.95  # probability of telling two explanations apart with which an experiment is worth its time
+ROUNDS = 12  # evaluations of a rival's derivatives: few are needed so near to its fit
+
+
+@dataclass(frozen=True)
+class Expected:
+    """What an experiment will bring: lambda of its own data, and of all data together."""
+
+    alone: float
+    together: float
+
+    @property
+    def deviations(self) -> float:
+        """How many standard deviations the explanations will lie apart, all data together."""
+        return float(np.sqrt(self.together))
+
+    @property
+    def probability(self) -> float:
+        """Of telling them apart, all data together."""
+        return told_apart(self.together)
+
+
+def expected(best: Fit, rival: Fit, table: Table) -> Expected:
+    """What the foreseen `table` will tell of two explanations of the data at hand, whichever of them is right.
+
+    Both are fits to the same data. Of the two cases, the best right and the rival right, the worse one counts. Times
+    of `table` come after those of the data.
+    """
+    ways = [_one_way(best, rival, table), _one_way(rival, best, table)]
+    return Expected(min(w.alone for w in ways), min(w.together for w in ways))
+
+
+def told_apart(noncentrality: float) -> float:
+    """Probability that the likelihood ratio will be beyond the odds at which two explanations are told apart."""
+    if noncentrality <= 0:
+        return 0.0
+    return float(ndtr((noncentrality - NOT_TOLD_APART) / (2 * np.sqrt(noncentrality))))
+
+
+def _one_way(right: Fit, wrong: Fit, table: Table) -> Expected:
+    """Where `right` is: predictions come from both fits' own history, the noise from that of `right`."""
+    whole = joined([right.table, table])
+    known, new = np.arange(whole.n) < right.table.n, np.arange(whole.n) >= right.table.n
+    truth = Problem(whole, right.problem.layout).residual(right.theta)
+    mistaken = Problem(whole, wrong.problem.layout)
+    noise = _noise_on(right, Problem(table, right.problem.layout))
+
+    def white(columns: Array) -> tuple[Array, Array]:
+        """Rows of the data at hand, and of the new; both (channels, n, k) -> (rows, k)."""
+        return right.noise.whiten(columns[:, known]), noise.whiten(columns[:, new])
+
+    def least(parts: slice) -> float:
+        def distance(theta: Array) -> Array:
+            return np.concatenate(white((mistaken.residual(theta) - truth)[:, :, None])[parts])[:, 0]
+
+        def slope(theta: Array) -> Array:
+            return np.concatenate(white(mistaken.jacobian(theta))[parts])
+
+        layout = mistaken.layout
+        return 2 * float(
+            least_squares(
+                distance, wrong.theta, slope, bounds=layout.bounds, x_scale=layout.typical, max_nfev=ROUNDS
+            ).cost
+        )
+
+    return Expected(least(slice(1, None)), least(slice(None)))
+
+
+def _noise_on(found: Fit, problem: Problem) -> Noise:
+    """The noise of a fit on other rows: white as their means will have it, scatter and slow noise as they were found."""
+    white = problem.white
+    if white is None:
+        white = np.zeros((len(problem.channels), problem.table.n))
+    noise = replace(found.noise, white=white, gap_s=problem.gap_s)
+    return replace(noise, ratio=found.noise.slow / rms(noise.fast))
