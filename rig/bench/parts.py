@@ -1,0 +1,112 @@
+"""The parts of a bench file, typed: its keys are these and no others."""
+
+from __future__ import annotations
+
+import importlib
+from datetime import date
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, create_model, field_validator
+
+from calibrations.error_table import Point
+from drivers.links.address import Address
+from drivers.links.faults import Fault
+from drivers.philtec_d63 import SIMULATED as SIMULATED_CURVE
+from drivers.philtec_d63 import Curve
+
+SIMULATED = "simulated"
+D63 = "d63"  # the displacement sensor's channel
+ROLES = ("alpha", "beta", "adc", "oven", "level", "positioner")
+TURNING = ("alpha", "beta")
+
+
+class Strict(BaseModel):
+    """A part of the file: its keys are these and no others."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Certificate(Strict):
+    """A calibration certificate, good until the end of the day `due`."""
+
+    model_config = ConfigDict(coerce_numbers_to_str=True)
+
+    number: str
+    due: date
+
+
+class Instrument(Strict):
+    """One instrument: a driver's name, an address, and settings that the driver declares.
+
+    `error_table` is a stage's own, as points or as a CSV file beside the bench file; `read_bench` leaves the points.
+    `faults` are what goes wrong with a simulated one.
+    """
+
+    driver: str
+    url: str
+    unit: int = 1
+    stream_url: str | None = None
+    settings: dict[str, Any] = {}
+    faults: tuple[Fault, ...] = ()
+    certificate: Certificate | None = None
+    error_table: tuple[Point, ...] | Path | None = None
+
+    @property
+    def simulated(self) -> bool:
+        return self.url.partition(":")[0] == SIMULATED
+
+    @property
+    def listen(self) -> str | None:
+        """Where its twin listens, if the file says so."""
+        return self.url.partition(":")[2] or None
+
+    @property
+    def address(self) -> Address:
+        return Address(self.url, self.unit, self.stream_url)
+
+    def typed_settings(self) -> Any:
+        """The driver's frozen Settings. Raises ValidationError."""
+        kind = importlib.import_module(f"drivers.{self.driver}").Settings
+        checker = create_model("Checked", settings=(kind, ...), __config__=ConfigDict(extra="forbid"))
+        return checker(settings=self.settings).settings  # type: ignore[attr-defined]
+
+
+class Sensor(Strict):
+    """A sensor under test; these become constants of its tables, apart from what its simulated twin has of its own."""
+
+    name: str = "sensor"
+    serial: str = ""
+    gravity_m_s2: float = 9.80665
+    filter_corner_hz: float | None = None
+    world: dict[str, Any] = {}
+
+    @property
+    def constants(self) -> dict[str, str | float]:
+        """What every table of this sensor says of it."""
+        said = self.model_dump(exclude_none=True, exclude={"world"})
+        return {"sensor": said.pop("name"), **{key: value for key, value in said.items() if value != ""}}
+
+
+class Displacement(Strict):
+    """The D63 behind the channel `d63`: its calibration curve, which side of the optical peak it works on, and
+    whether the gap grows (1) or closes (-1) as the carriage moves towards the sensor's +x.
+
+    `curve` is a YAML file beside the bench file, `simulated`, or the curve itself, which `read_bench` leaves.
+    """
+
+    curve: Curve
+    side: Literal["near", "far"] = "near"
+    direction: Literal[1, -1] = 1
+
+    @field_validator("curve", mode="before")
+    @classmethod
+    def _shipped(cls, given: Any) -> Any:
+        return Curve.from_file(SIMULATED_CURVE) if given == SIMULATED else given
+
+
+class Folders(Strict):
+    """The user's own effects and procedures."""
+
+    effects: Path | None = None
+    procedures: Path | None = None
