@@ -1,12 +1,14 @@
 """A procedure's settings from text: the keywords of its function, typed by their annotations.
 
-Types: float, int, bool, str, a `Literal` of texts, and `tuple[float, ...]` written 90,30,150.
+Types: float, int, bool, str, a `Literal` of texts, `tuple[float, ...]` written 90,30,150, and `tuple[str, ...]`, the
+lines of a file, which is named.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 from procedures.catalogue import Procedure
@@ -37,13 +39,27 @@ def _value(what: str, kind: Any, value: Value) -> Value:
         if choices:
             return choices[[str(choice) for choice in choices].index(str(value))]
         if get_origin(kind) is tuple:
-            parts = value.split(",") if isinstance(value, str) else value
-            return tuple(_scalar(get_args(kind)[0], part) for part in parts)
+            return tuple(_scalar(get_args(kind)[0], part) for part in _parts(what, kind, value))
         return _scalar(kind, value)
     except (ValueError, TypeError):
         listed = f"one of {', '.join(map(str, choices))}"
         wanted = listed if choices else _WANTED.get(kind, "numbers such as 90,30")
         raise SettingError(f"{what} is {value!r}; it takes {wanted}") from None
+
+
+def _parts(what: str, kind: Any, value: Value) -> Sequence[Value]:
+    if not isinstance(value, str):
+        return list(value)
+    return value.split(",") if get_args(kind)[0] is not str else _lines(what, Path(value))
+
+
+def _lines(what: str, path: Path) -> list[str]:
+    """Those of a file. Raises SettingError for one that cannot be read."""
+    try:
+        return path.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        why = error.strerror if isinstance(error, OSError) else "it is no text"
+        raise SettingError(f"{what}: the file {path} cannot be read: {why}") from None
 
 
 def _scalar(kind: Any, value: Value) -> Value:

@@ -13,6 +13,7 @@ from typing import Literal
 
 from procedures.errors import SettingError
 from procedures.level_check import levelled
+from procedures.pose_list import listed
 from procedures.session import Pose, Session
 
 INCLINATIONS_DEG = (90.0, 30.0, 150.0, 60.0, 120.0, 45.0, 135.0)
@@ -32,20 +33,24 @@ def sweep(
     paths: Paths = "grid",
     reference_every: int = 0,
     face: Face = "up",
+    pose_list: tuple[str, ...] = (),
 ) -> None:
     """Record `dwell_s` seconds at every angle of the grid, clockwise then anticlockwise.
 
     `paths="ang"` adds every inclination's negative, and the half turns to each side at 90 deg. `reference_every` other
     poses, one reference pose comes again, which tells drift from everything else; 0 for none. `face="both"`
     has the sensor turned over half way: what is the sensor's own turns with it, and what is the stages' does not.
+    `pose_list`, a CSV file such as `rig plan sweep --optimal` writes, has all poses in order instead of a grid.
     """
     if dwell_s <= 0 or settle_s < 0:
         raise SettingError(f"sweep: dwell_s is {dwell_s:g}, settle_s is {settle_s:g}: give times above 0")
     if reference_every < 0:
         raise SettingError(f"sweep: reference_every is {reference_every}; give a number of poses, or 0 for none")
+    if pose_list and (reference_every or face != "up"):
+        raise SettingError("sweep: pose_list has all poses; reference_every and face are for a grid")
     once = referenced(list(grid(inclinations_deg, step_deg, paths)), reference_every)
-    poses = [replace(pose, flip=flip) for flip in FLIPS[face] for pose in once]
-    if face != "down":
+    poses = listed(pose_list) if pose_list else [replace(pose, flip=flip) for flip in FLIPS[face] for pose in once]
+    if not poses[0].flip:
         rig.confirm(
             "mounting", "Is the sensor mounted face up on the table, its cable free to turn?", drawing="face-up"
         )

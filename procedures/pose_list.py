@@ -1,0 +1,66 @@
+"""Poses written out one by one: the lines of a CSV file, whose columns are the fields of a pose.
+
+    alpha_deg,beta_deg,direction,path,mount_deg,flip
+
+Angles and header are needed, the others may be left out. The lines are kept with a run as they are, so that it goes on
+with the same poses whatever became of the file.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import astuple, fields
+from typing import Any
+
+from procedures.errors import SettingError, nearest
+from procedures.session import Pose
+
+NAMES = tuple(field.name for field in fields(Pose))
+
+
+def listed(lines: Sequence[str]) -> list[Pose]:
+    """The poses in order; blank lines and those that begin with # say nothing.
+
+    Raises SettingError naming line and column.
+    """
+    said = [(number, line) for number, line in enumerate(lines, 1) if line.strip() and not line.startswith("#")]
+    rows = [(number, [cell.strip() for cell in row]) for number, line in said for row in csv.reader([line])]
+    (first, head), *rest = rows or [(1, [])]
+    for name in head:
+        if name not in NAMES:
+            raise SettingError(f"pose_list, line {first}: no pose has a column {name!r}{nearest(name, NAMES)}")
+    if not {"alpha_deg", "beta_deg"} <= set(head) or not rest:
+        raise SettingError("pose_list: give a header with alpha_deg and beta_deg, and at least one pose below it")
+    return [_pose(number, head, row) for number, row in rest]
+
+
+def written(poses: Iterable[Pose]) -> tuple[str, ...]:
+    """The lines that give `poses` back."""
+    return (",".join(NAMES), *(",".join(map(_text, astuple(pose))) for pose in poses))
+
+
+def _pose(number: int, head: Sequence[str], row: Sequence[str]) -> Pose:
+    if len(row) != len(head):
+        raise SettingError(f"pose_list, line {number}: {len(row)} values for {len(head)} columns ({', '.join(head)})")
+    values: dict[str, Any] = {name: _value(number, name, cell) for name, cell in zip(head, row, strict=True)}
+    return Pose(**values)
+
+
+def _value(number: int, name: str, cell: str) -> str | float | int:
+    if name == "path":
+        return cell
+    allowed = {"direction": (-1, 0, 1), "flip": (0, 1)}.get(name)
+    try:
+        value = float(cell)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value) or (allowed and value not in allowed):
+        wanted = f"one of {', '.join(map(str, allowed))}" if allowed else "a number"
+        raise SettingError(f"pose_list, line {number}, {name}: is {cell!r}; it takes {wanted}")
+    return int(value) if allowed else value
+
+
+def _text(value: str | float | int) -> str:
+    return value if isinstance(value, str) else f"{value:.10g}"
