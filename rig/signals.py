@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import signal
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from threading import Timer
 from types import FrameType
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 COMPILED = "drivers.simulation"  # its compiled code calls Python for its generators, and cannot bear an exception there
+SCREEN = "rich"  # left in the middle of writing, its console never writes again
 AGAIN_S = 0.001
 
 
@@ -17,12 +18,12 @@ AGAIN_S = 0.001
 def stoppable() -> Iterator[None]:
     """Inside, the first signal raises KeyboardInterrupt with its name; further ones do not disturb the cleaning up.
 
-    One that comes while the simulated world is being computed waits for an instant; a real rig has no such wait.
+    One that comes while the simulated world is computed or the screen is written waits for an instant.
     """
 
     def stop(number: int, frame: FrameType | None) -> None:
-        if _computing(frame):
-            Timer(AGAIN_S, signal.raise_signal, (number,)).start()
+        if _indivisible(frame):
+            threading.Timer(AGAIN_S, _signal_again, (number,)).start()
             return
         for each in SIGNALS:
             signal.signal(each, signal.SIG_IGN)
@@ -37,10 +38,19 @@ def stoppable() -> Iterator[None]:
             signal.signal(each, handler)
 
 
-def _computing(frame: FrameType | None) -> bool:
-    """Whether the simulated world's code is under way."""
+def _signal_again(number: int) -> None:
+    """To the main thread itself: only so does it wake from waiting."""
+    if (main := threading.main_thread().ident) is not None:
+        signal.pthread_kill(main, number)
+
+
+def _indivisible(frame: FrameType | None) -> bool:
+    """Whether code is under way that an exception would break."""
     while frame is not None:
-        if str(frame.f_globals.get("__name__")).startswith(COMPILED):
+        module = str(frame.f_globals.get("__name__"))
+        if module.startswith(COMPILED):
             return True
+        if module.partition(".")[0] == SCREEN:
+            return frame.f_code.co_name != "input"  # where it waits for a person
         frame = frame.f_back
     return False

@@ -1,6 +1,7 @@
 """A signal ends a run once; a terminal that closes does not end what nohup started."""
 
 import signal
+import time
 from threading import Event
 from types import FunctionType
 
@@ -33,18 +34,35 @@ def test_nohup_is_respected() -> None:
         signal.signal(signal.SIGHUP, before)
 
 
-def test_the_simulated_worlds_compiled_code_is_not_interrupted() -> None:
-    def compute() -> str:
-        signal.raise_signal(signal.SIGINT)
-        return "whole"
+def signalled_in(module: str, name: str) -> list[str]:
+    """What became of a function of this name and module that a signal comes into; afterwards the signal is heard."""
 
-    world = {"signal": signal, "__name__": "drivers.simulation.world"}
-    computed: list[str] = []
+    def compute() -> None:
+        signal.raise_signal(signal.SIGINT)
+        done.append("whole")
+
+    done: list[str] = []
+    namespace = {"signal": signal, "__name__": module}
+    function = FunctionType(compute.__code__.replace(co_name=name), namespace, closure=compute.__closure__)
 
     def compute_and_wait() -> None:
-        computed.append(FunctionType(compute.__code__, world)())
+        function()
         Event().wait(30)  # the signal ends it
 
+    begun_s = time.monotonic()
     with pytest.raises(KeyboardInterrupt, match="SIGINT"), stoppable():
         compute_and_wait()
-    assert computed == ["whole"]
+    assert time.monotonic() - begun_s < 10, "the signal does not wake who waits"
+    return done
+
+
+@pytest.mark.parametrize(
+    ("module", "name"), [("drivers.simulation.world", "advance"), ("rich.console", "print"), ("rich.live", "start")]
+)
+def test_a_computing_world_and_a_screen_half_written_are_not_interrupted(module: str, name: str) -> None:
+    assert signalled_in(module, name) == ["whole"]
+
+
+@pytest.mark.parametrize(("module", "name"), [("rich.console", "input"), ("richer", "print"), ("rig.runner", "run")])
+def test_who_waits_for_a_person_is(module: str, name: str) -> None:
+    assert signalled_in(module, name) == []
