@@ -22,6 +22,8 @@ from rig.instruments import connected
 
 pytestmark = pytest.mark.sockets
 
+ENDING = (signal.SIGINT, signal.SIGTERM)
+
 
 @pytest.fixture
 def served() -> Iterator[tuple[subprocess.Popen[str], dict[str, Any]]]:
@@ -51,12 +53,25 @@ def test_drivers_find_the_instruments_at_the_printed_addresses(served: Any) -> N
     links.close()
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", ENDING)
 def test_a_signal_ends_it_in_good_order(served: Any, number: signal.Signals) -> None:
     child, _ = served
     child.send_signal(number)
     assert child.wait(timeout=30) == 0
     assert child.stderr.read() == ""
+
+
+def test_the_signals_are_given_back(rig: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    def ended_by_both(servers: object, until: Callable[[], bool], clock: object) -> None:
+        assert not until()
+        for each in ENDING:
+            signal.raise_signal(each)
+        assert until()
+
+    before = [signal.getsignal(each) for each in ENDING]
+    monkeypatch.setattr("rig.cli.simulate.serve_forever", ended_by_both)
+    assert rig("simulate").status == 0
+    assert [signal.getsignal(each) for each in ENDING] == before
 
 
 def test_a_bench_of_which_a_part_is_real_runs_in_real_time(
