@@ -1,0 +1,40 @@
+"""One set, answered by every method: a record of plain values, from which all figures are worked out."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from tests.benchmark.discovery import ours
+from tests.benchmark.discovery.cases import case
+from tests.benchmark.discovery.equals import equals
+from tests.benchmark.discovery.library import library
+from tests.benchmark.discovery.sets import Case
+
+
+def attempt(which: Case) -> dict[str, Any]:
+    """`record`, or why there is none: a mechanism that this rig cannot show at this strength."""
+    try:
+        return record(which)
+    except ValueError as error:
+        return {"key": which.key, "failed": str(error)}
+
+
+def record(which: Case) -> dict[str, Any]:
+    """What is true of a set, and what each method says of it."""
+    table, truth = case(which.name, which.strength, which.seed)
+    lib = library(table)
+    return {
+        "key": which.key,
+        "row": which.row,
+        "name": which.name,
+        "strength": which.strength,
+        "seed": which.seed,
+        "layout": truth.layout,
+        "rows": table.n,
+        "slow": truth.slow,
+        "causes": [sorted(names) for names in truth.causes],
+        "equals": [sorted(names) for names in equals(table, truth, lib)],
+        "outside": truth.outside,
+        "structure": truth.structure,
+        "answers": {"ours": ours.answer(table, truth)},
+    }

@@ -1,0 +1,127 @@
+"""Figures of the demands' table, from the records of sets."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable
+from itertools import permutations
+from typing import Any
+
+Record = dict[str, Any]
+WITHIN = 1.15  # noise floors on unseen poses
+
+
+def right(record: Record, name: str) -> bool:
+    """Whether a name is that of a cause, up to what the data can distinguish."""
+    return any(name in names for names in record["equals"])
+
+
+def exact(record: Record, named: list[str]) -> bool:
+    """Whether each cause is named once, and nothing else."""
+    return len(named) == len(record["equals"]) and matched(record, named) == len(named)
+
+
+def matched(record: Record, named: list[str]) -> int:
+    """The most causes that the names can stand for, each name for one."""
+    causes = record["equals"]
+    named = [name for name in named if right(record, name)][:6]
+    padded = [*named, *[""] * len(causes)]
+    return max(
+        (sum(n in c for n, c in zip(chosen, causes, strict=True)) for chosen in permutations(padded, len(causes))),
+        default=0,
+    )
+
+
+def false_alarm(record: Record, said: Record) -> bool:
+    return bool(said["causes"]) or said["verdict"] == "unexplained"
+
+
+def unexplained(record: Record, said: Record) -> bool:
+    return bool(said["verdict"] == "unexplained")
+
+
+def structure_right(record: Record, said: Record) -> bool:
+    return bool(said.get("structure")) and re.search(record["structure"], said["structure"]) is not None
+
+
+Judge = Callable[[Record, Record], bool | float | None]
+
+
+def share(records: Iterable[Record], method: str, judge: Judge) -> tuple[float, int]:
+    """Mean of a judgement over the sets that it applies to, and how many those are."""
+    said = [(r, r["answers"][method]) for r in records if method in r["answers"]]
+    values = [float(value) for r, a in said if (value := judge(r, a)) is not None]
+    return (sum(values) / len(values) if values else float("nan")), len(values)
+
+
+def first_place(record: Record, said: Record) -> bool:
+    return bool(said["ranking"]) and right(record, said["ranking"][0])
+
+
+def first_three(record: Record, said: Record) -> bool:
+    return any(right(record, name) for name in said["ranking"][:3])
+
+
+def one_cause(record: Record, said: Record) -> bool:
+    return exact(record, said["causes"])
+
+
+def recall(record: Record, said: Record) -> float:
+    return matched(record, said["causes"]) / len(record["equals"])
+
+
+def precision(record: Record, said: Record) -> float | None:
+    return matched(record, said["causes"]) / len(said["causes"]) if said["causes"] else None
+
+
+def within(record: Record, said: Record) -> bool | None:
+    wanders = record["name"] in ("own/wandering reference", "sampled/kicks")
+    return None if said.get("error") is None or wanders else said["error"] <= WITHIN
+
+
+def at(*strengths: float) -> Callable[[Record], bool]:
+    return lambda record: record["strength"] in strengths
+
+
+def always(record: Record) -> bool:
+    return True
+
+
+# row of the table, row of sets, which of them, judgement, demand (at least, or with < at most)
+DEMANDS: tuple[tuple[str, str, Callable[[Record], bool], Judge, str, float], ...] = (
+    ("clean: false alarms", "clean", always, false_alarm, "<", 3 / 300),
+    ("clean, slow noise as much as white: false alarms", "slow", always, false_alarm, "<", 6 / 300),
+    ("single, faint: first place right", "single", at(0.3), first_place, ">", 0.90),
+    ("single, weak: first place right", "single", at(3), first_place, ">", 0.98),
+    ("single, medium and strong: first place right", "single", at(10, 30), first_place, ">", 0.99),
+    ("single: in the first three", "single", always, first_three, ">", 0.99),
+    ("single, weak and up: exactly the one cause", "single", at(3, 10, 30), one_cause, ">", 0.95),
+    ("single, weak and up: wrongly unexplained", "single", at(3, 10, 30), unexplained, "<", 0.03),
+    ("single, weak and up: unseen-pose error within 1.15", "single", at(3, 10, 30), within, ">", 0.95),
+    ("pairs: exact set", "pair", always, one_cause, ">", 0.90),
+    ("pairs: recall", "pair", always, recall, ">", 0.95),
+    ("pairs: precision", "pair", always, precision, ">", 0.95),
+    ("pairs: wrongly unexplained", "pair", always, unexplained, "<", 0.03),
+    ("pairs: unseen-pose error within 1.15", "pair", always, within, ">", 0.95),
+    ("triples: exact set", "triple", always, one_cause, ">", 0.60),
+    ("triples: recall", "triple", always, recall, ">", 0.92),
+    ("triples: precision", "triple", always, precision, ">", 0.90),
+    ("triples: wrongly unexplained", "triple", always, unexplained, "<", 0.20),
+    ("outside, weak and up: unexplained", "unknown", at(3, 10, 30), unexplained, ">", 0.95),
+    ("outside, weak and up: structure right", "unknown", at(3, 10, 30), structure_right, ">", 0.80),
+)
+
+
+def figures(records: list[Record], methods: list[str]) -> list[dict[str, Any]]:
+    """One entry for each demand that there are sets for."""
+    found = []
+    for text, row, chosen, judge, sign, demand in DEMANDS:
+        mine = [r for r in records if r["row"] == row and chosen(r)]
+        if not mine:
+            continue
+        shares = {method: share(mine, method, judge) for method in methods}
+        values = {method: round(value, 4) for method, (value, n) in shares.items() if n}
+        ours = values.get("ours", float("nan"))
+        met = ours <= demand if sign == "<" else ours >= demand
+        found.append({"demand": text, "sign": sign, "wanted": demand, "sets": len(mine), "met": met, **values})
+    return found
