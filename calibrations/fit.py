@@ -167,15 +167,16 @@ def _result(problem: Problem, theta: Array, noise: Noise) -> Fit:
     residual, jacobian = problem.residual(theta), problem.jacobian(theta)
     model = replace(problem.layout.model, unit=problem.table.unit)
     found = Fit(model, problem, theta, noise, residual, jacobian)
-    return replace(found, model=estimates(model, problem.layout, theta, _informative(found)))
+    cautious = cautiously(found)
+    informative = np.asarray(cautious.whitened[:, 1:] / cautious.birge)
+    return replace(found, model=estimates(model, problem.layout, theta, informative))
 
 
-def _informative(found: Fit) -> Array:
-    """The jacobian made white by all that the residual shows, to take standard uncertainties from.
+def cautiously(found: Fit) -> Fit:
+    """The fit under all the noise that its residual shows, from which standard uncertainties are taken.
 
     Here nothing is set aside: where inclinations follow each other in time, smooth functions of the angles take up slow
     noise as well, and parameters would look more certain than they are.
     """
     noise = estimate(found.noise, found.residual, found.jacobian, np.zeros((found.table.n, 0)))
-    plain = replace(found, noise=noise.prolonged())
-    return np.asarray(plain.whitened[:, 1:] / plain.birge)
+    return replace(found, noise=noise.prolonged())

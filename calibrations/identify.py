@@ -24,14 +24,25 @@ def covariance(jacobian: Array, typical: Array) -> tuple[Array, Array]:
 
     Returns ((p, p), (k, p)): the second an orthonormal basis, in units of `typical`, of what changes nothing.
     """
+    _, root, null = _directions(jacobian, typical)
+    return root @ root.T, np.linalg.qr(null.T)[0].T
+
+
+def gain(jacobian: Array, typical: Array) -> Array:
+    """The pseudo-inverse (p, rows) of the whitened jacobian: what a change of each row does to each parameter."""
+    U, root, _ = _directions(jacobian, typical)
+    return root @ U.T
+
+
+def _directions(jacobian: Array, typical: Array) -> tuple[Array, Array, Array]:
+    """What the data determine, as (rows, k) and (p, k) whose product is the gain, and what they do not, (p - k, p)."""
     scaled = jacobian * typical
     norm = np.linalg.norm(scaled, axis=0)
     norm = np.where(norm > ROUNDING * norm.max(), norm, 1.0)
-    _, s, Vt = np.linalg.svd(scaled / norm, full_matrices=False)
+    U, s, Vt = np.linalg.svd(scaled / norm, full_matrices=False)
     good = s > RELATIVE_RANK * s[0]
-    D = typical / norm
-    root = (Vt[good].T / s[good]) * D[:, None]
-    return root @ root.T, np.linalg.qr((Vt[~good] / norm).T)[0].T
+    root = (Vt[good].T / s[good]) * (typical / norm)[:, None]
+    return U[:, good], root, Vt[~good] / norm
 
 
 def estimates(model: Model, layout: Layout, theta: Array, jacobian: Array) -> Model:

@@ -7,14 +7,14 @@ For `motion` it is what each stretch of the record holds of measured minus predi
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrations.chain import backward, force, forward
+from calibrations.chain import Step, backward, force, forward
 from calibrations.errors import DataError, ModelError, TooFewRows
 from calibrations.lack_of_fit import smooth_columns
 from calibrations.mean_noise import norm_std, white_std
@@ -63,7 +63,10 @@ class Problem:
 
     def residual(self, theta: Array) -> Array:
         """Shape (channels, n)."""
-        steps = self.layout.steps(theta)
+        return self.residual_by(self.layout.steps(theta))
+
+    def residual_by(self, steps: Sequence[Step]) -> Array:
+        """As `residual`, of effects with their values: those of the model, and what else one wants to try."""
         if isinstance(self.table, Stretches):
             samples = self.table.samples
             return self.table.parts(samples.outputs - forward(samples, steps))

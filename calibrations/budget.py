@@ -1,0 +1,184 @@
+"""The uncertainty budget of a fit: for each parameter what adds to its standard uncertainty, and how much (GUM).
+
+    type A   white noise of the means, scatter, slow noise: the fit's own covariance, G Sigma G^T, in its parts; and the
+             misfit, by which the Birge ratio widens it
+    type B   inputs that are not fitted (`inputs.py`): u_i = |c_i| u(x_i), with c_i = G d residual / d x_i
+
+G is the gain of the fit, d theta = -G d residual: the pseudo-inverse of its jacobian under the noise it was found with.
+An input with an error of its own in each row adds the squares row by row. Effective degrees of freedom by Welch and
+Satterthwaite, the coverage factor for 95 % from Student's t. A source that is not given has no number.
+
+Errors of the inputs show in the residual too, and the fit takes them for scatter, slow noise or misfit. What they
+account for there, by the square of the residual that they would leave, is not counted a second time.
+
+Source  JCGM 100:2008, 4.3.10 (nothing counts twice), 5.1 (sensitivities), 5.2 (correlated inputs), G.4 (freedom).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import stdtrit
+
+from calibrations.fit import Fit, cautiously
+from calibrations.identify import gain
+from calibrations.inputs import Contribution
+from calibrations.noise import Noise
+from calibrations.table import Array
+
+LEVEL = 0.95
+CHUNK = 512  # columns whitened at a time
+MOST_TIMES = 400  # rows that the freedom of slow noise is worked out on
+
+
+@dataclass(frozen=True)
+class Line:
+    """One source. Arrays have an entry for each parameter, in its unit; None where the source is not given.
+
+    `sensitivity` is signed where the whole table has one error, else the root of the sum of squares.
+    """
+
+    source: str
+    kind: str  # "A" or "B"
+    unit: str
+    input_std: float | None
+    sensitivity: Array | None
+    std: Array | None
+    freedom: float
+
+
+@dataclass(frozen=True)
+class Budget:
+    """All sources of all parameters of a fit; entries that the data do not determine are NaN."""
+
+    lines: tuple[Line, ...]
+
+    @property
+    def given(self) -> tuple[Line, ...]:
+        """The sources that have a number."""
+        return tuple(line for line in self.lines if line.std is not None)
+
+    @property
+    def not_given(self) -> tuple[str, ...]:
+        """Names of the sources that have none."""
+        return tuple(line.source for line in self.lines if line.std is None)
+
+    @cached_property
+    def _variances(self) -> Array:
+        """Shape (sources, p)."""
+        return np.array([line.std for line in self.given]) ** 2
+
+    @cached_property
+    def combined(self) -> Array:
+        """Combined standard uncertainty of each parameter."""
+        return np.asarray(np.sqrt(self._variances.sum(axis=0)))
+
+    @cached_property
+    def freedom(self) -> Array:
+        """Effective degrees of freedom of each parameter."""
+        each = np.array([[line.freedom] for line in self.given])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(self.combined**4 / np.sum(self._variances**2 / each, axis=0))
+
+    @cached_property
+    def coverage(self) -> Array:
+        """Coverage factor of each parameter for 95 %, from the whole degrees of freedom (GUM G.4.1)."""
+        whole = np.minimum(np.maximum(np.floor(np.where(np.isnan(self.freedom), 1e9, self.freedom)), 1), 1e9)
+        return np.asarray(stdtrit(whole, (1 + LEVEL) / 2))
+
+    @cached_property
+    def expanded(self) -> Array:
+        """Expanded uncertainty of each parameter."""
+        return self.coverage * self.combined
+
+
+def budget(found: Fit, inputs: Iterable[Contribution]) -> Budget:
+    """The budget of a fit to poses or positions, from its own noise and from `inputs` that were not fitted."""
+    cautious = cautiously(found)
+    G = gains(cautious)
+    unknown = np.array([e.std is None for term in found.model.terms for e in term.estimates], dtype=bool)
+    of_inputs = [_of_type_b(found, G, c) for c in inputs]
+    own = _of_type_a(cautious, G, sum(seen for _, seen in of_inputs))
+    return Budget(tuple(_without(line, unknown) for line in [*own, *(line for line, _ in of_inputs)]))
+
+
+def gains(found: Fit) -> Array:
+    """How far each error of a row moves each parameter, shape (p, channels, n)."""
+    channels, n = found.residual.shape
+    inverse = gain(found.whitened[:, 1:], found.problem.layout.typical).reshape(-1, channels, n)
+    G = np.empty_like(inverse)
+    for first in range(0, n, CHUNK):
+        unit = np.eye(n)[:, first : first + CHUNK]
+        white = found.noise.whiten(np.broadcast_to(unit, (channels, *unit.shape))).reshape(channels, n, -1)
+        G[:, :, first : first + CHUNK] = np.einsum("pcn,cnk->pck", inverse, white)
+    return G
+
+
+def _of_type_a(found: Fit, G: Array, seen: float) -> list[Line]:
+    """The fit's own covariance, in its parts; what the inputs leave in the residual, `seen`, is no noise."""
+    noise, rows = found.noise, found.residual.size - len(found.theta)
+    white = np.einsum("pcn,cn->p", G**2, noise.white**2)
+    scatter = np.einsum("pcn,c->p", G**2, noise.scatter**2)
+    everything = np.sum(gain(found.whitened[:, 1:], found.problem.layout.typical) ** 2, axis=1)
+    slow = np.maximum(everything - white - scatter, 0.0) if np.any(noise.slow > 0) else np.zeros_like(white)
+    misfit = (found.birge**2 - 1) * everything
+    beyond = float(np.sum(found.residual**2) - np.sum(noise.white**2))
+    share = min(max(1 - seen / beyond, 0.0), 1.0) if seen and beyond > 0 else 1.0
+    parts = [
+        ("white noise of the dwells", white, float(rows)),
+        ("scatter from row to row", share * scatter, float(rows)),
+        ("slow noise", share * slow, slow_freedom(noise)),
+        ("misfit of the model", share * misfit, float(rows)),
+    ]
+    return [Line(name, "A", "", None, None, np.sqrt(v), freedom) for name, v, freedom in parts if np.any(v > 0)]
+
+
+def _of_type_b(found: Fit, G: Array, c: Contribution) -> tuple[Line, float]:
+    """One input that is not fitted, and the sum of squares that its errors leave in the residual."""
+    if c.std is None:
+        return Line(c.source, "B", c.unit, None, None, None, c.freedom), 0.0
+    # the residual is measured less predicted: a parameter follows an input against what the residual does
+    shown, number = -c.derivative(found.problem, found.theta), c.shared(found.table)
+    each = np.zeros((int(number.max()) + 1, len(G)))
+    np.add.at(each, number, np.einsum("pcn,cn->np", G, shown))
+    sensitivity = each[0] if len(each) == 1 else np.sqrt(np.sum(each**2, axis=0))
+    line = Line(c.source, "B", c.unit, c.std, sensitivity, np.abs(sensitivity) * c.std, c.freedom)
+    return line, c.std**2 * _left(shown, found.jacobian, each, number)
+
+
+def _left(shown: Array, jacobian: Array, each: Array, number: NDArray[np.intp]) -> float:
+    """Sum of squares of what errors (channels, n) leave of themselves when the parameters follow them by `each`.
+
+    One error for each `number`; the jacobian (channels, n, p) takes `each` (numbers, p) back to the rows.
+    """
+    crossed = np.einsum("cnp,np->cn", jacobian, each[number])
+    normal = np.einsum("cnp,cnq->pq", jacobian, jacobian)
+    return float(np.sum(shown**2) - 2 * np.sum(shown * crossed) + np.sum((each @ normal) * each))
+
+
+def slow_freedom(noise: Noise) -> float:
+    """Degrees of freedom with which slow noise is known: of the sum of squares of so correlated a record.
+
+    (tr R)^2 / tr R^2 for its correlation R (Satterthwaite); the least over the channels.
+    """
+    time_s = np.cumsum(noise.gap_s)
+    time_s = time_s[:: max(1, len(time_s) // MOST_TIMES)]
+    apart_s = np.abs(time_s[:, None] - time_s)
+    freedom = np.inf
+    for taus_s, slow in zip(noise.taus_s, noise.slow, strict=True):
+        if slow > 0:
+            correlation = np.mean([np.exp(-apart_s / tau_s) for tau_s in taus_s], axis=0)
+            freedom = min(freedom, len(time_s) ** 2 / float(np.sum(correlation**2)))
+    return freedom
+
+
+def _without(line: Line, unknown: Array) -> Line:
+    """The line without entries that the data do not determine."""
+    if line.std is None:
+        return line
+    std = np.where(unknown, np.nan, line.std)
+    return Line(line.source, line.kind, line.unit, line.input_std, line.sensitivity, std, line.freedom)

@@ -1,0 +1,165 @@
+"""Inputs of a calibration that no fit can know, and what their errors do to the residual: GUM type B.
+
+A table says how well it knows them by constants, standard uncertainties all; the bench file gives them to every run, a
+data file has them in its header. What it does not say is not given, and not zero.
+
+    alpha_std_deg, beta_std_deg   true angle of a stage, from its error table or its dial: alike at one angle
+    repeat_std_deg                true angle of either stage, from pose to pose: each on its own
+    tilt_std_deg                  the base against the vertical, about its x and y (the level; alpha's zero too)
+    mount_std_deg                 the sensor's edges against the table, about x, y and z (beta's zero too)
+    gravity_std_m_s2              gravity at the place
+    gain_std, offset_std_v        the converter: relative, and in V
+    temperature_std_c             the thermometer's offset
+
+Gravity counts for values per m/s^2: per local g a scale factor would not depend on it.
+Source  JCGM 100 (GUM) 4.3; JCGM 102 for several outputs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrations.axes import rotation
+from calibrations.chain import Pose
+from calibrations.effect import Effect, Values
+from calibrations.problem import Problem
+from calibrations.table import Array, Table
+
+Derivative = Callable[[Problem, Array], Array]  # (problem, theta) -> d residual / d input, (channels, n)
+Sharing = Callable[[Table], NDArray[np.intp]]  # number of the error that each row has, shape (n,)
+
+
+@dataclass(frozen=True)
+class Contribution:
+    """An input with its standard uncertainty `std` in `unit`, None where it is not given.
+
+    Rows of one number by `shared` have one error; those of different numbers are independent. `freedom` as in GUM G.4.
+    """
+
+    source: str
+    unit: str
+    std: float | None
+    derivative: Derivative
+    shared: Sharing
+    freedom: float = np.inf
+
+
+def alike(table: Table) -> NDArray[np.intp]:
+    """One error for the whole table."""
+    return np.zeros(table.n, dtype=np.intp)
+
+
+def each(table: Table) -> NDArray[np.intp]:
+    """Every row has its own."""
+    return np.arange(table.n)
+
+
+def at(name: str) -> Sharing:
+    """One error for all rows at the same angle."""
+
+    def number(table: Table) -> NDArray[np.intp]:
+        angle_deg = np.round(np.mod(table.column(name), 360), 6)
+        return np.asarray(np.unique(angle_deg, return_inverse=True)[1].ravel())
+
+    return number
+
+
+def of_column(name: str, step: float) -> Derivative:
+    """With respect to a column of the table, by central differences."""
+
+    def derivative(problem: Problem, theta: Array) -> Array:
+        ahead, behind = (_shifted(problem, name, by).residual(theta) for by in (step, -step))
+        return (ahead - behind) / (2 * step)
+
+    return derivative
+
+
+def of_step(effect: Effect, step: float) -> Derivative:
+    """With respect to what `effect` takes as "by", at zero."""
+
+    def derivative(problem: Problem, theta: Array) -> Array:
+        steps = problem.layout.steps(theta)
+        ahead, behind = (problem.residual_by([*steps, (effect, {"by": np.asarray(by)})]) for by in (step, -step))
+        return (ahead - behind) / (2 * step)
+
+    return derivative
+
+
+def contributions(table: Table) -> tuple[Contribution, ...]:
+    """Every input that this kind of table has. Raises DataError for a constant that is no number."""
+    made = [*_of_any(table), *(_of_poses() if table.kind == "poses" else ())]
+    return tuple(replace(c, std=_given(table, constant)) for constant, c in made)
+
+
+def _of_poses() -> list[tuple[str, Contribution]]:
+    stages = [(name, of_column(f"{name}_deg", 1e-3)) for name in ("alpha", "beta")]
+    return [
+        *(
+            (f"{name}_std_deg", Contribution(f"true angle of {name}", "deg", None, change, at(f"{name}_deg")))
+            for name, change in stages
+        ),
+        *(("repeat_std_deg", Contribution(f"{name} from pose to pose", "deg", None, d, each)) for name, d in stages),
+        *(("tilt_std_deg", _common(f"level of the base about {axis}", "deg", _tilt(k))) for k, axis in enumerate("xy")),
+        *(("mount_std_deg", _common(f"mount about {axis}", "deg", _turn(k))) for k, axis in enumerate("xyz")),
+        ("offset_std_v", _common("offset of the converter", "V", of_step(_acting(output=_more), 1e-4))),
+    ]
+
+
+def _of_any(table: Table) -> list[tuple[str, Contribution]]:
+    g = table.gravity_m_s2
+    found = [
+        ("gravity_std_m_s2", _common("gravity at the place", "m/s^2", of_step(_acting(force=_stronger(g)), 1e-3))),
+        ("gain_std", _common("gain of the converter", "1", of_step(_acting(output=_times), 1e-4))),
+    ]
+    if "temperature_c" in table:
+        found.append(("temperature_std_c", _common("thermometer", "K", of_column("temperature_c", 1e-2))))
+    return found
+
+
+def _given(table: Table, constant: str) -> float | None:
+    return table.number(constant, 0.0) if constant in table.constants else None
+
+
+def _common(source: str, unit: str, derivative: Derivative) -> Contribution:
+    return Contribution(source, unit, None, derivative, alike)
+
+
+def _shifted(problem: Problem, name: str, by: float) -> Problem:
+    columns = {**problem.table.columns, name: problem.table.column(name) + by}
+    return replace(problem, table=replace(problem.table, columns=MappingProxyType(columns)))
+
+
+def _tilt(component: int) -> Derivative:
+    def lean(pose: Pose, table: Table, p: Values) -> Pose:  # noqa: ARG001 as every effect
+        return replace(pose, up=rotation(np.radians(np.eye(3)[component] * p["by"])) @ pose.up)
+
+    return of_step(_acting(pose=lean), 1e-3)
+
+
+def _turn(component: int) -> Derivative:
+    def turn(a: Array, table: Table, p: Values) -> Array:  # noqa: ARG001
+        return a @ rotation(np.radians(np.eye(3)[component] * p["by"]))
+
+    return of_step(_acting(force=turn), 1e-3)
+
+
+def _stronger(gravity_m_s2: float) -> Callable[..., Array]:
+    return lambda a, table, p: a * (1 + p["by"] / gravity_m_s2)  # noqa: ARG005
+
+
+def _times(v: Array, table: Table, p: Mapping[str, Array]) -> Array:  # noqa: ARG001
+    return v * (1 + p["by"])
+
+
+def _more(v: Array, table: Table, p: Mapping[str, Array]) -> Array:  # noqa: ARG001
+    return v + p["by"]
+
+
+def _acting(**hook: Callable[..., object]) -> Effect:
+    """An error that acts as an effect does, and is not in any catalogue."""
+    return Effect("input", (), "", "", "", "", "", "", **hook)  # type: ignore[arg-type]
