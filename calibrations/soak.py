@@ -10,7 +10,7 @@ Source  Ang III.B, Fig. 10.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
@@ -66,7 +66,6 @@ class Soak:
     """What a soak's table comes to. Times since power-on, s."""
 
     table: Table
-    power_on_s: float  # on the clock of the table
     gaps: tuple[Gap, ...]
     courses: Mapping[str, Course]  # bias-x, scale-x, ...
 
@@ -104,7 +103,7 @@ class Soak:
         course = next(iter(self.courses.values()))
         if course.state is None:
             return None
-        values = np.interp(course.t_s, self.table.time_s - self.power_on_s, self.table.column("temperature_c"))
+        values = np.interp(course.t_s, self.table.time_s, self.table.column("temperature_c"))
         return steady_state(course.t_s, values, np.zeros(len(values)))
 
     @property
@@ -112,13 +111,13 @@ class Soak:
         """Peak to peak of what the sensor's own warming does not explain of the temperature: the room's, the oven's."""
         if self.temperature is None:
             return None
-        t_s = self.holds.time_s - self.power_on_s
+        t_s = self.holds.time_s
         left = self.holds.column("temperature_c") - self.temperature.at(t_s)
         return float(np.ptp(left[t_s >= self.temperature.span_s[0]]))
 
     def noise_of_hours(self, axis: str) -> tuple[Array, Array]:
         """(middles of hours, s; rms noise of single samples within blocks, V)."""
-        hour = ((self.holds.time_s - self.power_on_s) // HOUR_S).astype(int)
+        hour = (self.holds.time_s // HOUR_S).astype(int)
         hours = np.unique(hour)
         stds = self.holds.column(f"v{axis}_std_v")
         return (hours + 0.5) * HOUR_S, np.array([rms(stds[hour == h]) for h in hours])
@@ -132,15 +131,15 @@ class Soak:
         return allan_deviation(means, float(np.median(step)))
 
 
-def soak(table: Table, power_on_s: float = 0.0, oven_c: float = 0.0) -> Soak:
-    """Bias and scale factor over time. `power_on_s`: the table's time when the sensor was switched on.
+def soak(table: Table, oven_c: float = 0.0) -> Soak:
+    """Bias and scale factor over time.
 
     In an oven at `oven_c` (0: none) the approach begins when that is reached: what is measured while it heats and
     overshoots is left out.
 
     Raises TooFewRows where it holds no whole tumble.
     """
-    gaps = _gaps(table, power_on_s)
+    gaps = _gaps(table)
     broken = {gap.path for gap in gaps}
     whole = np.array([path.startswith(REVERSAL) and path not in broken for path in table.labels["path"]])
     if oven_c and "temperature_c" in table:
@@ -151,9 +150,9 @@ def soak(table: Table, power_on_s: float = 0.0, oven_c: float = 0.0) -> Soak:
     reversals = table.rows(_complete(table, whole))
     courses: dict[str, Course] = {}
     for axis in (axis for axis in table.axes if axis in AXES):
-        done = [replace(each, t_s=each.t_s - power_on_s) for each in tumbles(reversals, axis)]
+        done = tumbles(reversals, axis)
         courses |= {f"{quantity}-{axis}": _course(quantity, axis, done) for quantity in ("bias", "scale")}
-    return Soak(table, power_on_s, gaps, courses)
+    return Soak(table, gaps, courses)
 
 
 def _complete(table: Table, whole: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -174,15 +173,14 @@ def _course(quantity: str, axis: str, done: list[Tumble]) -> Course:
     return Course(quantity, axis, t_s, values, stds, state)
 
 
-def _gaps(table: Table, power_on_s: float) -> tuple[Gap, ...]:
+def _gaps(table: Table) -> tuple[Gap, ...]:
     paths, length = table.labels["path"], _lengths_s(table)
     ends, starts = (table.time_s + length / 2)[:-1], (table.time_s - length / 2)[1:]
     within = np.array([a == b and a.startswith(HOLD) for a, b in pairwise(paths)], dtype=bool)
     allowed = np.where(within, GAP_SAMPLES / _rate_hz(table), LONGEST_MOVE_S)
     found = np.flatnonzero(starts - ends > allowed)
     return tuple(
-        Gap(float(ends[i]) - power_on_s, float(starts[i] - ends[i]), paths[i] if paths[i] == paths[i + 1] else "")
-        for i in found
+        Gap(float(ends[i]), float(starts[i] - ends[i]), paths[i] if paths[i] == paths[i + 1] else "") for i in found
     )
 
 

@@ -62,9 +62,7 @@ def surroundings(found: Soak) -> Figure:
     figure, axes = panels(len(rows) + 1, 1, 1.6, sharex=True)
     labels = {"temperature_c": "sensor (°C)", "supply_v": "supply (V)"}
     for ax, name in zip(axes[:, 0], rows, strict=False):
-        ax.plot(
-            *_thinned(_hours(found, holds.time_s), holds.column(name)), color=GREEN if name == "supply_v" else AMBER
-        )
+        ax.plot(*_thinned(holds.time_s / HOUR_S, holds.column(name)), color=GREEN if name == "supply_v" else AMBER)
         ax.set_ylabel(labels[name])
         _mark(ax, found)
     ax = axes[-1, 0]
@@ -125,7 +123,7 @@ def _begin_h(found: Soak) -> float | None:
 
 def _span_s(found: Soak) -> tuple[float, float]:
     """First and last time of the table, since power-on, s."""
-    times_s = found.table.time_s - found.power_on_s
+    times_s = found.table.time_s
     return float(times_s.min()), float(times_s.max())
 
 
@@ -159,13 +157,9 @@ def _final(course: Course) -> float:
     return course.state.final[0] if course.state else float(course.values[-1])
 
 
-def _hours(found: Soak, t_s: Array) -> Array:
-    return np.asarray((t_s - found.power_on_s) / HOUR_S)
-
-
 def _still(found: Soak, course: Course) -> tuple[Array, Array]:
     """The still record at 0 g, shifted onto the bias: what differs there is load along z."""
-    t_s, volts = _thinned(found.holds.time_s - found.power_on_s, found.holds.column(f"v{course.axis}_v"))
+    t_s, volts = _thinned(found.holds.time_s, found.holds.column(f"v{course.axis}_v"))
     return t_s, volts - np.median(volts - np.interp(t_s, course.t_s, course.values))
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 from calibrations.table import Table
 from procedures.session import Reading
+from procedures.soak import POWER_ON
 from rig.bench import Sensor
 from rig.errors import RecordError, UnknownRun
 from rig.nearest import did_you_mean
@@ -70,8 +71,21 @@ class Measured:
     def part(self, kind: str, path: str = "") -> Table:
         """A table of another kind out of the run: of `poses` whose path begins with `path`. Raises RecordError."""
         run = replace(self.run, run=self.name, constants=self.constants, kind=kind)
-        poses = (kept for kept in self.kept() if kept.pose.path.startswith(path))
+        on_s = self._power_on_s()
+        poses = (replace(kept, t_s=kept.t_s - on_s) for kept in self.kept() if kept.pose.path.startswith(path))
         return (poses_table if kind == "poses" else samples_table)(run, poses)
+
+    def _power_on_s(self) -> float:
+        """When the run itself switched the sensor on, on its clock: 0 where it did not.
+
+        The reading is the bench's, and was taken before the first pose by the same process.
+        """
+        read_s = next((reading.value for reading in self.readings() if reading.name == POWER_ON), None)
+        first = next(self.record.kept(self.run.run), None)
+        if read_s is None or first is None:
+            return 0.0
+        middle_s = first.samples.start_s + len(first.samples.volts) / first.samples.rate_hz / 2
+        return first.t_s - (middle_s - read_s)
 
     @property
     def name(self) -> str:

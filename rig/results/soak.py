@@ -12,7 +12,7 @@ from calibrations.soak import soak as soak_of
 from calibrations.steady_state import COVERAGE, FEWEST, SteadyState
 from calibrations.table import Table
 from procedures.session import Dwell
-from procedures.soak import POWER_ON, REVERSAL
+from procedures.soak import REVERSAL
 from rig.record.measured import Measured
 from rig.results.result import Result
 
@@ -48,7 +48,7 @@ def evaluate(measured: Measured) -> dict[str, Result]:
 
 def night(measured: Measured) -> Soak:
     """The run as a soak; its times are counted from power-on, or from its beginning where that is not known."""
-    return soak_of(measured.table(), _power_on_s(measured), measured.run.settings["oven_c"])
+    return soak_of(measured.table(), measured.run.settings["oven_c"])
 
 
 def steady(dwells: Sequence[Dwell], oven_c: float) -> bool:
@@ -60,7 +60,7 @@ def steady(dwells: Sequence[Dwell], oven_c: float) -> bool:
     if len(list(groupby(reversals, lambda dwell: dwell.pose.path))) < FEWEST:
         return False
     sensors = dict.fromkeys(name.rpartition(".")[0] for name in dwells[0].means if name[-2:] in ("vx", "vy"))
-    return all(_at_rest(soak_of(_table(reversals, f"{sensor}." if sensor else ""), 0.0, oven_c)) for sensor in sensors)
+    return all(_at_rest(soak_of(_table(reversals, f"{sensor}." if sensor else ""), oven_c)) for sensor in sensors)
 
 
 def _at_rest(found: Soak) -> bool:
@@ -93,16 +93,6 @@ def _table(dwells: Sequence[Dwell], prefix: str) -> Table:
             columns[f"v{axis}_v"] = [dwell.means[channel] for dwell in dwells]
             columns[f"v{axis}_std_v"] = [dwell.stds[channel] for dwell in dwells]
     return Table.from_columns("poses", columns, labels={"path": tuple(dwell.pose.path for dwell in dwells)})
-
-
-def _power_on_s(measured: Measured) -> float:
-    """On the run's clock: the reading is the bench's, and was taken before the first pose of the same process."""
-    read = next((reading.value for reading in measured.readings() if reading.name == POWER_ON), None)
-    if read is None:
-        return 0.0
-    first = next(measured.kept())
-    middle_s = first.samples.start_s + len(first.samples.volts) / first.samples.rate_hz / 2
-    return read - middle_s + first.t_s
 
 
 def _steady(found: Soak, axis: str) -> dict[str, Result]:

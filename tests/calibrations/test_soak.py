@@ -35,7 +35,10 @@ def test_bias_and_scale_factor_come_to_rest() -> None:
 
 
 def test_times_count_from_power_on() -> None:
-    late, early = soak(soak_table(), power_on_s=-3600.0), soak(soak_table())
+    table = soak_table()
+    columns = {**table.columns, "t_s": table.time_s + 3600.0}
+    late = soak(type(table).from_columns("poses", columns, table.constants, "", table.labels))
+    early = soak(table)
     assert late.courses["bias-x"].t_s == pytest.approx(early.courses["bias-x"].t_s + 3600)
     times = late.time_s(), early.time_s()
     assert times[0] is not None
