@@ -2,6 +2,7 @@
 
 RigError (2)             bad usage or bad input
 ├── BenchError           the bench file: file, key and nearest key
+├── PlanError            a plan that cannot be made as asked
 ├── RecordError          the record cannot be opened, or does not hold what is asked
 │   └── UnknownRun       no run of this name; names the nearest
 ├── Busy                 another process works on this run, or with this instrument
@@ -23,6 +24,10 @@ class RigError(Exception):
 
 class BenchError(RigError):
     """The bench file cannot be used as it is."""
+
+
+class PlanError(RigError):
+    """No plan can be made as asked."""
 
 
 class RecordError(RigError):

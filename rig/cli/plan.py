@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import click
 
-from procedures.catalogue import find
+from procedures.catalogue import Procedure, find
+from procedures.pose_list import written
 from procedures.settings import parse
-from rig.bench import read_bench
-from rig.cli.output import bench_option, duration, emit, json_option, size
+from rig.bench import Bench, read_bench
+from rig.cli.output import bench_option, duration, emit, json_option, model_option, size
 from rig.cli.settings import PASS_ON, read_settings, settings_arguments
 from rig.plan import Plan, plan
 from rig.stretches import Stretch, stretches
@@ -22,6 +26,11 @@ HEAD, TAIL = 14, 4  # stretches of a long plan that are shown
 @click.argument("procedure")
 @settings_arguments
 @click.option("--moves", is_flag=True, help="Every move and every record, however many.")
+@click.option("--optimal", is_flag=True, help="Of a sweep: poses chosen for --model, beside the standard ones.")
+@model_option
+@click.option("--poses", type=int, help="How many to choose, at most 60, which is the default.")
+@click.option("--criterion", type=click.Choice(["D", "I"]), help="D: joint uncertainty; I, the default: prediction.")
+@click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="Write the poses to this file.")
 @bench_option
 @json_option
 def command(
@@ -29,22 +38,75 @@ def command(
     given: tuple[str, ...],
     pairs: tuple[str, ...],
     moves: bool,
+    optimal: bool,
+    model: str | None,
+    poses: int | None,
+    criterion: str | None,
+    out: Path | None,
     bench_file: Path | None,
     as_json: bool,
 ) -> None:
     """Print every move that PROCEDURE would make, the limits it stays within, and how long it takes.
 
     A long plan is summed up; --moves prints all of it. Settings of the procedure are options: `rig plan sweep
-    --step-deg 30`. Nothing is touched.
+    --step-deg 30`. Nothing is touched. --out writes the poses, for `rig run sweep --pose-list`.
+
+    --optimal chooses the poses of a sweep for a model, so that it takes less time to know as much. The settings are
+    those of the standard sweep beside it, whose range the chosen poses have.
     """
     bench = read_bench(bench_file)
     found = find(procedure, bench.folders.procedures)
-    planned = plan(bench, found, parse(found, read_settings(given, pairs, found.defaults)))
+    settings = parse(found, read_settings(given, pairs, found.defaults))
+    if optimal:
+        _optimal(bench, found, settings, Asked(model, poses, criterion, out, as_json))
+        return
+    if model or poses or criterion:
+        raise click.UsageError("--model, --poses and --criterion go with --optimal")
+    planned = plan(bench, found, settings)
+    if out is not None:
+        _write_poses(out, planned)
     if as_json:
         emit(_document(planned))
         return
     whole = moves or len(planned.steps) <= FEW_STEPS
     click.echo("\n".join([*(_steps(planned) if whole else _summary(planned)), "", *_end(planned)]))
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What is asked of chosen poses; None where nothing is said."""
+
+    model: str | None
+    poses: int | None
+    criterion: str | None
+    out: Path | None
+    as_json: bool
+
+
+def _optimal(bench: Bench, procedure: Procedure, settings: Mapping[str, Any], asked: Asked) -> None:
+    """Choose poses for a model, and print them beside the standard sweep. Raises UsageError for what is no sweep."""
+    from calibrations.effect import catalogue
+    from calibrations.model_file import read_model
+    from rig.cli.chosen import document, lines
+    from rig.optimal import MOST_POSES
+    from rig.optimal import optimal as chosen
+
+    if procedure.name != "sweep" or settings["pose_list"]:
+        raise click.UsageError("--optimal chooses the poses of a sweep over a grid")
+    model = read_model(asked.model or "linear", catalogue(bench.folders.effects))
+    found = chosen(bench, procedure, settings, model, asked.poses or MOST_POSES, asked.criterion or "I")
+    if asked.out is not None:
+        _write_poses(asked.out, found.equal.plan)
+    if asked.as_json:
+        emit(_document(found.equal.plan) | {"optimal": document(found)})
+    else:
+        click.echo("\n".join(lines(found, str(asked.out) if asked.out else None)))
+
+
+def _write_poses(out: Path, planned: Plan) -> None:
+    from rig.cli.asked import write_whole
+
+    write_whole(out, "\n".join([*written(held.pose for held in planned.held), ""]))
 
 
 def _steps(planned: Plan) -> list[str]:

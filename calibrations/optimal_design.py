@@ -1,0 +1,140 @@
+"""Which poses tell most about a model: D- and I-optimal designs, by exchange of one pose after another.
+
+    D   the greatest det M: the smallest volume of the parameters' joint uncertainty
+    I   the least mean variance of what the model predicts over a range of poses: tr(M^-1 W)
+
+M is the information of the chosen poses, W the mean of J' J over the range. A pose is taken out and the best of all
+candidates put in its place until no exchange helps, from several random beginnings: the optimum of each is local.
+
+Some of the chosen are then measured again, so that the noise is known from the data themselves (pure error) and a lack
+of fit can be told from it; and poses far from all of them are added that no fit sees.
+
+Source  Fedorov, Theory of Optimal Experiments (1972), exchange; Atkinson, Donev and Tobias, Optimum Experimental
+        Designs, with SAS (2007), ch. 10 to 12; Kennard and Stone, Technometrics 11 (1969), 137-148, poses far from all.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrations.table import Array
+
+Chosen = NDArray[np.intp]  # numbers of candidates; one that is measured twice is there twice
+
+STARTS = 3
+MOST_PASSES = 30
+RIDGE = 1e-6  # of the candidates' mean information: what makes a beginning solvable that knows too little
+LEAST_GAIN = 1e-9  # of the gain that the present pose has: less is rounding
+
+
+class Criterion(Protocol):
+    """What makes one design better than another. Covariances are those of scaled parameters, (p, p)."""
+
+    @property
+    def name(self) -> str: ...
+
+    def gain(self, covariance: Array, rows: Array) -> Array:
+        """How much better each of `rows` (candidates, axes, p) would make a design; to be greatest."""
+
+    def loss(self, covariance: Array) -> float:
+        """How bad a design is; to be least."""
+
+
+@dataclass(frozen=True)
+class DOptimal:
+    """The volume of the parameters' joint uncertainty."""
+
+    name: str = "D"
+
+    def gain(self, covariance: Array, rows: Array) -> Array:
+        return np.asarray(np.linalg.slogdet(_seen(rows @ covariance, rows))[1])
+
+    def loss(self, covariance: Array) -> float:
+        return float(np.linalg.slogdet(covariance)[1])
+
+
+@dataclass(frozen=True)
+class IOptimal:
+    """The mean variance of what is predicted, with `weight` (p, p) the mean of J' J over where it is."""
+
+    weight: Array
+    name: str = "I"
+
+    @staticmethod
+    def over(rows: Array) -> IOptimal:
+        """Over a range of which `rows` (poses, axes, p) are an even sample."""
+        return IOptimal(np.einsum("iap,iaq->pq", rows, rows) / len(rows))
+
+    def gain(self, covariance: Array, rows: Array) -> Array:
+        JC = rows @ covariance
+        lost = JC @ self.weight @ JC.transpose(0, 2, 1)
+        return np.asarray(np.trace(np.linalg.solve(_seen(JC, rows), lost), axis1=1, axis2=2))
+
+    def loss(self, covariance: Array) -> float:
+        return float(np.sum(covariance * self.weight))
+
+
+def scaled(rows: Array) -> Array:
+    """Each parameter in the unit in which the candidates' mean information is 1; `rows` is (candidates, axes, p)."""
+    size = np.sqrt(np.mean(np.sum(rows**2, axis=1), axis=0))
+    return rows / np.where(size > 0, size, 1.0)
+
+
+def exchanged(rows: Array, poses: int, criterion: Criterion, seed: int = 0) -> Chosen:
+    """The best design of so many `poses` among the scaled `rows` (candidates, axes, p), shape (poses,).
+
+    The same arguments give the same design.
+    """
+    rng = np.random.default_rng(seed)
+    designs = [_improved(rows, rng.integers(0, len(rows), poses), criterion, rng) for _ in range(STARTS)]
+    return min(designs, key=lambda chosen: criterion.loss(_covariance(rows[chosen])))
+
+
+def again(rows: Array, chosen: Chosen, more: int, criterion: Criterion) -> Chosen:
+    """Which of `chosen` to measure once more, each at most once: those that help most, one after another; (more,)."""
+    left, taken = [int(k) for k in np.unique(chosen)], list[int]()
+    for _ in range(min(more, len(left))):
+        covariance = _covariance(rows[np.concatenate([chosen, np.array(taken, dtype=np.intp)])])
+        taken.append(left.pop(int(np.argmax(criterion.gain(covariance, rows[left])))))
+    return np.array(taken, dtype=np.intp)
+
+
+def farthest(places: Array, chosen: Chosen, count: int) -> Chosen:
+    """The `places` (candidates, k) that are farthest from all `chosen` and from each other, one by one; (count,)."""
+    nearest = np.min(np.linalg.norm(places[:, None] - places[None, np.unique(chosen)], axis=2), axis=1)
+    taken: list[int] = []
+    for _ in range(count):
+        taken.append(int(np.argmax(nearest)))
+        nearest = np.minimum(nearest, np.linalg.norm(places - places[taken[-1]], axis=1))
+    return np.array(taken, dtype=np.intp)
+
+
+def _improved(rows: Array, chosen: Chosen, criterion: Criterion, rng: np.random.Generator) -> Chosen:
+    """Exchange pose by pose until a whole pass changes nothing. Among equals the first of a random order is taken."""
+    shuffled = rng.permutation(len(rows))
+    for _ in range(MOST_PASSES):
+        before = chosen.copy()
+        for k in range(len(chosen)):
+            covariance = _covariance(rows[np.delete(chosen, k)])
+            gains = criterion.gain(covariance, rows)
+            best = shuffled[np.argmax(gains[shuffled])]
+            if gains[best] > gains[chosen[k]] * (1 + LEAST_GAIN):
+                chosen[k] = best
+        if np.array_equal(before, chosen):
+            break
+    return chosen
+
+
+def _covariance(rows: Array) -> Array:
+    """Of the scaled parameters, shape (p, p)."""
+    flat = rows.reshape(-1, rows.shape[2])
+    return np.asarray(np.linalg.inv(flat.T @ flat + RIDGE * np.eye(flat.shape[1])))
+
+
+def _seen(JC: Array, rows: Array) -> Array:
+    """I + J C J' of each candidate, shape (candidates, axes, axes)."""
+    return np.asarray(np.eye(rows.shape[1]) + JC @ rows.transpose(0, 2, 1))
