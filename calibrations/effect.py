@@ -57,7 +57,8 @@ class Parameter:
 
     `typical` is the magnitude that a sensor may show (in g where the unit holds {out}, else in `unit`): the step
     of numerical derivatives follows from it, and an estimate no better than this tells nothing new. `measured` names
-    an axis without which it does not exist, `where` one of the effect's CONSTANTS that is 0 where it does not.
+    an axis without which it does not exist, `where` one of the effect's CONSTANTS that is 0 where it does not, and
+    `scale` one that `typical` is a multiple of, where only data can tell.
     """
 
     name: str
@@ -69,6 +70,7 @@ class Parameter:
     high: float = np.inf
     measured: str = ""
     where: str = ""
+    scale: str = ""
     doc: str = ""
 
     def __post_init__(self) -> None:
@@ -94,7 +96,7 @@ def _one(table: Table) -> float:  # noqa: ARG001
 
 @dataclass(frozen=True)
 class Effect:
-    """One physical effect, as read from its module."""
+    """One physical effect, as read from its module, or from its `expression`, which is then kept in model files."""
 
     name: str
     parameters: tuple[Parameter, ...]
@@ -114,6 +116,7 @@ class Effect:
     force: Callable[..., Array] | None = None
     transduction: Callable[..., Array] | None = None
     output: Callable[..., Array] | None = None
+    expression: str = ""
 
     @property
     def acts_on(self) -> str:
@@ -151,6 +154,16 @@ def find(name: str, effects: Mapping[str, Effect]) -> Effect:
     if name not in effects:
         raise UnknownName(f'unknown effect "{name}"{nearest(name, effects)}')
     return effects[name]
+
+
+def read_effect(path: Path) -> Effect:
+    """A user's effect from its file. Raises ModelError for what is none, or has the name of a shipped one."""
+    if not path.is_file():
+        raise ModelError(f"{path}: there is no such file; an effect of your own is a Python file")
+    effect = _guarded(_from_module(_load(path, None), path), path)
+    if effect.name in catalogue():
+        raise ModelError(f"{path}: {effect.name} is in the catalogue already; give the file another name")
+    return effect
 
 
 def _read_folder(folder: Path, package: str | None) -> Iterable[Effect]:

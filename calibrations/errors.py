@@ -5,6 +5,7 @@ CalibrationError
 │   ├── MissingColumn    a column that the question needs
 │   └── TooFewRows       fewer rows than parameters
 ├── ModelError           a model file: its key
+│   └── ExpressionError  an effect written as an expression: its column
 └── UnknownName          a model or an effect that nobody here knows; names the nearest
 """
 
@@ -32,6 +33,10 @@ class TooFewRows(DataError):
 
 class ModelError(CalibrationError):
     """A model file cannot be read, or does not fit the data."""
+
+
+class ExpressionError(ModelError):
+    """An effect's expression cannot be read, or has no finite value on the data."""
 
 
 class UnknownName(CalibrationError):

@@ -11,7 +11,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from calibrations.effect import Effect, catalogue, find
 from calibrations.errors import ModelError, UnknownName, nearest
+from calibrations.expression_effect import own_effect
 from calibrations.model import Estimate, Model, Term
+from calibrations.table import NUMBERS
 
 SHIPPED = Path(__file__).parent / "models"
 SCHEMA = "rig.model/1"
@@ -33,6 +35,8 @@ class _Parameter(_Strict):
 
 class _Effect(_Strict):
     effect: str
+    expression: str | None = None
+    columns: list[str] = []
     tied: bool = False
     constants: dict[str, float] = {}
     parameters: list[_Parameter] = []
@@ -104,18 +108,34 @@ def _fault(error: Any) -> str:
 
 
 def _term(entry: _Effect, source: str, known: Mapping[str, Effect]) -> Term:
-    try:
-        effect = find(entry.effect, known)
-    except UnknownName as error:
-        raise UnknownName(
-            f"{source}: {error}; your own effects are found with --bench (its key folders.effects)"
-        ) from None
+    effect = _written(entry, source, known) if entry.expression is not None else _known(entry, source, known)
     _check_parameters(entry, effect, f"{source}: {entry.effect}")
     for name in entry.constants:
         if name not in effect.constants:
             raise ModelError(f'{source}: {entry.effect} has no constant "{name}"{nearest(name, effect.constants)}')
     given = tuple(Estimate(p.name, p.axis or "", p.value, p.std, p.unit, p.identified, p.why) for p in entry.parameters)
     return Term(effect, entry.tied, given, entry.constants)
+
+
+def _known(entry: _Effect, source: str, known: Mapping[str, Effect]) -> Effect:
+    if entry.columns:
+        raise ModelError(f"{source}: {entry.effect} has columns, and no expression that they stand in")
+    try:
+        return find(entry.effect, known)
+    except UnknownName as error:
+        raise UnknownName(
+            f"{source}: {error}; your own effects are found with --bench (its key folders.effects)"
+        ) from None
+
+
+def _written(entry: _Effect, source: str, known: Mapping[str, Effect]) -> Effect:
+    """The effect of an expression: all of it is in the file, and nothing in the file is run."""
+    if entry.effect in known:
+        raise ModelError(f"{source}: {entry.effect} is known already; an expression needs a name of its own")
+    try:
+        return own_effect(entry.effect, entry.expression or "", tuple(entry.columns))
+    except ModelError as error:
+        raise type(error)(f"{source}: {entry.effect}: {error}") from None
 
 
 def _check_parameters(entry: _Effect, effect: Effect, where: str) -> None:
@@ -146,6 +166,10 @@ def dump_model(model: Model) -> str:
 
 def _dump_term(term: Term) -> dict[str, Any]:
     entry: dict[str, Any] = {"effect": term.name}
+    if term.effect.expression:
+        entry["expression"] = term.effect.expression
+        if columns := [name for name in term.effect.needs if name not in NUMBERS]:
+            entry["columns"] = columns
     if term.tied:
         entry["tied"] = True
     if term.constants:

@@ -47,7 +47,7 @@ class Layout:
     @cached_property
     def typical(self) -> Array:
         """Typical magnitude of each entry, in its own unit, shape (p,)."""
-        return np.array([self._size(s.parameter) * s.parameter.typical for s in self.slots])
+        return np.array([self._size(s.parameter) * s.parameter.typical * self._scale(s) for s in self.slots])
 
     @cached_property
     def bounds(self) -> tuple[Array, Array]:
@@ -56,6 +56,9 @@ class Layout:
             np.array([s.parameter.low for s in self.slots]),
             np.array([s.parameter.high for s in self.slots]),
         )
+
+    def _scale(self, slot: Slot) -> float:
+        return self.model.terms[slot.term].constants.get(slot.parameter.scale, 1.0)
 
     def _size(self, parameter: Parameter) -> float:
         return self.nominal if "{out}" in parameter.unit else 1.0
