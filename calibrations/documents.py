@@ -10,6 +10,7 @@ from calibrations.candidates import Candidate
 from calibrations.compare import Comparison, axis_of
 from calibrations.diagnose import Diagnosis
 from calibrations.discover import Added, Discovery
+from calibrations.expected import Expected, told_apart
 from calibrations.experiment import Experiment
 from calibrations.fit import Fit
 from calibrations.noise import rms
@@ -146,5 +147,20 @@ def why(c: Candidate, result: Diagnosis) -> str:
 def _experiment(e: Experiment | None) -> Document | None:
     if e is None:
         return None
-    pairs = [list(pair) for pair in e.separates]
-    return {"procedure": e.procedure, "settings": dict(e.settings), "separates": pairs, "why": e.why}
+    return {
+        "procedure": e.procedure,
+        "settings": dict(e.settings),
+        "separates": [list(pair) for pair in e.separates],
+        "why": e.why,
+        "command": e.command or None,
+        "duration_s": e.duration_s,
+        "expected": _expected(e.expected),
+    }
+
+
+def _expected(found: Expected | None) -> Document | None:
+    """Distances in standard deviations; null where they are not computed."""
+    if found is None:
+        return None
+    alone = {"deviations": float(np.sqrt(found.alone)), "probability": told_apart(found.alone)}
+    return {"deviations": found.deviations, "probability": found.probability, "alone": alone}

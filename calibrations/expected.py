@@ -5,7 +5,8 @@
 It is the noncentrality of the test between them. Where the best is right, twice the logarithm of the likelihood ratio
 scatters about lambda with the standard deviation 2 sqrt(lambda); sqrt(lambda) is their distance in standard deviations.
 
-Source  Atkinson and Fedorov, Biometrika 62 (1975), 57-70; Dette, Melas and Guchenko, Ann. Statist. 43 (2015), 1959-1985.
+Source  Atkinson and Fedorov, Biometrika 62 (1975), 57-70; Dette, Melas and Guchenko, Annals of Statistics 43 (2015),
+        1959-1985.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from calibrations.problem import Problem
 from calibrations.table import Array, Table
 
 CERTAIN = 0.95  # probability of telling two explanations apart with which an experiment is worth its time
-ROUNDS = 12  # evaluations of a rival's derivatives: few are needed so near to its fit
+ROUNDS, CLOSE = 12, 1e-2  # evaluations, and the relative change of lambda at which they end
 
 
 @dataclass(frozen=True)
@@ -81,18 +82,15 @@ def _one_way(right: Fit, wrong: Fit, table: Table) -> Expected:
         def slope(theta: Array) -> Array:
             return np.concatenate(white(mistaken.jacobian(theta))[parts])
 
-        layout = mistaken.layout
-        return 2 * float(
-            least_squares(
-                distance, wrong.theta, slope, bounds=layout.bounds, x_scale=layout.typical, max_nfev=ROUNDS
-            ).cost
-        )
+        size, bounds = mistaken.layout.typical, mistaken.layout.bounds
+        found = least_squares(distance, wrong.theta, slope, bounds, x_scale=size, ftol=CLOSE, max_nfev=ROUNDS)
+        return 2 * float(found.cost)
 
     return Expected(least(slice(1, None)), least(slice(None)))
 
 
 def _noise_on(found: Fit, problem: Problem) -> Noise:
-    """The noise of a fit on other rows: white as their means will have it, scatter and slow noise as they were found."""
+    """The noise of a fit on other rows: white as their means will have it, scatter and slow noise as found."""
     white = problem.white
     if white is None:
         white = np.zeros((len(problem.channels), problem.table.n))

@@ -1,4 +1,8 @@
-"""The experiment that tells apart two effects that the data at hand cannot."""
+"""The experiment that tells apart two effects that the data at hand cannot.
+
+`separating` goes by the physics of the two alone. Where a bench is known, each experiment of MENU is planned on it, and
+`calibrations/expected.py` computes how far apart the two will lie.
+"""
 
 from __future__ import annotations
 
@@ -6,24 +10,65 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from calibrations.candidates import Candidate
+from calibrations.expected import Expected
 
 TEMPERATURE = {"temperature-bias", "temperature-scale", "temperature-hysteresis"}
 TIME = {"warm-up-bias", "warm-up-scale", "bias-drift"}
 WARM_C = 45.0  # above what a powered sensor comes to in a room
 LEVELS = {"stage-zero-offset", "base-tilt"}
 DELAYS = {"output-filter", "sampling-delay"}
-TWO_HZ = "10,4"  # the usual one, and one well below that is at the same stroke still above the noise
+TWO_HZ = [10.0, 4.0]  # the usual one, and one well below that is at the same stroke still above the noise
 SQUARES = {"bias", "quadratic-nonlinearity", "cross-axis-bias", "z-axis-bias"}
+FEW, MANY = [90.0, 30.0, 150.0], [90.0, 30.0, 150.0, 60.0, 120.0, 45.0, 135.0, 75.0, 105.0]  # out of order, deg
+AS_IT_IS = 0.0  # s without power: the sensor stays on, and its warm-up goes on
 
 
 @dataclass(frozen=True)
 class Experiment:
-    """A procedure with settings, what it separates, and why it can."""
+    """A procedure with settings, what it separates, and why it can.
+
+    Of a known bench also the command line, how long it takes, and what it is expected to tell, where its data can be
+    foreseen.
+    """
 
     procedure: str
     settings: Mapping[str, object]
     separates: tuple[tuple[str, str], ...]
     why: str
+    command: str = ""
+    duration_s: float | None = None
+    expected: Expected | None = None
+
+
+def _of(procedure: str, why: str, **settings: object) -> Experiment:
+    return Experiment(procedure, settings, (), why)
+
+
+FINE = "full turns both ways at finely spaced inclinations, out of order, excite each of them differently"
+COARSE = "inclinations out of order: height does not follow time, and what depends on the angle returns with it"
+FACES = "mounted face down, an error of the sensor's axes turns with the sensor and one of the stage does not"
+LONGER = "longer dwells: the noise of each mean is half as large"
+LATER = "with the angles held, what still changes follows the time: an exponential comes to rest, a drift goes on"
+HELD = "in the oven the temperature is held, and what still changes follows the time"
+CYCLED = "the oven goes up and down again: what lags behind the temperature comes back another way, and time does not"
+TURNED_ROUND = "a level laid on the base shows the tilt of the base alone; an offset of alpha moves the table only"
+SHAKEN = "in a field of 1 g the squares of the three axes add up to a constant; motion along one axis does not"
+TWO_TONES = "a corner changes the size of an oscillation with its frequency, a delay only its phase"
+
+MENU = (
+    _of("sweep", COARSE, step_deg=30.0, inclinations_deg=FEW),
+    _of("sweep", COARSE, step_deg=20.0, inclinations_deg=MANY[:7]),
+    _of("sweep", FINE, step_deg=10.0, inclinations_deg=MANY),
+    _of("sweep", FACES, face="both", step_deg=45.0, inclinations_deg=FEW),
+    _of("sweep", FACES, face="both", step_deg=30.0, inclinations_deg=MANY[:7]),
+    _of("sweep", FACES, face="down", step_deg=45.0, inclinations_deg=FEW),
+    _of("sweep", LONGER, step_deg=30.0, inclinations_deg=FEW, dwell_s=20.0),
+    _of("soak", LATER, duration_s=1800.0, interval_s=300.0, off_s=AS_IT_IS),
+    _of("soak", LATER, duration_s=7200.0, interval_s=600.0, off_s=AS_IT_IS),
+    _of("soak", HELD, duration_s=3600.0, interval_s=600.0, off_s=AS_IT_IS, oven_c=WARM_C),
+    _of("temperature-cycle", CYCLED, temperatures_c=[35.0, 50.0], soak_s=1200.0),
+    _of("temperature-cycle", CYCLED),
+)
 
 
 def separating(best: Candidate) -> Experiment | None:
@@ -32,29 +77,24 @@ def separating(best: Candidate) -> Experiment | None:
     if not rivals:
         return None
     pairs = tuple((best.name, rival) for rival in rivals)
-    names = {best.name, *rivals}
+    procedure, settings, why = _by_physics({best.name, *rivals})
+    return Experiment(procedure, settings, pairs, why)
+
+
+def _by_physics(names: set[str]) -> tuple[str, dict[str, object], str]:
+    """Procedure, settings, and why they tell effects of these names apart."""
     if names <= SQUARES:
-        why = "in a field of 1 g the squares of the three axes add up to a constant; motion along one axis does not"
-        return Experiment("motion", {}, pairs, why)
+        return "motion", {}, SHAKEN
     if names <= DELAYS:
-        why = "a corner changes the size of an oscillation with its frequency, a delay only its phase"
-        return Experiment("motion", {"frequency_hz": TWO_HZ}, pairs, why)
+        return "motion", {"frequency_hz": TWO_HZ}, TWO_TONES
     if names <= TEMPERATURE:
-        why = "the oven goes up and down again: what lags behind the temperature comes back another way"
-        return Experiment("temperature-cycle", {}, pairs, why)
+        return "temperature-cycle", {"temperatures_c": [35.0, 50.0], "soak_s": 1200.0}, CYCLED
     if names <= TIME:
-        why = "over hours an exponential comes to rest, and a drift goes on"
-        return Experiment("soak", {}, pairs, why)
+        return "soak", {}, LATER
     if names <= TEMPERATURE | TIME:
-        why = "in the oven the temperature is held, and what still changes follows the time"
-        return Experiment("soak", {"oven_c": WARM_C}, pairs, why)
+        return "soak", {"oven_c": WARM_C}, HELD
     if names <= LEVELS:
-        why = "an offset of alpha and a tilt of the base turn gravity alike at every pose; a digital level tells them"
-        return Experiment("level-check", {}, pairs, why)
-    if names & {"axis-misalignment"} and names & {"stage-zero-offset", "base-tilt"}:
-        why = "mounted face down, an error of the sensor's axes turns with the sensor and one of the stage does not"
-        return Experiment("sweep", {"face": "both"}, pairs, why)
-    why = "full turns both ways at finely spaced inclinations, out of order, excite each of them differently"
-    return Experiment(
-        "sweep", {"step_deg": 10.0, "inclinations_deg": [90, 30, 150, 60, 120, 45, 135, 75, 105]}, pairs, why
-    )
+        return "level-check", {"on": "base"}, TURNED_ROUND
+    if names & {"axis-misalignment"} and names & LEVELS:
+        return "sweep", {"face": "both"}, FACES
+    return "sweep", {"step_deg": 10.0, "inclinations_deg": MANY}, FINE

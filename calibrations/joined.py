@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -42,7 +43,7 @@ def joined(tables: Sequence[Table]) -> Table:
 def clock_began_anew(tables: Sequence[Table]) -> bool:
     """Whether a table begins before the one before it ended."""
     spans = [(float(t.time_s.min()), float(t.time_s.max())) for t in tables if "t_s" in t]
-    return any(later[0] <= earlier[1] for earlier, later in zip(spans, spans[1:], strict=False))
+    return any(later[0] <= earlier[1] for earlier, later in pairwise(spans))
 
 
 def _common(tables: Sequence[Table]) -> list[str]:

@@ -25,11 +25,15 @@ def command(data: str, model: str | None, check: bool, bench_file: Path | None, 
     """Find the physical effect that a model misses on DATA (a file or a run)."""
     from calibrations.diagnose import diagnose
     from calibrations.documents import diagnosis_document
+    from rig.bench import read_bench
     from rig.cli.asked import asked, tell_blind
     from rig.cli.words import warning
+    from rig.next_experiment import proposed
 
     table, start, effects = asked(data, model, bench_file)
     result = diagnose(table, start, effects)
+    if result.next_experiment:
+        result = proposed(result, effects, read_bench(bench_file), bench_file)
     tell_blind(result.fit, effects)
     name = model or start.name
     if as_json:
@@ -42,6 +46,7 @@ def command(data: str, model: str | None, check: bool, bench_file: Path | None, 
 
 def _told(result: Diagnosis, data: str, model: str, bench: str) -> str:
     from calibrations.documents import why
+    from rig.cli.words import experiment
 
     lines = [f"{model} on {result.fit.table.n} rows of {result.fit.table.source}: {headline(result)}", ""]
     rows = [
@@ -62,7 +67,7 @@ def _told(result: Diagnosis, data: str, model: str, bench: str) -> str:
         lines += [f"{best.name}: {why(best, result)}", "", f"    {best.effect.formula.splitlines()[0]}", ""]
         lines.append(f"Add it: rig add {best.name} --model {model} --data {data} --out model.yaml{bench}")
     if result.next_experiment:
-        lines.append(f"To tell them apart: {result.next_experiment.why}.")
+        lines += experiment(result.next_experiment, data)
     return "\n".join(lines).rstrip()
 
 

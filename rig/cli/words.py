@@ -8,12 +8,14 @@ from pathlib import Path
 
 from calibrations.discover import Discovery
 from calibrations.errors import DataError
+from calibrations.expected import CERTAIN, Expected, told_apart
+from calibrations.experiment import Experiment
 from calibrations.fit import Fit
 from calibrations.held_out import held_out_excess
 from calibrations.model import Estimate, Model
 from calibrations.stepwise import stepwise
 from calibrations.table import Table
-from rig.cli.output import columns
+from rig.cli.output import columns, duration
 
 PREFIXES = ((1.0, ""), (1e3, "m"), (1e6, "u"))
 
@@ -91,7 +93,27 @@ def falling(result: Discovery) -> str:
 
 def _rivals(result: Discovery) -> list[str]:
     lines = [f"This data cannot tell {name} from {joined(rivals)}." for name, rivals in result.alternatives.items()]
-    return [*lines, f"To tell them apart: {result.next_experiment.why}."] if result.next_experiment else lines
+    return [*lines, *experiment(result.next_experiment, result.start.table.source)] if result.next_experiment else lines
+
+
+def experiment(e: Experiment, data: str) -> list[str]:
+    """Why the next experiment can tell, its command line, what it takes, and what it is expected to bring."""
+    lines = [f"To tell them apart: {e.why}."]
+    if e.command:
+        takes = [duration(e.duration_s)] if e.duration_s else []
+        lines += [f"    {e.command}", f"    {', '.join([*takes, _brings(e.expected, data)])}"]
+    return lines
+
+
+def _brings(expected: Expected | None, data: str) -> str:
+    """What an experiment is expected to tell, by its own data where they are enough."""
+    if expected is None:
+        return "what it will tell is not computed"
+    alone = told_apart(expected.alone) >= CERTAIN
+    value = expected.alone if alone else expected.together
+    judged = "by its own data" if alone else f"by both together: rig discover {data} ITS-RUN"
+    chance = min(100 * told_apart(value), 99.9)
+    return f"{math.sqrt(value):.3g} standard deviations apart, told with a probability of {chance:.3g} %, {judged}"
 
 
 def warning(caution: str | None) -> list[str]:

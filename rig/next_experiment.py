@@ -1,0 +1,172 @@
+"""Which experiment to run next: every one of the menu is planned on the bench, and its data are foreseen.
+
+The shortest is taken that will tell the explanations apart with certainty (95 %): what it would tell beyond that is
+worth no time. Where none is certain to, the one that brings most information per minute. What cannot be foreseen,
+as it gives no table of poses, is proposed by its physics alone, and nothing is said of what it brings.
+"""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from calibrations.diagnose import Diagnosis
+from calibrations.discover import Discovery
+from calibrations.effect import Effect
+from calibrations.errors import CalibrationError
+from calibrations.expected import CERTAIN, Expected, expected, told_apart
+from calibrations.experiment import MENU, Experiment
+from calibrations.fit import Fit, refit
+from calibrations.foreseen import foreseen
+from calibrations.table import Array, Table
+from drivers.errors import LimitError
+from procedures.catalogue import find
+from procedures.errors import ProcedureError
+from procedures.settings import parse
+from rig.bench import Bench
+from rig.errors import BenchError
+from rig.plan import Plan, plan
+
+PAUSE_S = 60.0  # from the end of the data to the beginning of the next run, at least
+OVEN_S = 1200.0  # in which an oven with what is in it comes near to its set point
+LEAST = 1.0  # of lambda, to be called information
+Answer = TypeVar("Answer", Diagnosis, Discovery)
+
+
+@dataclass(frozen=True)
+class Dispute:
+    """Explanations of the same data that it cannot tell apart: `best`, and the others by the effect that differs."""
+
+    best: Fit
+    rivals: Mapping[tuple[str, str], Fit]  # by (effect of the best, effect of the rival)
+    of_temperature: bool  # whether one of these effects depends on it
+
+    @classmethod
+    def of(cls, best: Fit, pairs: Iterable[tuple[str, str]], effects: Mapping[str, Effect]) -> Dispute:
+        """The best explanation, and it with each rival in its place. Raises what `refit` raises."""
+        rivals = {(a, b): refit(best, best.model.without(a).with_effect(effects[b])) for a, b in pairs}
+        return cls(best, rivals, any("temperature_c" in effects[name].needs for pair in rivals for name in pair))
+
+
+def proposed(result: Answer, effects: Mapping[str, Effect], bench: Bench, bench_file: Path | None) -> Answer:
+    """The answer with the next experiment chosen for the bench; the same where nothing is in dispute."""
+    e = result.next_experiment
+    if e is None:
+        return result
+    best = result.end if isinstance(result, Discovery) else result.path.steps[0].after
+    if {a for a, _ in e.separates} & set(result.path.start.model.effects):
+        return replace(result, next_experiment=_as_told(e, bench, bench_file))  # that frees a value, and adds none
+    return replace(result, next_experiment=chosen(Dispute.of(best, e.separates, effects), e, bench, bench_file))
+
+
+def planned_experiment(experiment: Experiment, bench: Bench, bench_file: Path | None) -> tuple[Experiment, Plan]:
+    """The experiment with its command line and its duration. Raises what `plan` raises where the bench cannot do it."""
+    procedure = find(experiment.procedure, bench.folders.procedures)
+    planned = plan(bench, procedure, parse(procedure, experiment.settings))
+    command = command_line(experiment, bench_file)
+    return replace(experiment, command=command, duration_s=round(planned.duration_s, 1)), planned
+
+
+def command_line(experiment: Experiment, bench_file: Path | None) -> str:
+    """What a person types to run it."""
+    words = ["rig", "run", experiment.procedure]
+    for name, value in experiment.settings.items():
+        words += [f"--{name.replace('_', '-')}", _text(value)]
+    return shlex.join([*words, *(["--bench", str(bench_file)] if bench_file else [])])
+
+
+def _text(value: object) -> str:
+    if isinstance(value, (list, tuple)):
+        return ",".join(map(_text, value))
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def chosen(dispute: Dispute, by_physics: Experiment, bench: Bench, bench_file: Path | None = None) -> Experiment:
+    """The next experiment for a dispute; one that the bench cannot do is not proposed, unless there is no other.
+
+    `by_physics` is what to do where nothing of the menu can tell; it then says what the bench lacks.
+    """
+    foreseeable = [e for e in (_foreseen(dispute, each, bench, bench_file) for each in MENU) if e is not None]
+    return best_of(foreseeable) or _as_told(by_physics, bench, bench_file)
+
+
+def best_of(experiments: Sequence[Experiment]) -> Experiment | None:
+    """The shortest that is certain, best with its own data alone; else the one that tells most per minute."""
+    for data in ("alone", "together"):
+        enough = [e for e in experiments if told_apart(getattr(e.expected, data)) >= CERTAIN]
+        if enough:
+            return min(enough, key=lambda e: (-len(e.separates), e.duration_s or 0.0))
+    telling = [e for e in experiments if _per_minute(e) > 0]
+    return max(telling, key=_per_minute, default=None)
+
+
+def _per_minute(e: Experiment) -> float:
+    """Lambda that a minute on the rig brings; 0 where there is as good as none."""
+    found = e.expected.together if e.expected else 0.0
+    return 60 * found / max(e.duration_s or 0.0, 1.0) if found > LEAST else 0.0
+
+
+def _foreseen(dispute: Dispute, e: Experiment, bench: Bench, bench_file: Path | None) -> Experiment | None:
+    """The experiment with what it will tell; None where the bench cannot do it, or its data cannot be foreseen.
+
+    Nobody knows the temperature of a room ahead: what depends on it is only foreseen in an oven.
+    """
+    try:
+        e, planned = planned_experiment(e, bench, bench_file)
+        planned_columns = columns(planned, dispute.best.table)
+        if dispute.of_temperature and "temperature_c" not in planned_columns:
+            return None
+        table = foreseen(dispute.best, planned_columns)
+        each = {pair: expected(dispute.best, rival, table) for pair, rival in dispute.rivals.items()}
+    except (LimitError, ProcedureError, BenchError, CalibrationError):
+        return None
+    told = {pair: each[pair] for pair in each if told_apart(each[pair].together) >= CERTAIN} or each
+    worst = Expected(min(x.alone for x in told.values()), min(x.together for x in told.values()))
+    return replace(e, separates=tuple(told), expected=worst)
+
+
+def _as_told(e: Experiment, bench: Bench, bench_file: Path | None) -> Experiment:
+    """Proposed by its physics; where the bench cannot do it, that is said too."""
+    try:
+        return planned_experiment(e, bench, bench_file)[0]
+    except (LimitError, ProcedureError, BenchError) as error:
+        return replace(e, command=command_line(e, bench_file), why=f"{e.why}; but not on this bench: {error}")
+
+
+def columns(planned: Plan, data: Table) -> dict[str, Array]:
+    """The columns of a planned run's poses: angles, side, mounting, time after `data`, temperature, length."""
+    poses = [held.pose for held in planned.held]
+    names = ("alpha_deg", "beta_deg", "direction", "mount_deg", "flip")
+    made = {name: np.array([getattr(pose, name) for pose in poses], dtype=float) for name in names}
+    dwell_s = np.array([_dwell_s(planned.settings, pose.path) for pose in poses])
+    since_s = np.array([held.start_s for held in planned.held]) + dwell_s / 2
+    made["t_s"] = float(data.time_s.max()) + PAUSE_S + since_s
+    if "temperature_c" in data and {"oven_c", "temperatures_c"} & {k for k, v in planned.settings.items() if v}:
+        last_c = float(data.column("temperature_c")[data.order[-1]])
+        made["temperature_c"] = _temperature_c(planned, last_c, since_s)
+    return made | ({"dwell_s": dwell_s} if "sample_rate_hz" in data.constants else {})
+
+
+def _dwell_s(settings: Mapping[str, Any], path: str) -> float:
+    """How long a pose is recorded: blocks of a hold, else dwells."""
+    return float(settings["block_s" if path.startswith("hold") and "block_s" in settings else "dwell_s"])
+
+
+def _temperature_c(planned: Plan, last_c: float, since_s: Array) -> Array:
+    """The sensor's temperature, from what it was last on its way to what the oven is set to (of first order)."""
+    now_c, at_s, course = last_c, 0.0, []
+    for held, t_s in zip(planned.held, since_s, strict=True):
+        now_c += (_oven_c(planned.settings, held.pose.path) - now_c) * -np.expm1(-(t_s - at_s) / OVEN_S)
+        at_s = t_s
+        course.append(now_c)
+    return np.array(course)
+
+
+def _oven_c(settings: Mapping[str, Any], path: str) -> float:
+    """The set point at a pose: that of a soak, or of the step of a cycle, which its path names."""
+    return float(settings["oven_c"] if "oven_c" in settings else path.split()[1])
