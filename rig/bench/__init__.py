@@ -7,6 +7,7 @@ parts.py   its parts: instruments, sensors, displacement sensor, certificates, f
 bench.py   the whole
 file.py    reading it, with the files that it names
 check.py   what its parts must be to each other
+values.py  values that cannot be
 faults.py  what is wrong with it, in words
 """
 

@@ -16,6 +16,7 @@ from rig.bench.bench import Bench
 from rig.bench.check import check
 from rig.bench.faults import told
 from rig.bench.parts import SIMULATED, TURNING, Folders, Instrument
+from rig.bench.values import check_values
 from rig.errors import BenchError
 
 DEFAULT = Path(__file__).with_name("default.yaml")
@@ -44,6 +45,7 @@ def _checked(document: dict[str, Any], path: Path) -> Bench:
     except ValidationError as error:
         raise BenchError(f"{path}, {told(error, Bench)}") from None
     check(bench, path)
+    check_values(bench, path)
     instruments = {role: _with_error_table(role, part, path) for role, part in bench.instruments.items()}
     return bench.model_copy(update={"instruments": instruments, "folders": _beside(bench.folders, path)})
 

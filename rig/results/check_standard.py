@@ -7,6 +7,7 @@ from rig.record.measured import Measured
 from rig.results.result import Result
 
 AXES = "xy"
+NAMES = ("bias-{axis}", "scale-{axis}")
 
 
 def evaluate(measured: Measured) -> dict[str, Result]:

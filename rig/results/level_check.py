@@ -9,6 +9,7 @@ from rig.record.measured import Measured
 from rig.results.result import Result
 
 OF_THE_BENCH = True
+NAMES = ("level-{axis}", "level-offset-{axis}")
 
 
 def evaluate(measured: Measured) -> dict[str, Result]:

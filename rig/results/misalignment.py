@@ -9,6 +9,11 @@ from rig.record.measured import Measured
 from rig.results.result import Result
 
 REFERENCE = "xyz"
+NAMES = (
+    *(f"theta-{axis}{reference}" for axis in "xy" for reference in REFERENCE),
+    *("alpha-{axis}", "beta-{axis}", "non-orthogonality", "rounds"),
+    *(f"correction-{row}{column}" for row in REFERENCE for column in REFERENCE),
+)
 
 
 def evaluate(measured: Measured) -> dict[str, Result]:

@@ -9,6 +9,8 @@ from procedures.motion import SWEEP
 from rig.record.measured import Measured
 from rig.results.result import Result
 
+NAMES = ("rmse-linear-x", "rmse-physical-x", "improvement-x", "noise-limit-x", "amplitude", "frequency")
+
 
 def evaluate(measured: Measured) -> dict[str, Result]:
     """rmse-linear-x, rmse-physical-x, noise-limit-x and amplitude in mm/s^2, improvement-x, frequency in Hz.

@@ -13,6 +13,7 @@ from rig.results.result import Result
 
 PEAK_TO_PEAK = 4  # x rms: Ang V
 UPRIGHT_DEG = {"x": (0.0, 180.0), "y": (90.0, 270.0)}  # beta at +1 g and at -1 g
+NAMES = ("noise-rms-{axis}", "noise-pp-{axis}", "inclination-{axis}")
 
 
 def evaluate(measured: Measured) -> dict[str, Result]:

@@ -8,6 +8,7 @@ from rig.record.measured import Measured
 from rig.results.result import Result
 
 AXES = "xy"
+NAMES = tuple(f"{quantity}-{kind}-{{axis}}" for quantity in ("bias", "scale") for kind in ("as-is", "power", "mount"))
 
 
 def evaluate(measured: Measured) -> dict[str, Result]:

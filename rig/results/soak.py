@@ -17,6 +17,11 @@ from rig.record.measured import Measured
 from rig.results.result import Result
 
 SEEN = 3  # reversals after the steady state before a soak is ended by it
+NAMES = (
+    *("steady-state", "steady-state-time", "steady-state-{axis}", "steady-state-time-{axis}"),
+    *("bias-drift-{axis}", "scale-drift-{axis}", "bias-tolerance-{axis}", "scale-tolerance-{axis}"),
+    *("time-constant-{axis}", "scale-time-constant-{axis}", "temperature-wander", "gap"),
+)
 
 
 def evaluate(measured: Measured) -> dict[str, Result]:

@@ -10,6 +10,7 @@ from rig.record.measured import Measured
 from rig.results.result import Result
 
 HOUR_S = 3600.0
+NAMES = ("reference-drift-{axis}",)
 
 
 def evaluate(measured: Measured) -> dict[str, Result]:

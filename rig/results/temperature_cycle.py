@@ -8,6 +8,10 @@ from rig.record.measured import Measured
 from rig.results.result import Result
 
 AXES = "xy"
+NAMES = (
+    *("bias-temperature-{axis}", "bias-temperature-hysteresis-{axis}"),
+    *("scale-temperature-{axis}", "scale-temperature-hysteresis-{axis}"),
+)
 
 
 def evaluate(measured: Measured) -> dict[str, Result]:

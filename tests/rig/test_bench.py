@@ -11,6 +11,7 @@ from drivers.links import Address
 from rig.bench import DEFAULT, Bench, drivers, read_bench
 from rig.errors import BenchError
 
+ONE_INPUT = {"vx": 1, "vy": 1}
 ALPHA = {"driver": "oriental_az", "url": "simulated"}
 
 
@@ -106,6 +107,21 @@ def test_every_driver_is_found_by_its_file() -> None:
             "key instruments.alpha.certificate.nummer: no such key. Did you mean 'number'?",
         ),
         ({"certificates": {"d63": {"number": 1, "due": "soon"}}}, "key certificates.d63.due: Input should be a valid"),
+        ({"sensor": {"gravity_m_s2": 98}}, "key sensor.gravity_m_s2: 98 m/s2 is the gravity of no laboratory"),
+        ({"sensor": {"filter_corner_hz": 0}}, "key sensor.filter_corner_hz: 0 Hz is no corner of a low-pass filter"),
+        ({"limits": {"temperature_c": [60, 20]}}, "key limits.temperature_c: [60, 20] is no range; give the lowest"),
+        ({"limits": {"overrun_deg": -1}}, "key limits.overrun_deg: -1 deg is no way to approach a pose"),
+        ({"limits": {"level_deg": 0}}, "key limits.level_deg: no table is within 0 deg"),
+        ({"limits": {"results": {"gap": [2, 1]}}}, "key limits.results.gap: [2, 1] is no range"),
+        ({"limits": {"results": {"gap": -1}}}, "key limits.results.gap: -1 is no magnitude"),
+        (
+            {"limits": {"results": {"noise-rsm-x": 0.001}}},
+            "key limits.results.noise-rsm-x: no procedure has such a result. Did you mean 'noise-rms-x'?",
+        ),
+        (
+            {"instruments": {"adc": {"driver": "labjack_t7", "url": "simulated", "settings": {"channels": ONE_INPUT}}}},
+            "key instruments.adc.settings.channels: vx and vy are both input 1; give each its own",
+        ),
         ({"world": {"sensr": {}}}, "'sensr' of the simulated world. Did you mean 'sensor'?"),
         ({"folders": {"effects": "nowhere"}}, "key folders.effects: there is no folder"),
         ("- a list", "a bench file is a mapping"),
@@ -120,6 +136,11 @@ def test_what_is_wrong_is_said_with_its_place(
         read_bench(path)
     assert str(error.value).startswith(str(path))
     assert said in str(error.value)
+
+
+def test_results_of_the_users_own_procedures_can_have_limits(bench_file: Callable[..., Path], tmp_path: Path) -> None:
+    path = bench_file({"limits": {"results": {"mass": 2.0}}, "folders": {"procedures": str(tmp_path)}})
+    assert read_bench(path).result_limits["mass"] == 2.0
 
 
 def test_a_misspelt_key_is_named_before_what_is_missing_for_it(bench_file: Callable[..., Path]) -> None:

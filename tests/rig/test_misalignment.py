@@ -17,6 +17,7 @@ from procedures.settings import parse
 from rig.bench import DEFAULT, Bench, read_bench
 from rig.plan import plan
 from rig.record import Record
+from rig.results.names import names
 from rig.runner import start
 from tests.rig.rigging import Onlooker
 
@@ -33,6 +34,7 @@ def test_known_axes_are_found_within_0_02_deg(rig: Rig, tmp_path: Path) -> None:
     file.write_text(yaml.safe_dump(document))
     ended = rig("run", "misalignment", "--dwell-s", "2", "--bench", str(file), "--unattended", "--json")
     results = json.loads(ended.out)["results"]
+    assert set(results) <= set(names())
     axes = {axis: np.array([results[f"theta-{axis}{r}"]["value"] for r in "xyz"]) for axis in "xy"}
     # the package is turned about x, y, z in turn; its y beam leans to its x beam
     a, b, c = np.radians([0.75, -1.3, 0.33])

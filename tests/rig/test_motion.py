@@ -27,6 +27,7 @@ from rig.cli.shaken import shaken_of
 from rig.plan import plan
 from rig.record import Kept, Record
 from rig.record.measured import Measured
+from rig.results.names import names
 from rig.runner import Outcome, resume, start
 from tests.rig.rigging import Onlooker
 
@@ -57,6 +58,7 @@ def test_the_physical_model_reaches_the_limit_that_noise_sets(seed: int, rig_hom
     with Record() as record:
         results = shaken(record, bench(PAPERS, seed), duration_s="30").run.results
     found = {name: result["value"] for name, result in results.items()}
+    assert set(found) <= set(names())
     assert found["rmse-linear-x"] == pytest.approx(300, abs=10)
     assert found["improvement-x"] >= 0.97
     assert found["rmse-physical-x"] <= 1.2 * found["noise-limit-x"]

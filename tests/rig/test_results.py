@@ -15,6 +15,7 @@ from rig.bench import DEFAULT
 from rig.record import Record
 from rig.record.measured import table_of
 from rig.results import Result, documents, returned
+from rig.results.names import names
 
 Rig = Callable[..., Any]
 
@@ -75,6 +76,7 @@ def test_the_noise_floor_is_that_of_the_world(rig: Rig, tmp_path: Path) -> None:
     hidden = np.degrees(np.arcsin(results["noise-pp-x"]["value"] / 1.0))
     assert results["inclination-x"]["value"] == pytest.approx(hidden, rel=0.05)
     assert {r["unit"] for r in results.values()} == {"V", "deg"}
+    assert set(results) <= set(names())
 
 
 @pytest.mark.sockets
@@ -96,6 +98,7 @@ def test_the_level_check_finds_the_tilt_and_not_the_offset(rig: Rig, tmp_path: P
     assert found == pytest.approx([0.1, 0.2], abs=0.02)
     assert all(results[f"level-{axis}"]["verdict"] == "pass" for axis in "xy")
     assert all(abs(results[f"level-offset-{axis}"]["value"]) < 0.1 for axis in "xy")
+    assert set(results) <= set(names())
 
 
 @pytest.mark.sockets

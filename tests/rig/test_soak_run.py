@@ -17,6 +17,7 @@ from procedures.soak import schedule
 from rig.bench import DEFAULT
 from rig.record import Record
 from rig.record.measured import Measured
+from rig.results.names import names
 from rig.results.soak import night
 from tests.rig.nursery import Harm, Nursery
 
@@ -44,6 +45,7 @@ def test_a_night_reaches_its_steady_state_after_hours_and_is_told_on_one_page(
     ended = rig("run", "soak", "--bench", cold, "--off-s", "36000", *NIGHT)
     document = json.loads(ended.out)
     found = document["results"]
+    assert set(found) <= set(names())
     assert (ended.status, document["state"]) == (0, "complete"), ended.err
     assert found["steady-state"]["verdict"] == found["steady-state-time"]["verdict"] == "pass"
     assert 2.0 < found["steady-state-time"]["value"] < 12.0
