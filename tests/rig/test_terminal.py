@@ -15,8 +15,9 @@ from tests.rig.rigging import POSES, SMALL_ARGUMENTS
 
 pytestmark = pytest.mark.sockets
 
-LONG = ("--step-deg", "5", "--dwell-s", "0.2", "--inclinations-deg", "90,45")  # 292 poses: time to press a key
-UNDER_WAY = r"deg.*[1-9]\d*/292 poses"
+LONG = ("--step-deg", "10", "--dwell-s", "0.2", "--inclinations-deg", "90,45")  # time to press a key
+LONG_POSES = 148
+UNDER_WAY = rf"deg.*[1-9]\d*/{LONG_POSES} poses"
 
 
 def at_terminal(*arguments: str) -> pexpect.spawn[str]:
@@ -87,7 +88,7 @@ def test_ctrl_c_stops_and_a_person_has_it_go_on(wish: str, excluded: list[str]) 
         terminal.expect("What now.*:")
         assert only_run()[0].state == "stopped"
         terminal.sendline(wish)
-        terminal.expect(f"complete, {292 + len(excluded)} poses")
+        terminal.expect(f"complete, {LONG_POSES + len(excluded)} poses", timeout=120)
         terminal.expect(pexpect.EOF)
     assert terminal.exitstatus == 0
     run, reasons = only_run()
@@ -114,7 +115,7 @@ def test_the_menu_ends_a_run_that_can_be_resumed(end: Callable[[pexpect.spawn[st
     assert terminal.exitstatus == 4
     run, _ = only_run()
     assert run.state == "stopped"
-    assert 0 < run.rows < 292
+    assert 0 < run.rows < LONG_POSES
 
 
 def test_sigterm_ends_a_guided_run_without_a_menu() -> None:
