@@ -6,6 +6,7 @@ RigError (2)             bad usage or bad input
 ├── RecordError          the record cannot be opened, or does not hold what is asked
 │   └── UnknownRun       no run of this name; names the nearest
 ├── Busy                 another process works on this run, or with this instrument
+├── BeyondLimits         what is planned would pass a limit of the bench
 ├── RunMismatch          the bench is not the one that the run was begun with
 ├── ExportError          a format that is not there, or does not fit the run
 └── OutputError          a file cannot be written where it is wanted
@@ -40,6 +41,10 @@ class UnknownRun(RecordError):
 
 class Busy(RigError):
     """Another process works on this run, or with this instrument."""
+
+
+class BeyondLimits(RigError):
+    """What is planned would pass a limit of the bench; a run of it would be refused or stopped."""
 
 
 class RunMismatch(RigError):

@@ -2,24 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import click
 
+from drivers.errors import LimitError
 from procedures.catalogue import Procedure, find
+from procedures.errors import SafetyLimit
 from procedures.pose_list import written
 from procedures.settings import parse
 from rig.bench import Bench, read_bench
 from rig.cli.output import bench_option, duration, emit, json_option, model_option, size
 from rig.cli.settings import PASS_ON, read_settings, settings_arguments
+from rig.errors import BeyondLimits
 from rig.plan import Plan, plan
 from rig.stretches import Stretch, stretches
 
 FEW_STEPS = 120  # that are read through rather than summed up
 HEAD, TAIL = 14, 4  # stretches of a long plan that are shown
+
+
+@contextmanager
+def _nothing_stopped() -> Iterator[None]:
+    """What a run would be stopped for is bad input here: a plan moves nothing."""
+    try:
+        yield
+    except (LimitError, SafetyLimit) as refused:
+        raise BeyondLimits(str(refused)) from None
 
 
 @click.command("plan", context_settings=PASS_ON)
@@ -33,6 +46,7 @@ HEAD, TAIL = 14, 4  # stretches of a long plan that are shown
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="Write the poses to this file.")
 @bench_option
 @json_option
+@_nothing_stopped()
 def command(
     procedure: str,
     given: tuple[str, ...],
