@@ -8,7 +8,8 @@ as it gives no table of poses, is proposed by its physics alone, and nothing is 
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -64,12 +65,26 @@ def proposed(result: Answer, effects: Mapping[str, Effect], bench: Bench, bench_
     return replace(result, next_experiment=chosen(Dispute.of(best, e.separates, effects), e, bench, bench_file))
 
 
+def possible(experiments: Iterable[Experiment], bench: Bench, within_s: float) -> Iterator[Experiment]:
+    """Those that the bench can do within a time."""
+    for e in experiments:
+        with suppress(LimitError, ProcedureError, BenchError):
+            if (planned_experiment(e, bench, None)[0].duration_s or 0.0) <= within_s:
+                yield e
+
+
 def planned_experiment(experiment: Experiment, bench: Bench, bench_file: Path | None) -> tuple[Experiment, Plan]:
     """The experiment with its command line and its duration. Raises what `plan` raises where the bench cannot do it."""
     procedure = find(experiment.procedure, bench.folders.procedures)
     planned = plan(bench, procedure, parse(procedure, experiment.settings))
     command = command_line(experiment, bench_file)
     return replace(experiment, command=command, duration_s=round(planned.duration_s, 1)), planned
+
+
+def gives_poses(e: Experiment, bench: Bench) -> bool:
+    """Whether its data are poses, which are judged together with those of a sweep. Raises as `plan` does."""
+    poses = planned_experiment(e, bench, None)[1].poses
+    return bool(poses) and find(e.procedure, bench.folders.procedures).kind == "poses"
 
 
 def command_line(experiment: Experiment, bench_file: Path | None) -> str:
@@ -86,18 +101,26 @@ def _text(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def chosen(dispute: Dispute, by_physics: Experiment, bench: Bench, bench_file: Path | None = None) -> Experiment:
+def chosen(
+    dispute: Dispute,
+    by_physics: Experiment,
+    bench: Bench,
+    bench_file: Path | None = None,
+    menu: Sequence[Experiment] = MENU,
+    judged: Sequence[str] = ("alone", "together"),
+) -> Experiment:
     """The next experiment for a dispute; one that the bench cannot do is not proposed, unless there is no other.
 
-    `by_physics` is what to do where nothing of the menu can tell; it then says what the bench lacks.
+    `by_physics` is what to do where nothing of the menu can tell; it then says what the bench lacks. `judged`: whether
+    its data will be judged alone or with those at hand, in order of preference.
     """
-    foreseeable = [e for e in (_foreseen(dispute, each, bench, bench_file) for each in MENU) if e is not None]
-    return best_of(foreseeable) or _as_told(by_physics, bench, bench_file)
+    foreseeable = [_foreseen(dispute, each, bench, bench_file) for each in menu]
+    return best_of([e for e in foreseeable if e is not None], judged) or _as_told(by_physics, bench, bench_file)
 
 
-def best_of(experiments: Sequence[Experiment]) -> Experiment | None:
-    """The shortest that is certain, best with its own data alone; else the one that tells most per minute."""
-    for data in ("alone", "together"):
+def best_of(experiments: Sequence[Experiment], judged: Sequence[str]) -> Experiment | None:
+    """The shortest that is certain to separate most pairs; else the one that tells most per minute."""
+    for data in judged:
         enough = [e for e in experiments if told_apart(getattr(e.expected, data)) >= CERTAIN]
         if enough:
             return min(enough, key=lambda e: (-len(e.separates), e.duration_s or 0.0))

@@ -26,6 +26,7 @@ from rig.certificates import EXPIRED, expired
 from rig.errors import RigError, RunMismatch, Stopped
 from rig.instruments import Rig, connected
 from rig.lease import lease
+from rig.onward import leave_as
 from rig.plan import Plan, plan
 from rig.record import Kept, Record, Run
 from rig.record.measured import Measured, of_sensor
@@ -68,18 +69,29 @@ class Outcome:
     moving: tuple[str, ...] = ()
 
 
-def start(record: Record, bench: Bench, procedure: Procedure, settings: Mapping[str, Any], watch: Watch) -> Outcome:
+def start(
+    record: Record,
+    bench: Bench,
+    procedure: Procedure,
+    settings: Mapping[str, Any],
+    watch: Watch,
+    after: str | None = None,
+) -> Outcome:
     """Run `procedure` from the beginning. Whatever is wrong before its first move leaves the record untouched.
+
+    A simulated bench begins anew, or goes on from where the run `after` left it, as a real one always does.
 
     Raises the errors of settings, plan and connection, Declined; an error of the run itself is in the outcome.
     """
     planned = plan(bench, procedure, settings)  # every move within its limits, or an error here
     with stoppable():
         watch.planned(planned)
-        return _as_wished(record, _begun(record, bench, procedure, settings, watch), watch)
+        return _as_wished(record, _begun(record, bench, procedure, settings, watch, after), watch)
 
 
-def _begun(record: Record, bench: Bench, procedure: Procedure, settings: Mapping[str, Any], watch: Watch) -> Outcome:
+def _begun(
+    record: Record, bench: Bench, procedure: Procedure, settings: Mapping[str, Any], watch: Watch, after: str | None
+) -> Outcome:
     with stoppable(), connected(bench) as rig:
         identities = {role: asdict(identity) for role, identity in rig.identities().items()}
         faults = expired(bench, datetime.now(UTC).date())
@@ -95,6 +107,8 @@ def _begun(record: Record, bench: Bench, procedure: Procedure, settings: Mapping
         )
         for fault in faults:
             record.note(run, EXPIRED, fault)
+        if after is not None:
+            leave_as(rig, record, after)
         with _held(record, run):
             return _carry_out(record, rig, record.run(run), procedure, watch)
 

@@ -43,7 +43,7 @@ def asked(
     Raises OutputError where `out` cannot be written, before anything is computed.
     """
     if out is not None:
-        _check_out(out, data, model, bench_file)
+        require_out(out, data, model, bench_file)
     effects = effects_of(bench_file)
     chosen = read_model(model, effects) if model is not None else None
     table = load(data, tell=note)
@@ -63,7 +63,7 @@ def _check_unit(model: Model, table: Table) -> None:
         )
 
 
-def _check_out(out: Path, *inputs: str | Path | None) -> None:
+def require_out(out: Path, *inputs: str | Path | None) -> None:
     """A result needs a folder, and takes the place of nothing that it was made from."""
     if not out.parent.is_dir():
         raise OutputError(f"{out}: there is no folder {out.parent}; make it, or name another file")

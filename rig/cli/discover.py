@@ -6,25 +6,64 @@ from pathlib import Path
 
 import click
 
-from rig.cli.output import bench_option, check_option, emit, json_option, model_option, notes
+from rig.cli.output import bench_option, check_option, emit, json_option, model_option, note, notes
+from rig.cli.watch import watch_options
 
 
 @click.command("discover")
-@click.argument("data")
+@click.argument("data", nargs=-1)
 @model_option
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="Write the final model to this file.")
+@click.option("--live", is_flag=True, help="Measure on the bench, and choose what to measure next.")
+@click.option("--time", "minutes", type=click.FloatRange(min=0, min_open=True), help="Rig time for --live, minutes.")
+@watch_options
 @check_option
 @bench_option
 @json_option
-def command(data: str, model: str | None, out: Path | None, check: bool, bench_file: Path | None, as_json: bool) -> int:
-    """Diagnose and add until nothing is missing on DATA (a file or a run)."""
+def command(
+    data: tuple[str, ...],
+    model: str | None,
+    out: Path | None,
+    live: bool,
+    minutes: float | None,
+    unattended: bool,
+    answers: Path | None,
+    check: bool,
+    bench_file: Path | None,
+    as_json: bool,
+) -> int:
+    """Diagnose and add until nothing is missing on DATA (a file or a run; several are judged together).
+
+    With --live there is no DATA: it is measured, little by little, until one explanation stands or the time is used up
+    (without --time: as long as the standard sweep takes).
+    """
+    if live:
+        from rig.cli.live import discover_live
+
+        if data:
+            raise click.UsageError("--live measures its own data; leave out DATA, or --live")
+        return discover_live(model, out, minutes, unattended, answers, check, bench_file, as_json)
+    if not data:
+        raise click.UsageError("name DATA (a file or a run), or --live to measure it")
+    return _discover(data, model, out, check, bench_file, as_json)
+
+
+def _discover(
+    data: tuple[str, ...], model: str | None, out: Path | None, check: bool, bench_file: Path | None, as_json: bool
+) -> int:
     from calibrations.discover import discover
     from calibrations.documents import discovery_document
+    from rig.bench import read_bench
     from rig.cli.asked import asked, write_model
     from rig.cli.words import discovery, parameters, warning
+    from rig.next_experiment import proposed
+    from rig.several import load_all
 
-    table, start, effects = asked(data, model, bench_file, out)
+    table, start, effects = asked(data[0], model, bench_file, out)
+    table = load_all(data, note) if len(data) > 1 else table
     result = discover(table, start, effects)
+    if result.next_experiment:
+        result = proposed(result, effects, read_bench(bench_file), bench_file)
     if out is not None:
         write_model(result.end, start, out)
     if as_json:
