@@ -62,6 +62,7 @@ MENU = (
     _of("sweep", FACES, face="both", step_deg=45.0, inclinations_deg=FEW),
     _of("sweep", FACES, face="both", step_deg=30.0, inclinations_deg=MANY[:7]),
     _of("sweep", FACES, face="down", step_deg=45.0, inclinations_deg=FEW),
+    _of("sweep", FACES, face="down", step_deg=90.0, inclinations_deg=[90.0, 45.0]),
     _of("sweep", LONGER, step_deg=30.0, inclinations_deg=FEW, dwell_s=20.0),
     _of("soak", LATER, duration_s=1800.0, interval_s=300.0, off_s=AS_IT_IS),
     _of("soak", LATER, duration_s=7200.0, interval_s=600.0, off_s=AS_IT_IS),
