@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from calibrations.identify import RELATIVE_RANK
 from calibrations.table import Array
 
-PROPOSALS = 15_000
-WARM_S, COLD_S = 3.0, 0.02  # rig time that is given away for a better order later: at the beginning, at the end
+PROPOSALS = 250  # for each pose
+WARM_S, COLD_S = 10.0, 0.05  # rig time that is given away for a better order later: at the beginning, at the end
 DEGREES = (1, 2)  # of time: what a drift may be
 Order = NDArray[np.intp]
 
@@ -99,7 +99,7 @@ def ordered(tour: Tour, seed: int = 0) -> Order:
     rng = np.random.default_rng(seed)
     present = best = _nearest_neighbours(tour)
     cost = least = tour.cost_s(present)
-    for warmth_s in np.geomspace(WARM_S, COLD_S, PROPOSALS):
+    for warmth_s in np.geomspace(WARM_S, COLD_S, PROPOSALS * len(present)):
         tried, most = _changed(present, rng), cost + warmth_s * rng.exponential()
         if tour.travel_s(tried) < most and (tried_cost := tour.cost_s(tried)) < most:
             present, cost = tried, tried_cost

@@ -10,7 +10,8 @@ from typing import Any
 from click import wrap_text
 
 from rig.cli.output import columns, duration
-from rig.optimal import AGAIN, CHECK, DESIGN, Judged, Optimal
+from rig.optimal import AGAIN, CHECK, DESIGN, Optimal, most_relative, relative
+from rig.sweep_range import Judged
 
 HEAD = ("", "standard sweep", "chosen, same dwell", "chosen, same error")
 
@@ -24,7 +25,7 @@ def lines(found: Optimal, out: str | None) -> Iterator[str]:
     yield ""
     yield f"{found.times_less:.1f} x less rig time at equal worst standard error: {_worst(found)}."
     yield f"{_times(found.times_less_for_all)} with no parameter less certain than after the sweep: {_longest(found)}."
-    if lost := [_name(found, k) for k, known in enumerate(found.determined) if not known]:
+    if lost := [_name(found, k) for k, known in enumerate(found.standard.told) if not known]:
         yield f"The standard sweep does not tell {', '.join(lost)}: left out of account."
     yield ""
     yield from map(wrap_text, _about(found))
@@ -61,8 +62,8 @@ def _rows(found: Optimal, plans: Sequence[Judged]) -> list[tuple[str, ...]]:
         ("poses", *(str(each.plan.poses) for each in plans)),
         ("dwell", *(f"{each.dwell_s:g} s" for each in plans)),
         ("rig time", *(duration(each.plan.duration_s) for each in plans)),
-        ("worst standard error", *(_percent(found.relative(each)) for each in plans)),
-        ("each error, at most", *(_percent(found.most_relative(each)) for each in plans)),
+        ("worst standard error", *(_percent(relative(found.standard, each)) for each in plans)),
+        ("each error, at most", *(_percent(most_relative(found.standard, each)) for each in plans)),
     ]
 
 
@@ -112,7 +113,7 @@ def _of_plan(found: Optimal, each: Judged) -> dict[str, Any]:
         "poses": each.plan.poses,
         "dwell_s": each.dwell_s,
         "duration_s": each.plan.duration_s,
-        "worst_error": found.relative(each),
+        "worst_error": relative(found.standard, each),
         "worst_parameter": _name(found, found.worst(each)),
         "errors": {_name(found, k): ratio if math.isfinite(ratio) else None for k, ratio in enumerate(ratios)},
     }

@@ -22,7 +22,9 @@ def command(data: str, model: str | None, out: Path | None, check: bool, bench_f
     from calibrations.determined import undetermined
     from calibrations.documents import fit_document
     from calibrations.fit import fit
+    from calibrations.unseen import unseen
     from rig.cli.asked import asked, tell_blind, write_model
+    from rig.cli.checked import document, lines
     from rig.cli.words import errors, paper, parameters, warning
 
     table, start, effects = asked(data, model, bench_file, out)
@@ -30,13 +32,14 @@ def command(data: str, model: str | None, out: Path | None, check: bool, bench_f
     if out is not None:
         write_model(found, start, out)
     tell_blind(found, effects)
-    caution = undetermined(found)
+    caution, checked = undetermined(found), unseen(start, table)
     if as_json:
-        emit(fit_document(found, str(out) if out else None))
+        emit(fit_document(found, str(out) if out else None) | document(checked))
         notes(warning(caution))
     else:
         click.echo(f"{found.model.name} fitted to {table.n} rows of {table.source}\n\n{parameters(found.model)}\n")
-        click.echo("\n".join([errors(found), *(f"\n{line}" for line in warning(caution))]))
+        told = [*warning(caution), *lines(checked, data)]
+        click.echo("\n".join([errors(found), *(f"\n{line}" for line in told)]))
         if "cross-axis-bias" in start.effects and table.kind == "poses":
             click.echo(f"\n{paper(table)}")
         if out is not None:
