@@ -16,6 +16,7 @@ from procedures.session import Dwell, Pose, Reading, Samples
 from rig.record.values import Block
 
 LEVEL_S = 1.0  # a reading of the level
+ROOM_C = 25.0
 EXCHANGE_S = 0.05  # what commands and polls add to a move or a record
 
 
@@ -107,10 +108,11 @@ class PlannedStage:
 
 
 class PlannedAdc:
-    """A converter that counts samples."""
+    """A converter that counts samples. The sensor is on, until it is switched."""
 
     def __init__(self, name: str, settings: AdcSettings, ledger: Ledger) -> None:
         self._name, self._settings, self._ledger = name, settings, ledger
+        self._power = True
 
     def acquire(self, duration_s: float) -> Samples:
         return next(self.stream(duration_s, duration_s))
@@ -129,29 +131,35 @@ class PlannedAdc:
     def power(self, on: bool) -> None:
         if self._settings.power_dio is None:
             raise LimitError(f"{self._name}: no line switches the power", "Set power_dio in the bench file")
-        self._ledger.add(f"{self._name} switches the sensor {'on' if on else 'off'}", EXCHANGE_S)
+        if on != self._power:
+            self._ledger.add(f"{self._name} switches the sensor {'on' if on else 'off'}", EXCHANGE_S)
+        self._power = on
 
 
 class PlannedOven:
-    """An oven that is at the temperature it was set to."""
+    """An oven that is at the temperature it was set to. It is off, until it is switched."""
 
     def __init__(self, name: str, settings: OvenSettings, ledger: Ledger) -> None:
         self._name, self._settings, self._ledger = name, settings, ledger
-        self._c = 25.0
+        self._set_c: float | None = None
+        self._on = False
 
     def temperature_c(self) -> float:
-        return self._c
+        return ROOM_C if self._set_c is None else self._set_c
 
     def set_temperature(self, c: float) -> None:
         low, high = self._settings.limits_c
         if not low <= c <= high:
             outside = f"{self._name}: {c:g} C is outside its limits {low:g} .. {high:g} C"
             raise LimitError(outside, "Choose another temperature, or change limits_c in the bench file")
-        self._ledger.add(f"{self._name} to {c:g} C", EXCHANGE_S)
-        self._c = c
+        if c != self._set_c:
+            self._ledger.add(f"{self._name} to {c:g} C", EXCHANGE_S)
+        self._set_c = c
 
     def run(self, on: bool) -> None:
-        self._ledger.add(f"{self._name} {'on' if on else 'off'}", EXCHANGE_S)
+        if on != self._on:
+            self._ledger.add(f"{self._name} {'on' if on else 'off'}", EXCHANGE_S)
+        self._on = on
 
 
 @dataclass(frozen=True)
@@ -218,9 +226,10 @@ def planned_answer(question: Question) -> str:
 
 @dataclass
 class PlanHost:
-    """The session's host that keeps nothing."""
+    """The session's host that keeps nothing but what was read: how the sensor is mounted is among it."""
 
     ledger: Ledger
+    read: dict[str, Reading] = field(default_factory=dict, kw_only=True)
 
     def kept(self) -> Sequence[Pose]:
         return ()
@@ -232,13 +241,13 @@ class PlanHost:
         return ()
 
     def readings(self) -> Sequence[Reading]:
-        return ()
+        return list(self.read.values())
 
     def keep(self, pose: Pose, samples: Samples, temperature_c: float | None) -> None:  # noqa: ARG002
         self.ledger.held.append(Held(samples.start_s, pose))
 
     def keep_readings(self, *readings: Reading) -> None:
-        """A plan reads nothing."""
+        self.read |= {reading.name: reading for reading in readings}
 
     def ask(self, question: Question) -> str:
         self.ledger.asked.append(question)

@@ -47,6 +47,14 @@ def test_what_is_done_besides_is_named_once_and_long_waits_are_added_up() -> Non
     assert found[0].words.endswith("8 poses  up 35 cycle 1")
 
 
+@pytest.mark.parametrize(("oven_c", "first"), [("0", ()), ("45", ("oven to 45 C", "oven on"))])
+def test_what_is_told_again_and_changes_nothing_is_no_step(oven_c: str, first: tuple[str, ...]) -> None:
+    cold, *others = stretches(planned("soak", duration_s="3600", block_s="60", oven_c=oven_c))
+    switched = ("adc switches the sensor off", "adc switches the sensor on")
+    assert cold.also == (*switched, *first, "waiting for 3600 s")
+    assert not any(stretch.also for stretch in others)
+
+
 def test_poses_that_are_counted_are_one_stretch() -> None:
     poses = [Pose(0, 0, 0, f"still {k}") for k in range(6)]
     held = tuple(Held(float(k), pose) for k, pose in enumerate(poses))
