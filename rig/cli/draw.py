@@ -10,6 +10,12 @@ import click
 from rig.cli.output import emit, json_option
 
 
+def _svg(context: click.Context, parameter: click.Parameter, out: Path | None) -> Path | None:  # noqa: ARG001
+    if out is not None and out.suffix.lower() != ".svg":
+        raise click.BadParameter(f"{out}: a drawing is an SVG file; name it {out.with_suffix('.svg').name}")
+    return out
+
+
 def _finite(context: click.Context, parameter: click.Parameter, deg: float) -> float:  # noqa: ARG001
     if not math.isfinite(deg):
         raise click.BadParameter(f"{deg:g} is no angle")
@@ -21,7 +27,12 @@ def _finite(context: click.Context, parameter: click.Parameter, deg: float) -> f
 @click.option("--beta", default=0.0, callback=_finite, metavar="DEG", help="Angle of beta, which turns the table.")
 @click.option("--mount", default=0.0, callback=_finite, metavar="DEG", help="Turn of the sensor about its z axis.")
 @click.option("--flip", default=0, type=click.IntRange(0, 1), help="1: the sensor is mounted face down.")
-@click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="Write the drawing to this SVG file.")
+@click.option(
+    "--out",
+    type=click.Path(dir_okay=False, path_type=Path),
+    callback=_svg,
+    help="Write the drawing to this file, FILE.svg.",
+)
 @json_option
 def command(alpha: float, beta: float, mount: float, flip: int, out: Path | None, as_json: bool) -> None:
     """Draw how the stages stand and how the sensor is mounted, and say what it feels there at rest.

@@ -120,6 +120,11 @@ def test_the_drawing_in_the_readme_is_todays() -> None:
 
 def test_what_cannot_be_drawn_is_refused(rig: Rig, tmp_path: Path) -> None:
     assert "nan is no angle" in rig("draw", "--alpha", "nan").err
+    for name in ("a.pdf", "a"):
+        ended = rig("draw", "--out", str(tmp_path / name))
+        assert (ended.status, ended.out) == (2, "")
+        assert "a drawing is an SVG file; name it a.svg" in ended.err
+        assert not (tmp_path / name).exists()
     ended = rig("draw", "--out", str(tmp_path / "no" / "such.svg"))
     assert (ended.status, ended.out) == (2, "")
     assert "name another file" in ended.err
