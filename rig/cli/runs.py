@@ -17,8 +17,8 @@ def command(as_json: bool) -> None:
     if as_json:
         emit({"schema": "rig.runs/1", "runs": [_document(run) for run in runs]})
     elif runs:
-        rows = [(run.run, run.state, run.kind, run.rows, run.source) for run in runs]
-        click.echo(columns(("run", "state", "kind", "rows", "source"), rows))
+        rows = [(run.run, run.state, run.kind, run.extent, run.source) for run in runs]
+        click.echo(columns(("run", "state", "kind", "holds", "source"), rows))
     else:
         click.echo("The record is empty. `rig run sweep` makes a first run, `rig import FILE` takes in a file.")
 

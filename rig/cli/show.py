@@ -61,7 +61,7 @@ def _pose(number: int, kept: Kept) -> dict[str, Any]:
 
 def _head(run: Run) -> list[str]:
     ended = f"{run.state} {run.ended or ''}".strip()
-    head = [f"{run.run}: {run.procedure}, {ended}, {run.rows} rows of {run.kind}", f"from {run.source}"]
+    head = [f"{run.run}: {run.procedure}, {ended}, {run.extent}, a table of {run.kind}", f"from {run.source}"]
     why = [run.message] if run.message else []
     why += [f"But {run.constants[EXPIRED]}."] if EXPIRED in run.constants else []
     return [*head, *why, *_settings(run.settings)]

@@ -106,7 +106,7 @@ def tell(record: Record, outcome: Outcome, as_json: bool) -> int:
     else:
         mark = [f"But {run.constants[EXPIRED]}."] if EXPIRED in run.constants else []
         after = next_steps(run, record.excluded(run.run))
-        click.echo("\n".join([f"{run.run}: {run.state}, {run.rows} poses", *results(run.results), *mark, *after]))
+        click.echo("\n".join([f"{run.run}: {run.state}, {run.extent}", *results(run.results), *mark, *after]))
     if outcome.error is not None:
         notes(outcome.moving)
         raise outcome.error

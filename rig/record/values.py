@@ -35,6 +35,13 @@ class Run:
     results: Mapping[str, Any]
     rows: int
 
+    @property
+    def extent(self) -> str:
+        """How much it holds, for people; a record without gaps is kept as many blocks."""
+        if not self.bench:
+            return f"{self.rows} rows"
+        return f"{self.rows} poses" if self.kind == "poses" else f"{self.rows} poses and blocks"
+
 
 @dataclass(frozen=True)
 class Block:

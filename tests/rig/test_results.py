@@ -86,6 +86,7 @@ def test_a_still_record_is_a_table_of_samples_in_time(rig: Rig) -> None:
         table = table_of(record, json.loads(ended.out)["run"])
     assert (table.kind, table.n) == ("still", 4000)
     assert np.allclose(np.diff(table.column("t_s")), 1e-3, atol=1e-9)
+    assert "8 poses and blocks" in rig("runs").out
 
 
 @pytest.mark.sockets
