@@ -1,7 +1,7 @@
 """The uncertainty budget of a fit: for each parameter what adds to its standard uncertainty, and how much (GUM).
 
-    type A   white noise of the means, scatter, slow noise: the fit's own covariance, G Sigma G^T, in its parts; and the
-             misfit, by which the Birge ratio widens it
+    type A   white noise of the means and scatter, G W G^T and G k^2 G^T; slow noise, the rest of what the fit's own
+             standard uncertainty holds; and the misfit, by which the Birge ratio widens it
     type B   inputs that are not fitted (`inputs.py`): u_i = |c_i| u(x_i), with c_i = G d residual / d x_i
 
 G is the gain of the fit, d theta = -G d residual: the pseudo-inverse of its jacobian under the noise it was found with.
@@ -100,10 +100,9 @@ def budget(found: Fit, inputs: Iterable[Contribution]) -> Budget:
     """The budget of a fit to poses or positions, from its own noise and from `inputs` that were not fitted."""
     cautious = cautiously(found)
     G = gains(cautious)
-    unknown = np.array([e.std is None for term in found.model.terms for e in term.estimates], dtype=bool)
     of_inputs = [_of_type_b(found, G, c) for c in inputs]
     own = _of_type_a(cautious, G, sum(seen for _, seen in of_inputs))
-    return Budget(tuple(_without(line, unknown) for line in [*own, *(line for line, _ in of_inputs)]))
+    return Budget((*own, *(line for line, _ in of_inputs)))
 
 
 def gains(found: Fit) -> Array:
@@ -121,11 +120,12 @@ def gains(found: Fit) -> Array:
 def _of_type_a(found: Fit, G: Array, seen: float) -> list[Line]:
     """The fit's own covariance, in its parts; what the inputs leave in the residual, `seen`, is no noise."""
     noise, rows = found.noise, found.residual.size - len(found.theta)
-    white = np.einsum("pcn,cn->p", G**2, noise.white**2)
-    scatter = np.einsum("pcn,c->p", G**2, noise.scatter**2)
-    everything = np.sum(gain(found.whitened[:, 1:], found.problem.layout.typical) ** 2, axis=1)
-    slow = np.maximum(everything - white - scatter, 0.0) if np.any(noise.slow > 0) else np.zeros_like(white)
-    misfit = (found.birge**2 - 1) * everything
+    stds = [e.std for term in found.model.terms for e in term.estimates]
+    everything = np.array([np.nan if std is None else std for std in stds]) ** 2
+    by_noise = everything / found.birge**2
+    white = np.minimum(np.einsum("pcn,cn->p", G**2, noise.white**2), by_noise)
+    scatter = np.minimum(np.einsum("pcn,c->p", G**2, noise.scatter**2), by_noise - white)
+    slow, misfit = by_noise - white - scatter, everything - by_noise
     beyond = float(np.sum(found.residual**2) - np.sum(noise.white**2))
     share = min(max(1 - seen / beyond, 0.0), 1.0) if seen and beyond > 0 else 1.0
     parts = [
@@ -134,7 +134,11 @@ def _of_type_a(found: Fit, G: Array, seen: float) -> list[Line]:
         ("slow noise", share * slow, slow_freedom(noise)),
         ("misfit of the model", share * misfit, float(rows)),
     ]
-    return [Line(name, "A", "", None, None, np.sqrt(v), freedom) for name, v, freedom in parts if np.any(v > 0)]
+    return [
+        Line(name, "A", "", None, None, np.sqrt(v), freedom)
+        for name, v, freedom in parts
+        if np.nanmax(v, initial=0.0) > 0
+    ]
 
 
 def _of_type_b(found: Fit, G: Array, c: Contribution) -> tuple[Line, float]:
@@ -174,11 +178,3 @@ def slow_freedom(noise: Noise) -> float:
             correlation = np.mean([np.exp(-apart_s / tau_s) for tau_s in taus_s], axis=0)
             freedom = min(freedom, len(time_s) ** 2 / float(np.sum(correlation**2)))
     return freedom
-
-
-def _without(line: Line, unknown: Array) -> Line:
-    """The line without entries that the data do not determine."""
-    if line.std is None:
-        return line
-    std = np.where(unknown, np.nan, line.std)
-    return Line(line.source, line.kind, line.unit, line.input_std, line.sensitivity, std, line.freedom)

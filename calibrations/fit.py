@@ -16,6 +16,7 @@ from scipy.optimize import least_squares
 from calibrations.identify import RELATIVE_RANK, estimates
 from calibrations.model import Model
 from calibrations.noise import Noise, rms, white_only
+from calibrations.noise_average import widening
 from calibrations.noise_fit import estimate
 from calibrations.problem import Problem
 from calibrations.table import Array, Table
@@ -169,7 +170,8 @@ def _result(problem: Problem, theta: Array, noise: Noise) -> Fit:
     found = Fit(model, problem, theta, noise, residual, jacobian)
     cautious = cautiously(found)
     informative = np.asarray(cautious.whitened[:, 1:] / cautious.birge)
-    return replace(found, model=estimates(model, problem.layout, theta, informative))
+    wider = widening(cautious.noise, residual, jacobian, problem.layout.typical)
+    return replace(found, model=estimates(model, problem.layout, theta, informative, wider))
 
 
 def cautiously(found: Fit) -> Fit:

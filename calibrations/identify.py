@@ -45,12 +45,12 @@ def _directions(jacobian: Array, typical: Array) -> tuple[Array, Array, Array]:
     return U[:, good], root, Vt[~good] / norm
 
 
-def estimates(model: Model, layout: Layout, theta: Array, jacobian: Array) -> Model:
-    """`model` with a value and a standard uncertainty for every parameter."""
+def estimates(model: Model, layout: Layout, theta: Array, jacobian: Array, wider: Array) -> Model:
+    """`model` with a value and a standard uncertainty for every parameter, `wider` by so many times than by noise."""
     if not len(theta):
         return model
     cov, null = covariance(jacobian, layout.typical)
-    std, free = np.sqrt(np.diag(cov)), null.T @ null
+    std, free = wider * np.sqrt(np.diag(cov)), null.T @ null
     found: list[list[Estimate]] = [[] for _ in model.terms]
     for k, slot in enumerate(layout.slots):
         why = _why_not(k, layout, std, free)

@@ -41,7 +41,7 @@ def estimate(start: Noise, residual: Array, jacobian: Array, smooth: Array) -> N
     noise = start
     rounding = 0.0 if start.known or not jacobian.size else EXACT * rms(jacobian.swapaxes(1, 2)).max(axis=1)
     for _ in range(ROUNDS):
-        best = _Search(noise, residual, (jacobian,), smooth).best()
+        best = Search(noise, residual, (jacobian,), smooth, grid(noise.gap_s)).best()
         variance = best.scale**2 * np.mean(noise.fast**2, axis=1) - np.mean(noise.white**2, axis=1)
         scatter = np.maximum(np.sqrt(np.maximum(variance, 0.0)), rounding)
         noise = replace(noise, scatter=scatter, ratio=best.ratio, taus_s=best.taus_s)
@@ -55,46 +55,53 @@ def gains(noise: Noise, residual: Array, jacobian: Array, extras: Sequence[Array
 
     Smooth columns are set aside: this is what each explains beside them. Gram matrices are made once for all.
     """
-    search = _Search(noise, residual, (jacobian, *extras), smooth)
+    search = Search(noise, residual, (jacobian, *extras), smooth, grid(noise.gap_s))
     without = search.best().deviance
     return [
         max(0.0, without - search.best(k).deviance) if k in search.beside[1] else 0.0 for k in range(1, len(extras) + 1)
     ]
 
 
+def grid(gap_s: Array) -> list[Point]:
+    """Slow noise to try on rows so far apart: none, one process, flicker."""
+    if not long_enough(gap_s):
+        return [NO_SLOW]
+    span, gap = float(np.sum(gap_s)), float(np.median(gap_s[1:]))
+    single = [(float(tau),) for tau in np.geomspace(3 * gap, span / 3, TIME_CONSTANTS)]
+    flicker = tuple(np.geomspace(gap / 2, span / 3, FLICKER_PROCESSES).tolist())
+    return [
+        NO_SLOW,
+        *((ratio, taus) for taus in single for ratio in RATIOS),
+        *((ratio, flicker) for ratio in FLICKER_RATIOS),
+    ]
+
+
+def long_enough(gap_s: Array) -> bool:
+    """Whether rows so far apart can tell slow noise from white."""
+    gap = float(np.median(gap_s[1:])) if len(gap_s) > 1 else 0.0
+    return len(gap_s) >= FEWEST_FOR_SLOW and gap > 0 and float(np.sum(gap_s)) >= 20 * gap
+
+
 @dataclass(frozen=True)
-class _Best:
+class Best:
     """The point of greatest likelihood: per channel ratio, time constants and the factor on all noise."""
 
     ratio: Array
     taus_s: tuple[tuple[float, ...], ...]
     scale: Array
     deviance: float
+    picks: tuple[int, ...]  # of the grid
 
 
 @dataclass(frozen=True)
-class _Search:
+class Search:
     """Likelihood over a grid of slow noise, for the first group of columns alone or with one of the others."""
 
     noise: Noise
     residual: Array
     groups: tuple[Array, ...]
     smooth: Array
-
-    @cached_property
-    def grid(self) -> list[Point]:
-        """Slow noise to try: none, one process, flicker."""
-        gap_s = self.noise.gap_s
-        n, span, gap = len(gap_s), float(np.sum(gap_s)), float(np.median(gap_s[1:]))
-        if n < FEWEST_FOR_SLOW or gap <= 0 or span < 20 * gap:
-            return [NO_SLOW]
-        single = [(float(tau),) for tau in np.geomspace(3 * gap, span / 3, TIME_CONSTANTS)]
-        flicker = tuple(np.geomspace(gap / 2, span / 3, FLICKER_PROCESSES).tolist())
-        return [
-            NO_SLOW,
-            *((ratio, taus) for taus in single for ratio in RATIOS),
-            *((ratio, flicker) for ratio in FLICKER_RATIOS),
-        ]
+    grid: list[Point]
 
     @cached_property
     def beside(self) -> tuple[Array, tuple[int, ...]]:
@@ -125,7 +132,7 @@ class _Search:
         return kept[:, first.shape[1] :]
 
     @cached_property
-    def grams(self) -> list[_Grams]:
+    def grams(self) -> list[Grams]:
         """Per channel, over the grid."""
         basis, _ = self.beside
         smooth = np.broadcast_to(self.smooth, (len(basis), *self.smooth.shape))
@@ -144,7 +151,7 @@ class _Search:
         flicker = int(np.argmin(np.where(flickers, score, np.inf)))
         return flicker if score[flicker] - score[best] < NOT_TOLD_APART else best
 
-    def best(self, group: int = 0) -> _Best:
+    def best(self, group: int = 0) -> Best:
         """The noise of greatest likelihood with the first group in the model, and another; channels in turn."""
         channels, n = self.residual.shape
         chosen = np.flatnonzero([origin in (0, group) for origin in self.beside[1]])
@@ -157,7 +164,7 @@ class _Search:
             before = list(pick)
             for c in range(channels):
                 others = (grams[d].gram[pick[d]] / scale[d] ** 2 for d in range(channels) if d != c)
-                score, scales = _scores(grams[c], sum(others, np.zeros((rank + 1, rank + 1))), free, float(least[c]))
+                score, scales = scores(grams[c], sum(others, np.zeros((rank + 1, rank + 1))), free, float(least[c]))
                 pick[c] = self._choose(score)
                 scale[c] = scales[pick[c]]
             if pick == before:
@@ -166,37 +173,38 @@ class _Search:
         total = sum((grams[c].gram[pick[c]] / scale[c] ** 2 for c in range(channels)), np.zeros((rank + 1, rank + 1)))
         theta = np.linalg.lstsq(total[:-1, :-1], total[:-1, -1], rcond=1e-10)[0]
         ratio, taus_s = zip(*(self.grid[k] for k in pick), strict=True)
-        return _Best(np.array(ratio), taus_s, scale, deviance + float(total[-1, -1] - total[:-1, -1] @ theta))
+        left = float(total[-1, -1] - total[:-1, -1] @ theta)
+        return Best(np.array(ratio), taus_s, scale, deviance + left, tuple(pick))
 
 
 @dataclass(frozen=True)
-class _Grams:
+class Grams:
     """One channel's [J r]^T Sigma^-1 [J r], (grid, p + 1, p + 1), smooth columns set aside, and determinants."""
 
     gram: Array
     logdet: Array  # of Sigma, (grid,)
     information: Array  # log det S^T Sigma^-1 S of the smooth columns, (grid,)
 
-    def of(self, columns: NDArray[np.intp]) -> _Grams:
+    def of(self, columns: NDArray[np.intp]) -> Grams:
         """The same with some of the columns, and the residual."""
         keep = np.append(columns, self.gram.shape[1] - 1)
         return replace(self, gram=self.gram[:, keep[:, None], keep])
 
 
-def _grams(gap_s: Array, fast: Array, columns: Array, grid: list[Point], k: int) -> _Grams:
+def _grams(gap_s: Array, fast: Array, columns: Array, grid: list[Point], k: int) -> Grams:
     """Gram matrices over the grid; the first `k` columns are set aside (Schur complement)."""
     w = float(rms(fast))
     made = [correlated(columns, gap_s, fast, ratio * w, taus) for ratio, taus in grid]
     gram = np.stack([out.T @ out for out, _ in made])
     logdet = np.array([logdet for _, logdet in made])
     if not k:
-        return _Grams(gram, logdet, np.zeros(len(grid)))
+        return Grams(gram, logdet, np.zeros(len(grid)))
     S, cross = gram[:, :k, :k], gram[:, :k, k:]
     reduced = gram[:, k:, k:] - np.swapaxes(cross, 1, 2) @ np.linalg.solve(S, cross)
-    return _Grams(reduced, logdet, np.linalg.slogdet(S)[1])
+    return Grams(reduced, logdet, np.linalg.slogdet(S)[1])
 
 
-def _scores(g: _Grams, rest: Array, free: int, least: float) -> tuple[Array, Array]:
+def scores(g: Grams, rest: Array, free: int, least: float) -> tuple[Array, Array]:
     """-2 log restricted likelihood up to a constant, and the factor on all noise (profiled), along the grid.
 
     `free` rows less smooth columns; the parameters that this channel bears, and not the others, are taken off here.
