@@ -11,9 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-
-from calibrations.candidates import SIGNIFICANT, Candidate
+from calibrations.candidates import Candidate
 from calibrations.determined import undetermined
 from calibrations.effect import Effect, catalogue
 from calibrations.experiment import Experiment, separating
@@ -21,12 +19,11 @@ from calibrations.fit import Fit
 from calibrations.held_out import held_out_excess
 from calibrations.model import Model
 from calibrations.path import MATERIAL, Path, find_path, share_left
-from calibrations.patterns import patterns
+from calibrations.patterns import Pattern
 from calibrations.plainer import plainer
-from calibrations.screen import Screen, Search
+from calibrations.structure import structure_of
 from calibrations.table import Table
 
-MOST_NOISE = 2.5  # times the noise floor: more than white and slow noise of a sensor alone
 MOST_LEFT = 1 / 5  # of the excess variance: more left than this, and the catalogue has not explained it
 
 
@@ -42,6 +39,7 @@ class Diagnosis:
     next_experiment: Experiment | None
     path: Path
     caution: str | None  # why the data do not even determine the model, where they do not
+    pattern: Pattern | None  # that of the structure
 
     @property
     def excess_before(self) -> float:
@@ -63,14 +61,15 @@ def diagnose(table: Table, model: Model, effects: Mapping[str, Effect] | None = 
         verdict=verdict,
         candidates=path.first or left,
         held_out_before=held_out_excess(path.start),
-        residual_structure=structure if verdict == "unexplained" else None,
+        residual_structure=structure.text if structure and verdict == "unexplained" else None,
         next_experiment=separating(path.first[0]) if verdict == "ambiguous" and path.steps else None,
         path=path,
         caution=caution,
+        pattern=structure if verdict == "unexplained" else None,
     )
 
 
-def _verdict_of(path: Path, structure: str | None, plainer_wins: bool) -> str:
+def _verdict_of(path: Path, structure: Pattern | None, plainer_wins: bool) -> str:
     """The verdict on the model at the start of `path`, given what is left at its end."""
     not_explained = plainer_wins or _share_left(path) > MOST_LEFT
     if structure is not None and not_explained and path.end.pooled_excess > MATERIAL:
@@ -83,26 +82,3 @@ def _verdict_of(path: Path, structure: str | None, plainer_wins: bool) -> str:
 def _share_left(path: Path) -> float:
     """Part of the excess variance that the path has not explained; 1 where it has not begun."""
     return share_left(path.start, path.end) if path.steps else 1.0
-
-
-def structure_of(fit: Fit) -> str | None:
-    """The plainest pattern in a fit's residual, in words; None where there is none beyond noise."""
-    screen = Screen(fit)
-    tried = [(p, screen.basis(p.columns)) for p in patterns(fit.table, fit.channels)]
-    tried = [(p, basis) for p, basis in tried if basis.shape[1]]
-    search = Search(screen, [basis for _, basis in tried])
-    price = np.log(fit.residual.size)
-    worth = search.statistics - price * search.ranks
-    if len(tried) and np.min(search.p_values) < SIGNIFICANT:
-        significant = np.where(search.p_values < SIGNIFICANT, worth, -np.inf)
-        return tried[int(np.argmax(significant))][0].text
-    return _patternless(fit)
-
-
-def _patternless(fit: Fit) -> str | None:
-    """More noise than a sensor makes by itself. On positions it is how well a hand repeats them, and no effect."""
-    if fit.table.kind == "positions" or not fit.noise.known or fit.pooled_excess <= MOST_NOISE:
-        return None
-    slow, scatter = (float(np.max(noise / fit.noise.floor)) for noise in (fit.noise.slow, fit.noise.scatter))
-    what = "slow drift" if slow > scatter else "scatter"
-    return f"{what} without a pattern, {max(slow, scatter):.1f} x the noise floor"

@@ -15,15 +15,17 @@ import numpy as np
 
 from calibrations.candidates import SIGNIFICANT, Candidate, candidates
 from calibrations.determined import undetermined
-from calibrations.diagnose import MOST_LEFT, structure_of
+from calibrations.diagnose import MOST_LEFT
 from calibrations.effect import Effect, catalogue
 from calibrations.experiment import Experiment, separating
 from calibrations.fit import Fit, fit, refit
 from calibrations.held_out import held_out_excess
 from calibrations.model import Model
 from calibrations.path import MATERIAL, Path, find_path, share_left
+from calibrations.patterns import Pattern
 from calibrations.plainer import plainer
 from calibrations.screen import chance
+from calibrations.structure import structure_of
 from calibrations.table import Table
 
 REFINEMENT = 0.02  # of the greatest cost: an effect that costs less to lose refines the form of another
@@ -61,6 +63,7 @@ class Discovery:
     residual_structure: str | None
     next_experiment: Experiment | None
     path: Path
+    pattern: Pattern | None = None  # that of the structure
 
     @property
     def end(self) -> Fit:
@@ -91,9 +94,10 @@ def add(effect: Effect, model: Model, table: Table, effects: Mapping[str, Effect
         causes=(effect.name,),
         refinements=(),
         alternatives={effect.name: rivals} if rivals else {},
-        residual_structure=structure if left else None,
+        residual_structure=structure.text if structure and left else None,
         next_experiment=None,
         path=Path(before, (), tuple(found)),
+        pattern=structure if left else None,
     )
 
 
@@ -104,8 +108,8 @@ def discover(table: Table, model: Model, effects: Mapping[str, Effect] | None = 
     better = plainer(path)
     structure = better or structure_of(path.end)
     left = path.end.pooled_excess > MATERIAL and structure is not None
-    if left and (not path.steps or better or share_left(path.start, path.end) > MOST_LEFT):
-        return Discovery(path.start, (), "unexplained", (), (), {}, structure, None, path)
+    if structure and left and (not path.steps or better or share_left(path.start, path.end) > MOST_LEFT):
+        return Discovery(path.start, (), "unexplained", (), (), {}, structure.text, None, path, structure)
     kept = _needed(path)
     steps = _in_order(path, kept, effects)
     new = [name for name in kept if name not in path.start.model.effects]
@@ -122,9 +126,10 @@ def discover(table: Table, model: Model, effects: Mapping[str, Effect] | None = 
         causes=causes,
         refinements=tuple(s.name for s in steps if s.name not in causes),
         alternatives=alternatives,
-        residual_structure=structure if left else None,
+        residual_structure=structure.text if structure and left else None,
         next_experiment=separating(ambiguous) if ambiguous else None,
         path=path,
+        pattern=structure if left else None,
     )
 
 

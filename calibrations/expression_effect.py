@@ -24,7 +24,7 @@ from calibrations.expression_variables import COLUMNS, FORCES, KNOWN, MEASURED, 
 from calibrations.expression_words import FUNCTIONS
 from calibrations.table import AXES, LARGEST, Array, Table
 
-NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
+NAME = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*")
 LONGEST_NAME = 60
 MOST_PARAMETERS = 12
 MISSPELT = 0.8  # likeness, as difflib has it, of a name of at least four letters to one that is known

@@ -1,13 +1,15 @@
-"""Patterns that a residual may show, whatever their cause: harmonics, steps, sectors, trends, outliers.
+"""Patterns that a residual may show, whatever their cause: harmonics, steps, ramps, sectors, trends.
 
 They are not effects: they explain nothing. They tell whether something is left that the catalogue does not hold,
-and describe it in words that a person can start from.
+describe it in words that a person can start from, and give the expression that takes it into a model.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -15,17 +17,43 @@ from calibrations.chain import nominal_pose, specific_force
 from calibrations.table import Array, Table
 
 HARMONICS = range(2, 13)
+OF_ALPHA = range(2, 7)
 STEPS = 40
+RAMPS = 12
 SECTORS = 24
 SECTOR_WIDTH_DEG = 30.0
+FINER_WIDTHS_DEG = (10.0, 15.0, 20.0, 25.0, 30.0, 40.0, 50.0, 60.0)
+LEVELS = 12  # of a column, that a step could be at
+NEIGHBOURS = 200  # of a step, at most, once it is found
+FEWEST_LEVELS = 12  # values of a column that has levels
 
 
 @dataclass(frozen=True)
 class Pattern:
-    """Columns, shape (channels, n, k), and what they mean."""
+    """Columns, shape (channels, n, k), and what they mean.
+
+    `expression` is what adds it to a model ("" where none could), `finer` gives patterns between it and its neighbours,
+    `choices` is twice the logarithm of how many there are of its kind, where it was chosen by the data.
+    """
 
     text: str
     columns: Array
+    expression: str = ""
+    finer: Callable[[], list[Pattern]] = list
+    choices: float = 0.0
+
+    @property
+    def name(self) -> str:
+        """Its words as the name of an effect."""
+        return re.sub(r"[^a-z0-9]+", "-", self.text.lower()).strip("-")
+
+
+# words for columns and their units, and their short names in expressions
+WORDS = {
+    "direction": ("direction of turning", "", "direction"),
+    "temperature_c": ("temperature", " C", "temperature"),
+    "supply_v": ("supply voltage", " V", "supply"),
+}
 
 
 def patterns(table: Table, channels: tuple[str, ...]) -> list[Pattern]:
@@ -35,10 +63,10 @@ def patterns(table: Table, channels: tuple[str, ...]) -> list[Pattern]:
         found += [*_in_angles(table), *_in_stage(table, len(channels))]
     if table.kind == "motion":
         found += _in_parts(table, channels)
-    return [_per_channel(p, len(channels)) for p in found if np.ptp(p.columns) > 0]
+    return [per_channel(p, len(channels)) for p in found if np.ptp(p.columns) > 0]
 
 
-def _per_channel(pattern: Pattern, channels: int) -> Pattern:
+def per_channel(pattern: Pattern, channels: int) -> Pattern:
     """Columns given as (n, k) serve each channel on its own."""
     if pattern.columns.ndim == 3:
         return pattern
@@ -46,30 +74,86 @@ def _per_channel(pattern: Pattern, channels: int) -> Pattern:
     columns = np.zeros((channels, n, k * channels))
     for c in range(channels):
         columns[c, :, c * k : (c + 1) * k] = pattern.columns
-    return Pattern(pattern.text, columns)
+    return replace(pattern, columns=columns)
+
+
+def one_sided(pattern: Pattern, table: Table) -> list[Pattern]:
+    """The same on approaches from one side only, where both are in the table."""
+    if "direction" in pattern.text or pattern.choices:
+        return []
+    direction = table.optional("direction", 0.0)
+    sides = {"clockwise": ">", "anticlockwise": "<"} if np.ptp(direction) > 0 else {}
+    found = []
+    for word, sign in sides.items():
+        rows = direction > 0 if sign == ">" else direction < 0
+        target, plus, of = pattern.expression.rpartition("+= ")
+        expression = f"{target}{plus}(direction {sign} 0)*({of})" if of else ""
+        columns = pattern.columns * rows[None, :, None]
+        found.append(Pattern(f"{pattern.text}, turning {word} only", columns, expression))
+    return found
 
 
 def _in_time(table: Table) -> Iterator[Pattern]:
-    t = table.time_s
-    named = "t_s" in table
-    where = "t = {:.0f} s" if named else "row {:.0f}"
-    u = (t - t.mean()) / (np.ptp(t) or 1.0)
-    yield Pattern("trend with time", np.column_stack([u, u**2]))
+    t, named = table.time_s, "t_s" in table
+    u: Array = (t - t.mean()) / (float(np.ptp(t)) or 1.0)
+    yield Pattern("trend with time", np.column_stack([u, u**2]), "a*t + b*t**2" if named else "")
     inner = np.unique(np.linspace(2, table.n - 3, min(STEPS, max(table.n - 4, 1))).astype(int))
-    for k in inner:
-        yield Pattern(f"step at {where.format((t[k - 1] + t[k]) / 2)}", (np.arange(table.n) >= k)[:, None] * 1.0)
+    for k, near in zip(inner, _between(inner, table.n), strict=True):
+        yield replace(_step(table, k), finer=partial(_steps, table, near))
+    if named:
+        for start in np.quantile(t, np.linspace(0, 1, RAMPS + 2)[1:-1]):
+            text, expression = f"ramp from t = {start:.0f} s on", f"a*max(0, t - {start:.6g})"
+            since: Array = np.maximum(0.0, t - start) / (float(np.ptp(t)) or 1.0)
+            yield Pattern(text, since[:, None], expression)
+
+
+def _between(places: Array, n: int) -> list[Array]:
+    """For each of the places in a row of n the rows up to its neighbours."""
+    edges = np.concatenate([[1], places, [n - 1]])
+    rows = [np.arange(a, b + 1) for a, b in zip(edges[:-2], edges[2:], strict=True)]
+    return [each[:: 1 + len(each) // NEIGHBOURS] for each in rows]
+
+
+def _steps(table: Table, rows: Array) -> list[Pattern]:
+    return [_step(table, k) for k in rows]
+
+
+def _step(table: Table, k: int) -> Pattern:
+    """Before row k, and from it on."""
+    at = (table.time_s[k - 1] + table.time_s[k]) / 2
+    named = "t_s" in table
+    text = f"step at t = {at:.0f} s" if named else f"step at row {at:.0f}"
+    return Pattern(text, (np.arange(table.n) >= k)[:, None] * 1.0, f"a*step(t - {at:.7g})" if named else "")
 
 
 def _in_columns(table: Table) -> Iterator[Pattern]:
-    words = {"direction": "direction of turning", "temperature_c": "temperature", "supply_v": "supply voltage"}
     skip = {"alpha_deg", "beta_deg", "t_s", "n", "flip", "mount_deg", *("ax", "ay", "az", "vx_v", "vy_v", "vz_v")}
     skip.add("displacement_m")
     for name, values in table.columns.items():
         if name in skip or name.endswith(("_std", "_std_v")) or not np.ptp(values):
             continue
-        u = (values - values.mean()) / np.ptp(values)
-        powers = [u, u**2] if len(np.unique(values)) > 3 else [u]
-        yield Pattern(f"follows {words.get(name, name)}", np.column_stack(powers))
+        words, unit, short = WORDS.get(name, (name, "", name))
+        short = short if short.isidentifier() else ""
+        u, levels = (values - values.mean()) / np.ptp(values), np.unique(values)
+        curved = len(levels) > 3
+        expression = (f"a*{short} + b*{short}**2" if curved else f"a*{short}") if short else ""
+        yield Pattern(f"follows {words}", np.column_stack([u, u**2]) if curved else u[:, None], expression)
+        if len(levels) >= FEWEST_LEVELS:
+            places = np.unique(np.linspace(2, len(levels) - 3, LEVELS).astype(int))
+            for k, near in zip(places, _between(places, len(levels)), strict=True):
+                levelled = partial(_level, values, levels, (words, unit, short))
+                yield replace(levelled(k), finer=partial(_levels, levelled, near))
+
+
+def _levels(levelled: Callable[[int], Pattern], places: Array) -> list[Pattern]:
+    return [levelled(k) for k in places]
+
+
+def _level(values: Array, levels: Array, words: tuple[str, str, str], k: int) -> Pattern:
+    """Below a level of a column, and above it."""
+    (word, unit, short), at = words, (levels[k - 1] + levels[k]) / 2
+    expression = f"a*step({short} - {at:.7g})" if short else ""
+    return Pattern(f"step at {word} = {at:.4g}{unit}", (values >= at)[:, None] * 1.0, expression)
 
 
 def _in_parts(table: Table, channels: tuple[str, ...]) -> Iterator[Pattern]:
@@ -81,28 +165,56 @@ def _in_parts(table: Table, channels: tuple[str, ...]) -> Iterator[Pattern]:
 def _in_angles(table: Table) -> Iterator[Pattern]:
     beta = np.radians(table.column("beta_deg"))
     for k in HARMONICS:
-        yield Pattern(f"{_ordinal(k)} harmonic of beta", np.column_stack([np.cos(k * beta), np.sin(k * beta)]))
-    turn = np.degrees(beta) % 360
+        yield Pattern(f"{_ordinal(k)} harmonic of beta", _waves(k * beta), _harmonic(k, "beta"))
     for centre in np.arange(SECTORS) * 360 / SECTORS:
-        away = np.abs((turn - centre + 180) % 360 - 180)
-        bump = np.maximum(0.0, 1 - away / SECTOR_WIDTH_DEG)
-        yield Pattern(f"sector of beta around {centre:.0f} deg", bump[:, None])
+        yield replace(_sector(beta, centre, SECTOR_WIDTH_DEG), finer=partial(_sectors, beta, centre))
     alpha = table.column("alpha_deg")
     values = np.unique(alpha)
+    for k in OF_ALPHA:
+        if len(values) > 2 * k:
+            yield Pattern(f"{_ordinal(k)} harmonic of alpha", _waves(k * np.radians(alpha)), _harmonic(k, "alpha"))
     if 1 < len(values) <= 40:
         for value in values:
-            yield Pattern(f"inclination alpha = {value:g} deg", (alpha == value)[:, None] * 1.0)
+            expression = f"a*(abs(alpha_deg - {value:.6g}) < {_half_gap(values):.2g})"
+            yield Pattern(f"inclination alpha = {value:g} deg", (alpha == value)[:, None] * 1.0, expression)
+
+
+def _half_gap(values: Array) -> float:
+    return float(np.min(np.diff(values))) / 2
+
+
+def _sectors(beta: Array, centre: float) -> list[Pattern]:
+    step = 360 / SECTORS
+    middles = centre + np.linspace(-step, step, 13)
+    return [_sector(beta, middle, width) for middle in middles for width in FINER_WIDTHS_DEG]
+
+
+def _sector(beta: Array, centre_deg: float, width_deg: float) -> Pattern:
+    """A bump, 1 in the middle of the sector and 0 outside."""
+    centre, edge = np.radians(centre_deg), np.cos(np.radians(width_deg))
+    bump = np.maximum(0.0, np.cos(beta - centre) - edge) / (1 - edge)
+    expression = f"a*max(0, cos(beta - {centre % (2 * np.pi):.4g}) - {edge:.4g})"
+    return Pattern(f"sector of beta around {centre_deg % 360:.0f} deg", bump[:, None], expression)
 
 
 def _in_stage(table: Table, channels: int) -> Iterator[Pattern]:
-    """An error of the stage angle beta turns all axes alike."""
-    a = specific_force(nominal_pose(table))
-    side = np.where(table.optional("flip", 0.0) > 0, -1.0, 1.0)
-    turned = np.stack([-a[:, 1] * side, a[:, 0] * side, np.zeros(table.n)])[:channels]
-    beta = np.radians(table.column("beta_deg"))
-    for k in HARMONICS:
-        waves = np.column_stack([np.cos(k * beta), np.sin(k * beta)])
-        yield Pattern(f"{_ordinal(k)} harmonic of the stage angle beta", turned[:, :, None] * waves[None])
+    """An error of a stage angle turns gravity in the sensor, so that all axes err together."""
+    for angle, numbers in (("beta", HARMONICS), ("alpha", OF_ALPHA)):
+        pose, degrees = nominal_pose(table), table.column(f"{angle}_deg")
+        turned = replace(pose, **{angle: getattr(pose, angle) + 1e-6})
+        felt = ((specific_force(turned) - specific_force(pose)) / 1e-6).T[:channels, :, None]
+        for k in numbers:
+            if len(np.unique(degrees)) > 2 * k:
+                text, waves = f"{_ordinal(k)} harmonic of the stage angle {angle}", _waves(k * np.radians(degrees))
+                yield Pattern(text, felt * waves[None], f"{angle}_deg += {_harmonic(k, angle)}")
+
+
+def _waves(turned: Array) -> Array:
+    return np.column_stack([np.cos(turned), np.sin(turned)])
+
+
+def _harmonic(k: int, angle: str) -> str:
+    return f"a*sin({k}*{angle}) + b*cos({k}*{angle})"
 
 
 def _ordinal(k: int) -> str:

@@ -1,0 +1,105 @@
+"""What a residual shows, in words: the plainest pattern, the poses that stand out, or more noise than a sensor has.
+
+A pattern is found under the fitted noise, and compared with others by likelihood under the noise without its slow part,
+which would take up steps and ramps alike. The best few are sharpened before: which row a step is at, how wide a sector,
+whether from one side only. Poses that stand out compete with them, and pay for each pose and for the choice of it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import gammaln
+from scipy.stats import norm
+
+from calibrations.candidates import SIGNIFICANT
+from calibrations.fit import Fit
+from calibrations.patterns import Pattern, one_sided, patterns, per_channel
+from calibrations.screen import Screen, Search
+from calibrations.table import Array
+
+MOST_NOISE = 2.5  # times the noise floor: more than white and slow noise of a sensor alone
+MOST_OUT = 1 / 10  # of the poses: more do not stand out
+FINALISTS = 6  # patterns that are sharpened
+NAMED = 6  # poses that are told one by one
+SURER = 10.0  # of twice the log-likelihood, for one side rather than both: odds of 150 to 1
+
+
+def structure_of(fit: Fit) -> Pattern | None:
+    """The plainest pattern in a fit's residual; None where there is none beyond noise."""
+    screen = Screen(without_slow(fit))
+    found = sorted(_significant(Screen(fit)), key=lambda p: worth(p, screen), reverse=True)[:FINALISTS]
+    sharp = [sharpened(pattern, screen) for pattern in (*found, *_out(fit))]
+    return max(sharp, key=lambda p: worth(p, screen), default=None) or _patternless(fit)
+
+
+def without_slow(fit: Fit) -> Fit:
+    """The fit with the slow part of its noise left out."""
+    return replace(fit, noise=replace(fit.noise, ratio=np.zeros_like(fit.noise.ratio)))
+
+
+def worth(pattern: Pattern, screen: Screen) -> float:
+    """Twice the log-likelihood with the pattern less the price of its parameters, up to a constant."""
+    basis = screen.basis(pattern.columns)
+    left = float(screen.residual @ screen.residual) - screen.statistic(basis)
+    return likelihood(left, basis.shape[1], screen.fit) - pattern.choices
+
+
+def likelihood(squares: float, parameters: int, fit: Fit) -> float:
+    """Twice the log-likelihood of a sum of whitened squares, less log(rows) for each parameter (Schwarz)."""
+    rows = fit.residual.size
+    return -rows * float(np.log(max(squares, 1e-300) / rows)) - parameters * float(np.log(rows))
+
+
+def _significant(screen: Screen) -> list[Pattern]:
+    """The patterns that noise alone would hardly show."""
+    tried = [(p, screen.basis(p.columns)) for p in patterns(screen.fit.table, screen.fit.channels)]
+    tried = [(p, basis) for p, basis in tried if basis.shape[1]]
+    chances = Search(screen, [basis for _, basis in tried]).p_values
+    return [p for (p, _), chance in zip(tried, chances, strict=True) if chance < SIGNIFICANT]
+
+
+def sharpened(pattern: Pattern, screen: Screen) -> Pattern:
+    """The best of the pattern and those between it and its neighbours, on both sides or on one."""
+    table, channels = screen.fit.table, len(screen.fit.channels)
+    near = [pattern, *(per_channel(p, channels) for p in pattern.finer() if np.ptp(p.columns) > 0)]
+    best = max(near, key=lambda p: screen.statistic(screen.basis(p.columns)))
+    side = max(one_sided(best, table), key=lambda p: worth(p, screen), default=best)
+    return side if worth(side, screen) > worth(best, screen) + SURER else best
+
+
+def _out(fit: Fit) -> list[Pattern]:
+    """The poses that stand out; none where there are none, or too many."""
+    rows, n = standing_out(fit.residual), fit.table.n
+    if fit.table.kind == "motion" or not 0 < len(rows) <= max(1, MOST_OUT * n):
+        return []
+    columns = per_channel(Pattern("", np.eye(n)[:, rows]), len(fit.channels)).columns
+    choices = gammaln(n + 1) - gammaln(len(rows) + 1) - gammaln(n - len(rows) + 1)
+    return [Pattern(_named(fit, rows), columns, choices=2 * float(choices))]
+
+
+def standing_out(residual: Array) -> NDArray[np.intp]:
+    """Rows whose residual (channels, n) is too large to be noise of the others' spread, by medians."""
+    middle = np.median(residual, axis=1, keepdims=True)
+    spread = 1.4826 * np.median(np.abs(residual - middle), axis=1, keepdims=True)
+    most = norm.isf(SIGNIFICANT / 2 / residual.size)
+    return np.flatnonzero(np.any(np.abs(residual - middle) > most * spread, axis=0))
+
+
+def _named(fit: Fit, rows: NDArray[np.intp]) -> str:
+    """Poses by their number, as `rig show RUN --poses` counts them: in order of time, from 0."""
+    listed = ", ".join(f"#{row}" for row in rows[:NAMED])
+    more = f" and {len(rows) - NAMED} more" if len(rows) > NAMED else ""
+    what = fit.table.kind if len(rows) > 1 else fit.table.kind.removesuffix("s")
+    return f"{len(rows)} {what} stand{'s' if len(rows) == 1 else ''} out: {listed}{more}"
+
+
+def _patternless(fit: Fit) -> Pattern | None:
+    """More noise than a sensor makes by itself. On positions it is how well a hand repeats them, and no effect."""
+    if fit.table.kind == "positions" or not fit.noise.known or fit.pooled_excess <= MOST_NOISE:
+        return None
+    slow, scatter = (float(np.max(noise / fit.noise.floor)) for noise in (fit.noise.slow, fit.noise.scatter))
+    what = "slow drift" if slow > scatter else "scatter"
+    return Pattern(f"{what} without a pattern, {max(slow, scatter):.1f} x the noise floor", np.zeros((0, 0, 0)))
