@@ -21,6 +21,7 @@ from calibrations.model import Model
 from calibrations.path import MATERIAL, Path, find_path, share_left
 from calibrations.patterns import Pattern
 from calibrations.plainer import plainer
+from calibrations.settle import settled
 from calibrations.structure import structure_of
 from calibrations.table import Table
 
@@ -49,17 +50,20 @@ class Diagnosis:
 
 def diagnose(table: Table, model: Model, effects: Mapping[str, Effect] | None = None) -> Diagnosis:
     """Fit `model` to `table` and find what it misses. Raises what `fit` raises."""
-    path = find_path(model, table, catalogue() if effects is None else effects, enough=MOST_LEFT)
-    better = plainer(path)
-    structure = better or structure_of(path.end)
-    left = path.left
-    verdict, caution = _verdict_of(path, structure, better is not None), undetermined(path.start)
+    effects = catalogue() if effects is None else effects
+    path = find_path(model, table, effects, enough=MOST_LEFT)
+    end = path.end
+    if path.steps and share_left(path.start, end) > MOST_LEFT:
+        end = settled(path, effects).end
+    better = plainer(path.start, end)
+    structure = better or structure_of(end)
+    verdict, caution = _verdict_of(path, end, structure, better is not None), undetermined(path.start)
     if verdict == "adequate" and caution:
         verdict = "ambiguous"
     return Diagnosis(
         fit=path.start,
         verdict=verdict,
-        candidates=path.first or left,
+        candidates=path.first,
         held_out_before=held_out_excess(path.start),
         residual_structure=structure.text if structure and verdict == "unexplained" else None,
         next_experiment=separating(path.first[0]) if verdict == "ambiguous" and path.steps else None,
@@ -69,16 +73,11 @@ def diagnose(table: Table, model: Model, effects: Mapping[str, Effect] | None = 
     )
 
 
-def _verdict_of(path: Path, structure: Pattern | None, plainer_wins: bool) -> str:
-    """The verdict on the model at the start of `path`, given what is left at its end."""
-    not_explained = plainer_wins or _share_left(path) > MOST_LEFT
-    if structure is not None and not_explained and path.end.pooled_excess > MATERIAL:
+def _verdict_of(path: Path, end: Fit, structure: Pattern | None, plainer_wins: bool) -> str:
+    """The verdict on the model at the start of `path`, given what is left when its effects have settled."""
+    not_explained = plainer_wins or not path.steps or share_left(path.start, end) > MOST_LEFT
+    if structure is not None and not_explained and end.pooled_excess > MATERIAL:
         return "unexplained"
     if not path.steps:
         return "adequate"
     return "ambiguous" if path.steps[0].taken.indistinguishable_from else "effect-missing"
-
-
-def _share_left(path: Path) -> float:
-    """Part of the excess variance that the path has not explained; 1 where it has not begun."""
-    return share_left(path.start, path.end) if path.steps else 1.0

@@ -82,6 +82,11 @@ def long_enough(gap_s: Array) -> bool:
     return len(gap_s) >= FEWEST_FOR_SLOW and gap > 0 and float(np.sum(gap_s)) >= 20 * gap
 
 
+def deviance(noise: Noise, residual: Array, jacobian: Array, smooth: Array) -> float:
+    """-2 log restricted likelihood up to a constant of the data, under the noise of greatest likelihood."""
+    return Search(noise, residual, (jacobian,), smooth, grid(noise.gap_s)).best().deviance
+
+
 @dataclass(frozen=True)
 class Best:
     """The point of greatest likelihood: per channel ratio, time constants and the factor on all noise."""

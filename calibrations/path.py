@@ -62,8 +62,12 @@ def find_path(model: Model, table: Table, effects: Mapping[str, Effect], enough:
 
     Raises what `fit` raises.
     """
-    start = present = fit(model, table)
-    steps: list[Step] = []
+    return grown(Path(fit(model, table), (), ()), effects, enough)
+
+
+def grown(path: Path, effects: Mapping[str, Effect], enough: float = 0.0) -> Path:
+    """The path, as far as it goes on from its end."""
+    present, steps = path.end, list(path.steps)
     found = candidates(present, effects)
     while len(steps) < MOST_EFFECTS:
         step = _next(present, found)
@@ -71,10 +75,10 @@ def find_path(model: Model, table: Table, effects: Mapping[str, Effect], enough:
             break
         steps.append(step)
         present = step.after
-        if share_left(start, present) <= enough:
+        if share_left(path.start, present) <= enough:
             break
         found = candidates(present, effects)
-    return Path(start, tuple(steps), tuple(found))
+    return Path(path.start, tuple(steps), tuple(found))
 
 
 def share_left(start: Fit, present: Fit) -> float:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 
 from calibrations.fit import Fit
-from calibrations.path import Path
 from calibrations.patterns import Pattern, patterns
 from calibrations.screen import Screen
 from calibrations.structure import likelihood, sharpened, without_slow, worth
@@ -17,25 +16,25 @@ from calibrations.structure import likelihood, sharpened, without_slow, worth
 MARGIN = 10.0  # of twice the log-likelihood, beyond the price of parameters: odds of 150 to 1
 
 
-def plainer(path: Path) -> Pattern | None:
-    """The pattern that explains what the path's first model misses better than the effects of the path.
+def plainer(begin: Fit, end: Fit) -> Pattern | None:
+    """The pattern that explains what the model of `begin` misses better than the effects added up to `end`.
 
     Both are compared by likelihood under the noise without its slow part, which would take up either; a parameter
     costs log(rows), and so does the choice among the patterns. In a motion, whose rows repeat each other, a step at the
     beginning is an effect that is always there: nothing competes.
     """
-    if not path.steps or path.start.table.kind == "motion":
+    if end is begin or begin.table.kind == "motion":
         return None
-    start = without_slow(path.start)
+    start = without_slow(begin)
     screen = Screen(start)
     price = float(np.log(start.residual.size))
     tried = [(worth(p, screen) - price, p) for p in patterns(start.table, start.channels)]
     best, pattern = max(tried, key=lambda each: each[0], default=(-np.inf, None))
-    if pattern is None or not best > _by_effects(path, start) + MARGIN:
+    if pattern is None or not best > _by_effects(end, start) + MARGIN:
         return None
     return sharpened(pattern, screen)
 
 
-def _by_effects(path: Path, start: Fit) -> float:
-    white = start.noise.whiten(path.end.residual[:, :, None])[:, 0]
-    return likelihood(float(white @ white), len(path.end.theta) - len(path.start.theta), start)
+def _by_effects(end: Fit, start: Fit) -> float:
+    white = start.noise.whiten(end.residual[:, :, None])[:, 0]
+    return likelihood(float(white @ white), len(end.theta) - len(start.theta), start)

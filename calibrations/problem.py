@@ -34,7 +34,7 @@ class Problem:
     @staticmethod
     def of(model: Model, table: Table) -> Problem:
         """The problem. Raises ModelError and TooFewRows where there is none to solve."""
-        table = stretches(table) if table.kind == "motion" else table.rows(table.order)
+        table = stretches(table) if table.kind == "motion" else table.in_order()
         model = model.for_table(table)
         if table.kind not in ("poses", "positions", "motion"):
             raise ModelError(

@@ -19,6 +19,8 @@ from calibrations.table import Array
 
 DRAWS = 300
 SMALLEST = 1e-2  # of a column's length: what the model leaves less of, this data cannot show beside it
+ROUNDING = 1e-11  # of a column's length: what rounding leaves of a column that the model holds
+NEARLY = 1e-6  # least eigenvalue of a Gram matrix of columns of length 1: less has too few digits left for 1e-9
 
 
 @dataclass(frozen=True)
@@ -39,12 +41,7 @@ class Screen:
 
     def basis(self, columns: Array) -> Array:
         """Orthonormal basis of what `columns` (channels, n, k) could add to the model, shape (rows, rank)."""
-        white = self.fit.noise.whiten(columns)
-        size = np.linalg.norm(white, axis=0)
-        free = _freed(white, self.explained)
-        left = np.linalg.norm(free, axis=0)
-        keep = left > SMALLEST * np.where(size > 0, size, 1.0)
-        return _basis(free[:, keep])
+        return _beside(self.fit.noise.whiten(columns), self.explained, SMALLEST)
 
     @property
     def free(self) -> int:
@@ -102,13 +99,61 @@ def of_search(p: Array | float, trials: float) -> Array:
     return np.asarray(-np.expm1(trials * np.log1p(-np.minimum(p, 1 - 1e-16))))
 
 
+def reductions(model: Array, residual: Array, candidates: Sequence[Array]) -> Array:
+    """What the sum of squares of `residual` (rows,) falls by when each of `candidates` (rows, k) joins the model.
+
+    As a least-squares solution each would give it, with `model` (rows, p) worked out once. Gram matrices are enough, of
+    the columns as they are, or freed of the model where they are nearly its own; a basis is made where neither has the
+    digits.
+    """
+    Q = _basis(model)
+    left = _freed(residual, Q)
+    known = np.column_stack([Q, left]).T
+    sums, least = _by_gram([(columns.T @ columns, known @ columns) for columns in candidates])
+    for k in map(int, np.flatnonzero(least < NEARLY)):
+        sums[k] = _reduction(_freed(candidates[k], Q), left, ROUNDING * np.linalg.norm(candidates[k], axis=0))
+    return sums
+
+
+def _reduction(free: Array, left: Array, rounding: Array) -> float:
+    """The same for one candidate freed of the model; columns no longer than `rounding` are none."""
+    free = free[:, np.linalg.norm(free, axis=0) > rounding]
+    sums, least = _by_gram([(free.T @ free, (left @ free)[None])])
+    return float(sums[0]) if least[0] >= NEARLY else float(np.sum((_basis(free).T @ left) ** 2))
+
+
+def _by_gram(products: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
+    """Reductions, and the least eigenvalue of each candidate's Gram matrix freed of the model, columns of length 1.
+
+    Products of each candidate: with itself (k, k), and with the model's basis and, last, the residual (p + 1, k).
+    """
+    wide = max((len(gram) for gram, _ in products), default=0)
+    grams, sides = np.tile(np.eye(wide), (len(products), 1, 1)), np.zeros((len(products), wide, 1))
+    for free, side, (gram, projections) in zip(grams, sides, products, strict=True):
+        k, scale = len(gram), 1 / np.sqrt(np.maximum(np.diagonal(gram), np.finfo(float).tiny))
+        along = projections * scale
+        free[:k, :k] = gram * scale * scale[:, None] - along[:-1].T @ along[:-1]
+        side[:k, 0] = along[-1]
+    values, vectors = np.linalg.eigh(grams)
+    squares = (np.swapaxes(vectors, 1, 2) @ sides)[:, :, 0] ** 2 / np.maximum(values, NEARLY)
+    return squares.sum(axis=1), np.min(values, axis=1, initial=1.0)
+
+
+def _beside(columns: Array, basis: Array, least: float) -> Array:
+    """Orthonormal basis of what columns add to those of `basis`, without those of which less than `least` is left."""
+    size = np.linalg.norm(columns, axis=0)
+    free = _freed(columns, basis)
+    return _basis(free[:, np.linalg.norm(free, axis=0) > least * np.where(size > 0, size, 1.0)])
+
+
 def _basis(columns: Array) -> Array:
     if not columns.size:
         return np.zeros((len(columns), 0))
     norm = np.linalg.norm(columns, axis=0)
-    columns = columns[:, norm > 0] / norm[norm > 0]
-    U, s, _ = np.linalg.svd(columns, full_matrices=False)
-    return U[:, s > 1e-9 * (s[0] if len(s) else 1.0)]
+    Q, R = np.linalg.qr(columns[:, norm > 0] / norm[norm > 0])
+    U, s, _ = np.linalg.svd(R)
+    rank = int(np.sum(s > 1e-9 * s[0])) if len(s) else 0
+    return Q if rank == Q.shape[1] else Q @ U[:, :rank]
 
 
 def _freed(columns: Array, basis: Array) -> Array:

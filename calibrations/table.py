@@ -126,6 +126,10 @@ class Table:
         """Row numbers in order of time (of the rows themselves where no time is given)."""
         return np.argsort(self.columns["t_s"], kind="stable") if "t_s" in self else np.arange(self.n)
 
+    def in_order(self) -> Table:
+        """Rows in order of time; this very table where they are, so that what was found on it is found again."""
+        return self if np.all(np.diff(self.order) > 0) else self.rows(self.order)
+
     @cached_property
     def time_s(self) -> Array:
         """Time of each row, s; one second a row where no time is given."""

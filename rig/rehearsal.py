@@ -14,7 +14,7 @@ from inspect import isgenerator
 from typing import Any
 
 from procedures.questions import Dial, Question
-from procedures.session import Dwell, Pose, Reading, Samples, Session
+from procedures.session import Dwell, Pose, Samples, Session
 from rig.bench import SIMULATED, Bench
 from rig.instruments import Rig, absent, connected
 from rig.planned import Held, Ledger, PlanHost
@@ -47,7 +47,6 @@ class RehearsalHost(PlanHost):
 
     rig: Rig
     dwells: list[Dwell] = field(default_factory=list)
-    read: dict[str, Reading] = field(default_factory=dict)
 
     def kept(self) -> Sequence[Pose]:
         return [dwell.pose for dwell in self.dwells]
@@ -55,16 +54,10 @@ class RehearsalHost(PlanHost):
     def measured(self) -> Sequence[Dwell]:
         return self.dwells
 
-    def readings(self) -> Sequence[Reading]:
-        return list(self.read.values())
-
     def keep(self, pose: Pose, samples: Samples, temperature_c: float | None) -> None:
         self.ledger.held.append(Held(self.ledger.now_s, pose))  # the twins' clock shows another time
         kept = Kept(pose, samples, samples.start_s, temperature_c)
         self.dwells.append(of_sensor(kept, self.rig.bench.first_sensor).dwell)
-
-    def keep_readings(self, *readings: Reading) -> None:
-        self.read |= {reading.name: reading for reading in readings}
 
     def ask(self, question: Question) -> str:
         done = answer(question, self.rig)

@@ -13,6 +13,7 @@ Source    Widrow and Kollar, Quantization Noise (2008), chapter 4; Book 17.3.3.
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from calibrations.effect import Parameter, Values
 from calibrations.lack_of_fit import smooth_columns
@@ -33,6 +34,7 @@ STARTS = {
 HARMONICS = 12
 FINEST = 4.0  # points in a resolved interval of frequency
 MOST = 20_000  # frequencies
+TOGETHER = 64  # frequencies of one block
 VISIBLE = 0.6  # of a step: more noise leaves a thousandth of the saw
 
 
@@ -72,9 +74,16 @@ def _saw(table: Table) -> tuple[float, float, float]:
     frequencies = _frequencies(table)
     if not len(frequencies):
         return 1e-3, 0.0, 0.0
-    turned = np.array([np.exp(-2j * np.pi * f * even.ravel()) @ rest for f in frequencies])
+    turned = _transform(rest, even.ravel(), frequencies)
     best = int(np.argmax(np.abs(turned)))
     f = float(frequencies[best])
     # - q / pi sin(2 pi f (V - o)): its transform is + i times a phase of -2 pi f o
     offset = -np.angle(turned[best] / 1j) / (2 * np.pi * f)
     return 1 / f, float(offset), float(np.median(table.optional("vx_std_v", 0.0))) / 2
+
+
+def _transform(values: Array, at: Array, frequencies: Array) -> NDArray[np.complex128]:
+    """Sum of values exp(-2 pi i f at) at evenly spaced frequencies: a block's first one, and steps from there."""
+    steps = np.exp(-2j * np.pi * np.outer(frequencies[:TOGETHER] - frequencies[0], at))
+    firsts = np.exp(-2j * np.pi * np.outer(frequencies[::TOGETHER], at))
+    return np.asarray(((firsts * values) @ steps.T).ravel()[: len(frequencies)])

@@ -52,7 +52,8 @@ def _figures(folder: Path) -> Iterator[tuple[str, Figure]]:
     yield "demo", _demo(folder)
     yield "samples of one dwell", _inside("", subject(folder, "samples"))
     yield "dwell means of 518 poses", _inside("", subject(folder, "dwells"))
-    yield "screen of candidates", _inside("", subject(folder, "screening", file))
+    for threads in (1, os.cpu_count() or 1):
+        yield f"linear algebra, {threads} threads", json.loads(subject(folder, "screening", threads=threads).out)
     yield "soak", _inside("soak", subject(folder, "soak", "12"))
     yield "night", _commands("night", folder, 1, "run", "soak", "--off-s", "0", "--unattended", "--json")
     yield "generation", _generation(folder)

@@ -25,9 +25,9 @@ class Ended:
     out: str
 
 
-def run(folder: Path, *words: str) -> Ended:
+def run(folder: Path, *words: str, threads: int = 1) -> Ended:
     """Run a program in `folder`, with its record there. Raises RuntimeError where it fails."""
-    places = {"RIG_HOME": str(folder), "PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1"}
+    places = {"RIG_HOME": str(folder), "PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": str(threads)}
     with (folder / "out").open("w+") as out, (folder / "err").open("w+") as err:
         began = time.perf_counter()
         process = subprocess.Popen(words, cwd=folder, env={**os.environ, **places}, stdout=out, stderr=err)
@@ -46,6 +46,6 @@ def rig(folder: Path, *words: str) -> Ended:
     return run(folder, str(RIG), *words)
 
 
-def subject(folder: Path, name: str, *words: str) -> Ended:
+def subject(folder: Path, name: str, *words: str, threads: int = 1) -> Ended:
     """A module beside this one, which prints a JSON document."""
-    return run(folder, sys.executable, "-m", f"tests.benchmark.{name}", *words)
+    return run(folder, sys.executable, "-m", f"tests.benchmark.{name}", *words, threads=threads)

@@ -11,7 +11,7 @@ from scipy.stats import kstest
 from calibrations.fit import Fit, fit
 from calibrations.model_file import read_model
 from calibrations.noise import Noise
-from calibrations.screen import SMALLEST, Screen, Search, of_search
+from calibrations.screen import SMALLEST, Screen, Search, of_search, reductions
 from calibrations.table import Array
 from tests.calibrations import synthetic
 from tests.calibrations.test_kernels import covariance
@@ -92,3 +92,34 @@ def test_of_search_is_exact_for_small_chances() -> None:
     assert of_search(1e-20, 5.0) == pytest.approx(5e-20, rel=1e-12)
     assert of_search(0.5, 2.0) == pytest.approx(0.75)
     assert of_search(1.0, 3.0) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("cosine", [0.0, 0.9, 1 - 1e-5, 1 - 1e-10])
+@pytest.mark.parametrize("like", ["model", "another"])
+def test_reductions_are_those_of_a_least_squares_solve_each(cosine: float, like: str) -> None:
+    rng = np.random.default_rng(17)
+    rows, sine = 5000, np.sqrt(1 - cosine**2)
+    model = np.linalg.qr(rng.standard_normal((rows, 6)))[0] * 10.0 ** rng.uniform(-3, 3, 6)
+    candidates = [rng.standard_normal((rows, 1 + k % 3)) for k in range(25)]
+    for columns in candidates:
+        near = model[:, 2] if like == "model" or columns.shape[1] == 1 else columns[:, 0]
+        columns[:, -1] = cosine * near / np.linalg.norm(near) + sine * columns[:, -1] / np.linalg.norm(columns[:, -1])
+    signal = sum(c[:, -1] / max(sine, 1e-6) for c in candidates)
+    residual = model @ rng.standard_normal(6) + signal + 0.02 * rng.standard_normal(rows)
+    by_solving = [left(model, residual) - left(np.hstack([model, columns]), residual) for columns in candidates]
+    rounding = 1e-13 * left(model, residual)  # of the two sums of squares whose difference it is
+    np.testing.assert_allclose(reductions(model, residual, candidates), by_solving, rtol=1e-9, atol=rounding)
+
+
+def left(columns: Array, residual: Array) -> float:
+    """Sum of squares beside `columns`."""
+    scaled = columns / np.linalg.norm(columns, axis=0)
+    return float(np.sum((residual - scaled @ np.linalg.lstsq(scaled, residual)[0]) ** 2))
+
+
+def test_a_candidate_that_the_model_holds_reduces_nothing() -> None:
+    rng = np.random.default_rng(18)
+    model, residual = rng.standard_normal((200, 3)), rng.standard_normal(200)
+    held = model @ rng.standard_normal((3, 2))
+    assert reductions(model, residual, [held, np.zeros((200, 1))]) == pytest.approx([0.0, 0.0], abs=1e-12)
+    assert len(reductions(model, residual, [])) == 0

@@ -1,0 +1,112 @@
+"""The effects that a search has added, put to the test beside each other.
+
+Effects are added one at a time, the first of them while all others are still missing: one may be there in another's
+place, or have been fitted from a bad start, or be needed no longer. So each is taken out of the whole. What the model
+does as well without is dropped. What then explains more of what is left, be it another effect or the same from another
+start, takes its place where the likelihood clearly gains (an exchange step; Miller, Subset Selection in Regression).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibrations.candidates import SIGNIFICANT, Candidate, added, candidates
+from calibrations.effect import Effect
+from calibrations.fit import Fit, refit
+from calibrations.held_out import held_out_excess
+from calibrations.noise_fit import deviance
+from calibrations.path import Path, grown
+from calibrations.screen import chance
+
+MOST_ROUNDS = 6
+TRIED = 2  # candidates for one place
+CLEARLY = 6.0  # of twice the log-likelihood beyond the price of parameters: odds of 20 to 1
+
+
+@dataclass(frozen=True)
+class Settled:
+    """The final fit, the effects that it needs beyond the first model, and each as a candidate beside all others."""
+
+    end: Fit
+    names: tuple[str, ...]
+    beside: Mapping[str, Candidate]
+
+
+def settled(path: Path, effects: Mapping[str, Effect]) -> Settled:
+    """What stands of the effects of `path`, and what comes in their place."""
+    freed = {term.name for term in path.start.model.terms}
+    end, names = path.end, tuple(step.taken.name for step in path.steps)
+    beside: dict[str, Candidate] = {}
+    for _ in range(MOST_ROUNDS):
+        end, names = _needed(end, names, freed)
+        found = _beside(path, end, tuple(name for name in names if name not in freed), effects)
+        beside = {name: c for name, others in found.items() for c in others if c.name == name}
+        after = _exchanged(end, names, found)
+        if after is None:
+            break
+        end, names = after
+        further = grown(Path(end, (), ()), effects)
+        end, names = further.end, (*names, *(step.taken.name for step in further.steps))
+    return Settled(end, names, beside)
+
+
+def _needed(present: Fit, names: tuple[str, ...], freed: set[str]) -> tuple[Fit, tuple[str, ...]]:
+    """Without those of the added effects that the model does as well without, the least first."""
+    while len([name for name in names if name not in freed]) > 1:
+        costs = {name: cost(present, name) for name in names if name not in freed}
+        name = min(costs, key=lambda n: costs[n][0] / max(costs[n][1], 1))
+        smaller = refit(present, present.model.without(name))
+        if chance(*costs[name]) < SIGNIFICANT and held_out_excess(smaller) > held_out_excess(present):
+            break
+        names = tuple(other for other in names if other != name)
+        present = smaller
+    return present, names
+
+
+def _beside(
+    path: Path, end: Fit, names: tuple[str, ...], effects: Mapping[str, Effect]
+) -> Mapping[str, tuple[Candidate, ...]]:
+    """For each effect, all candidates once every other one is in the model."""
+    if len(path.steps) == 1 and names == (path.steps[0].taken.name,):
+        return {names[0]: path.steps[0].candidates}
+    return {name: tuple(candidates(refit(end, end.model.without(name)), effects)) for name in names}
+
+
+def _exchanged(
+    end: Fit, names: tuple[str, ...], beside: Mapping[str, tuple[Candidate, ...]]
+) -> tuple[Fit, tuple[str, ...]] | None:
+    """The first exchange that makes the model clearly likelier; None where there is none."""
+    present = likelihood(end)
+    for name, found in beside.items():
+        without = refit(end, end.model.without(name))
+        for c in found[:1] if found and found[0].name == name else found[:TRIED]:
+            after = added(without, c)
+            if likelihood(after) > present + CLEARLY:
+                return after, tuple(c.name if other == name else other for other in names)
+    return None
+
+
+def likelihood(fit: Fit) -> float:
+    """Twice the restricted log-likelihood with the noise of the fit's own residual, a parameter costing log(rows)."""
+    price = len(fit.theta) * float(np.log(fit.residual.size))
+    return -deviance(fit.noise, fit.residual, fit.jacobian, np.zeros((fit.table.n, 0))) - price
+
+
+def cost(found: Fit, name: str, tied: bool = False) -> tuple[float, int]:
+    """Sum of squares that losing the effect would cost, to first order, and the parameters that it has.
+
+    `tied`: losing it means that its axes share one value again.
+    """
+    white, mine = found.whitened[:, 1:], found.problem.layout.of_effect(name)
+    size = np.linalg.norm(white, axis=0)
+    white = white / np.where(size > 0, size, 1.0)
+    value = found.theta[mine]
+    if tied:
+        value = value - value.mean()
+    signal = white[:, mine] @ (value * size[mine])
+    others = white[:, ~mine]
+    lost = signal - others @ np.linalg.lstsq(others, signal, rcond=1e-9)[0]
+    return float(lost @ lost), int(mine.sum())
