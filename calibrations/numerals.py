@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 SMALL, LARGE = -4, 6  # powers of ten beyond which a number is written with one
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -19,6 +20,13 @@ def measured(value: float, std: float | None) -> str:
         return minus(f"{round(value, decimals):.{shown}f} ± {round(std, decimals):.{shown}f}")
     shown = decimals + power
     return minus(f"({value / 10.0**power:.{shown}f} ± {std / 10.0**power:.{shown}f})") + times_ten_to(power)
+
+
+def bound(value: float, limit: float | Sequence[float]) -> str:
+    """A limit as `value` meets it: `0 to 12`; of a magnitude the side that it is on, `at most 3` or `at least −3`."""
+    if isinstance(limit, Sequence):
+        return minus(f"{limit[0]:g} to {limit[1]:g}")
+    return f"at most {limit:g}" if value >= 0 else minus(f"at least {-limit:g}")
 
 
 def plain(value: float, digits: int = 3) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from calibrations.numerals import measured, minus, plain
+from calibrations.numerals import bound, measured, minus, plain
 from calibrations.pictures.album import Picture
 from calibrations.pictures.soak import soak_album
 from calibrations.report_page import figure, page
@@ -115,10 +115,10 @@ def _course(course: Course) -> dict[str, Any]:
 
 
 def _verdict(name: str, result: Mapping[str, Any]) -> dict[str, str]:
-    limit = result["limit"]
-    bounds = f"{limit[0]:g} to {limit[1]:g}" if isinstance(limit, (list, tuple)) else f"±{limit:g}"
-    value = measured(result["value"], result["std"])
-    return {"name": name, "value": f"{value} {result['unit']}", "limit": bounds, "verdict": result["verdict"]}
+    value, std = result["value"], result["std"]
+    shown = measured(value, std) if std else minus(f"{value:.3g}")
+    limit = bound(value, result["limit"])
+    return {"name": name, "value": f"{shown} {result['unit']}", "limit": limit, "verdict": result["verdict"]}
 
 
 def _gap(gap: Gap) -> dict[str, str]:
@@ -128,7 +128,10 @@ def _gap(gap: Gap) -> dict[str, str]:
 
 
 def _hours(time: tuple[float, float] | None) -> str:
-    return measured(*(round(each / HOUR_S, 2) for each in time)) if time else "–"
+    if time is None:
+        return "–"
+    value, std = (each / HOUR_S for each in time)
+    return measured(value, std) if std else plain(value)
 
 
 def _span_h(found: Soak) -> str:

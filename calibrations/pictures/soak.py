@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
+from calibrations.numerals import measured
 from calibrations.pictures.album import Picture
 from calibrations.pictures.style import AMBER, BAND, BLUE, GREEN, INK, QUIET, VERMILION, panels, styled
 from calibrations.soak import HOUR_S, Course, Soak
@@ -135,7 +136,7 @@ def _mark_steady(ax: Axes, course: Course) -> None:
     if course.state and not course.state.terms and time:
         words = "steady from the first reversal on"
     elif time is not None:
-        words = f"steady after {time[0] / HOUR_S:.1f} ± {time[1] / HOUR_S:.1f} h"
+        words = f"steady after {measured(*(each / HOUR_S for each in time))} h"
     up = course.values[0] > course.values[-1]
     ax.annotate(words, (1, 1 if up else 0), xycoords="axes fraction", xytext=(-4, -4 if up else 6),
                 textcoords="offset points", ha="right", va="top" if up else "bottom")  # fmt: skip

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from calibrations.model import Estimate
+from calibrations.numerals import bound
 from rig.cli.output import columns
 from rig.cli.words import joined, with_uncertainty
 from rig.record import Run
@@ -26,6 +27,7 @@ REMEDIES = {
     r"gap": "the run was interrupted: rig show {run} says when",
     r"": "look for poses unlike the others: rig show {run} --poses; rig exclude leaves one out, with a reason",
 }
+SPREADS = re.compile("tolerance|wander")  # uncertainties themselves: two digits
 LENGTHS = ("duration_s", "times", "cycles", "most_rounds", "dwell_s")  # settings by which a procedure measures longer
 LONGER = 4  # times as long halves a statistical uncertainty
 
@@ -34,18 +36,20 @@ def lines(results: Mapping[str, Any]) -> list[str]:
     """A table of the results of a run, none where it has none."""
     if not results:
         return []
-    rows = [(name, _value(name, r), _limit(r["limit"]), r["verdict"] or "") for name, r in results.items()]
+    rows = [(name, _value(name, r), _limit(r["value"], r["limit"]), r["verdict"] or "") for name, r in results.items()]
     return columns(("result", "value", "limit", "verdict"), rows).splitlines()
 
 
 def _value(name: str, result: Mapping[str, Any]) -> str:
+    if SPREADS.search(name):
+        return f"{result['value']:.2g} {result['unit']}"
     return with_uncertainty(Estimate(name, "", result["value"], result["std"], result["unit"]))
 
 
-def _limit(limit: Any) -> str:
+def _limit(value: float, limit: Any) -> str:
     if limit is None:
         return "-"
-    return f"{limit[0]:g} .. {limit[1]:g}" if isinstance(limit, (list, tuple)) else f"+-{limit:g}"
+    return bound(value, limit).replace("−", "-")
 
 
 def next_steps(run: Run, excluded: Mapping[int, str]) -> list[str]:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from calibrations.errors import TooFewRows
+from calibrations.numerals import measured
 from calibrations.pictures.soak import soak_album
 from calibrations.soak import soak
 from calibrations.soak_report import soak_report
@@ -107,15 +108,20 @@ def test_noise_of_hours_and_allan_deviation_are_those_of_the_still_record() -> N
 
 def test_the_page_tells_the_night_without_a_network() -> None:
     found = soak(soak_table())
+    rounded = {"value": 0.123456, "std": None, "unit": "K", "limit": 0.3, "verdict": "pass"}
     limited = {"value": 3.0, "std": 0.1, "unit": "h", "limit": [0, 7], "verdict": "pass"}
-    text = page(found, {"steady-state-time": limited, "gap": {**limited, "limit": None, "verdict": None}})
-    assert re.search(r"Bias and scale factor are steady [\d.]+ ± [\d.]+ h after power-on", text)
+    results = {"steady-state-time": limited, "gap": {**limited, "limit": None}, "temperature-wander": rounded}
+    text = page(found, results)
+    time = found.time_s()
+    assert time is not None
+    assert f"Bias and scale factor are steady {measured(time[0] / 3600, time[1] / 3600)} h after power-on" in text
     assert "12.0 h held still, every sample kept, with 53 reversals" in text
     assert "0 to 7" in text
+    assert re.search("0.123 K<.*at most 0.3<", text)
     assert "None: every sample" in text
     assert "a &lt;sensor&gt;" in text
     assert not re.search(r'(src|href)="https?:', text)
-    assert text == page(found, {"steady-state-time": limited})
+    assert text == page(found, results)
 
 
 def test_the_page_says_what_is_not_reached() -> None:
