@@ -45,7 +45,8 @@ class Pattern:
     @property
     def name(self) -> str:
         """Its words as the name of an effect."""
-        return re.sub(r"[^a-z0-9]+", "-", self.text.lower()).strip("-")
+        words = re.sub(r"\b(of|the|at|around|t|only)\b", "", self.text.lower())
+        return re.sub(r"[^a-z0-9]+", "-", words).strip("-")
 
 
 # words for columns and their units, and their short names in expressions
@@ -123,7 +124,7 @@ def _step(table: Table, k: int) -> Pattern:
     at = (table.time_s[k - 1] + table.time_s[k]) / 2
     named = "t_s" in table
     text = f"step at t = {at:.0f} s" if named else f"step at row {at:.0f}"
-    return Pattern(text, (np.arange(table.n) >= k)[:, None] * 1.0, f"a*step(t - {at:.7g})" if named else "")
+    return Pattern(text, np.where(np.arange(table.n) >= k, 1.0, 0.0)[:, None], f"a*step(t - {at:.7g})" if named else "")
 
 
 def _in_columns(table: Table) -> Iterator[Pattern]:

@@ -27,6 +27,7 @@ def command(data: str, model: str | None, check: bool, bench_file: Path | None, 
     from calibrations.documents import diagnosis_document
     from rig.bench import read_bench
     from rig.cli.asked import asked, tell_blind
+    from rig.cli.own_effect import own_effect, told
     from rig.cli.words import warning
     from rig.next_experiment import proposed
 
@@ -37,10 +38,12 @@ def command(data: str, model: str | None, check: bool, bench_file: Path | None, 
     tell_blind(result.fit, effects)
     name = model or start.name
     if as_json:
-        emit(diagnosis_document(result, name))
+        own = own_effect(result.pattern, name, data, bench_file)
+        emit(diagnosis_document(result, name) | {"own_effect": own})
         notes(warning(result.caution))
     else:
-        click.echo(_told(result, data, name, f" --bench {bench_file}" if bench_file else ""))
+        text = _told(result, data, name, f" --bench {bench_file}" if bench_file else "")
+        click.echo("\n".join([text, *told(result.pattern, name, data, bench_file)]))
     return 1 if check and result.verdict != "adequate" else 0
 
 

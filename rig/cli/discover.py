@@ -55,6 +55,7 @@ def _discover(
     from calibrations.documents import discovery_document
     from rig.bench import read_bench
     from rig.cli.asked import asked, write_model
+    from rig.cli.own_effect import own_effect, told
     from rig.cli.words import discovery, parameters, warning
     from rig.next_experiment import proposed
     from rig.several import load_all
@@ -66,11 +67,14 @@ def _discover(
         result = proposed(result, effects, read_bench(bench_file), bench_file)
     if out is not None:
         write_model(result.end, start, out)
+    reached = str(out) if out else model or start.name
+    own = (result.pattern if len(data) == 1 else None, reached, data[0], bench_file)
     if as_json:
-        emit(discovery_document(result, str(out) if out else None))
+        emit(discovery_document(result, str(out) if out else None) | {"own_effect": own_effect(*own)})
         notes(warning(result.caution))
     else:
-        click.echo(f"{table.n} rows of {table.source}\n\n{discovery(result)}\n\n{parameters(result.end.model)}")
+        lines = "\n".join([discovery(result), *told(*own)])
+        click.echo(f"{table.n} rows of {table.source}\n\n{lines}\n\n{parameters(result.end.model)}")
         if out is not None:
             click.echo(f"\nwritten to {out}")
     return 1 if check and result.verdict != "adequate" else 0
