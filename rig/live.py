@@ -27,9 +27,11 @@ BETWEEN = tuple(
     for step, inclinations in (
         (60.0, (60.0, 120.0, 45.0, 135.0)),
         (20.0, (75.0, 105.0, 90.0)),
-        (10.0, (90.0, 30.0, 150.0, 60.0)),
+        (30.0, (30.0, 150.0, 60.0, 120.0)),
+        (30.0, (45.0, 135.0, 90.0, 75.0)),
     )
 )
+FEW = 1 / 3  # of the time of an experiment: poses in between that take less come first
 
 
 @dataclass(frozen=True)
@@ -62,30 +64,37 @@ class Live:
             run, table = self.measure(following)
             used_s = (done[-1].used_s if done else 0.0) + (following.duration_s or 0.0)
             done.append(Measurement(following, run, discover(table, self.model, self.effects), used_s))
-            proposed = None if stands(done) else self._proposed(done)
-            following = proposed if proposed and self._can_run(proposed, done) else None
-            if done[-1].found.next_experiment is not None and proposed is not None:
-                done[-1] = replace(done[-1], found=replace(done[-1].found, next_experiment=proposed))
-            done[-1] = replace(done[-1], following=following)
+            telling = self._telling(done)
+            following = None if stands(done) else self._following(telling, done)
+            found = replace(done[-1].found, next_experiment=telling)
+            done[-1] = replace(done[-1], found=found, following=following)
             yield done[-1]
 
     def planned(self, experiment: Experiment) -> Experiment:
         """The experiment with its duration on the bench."""
         return planned_experiment(experiment, self.bench, self.bench_file)[0]
 
-    def _proposed(self, done: Sequence[Measurement]) -> Experiment | None:
-        """What would help most: to tell rivals apart, else to see whether the explanation holds elsewhere."""
-        found, left_s = done[-1].found, self.time_s - done[-1].used_s
+    def _telling(self, done: Sequence[Measurement]) -> Experiment | None:
+        """What would tell the explanations apart, whether there is time for it or not; None where there is one."""
+        found = done[-1].found
         if found.next_experiment is None:
-            return next((self.planned(e) for e in possible(_new(BETWEEN, done), self.bench, left_s)), None)
+            return None
         dispute = Dispute.of(found.end, found.next_experiment.separates, self.effects)
-        menu = list(possible(_new(MENU, done), self.bench, left_s))
+        menu = _new(MENU, done)
         return chosen(dispute, found.next_experiment, self.bench, self.bench_file, menu, ("together",))
 
-    def _can_run(self, e: Experiment, done: Sequence[Measurement]) -> bool:
-        """Whether there is time for it, and it gives poses that can be judged together with the others."""
-        new = bool(_new([e], done)) and e.duration_s is not None
-        return new and (e.duration_s or 0.0) <= self.time_s - done[-1].used_s and gives_poses(e, self.bench)
+    def _following(self, telling: Experiment | None, done: Sequence[Measurement]) -> Experiment | None:
+        """`telling`, where its poses can be judged with the others, else poses in between; None when time is up.
+
+        A few minutes of poses come before what takes much longer: the room may tell what the oven would.
+        """
+        left_s = self.time_s - done[-1].used_s
+        between = next((self.planned(e) for e in possible(_new(BETWEEN, done), self.bench, left_s)), None)
+        if telling is None or telling.duration_s is None or telling.duration_s > left_s:
+            return between
+        if between is not None and (between.duration_s or 0.0) < FEW * telling.duration_s:
+            return between
+        return telling if _new([telling], done) and gives_poses(telling, self.bench) else between
 
 
 def stands(done: Sequence[Measurement]) -> bool:
