@@ -22,7 +22,7 @@ from calibrations.motion.evaluate import MotionResult
 from calibrations.numerals import chance, measured, minus, plain, unit
 from calibrations.pictures.album import Picture, album
 from calibrations.pictures.view import mg, pooled_mg, rows_of
-from calibrations.report_motion import section
+from calibrations.report_motion import head, section
 from calibrations.report_page import figure, page
 from calibrations.report_words import VERDICTS, capital, headline, key_figures, next_words, state, summary, unbroken
 
@@ -44,15 +44,12 @@ def report(
     `date` and `program` (name and version) stand in the provenance: the same arguments give the same page.
     """
     shown = {p.name: figure(p) for p in (album(found, beside, motion) if pictures is None else pictures)}
+    discovery = _head(found, beside.fit.model.name)
     return page(
         "report.html",
-        headline=headline(found),
-        verdict=VERDICTS[state(found)],
-        state=state(found),
-        what=f"Calibration report, model {beside.fit.model.name}",
+        **(head(motion) if motion else discovery),
+        discovery=discovery,
         kind=rows_of(found.start.table),
-        summary=unbroken(summary(found)),
-        figures=key_figures(found),
         steps=[_first(found), *(_step(step, found) for step in found.steps)],
         chance_of_excess=unbroken(f"1 ± {spread_of_excess(found.end)}"),
         fails=[capital(minus(place.text)).replace("x the noise", "× the noise") for place in beside.fails],
@@ -72,6 +69,18 @@ def report(
         pictures=shown,
         curves=[drawn for name, drawn in shown.items() if name.startswith("effect-")],
     )
+
+
+def _head(found: Discovery, model: str) -> dict[str, Any]:
+    """The head of the page, or of its part on models that were fitted to a motion."""
+    return {
+        "headline": headline(found),
+        "verdict": VERDICTS[state(found)],
+        "state": state(found),
+        "what": f"Calibration report, model {model}",
+        "summary": unbroken(summary(found)),
+        "figures": key_figures(found),
+    }
 
 
 def spread_of_excess(fit: Fit) -> str:

@@ -1,4 +1,7 @@
-"""The report's section on a motion: both models beside the displacement sensor, and each filter's own bias."""
+"""A motion's place in the report: both models beside the displacement sensor come first, and each filter's own bias.
+
+They are the models of the run's own sweep. The rest of the report is on a model that is fitted to the motion itself.
+"""
 
 from __future__ import annotations
 
@@ -22,10 +25,28 @@ NAMES = {
 LEAST = 1e-8
 
 
-def section(found: MotionResult) -> dict[str, Any]:
-    """What the page says of the motion, in words and rows."""
+def head(found: MotionResult) -> dict[str, Any]:
+    """The head of the page."""
+    linear, physical, limit = (
+        f"{plain(q.value)} mm/s²" for q in (found.rmse_linear, found.rmse_physical, found.noise_limit)
+    )
     return {
+        "headline": f"In motion, the physical model errs by {physical}, the linear model by {linear}.",
+        "verdict": "measured",
+        "state": "found",
+        "what": f"Calibration report, motion at {found.frequency.value:.4g} Hz",
         "summary": unbroken(_summary(found)),
+        "figures": [
+            ("linear model of the sweep", linear, "rms error beside the displacement sensor"),
+            ("physical model of the sweep", physical, f"{plain(found.excess)} × the noise limit"),
+            ("noise limit", limit, "what the sensor's noise alone leaves in this band"),
+        ],
+    }
+
+
+def section(found: MotionResult) -> dict[str, Any]:
+    """What the page says of the motion, in rows."""
+    return {
         "quantities": [(NAMES[name], *_written(quantity)) for name, quantity in found.results.items()],
         "biases": [_bias(bias) for bias in found.biases],
     }
