@@ -34,9 +34,6 @@ LEAST_GAIN = 1e-9  # of the gain that the present pose has: less is rounding
 class Criterion(Protocol):
     """What makes one design better than another. Covariances are those of scaled parameters, (p, p)."""
 
-    @property
-    def name(self) -> str: ...
-
     def gain(self, covariance: Array, rows: Array) -> Array:
         """How much better each of `rows` (candidates, axes, p) would make a design; to be greatest."""
 
@@ -47,8 +44,6 @@ class Criterion(Protocol):
 @dataclass(frozen=True)
 class DOptimal:
     """The volume of the parameters' joint uncertainty."""
-
-    name: str = "D"
 
     def gain(self, covariance: Array, rows: Array) -> Array:
         return np.asarray(np.linalg.slogdet(_seen(rows @ covariance, rows))[1])
@@ -62,7 +57,6 @@ class IOptimal:
     """The mean variance of what is predicted, with `weight` (p, p) the mean of J' J over where it is."""
 
     weight: Array
-    name: str = "I"
 
     @staticmethod
     def over(rows: Array) -> IOptimal:

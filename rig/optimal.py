@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from calibrations.fit import Fit
 from calibrations.model import Model
 from calibrations.optimal_design import Criterion, DOptimal, IOptimal, again, exchanged, farthest
 from calibrations.run_order import Tour, ordered
@@ -29,26 +28,31 @@ from rig.travel import from_home_s, moves_s
 MOST_POSES = 60
 ONE_IN = 10  # poses is measured again, and as many are kept out of the fit
 FEWEST = 4  # of either
+NEARLY = 0.99  # as good
 DESIGN, AGAIN, CHECK = "design", "again", MARK  # paths of poses
 CRITERIA: Mapping[str, Callable[[Array], Criterion]] = {"D": lambda _: DOptimal(), "I": IOptimal.over}
 
 
 @dataclass(frozen=True)
 class Optimal:
-    """The poses of `criterion` for the model of `fit`, beside the standard sweep.
+    """The poses of `criterion` for the model of a range, beside its standard sweep.
 
     `short` has the standard sweep's dwell, `equal` the dwell at which the worst standard errors are equal, `all_equal`
     that at which no parameter is less certain than after the sweep. `drift_loss`: by how much the variance of the
     parameter that suffers most grows where a drift is fitted beside all.
     """
 
-    fit: Fit
+    over: Range
     criterion: str
-    standard: Judged
     short: Judged
     equal: Judged
     all_equal: Judged
     drift_loss: float
+
+    @property
+    def standard(self) -> Judged:
+        """The standard sweep."""
+        return self.over.standard
 
     @property
     def times_less(self) -> float:
@@ -98,6 +102,8 @@ def optimal(
     raise.
     """
     over = Range(bench, sweep, settings, model)
+    if not over.standard.told.any():
+        raise PlanError(f"this sweep determines no parameter of {model.name}; give it more inclinations")
     parameters = len(over.fit.theta)
     least = 3 * FEWEST + -(-parameters // len(over.axes))
     if not least <= poses <= MOST_POSES:
@@ -105,10 +111,9 @@ def optimal(
     chosen, rows = _chosen(over, CRITERIA[criterion](over.white), poses)
     tour = Tour(from_home_s(bench, chosen), moves_s(bench, chosen), rows, _dwell_s(over, chosen))
     order = ordered(tour)
-    short = over.judged(listing := _listing(settings, [chosen[k] for k in order]))
-    ratios = relative(over.standard, short), most_relative(over.standard, short)
-    equal, all_equal = (over.judged({**listing, "dwell_s": _longer(short.dwell_s, ratio)}) for ratio in ratios)
-    return Optimal(over.fit, criterion, over.standard, short, equal, all_equal, tour.drift_loss(order))
+    short = over.judged(_listing(settings, [chosen[k] for k in order]))
+    equal, all_equal = (_as_good(over, short, ratio) for ratio in (relative, most_relative))
+    return Optimal(over, criterion, short, equal, all_equal, tour.drift_loss(order))
 
 
 def _chosen(over: Range, criterion: Criterion, poses: int) -> tuple[list[Pose], Array]:
@@ -125,8 +130,10 @@ def _chosen(over: Range, criterion: Criterion, poses: int) -> tuple[list[Pose], 
 
 
 def _dwell_s(over: Range, chosen: Sequence[Pose]) -> float:
-    """All dwells together at equal worst standard error: in any order about the same."""
+    """All dwells together at equal worst standard error: in any order about the same. Raises PlanError."""
     unordered = over.judged(_listing(over.settings, chosen))
+    if lost := [over.name(int(k)) for k in np.flatnonzero(over.standard.told & ~unordered.told)]:
+        raise PlanError(f"{len(chosen)} poses do not tell {', '.join(lost)}, as the sweep does; choose more of them")
     return len(chosen) * _longer(unordered.dwell_s, relative(over.standard, unordered))
 
 
@@ -135,8 +142,22 @@ def _listing(settings: Mapping[str, Any], poses: Sequence[Pose]) -> dict[str, An
     return {**settings, "face": "up", "reference_every": 0, "pose_list": written(poses)}
 
 
+def _as_good(over: Range, short: Judged, ratio: Callable[[Judged, Judged], float]) -> Judged:
+    """The plan with the dwell at which its `ratio` to the standard sweep is 1.
+
+    White noise gives it at once. Where time itself tells something, a longer run tells more than its dwells: halving.
+    """
+    low, high = short, _with_dwell(over, short, _longer(short.dwell_s, ratio(over.standard, short)))
+    while ratio(over.standard, high) < NEARLY and high.dwell_s - low.dwell_s > 0.15:
+        middle = _with_dwell(over, short, round(float(np.sqrt(low.dwell_s * high.dwell_s)), 1))
+        low, high = (low, middle) if ratio(over.standard, middle) <= 1 else (middle, high)
+    return high
+
+
+def _with_dwell(over: Range, judged: Judged, dwell_s: float) -> Judged:
+    return over.judged({**judged.plan.settings, "dwell_s": dwell_s})
+
+
 def _longer(dwell_s: float, error_ratio: float) -> float:
-    """The dwell that takes a white noise's errors down by the ratio, up to a tenth of a second. Raises PlanError."""
-    if not np.isfinite(error_ratio):
-        raise PlanError("so few poses do not tell all parameters that the sweep tells; choose more")
+    """The dwell that takes a white noise's errors down by the ratio, up to a tenth of a second."""
     return float(np.ceil(10 * dwell_s * error_ratio**2 - 1e-6) / 10)

@@ -7,9 +7,10 @@ only so can volts be set beside degrees. The greatest of them is the worst stand
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -106,7 +107,14 @@ class Range:
         planned = plan(self.bench, self.sweep, settings)
         seen = replace(planned, held=tuple(held for held in planned.held if not held.pose.path.startswith(MARK)))
         rows = information(self.fit, foreseen(self.fit, _columns(seen)))
-        return Judged(planned, np.sqrt(np.diag(covariance_of(rows))) * self._full_scale)
+        std = np.sqrt(np.diag(covariance_of(rows)))
+        unknown = np.full(len(std), np.inf)
+        return Judged(planned, np.multiply(std, self._full_scale, where=np.isfinite(std), out=unknown))
+
+    def name(self, k: int) -> str:
+        """A parameter: `scale-factor scale x`."""
+        slot = self.fit.problem.layout.slots[k]
+        return " ".join(filter(None, (self.fit.model.terms[slot.term].name, slot.parameter.name, slot.axis)))
 
     @cached_property
     def _plan(self) -> Plan:
@@ -128,14 +136,19 @@ class Range:
 
 
 def _candidates(standard: Sequence[Pose]) -> Iterator[Pose]:
-    """A grid over the range of the standard poses, with all their inclinations."""
-    alphas, betas = ([getattr(pose, name) for pose in standard] for name in ("alpha_deg", "beta_deg"))
-    finer = np.arange(min(alphas), max(alphas) + 1e-9, GRID_DEG)
-    whole = [beta for beta in np.arange(min(betas), max(betas) + 1e-9, GRID_DEG) if beta < min(betas) + 360]
+    """The sweep's own angles and what lies between them, from both sides, on its faces."""
+    alphas, betas = (_filled(getattr(pose, name) for pose in standard) for name in ("alpha_deg", "beta_deg"))
     for flip in sorted({pose.flip for pose in standard}):
-        for alpha in np.unique([*alphas, *finer]):
-            for beta in whole:
-                yield from (Pose(float(alpha), float(beta), direction, flip=flip) for direction in (1, -1))
+        for alpha in alphas:
+            for beta in (beta for beta in betas if beta < betas[0] + 360):
+                yield from (Pose(alpha, beta, direction, flip=flip) for direction in (1, -1))
+
+
+def _filled(angles_deg: Iterable[float]) -> list[float]:
+    """Angles in order, with others between those that are farther apart than GRID_DEG."""
+    known = sorted(set(angles_deg))
+    steps = [(a, b, max(1, round((b - a) / GRID_DEG))) for a, b in pairwise(known)]
+    return [a + (b - a) * k / n for a, b, n in steps for k in range(n)] + known[-1:]
 
 
 def _columns(planned: Plan) -> dict[str, Array]:

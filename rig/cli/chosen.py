@@ -18,14 +18,14 @@ HEAD = ("", "standard sweep", "chosen, same dwell", "chosen, same error")
 
 def lines(found: Optimal, out: str | None) -> Iterator[str]:
     """For people; `out` is the file that the poses were written to."""
-    model, count = found.fit.model.name, len(found.fit.theta)
+    model, count = found.over.fit.model.name, len(found.over.fit.theta)
     yield f"{model}, {count} parameters: {found.criterion}-optimal poses in the range of the standard sweep"
     yield ""
     yield columns(HEAD, _rows(found, (found.standard, found.short, found.equal)))
     yield ""
     yield f"{found.times_less:.1f} x less rig time at equal worst standard error: {_worst(found)}."
     yield f"{_times(found.times_less_for_all)} with no parameter less certain than after the sweep: {_longest(found)}."
-    if lost := [_name(found, k) for k, known in enumerate(found.standard.told) if not known]:
+    if lost := [found.over.name(k) for k, known in enumerate(found.standard.told) if not known]:
         yield f"The standard sweep does not tell {', '.join(lost)}: left out of account."
     yield ""
     yield from map(wrap_text, _about(found))
@@ -36,7 +36,7 @@ def lines(found: Optimal, out: str | None) -> Iterator[str]:
 def document(found: Optimal) -> dict[str, Any]:
     """The key `optimal` of the plan's document."""
     return {
-        "model": found.fit.model.name,
+        "model": found.over.fit.model.name,
         "criterion": found.criterion,
         "times_less_rig_time": found.times_less,
         "times_less_rig_time_for_all": found.times_less_for_all,
@@ -68,7 +68,7 @@ def _rows(found: Optimal, plans: Sequence[Judged]) -> list[tuple[str, ...]]:
 
 
 def _worst(found: Optimal) -> str:
-    before, after = (_name(found, found.worst(each)) for each in (found.standard, found.equal))
+    before, after = (found.over.name(found.worst(each)) for each in (found.standard, found.equal))
     return before if before == after else f"{before}, now {after}"
 
 
@@ -101,12 +101,6 @@ def _how_to_run(found: Optimal, out: str | None) -> Iterator[str]:
         yield "           once the same command with --out poses.csv has written them"
 
 
-def _name(found: Optimal, k: int) -> str:
-    """A parameter: `scale-factor scale x`."""
-    slot = found.fit.problem.layout.slots[k]
-    return " ".join(filter(None, (found.fit.model.terms[slot.term].name, slot.parameter.name, slot.axis)))
-
-
 def _of_plan(found: Optimal, each: Judged) -> dict[str, Any]:
     ratios = [float(ratio) for ratio in each.errors / found.standard.errors]
     return {
@@ -114,6 +108,6 @@ def _of_plan(found: Optimal, each: Judged) -> dict[str, Any]:
         "dwell_s": each.dwell_s,
         "duration_s": each.plan.duration_s,
         "worst_error": relative(found.standard, each),
-        "worst_parameter": _name(found, found.worst(each)),
-        "errors": {_name(found, k): ratio if math.isfinite(ratio) else None for k, ratio in enumerate(ratios)},
+        "worst_parameter": found.over.name(found.worst(each)),
+        "errors": {found.over.name(k): ratio if math.isfinite(ratio) else None for k, ratio in enumerate(ratios)},
     }
