@@ -16,7 +16,9 @@ lint: setup
 	$(BIN)/lint-imports --no-cache
 
 bench: setup
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[bench]'
 	$(BIN)/python -m tests.benchmark
+	$(BIN)/python -m tests.benchmark.discovery --sets 24
 
 setup: .venv/ready
 

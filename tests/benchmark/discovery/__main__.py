@@ -12,16 +12,19 @@ import json
 import os
 import sys
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from itertools import zip_longest
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 from tests.benchmark.child import ROOT
 from tests.benchmark.discovery.one import attempt
+from tests.benchmark.discovery.peers import PEERS
 from tests.benchmark.discovery.score import figures
 from tests.benchmark.discovery.sets import ROWS, Case, sets
 
 WORKERS = 2
+METHODS = ["ours", *PEERS, "oracle"]
 
 
 def main() -> None:
@@ -30,9 +33,10 @@ def main() -> None:
     asked.add_argument("--rows", default=",".join(ROWS))
     asked.add_argument("--file", type=Path, default=ROOT / "out" / f"discovery-{_version()}.jsonl")
     given = asked.parse_args()
-    cases = [case for row in given.rows.split(",") for case in sets(row, given.sets)]
+    rows = [sets(row, given.sets) for row in given.rows.split(",")]
+    cases = [case for some in zip_longest(*rows) for case in some if case]  # each row has some, whenever it ends
     records = measured(cases, given.file)
-    found = figures(records, ["ours"])
+    found = figures(records, METHODS)
     print(markdown(found), file=sys.stderr)
     json.dump({"schema": "rig.benchmark.discovery/1", "sets": len(records), "figures": found}, sys.stdout, indent=1)
     print()

@@ -9,7 +9,7 @@ outside/NAME  world/NAME           what no effect describes
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from calibrations.table import Table
 from tests.benchmark.discovery import noises
+from tests.benchmark.discovery.inseparable import INSEPARABLE
 from tests.benchmark.discovery.layouts import Array
 from tests.benchmark.discovery.mechanisms import MECHANISMS, few_bits, rounded
 from tests.benchmark.discovery.outside import OUTSIDE
@@ -44,6 +45,7 @@ class Truth:
     fresh: Table | None = None
     outside: bool = False
     structure: str = ""
+    experiment: str = ""  # a regular expression: what would tell the cause from the names it is taken for
     layout: str = ""
     run: Run | None = None
     built: tuple[tuple[str, Built], ...] = ()
@@ -60,9 +62,14 @@ def case(name: str, strength: float = 0.0, seed: int = 0) -> tuple[Table, Truth]
     """The table and the truth of one set; `strength` in noise floors."""
     kind, _, which = name.partition("/")
     if kind in ("world", "sampled"):
-        from tests.benchmark.discovery import others  # the other generators are only loaded where they are asked
+        from tests.benchmark.discovery import others  # made of this file's Truth
 
         return others.case(kind, which, strength, seed)
+    if kind == "inseparable":
+        question = INSEPARABLE[which]
+        run = Run(question.layout or layout_of(seed), seed, question.mechanism.cold, question.room)
+        table, truth = measured(run, {which: question.mechanism}, strength, 0.0)
+        return table, replace(truth, experiment=question.experiment)
     if kind == "clean":
         return measured(Run(layout_of(seed), seed), {}, 0.0, 1.0 if which == "slow" else 0.0)
     slow = SLOW[(seed // 4 + seed) % len(SLOW)]

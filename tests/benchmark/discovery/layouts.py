@@ -1,4 +1,4 @@
-"""Ways to visit poses: alpha moves first, then beta. Some poses are visited and kept out of the table, as fresh ones."""
+"""Ways to visit poses: alpha moves first, then beta. Some are visited and kept out of the table, as fresh ones."""
 
 from __future__ import annotations
 
@@ -54,12 +54,28 @@ def scattered(random: np.random.Generator) -> tuple[Array, Array, Array]:
     return alpha, beta, np.sign(np.diff(beta, prepend=-1.0))
 
 
+def upright(random: np.random.Generator) -> tuple[Array, Array, Array]:
+    """One inclination only, five turns there and back."""
+    up = np.arange(0.0, 361.0, 10.0)
+    return _sweeps(np.full(5, 90.0), up, up[::-1] - 5.0)
+
+
+def one_way(random: np.random.Generator) -> tuple[Array, Array, Array]:
+    """Clockwise only: the table goes on and on."""
+    beta = np.tile(np.arange(5.0, 365.0, 10.0), 7)
+    alpha = np.repeat(random.permutation([15.0, 40.0, 65.0, 90.0, 115.0, 140.0, 165.0]), 36)
+    return alpha, beta + 360.0 * np.repeat(np.arange(7), 36), np.ones(len(beta))
+
+
 LAYOUTS: dict[str, Callable[[np.random.Generator], tuple[Array, Array, Array]]] = {
     "ang": ang,
     "seven": seven,
     "turntable": turntable,
     "scattered": scattered,
+    "upright": upright,
+    "one way": one_way,
 }
+USUAL = ("ang", "seven", "turntable", "scattered")
 
 
 def visits(name: str, random: np.random.Generator) -> Visits:

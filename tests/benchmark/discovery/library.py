@@ -21,7 +21,7 @@ SMALLEST = 1e-3  # of a column's length: less beside the base model is not there
 
 @dataclass(frozen=True)
 class Library:
-    """`y` (rows,) and the candidates' columns (rows, k), white and freed of the base model `base` (rows, p), orthonormal.
+    """`y` (rows,) and the candidates' columns (rows, k), white and freed of the base model, `base` (rows, p).
 
     Rows are those of x, then those of y, in order of time; `floor` (rows,) is the noise by which they were divided.
     """

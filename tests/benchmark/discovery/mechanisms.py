@@ -42,7 +42,7 @@ def off_centre(s: Stand, run: Run, size: Array) -> Stand:
 
 def loose_gear(s: Stand, run: Run, size: Array) -> Stand:
     """The table stays until the tooth has gone through its play."""
-    return replace(s, beta=trailing(s.beta, size[0], s.beta[0]))
+    return replace(s, beta=trailing(s.beta, size[0], 0.0))
 
 
 def sunk_foot(s: Stand, run: Run, size: Array) -> Stand:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from tests.benchmark.discovery import ours
+from tests.benchmark.discovery import oracle, ours, peers
 from tests.benchmark.discovery.cases import case
 from tests.benchmark.discovery.equals import equals
 from tests.benchmark.discovery.library import library
@@ -23,6 +23,11 @@ def record(which: Case) -> dict[str, Any]:
     """What is true of a set, and what each method says of it."""
     table, truth = case(which.name, which.strength, which.seed)
     lib = library(table)
+    said = {
+        "ours": ours.answer(table, truth),
+        **peers.answers(table, truth, lib),
+        "oracle": oracle.answer(table, truth),
+    }
     return {
         "key": which.key,
         "row": which.row,
@@ -36,5 +41,6 @@ def record(which: Case) -> dict[str, Any]:
         "equals": [sorted(names) for names in equals(table, truth, lib)],
         "outside": truth.outside,
         "structure": truth.structure,
-        "answers": {"ours": ours.answer(table, truth)},
+        "experiment": truth.experiment,
+        "answers": {name: answer for name, answer in said.items() if answer is not None},
     }

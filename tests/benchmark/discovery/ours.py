@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from calibrations.diagnose import diagnose
-from calibrations.discover import discover
+from calibrations.diagnose import Diagnosis, diagnose
+from calibrations.discover import Discovery, discover
 from calibrations.model import Model
 from calibrations.model_file import read_model
 from calibrations.problem import Problem
@@ -33,12 +33,21 @@ def answer(table: Table, truth: Truth) -> dict[str, Any]:
         "causes": list(found.causes),
         "refinements": list(found.refinements),
         "alternatives": {name: list(rivals) for name, rivals in found.alternatives.items()},
-        "rivals": list(asked.path.steps[0].taken.indistinguishable_from) if asked.path.steps else [],
+        "listed": _listed(asked, found),
         "structure": found.residual_structure or asked.residual_structure,
         "experiment": [experiment.procedure, dict(experiment.settings)] if experiment else None,
         "error": error(found.end.model, table, truth),
         **{name: round(seconds, 2) for name, seconds in taken.items()},
     }
+
+
+def _listed(asked: Diagnosis, found: Discovery) -> list[str]:
+    """The first cause and what it is said to be taken for."""
+    if found.causes:
+        return [found.causes[0], *found.alternatives.get(found.causes[0], ())]
+    return (
+        [asked.path.steps[0].taken.name, *asked.path.steps[0].taken.indistinguishable_from] if asked.path.steps else []
+    )
 
 
 def _fresh(table: Table) -> Table:
@@ -47,7 +56,7 @@ def _fresh(table: Table) -> Table:
 
 
 def error(model: Model, table: Table, truth: Truth) -> float | None:
-    """What a reading at poses that were not shown would miss by, in noise floors: the model's own error, and white noise.
+    """What a reading at poses that were not shown would miss by, in noise floors: the model's error, and white noise.
 
     At the table's own poses, without their noise, where no others are known.
     """

@@ -8,7 +8,7 @@ imported from the catalogue of effects, nor from the simulated world.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -16,7 +16,7 @@ from zlib import crc32
 
 import numpy as np
 
-from tests.benchmark.discovery.layouts import LAYOUTS, Array, visits
+from tests.benchmark.discovery.layouts import USUAL, Array, visits
 
 STOPS = 24  # on the way of one stage from pose to pose
 ARRIVAL_S, DEG_S = 1.0, 20.0  # settling, and speed of the stages
@@ -47,6 +47,7 @@ class Run:
     layout: str
     seed: int
     cold: bool = False  # the sensor was powered at the beginning
+    room: str = "breathing"  # or "rising", or "settling"
 
     def draw(self, what: str) -> np.random.Generator:
         """Random numbers of one purpose, always the same."""
@@ -84,8 +85,12 @@ class Run:
 
     @cached_property
     def temperature_c(self) -> Array:
-        """Of the die: the room breathes one to three times in a record, and drifts a little."""
+        """Of the die: the room breathes one to three times in a record, and drifts a little; or it only rises."""
         r = self.draw("room")
+        if self.room == "rising":
+            return r.uniform(20, 27) + r.uniform(1, 3) * self.u
+        if self.room == "settling":
+            return r.uniform(25, 30) - r.uniform(2, 5) * np.exp(-self.u / r.uniform(0.15, 0.4))
         waves = r.uniform(1, 2.5) * np.sin(2 * np.pi * (r.uniform(1.2, 3.2) * self.u + r.random()))
         return r.uniform(20, 27) + waves + r.uniform(-0.8, 0.8) * self.u + 0.3 * np.sin(2 * np.pi * 5.3 * self.u)
 
@@ -199,7 +204,4 @@ def sized(run: Run, name: str, mechanism: Mechanism, target_v: float) -> Built:
 
 def layout_of(seed: int) -> str:
     """Layouts in turn."""
-    return list(LAYOUTS)[seed % len(LAYOUTS)]
-
-
-Catalogue = Mapping[str, Mechanism]
+    return USUAL[seed % len(USUAL)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable, Iterable
 from itertools import permutations
@@ -42,6 +43,18 @@ def unexplained(record: Record, said: Record) -> bool:
 
 def structure_right(record: Record, said: Record) -> bool:
     return bool(said.get("structure")) and re.search(record["structure"], said["structure"]) is not None
+
+
+def listed(record: Record, said: Record) -> bool:
+    """Whether the cause is in the list, and something that it can be taken for."""
+    names = set(said.get("listed", ()))
+    return bool(names & set(record["causes"][0])) and bool(
+        names & (set(record["equals"][0]) - set(record["causes"][0]))
+    )
+
+
+def experiment_right(record: Record, said: Record) -> bool:
+    return bool(said.get("experiment")) and re.search(record["experiment"], json.dumps(said["experiment"])) is not None
 
 
 Judge = Callable[[Record, Record], bool | float | None]
@@ -109,6 +122,8 @@ DEMANDS: tuple[tuple[str, str, Callable[[Record], bool], Judge, str, float], ...
     ("triples: wrongly unexplained", "triple", always, unexplained, "<", 0.20),
     ("outside, weak and up: unexplained", "unknown", at(3, 10, 30), unexplained, ">", 0.95),
     ("outside, weak and up: structure right", "unknown", at(3, 10, 30), structure_right, ">", 0.80),
+    ("inseparable: listed", "inseparable", always, listed, ">", 0.90),
+    ("inseparable: the experiment that tells", "inseparable", always, experiment_right, ">", 0.90),
 )
 
 

@@ -6,11 +6,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from tests.benchmark.discovery.cases import STRENGTHS
+from tests.benchmark.discovery.inseparable import INSEPARABLE
 from tests.benchmark.discovery.mechanisms import MECHANISMS
 from tests.benchmark.discovery.others import SAMPLED, WORLD, WORLD_OUTSIDE
 from tests.benchmark.discovery.outside import OUTSIDE
 
-ROWS = ("clean", "slow", "single", "unknown", "pair", "triple")
+ROWS = ("clean", "slow", "single", "unknown", "pair", "triple", "inseparable")
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,8 @@ def sets(row: str, count: int) -> Iterator[Case]:
             yield Case(row, "clean/slow", 0.0, 2000 + k)
         elif row in ("pair", "triple"):
             yield Case(row, row, STRENGTHS["medium"], 4000 + k)
+        elif row == "inseparable":
+            yield Case(row, f"inseparable/{list(INSEPARABLE)[k % len(INSEPARABLE)]}", STRENGTHS["medium"], 5000 + 5 * k)
         else:
             names = SINGLE if row == "single" else UNKNOWN
             for strength in STRENGTHS.values():
