@@ -24,10 +24,10 @@ def exclude(record: Record, run_id: str, number: int, reason: str | None) -> Run
 
 
 def _evaluate_again(record: Record, run: Run) -> None:
-    """The results of the poses that are left; none, and why, where they do not determine them."""
+    """The results of the poses that are left; what is missing, and why, where they do not determine all."""
     results, why = judged(record, run)
     if results or why:
         record.set_results(run.run, results)
-        record.note(run.run, RESULTS, f"none: {why}" if why else "evaluated again")
+        record.note(run.run, RESULTS, why or "evaluated again")
     elif run.results:
         record.note(run.run, RESULTS, "given by the procedure itself, which knew all poses; not evaluated again")

@@ -179,7 +179,7 @@ def _carry_out(record: Record, rig: Rig, run: Run, procedure: Procedure, watch: 
         if isinstance(failure, Exception) and error is not failure:
             raise  # a fault of the program is not the run's
         return Outcome(record.run(run.run), error, tuple(complaints))
-    record.set_state(run.run, "complete", why and f"no results: {why}", results)
+    record.set_state(run.run, "complete", why and f"results: {why}", results)
     return Outcome(record.run(run.run))
 
 

@@ -11,22 +11,24 @@ from rig.bench import Bench
 from rig.errors import RecordError
 from rig.record import Record, Run
 from rig.record.measured import Measured, sensors_of
-from rig.results.result import Result, documents
+from rig.results.result import Missing, Result, documents
 
 
 def judged(record: Record, run: Run) -> tuple[dict[str, Any], str | None]:
-    """The run's results as documents, judged by the limits of its bench; where what was measured gives none, why.
+    """The run's results as documents, judged by the limits of its bench; and which of them are missing, and why.
 
     An instrument's fault that shows only now is raised: SensorFault.
     """
     try:
         found = evaluated(record, record.run(run.run))  # as it is now: the number of its rows bounds the memory
     except (CalibrationError, RecordError) as error:
-        return {}, str(error)
-    return documents(found, Bench.model_validate(run.bench).result_limits), None
+        return {}, f"none: {error}"
+    given = {name: result for name, result in found.items() if isinstance(result, Result)}
+    missing = [f"no {name}: {result.why}" for name, result in found.items() if isinstance(result, Missing)]
+    return documents(given, Bench.model_validate(run.bench).result_limits), "; ".join(missing) or None
 
 
-def evaluated(record: Record, run: Run) -> dict[str, Result]:
+def evaluated(record: Record, run: Run) -> dict[str, Result | Missing]:
     """What the run's measurements come to, by name; nothing for a procedure without results.
 
     Those of a batch begin with the sensor's name: `a1/bias-drift-x`. What belongs to the bench (OF_THE_BENCH of the
@@ -38,7 +40,7 @@ def evaluated(record: Record, run: Run) -> dict[str, Result]:
     module = importlib.import_module(f"rig.results.{name}")
     sensors = [] if getattr(module, "OF_THE_BENCH", False) else sensors_of(run)
     if not sensors:
-        found: dict[str, Result] = module.evaluate(Measured(record, run))
+        found: dict[str, Result | Missing] = module.evaluate(Measured(record, run))
         return found
     each = {sensor: module.evaluate(Measured(record, run, sensor)) for sensor in sensors}
     return {f"{sensor}/{name}": result for sensor, results in each.items() for name, result in results.items()}

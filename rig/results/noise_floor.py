@@ -9,37 +9,40 @@ from calibrations.noise_floor import hidden_inclination_deg, rms
 from procedures.noise_floor import STILL
 from rig.record import Kept
 from rig.record.measured import Measured
-from rig.results.result import Result
+from rig.results.result import Missing, Result
 
 PEAK_TO_PEAK = 4  # x rms: Ang V
 UPRIGHT_DEG = {"x": (0.0, 180.0), "y": (90.0, 270.0)}  # beta at +1 g and at -1 g
 NAMES = ("noise-rms-{axis}", "noise-pp-{axis}", "inclination-{axis}")
 
 
-def evaluate(measured: Measured) -> dict[str, Result]:
-    """V, and deg for the inclination. Raises DataError where the still record, or a pose at +-1 g, is missing."""
+def evaluate(measured: Measured) -> dict[str, Result | Missing]:
+    """V, and deg for the inclination, which needs both poses at +-1 g. Raises DataError without a still record."""
     upright: list[Kept] = []
     still: list[Kept] = []
     for kept in measured.kept():
         (still if kept.pose.path.startswith(STILL) else upright).append(kept)
     if not still:
         raise DataError(f"run {measured.run.run} holds no still record yet; `rig resume` goes on with it")
-    first, results = still[0].samples, {}
-    for axis, betas in UPRIGHT_DEG.items():
+    first, results = still[0].samples, dict[str, Result | Missing]()
+    for axis in UPRIGHT_DEG:
         if (channel := f"v{axis}") not in first.channels:
             continue
         k = first.channels.index(channel)
         value, std = rms([kept.samples.volts[:, k] for kept in still])
-        plus, minus = (_output(upright, channel, beta_deg) for beta_deg in betas)
-        inclination = hidden_inclination_deg(PEAK_TO_PEAK * value, (plus - minus) / 2)
         results[f"noise-rms-{axis}"] = Result(value, "V", std)
         results[f"noise-pp-{axis}"] = Result(PEAK_TO_PEAK * value, "V", PEAK_TO_PEAK * std)
-        results[f"inclination-{axis}"] = Result(inclination, "deg", inclination * std / value if value else None)
+        results[f"inclination-{axis}"] = _inclination(upright, axis, value, std)
     return results
 
 
-def _output(upright: list[Kept], channel: str, beta_deg: float) -> float:
-    found = [kept.dwell.means[channel] for kept in upright if kept.pose.beta_deg == beta_deg]
-    if not found:
-        raise DataError(f"there is no pose at alpha 90, beta {beta_deg:g} deg; `rig show RUN --poses` lists those kept")
-    return float(np.mean(found))
+def _inclination(upright: list[Kept], axis: str, rms_v: float, std_v: float) -> Result | Missing:
+    outputs_v = []
+    for beta_deg in UPRIGHT_DEG[axis]:
+        found = [kept.dwell.means[f"v{axis}"] for kept in upright if kept.pose.beta_deg == beta_deg]
+        if not found:
+            return Missing(f"there is no pose at alpha 90, beta {beta_deg:g} deg; `rig show RUN --poses` lists all")
+        outputs_v.append(float(np.mean(found)))
+    plus, minus = outputs_v
+    inclination = hidden_inclination_deg(PEAK_TO_PEAK * rms_v, (plus - minus) / 2)
+    return Result(inclination, "deg", inclination * std_v / rms_v if rms_v else None)

@@ -34,6 +34,13 @@ class Result:
         return "pass" if inside >= guard else "fail" if inside < -guard else "marginal"
 
 
+@dataclass(frozen=True)
+class Missing:
+    """A result that the poses which are left do not determine, and why."""
+
+    why: str
+
+
 def returned(name: str, given: Any) -> Result:
     """A result that a procedure returns itself: {"value": 2.0, "unit": "g", "std": 0.1}. Raises ProcedureError."""
     try:

@@ -66,8 +66,18 @@ def test_it_is_said_in_words(rig: Rig, run: str) -> None:
     assert rig("exclude", run, "5", "--include").out.startswith(f"{run}: pose 5 is taken in again")
 
 
+def test_what_the_other_poses_still_determine_is_given_and_the_rest_is_named(rig: Rig, run: str) -> None:
+    before = results(run)
+    said = rig("exclude", run, "0", "--reason", "x").out
+    assert "results: no inclination-x: there is no pose at alpha 90, beta 0 deg" in said
+    assert results(run) == {name: result for name, result in before.items() if name != "inclination-x"}
+    assert "no inclination-x" in rig("show", run).out
+
+
 def test_poses_that_do_not_determine_the_results_leave_none(rig: Rig, run: str) -> None:
-    assert "results: none: there is no pose at alpha 90, beta 0 deg" in rig("exclude", run, "0", "--reason", "x").out
+    for number in ("4", "5", "6"):
+        said = rig("exclude", run, number, "--reason", "x").out
+    assert "results: none: run " in said
     assert results(run) == {}
     assert rig("show", run).status == 0
 

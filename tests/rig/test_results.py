@@ -139,5 +139,5 @@ def test_what_was_measured_is_complete_even_if_nothing_comes_of_it(rig: Rig, mon
     ended = rig("run", "level-check", "--unattended", "--json")
     document = json.loads(ended.out)
     assert (ended.status, document["state"], document["results"]) == (1, "complete", {})
-    assert "no results: the stretches are too short" in ended.err
-    assert "no results: the stretches are too short" in rig("show", document["run"]).out
+    assert "results: none: the stretches are too short" in ended.err
+    assert "results: none: the stretches are too short" in rig("show", document["run"]).out
