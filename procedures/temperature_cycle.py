@@ -46,8 +46,11 @@ def temperature_cycle(
 def staircase(temperatures_c: tuple[float, ...], cycles: int) -> list[tuple[str, float]]:
     """(path, set point) of every step: up, then down, of each cycle. Raises SettingError."""
     rising = sorted(set(temperatures_c))
-    if len(rising) < 2 or cycles < 1:
-        raise SettingError("temperature-cycle: give at least two temperatures_c and one cycle, such as 35,50,65")
+    if len(rising) < 2:
+        given = f"{rising[0]:g} alone shows no slope" if rising else "there is none"
+        raise SettingError(f"temperature-cycle: temperatures_c must be at least two, such as 35,50,65; {given}")
+    if cycles < 1:
+        raise SettingError(f"temperature-cycle: cycles must be 1 or more, is {cycles}; two tell hysteresis from drift")
     once = [*(("up", c) for c in rising), *(("down", c) for c in rising[-2::-1])]
     return [(f"{way} {c:g} cycle {k}", c) for k in range(1, cycles + 1) for way, c in once]
 
