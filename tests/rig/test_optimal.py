@@ -1,0 +1,171 @@
+"""Poses chosen for a model: better than the sweep by plan and in truth, and a run like any other."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Callable, Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from calibrations.model_file import read_model
+from procedures.catalogue import find
+from procedures.session import Pose
+from procedures.settings import parse
+from rig.bench import read_bench
+from rig.cli.chosen import lines
+from rig.errors import PlanError
+from rig.optimal import AGAIN, CHECK, DESIGN, Optimal, most_relative, optimal, relative
+from rig.planned import EXCHANGE_S
+from rig.record import Kept, Record
+from rig.runner import resume, start
+from rig.travel import from_home_s, moves_s
+from tests.rig.rigging import Onlooker
+
+COARSE = {"step_deg": "30", "inclinations_deg": "90,45,135"}  # a small sweep, to be quick
+
+
+def settings(**given: str) -> Mapping[str, Any]:
+    return parse(find("sweep"), given)
+
+
+@cache
+def chosen(model: str = "linear", criterion: str = "I", poses: int = 40, **given: str) -> Optimal:
+    return optimal(read_bench(), find("sweep"), settings(**(given or COARSE)), read_model(model), poses, criterion)
+
+
+def angles(pose: Pose) -> tuple[float, float]:
+    return pose.alpha_deg, pose.beta_deg
+
+
+@pytest.mark.parametrize("paths", ["grid", "ang"])
+def test_it_takes_1_8_times_less_rig_time_than_the_standard_sweep(paths: str) -> None:
+    found = chosen(poses=60, paths=paths)
+    assert found.times_less > 1.8
+    assert found.equal.plan.poses == 60
+    assert 0.98 < relative(found.standard, found.equal) <= 1
+    assert 0.98 < most_relative(found.standard, found.all_equal) <= 1
+    assert found.drift_loss < 0.05
+    assert abs(found.height_correlation) < 0.3
+
+
+@pytest.mark.parametrize("criterion", ["D", "I"])
+def test_poses_are_those_of_the_range(criterion: str) -> None:
+    poses = chosen(criterion=criterion).equal.poses
+    paths = Counter(pose.path for pose in poses)
+    assert (paths[DESIGN], paths[AGAIN], paths[CHECK]) == (32, 4, 4)
+    assert all(45 <= pose.alpha_deg <= 135 and 0 <= pose.beta_deg < 360 for pose in poses)
+    design = Counter(angles(pose) for pose in poses if pose.path != CHECK)
+    assert all(design[angles(pose)] >= 2 for pose in poses if pose.path == AGAIN)
+    assert not {angles(pose) for pose in poses if pose.path == CHECK} & set(design)
+
+
+def test_the_same_question_has_the_same_answer() -> None:
+    assert chosen().equal.poses == chosen.__wrapped__().equal.poses
+
+
+def test_what_the_sweep_tells_is_told() -> None:
+    found = chosen("physical")
+    assert found.standard.told.all()
+    assert np.all(np.isfinite(found.equal.errors))
+
+
+def test_the_sensor_is_turned_over_once() -> None:
+    flips = [pose.flip for pose in chosen(face="both", **COARSE).equal.poses]
+    assert flips == sorted(flips)
+    assert 0 < sum(flips) < len(flips)
+
+
+def test_travel_is_what_a_plan_counts() -> None:
+    found = chosen().equal
+    poses = found.poses
+    travel = from_home_s(read_bench(), poses)[0] + sum(
+        moves_s(read_bench(), poses)[k, k + 1] for k in range(len(poses) - 1)
+    )
+    counted = sum(step.duration_s for step in found.plan.steps if " from " in step.what)
+    level = sum(step.duration_s for step in found.plan.steps if step.what.startswith("level"))
+    assert level > 0  # the table is turned for it, before the first pose
+    assert travel <= counted < travel + 20
+    assert moves_s(read_bench(), [Pose(0, 0, 1)] * 2)[0, 1] == pytest.approx(2 * (2 * np.sqrt(5 / 60) + EXCHANGE_S))
+
+
+@pytest.mark.parametrize(("poses", "told"), [(61, "give 14 to 60"), (13, "give 14 to 60 for the 4 parameters")])
+def test_too_many_and_too_few_are_refused(poses: int, told: str) -> None:
+    with pytest.raises(PlanError, match=told):
+        chosen(poses=poses)
+
+
+def test_a_sweep_that_tells_nothing_is_no_standard() -> None:
+    with pytest.raises(PlanError, match="determines no parameter of physical"):
+        chosen("physical", inclinations_deg="90")
+
+
+def test_people_are_told_what_it_saves_and_how_to_run_it() -> None:
+    text = "\n".join(lines(chosen("physical"), None))
+    assert "physical, 16 parameters: I-optimal poses" in text
+    assert "x less rig time at equal worst standard error" in text
+    assert f"rig run sweep --pose-list poses.csv --dwell-s {chosen('physical').equal.dwell_s:g}" in text
+
+
+def test_the_command_writes_poses_that_a_run_takes(rig: Callable[..., Any], tmp_path: Path) -> None:
+    out = tmp_path / "poses.csv"
+    small = ("--step-deg", "30", "--inclinations-deg", "90,45,135")
+    ended = rig("plan", "sweep", *small, "--optimal", "--poses", "20", "--out", str(out), "--json")
+    said = json.loads(ended.out)
+    assert said["schema"] == "rig.plan/1"
+    assert said["poses"] == len(said["optimal"]["poses"]) == 20
+    assert said["optimal"]["same_worst_error"]["duration_s"] == said["duration_s"]
+    planned = json.loads(rig("plan", "sweep", "--pose-list", str(out), "--dwell-s", "0.2", "--json").out)
+    assert planned["settings"]["pose_list"] == out.read_text().splitlines()
+
+
+def test_options_of_chosen_poses_need_optimal(rig: Callable[..., Any]) -> None:
+    assert rig("plan", "sweep", "--poses", "20").status == 2
+    assert rig("plan", "soak", "--optimal").status == 2
+
+
+@pytest.mark.sockets
+def test_a_run_of_chosen_poses_checks_its_model(rig: Callable[..., Any], tmp_path: Path, rig_home: Path) -> None:
+    out = tmp_path / "poses.csv"
+    rig(
+        "plan",
+        "sweep",
+        "--step-deg",
+        "30",
+        "--inclinations-deg",
+        "90,45,135",
+        "--optimal",
+        "--poses",
+        "20",
+        "--out",
+        out,
+    )
+    run = json.loads(rig("run", "sweep", "--pose-list", str(out), "--dwell-s", "0.5", "--unattended", "--json").out)
+    out.unlink()  # the record has what it needs
+    fitted = json.loads(rig("fit", run["run"], "--json").out)
+    assert fitted["unseen"]["poses"] == 4
+    assert fitted["unseen"]["repeats"] >= 4
+    assert "check poses" in rig("fit", run["run"]).out
+
+
+class Leaving(Onlooker):
+    """Stops the run when three poses are kept."""
+
+    def kept(self, kept: Kept) -> None:
+        super().kept(kept)
+        if len(self.seen) == 3:
+            raise KeyboardInterrupt
+
+
+@pytest.mark.sockets
+def test_an_interrupted_run_goes_on_with_the_same_poses() -> None:
+    listing = {**chosen(poses=20).equal.plan.settings, "dwell_s": 0.1}
+    with Record() as record:
+        run = start(record, read_bench(), find("sweep"), listing, Leaving()).run
+        assert (run.state, run.rows) == ("stopped", 3)
+        assert resume(record, run.run, Onlooker(), read_bench()).run.state == "complete"
+        assert tuple(record.poses(run.run)) == chosen(poses=20).equal.poses
