@@ -24,7 +24,7 @@ from tests.benchmark.discovery.score import figures
 from tests.benchmark.discovery.sets import ROWS, Case, sets
 
 WORKERS = 2
-METHODS = ["ours", *PEERS, "oracle"]
+METHODS = ["ours", *PEERS, "told", "oracle"]
 
 
 def main() -> None:
@@ -60,7 +60,7 @@ def measured(cases: list[Case], file: Path) -> list[dict[str, Any]]:
 
 def markdown(found: list[dict[str, Any]]) -> str:
     """A table as the demands have it."""
-    methods = [name for name in found[0] if name not in ("demand", "sign", "wanted", "sets", "met")] if found else []
+    methods = [name for name in METHODS if any(name in each for each in found)]
     lines = [["", "sets", "demand", *methods, "met"]]
     for each in found:
         wanted = f"{'at most' if each['sign'] == '<' else 'at least'} {100 * each['wanted']:g} %"

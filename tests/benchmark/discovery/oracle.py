@@ -15,7 +15,7 @@ from scipy.stats import chi2
 from calibrations.table import Array, Table
 from tests.benchmark.discovery.cases import Truth
 from tests.benchmark.discovery.mechanisms import MECHANISMS
-from tests.benchmark.discovery.rig import Run, gravity, sized, volts
+from tests.benchmark.discovery.rig import NotShown, Run, gravity, sized, volts
 
 LEVEL = 0.003  # of naming anything where there is nothing, over the whole search
 
@@ -60,7 +60,7 @@ def _traces(run: Run, truth: Truth) -> dict[str, Array]:
     for name, mechanism in MECHANISMS.items():
         try:
             built = there.get(name) or sized(run, name, mechanism, 10 * run.floor_v)
-        except ValueError:  # this record does not show it
+        except NotShown:
             continue
         change = (volts(run, (built,)) - clean)[given][:, :, None]
         found[name] = _white(truth, change if mechanism.place in ("stage", "body") else change * np.eye(2))

@@ -129,6 +129,10 @@ class Run:
         return self.noise_of_sample_v * float(np.sqrt((1 + kept) / (1 - kept) / n))
 
 
+class NotShown(Exception):
+    """A mechanism that a record does not show at the size asked for."""
+
+
 Change = Callable[[Any, "Run", Array], Any]  # what passes, the run, the mechanism's size per axis (stages: the first)
 
 
@@ -184,7 +188,7 @@ def unabsorbed(run: Run, change: Array, others: Sequence[Array] = ()) -> Array:
 
 
 def sized(run: Run, name: str, mechanism: Mechanism, target_v: float) -> Built:
-    """The mechanism at the size at which base model's error is `target_v` rms. Raises ValueError where none is."""
+    """The mechanism at the size at which base model's error is `target_v` rms. Raises NotShown where none is."""
     clean, share = volts(run, ()), shares(run, name)
 
     def log_ratio(log_size: float) -> float:
@@ -199,7 +203,7 @@ def sized(run: Run, name: str, mechanism: Mechanism, target_v: float) -> Built:
         if abs(ratio) < 0.01:
             return Built(mechanism, np.exp(middle) * share)
         low, high = (middle, high) if ratio < 0 else (low, middle)
-    raise ValueError(f"{name}: no size gives {target_v:g} V on layout {run.layout}, seed {run.seed}")
+    raise NotShown(f"{name}: no size gives {target_v:g} V on layout {run.layout}, seed {run.seed}")
 
 
 def layout_of(seed: int) -> str:
