@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from dataclasses import dataclass
 
 from calibrations.candidates import Candidate
@@ -61,14 +61,16 @@ MENU = (
     _of("sweep", FINE, step_deg=10.0, inclinations_deg=MANY),
     _of("sweep", FACES, face="both", step_deg=45.0, inclinations_deg=FEW),
     _of("sweep", FACES, face="both", step_deg=30.0, inclinations_deg=MANY[:7]),
-    _of("sweep", FACES, face="down", step_deg=45.0, inclinations_deg=FEW),
-    _of("sweep", FACES, face="down", step_deg=90.0, inclinations_deg=[90.0, 45.0]),
     _of("sweep", LONGER, step_deg=30.0, inclinations_deg=FEW, dwell_s=20.0),
     _of("soak", LATER, duration_s=1800.0, interval_s=300.0, off_s=AS_IT_IS),
     _of("soak", LATER, duration_s=7200.0, interval_s=600.0, off_s=AS_IT_IS),
     _of("soak", HELD, duration_s=3600.0, interval_s=600.0, off_s=AS_IT_IS, oven_c=WARM_C),
     _of("temperature-cycle", CYCLED, temperatures_c=[35.0, 50.0], soak_s=1200.0),
     _of("temperature-cycle", CYCLED),
+)
+BESIDE = (  # what tells nothing by itself, but much beside data that were taken face up
+    _of("sweep", FACES, face="down", step_deg=90.0, inclinations_deg=[90.0, 45.0]),
+    _of("sweep", FACES, face="down", step_deg=45.0, inclinations_deg=FEW),
 )
 
 
@@ -78,11 +80,11 @@ def separating(best: Candidate) -> Experiment | None:
     if not rivals:
         return None
     pairs = tuple((best.name, rival) for rival in rivals)
-    procedure, settings, why = _by_physics({best.name, *rivals})
+    procedure, settings, why = by_physics({best.name, *rivals})
     return Experiment(procedure, settings, pairs, why)
 
 
-def _by_physics(names: set[str]) -> tuple[str, dict[str, object], str]:
+def by_physics(names: Set[str]) -> tuple[str, dict[str, object], str]:
     """Procedure, settings, and why they tell effects of these names apart."""
     if names <= SQUARES:
         return "motion", {}, SHAKEN

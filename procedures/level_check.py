@@ -1,24 +1,32 @@
 """level-check: how far the table is from level, by the digital level or a typed reading.
 
 Excites   tilt of the base, zero offset of alpha.
-Blind to  turns about the vertical; the level's own offset, which the half turn of beta takes out.
+Blind to  turns about the vertical; the level's own offset, which the half turn takes out; on the table, which of base
+          and alpha is off: laid on the base, the level shows the base alone.
 Source    Ang V: the level is read before every experiment; reversal, as for any spirit level.
 """
 
 from __future__ import annotations
+
+from typing import Literal
 
 from procedures.errors import SafetyLimit
 from procedures.session import Reading, Session
 
 HALF_TURN = (("front", 0.0), ("back", 180.0))  # of beta: the table's tilt turns its sign on the level, its offset not
 LEVEL_RANGE_DEG = 45.0
+Place = Literal["table", "base"]
 
 
-def level_check(rig: Session, *, settle_s: float = 2.0) -> None:
+def level_check(rig: Session, *, settle_s: float = 2.0, on: Place = "table") -> None:
     """Read the level at beta = 0 and 180 deg with alpha at 0, and refuse to go on where the table is not level.
 
-    Other procedures begin with it where the bench has limits.level_deg. Raises SafetyLimit.
+    Other procedures begin with it where the bench has limits.level_deg. With `on="base"` a person lays the level on the
+    base beside the stages, reads it, turns it round by half a turn and reads it again. Raises SafetyLimit.
     """
+    if on == "base":
+        _read_base(rig)
+        return
     again = all(_is_read(rig, side) for side, _ in HALF_TURN) and _refused(rig)  # the base was levelled since
     for side, beta_deg in HALF_TURN:
         if again or not _is_read(rig, side):
@@ -74,6 +82,26 @@ def _read(rig: Session, side: str, beta_deg: float, settle_s: float) -> None:
     rig.keep_readings(
         Reading(f"level-{side}-x", x_deg, "deg", std_deg), Reading(f"level-{side}-y", y_deg, "deg", std_deg)
     )
+
+
+def _read_base(rig: Session) -> None:
+    """Both axes of the base, the level lying along the base and turned round; typed, as nothing moves it there."""
+    for side, turned_deg in HALF_TURN:
+        if rig.reading(f"base-{side}-y") is not None:
+            continue
+        where = f"The level on the base, turned by {turned_deg:g} deg from along the base's x"
+        names = [f"base-{side}-{axis}" for axis in "xy"]
+        shown = [
+            rig.number(
+                name,
+                f"{where}: what does it show along its {name[-1]}, in deg?",
+                "deg",
+                -LEVEL_RANGE_DEG,
+                LEVEL_RANGE_DEG,
+            )
+            for name in names
+        ]
+        rig.keep_readings(*(Reading(name, value, "deg") for name, value in zip(names, shown, strict=True)))
 
 
 def _typed_deg(rig: Session, name: str, axis: str, beta_deg: float) -> float:

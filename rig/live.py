@@ -13,7 +13,7 @@ from pathlib import Path
 
 from calibrations.discover import Discovery, discover
 from calibrations.effect import Effect
-from calibrations.experiment import MENU, Experiment
+from calibrations.experiment import BESIDE, MENU, Experiment
 from calibrations.model import Model
 from calibrations.table import Table
 from rig.bench import Bench
@@ -80,7 +80,7 @@ class Live:
         if found.next_experiment is None:
             return None
         dispute = Dispute.of(found.end, found.next_experiment.separates, self.effects)
-        menu = _new(MENU, done)
+        menu = _new((*BESIDE, *MENU), done)
         return chosen(dispute, found.next_experiment, self.bench, self.bench_file, menu, ("together",))
 
     def _following(self, telling: Experiment | None, done: Sequence[Measurement]) -> Experiment | None:

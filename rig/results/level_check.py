@@ -9,17 +9,18 @@ from rig.record.measured import Measured
 from rig.results.result import Result
 
 OF_THE_BENCH = True
-NAMES = ("level-{axis}", "level-offset-{axis}")
+NAMES = ("level-{axis}", "level-offset-{axis}", "base-{axis}", "base-offset-{axis}")
 
 
 def evaluate(measured: Measured) -> dict[str, Result]:
-    """Tilt along x and y of the level, and the offset that the half turn takes out, deg."""
+    """Tilt along x and y of the level, or of the base, and the offset that the half turn takes out, deg."""
     read = {reading.name: reading for reading in measured.readings()}
+    what = "base" if measured.run.settings.get("on") == "base" else "level"
     results = {}
     for axis in "xy":
-        front, back = read[f"level-front-{axis}"], read[f"level-back-{axis}"]
+        front, back = read[f"{what}-front-{axis}"], read[f"{what}-back-{axis}"]
         std = hypot(front.std, back.std) / 2 if front.std is not None and back.std is not None else None
         tilt_deg, offset_deg = reversal(front.value, back.value)
-        results[f"level-{axis}"] = Result(tilt_deg, "deg", std)
-        results[f"level-offset-{axis}"] = Result(offset_deg, "deg", std)
+        results[f"{what}-{axis}"] = Result(tilt_deg, "deg", std)
+        results[f"{what}-offset-{axis}"] = Result(offset_deg, "deg", std)
     return results

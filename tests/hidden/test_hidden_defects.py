@@ -118,13 +118,13 @@ TWINS = [
         {"axis-misalignment", "stage-zero-offset"},
         ("sweep", {"face": "both"}),
     ),
-    ({"base": {"tilt_y_deg": 0.05}}, {"base-tilt", "stage-zero-offset"}, ("level-check", {})),
+    ({"base": {"tilt_y_deg": 0.05}}, {"base-tilt", "stage-zero-offset"}, ("level-check", {"on": "base"})),
 ]
 
 
 @pytest.mark.parametrize(("defect", "names", "experiment"), TWINS, ids=["turned about z", "tilted about alpha"])
 def test_what_no_pose_can_tell_apart_is_listed_with_the_experiment_that_can(
-    defect: dict[str, object], names: set[str], experiment: tuple[str, dict[str, int]]
+    defect: dict[str, object], names: set[str], experiment: tuple[str, dict[str, str]]
 ) -> None:
     found = diagnose(table(rigs.swept(rigs.IDEAL.changed(defect), seed=8)), linear())
     best = found.path.steps[0].taken

@@ -1,0 +1,90 @@
+"""What an experiment is expected to tell is what it then tells."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from calibrations.effect import catalogue
+from calibrations.expected import CERTAIN, expected, told_apart
+from calibrations.fit import Fit, fit, refit
+from calibrations.foreseen import foreseen
+from calibrations.model import Model
+from calibrations.model_file import read_model
+from calibrations.table import Table
+from drivers.simulation.world import World
+from tests.hidden.rigs import IDEAL
+
+UP = np.arange(0.0, 361.0, 45.0)
+ALPHA, BETA = np.repeat([90.0, 30.0, 150.0], 18), np.tile(np.concatenate([UP, UP[::-1]]), 3)
+DIRECTION = np.tile(np.repeat([1, -1], 9), 3)
+CONSTANTS = {"sample_rate_hz": 1000.0, "filter_corner_hz": 15.07}
+
+
+def model(effect: str) -> Model:
+    return read_model("linear").with_effect(catalogue()[effect])
+
+
+def measured(turn_z_deg: float, seed: int, faces: tuple[int, ...]) -> list[Table]:
+    """A coarse sweep each with the sensor face up (0) or down (1), one after the other."""
+    config = IDEAL.changed(
+        {"sensor": {"package": {"turn_z_deg": turn_z_deg}}, "spread": {"imperfection_fraction": 0.0}}
+    )
+    world = World(config, seed)
+    means = [world.dwell_mean(ALPHA, BETA, direction=DIRECTION, flip=flip) for flip in faces]
+    return [Table.from_columns("poses", columns, CONSTANTS, "made") for columns in means]
+
+
+def rivals(table: Table) -> tuple[Fit, Fit]:
+    best = fit(model("stage-zero-offset"), table)
+    return best, refit(best, model("axis-misalignment"))
+
+
+def planned(best: Fit, flip: float) -> Table:
+    t = best.table.time_s.max() + 60 + 7 * np.arange(float(len(ALPHA)))
+    columns = {"alpha_deg": ALPHA, "beta_deg": BETA, "direction": DIRECTION, "t_s": t, "flip": np.full(len(t), flip)}
+    return foreseen(best, columns)
+
+
+def test_what_is_identical_stays_so_and_what_turns_with_the_sensor_does_not() -> None:
+    best, rival = rivals(measured(0.05, 1, (0,))[0])
+    up, down = (expected(best, rival, planned(best, flip)) for flip in (0.0, 1.0))
+    assert told_apart(up.together) < 0.1
+    assert told_apart(down.together) > 0.999
+    assert down.deviations == pytest.approx(np.sqrt(down.together))
+    assert down.together >= down.alone
+
+
+def test_it_is_the_gain_in_likelihood_that_the_experiment_then_brings() -> None:
+    ratios = []
+    for seed in range(6):
+        tables = measured(0.02, seed, (0, 1))
+        best, rival = rivals(tables[0])
+        foretold = expected(best, rival, planned(best, 1.0)).alone
+        wrong, right = rivals(tables[1])
+        gain = np.sum((wrong.residual**2 - right.residual**2) / right.noise.white**2)
+        ratios.append(gain / foretold)
+    assert np.mean(ratios) == pytest.approx(1.0, abs=0.15)
+
+
+def test_a_longer_dwell_brings_more_in_proportion() -> None:
+    best, rival = rivals(measured(0.05, 2, (0,))[0])
+    table = planned(best, 1.0)
+    longer = foreseen(
+        best,
+        {
+            **{n: table.column(n) for n in ("alpha_deg", "beta_deg", "direction", "t_s", "flip")},
+            "n": 4 * table.column("n"),
+        },
+    )
+    ratio = expected(best, rival, longer).alone / expected(best, rival, table).alone
+    assert ratio == pytest.approx(4.0, rel=0.05)
+
+
+def test_the_probability_of_telling_apart() -> None:
+    """Odds of 20 to 1 are six in twice the logarithm: at lambda = 6 they are reached half of the time."""
+    assert told_apart(0.0) == 0.0
+    assert told_apart(6.0) == pytest.approx(0.5)
+    assert told_apart(21.2) == pytest.approx(CERTAIN, abs=0.001)
+    draws = 30.0 + 2 * np.sqrt(30.0) * np.random.default_rng(1).standard_normal(20000)
+    assert told_apart(30.0) == pytest.approx(np.mean(draws > 6), abs=0.005)

@@ -1,0 +1,149 @@
+"""The next experiment is a command that the bench can carry out, and what it will tell is computed or not said."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from calibrations.diagnose import diagnose
+from calibrations.documents import diagnosis_document
+from calibrations.effect import catalogue
+from calibrations.experiment import BESIDE, MENU, Experiment, by_physics
+from calibrations.model_file import read_model
+from procedures.catalogue import find
+from procedures.settings import parse
+from rig.bench import Bench, read_bench
+from rig.cli import rig as commands
+from rig.cli.settings import read_settings
+from rig.next_experiment import Dispute, chosen, columns, command_line, planned_experiment, proposed
+from tests.hidden.quick_rig import QuickRig
+from tests.hidden.rigs import IDEAL
+from tests.rig.conftest import Ended
+
+PAIRS = (
+    {"quadratic-nonlinearity", "bias"},
+    {"output-filter", "sampling-delay"},
+    {"temperature-bias", "temperature-hysteresis"},
+    {"warm-up-bias", "bias-drift"},
+    {"temperature-bias", "warm-up-bias"},
+    {"base-tilt", "stage-zero-offset"},
+    {"axis-misalignment", "stage-zero-offset"},
+    {"dead-zone", "hysteresis"},
+)
+BY_PHYSICS = tuple(Experiment(*by_physics(names)[:2], (), "") for names in PAIRS)
+COARSE = Experiment("sweep", {"step_deg": 45.0, "inclinations_deg": [90.0, 30.0, 150.0]}, (), "")
+
+
+def named(e: Experiment) -> str:
+    return " ".join([e.procedure, *map(str, e.settings.values())])
+
+
+@pytest.mark.parametrize("experiment", [*MENU, *BESIDE, *BY_PHYSICS], ids=named)
+def test_every_experiment_can_be_planned_and_its_command_line_means_the_same(experiment: Experiment) -> None:
+    e, planned = planned_experiment(experiment, read_bench(None), Path("a bench.yaml"))
+    name, run, procedure, *rest = shlex.split(e.command)
+    assert (name, run, procedure, rest[-2:]) == ("rig", "run", e.procedure, ["--bench", "a bench.yaml"])
+    found = find(procedure)
+    assert parse(found, read_settings(rest[:-2], (), found.defaults)) == planned.settings
+    assert e.duration_s == pytest.approx(planned.duration_s, abs=0.1)
+    assert run in commands.list_commands(None)  # type: ignore[arg-type]
+
+
+def ambiguous(bench: Bench, **package: float) -> Any:
+    _, table = QuickRig(IDEAL.changed({"sensor": {"package": package}}), 8, bench).measure(COARSE)
+    return diagnose(table, read_model("linear"))
+
+
+def test_a_turned_sensor_is_to_be_mounted_face_down() -> None:
+    bench = read_bench(None)
+    e = proposed(ambiguous(bench, turn_z_deg=0.05), catalogue(), bench, None).next_experiment
+    assert e.procedure == "sweep"
+    assert e.settings["face"] == "both"
+    assert e.separates == (("stage-zero-offset", "axis-misalignment"),)
+    assert e.expected.deviations > 50
+    assert e.expected.probability > 0.999
+    assert e.duration_s < 3352
+
+
+def test_what_is_not_computed_is_null() -> None:
+    bench = read_bench(None)
+    _, table = QuickRig(IDEAL.changed({"base": {"tilt_y_deg": 0.05}}), 8, bench).measure(COARSE)
+    found = proposed(diagnose(table, read_model("linear")), catalogue(), bench, Path("b.yaml"))
+    e = diagnosis_document(found, "linear")["next_experiment"]
+    assert (e["procedure"], e["settings"], e["expected"]) == ("level-check", {"on": "base"}, None)
+    assert e["command"] == "rig run level-check --on base --bench b.yaml"
+    assert "the base alone" in e["why"]
+
+
+def dispute(temperature: bool) -> Dispute:
+    found = ambiguous(read_bench(None), turn_z_deg=0.05)
+    return replace(
+        Dispute.of(found.path.steps[0].after, found.next_experiment.separates, catalogue()), of_temperature=temperature
+    )
+
+
+def test_nobody_knows_the_rooms_temperature_ahead() -> None:
+    """Of what depends on temperature only experiments in the oven are foreseen, and they tell these two nothing."""
+    told = Experiment("temperature-cycle", {}, (("a", "b"),), "by physics")
+    assert chosen(dispute(temperature=True), told, read_bench(None)).expected is None
+    assert chosen(dispute(temperature=False), told, read_bench(None)).expected is not None
+
+
+def test_without_an_oven_nothing_is_planned_in_it_and_what_lacks_is_said(bench_file: Callable[..., Path]) -> None:
+    parts = {
+        role: part.model_dump(mode="json") for role, part in read_bench(None).instruments.items() if role != "oven"
+    }
+    bench = read_bench(bench_file({"instruments": parts}))
+    e = chosen(dispute(temperature=True), Experiment("soak", {"oven_c": 45.0}, (), "it is held"), bench)
+    assert e.duration_s is None
+    assert "it is held; but not on this bench: the bench has no oven" in e.why
+
+
+def test_limits_of_a_stage_rule_experiments_out(bench_file: Callable[..., Path]) -> None:
+    parts = {role: part.model_dump(mode="json") for role, part in read_bench(None).instruments.items()}
+    parts["alpha"]["settings"]["limits_deg"] = [-95, 95]
+    bench = read_bench(bench_file({"instruments": parts}))
+    told = Experiment("sweep", {"face": "both"}, (("a", "b"),), "by physics")
+    assert "alpha: 150 deg is outside its limits" in chosen(dispute(temperature=False), told, bench).why
+
+
+def test_the_oven_warms_over_minutes_and_time_goes_on() -> None:
+    bench = read_bench(None)
+    _, table = QuickRig(IDEAL, 1, bench).measure(COARSE)
+    _, planned = planned_experiment(
+        Experiment("temperature-cycle", {"temperatures_c": [35.0, 50.0], "soak_s": 3600.0}, (), ""), bench, None
+    )
+    foreseen: dict[str, Any] = dict(columns(planned, table))
+    at_c = [foreseen["temperature_c"][k : k + 8].mean() for k in (0, 8, 16)]
+    assert at_c == pytest.approx([34.5, 49.4, 35.6], abs=0.5)
+    assert foreseen["t_s"][0] > table.time_s.max()
+    assert np.all(np.diff(foreseen["t_s"]) > 0)
+    assert set(foreseen["dwell_s"]) == {5.0}
+
+
+def test_the_commands_print_it(rig: Callable[..., Ended], tmp_path: Path) -> None:
+    from calibrations.read_csv import write_csv
+
+    bench = read_bench(None)
+    _, table = QuickRig(IDEAL.changed({"sensor": {"package": {"turn_z_deg": 0.05}}}), 8, bench).measure(COARSE)
+    data = str(tmp_path / "turned.csv")
+    write_csv(table, Path(data))
+    for command in ("diagnose", "discover"):
+        said = rig(command, data).out
+        assert "    rig run sweep --face both --step-deg 45 --inclinations-deg 90,30,150\n    14:" in said
+        assert "standard deviations apart, told with a probability of 99.9 %, by its own data" in said
+
+
+def test_the_same_data_counts_once(refused: Callable[..., str]) -> None:
+    assert "good.csv is named twice; the same data counts once" in refused("discover", "good.csv", "good.csv")
+
+
+def test_a_command_line_is_made_of_words_that_a_shell_takes() -> None:
+    e = Experiment("sweep", {"step_deg": 22.5, "inclinations_deg": [90.0, -30.0], "face": "both"}, (), "")
+    assert command_line(e, None) == "rig run sweep --step-deg 22.5 --inclinations-deg 90,-30 --face both"
