@@ -1,4 +1,4 @@
-"""The benchmark's own rigs are what they say: sizes, noise, names, what cannot be told apart. Its scores count right."""
+"""The benchmark's own rigs are what they say: sizes, noise, names, what cannot be told apart. Its scores count."""
 
 from __future__ import annotations
 
