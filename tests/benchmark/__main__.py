@@ -25,6 +25,8 @@ TARGET_S = {
     "soak": 60.0,  # 12 h x 4 channels x 1 kHz through the sockets into a record
 }
 LEAST_TIMES_FASTER = 4.0  # samples of the simulated rig, against the same content out of numpy and scipy
+LEAST_TIMES_LESS = 1.8  # rig time of chosen poses, at equal worst standard error
+NEAR_PLAN = 1.2  # factor within which the parameters' real errors are those of the plan
 MOST_OVERHEAD = 0.02  # of dwells and moves, in real time
 
 Figure = dict[str, Any]
@@ -58,6 +60,7 @@ def _figures(folder: Path) -> Iterator[tuple[str, Figure]]:
     yield "night", _commands("night", folder, 1, "run", "soak", "--off-s", "0", "--unattended", "--json")
     yield "generation", _generation(folder)
     yield "poses in real time", _overhead(folder)
+    yield "chosen poses", _chosen_poses(folder)
     yield "100 kills", _inside("", subject(folder, "kills", "100"))
 
 
@@ -70,6 +73,14 @@ def _generation(folder: Path) -> Figure:
 def _overhead(folder: Path) -> Figure:
     said = json.loads(subject(folder, "poses", "20", "5").out)
     return {**said, "target_overhead": MOST_OVERHEAD, "met": said["overhead"] <= MOST_OVERHEAD}
+
+
+def _chosen_poses(folder: Path) -> Figure:
+    said = json.loads(subject(folder, "optimal", "30").out)
+    real = said["truth_over_plan"].values()
+    near = all(1 / NEAR_PLAN <= ratio <= NEAR_PLAN for ratio in real) and all(said["hidden_effects_named"].values())
+    met = min(said["times_less_rig_time"].values()) >= LEAST_TIMES_LESS and near
+    return {**said, "target_times_less": LEAST_TIMES_LESS, "target_truth": NEAR_PLAN, "met": met}
 
 
 def _demo(folder: Path) -> Figure:

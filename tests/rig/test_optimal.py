@@ -83,9 +83,8 @@ def test_the_sensor_is_turned_over_once() -> None:
 def test_travel_is_what_a_plan_counts() -> None:
     found = chosen().equal
     poses = found.poses
-    travel = from_home_s(read_bench(), poses)[0] + sum(
-        moves_s(read_bench(), poses)[k, k + 1] for k in range(len(poses) - 1)
-    )
+    between = moves_s(read_bench(), poses)
+    travel = from_home_s(read_bench(), poses)[0] + np.trace(between, offset=1)
     counted = sum(step.duration_s for step in found.plan.steps if " from " in step.what)
     level = sum(step.duration_s for step in found.plan.steps if step.what.startswith("level"))
     assert level > 0  # the table is turned for it, before the first pose
