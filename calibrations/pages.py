@@ -1,4 +1,4 @@
-"""One page of Markdown for each effect, made from its file: `python -m calibrations.pages docs/effects`.
+"""A page of Markdown and a picture for each effect, made from its file: `python -m calibrations.pages docs/effects`.
 
 The file stays the only place where an effect is described; a test fails when a page is not what its file says.
 """
@@ -12,6 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from calibrations.effect import Effect, Parameter, catalogue
+from calibrations.pictures.compact import sparing
+from calibrations.pictures.save import svg
+from calibrations.pictures.signature import picture, shown_value
 
 ACTS_ON = {
     "pose": "the pose: where the stages and the vertical really are",
@@ -40,6 +43,7 @@ def page(effect: Effect) -> str:
     lines = "\n".join(f"- **{title}**: {text}" for title, text in about)
     return (
         f"# {effect.name}\n\n{effect.summary[:1].upper()}{effect.summary[1:]}\n\n"
+        f"![{_alternative(effect)}](pictures/{effect.name}.svg)\n\n{_caption(effect)}\n\n"
         f"```text\n{effect.formula}\n```\n\n{lines}\n\n"
         "| parameter | unit | values | range | meaning |\n| --- | --- | --- | --- | --- |\n"
         f"{rows}\n{_footnote(effect)}"
@@ -48,12 +52,13 @@ def page(effect: Effect) -> str:
 
 def index(effects: Mapping[str, Effect]) -> str:
     """The list of all pages."""
-    rows = "\n".join(f"| [{e.name}]({e.name}.md) | {e.acts_on} | {e.summary.rstrip('.')} |" for e in effects.values())
+    rows = "\n".join(_gallery(effect) for effect in effects.values())
     return (
         "# The catalogue of physical effects\n\n"
         "Made by `python -m calibrations.pages docs/effects` from the files in `calibrations/effects`;\n"
-        "`rig effects NAME` shows the same in a terminal.\n\n"
-        f"| effect | acts on | what happens |\n| --- | --- | --- |\n{rows}\n{SOURCES}"
+        "`rig effects NAME` shows the same in a terminal. The pictures show what the linear model leaves of each,\n"
+        "noise aside.\n\n"
+        f"| effect | acts on | what happens | what it leaves |\n| --- | --- | --- | --- |\n{rows}\n{SOURCES}"
     )
 
 
@@ -63,13 +68,47 @@ def pages(effects: Mapping[str, Effect]) -> dict[str, str]:
     return {"README.md": index(effects)} | {f"{name}.md": page(effect) for name, effect in effects.items()}
 
 
+def drawing(effect: Effect) -> str:
+    """The effect's picture as an SVG document; the same effect gives the same text."""
+    return sparing(svg(picture(effect)).decode())
+
+
 def write(folder: Path) -> None:
-    """Write all pages, and remove those of effects that are no more."""
-    made = pages(catalogue())
-    for stale in set(folder.glob("*.md")) - {folder / name for name in made}:
+    """Write all pages and pictures, and remove those of effects that are no more."""
+    effects = catalogue()
+    made = pages(effects) | {f"pictures/{effect.name}.svg": drawing(effect) for effect in effects.values()}
+    for stale in {*folder.glob("*.md"), *folder.glob("pictures/*.svg")} - {folder / name for name in made}:
         stale.unlink()
+    (folder / "pictures").mkdir(exist_ok=True)
     for name, text in made.items():
         (folder / name).write_text(text, encoding="utf-8")
+
+
+def _alternative(effect: Effect) -> str:
+    return f"What the linear model leaves of {effect.name}"
+
+
+def _caption(effect: Effect) -> str:
+    """What the picture shows, and of how large an effect."""
+    kept = {"bias": "A model without a bias", "scale-factor": "A model without a scale factor"}
+    values = [_value(p, effect) for p in effect.parameters if not p.where]
+    return (
+        f"{kept.get(effect.name, 'The linear model')} leaves this, noise aside, of a sensor of 1 V/g with "
+        f"{', '.join(values)}."
+    )
+
+
+def _value(p: Parameter, effect: Effect) -> str:
+    value = np.atleast_1d(shown_value(p, effect))
+    unit = "" if p.unit == "1" else f" {p.unit.replace('{out}', 'V')}"
+    own = f" ({value[1]:g} for y)" if len(value) > 1 and value[1] != value[0] else ""
+    return f"{p.name.replace('_', ' ')} {value[0]:g}{unit}{own}"
+
+
+def _gallery(e: Effect) -> str:
+    """A row of the list, with the picture as it fits there."""
+    image = f'<img src="pictures/{e.name}.svg" alt="{_alternative(e)}" width="330">'
+    return f"| [{e.name}]({e.name}.md) | {e.acts_on} | {e.summary.rstrip('.')} | [{image}]({e.name}.md) |"
 
 
 def _needs(effect: Effect) -> str:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 
 MARKERS = re.compile(r'<g([^>]*)>\s*((?:<use [^>]*? style="([^"]*)"/>\s*)(?:<use [^>]*? style="\3"/>\s*)*)</g>')
 COORDINATES = re.compile(r' (?:x|y|d|width|height)="[^"]*"')
+OFTEN = 3  # times the same style
 FINE = re.compile(r"(\.\d\d)\d+")
 
 
@@ -26,3 +28,22 @@ def _hoisted(found: re.Match[str]) -> str:
 def _rounded(found: re.Match[str]) -> str:
     """One attribute with its numbers cut to two decimals, on one line."""
     return " " + " ".join(FINE.sub(r"\1", found[0]).split())
+
+
+def sparing(text: str) -> str:
+    """The same drawing for a page that holds many: digits beyond 0.1 pt, names and words for machines left out."""
+    text = re.sub(r"<!DOCTYPE.*?>\s*|<metadata>.*?</metadata>\s*|<\?xml.*?\?>\s*", "", text, flags=re.DOTALL)
+    text = re.sub(r'<g id="[^"]*"', "<g", text).replace("font-family: 'DejaVu Sans', Verdana, sans-serif; ", "")
+    text = re.sub(r' transform="rotate\(-0 [^"]*"', "", text)
+    text = COORDINATES.sub(lambda found: re.sub(r"\.0(?=[ \"])", "", re.sub(r"(\.\d)\d+", r"\1", found[0])), text)
+    text = re.sub(r' d="M [-\d. L]*"', lambda path: path[0].replace(" L ", " "), text)
+    text = text.replace("<svg ", "<svg font-family=\"'DejaVu Sans', Verdana, sans-serif\" ", 1)
+    return re.sub(r">\n(?=</?[a-z])", ">", _classes(text)) + "\n"
+
+
+def _classes(text: str) -> str:
+    """Styles that stand there often are written once."""
+    often = [s for s, n in Counter(re.findall(r' style="([^"]*)"', text)).items() if n >= OFTEN]
+    for k, style in enumerate(often):
+        text = text.replace(f' style="{style}"', f' class="s{k}"')
+    return text.replace("</style>", "".join(f".s{k}{{{style}}}" for k, style in enumerate(often)) + "</style>", 1)

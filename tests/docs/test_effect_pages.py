@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import pytest
 
 from calibrations.effect import catalogue
-from calibrations.pages import page, pages, write
+from calibrations.pages import drawing, page, pages, write
 from tests.docs.markdown import ROOT
 
 FOLDER = ROOT / "docs" / "effects"
@@ -16,6 +17,7 @@ REMEDY = "run: python -m calibrations.pages docs/effects"
 
 def test_there_is_a_page_for_each_effect_and_no_other() -> None:
     assert {path.name for path in FOLDER.glob("*.md")} == set(pages(catalogue())), REMEDY
+    assert {path.stem for path in (FOLDER / "pictures").iterdir()} == set(catalogue()), REMEDY
 
 
 @pytest.mark.parametrize("name", pages(catalogue()))
@@ -32,7 +34,20 @@ def test_a_page_tells_all_that_is_known_of_an_effect() -> None:
     assert "| `slope` | {out}/K | one per axis | any | output per kelvin |" in text
 
 
-def test_a_page_of_an_effect_that_is_no_more_is_removed(tmp_path: Path) -> None:
-    (tmp_path / "phlogiston.md").write_text("# phlogiston\n", encoding="utf-8")
+@pytest.mark.parametrize("name", catalogue())
+def test_the_picture_is_up_to_date_and_small(name: str) -> None:
+    made = drawing(catalogue()[name])
+    assert (FOLDER / "pictures" / f"{name}.svg").read_text(encoding="utf-8") == made, REMEDY
+    assert len(made.encode()) < 20_000
+    assert "left over (mV)" in made  # text stays text
+    ET.fromstring(made)  # noqa: S314 what we have just made
+
+
+def test_a_page_of_an_effect_that_is_no_more_is_removed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    one = {"bias": catalogue()["bias"]}
+    monkeypatch.setattr("calibrations.pages.catalogue", lambda: one)
+    (tmp_path / "pictures").mkdir()
+    for stale in ("phlogiston.md", "pictures/phlogiston.svg"):
+        (tmp_path / stale).write_text("# phlogiston\n", encoding="utf-8")
     write(tmp_path)
-    assert {path.name for path in tmp_path.iterdir()} == set(pages(catalogue()))
+    assert {path.name for path in tmp_path.rglob("*.*")} == {"README.md", "bias.md", "bias.svg"}
