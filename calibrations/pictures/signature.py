@@ -25,7 +25,7 @@ from calibrations.table import Array, Table
 INCLINATIONS_DEG = (90.0, 30.0, 150.0, 60.0, 120.0)
 STEP_DEG = 9.0
 ACROSS = np.array([1.0, 0.6, 1.0])  # parameters of each axis, times those of x: no two are alike
-SMOOTH = 0.6  # von Neumann's ratio of a residual that is a function of a force; 2 where it is none
+SMOOTH = 1.0  # von Neumann's ratio of a residual that is a function of a force; 2 where it is none
 SAME = 0.02  # of its range
 DIGITS = 4  # decimals of mV: what lies beyond depends on the machine
 CLOSE_S = (3.0, 4.0)  # of a motion, where its waves are to be seen
