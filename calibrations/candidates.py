@@ -61,8 +61,13 @@ def candidates(before: Fit, effects: Mapping[str, Effect]) -> list[Candidate]:
     ]
     tried = [each for each in tried if each[3].shape[1]]
     search = Search(screen, [basis for *_, basis in tried])
-    refitted = _gains(before, [columns for *_, columns, _ in tried])
-    found = [_judge(screen, *each, gain, search.trials) for each, gain in zip(tried, refitted, strict=True)]
+    extras = [columns for *_, columns, _ in tried]
+    worth = _gains(before, extras)
+    besides = _gains(before, extras, before.problem.smooth) if before.problem.smooth.size else worth
+    found = [
+        _judge(screen, *each, gain, beside, search.trials)
+        for each, gain, beside in zip(tried, worth, besides, strict=True)
+    ]
     unseen = held_out_excess(before)
     found = _with_probabilities(found, before.residual.size, unseen)
     found.sort(key=lambda c: (c.held_out_after < unseen, schwarz(c, before.residual.size)), reverse=True)
@@ -75,7 +80,7 @@ def best_pair(before: Fit, found: list[Candidate]) -> tuple[Candidate, Candidate
     A sensor may miss two effects of which neither is seen while the other is missing.
     """
     pairs = [(a, b) for a, b in combinations(found, 2) if _fits(before, a.effect, b.effect)]
-    joint = _gains(before, [np.concatenate([a.columns, b.columns], axis=2) for a, b in pairs])
+    joint = _gains(before, [np.concatenate([a.columns, b.columns], axis=2) for a, b in pairs], before.problem.smooth)
     best, least = None, 1.0
     for (a, b), gain in zip(pairs, joint, strict=True):
         rank = a.rank + b.rank
@@ -145,14 +150,27 @@ def _contribution(before: Fit, problem: Problem, theta: Array, mine: NDArray[np.
     return (before.problem.residual(theta[~mine]) - problem.residual(theta))[:, :, None]
 
 
-def _gains(before: Fit, extras: list[Array]) -> list[float]:
+def _gains(before: Fit, extras: list[Array], smooth: Array | None = None) -> list[float]:
+    """Twice the gain in log-likelihood by each, the noise fitted anew with it, `smooth` columns set aside."""
     scaled = [e / np.maximum(np.sqrt(np.sum(e**2, axis=(0, 1))), np.finfo(float).tiny) for e in extras]
-    return gains(before.noise, before.residual, before.jacobian, scaled, before.problem.smooth)
+    nothing = np.zeros((before.table.n, 0))
+    return gains(before.noise, before.residual, before.jacobian, scaled, nothing if smooth is None else smooth)
 
 
 def _judge(
-    screen: Screen, effect: Effect, start: Array, columns: Array, basis: Array, refitted: float, trials: float
+    screen: Screen,
+    effect: Effect,
+    start: Array,
+    columns: Array,
+    basis: Array,
+    worth: float,
+    beside_smooth: float,
+    trials: float,
 ) -> Candidate:
+    """`worth`: twice the gain in log-likelihood; `beside_smooth`: what is left of it beside the smooth columns.
+
+    What returns with the angles passes for slow noise in neither test: it is set aside, or the noise stays as it was.
+    """
     before, rank = screen.fit, basis.shape[1]
     smooth = before.problem.smooth.shape[1]
     score = screen.statistic(basis)
@@ -160,13 +178,13 @@ def _judge(
         before.residual.size - before.jacobian.shape[2] - rank - smooth * len(before.channels), before.noise.freedom
     )
     p_score = float(fdtrc(rank, free, score / rank)) if smooth else 1.0
-    p_refitted = _tail(refitted, before.residual.size, rank, free)
+    p_refitted = _tail(beside_smooth, before.residual.size, rank, free)
     tests, searched = 2 if smooth else 1, effect.searched(before.table)
     after = before.residual - np.concatenate([before.jacobian, columns], axis=2) @ _change(before, columns)
     return Candidate(
         effect=effect,
         rank=rank,
-        gain=max(score if smooth else 0.0, refitted) - 2 * float(np.log(searched)),
+        gain=worth - 2 * float(np.log(searched)),
         p_value=float(of_search(min(p_score, p_refitted), tests * trials * searched)),
         excess_after=float(np.sqrt(np.mean((rms(after) / before.noise.floor) ** 2))),
         held_out_after=held_out_excess(before, columns),

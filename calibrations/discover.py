@@ -1,8 +1,8 @@
 """Add missing effects until none is missing; drop what later effects have made needless; say what caused the error.
 
-An effect whose loss would cost little beside the loss of the greatest transduction is a refinement: it corrects the
-form in which another acts, known only approximately, and is kept without being named as a cause. Geometry is exact: a
-strong misalignment makes nothing else a refinement.
+An effect whose loss would cost little beside the loss of the greatest is a refinement: it corrects the form in which
+another acts, known only approximately, and is kept without being named as a cause. Geometry is exact: a strong
+misalignment makes nothing else a refinement.
 """
 
 from __future__ import annotations
@@ -147,6 +147,6 @@ def _causes(steps: tuple[Added, ...]) -> tuple[str, ...]:
         return ()
     tied = {term.name for term in steps[0].before.model.terms if term.tied}
     costs = {s.name: cost(steps[-1].after, s.name, s.name in tied)[0] for s in steps}
-    approximate = [s.name for s in steps if s.after.model.terms[-1].effect.acts_on in ("transduction", "output")]
+    approximate = [s.name for s in steps if not s.after.model.terms[-1].effect.exact]
     greatest = max((costs[name] for name in approximate), default=0.0)
     return tuple(name for name, lost in costs.items() if name not in approximate or lost >= REFINEMENT * greatest)

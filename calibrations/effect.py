@@ -22,8 +22,9 @@ a tuple PARAMETERS, and at least one of four functions, named by where in the si
 `p` maps a parameter's name to its value: shape (3,) if per axis, else a float. Optional are
 NEEDS (columns), KINDS (of tables), AFTER (effects without which in a model it means nothing); CONSTANTS: name ->
 function of the table, for reference values that are kept with the model and not fitted; STARTS: name -> function of
-the table, for starts from the data, (axes,) or (starts, axes); and SEARCHED, a function of the table: how many starts
-that look different STARTS is the best of.
+the table, for starts from the data, (axes,) or (starts, axes); SEARCHED, a function of the table: how many starts
+that look different STARTS is the best of; and EXACT, where the form follows from geometry alone and needs no other
+effect to refine it.
 """
 
 from __future__ import annotations
@@ -112,6 +113,7 @@ class Effect:
     constants: Mapping[str, Callable[[Table], float]] = field(default_factory=dict)
     starts: Mapping[str, Callable[[Table], Array]] = field(default_factory=dict)
     searched: Callable[[Table], float] = _one
+    exact: bool = False
     pose: Callable[..., Any] | None = None
     force: Callable[..., Array] | None = None
     transduction: Callable[..., Array] | None = None
@@ -209,6 +211,7 @@ def _from_module(module: ModuleType, path: Path) -> Effect:
         constants=dict(getattr(module, "CONSTANTS", {})),
         starts=dict(getattr(module, "STARTS", {})),
         searched=getattr(module, "SEARCHED", _one),
+        exact=bool(getattr(module, "EXACT", False)),
         pose=hooks.get("pose"),
         force=hooks.get("force"),
         transduction=hooks.get("transduction"),

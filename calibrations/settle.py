@@ -23,6 +23,7 @@ from calibrations.screen import chance
 
 MOST_ROUNDS = 6
 TRIED = 2  # candidates for one place
+NEARLY = 0.9  # of the best one's gain
 CLEARLY = 6.0  # of twice the log-likelihood beyond the price of parameters: odds of 20 to 1
 
 
@@ -44,12 +45,11 @@ def settled(path: Path, effects: Mapping[str, Effect]) -> Settled:
         end, names = _needed(end, names, freed)
         found = _beside(path, end, tuple(name for name in names if name not in freed), effects)
         beside = {name: c for name, others in found.items() for c in others if c.name == name}
-        after = _exchanged(end, names, found)
+        after = _exchanged(end, names, found, freed)
         if after is None:
             break
-        end, names = after
-        further = grown(Path(end, (), ()), effects)
-        end, names = further.end, (*names, *(step.taken.name for step in further.steps))
+        further = grown(Path(after[0], (), ()), effects)
+        end, names = further.end, (*after[1], *(step.taken.name for step in further.steps))
     return Settled(end, names, beside)
 
 
@@ -72,21 +72,35 @@ def _beside(
     """For each effect, all candidates once every other one is in the model."""
     if len(path.steps) == 1 and names == (path.steps[0].taken.name,):
         return {names[0]: path.steps[0].candidates}
-    return {name: tuple(candidates(refit(end, end.model.without(name)), effects)) for name in names}
+    return {name: tuple(candidates(_without(end, name), effects)) for name in names}
 
 
 def _exchanged(
-    end: Fit, names: tuple[str, ...], beside: Mapping[str, tuple[Candidate, ...]]
+    end: Fit, names: tuple[str, ...], beside: Mapping[str, tuple[Candidate, ...]], freed: set[str]
 ) -> tuple[Fit, tuple[str, ...]] | None:
-    """The first exchange that makes the model clearly likelier; None where there is none."""
+    """The first exchange that makes the model clearly likelier; None where there is none.
+
+    One that is as good counts as well if it makes another effect needless.
+    """
     present = likelihood(end)
     for name, found in beside.items():
-        without = refit(end, end.model.without(name))
-        for c in found[:1] if found and found[0].name == name else found[:TRIED]:
-            after = added(without, c)
+        for c in _promising(found):
+            after = added(_without(end, name), c)
+            others = tuple(c.name if other == name else other for other in names)
+            if present - CLEARLY < likelihood(after) <= present + CLEARLY and c.name != name:
+                after, others = _needed(after, others, freed)
             if likelihood(after) > present + CLEARLY:
-                return after, tuple(c.name if other == name else other for other in names)
+                return after, others
     return None
+
+
+def _promising(found: tuple[Candidate, ...]) -> list[Candidate]:
+    """The best, and those that explain nearly as much."""
+    return [c for c in found[:TRIED] if c.gain > NEARLY * found[0].gain]
+
+
+def _without(end: Fit, name: str) -> Fit:
+    return refit(end, end.model.without(name))
 
 
 def likelihood(fit: Fit) -> float:

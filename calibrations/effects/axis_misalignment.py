@@ -15,6 +15,7 @@ from calibrations.effect import Parameter, Values
 from calibrations.table import Array, Table
 
 KINDS = ("poses", "motion")
+EXACT = True
 PARAMETERS = (
     Parameter("x", "deg", typical=2.0, per_axis=False, doc="turn about the sensor's x axis"),
     Parameter("y", "deg", typical=2.0, per_axis=False, doc="turn about the sensor's y axis"),

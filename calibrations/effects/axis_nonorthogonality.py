@@ -15,6 +15,7 @@ import numpy as np
 from calibrations.effect import Parameter, Values
 from calibrations.table import Array, Table
 
+EXACT = True
 PARAMETERS = (
     Parameter("xy", "deg", typical=2.0, per_axis=False, measured="y", doc="x-y departure from 90 deg"),
     Parameter("xz", "deg", typical=2.0, per_axis=False, measured="z", doc="x-z departure from 90 deg"),

@@ -18,6 +18,7 @@ from calibrations.effect import Parameter, Values
 from calibrations.table import Table
 
 KINDS = ("poses", "motion")
+EXACT = True
 PARAMETERS = (
     Parameter("x", "deg", typical=1.0, per_axis=False, doc="tilt of the base about its x axis"),
     Parameter("y", "deg", typical=1.0, per_axis=False, doc="tilt of the base about its y axis, that of alpha"),

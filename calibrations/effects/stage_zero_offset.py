@@ -18,6 +18,7 @@ from calibrations.effect import Parameter, Values
 from calibrations.table import Table
 
 KINDS = ("poses", "motion")
+EXACT = True
 PARAMETERS = (
     Parameter("alpha", "deg", typical=1.0, per_axis=False, doc="added to the angle alpha"),
     Parameter("beta", "deg", typical=1.0, per_axis=False, doc="added to the angle beta"),
