@@ -20,12 +20,14 @@ HARMONICS = range(2, 13)
 OF_ALPHA = range(2, 7)
 STEPS = 40
 RAMPS = 12
+FINER_RAMPS = 23
 SECTORS = 24
 SECTOR_WIDTH_DEG = 30.0
 FINER_WIDTHS_DEG = (10.0, 15.0, 20.0, 25.0, 30.0, 40.0, 50.0, 60.0)
 LEVELS = 12  # of a column, that a step could be at
 NEIGHBOURS = 200  # of a step, at most, once it is found
 FEWEST_LEVELS = 12  # values of a column that has levels
+ONE_SIDED = 10.0  # of twice the log-likelihood, for one side rather than both: odds of 150 to 1
 
 
 @dataclass(frozen=True)
@@ -33,14 +35,17 @@ class Pattern:
     """Columns, shape (channels, n, k), and what they mean.
 
     `expression` is what adds it to a model ("" where none could), `finer` gives patterns between it and its neighbours,
-    `choices` is twice the logarithm of how many there are of its kind, where it was chosen by the data.
+    `price` is what having chosen it by the data costs, as twice a log-likelihood; `slow` ones look like slow noise,
+    `poses` are rows that stand out.
     """
 
     text: str
     columns: Array
     expression: str = ""
     finer: Callable[[], list[Pattern]] = list
-    choices: float = 0.0
+    price: float = 0.0
+    slow: bool = False
+    poses: tuple[int, ...] = ()
 
     @property
     def name(self) -> str:
@@ -80,7 +85,7 @@ def per_channel(pattern: Pattern, channels: int) -> Pattern:
 
 def one_sided(pattern: Pattern, table: Table) -> list[Pattern]:
     """The same on approaches from one side only, where both are in the table."""
-    if "direction" in pattern.text or pattern.choices:
+    if "direction" in pattern.text or pattern.poses:
         return []
     direction = table.optional("direction", 0.0)
     sides = {"clockwise": ">", "anticlockwise": "<"} if np.ptp(direction) > 0 else {}
@@ -90,22 +95,39 @@ def one_sided(pattern: Pattern, table: Table) -> list[Pattern]:
         target, plus, of = pattern.expression.rpartition("+= ")
         expression = f"{target}{plus}(direction {sign} 0)*({of})" if of else ""
         columns = pattern.columns * rows[None, :, None]
-        found.append(Pattern(f"{pattern.text}, turning {word} only", columns, expression))
+        found.append(
+            replace(
+                pattern,
+                text=f"{pattern.text}, turning {word} only",
+                columns=columns,
+                expression=expression,
+                price=ONE_SIDED,
+            )
+        )
     return found
 
 
 def _in_time(table: Table) -> Iterator[Pattern]:
     t, named = table.time_s, "t_s" in table
     u: Array = (t - t.mean()) / (float(np.ptp(t)) or 1.0)
-    yield Pattern("trend with time", np.column_stack([u, u**2]), "a*t + b*t**2" if named else "")
+    yield Pattern("trend with time", np.column_stack([u, u**2]), "a*t + b*t**2" if named else "", slow=True)
     inner = np.unique(np.linspace(2, table.n - 3, min(STEPS, max(table.n - 4, 1))).astype(int))
     for k, near in zip(inner, _between(inner, table.n), strict=True):
         yield replace(_step(table, k), finer=partial(_steps, table, near))
     if named:
-        for start in np.quantile(t, np.linspace(0, 1, RAMPS + 2)[1:-1]):
-            text, expression = f"ramp from t = {start:.0f} s on", f"a*max(0, t - {start:.6g})"
-            since: Array = np.maximum(0.0, t - start) / (float(np.ptp(t)) or 1.0)
-            yield Pattern(text, since[:, None], expression)
+        starts = np.quantile(t, np.linspace(0, 1, RAMPS + 2))
+        for low, start, high in zip(starts[:-2], starts[1:-1], starts[2:], strict=True):
+            yield replace(_ramp(t, start), finer=partial(_ramps, t, low, high))
+
+
+def _ramps(t: Array, low: float, high: float) -> list[Pattern]:
+    return [_ramp(t, start) for start in np.linspace(low, high, FINER_RAMPS + 2)[1:-1]]
+
+
+def _ramp(t: Array, start: float) -> Pattern:
+    """Nothing up to `start`, and then more and more."""
+    since: Array = np.maximum(0.0, t - start) / (float(np.ptp(t)) or 1.0)
+    return Pattern(f"ramp from t = {start:.0f} s on", since[:, None], f"a*max(0, t - {start:.6g})", slow=True)
 
 
 def _between(places: Array, n: int) -> list[Array]:
@@ -124,7 +146,8 @@ def _step(table: Table, k: int) -> Pattern:
     at = (table.time_s[k - 1] + table.time_s[k]) / 2
     named = "t_s" in table
     text = f"step at t = {at:.0f} s" if named else f"step at row {at:.0f}"
-    return Pattern(text, np.where(np.arange(table.n) >= k, 1.0, 0.0)[:, None], f"a*step(t - {at:.7g})" if named else "")
+    expression = f"a*step(t - {at:.7g})" if named else ""
+    return Pattern(text, np.where(np.arange(table.n) >= k, 1.0, 0.0)[:, None], expression, slow=True)
 
 
 def _in_columns(table: Table) -> Iterator[Pattern]:

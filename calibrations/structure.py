@@ -16,6 +16,7 @@ from scipy.stats import norm
 
 from calibrations.candidates import SIGNIFICANT
 from calibrations.fit import Fit
+from calibrations.noise import rms
 from calibrations.patterns import Pattern, one_sided, patterns, per_channel
 from calibrations.screen import Screen, Search
 from calibrations.table import Array
@@ -24,15 +25,30 @@ MOST_NOISE = 2.5  # times the noise floor: more than white and slow noise of a s
 MOST_OUT = 1 / 10  # of the poses: more do not stand out
 FINALISTS = 6  # patterns that are sharpened
 NAMED = 6  # poses that are told one by one
-SURER = 10.0  # of twice the log-likelihood, for one side rather than both: odds of 150 to 1
+MOST_LEFT = 1 / 5  # of the excess variance, by a pattern that slow noise could look like
 
 
 def structure_of(fit: Fit) -> Pattern | None:
     """The plainest pattern in a fit's residual; None where there is none beyond noise."""
-    screen = Screen(without_slow(fit))
-    found = sorted(_significant(Screen(fit)), key=lambda p: worth(p, screen), reverse=True)[:FINALISTS]
+    screen, noise = Screen(without_slow(fit)), _patternless(fit)
+    every = patterns(fit.table, fit.channels)
+    found = _significant(every, Screen(fit)) or ([p for p in every if p.slow] if noise else [])
+    found = sorted(found, key=lambda p: worth(p, screen), reverse=True)[:FINALISTS]
     sharp = [sharpened(pattern, screen) for pattern in (*found, *_out(fit))]
-    return max(sharp, key=lambda p: worth(p, screen), default=None) or _patternless(fit)
+    sharp = [p for p in sharp if not (p.slow and noise) or _share_left(p, screen) < MOST_LEFT]
+    return max(sharp, key=lambda p: worth(p, screen), default=noise)
+
+
+def _share_left(pattern: Pattern, screen: Screen) -> float:
+    """Part of the residual's excess over white noise that the pattern leaves: slow noise leaves much of its own."""
+    fit, columns = screen.fit, pattern.columns.reshape(screen.fit.residual.size, -1)
+    J = np.hstack([fit.jacobian.reshape(fit.residual.size, -1), columns])
+    size = np.linalg.norm(J, axis=0)
+    J = J / np.where(size > 0, size, 1.0)
+    r = fit.residual.ravel()
+    left = (r - J @ np.linalg.lstsq(J, r, rcond=1e-9)[0]).reshape(fit.residual.shape)
+    after = float(np.mean((rms(left) / fit.noise.floor) ** 2))
+    return max(after - 1, 0.0) / max(fit.pooled_excess**2 - 1, 1e-9)
 
 
 def without_slow(fit: Fit) -> Fit:
@@ -44,7 +60,7 @@ def worth(pattern: Pattern, screen: Screen) -> float:
     """Twice the log-likelihood with the pattern less the price of its parameters, up to a constant."""
     basis = screen.basis(pattern.columns)
     left = float(screen.residual @ screen.residual) - screen.statistic(basis)
-    return likelihood(left, basis.shape[1], screen.fit) - pattern.choices
+    return likelihood(left, basis.shape[1], screen.fit) - pattern.price
 
 
 def likelihood(squares: float, parameters: int, fit: Fit) -> float:
@@ -53,9 +69,9 @@ def likelihood(squares: float, parameters: int, fit: Fit) -> float:
     return -rows * float(np.log(max(squares, 1e-300) / rows)) - parameters * float(np.log(rows))
 
 
-def _significant(screen: Screen) -> list[Pattern]:
+def _significant(every: list[Pattern], screen: Screen) -> list[Pattern]:
     """The patterns that noise alone would hardly show."""
-    tried = [(p, screen.basis(p.columns)) for p in patterns(screen.fit.table, screen.fit.channels)]
+    tried = [(p, screen.basis(p.columns)) for p in every]
     tried = [(p, basis) for p, basis in tried if basis.shape[1]]
     chances = Search(screen, [basis for _, basis in tried]).p_values
     return [p for (p, _), chance in zip(tried, chances, strict=True) if chance < SIGNIFICANT]
@@ -66,8 +82,7 @@ def sharpened(pattern: Pattern, screen: Screen) -> Pattern:
     table, channels = screen.fit.table, len(screen.fit.channels)
     near = [pattern, *(per_channel(p, channels) for p in pattern.finer() if np.ptp(p.columns) > 0)]
     best = max(near, key=lambda p: screen.statistic(screen.basis(p.columns)))
-    side = max(one_sided(best, table), key=lambda p: worth(p, screen), default=best)
-    return side if worth(side, screen) > worth(best, screen) + SURER else best
+    return max([best, *one_sided(best, table)], key=lambda p: worth(p, screen))
 
 
 def _out(fit: Fit) -> list[Pattern]:
@@ -77,7 +92,7 @@ def _out(fit: Fit) -> list[Pattern]:
         return []
     columns = per_channel(Pattern("", np.eye(n)[:, rows]), len(fit.channels)).columns
     choices = gammaln(n + 1) - gammaln(len(rows) + 1) - gammaln(n - len(rows) + 1)
-    return [Pattern(_named(fit, rows), columns, choices=2 * float(choices))]
+    return [Pattern(_named(fit, rows), columns, price=2 * float(choices), poses=tuple(map(int, rows)))]
 
 
 def standing_out(residual: Array) -> NDArray[np.intp]:

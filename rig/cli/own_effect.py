@@ -25,6 +25,6 @@ def told(pattern: Pattern | None, model: str, data: str, bench_file: Path | None
             "To take it into the model as an effect of your own (and then see what is left):",
             f"    {found['command']}",
         ]
-    if pattern is not None and pattern.choices and not Path(data).exists():
+    if pattern is not None and pattern.poses and not Path(data).exists():
         return [f"Look at them: rig show {data} --poses. rig exclude {data} POSE leaves one out, with a reason."]
     return []
