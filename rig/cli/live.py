@@ -50,6 +50,11 @@ class Taken:
         self.runs.append(outcome.run.run)
         return outcome.run.run, self._all()
 
+    def stopped(self) -> None:
+        """Tell what there is, to somebody who has stopped it between two runs."""
+        if self.runs:
+            note(f"What was measured is in the record. To see what it says: rig discover {' '.join(self.runs)}")
+
     def _all(self) -> Table:
         measured = [Measured(self.record, self.record.run(run), self.bench.first_sensor) for run in self.runs]
         return joined_runs([m.part("poses") for m in measured], [begun(self.record, run) for run in self.runs])
@@ -84,9 +89,13 @@ def discover_live(
                 f"--time {minutes:g}: the first measurement takes {first_s / 60:.1f} minutes; give more"
             )
         done: list[Measurement] = []
-        for measurement in live.measurements():
-            done.append(measurement)
-            note(told(done, live.time_s))
+        try:
+            for measurement in live.measurements():
+                done.append(measurement)
+                note(told(done, live.time_s))
+        except KeyboardInterrupt:
+            taken.stopped()
+            raise
     found = done[-1].found
     if out is not None:
         write_model(found.end, given, out)
