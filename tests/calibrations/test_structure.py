@@ -1,0 +1,86 @@
+"""The structure of a residual is named right, and its expression takes the error to the noise floor."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from calibrations.expression_effect import effect_for
+from calibrations.fit import Fit, fit
+from calibrations.model_file import read_model
+from calibrations.patterns import Pattern
+from calibrations.structure import structure_of
+from calibrations.table import Array, Table
+from tests.hidden import sampled
+
+SWEEP = sampled.sweep()
+BETA, TIME, WARM = np.radians(SWEEP.beta_deg), SWEEP.t_s, SWEEP.temperature_c
+FLOOR_V = 60e-6  # of a mean of `sampled`
+
+
+def changed(of: Array) -> Table:
+    """A sweep with as many noise floors of `of` on x, and less on y."""
+    return sampled.measured(3, lambda v, poses, random: v + FLOOR_V * of[:, None] * np.array([1.0, -0.7]))
+
+
+def turned(wave_deg: Array) -> Table:
+    """A sweep whose stage is off by so much."""
+    turn = np.radians(wave_deg)[:, None]
+    return sampled.measured(3, lambda v, poses, random: v + turn * poses.a[:, ::-1] * np.array([-1.0, 1.0]))
+
+
+def found(table: Table) -> tuple[Fit, Pattern | None]:
+    before = fit(read_model("linear"), table)
+    return before, structure_of(before)
+
+
+BUMP = np.maximum(0, 1 - np.abs(SWEEP.beta_deg - 200) / 25)
+KINDS: dict[str, Callable[[], Table]] = {
+    "5th harmonic of beta": lambda: changed(3 * np.sin(5 * BETA + 0.3)),
+    "8th harmonic of the stage angle beta": lambda: turned(0.02 * np.sin(8 * BETA)),
+    "step at t = 802 s": lambda: changed(6.0 * (TIME > 800)),
+    "step at temperature = 24.5 C": lambda: changed(6.0 * (WARM > 24.5)),
+    "ramp from t = 1": lambda: changed(9 * np.maximum(0, TIME - 1500) / 2100),
+    "sector of beta around 200 deg": lambda: changed(12 * BUMP),
+    "inclination alpha = 60 deg": lambda: changed(6.0 * (SWEEP.alpha_deg == 60)),
+    "follows direction of turning": lambda: changed(3 * SWEEP.direction),
+    "6th harmonic of beta, turning clockwise only": lambda: changed(4 * np.sin(6 * BETA) * (SWEEP.direction > 0)),
+}
+
+
+@pytest.mark.parametrize("words", KINDS)
+def test_each_kind_is_named_and_its_expression_explains_it(words: str) -> None:
+    before, pattern = found(KINDS[words]())
+    assert pattern is not None
+    assert words in pattern.text
+    after = fit(before.model.with_effect(effect_for(pattern.name, pattern.expression, before.table)), before.table)
+    assert before.pooled_excess > 1.5
+    assert after.pooled_excess < 1.15
+
+
+def test_poses_that_stand_out_are_listed() -> None:
+    off = np.zeros(len(BETA))
+    off[[12, 140, 377]] = 60.0, -60.0, 60.0
+    _, pattern = found(changed(off))
+    assert pattern is not None
+    assert (pattern.text, pattern.expression) == ("3 poses stand out: #12, #140, #377", "")
+
+
+def test_one_pose_and_many() -> None:
+    off = np.zeros(len(BETA))
+    off[7] = 60.0
+    assert found(changed(off))[1].text == "1 pose stands out: #7"  # type: ignore[union-attr]
+    off[np.arange(20, 29) * 13 % 500] = 60.0
+    assert found(changed(off))[1].text.endswith("and 4 more")  # type: ignore[union-attr]
+
+
+def test_a_walk_is_a_drift_and_no_step() -> None:
+    _, pattern = found(sampled.measured(3, sampled.kicks(20 * FLOOR_V)))
+    assert pattern is not None
+    assert pattern.text.startswith("slow drift without a pattern")
+
+
+def test_nothing_is_left_of_noise() -> None:
+    assert found(changed(0 * TIME))[1] is None
