@@ -36,6 +36,7 @@ def record(which: Case) -> dict[str, Any]:
         "name": which.name,
         "strength": which.strength,
         "seed": which.seed,
+        "mechanisms": [name for name, _ in truth.built],
         "layout": truth.layout,
         "rows": table.n,
         "slow": truth.slow,

@@ -94,15 +94,15 @@ def _m(place: str, change: object, structure: str) -> Mechanism:
 
 OUTSIDE: dict[str, Mechanism] = {
     "worm": _m("stage", worm, r"5th harmonic of .*beta"),
-    "slipped once": _m("stage", slipped_once, r"alpha = |inclination|step at|between t"),
-    "seesaw": _m("stage", seesaw, r"harmonic of .*beta|sector of beta|step at beta|beta"),
-    "arrived charge": _m("volts", arrived_charge, r"step at"),
-    "lid": _m("volts", lid, r"two levels|jump|telegraph|step at"),
+    "slipped once": _m("stage", slipped_once, r"alpha|stands? out"),
+    "seesaw": _m("stage", seesaw, r"harmonic of .*(alpha|beta)|sector of beta|step at beta"),
+    "arrived charge": _m("volts", arrived_charge, r"step at t"),
+    "lid": _m("volts", lid, r"two levels|jump|telegraph|step at t"),
     "stick-slip": _m("volts", stick_slip, r"saw|beta|stick"),
     "cable": _m("volts", cable, r"sector of beta"),
     "mains beat": _m("volts", mains_beat, r"oscillat|period|waves|beat|Hz"),
-    "sparks": _m("volts", sparks, r"outlier|spike|every"),
-    "magnet": _m("volts", magnet, r"alpha"),
+    "sparks": _m("volts", sparks, r"stands? out|outlier|spike|every"),
+    "magnet": _m("volts", magnet, r"harmonic of .*alpha|inclination"),
     "heater": _m("volts", heater, r"temperature"),
-    "grain": _m("transducer", grain, r"sector of beta|alpha|harmonic|scatter|beta"),
+    "grain": _m("transducer", grain, r"alpha|beta"),
 }

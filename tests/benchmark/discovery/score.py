@@ -90,16 +90,19 @@ def precision(record: Record, said: Record) -> float | None:
 
 
 def within(record: Record, said: Record) -> bool | None:
-    """Where there is no slow noise; random walks apart."""
-    wanders = record["name"] in ("own/wandering reference", "sampled/kicks")
-    return None if said["error"] is None or wanders or record["slow"] else said["error"] <= WITHIN
+    """Where there is no slow noise."""
+    return None if said["error"] is None or _wanders(record) or record["slow"] else said["error"] <= WITHIN
 
 
 def within_slow(record: Record, said: Record) -> bool | None:
     """Where there is: a constant of the sensor is known no better than the noise wanders, by the oracle neither."""
     best = record["answers"].get("oracle")
-    wanders = record["name"] == "own/wandering reference"
-    return None if best is None or wanders or not record["slow"] else said["error"] <= WITHIN * best["error"]
+    return None if best is None or _wanders(record) or not record["slow"] else said["error"] <= WITHIN * best["error"]
+
+
+def _wanders(record: Record) -> bool:
+    """Whether a random walk is among the causes: no form describes one."""
+    return record["name"] == "sampled/kicks" or "wandering reference" in record["mechanisms"]
 
 
 def at(*strengths: float) -> Callable[[Record], bool]:
