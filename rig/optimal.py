@@ -28,6 +28,7 @@ from rig.travel import from_home_s, moves_s
 MOST_POSES = 60
 ONE_IN = 10  # poses is measured again, and as many are kept out of the fit
 FEWEST = 4  # of either
+APART_S = 5.0  # of moves are worth it that no repeat follows at once: it would not show what changes between visits
 NEARLY = 0.99  # as good
 DESIGN, AGAIN, CHECK = "design", "again", MARK  # paths of poses
 CRITERIA: Mapping[str, Callable[[Array], Criterion]] = {"D": lambda _: DOptimal(), "I": IOptimal.over}
@@ -93,11 +94,12 @@ def optimal(
     sweep: Procedure,
     settings: Mapping[str, Any],
     model: Model,
-    poses: int = MOST_POSES,
+    poses: int | None = None,
     criterion: str = "I",
 ) -> Optimal:
     """`poses` poses for `model`, for the range of the sweep with `settings`. The same arguments give the same poses.
 
+    A quarter of the sweep's, at most MOST_POSES, where no number is given: fewer poses have fewer moves between them.
     `criterion` is a name of CRITERIA. Raises PlanError where `poses` are too few or too many; what a plan and a fit
     raise.
     """
@@ -106,10 +108,12 @@ def optimal(
         raise PlanError(f"this sweep determines no parameter of {model.name}; give it more inclinations")
     parameters = len(over.fit.theta)
     least = 3 * FEWEST + -(-parameters // len(over.axes))
+    poses = min(MOST_POSES, max(least, over.standard.plan.poses // 4)) if poses is None else poses
     if not least <= poses <= MOST_POSES:
         raise PlanError(f"{poses} poses: give {least} to {MOST_POSES} for the {parameters} parameters of {model.name}")
     chosen, rows = _chosen(over, CRITERIA[criterion](over.white), poses)
-    tour = Tour(from_home_s(bench, chosen), moves_s(bench, chosen), rows, _dwell_s(over, chosen))
+    between_s = moves_s(bench, chosen) + APART_S * _same(chosen)
+    tour = Tour(from_home_s(bench, chosen), between_s, rows, _dwell_s(over, chosen))
     order = ordered(tour)
     short = over.judged(_listing(settings, [chosen[k] for k in order]))
     equal, all_equal = (_as_good(over, short, ratio) for ratio in (relative, most_relative))
@@ -127,6 +131,12 @@ def _chosen(over: Range, criterion: Criterion, poses: int) -> tuple[list[Pose], 
     numbers = np.concatenate([fitted, checks])
     rows = np.concatenate([over.white[fitted], 0 * over.white[checks]])
     return [replace(over.candidates[k], path=path) for k, path in zip(numbers, paths, strict=True)], rows
+
+
+def _same(poses: Sequence[Pose]) -> Array:
+    """1 where two poses are the same but for their paths, else 0, (n, n)."""
+    places = [replace(pose, path="") for pose in poses]
+    return np.array([[float(a == b) for b in places] for a in places])
 
 
 def _dwell_s(over: Range, chosen: Sequence[Pose]) -> float:

@@ -41,7 +41,7 @@ def _nothing_stopped() -> Iterator[None]:
 @click.option("--moves", is_flag=True, help="Every move and every record, however many.")
 @click.option("--optimal", is_flag=True, help="Of a sweep: poses chosen for --model, beside the standard ones.")
 @model_option
-@click.option("--poses", type=int, help="How many to choose, at most 60, which is the default.")
+@click.option("--poses", type=int, help="How many to choose, at most 60. Default: a quarter.")
 @click.option("--criterion", type=click.Choice(["D", "I"]), help="D: joint uncertainty; I, the default: prediction.")
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="Write the poses to this file.")
 @bench_option
@@ -102,13 +102,12 @@ def _optimal(bench: Bench, procedure: Procedure, settings: Mapping[str, Any], as
     from calibrations.effect import catalogue
     from calibrations.model_file import read_model
     from rig.cli.chosen import document, lines
-    from rig.optimal import MOST_POSES
     from rig.optimal import optimal as chosen
 
     if procedure.name != "sweep" or settings["pose_list"]:
         raise click.UsageError("--optimal chooses the poses of a sweep over a grid")
     model = read_model(asked.model or "linear", catalogue(bench.folders.effects))
-    found = chosen(bench, procedure, settings, model, asked.poses or MOST_POSES, asked.criterion or "I")
+    found = chosen(bench, procedure, settings, model, asked.poses, asked.criterion or "I")
     if asked.out is not None:
         _write_poses(asked.out, found.equal.plan)
     if asked.as_json:
