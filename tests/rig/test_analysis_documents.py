@@ -30,7 +30,9 @@ CANDIDATE = {
     "indistinguishable_from": [str],
     "why": str,
 }
-EXPERIMENT = {"procedure": str, "settings": dict, "separates": [[str]], "why": str}
+TOLD = {"deviations": float, "probability": float}
+EXPERIMENT = {"procedure": str, "settings": dict, "separates": [[str]], "why": str, "command": str}
+EXPERIMENT |= {"duration_s": float, "expected": TOLD | {"alone": TOLD}}
 STEP = {"added": str, **dict.fromkeys(("excess_before", "excess_after", "held_out_before", "held_out_after"), float)}
 PARAMETER = {
     "effect": str,
