@@ -18,6 +18,7 @@ from calibrations.experiment import Experiment, separating
 from calibrations.fit import Fit
 from calibrations.held_out import held_out_excess
 from calibrations.model import Model
+from calibrations.outliers import caution, told
 from calibrations.path import MATERIAL, Path, find_path, share_left
 from calibrations.patterns import Pattern
 from calibrations.plainer import plainer
@@ -39,7 +40,7 @@ class Diagnosis:
     residual_structure: str | None
     next_experiment: Experiment | None
     path: Path
-    caution: str | None  # why the data do not even determine the model, where they do not
+    caution: str | None  # poses that were set aside, and why the data do not even determine the model
     pattern: Pattern | None  # that of the structure
 
     @property
@@ -57,18 +58,21 @@ def diagnose(table: Table, model: Model, effects: Mapping[str, Effect] | None = 
         end = settled(path, effects).end
     better = plainer(path.start, end)
     structure = better or structure_of(end)
-    verdict, caution = _verdict_of(path, end, structure, better is not None), undetermined(path.start)
-    if verdict == "adequate" and caution:
+    verdict, why_not = _verdict_of(path, end, structure, better is not None), undetermined(path.start)
+    if verdict == "adequate" and why_not:
         verdict = "ambiguous"
+    shown = structure.text if structure and verdict == "unexplained" else None
+    if verdict == "adequate" and path.outliers:
+        verdict, structure, shown = "unexplained", None, told(path.outliers)
     return Diagnosis(
         fit=path.start,
         verdict=verdict,
         candidates=path.first,
         held_out_before=held_out_excess(path.start),
-        residual_structure=structure.text if structure and verdict == "unexplained" else None,
+        residual_structure=shown,
         next_experiment=separating(path.first[0]) if verdict == "ambiguous" and path.steps else None,
         path=path,
-        caution=caution,
+        caution="; ".join(filter(None, (caution(path.outliers), why_not))) or None,
         pattern=structure if verdict == "unexplained" else None,
     )
 

@@ -16,9 +16,10 @@ from calibrations.determined import undetermined
 from calibrations.diagnose import MOST_LEFT
 from calibrations.effect import Effect, catalogue
 from calibrations.experiment import Experiment, separating
-from calibrations.fit import Fit, fit, refit
+from calibrations.fit import Fit, refit
 from calibrations.held_out import held_out_excess
 from calibrations.model import Model
+from calibrations.outliers import caution, fit_without, told
 from calibrations.path import MATERIAL, Path, find_path, share_left
 from calibrations.patterns import Pattern
 from calibrations.plainer import plainer
@@ -70,8 +71,8 @@ class Discovery:
 
     @cached_property
     def caution(self) -> str | None:
-        """Why the data do not even determine the final model, where they do not."""
-        return undetermined(self.end)
+        """Poses that were set aside, and why the data do not even determine the final model, where they do not."""
+        return "; ".join(filter(None, (caution(self.path.outliers), undetermined(self.end)))) or None
 
 
 def add(effect: Effect, model: Model, table: Table, effects: Mapping[str, Effect] | None = None) -> Discovery:
@@ -79,7 +80,7 @@ def add(effect: Effect, model: Model, table: Table, effects: Mapping[str, Effect
 
     The verdict is on the model with the effect: `unexplained` where a pattern is left beyond noise.
     """
-    before = fit(model, table)
+    before, outliers = fit_without(model, table)
     found = candidates(before, catalogue() if effects is None else effects)
     rivals = next((c.indistinguishable_from for c in found if c.name == effect.name), ())
     step = Added(effect.name, before, refit(before, before.model.with_effect(effect)))
@@ -94,7 +95,7 @@ def add(effect: Effect, model: Model, table: Table, effects: Mapping[str, Effect
         alternatives={effect.name: rivals} if rivals else {},
         residual_structure=structure.text if structure and left else None,
         next_experiment=None,
-        path=Path(before, (), tuple(found)),
+        path=Path(before, (), tuple(found), outliers),
         pattern=structure if left else None,
     )
 
@@ -109,6 +110,8 @@ def discover(table: Table, model: Model, effects: Mapping[str, Effect] | None = 
     left = stand.end.pooled_excess > MATERIAL and structure is not None
     if structure and left and (not stand.names or better or share_left(path.start, stand.end) > MOST_LEFT):
         return Discovery(path.start, (), "unexplained", (), (), {}, structure.text, None, path, structure)
+    if path.outliers and not stand.names:
+        return Discovery(path.start, (), "unexplained", (), (), {}, told(path.outliers), None, path)
     steps = _in_order(path.start, stand, effects)
     alternatives = {name: c.indistinguishable_from for name, c in stand.beside.items() if c.indistinguishable_from}
     causes = _causes(steps)

@@ -8,9 +8,10 @@ from functools import cached_property
 
 from calibrations.candidates import SIGNIFICANT, Candidate, added, best_pair, candidates
 from calibrations.effect import Effect
-from calibrations.fit import Fit, fit
+from calibrations.fit import Fit
 from calibrations.held_out import held_out_excess
 from calibrations.model import Model
+from calibrations.outliers import fit_without
 from calibrations.table import Table
 
 MOST_EFFECTS = 14
@@ -45,6 +46,7 @@ class Path:
     start: Fit
     steps: tuple[Step, ...]
     left: tuple[Candidate, ...]  # candidates of the last search
+    outliers: tuple[int, ...] = ()  # poses that were set aside
 
     @property
     def end(self) -> Fit:
@@ -62,7 +64,8 @@ def find_path(model: Model, table: Table, effects: Mapping[str, Effect], enough:
 
     Raises what `fit` raises.
     """
-    return grown(Path(fit(model, table), (), ()), effects, enough)
+    start, outliers = fit_without(model, table)
+    return grown(Path(start, (), (), outliers), effects, enough)
 
 
 def grown(path: Path, effects: Mapping[str, Effect], enough: float = 0.0) -> Path:
@@ -78,7 +81,7 @@ def grown(path: Path, effects: Mapping[str, Effect], enough: float = 0.0) -> Pat
         if share_left(path.start, present) <= enough:
             break
         found = candidates(present, effects)
-    return Path(path.start, tuple(steps), tuple(found))
+    return Path(path.start, tuple(steps), tuple(found), path.outliers)
 
 
 def share_left(start: Fit, present: Fit) -> float:

@@ -15,6 +15,8 @@ from calibrations.stills import is_raw_log, positions
 from calibrations.table import Table
 from rig.errors import RecordError, UnknownRun
 
+EXCLUDED = "excluded"
+
 
 def averaged(log: Table, tell: Callable[[str], None]) -> Table:
     """The table itself, or the means of what a raw log holds still, which `tell` is then told.
@@ -26,7 +28,20 @@ def averaged(log: Table, tell: Callable[[str], None]) -> Table:
         what = "poses" if table.kind == "poses" else "still positions"
         tell(f"{log.source} is a log of raw samples: the means of {table.n} {what}, out of {log.n} samples, are taken.")
     check_duplicates(table)
-    return table
+    return _included(table, tell)
+
+
+def _included(table: Table, tell: Callable[[str], None]) -> Table:
+    """The table without the rows that its column `excluded` leaves out; a run has `rig exclude` for that."""
+    out = table.optional(EXCLUDED, 0.0) != 0
+    if not out.any():
+        return table
+    tell(f"{table.source}: {np.count_nonzero(out)} of {table.n} rows are left out, by its column `{EXCLUDED}`.")
+    if out.all():
+        raise DataError(
+            f"{table.source}: every row is left out, by its column `{EXCLUDED}`; put 0 where a row is to count"
+        )
+    return table.rows(~out)
 
 
 def _means(log: Table) -> Table:
