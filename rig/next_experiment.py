@@ -60,8 +60,11 @@ def proposed(result: Answer, effects: Mapping[str, Effect], bench: Bench, bench_
     if e is None:
         return result
     best = result.end if isinstance(result, Discovery) else result.path.steps[0].after
-    if {a for a, _ in e.separates} & set(result.path.start.model.effects):
-        return replace(result, next_experiment=_as_told(e, bench, bench_file))  # that frees a value, and adds none
+    frees = {a for a, _ in e.separates} & set(
+        result.path.start.model.effects
+    )  # a value for each axis, and adds nothing
+    if best.table.kind != "poses" or frees:
+        return replace(result, next_experiment=_as_told(e, bench, bench_file))
     return replace(result, next_experiment=chosen(Dispute.of(best, e.separates, effects), e, bench, bench_file))
 
 

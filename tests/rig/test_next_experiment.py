@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from calibrations.experiment import BESIDE, MENU, Experiment, by_physics
 from calibrations.model_file import read_model
 from procedures.catalogue import find
 from procedures.settings import parse
-from rig.bench import Bench, read_bench
+from rig.bench import read_bench
 from rig.cli import rig as commands
 from rig.cli.settings import read_settings
 from rig.next_experiment import Dispute, chosen, columns, command_line, planned_experiment, proposed
@@ -55,14 +56,15 @@ def test_every_experiment_can_be_planned_and_its_command_line_means_the_same(exp
     assert run in commands.list_commands(None)  # type: ignore[arg-type]
 
 
-def ambiguous(bench: Bench, **package: float) -> Any:
-    _, table = QuickRig(IDEAL.changed({"sensor": {"package": package}}), 8, bench).measure(COARSE)
-    return diagnose(table, read_model("linear"))
+@cache
+def turned() -> Any:
+    """The diagnosis of a sensor that is turned about z, as any stage may be."""
+    config = IDEAL.changed({"sensor": {"package": {"turn_z_deg": 0.05}}})
+    return diagnose(QuickRig(config, 8, read_bench(None)).measure(COARSE)[1], read_model("linear"))
 
 
 def test_a_turned_sensor_is_to_be_mounted_face_down() -> None:
-    bench = read_bench(None)
-    e = proposed(ambiguous(bench, turn_z_deg=0.05), catalogue(), bench, None).next_experiment
+    e = proposed(turned(), catalogue(), read_bench(None), None).next_experiment
     assert e.procedure == "sweep"
     assert e.settings["face"] == "both"
     assert e.separates == (("stage-zero-offset", "axis-misalignment"),)
@@ -82,7 +84,7 @@ def test_what_is_not_computed_is_null() -> None:
 
 
 def dispute(temperature: bool) -> Dispute:
-    found = ambiguous(read_bench(None), turn_z_deg=0.05)
+    found = turned()
     return replace(
         Dispute.of(found.path.steps[0].after, found.next_experiment.separates, catalogue()), of_temperature=temperature
     )
@@ -130,10 +132,8 @@ def test_the_oven_warms_over_minutes_and_time_goes_on() -> None:
 def test_the_commands_print_it(rig: Callable[..., Ended], tmp_path: Path) -> None:
     from calibrations.read_csv import write_csv
 
-    bench = read_bench(None)
-    _, table = QuickRig(IDEAL.changed({"sensor": {"package": {"turn_z_deg": 0.05}}}), 8, bench).measure(COARSE)
     data = str(tmp_path / "turned.csv")
-    write_csv(table, Path(data))
+    write_csv(turned().fit.table, Path(data))
     for command in ("diagnose", "discover"):
         said = rig(command, data).out
         assert "    rig run sweep --face both --step-deg 45 --inclinations-deg 90,30,150\n    14:" in said
