@@ -72,6 +72,8 @@ def _settings(settings: Mapping[str, Any]) -> Iterator[str]:
     for name, value in settings.items():
         if isinstance(value, Mapping):
             yield from (f"  {name}: {key} = {each}" for key, each in value.items())
+        elif isinstance(value, list) and len(value) > 1 and isinstance(value[0], str):  # those of a file
+            yield f"  {name} = {len(value)} lines: {value[0]} ..."
         elif isinstance(value, list):
             yield f"  {name} = {', '.join(f'{each:g}' if isinstance(each, float) else str(each) for each in value)}"
         else:

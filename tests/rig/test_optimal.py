@@ -122,6 +122,12 @@ def test_the_command_writes_poses_that_a_run_takes(rig: Callable[..., Any], tmp_
     assert planned["settings"]["pose_list"] == out.read_text().splitlines()
 
 
+def test_any_plan_s_poses_can_be_written(rig: Callable[..., Any], tmp_path: Path) -> None:
+    out = tmp_path / "poses.csv"
+    rig("plan", "sweep", "--step-deg", "180", "--inclinations-deg", "90", "--out", str(out))
+    assert out.read_text().splitlines()[1:3] == ["90,0,1,A+ to B-,0,0", "90,180,1,A+ to B-,0,0"]
+
+
 def test_options_of_chosen_poses_need_optimal(rig: Callable[..., Any]) -> None:
     assert rig("plan", "sweep", "--poses", "20").status == 2
     assert rig("plan", "soak", "--optimal").status == 2
@@ -149,6 +155,7 @@ def test_a_run_of_chosen_poses_checks_its_model(rig: Callable[..., Any], tmp_pat
     assert fitted["unseen"]["poses"] == 4
     assert fitted["unseen"]["repeats"] >= 4
     assert "check poses" in rig("fit", run["run"]).out
+    assert "pose_list = 21 lines: alpha_deg,beta_deg," in rig("show", run["run"]).out
 
 
 class Leaving(Onlooker):
