@@ -45,8 +45,9 @@ def main() -> None:
 def measured(cases: list[Case], file: Path) -> list[dict[str, Any]]:
     """The records of all cases; those that the file holds are not made again."""
     file.parent.mkdir(exist_ok=True)
-    lines = file.read_text().splitlines() if file.exists() else []
-    known = {record["key"]: record for record in map(json.loads, lines)}
+    text = file.read_text() if file.exists() else ""
+    file.write_text(text := text[: text.rfind("\n") + 1])  # a line that a kill has cut is made again
+    known = {record["key"]: record for record in map(json.loads, text.splitlines())}
     left = [case for case in cases if case.key not in known]
     os.environ["OPENBLAS_NUM_THREADS"] = "1"  # of the workers, which are new processes
     with file.open("a") as out, ProcessPoolExecutor(WORKERS, get_context("spawn")) as pool:

@@ -105,6 +105,11 @@ def _wanders(record: Record) -> bool:
     return record["name"] == "sampled/kicks" or "wandering reference" in record["mechanisms"]
 
 
+def quick(question: str, seconds: float) -> Judge:
+    """Whether a question of ours took no longer, in processor time."""
+    return lambda record, said: said[question] <= seconds if question in said else None
+
+
 def at(*strengths: float) -> Callable[[Record], bool]:
     return lambda record: record["strength"] in strengths
 
@@ -138,6 +143,10 @@ DEMANDS: tuple[tuple[str, str, Callable[[Record], bool], Judge, str, float], ...
     ("outside, weak and up: structure right", "unknown", at(3, 10, 30), structure_right, ">", 0.80),
     ("inseparable: listed", "inseparable", always, listed, ">", 0.90),
     ("inseparable: the experiment that tells", "inseparable", always, experiment_right, ">", 0.90),
+    ("single: diagnose within 2 s", "single", always, quick("diagnose_s", 2), ">", 1.0),
+    ("single: discover within 5 s", "single", always, quick("discover_s", 5), ">", 1.0),
+    ("triples: discover within 20 s", "triple", always, quick("discover_s", 20), ">", 1.0),
+    ("outside: discover within 20 s", "unknown", always, quick("discover_s", 20), ">", 1.0),
 )
 
 
