@@ -10,7 +10,7 @@ from calibrations.candidates import Candidate
 from calibrations.compare import Comparison, axis_of
 from calibrations.diagnose import Diagnosis
 from calibrations.discover import Added, Discovery
-from calibrations.expected import Expected, told_apart
+from calibrations.expected import Expected
 from calibrations.experiment import Experiment
 from calibrations.fit import Fit
 from calibrations.noise import rms
@@ -162,5 +162,5 @@ def _expected(found: Expected | None) -> Document | None:
     """Distances in standard deviations; null where they are not computed."""
     if found is None:
         return None
-    alone = {"deviations": float(np.sqrt(found.alone)), "probability": told_apart(found.alone)}
+    alone = {"deviations": float(np.sqrt(found.alone)), "probability": found.probability_alone}
     return {"deviations": found.deviations, "probability": found.probability, "alone": alone}

@@ -25,15 +25,20 @@ from calibrations.problem import Problem
 from calibrations.table import Array, Table
 
 CERTAIN = 0.95  # probability of telling two explanations apart with which an experiment is worth its time
+NAMED = 20.0  # a gain of two parameters that has a chance of 0.003 on noise, in a search worth some 60 trials
 ROUNDS, CLOSE = 12, 1e-2  # evaluations, and the relative change of lambda at which they end
 
 
 @dataclass(frozen=True)
 class Expected:
-    """What an experiment will bring: lambda of its own data, and of all data together."""
+    """What an experiment will bring: lambda of its own data, and of all data together.
+
+    `visible` is lambda of its own data between an explanation and nothing missing: what does not show is not named.
+    """
 
     alone: float
     together: float
+    visible: float = np.inf
 
     @property
     def deviations(self) -> float:
@@ -45,6 +50,11 @@ class Expected:
         """Of telling them apart, all data together."""
         return told_apart(self.together)
 
+    @property
+    def probability_alone(self) -> float:
+        """Of finding that something is missing, and telling what, by its own data."""
+        return min(told_apart(self.alone), _beyond(self.visible, NAMED))
+
 
 def expected(best: Fit, rival: Fit, table: Table) -> Expected:
     """What the foreseen `table` will tell of two explanations of the data at hand, whichever of them is right.
@@ -52,19 +62,24 @@ def expected(best: Fit, rival: Fit, table: Table) -> Expected:
     Both are fits to the same data. Of the two cases, the best right and the rival right, the worse one counts. Times
     of `table` come after those of the data.
     """
-    ways = [_one_way(best, rival, table), _one_way(rival, best, table)]
+    ways = [one_way(best, rival, table), one_way(rival, best, table)]
     return Expected(min(w.alone for w in ways), min(w.together for w in ways))
 
 
 def told_apart(noncentrality: float) -> float:
     """Probability that the likelihood ratio will be beyond the odds at which two explanations are told apart."""
-    if noncentrality <= 0:
-        return 0.0
-    return float(ndtr((noncentrality - NOT_TOLD_APART) / (2 * np.sqrt(noncentrality))))
+    return _beyond(noncentrality, NOT_TOLD_APART)
 
 
-def _one_way(right: Fit, wrong: Fit, table: Table) -> Expected:
-    """Where `right` is: predictions come from both fits' own history, the noise from that of `right`."""
+def _beyond(noncentrality: float, threshold: float) -> float:
+    """Probability that a statistic of mean lambda and standard deviation 2 sqrt(lambda) is beyond a threshold."""
+    if noncentrality <= 0 or noncentrality == np.inf:
+        return float(noncentrality > 0)
+    return float(ndtr((noncentrality - threshold) / (2 * np.sqrt(noncentrality))))
+
+
+def one_way(right: Fit, wrong: Fit, table: Table) -> Expected:
+    """As `expected`, where `right` is: predictions come from both fits' own history, the noise from that of `right`."""
     whole = joined([right.table, table])
     known, new = np.arange(whole.n) < right.table.n, np.arange(whole.n) >= right.table.n
     truth = Problem(whole, right.problem.layout).residual(right.theta)

@@ -17,7 +17,7 @@ from calibrations.experiment import BESIDE, MENU, Experiment
 from calibrations.model import Model
 from calibrations.table import Table
 from rig.bench import Bench
-from rig.next_experiment import Dispute, chosen, gives_poses, planned_experiment, possible
+from rig.next_experiment import TOGETHER, Dispute, chosen, gives_poses, planned_experiment, possible
 
 STANDARD = Experiment("sweep", {}, (), "the sweep as it is without settings")
 FIRST = Experiment("sweep", {"step_deg": 45.0, "inclinations_deg": [90.0, 30.0, 150.0]}, (), "a little, to begin with")
@@ -81,7 +81,7 @@ class Live:
             return None
         dispute = Dispute.of(found.end, found.next_experiment.separates, self.effects)
         menu = _new((*BESIDE, *MENU), done)
-        return chosen(dispute, found.next_experiment, self.bench, self.bench_file, menu, ("together",))
+        return chosen(dispute, found.next_experiment, self.bench, self.bench_file, menu, (TOGETHER,))
 
     def _following(self, telling: Experiment | None, done: Sequence[Measurement]) -> Experiment | None:
         """`telling`, where its poses can be judged with the others, else poses in between; None when time is up.

@@ -20,7 +20,7 @@ from calibrations.diagnose import Diagnosis
 from calibrations.discover import Discovery
 from calibrations.effect import Effect
 from calibrations.errors import CalibrationError
-from calibrations.expected import CERTAIN, Expected, expected, told_apart
+from calibrations.expected import CERTAIN, Expected, expected, one_way, told_apart
 from calibrations.experiment import MENU, Experiment
 from calibrations.fit import Fit, refit
 from calibrations.foreseen import foreseen
@@ -35,6 +35,7 @@ from rig.plan import Plan, plan
 
 PAUSE_S = 60.0  # from the end of the data to the beginning of the next run, at least
 OVEN_S = 1200.0  # in which an oven with what is in it comes near to its set point
+ALONE, TOGETHER = "probability_alone", "probability"  # of Expected
 LEAST = 1.0  # of lambda, to be called information
 Answer = TypeVar("Answer", Diagnosis, Discovery)
 
@@ -45,13 +46,17 @@ class Dispute:
 
     best: Fit
     rivals: Mapping[tuple[str, str], Fit]  # by (effect of the best, effect of the rival)
+    nothing: Fit  # the model without any of them
     of_temperature: bool  # whether one of these effects depends on it
 
     @classmethod
     def of(cls, best: Fit, pairs: Iterable[tuple[str, str]], effects: Mapping[str, Effect]) -> Dispute:
         """The best explanation, and it with each rival in its place. Raises what `refit` raises."""
         rivals = {(a, b): refit(best, best.model.without(a).with_effect(effects[b])) for a, b in pairs}
-        return cls(best, rivals, any("temperature_c" in effects[name].needs for pair in rivals for name in pair))
+        nothing = refit(best, best.model.without(next(iter(rivals))[0]))
+        return cls(
+            best, rivals, nothing, any("temperature_c" in effects[name].needs for pair in rivals for name in pair)
+        )
 
 
 def proposed(result: Answer, effects: Mapping[str, Effect], bench: Bench, bench_file: Path | None) -> Answer:
@@ -110,7 +115,7 @@ def chosen(
     bench: Bench,
     bench_file: Path | None = None,
     menu: Sequence[Experiment] = MENU,
-    judged: Sequence[str] = ("alone", "together"),
+    judged: Sequence[str] = (ALONE, TOGETHER),
 ) -> Experiment:
     """The next experiment for a dispute; one that the bench cannot do is not proposed, unless there is no other.
 
@@ -123,8 +128,8 @@ def chosen(
 
 def best_of(experiments: Sequence[Experiment], judged: Sequence[str]) -> Experiment | None:
     """The shortest that is certain to separate most pairs; else the one that tells most per minute."""
-    for data in judged:
-        enough = [e for e in experiments if told_apart(getattr(e.expected, data)) >= CERTAIN]
+    for probability in judged:
+        enough = [e for e in experiments if getattr(e.expected, probability) >= CERTAIN]
         if enough:
             return min(enough, key=lambda e: (-len(e.separates), e.duration_s or 0.0))
     telling = [e for e in experiments if _per_minute(e) > 0]
@@ -152,7 +157,8 @@ def _foreseen(dispute: Dispute, e: Experiment, bench: Bench, bench_file: Path | 
     except (LimitError, ProcedureError, BenchError, CalibrationError):
         return None
     told = {pair: each[pair] for pair in each if told_apart(each[pair].together) >= CERTAIN} or each
-    worst = Expected(min(x.alone for x in told.values()), min(x.together for x in told.values()))
+    shown = [one_way(found, dispute.nothing, table).alone for found in (dispute.best, *dispute.rivals.values())]
+    worst = Expected(min(x.alone for x in told.values()), min(x.together for x in told.values()), min(shown))
     return replace(e, separates=tuple(told), expected=worst)
 
 

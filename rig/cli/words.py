@@ -109,7 +109,7 @@ def _brings(expected: Expected | None, data: str) -> str:
     """What an experiment is expected to tell, by its own data where they are enough."""
     if expected is None:
         return "what it will tell is not computed"
-    alone = told_apart(expected.alone) >= CERTAIN
+    alone = expected.probability_alone >= CERTAIN
     value = expected.alone if alone else expected.together
     judged = "by its own data" if alone else f"by both together: rig discover {data} ITS-RUN"
     chance = min(100 * told_apart(value), 99.9)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from calibrations.effect import catalogue
-from calibrations.expected import CERTAIN, expected, told_apart
+from calibrations.expected import CERTAIN, Expected, expected, one_way, told_apart
 from calibrations.fit import Fit, fit, refit
 from calibrations.foreseen import foreseen
 from calibrations.joined import joined
@@ -84,3 +84,14 @@ def test_the_probability_of_telling_apart() -> None:
     assert told_apart(21.2) == pytest.approx(CERTAIN, abs=0.001)
     draws = 30.0 + 2 * np.sqrt(30.0) * np.random.default_rng(1).standard_normal(20000)
     assert told_apart(30.0) == pytest.approx(np.mean(draws > 6), abs=0.005)
+
+
+def test_what_does_not_show_by_itself_is_not_named_by_itself() -> None:
+    clear = Expected(alone=100.0, together=100.0, visible=100.0)
+    faint = Expected(alone=100.0, together=100.0, visible=15.0)
+    assert clear.probability_alone == pytest.approx(1.0, abs=1e-3)
+    assert faint.probability_alone < 0.5
+    assert faint.probability == clear.probability
+    best, _ = rivals(measured(0.05, 3, (0,))[0])
+    nothing = refit(best, best.model.without("stage-zero-offset"))
+    assert one_way(best, nothing, planned(best, 0.0)).alone > 1000
