@@ -49,7 +49,7 @@ def gross(found: Fit) -> NDArray[np.intp]:
 def _nearest(places: Array) -> NDArray[np.intp]:
     """Rows around each row, itself left out, shape (n, NEIGHBOURS)."""
     n = len(places)
-    near = cKDTree(places).query(places, NEIGHBOURS + 1)[1]
+    near: NDArray[np.intp] = np.asarray(cKDTree(places).query(places, NEIGHBOURS + 1)[1])
     others = near != np.arange(n)[:, None]
     others[np.all(others, axis=1), -1] = False  # of many rows in one place a row need not be among its own nearest
     return np.asarray(near[others].reshape(n, NEIGHBOURS))

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from calibrations import report_budget
 from calibrations.candidates import SIGNIFICANT, Candidate
 from calibrations.compare import Comparison
 from calibrations.discover import Added, Discovery
@@ -59,6 +60,7 @@ def report(
         before=(plain(found.start.pooled_excess), plain(held_out_excess(found.start))),
         model=found.end.model.name,
         parameters=_parameters(found.end.model, {s.name for s in found.steps}),
+        budget=report_budget.section(found.end),
         birge=f"{found.end.birge:.2f}" if found.end.birge > 1.05 else "",
         end_errors=_errors(found.end),
         known=found.end.noise.known,

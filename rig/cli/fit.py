@@ -22,6 +22,7 @@ def command(data: str, model: str | None, out: Path | None, check: bool, bench_f
     from calibrations.determined import undetermined
     from calibrations.documents import fit_document
     from calibrations.fit import fit
+    from calibrations.report_budget import document as in_parts
     from calibrations.unseen import unseen
     from rig.cli.asked import asked, tell_blind, write_model
     from rig.cli.checked import document, lines
@@ -34,7 +35,7 @@ def command(data: str, model: str | None, out: Path | None, check: bool, bench_f
     tell_blind(found, effects)
     caution, checked = undetermined(found), unseen(start, table)
     if as_json:
-        emit(fit_document(found, str(out) if out else None) | document(checked))
+        emit(fit_document(found, str(out) if out else None) | document(checked) | {"budget": in_parts(found)})
         notes(warning(caution))
     else:
         click.echo(f"{found.model.name} fitted to {table.n} rows of {table.source}\n\n{parameters(found.model)}\n")

@@ -56,6 +56,7 @@ def _figures(folder: Path) -> Iterator[tuple[str, Figure]]:
     yield "dwell means of 518 poses", _inside("", subject(folder, "dwells"))
     for threads in (1, os.cpu_count() or 1):
         yield f"linear algebra, {threads} threads", json.loads(subject(folder, "screening", threads=threads).out)
+    yield "coverage of 95 % intervals", json.loads(subject(folder, "coverage", "200").out)
     yield "soak", _inside("soak", subject(folder, "soak", "12"))
     yield "night", _commands("night", folder, 1, "run", "soak", "--off-s", "0", "--unattended", "--json")
     yield "generation", _generation(folder)

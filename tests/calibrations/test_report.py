@@ -163,8 +163,9 @@ def test_it_holds_every_parameter_with_its_uncertainty() -> None:
 
 
 def test_it_says_why_a_parameter_is_not_identified() -> None:
-    bias = Term(catalogue()["bias"], estimates=(Estimate("bias", "x", 1.0, None, "V", False, "nothing moved"),))
     end = warm().end
+    still = Estimate("bias", "x", 1.0, None, "V", False, "nothing moved")
+    bias = Term(catalogue()["bias"], estimates=(still, *end.model.terms[0].estimates[1:]))
     model = Model("m", (bias, *end.model.terms[1:]))
     text = Page(report(changed(warm(), start=_with_model(end, model), steps=()), beside(), "d", "p", blank())).text
     assert "not identified: nothing moved" in text

@@ -1,0 +1,100 @@
+"""The uncertainty budget in the report: a line for each parameter, and beneath it every source of each effect."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from calibrations.budget import Budget, Line, budget
+from calibrations.fit import Fit
+from calibrations.inputs import contributions
+from calibrations.model import Estimate
+from calibrations.numerals import plain, unit
+
+MANY = 1e4  # degrees of freedom, told as no limit
+
+
+def section(found: Fit) -> dict[str, Any] | None:
+    """Numbers and words of the section; None for tables that no budget is drawn up for, and where nothing is known."""
+    if found.table.kind not in ("poses", "positions") or not len(found.theta):
+        return None
+    drawn = budget(found, contributions(found.table))
+    if not drawn.given:
+        return None
+    known = [(k, name, e) for k, (name, e) in enumerate(_estimates(found)) if e.identified and e.std is not None]
+    groups = dict.fromkeys(name for _, name, _ in known)
+    return {
+        "parameters": [_parameter(drawn, *each) for each in known],
+        "groups": [(name, [_sources(drawn, k, e) for k, n, e in known if n == name]) for name in groups],
+        "not_given": ", ".join(drawn.not_given),
+    }
+
+
+def _estimates(found: Fit) -> list[tuple[str, Estimate]]:
+    return [(term.name, e) for term in found.model.terms for e in term.estimates]
+
+
+def _label(e: Estimate) -> str:
+    return f"{e.name} {e.axis}".strip()
+
+
+def _parameter(drawn: Budget, k: int, effect: str, e: Estimate) -> dict[str, str]:
+    largest = max(drawn.given, key=lambda line: _of(line.std, k))
+    return {
+        "effect": effect,
+        "name": _label(e),
+        "combined": plain(drawn.combined[k], 2),
+        "freedom": _freedom(drawn.freedom[k]),
+        "coverage": f"{drawn.coverage[k]:.2f}",
+        "expanded": plain(drawn.expanded[k], 2),
+        "unit": unit(e.unit),
+        "largest": largest.source,
+    }
+
+
+def _sources(drawn: Budget, k: int, e: Estimate) -> dict[str, Any]:
+    return {"name": f"{_label(e)}, {unit(e.unit)}", "rows": [_source(line, k) for line in drawn.given]}
+
+
+def _source(line: Line, k: int) -> dict[str, str]:
+    return {
+        "source": line.source,
+        "kind": line.kind,
+        "input": "–" if line.input_std is None else f"{plain(line.input_std, 2)} {unit(line.unit)}".strip(),
+        "sensitivity": "–" if line.sensitivity is None else plain(line.sensitivity[k], 2),
+        "std": plain(_of(line.std, k), 2),
+        "freedom": _freedom(line.freedom),
+    }
+
+
+def _of(std: Any, k: int) -> float:
+    return 0.0 if std is None or np.isnan(std[k]) else float(std[k])
+
+
+def document(found: Fit) -> dict[str, Any] | None:
+    """The budget as JSON: for each parameter what it adds up to, and the contributions by source. None as `section`."""
+    if found.table.kind not in ("poses", "positions") or not len(found.theta):
+        return None
+    drawn = budget(found, contributions(found.table))
+    known = [(k, name, e) for k, (name, e) in enumerate(_estimates(found)) if e.identified and e.std is not None]
+    return {
+        "parameters": [
+            {
+                "effect": name,
+                "axis": e.axis or None,
+                "name": e.name,
+                "combined": float(drawn.combined[k]),
+                "freedom": float(drawn.freedom[k]) if drawn.freedom[k] < MANY else None,
+                "coverage_factor": float(drawn.coverage[k]),
+                "expanded": float(drawn.expanded[k]),
+                "contributions": {line.source: _of(line.std, k) for line in drawn.given},
+            }
+            for k, name, e in known
+        ],
+        "not_given": list(drawn.not_given),
+    }
+
+
+def _freedom(freedom: float) -> str:
+    return f"{freedom:.0f}" if freedom < MANY else "∞"

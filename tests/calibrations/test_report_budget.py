@@ -1,0 +1,41 @@
+"""The budget in the report and in JSON: every number with its source, and what is not given said."""
+
+from __future__ import annotations
+
+import json
+
+from calibrations.compare import compare
+from calibrations.discover import discover
+from calibrations.fit import fit
+from calibrations.model_file import read_model
+from calibrations.report import report
+from calibrations.report_budget import document, section
+from tests.calibrations.test_budget import given, measured
+
+
+def test_the_report_shows_sources_and_what_is_not_given() -> None:
+    table = given(measured(1), gain_std=2e-4, beta_std_deg=0.01)
+    found = discover(table, read_model("linear"))
+    page = report(found, compare(table, read_model("linear")), "2026-01-01", "program 1")
+    for text in ("Uncertainty budget", "gain of the converter", "white noise of the dwells", "coverage factor"):
+        assert text in page
+    assert "Not given, and so not in these numbers: gravity at the place" in page
+
+
+def test_the_section_says_what_counts_most() -> None:
+    table = given(measured(1), gain_std=2e-2)
+    found = section(fit(read_model("linear"), table))
+    assert found is not None
+    assert {row["largest"] for row in found["parameters"]} == {"gain of the converter"}
+    assert [name for name, _ in found["groups"]] == ["bias", "scale-factor"]
+
+
+def test_the_document_is_json_and_adds_up() -> None:
+    table = given(measured(1), gain_std=2e-4)
+    found = document(fit(read_model("linear"), table))
+    assert found is not None
+    told = json.loads(json.dumps(found, allow_nan=False))
+    for row in told["parameters"]:
+        assert abs(sum(u**2 for u in row["contributions"].values()) ** 0.5 - row["combined"]) < 1e-9
+        assert row["expanded"] > row["combined"]
+    assert "thermometer" in told["not_given"]
