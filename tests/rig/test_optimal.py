@@ -6,6 +6,7 @@ import json
 from collections import Counter
 from collections.abc import Callable, Mapping
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ import pytest
 
 from calibrations.model_file import read_model
 from procedures.catalogue import find
+from procedures.pose_list import written
 from procedures.session import Pose
 from procedures.settings import parse
 from rig.bench import read_bench
@@ -72,6 +74,18 @@ def test_what_the_sweep_tells_is_told() -> None:
     found = chosen("physical")
     assert found.standard.told.all()
     assert np.all(np.isfinite(found.equal.errors))
+
+
+def test_what_check_poses_tell_is_not_counted() -> None:
+    found = chosen()
+    fitted = written(pose for pose in found.equal.poses if pose.path != CHECK)
+    judged = found.over.judged({**found.equal.plan.settings, "pose_list": fitted})
+    assert judged.errors == pytest.approx(found.equal.errors)
+
+
+def test_no_repeat_follows_at_once() -> None:
+    places = [(pose.alpha_deg, pose.beta_deg, pose.direction) for pose in chosen().equal.poses]
+    assert sum(a == b for a, b in pairwise(places)) <= 2 < len(places) - len(set(places))
 
 
 def test_the_sensor_is_turned_over_once() -> None:
