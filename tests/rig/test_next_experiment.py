@@ -22,7 +22,8 @@ from procedures.settings import parse
 from rig.bench import read_bench
 from rig.cli import rig as commands
 from rig.cli.settings import read_settings
-from rig.next_experiment import Dispute, chosen, columns, command_line, planned_experiment, proposed
+from rig.next_experiment import Dispute, chosen, command_line, planned_experiment, proposed
+from rig.planned_columns import columns
 from tests.hidden.quick_rig import QuickRig
 from tests.hidden.rigs import IDEAL
 from tests.rig.conftest import Ended
