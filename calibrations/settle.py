@@ -58,7 +58,7 @@ def _needed(present: Fit, names: tuple[str, ...], freed: set[str]) -> tuple[Fit,
     while len([name for name in names if name not in freed]) > 1:
         costs = {name: cost(present, name) for name in names if name not in freed}
         name = min(costs, key=lambda n: costs[n][0] / max(costs[n][1], 1))
-        smaller = refit(present, present.model.without(name))
+        smaller = _without(present, name)
         if chance(*costs[name]) < SIGNIFICANT and held_out_excess(smaller) > held_out_excess(present):
             break
         names = tuple(other for other in names if other != name)
@@ -109,18 +109,20 @@ def likelihood(fit: Fit) -> float:
     return -deviance(fit.noise, fit.residual, fit.jacobian, np.zeros((fit.table.n, 0))) - price
 
 
-def cost(found: Fit, name: str, tied: bool = False) -> tuple[float, int]:
-    """Sum of squares that losing the effect would cost, to first order, and the parameters that it has.
+def cost(end: Fit, name: str) -> tuple[float, int]:
+    """Growth of the whitened sum of squares when the model does without the effect, and the parameters that it has."""
+    left = end.noise.whiten(_without(end, name).residual[:, :, None])[:, 0]
+    present = end.whitened[:, 0]
+    return float(left @ left - present @ present), int(end.problem.layout.of_effect(name).sum())
 
-    `tied`: losing it means that its axes share one value again.
-    """
-    white, mine = found.whitened[:, 1:], found.problem.layout.of_effect(name)
+
+def cost_of_sharing(end: Fit, name: str) -> float:
+    """The same, to first order, when the axes share one value of each of its parameters."""
+    white, mine = end.whitened[:, 1:], end.problem.layout.of_effect(name)
     size = np.linalg.norm(white, axis=0)
     white = white / np.where(size > 0, size, 1.0)
-    value = found.theta[mine]
-    if tied:
-        value = value - value.mean()
-    signal = white[:, mine] @ (value * size[mine])
+    value = end.theta[mine]
+    signal = white[:, mine] @ ((value - value.mean()) * size[mine])
     others = white[:, ~mine]
     lost = signal - others @ np.linalg.lstsq(others, signal, rcond=1e-9)[0]
-    return float(lost @ lost), int(mine.sum())
+    return float(lost @ lost)
