@@ -111,7 +111,7 @@ def _brings(expected: Expected | None, data: str) -> str:
         return "what it will tell is not computed"
     alone = expected.probability_alone >= CERTAIN
     value = expected.alone if alone else expected.together
-    judged = "by its own data" if alone else f"by both together: rig discover {data} ITS-RUN"
+    judged = "by its own data" if alone else f"by all together: rig discover {data.replace(' + ', ' ')} ITS-RUN"
     chance = min(100 * told_apart(value), 99.9)
     return f"{math.sqrt(value):.3g} standard deviations apart, told with a probability of {chance:.3g} %, {judged}"
 
