@@ -10,7 +10,7 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from procedures.session import Limits
-from rig.bench.parts import Certificate, Displacement, Folders, Instrument, Sensor, Strict
+from rig.bench.parts import Certificate, Displacement, Folders, Instrument, Sensor, Strict, Uncertainty
 
 SENSOR = "^[A-Za-z0-9_-]+$"  # name of a batch's sensor: part of channels and of RUN/SENSOR
 
@@ -25,6 +25,7 @@ class Bench(Strict):
     sensors: dict[Annotated[str, Field(pattern=SENSOR)], Sensor] = Field(default_factory=dict)
     limits: Limits = Limits()
     d63: Displacement | None = None
+    uncertainty: Uncertainty = Uncertainty()
     certificates: dict[str, Certificate] = Field(default_factory=dict)  # of what plays no role, such as a hand level
     world: dict[str, Any] = Field(default_factory=dict)
     folders: Folders = Folders()
@@ -47,9 +48,9 @@ class Bench(Strict):
 
     @property
     def constants(self) -> dict[str, str | float]:
-        """What every table from this bench says of the sensor (those of a batch are named apart), and of the way."""
+        """What every table says of the sensor (those of a batch are named apart), of the way and of the inputs."""
         sensor = {} if self.sensors else self.sensor.constants
-        return {**sensor, "approach_deg": self.limits.overrun_deg}
+        return {**sensor, "approach_deg": self.limits.overrun_deg, **self.uncertainty.model_dump(exclude_none=True)}
 
     @property
     def result_limits(self) -> Mapping[str, float | tuple[float, float]]:

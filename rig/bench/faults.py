@@ -9,7 +9,7 @@ from pydantic import BaseModel, ValidationError
 
 from drivers.links.faults import Fault
 from procedures.session import Limits
-from rig.bench.parts import Certificate, Displacement, Folders, Instrument, Sensor
+from rig.bench.parts import Certificate, Displacement, Folders, Instrument, Sensor, Uncertainty
 from rig.nearest import did_you_mean
 
 UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
@@ -34,7 +34,8 @@ def fault_of(fault: Any, keys: list[str]) -> str:
 
 def _keys(model: Any, where: list[str]) -> list[str]:
     """The keys that are known at a place of the file."""
-    parts = {"instruments": Instrument, "sensor": Sensor, "folders": Folders, "limits": Limits, "d63": Displacement}
+    own = {"limits": Limits, "d63": Displacement, "uncertainty": Uncertainty}
+    parts = {"instruments": Instrument, "sensor": Sensor, "folders": Folders, **own}
     part = parts.get(where[0], model) if where else model
     if where and (where[0] == "certificates" or where[-1] == "certificate"):
         part = Certificate

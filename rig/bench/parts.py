@@ -7,7 +7,7 @@ from datetime import date
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, create_model, field_validator
+from pydantic import BaseModel, ConfigDict, Field, create_model, field_validator
 
 from calibrations.error_table import Point
 from drivers.links.address import Address
@@ -86,6 +86,21 @@ class Sensor(Strict):
         """What every table of this sensor says of it."""
         said = self.model_dump(exclude_none=True, exclude={"world"})
         return {"sensor": said.pop("name"), **{key: value for key, value in said.items() if value != ""}}
+
+
+class Uncertainty(Strict):
+    """Standard uncertainties of what no fit can know, for the budget (`calibrations/inputs.py`); None: not given.
+
+    The converter's are those of its specification or certificate, as the range is used: a limit over sqrt(3).
+    """
+
+    repeat_std_deg: float | None = Field(default=None, ge=0)  # of a stage's angle, from pose to pose
+    tilt_std_deg: float | None = Field(default=None, ge=0)  # of the base against the vertical
+    mount_std_deg: float | None = Field(default=None, ge=0)  # of the sensor's edges against the table
+    gravity_std_m_s2: float | None = Field(default=None, ge=0)
+    gain_std: float | None = Field(default=None, ge=0)  # of the converter, relative
+    offset_std_v: float | None = Field(default=None, ge=0)
+    temperature_std_c: float | None = Field(default=None, ge=0)
 
 
 class Displacement(Strict):
