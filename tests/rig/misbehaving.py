@@ -25,7 +25,7 @@ SHORT: dict[str, dict[str, str]] = {  # settings with which a procedure is short
     "noise-floor": {"duration_s": "3", "block_s": "1", "dwell_s": "0.2", "settle_s": "0.1"},
     "misalignment": {"dwell_s": "0.2", "most_rounds": "1"},
     "temperature-cycle": {"dwell_s": "0.2", "temperatures_c": "40,50", "soak_s": "600"},
-    "soak": {"duration_s": "1200", "interval_s": "600", "block_s": "60", "dwell_s": "0.2", "settle_s": "0.1"},
+    "soak": {"duration_s": "400", "interval_s": "200", "block_s": "20", "dwell_s": "0.2", "settle_s": "0.1"},
     "motion": {"duration_s": "4", "still_s": "4", "block_s": "2", "dwell_s": "0.1", "settle_s": "0"},
     "repeat": {"times": "2", "dwell_s": "0.2", "power": "false", "mount": "false"},
 }
