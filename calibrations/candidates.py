@@ -71,7 +71,10 @@ def candidates(before: Fit, effects: Mapping[str, Effect]) -> list[Candidate]:
     unseen = held_out_excess(before)
     found = _with_probabilities(found, before.residual.size, unseen)
     found.sort(key=lambda c: (c.held_out_after < unseen, schwarz(c, before.residual.size)), reverse=True)
-    return [replace(c, indistinguishable_from=_like(c, found, screen)) for c in found]
+    return [
+        replace(c, indistinguishable_from=(*_like(c, found, screen), *_unlogged(c.effect, before, effects)))
+        for c in found
+    ]
 
 
 def best_pair(before: Fit, found: list[Candidate]) -> tuple[Candidate, Candidate] | None:
@@ -211,6 +214,17 @@ def _with_probabilities(found: list[Candidate], rows: int, unseen: float) -> lis
     half = np.array([schwarz(c, rows) / 2 if c.held_out_after < unseen else -np.inf for c in found] + [0.0])
     weight = np.exp(half - half.max())
     return [replace(c, probability=float(w / weight.sum())) for c, w in zip(found, weight[:-1], strict=True)]
+
+
+def _unlogged(effect: Effect, before: Fit, effects: Mapping[str, Effect]) -> tuple[str, ...]:
+    """What an effect of time may be confused with, and the table lacks the column to tell: an unlogged temperature."""
+    if "t_s" not in effect.needs or before.table.kind != "poses":
+        return ()
+    return tuple(
+        name
+        for name, other in effects.items()
+        if name in effect.confused_with and "temperature_c" in other.needs and "temperature_c" not in before.table
+    )
 
 
 def _like(c: Candidate, others: list[Candidate], screen: Screen) -> tuple[str, ...]:

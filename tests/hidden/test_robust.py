@@ -129,3 +129,14 @@ def test_what_the_rig_has_is_named_all_the_same(subject: str, spoilt: Callable[[
     result = found(spoilt(make()))
     assert result.causes == causes
     assert result.verdict == "adequate" or any(set(causes) & set(result.alternatives))
+
+
+@pytest.mark.parametrize("subject", ["samples", "samples, clean"])
+def test_an_unlogged_temperature_is_not_called_a_drift_for_certain(subject: str) -> None:
+    make, causes = SUBJECTS[subject]
+    result = found(changed(make(), {"temperature_c": None}))
+    if not causes:
+        assert (result.verdict, result.causes) == ("adequate", ())
+        return
+    assert result.verdict in ("ambiguous", "unexplained")
+    assert all("temperature-bias" in result.alternatives[name] for name in result.causes)
