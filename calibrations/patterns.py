@@ -18,6 +18,7 @@ from calibrations.table import Array, Table
 
 HARMONICS = range(2, 13)
 OF_ALPHA = range(2, 7)
+ROCKING = range(1, 7)  # of alpha, as beta turns
 STEPS = 40
 RAMPS = 12
 FINER_RAMPS = 23
@@ -222,15 +223,20 @@ def _sector(beta: Array, centre_deg: float, width_deg: float) -> Pattern:
 
 
 def _in_stage(table: Table, channels: int) -> Iterator[Pattern]:
-    """An error of a stage angle turns gravity in the sensor, so that all axes err together."""
-    for angle, numbers in (("beta", HARMONICS), ("alpha", OF_ALPHA)):
-        pose, degrees = nominal_pose(table), table.column(f"{angle}_deg")
+    """An error of a stage angle turns gravity in the sensor, so that all axes err together.
+
+    It returns with the stage's own angle or, where the table rocks as the other turns, with that of beta.
+    """
+    pose = nominal_pose(table)
+    for angle, along, numbers in (("beta", "beta", HARMONICS), ("alpha", "alpha", OF_ALPHA), ("alpha", "beta", ROCKING)):
         turned = replace(pose, **{angle: getattr(pose, angle) + 1e-6})
         felt = ((specific_force(turned) - specific_force(pose)) / 1e-6).T[:channels, :, None]
+        degrees = table.column(f"{along}_deg")
+        where = f"the stage angle {angle}" if angle == along else f"{along} in the stage angle {angle}"
         for k in numbers:
             if len(np.unique(degrees)) > 2 * k:
-                text, waves = f"{_ordinal(k)} harmonic of the stage angle {angle}", _waves(k * np.radians(degrees))
-                yield Pattern(text, felt * waves[None], f"{angle}_deg += {_harmonic(k, angle)}")
+                text, waves = f"{_ordinal(k)} harmonic of {where}", _waves(k * np.radians(degrees))
+                yield Pattern(text, felt * waves[None], f"{angle}_deg += {_harmonic(k, along)}")
 
 
 def _waves(turned: Array) -> Array:
