@@ -151,15 +151,14 @@ DEMANDS: tuple[tuple[str, str, Callable[[Record], bool], Judge, str, float], ...
 
 
 def figures(records: list[Record], methods: list[str]) -> list[dict[str, Any]]:
-    """One entry for each demand that there are sets for."""
+    """One entry for each demand that there are sets for: the share of each method, and whether ours meets it."""
     found = []
     for text, row, chosen, judge, sign, demand in DEMANDS:
         mine = [r for r in records if r["row"] == row and chosen(r)]
-        if not mine:
-            continue
         shares = {method: share(mine, method, judge) for method in methods}
-        values = {method: round(value, 4) for method, (value, n) in shares.items() if n}
-        ours = values.get("ours", float("nan"))
-        met = ours <= demand if sign == "<" else ours >= demand
-        found.append({"demand": text, "sign": sign, "wanted": demand, "sets": len(mine), "met": met, **values})
+        ours, count = shares["ours"]
+        if count:
+            values = {method: round(value, 4) for method, (value, n) in shares.items() if n}
+            met = ours <= demand if sign == "<" else ours >= demand
+            found.append({"demand": text, "sign": sign, "wanted": demand, "sets": count, "met": met, **values})
     return found
