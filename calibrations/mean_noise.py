@@ -54,6 +54,16 @@ def inflation(table: Table, axis: str = "") -> float:
     return float((1 + rho) / (1 - rho))
 
 
+def correlation_known(table: Table) -> bool:
+    """Whether the inflation follows from the samples, or from filter and rate; single samples need none.
+
+    Else means are taken as those of independent samples, and their noise may be more than that.
+    """
+    measured = any(name.startswith("noise_inflation") for name in table.constants)
+    filtered = "filter_corner_hz" in table.constants and "sample_rate_hz" in table.constants
+    return measured or filtered or "n" not in table or bool(np.all(table.column("n") == 1))
+
+
 def measured_inflation(blocks: Array) -> tuple[Array, Array]:
     """The inflation of each channel and its standard error, shape (channels,).
 

@@ -16,6 +16,7 @@ from scipy.stats import norm
 
 from calibrations.candidates import SIGNIFICANT
 from calibrations.fit import Fit
+from calibrations.mean_noise import correlation_known
 from calibrations.noise import rms
 from calibrations.patterns import Pattern, one_sided, patterns, per_channel
 from calibrations.screen import Screen, Search
@@ -116,5 +117,7 @@ def _patternless(fit: Fit) -> Pattern | None:
     if fit.table.kind == "positions" or not fit.noise.known or fit.pooled_excess <= MOST_NOISE:
         return None
     slow, scatter = (float(np.max(noise / fit.noise.floor)) for noise in (fit.noise.slow, fit.noise.scatter))
+    if scatter > slow and not correlation_known(fit.table):
+        return None  # the means may be of so few independent samples
     what = "slow drift" if slow > scatter else "scatter"
     return Pattern(f"{what} without a pattern, {max(slow, scatter):.1f} x the noise floor", np.zeros((0, 0, 0)))

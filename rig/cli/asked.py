@@ -15,6 +15,7 @@ import numpy as np
 from calibrations.effect import Effect, catalogue
 from calibrations.errors import ModelError
 from calibrations.fit import Fit
+from calibrations.mean_noise import correlation_known
 from calibrations.model import Model
 from calibrations.model_file import dump_model, read_model
 from calibrations.table import Table
@@ -49,6 +50,11 @@ def asked(
     table = load(data, tell=note)
     if chosen is not None:
         _check_unit(chosen, table)
+    if table.kind == "poses" and not correlation_known(table):
+        note(
+            f"{table.source}: how the samples of a mean correlate is not known, and they are taken as independent; "
+            "scatter of the poses beyond that counts as noise. Give the constants filter_corner_hz and sample_rate_hz."
+        )
     return table, chosen or read_model(DEFAULTS.get(table.kind, "linear"), effects), effects
 
 

@@ -140,3 +140,14 @@ def test_an_unlogged_temperature_is_not_called_a_drift_for_certain(subject: str)
         return
     assert result.verdict in ("ambiguous", "unexplained")
     assert all("temperature-bias" in result.alternatives[name] for name in result.causes)
+
+
+@pytest.mark.parametrize("subject", ["world", "world, clean"])
+def test_an_unknown_filter_is_no_effect(subject: str) -> None:
+    """Correlated samples taken as independent make means look four times too good: they scatter, that is all."""
+    make, causes = SUBJECTS[subject]
+    table = make()
+    blind = Table.from_columns(table.kind, table.columns)
+    assert fit(read_model("linear"), blind).pooled_excess > 4
+    result = found(blind)
+    assert (result.verdict, result.causes) == ("adequate", causes)
