@@ -1,0 +1,17 @@
+"""Noise of a still sensor: how it averages, its spectrum, and the processes that it is made of.
+
+    octaves      Allan deviations at octave times: one pass over blocks, constant memory
+    exact        the same at any time, with every overlap, of an array at hand
+    freedom      degrees of freedom of a deviation, and its interval
+    noise_type   the power of frequency that a spectrum follows, from neighbouring means
+    decimated    a record of any length as at most 2^17 means
+    welch        the spectrum of what is faster than these
+    bands        both as averages over narrow bands, each a chi-square variable
+    processes    the spectra of white noise, flicker, random walk ...
+    whittle      their coefficients by maximum likelihood
+    identify     which of them the data shows, and bounds on the others
+    lines        sinusoids
+    analysis     all of it in one pass
+
+Values are those of a rate: the sensor's output. Their sum over time is what the literature on clocks calls phase.
+"""
