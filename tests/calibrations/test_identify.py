@@ -84,3 +84,42 @@ def test_an_estimate_no_better_than_what_a_sensor_may_show() -> None:
     assert not e.identified
     assert e.std is not None
     assert "no smaller than what a sensor may show" in str(e.why)
+
+
+def heated(model: Model, temperature_c: np.ndarray) -> dict[tuple[str, str], Estimate]:
+    data = table(90, 30)
+    return estimates(model, Table.from_columns("poses", {**data.columns, "temperature_c": temperature_c[: data.n]}))
+
+
+def test_without_a_span_of_temperature_its_coefficient_is_not_known() -> None:
+    still, hardly = np.full(500, 22.0), 22 + 1e-3 * np.sin(np.arange(500.0))
+    for temperature_c, why in ((still, "it changes nothing"), (hardly, "no smaller than what a sensor may show")):
+        found = heated(linear_with("temperature-bias"), temperature_c)
+        assert why in str(found["temperature-bias", "x"].why)
+        assert found["scale-factor", "x"].identified
+
+
+def test_a_warm_up_that_outlasts_the_record_has_no_time_constant() -> None:
+    columns = synthetic.turns((90, 30, 150))
+    a_x, a_y, _ = synthetic.components(columns)
+    warmth = 0.01 * np.exp(-columns["t_s"] / 20000)
+    found = estimates(linear_with("warm-up-bias"), synthetic.poses(columns, a_x + 2.5 + warmth, a_y + 2.5 + warmth))
+    assert not any(found["warm-up-bias", name].identified for name in ("x", "y", "time_constant"))
+    assert found["scale-factor", "x"].identified
+
+
+def test_cross_axis_terms_need_the_other_axis() -> None:
+    columns = synthetic.turns((90, 30, 150), step_deg=180)
+    a_x, a_y, _ = synthetic.components(columns)
+    data = synthetic.poses(columns, a_x + 2.5, a_y + 2.5)
+    found = estimates(linear_with("cross-axis-bias", "cross-axis-scale"), data)
+    assert not any(found[key].identified for key in (("cross-axis-bias", "x"), ("cross-axis-scale", "x")))
+    assert found["scale-factor", "x"].identified
+
+
+def test_one_axis_at_one_inclination_tells_no_geometry() -> None:
+    both = table(90)
+    one = Table.from_columns("poses", {k: v for k, v in both.columns.items() if not k.startswith("vy")})
+    found = estimates(linear_with("axis-misalignment"), one)
+    assert not any(found["axis-misalignment", k].identified for k in "xy")
+    assert found["scale-factor", "x"].identified
