@@ -1,6 +1,6 @@
 """What each of 25 candidates would explain at 5000 rows: all at once, and by a least-squares solution each.
 
-The candidates are the catalogue's, on the table of a sweep of 2500 poses and two axes, made white: 20 of them, and 5
+The candidates are the catalogue's, on the table of a sweep of 2500 poses and two axes, made white: at most 20 of them, the others
 turned to within 1 - 1e-10 (cosine) of a column of the model. Two models are timed, the smallest and the one with most
 parameters, both ways in turns, by the least time of each, so that nothing else on the machine counts.
 """
@@ -61,7 +61,9 @@ def candidates(before: Fit) -> list[Array]:
         mine = problem.layout.of_effect(effect.name)
         plain += [before.noise.whiten(problem.jacobian(theta, mine)) for theta in problem.layout.starts()[:3]]
     plain = [columns for columns in plain if _adds(columns, before.whitened[:, 1:])][: CANDIDATES - NEAR]
-    return plain + [_turned(columns, before.whitened[:, 1 + k % 4]) for k, columns in enumerate(plain[:NEAR])]
+    return plain + [
+        _turned(columns, before.whitened[:, 1 + k % 4]) for k, columns in enumerate(plain[: CANDIDATES - len(plain)])
+    ]
 
 
 def _adds(columns: Array, model: Array) -> bool:
