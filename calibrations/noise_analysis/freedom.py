@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from scipy.special import xlogy
@@ -27,7 +28,7 @@ ORDERS: Mapping[str, tuple[int, bool]] = MappingProxyType(  # order of the diffe
      "separate-hadamard": (3, False)}
 )  # fmt: skip
 TOTAL: Mapping[int, tuple[float, float]] = MappingProxyType({0: (1.5, 0.0), -1: (1.168, 0.222), -2: (0.927, 0.358)})
-COVARIANCES: Mapping[int, Callable[[Array], Array]] = MappingProxyType(
+COVARIANCES: Mapping[int, Callable[[Array], Any]] = MappingProxyType(
     {
         2: lambda t: -np.abs(t),
         1: lambda t: xlogy(t**2, np.abs(t)),
@@ -74,8 +75,8 @@ def overlap_of(kind: str, m: int, alpha: int) -> int:
 def interval(deviation: float, edf: float) -> tuple[float, float]:
     """The bounds between which the true deviation lies with a probability of COVERAGE."""
     tail = (1 - COVERAGE) / 2
-    high, low = chi2.ppf([tail, 1 - tail], edf)
-    return deviation * float(np.sqrt(edf / low)), deviation * float(np.sqrt(edf / high))
+    low, high = (deviation * float(np.sqrt(edf / chi2.ppf(p, edf))) for p in (1 - tail, tail))
+    return low, high
 
 
 def _autocovariance(t: Array, factor: float, alpha: int, order: int) -> Array:
@@ -90,6 +91,6 @@ def _autocovariance(t: Array, factor: float, alpha: int, order: int) -> Array:
 def _averaged(t: Array, factor: float, alpha: int) -> Array:
     """Generalised autocovariance of the phase, averaged over 1 / factor of an averaging time, each way."""
     if np.isinf(factor):
-        return COVARIANCES[alpha + 2](t)
+        return np.asarray(COVARIANCES[alpha + 2](t))
     w, step = COVARIANCES[alpha], 1 / factor
-    return factor**2 * (2 * w(t) - w(t - step) - w(t + step))
+    return np.asarray(factor**2 * (2 * w(t) - w(t - step) - w(t + step)))

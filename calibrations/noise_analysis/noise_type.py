@@ -29,7 +29,7 @@ def noise_type(n: int, moments: Sequence[float] | Array) -> int | None:
     variance = zz - n * mean**2
     if n < FEWEST or not variance > 1e-12 * zz or not ww > 0:
         return None
-    order = _order((lagged - n * mean**2) / variance)
+    order = _order((lagged - (n - 1) * mean**2) / variance)
     if order >= STATIONARY:
         order = 1 + _order(w_lagged / ww)
     return int(np.clip(round(-2 * order), REDDEST, BLUEST))

@@ -11,6 +11,7 @@ Source  Greenhall, IEEE Trans. UFFC 50 (2003), on how little stride costs; NIST 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from copy import deepcopy
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -22,7 +23,6 @@ from calibrations.noise_analysis.kernels import (
     FACTORS,
     HADAMARD,
     MODIFIED,
-    OVERLAP,
     Tree,
     absorb,
     empty_tree,
@@ -77,7 +77,7 @@ class Octaves:
     def curve(self, kind: str = "overlapping") -> Curve:
         """The deviation at 1, 2, 4 ... samples, as far as the record has two windows (hadamard: three)."""
         if self._whole is None:
-            self._whole = Tree(*(array.copy() for array in self._tree))
+            self._whole = deepcopy(self._tree)
             finish(self._whole)
         points = [_point(self._whole, kind, octave) for octave in range(self.n.bit_length())]
         rows = [point for point in points if point is not None]
@@ -124,6 +124,3 @@ def _alpha(tree: Tree, octave: int) -> int:
         if found is not None:
             return found
     return 0
-
-
-__all__ = ["BLOCK", "KINDS", "OVERLAP", "Curve", "Octaves", "octaves"]

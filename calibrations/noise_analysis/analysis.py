@@ -1,0 +1,210 @@
+"""Everything about the noise of a still record, in one pass over its blocks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from calibrations.errors import DataError, TooFewRows
+from calibrations.noise_analysis.bands import Bands, fast_bands, slow_bands
+from calibrations.noise_analysis.decimated import Means
+from calibrations.noise_analysis.identify import (
+    Mixture,
+    Spectrum,
+    mixture,
+    most_likely_markov,
+    settled,
+    uncertainties,
+    upper_bound,
+)
+from calibrations.noise_analysis.lines import MOST, Line, fast_lines, without_line
+from calibrations.noise_analysis.octaves import KINDS, Curve, Octaves
+from calibrations.noise_analysis.processes import (
+    GAUSS_MARKOV,
+    LINEAR,
+    SINUSOIDAL,
+    Sampling,
+    allan_gauss_markov,
+    allan_sinusoid,
+)
+from calibrations.noise_analysis.welch import Welch
+from calibrations.table import Array
+
+FEWEST = 64  # samples below which nothing can be said
+
+
+@dataclass(frozen=True)
+class Coefficient:
+    """One process. `value` is 0 where it is not identified: with 95 % it is then below `upper`.
+
+    `std` is the standard uncertainty of `value`. A Gauss-Markov process has a time constant, a sinusoid a frequency.
+    """
+
+    value: float
+    std: float
+    unit: str
+    upper: float | None = None
+    time_constant_s: float | None = None
+    frequency_hz: float | None = None
+
+    @property
+    def identified(self) -> bool:
+        return self.upper is None
+
+
+@dataclass(frozen=True)
+class NoiseAnalysis:
+    """What a still record shows. `spectrum` is two-sided; lines have been taken off it, strongest first."""
+
+    rate_hz: float
+    n: int
+    unit: str
+    curves: dict[str, Curve]
+    spectrum: Spectrum
+    lines: tuple[Line, ...]
+    found: Mixture
+    line_bound: float
+
+    @property
+    def allan(self) -> Curve:
+        """The overlapping Allan deviation."""
+        return self.curves["overlapping"]
+
+    @cached_property
+    def coefficients(self) -> dict[str, Coefficient]:
+        """Every process of the catalogue by its name."""
+        stds = uncertainties(self.spectrum, self.found)
+        each = {name: self._linear(name, stds) for name in LINEAR}
+        return each | {SINUSOIDAL: self._sinusoidal(), GAUSS_MARKOV: self._gauss_markov(stds)}
+
+    @property
+    def misfit(self) -> float:
+        """Of the spectrum from that of the processes: 1 where only chance is left."""
+        off = self.spectrum.density / self.found.expected(self.spectrum) - 1
+        return float(np.sqrt(np.mean(self.spectrum.freedom / 2 * off**2)))
+
+    def modelled(self, tau_s: Array) -> Array:
+        """Allan deviation of the processes that were identified, shape of `tau_s`, without the output's filter."""
+        found = self.found
+        parts = [v * LINEAR[name].allan(tau_s) for name, v in found.power.items() if name in LINEAR]
+        if GAUSS_MARKOV in found.power:
+            parts.append(found.power[GAUSS_MARKOV] * allan_gauss_markov(tau_s, found.time_constant_s))
+        parts += [line.amplitude**2 * allan_sinusoid(tau_s, line.frequency_hz) for line in self.lines]
+        return np.asarray(np.sqrt(np.sum(parts, axis=0)))
+
+    def _linear(self, name: str, stds: dict[str, float]) -> Coefficient:
+        unit = self.unit + LINEAR[name].per
+        if name in self.found.power:
+            return Coefficient(float(np.sqrt(self.found.power[name])), stds[name], unit)
+        bound = upper_bound(self.spectrum, self.found, name)
+        return Coefficient(0.0, bound / 1.645, unit, bound)
+
+    def _gauss_markov(self, stds: dict[str, float]) -> Coefficient:
+        found = self.found
+        if GAUSS_MARKOV in found.power:
+            value = float(np.sqrt(found.power[GAUSS_MARKOV]))
+            return Coefficient(value, stds[GAUSS_MARKOV], self.unit, None, found.time_constant_s)
+        time_s = most_likely_markov(self.spectrum, tuple(found.power)).time_constant_s
+        bound = upper_bound(self.spectrum, found, GAUSS_MARKOV, time_s)
+        return Coefficient(0.0, bound / 1.645, self.unit, bound, time_s)
+
+    def _sinusoidal(self) -> Coefficient:
+        if not self.lines:
+            return Coefficient(0.0, self.line_bound / 1.645, self.unit, self.line_bound)
+        line = self.lines[0]
+        return Coefficient(line.amplitude, line.std, self.unit, None, None, line.frequency_hz)
+
+
+def analyse(blocks: Iterable[Any], rate_hz: float, unit: str, source: str, corner_hz: float = np.inf) -> NoiseAnalysis:
+    """Of samples that come in blocks, shape (n,) each, in order and without gaps.
+
+    `corner_hz` is that of a first-order filter which the output has passed, where it is known: what is faster than half
+    of it is left out of the fit.
+
+    Raises DataError naming the sample that is no number, or where all are the same; TooFewRows.
+    """
+    octaves, means, welch = Octaves(rate_hz), Means(), Welch(rate_hz)
+    for block in blocks:
+        samples = _checked(np.asarray(block), octaves.n, source)
+        for each in (octaves, means, welch):
+            each.add(samples)
+    _check_whole(octaves.n, means, source)
+    return _analysed(octaves, means, welch, Record(rate_hz, unit, corner_hz))
+
+
+@dataclass(frozen=True)
+class Record:
+    """What is known of a record beside its samples."""
+
+    rate_hz: float
+    unit: str
+    corner_hz: float
+
+
+def _analysed(octaves: Octaves, means: Means, welch: Welch, record: Record) -> NoiseAnalysis:
+    sampling = Sampling(record.rate_hz, means.size)
+    fast: list[Bands] = []
+    lines: list[Line] = []
+    if means.size > 1:
+        above_hz = 0.5 / sampling.interval_s
+        f, density, freedom = welch.ordinates()
+        density, lines = fast_lines(f, density, freedom, above_hz, octaves.n / record.rate_hz)
+        chosen = f > above_hz
+        fast = [fast_bands(f[chosen], density[chosen], freedom, record.rate_hz, record.corner_hz)]
+    spectrum, found, slow, bound = _without_lines(means.values(), sampling, fast, record.corner_hz)
+    curves = {kind: octaves.curve(kind) for kind in KINDS}
+    strongest = sorted([*lines, *slow], key=lambda line: -line.amplitude)
+    return NoiseAnalysis(
+        record.rate_hz, octaves.n, record.unit, curves, spectrum, tuple(strongest), settled(found), bound
+    )
+
+
+def _without_lines(
+    values: Array, sampling: Sampling, fast: list[Bands], corner_hz: float
+) -> tuple[Spectrum, Mixture, list[Line], float]:
+    """(spectrum, its processes, the lines taken off, the amplitude that one more could have)."""
+    lines: list[Line] = []
+    while True:
+        slow = slow_bands(values, sampling, corner_hz)
+        spectrum = Spectrum((slow, *(part for part in fast if len(part.density))))
+        found = mixture(spectrum)
+        seen = without_line(values, sampling, _between(slow, found), corner_hz / 2)
+        if isinstance(seen, float):
+            return spectrum, found, lines, seen
+        values, line = seen
+        lines.append(line)
+        if len(lines) == MOST:
+            return spectrum, found, lines, line.amplitude
+
+
+def _between(slow: Bands, found: Mixture) -> Callable[[Array], Array]:
+    """The spectrum of the processes, read off at any frequency between the bands."""
+    at, level = np.log(slow.frequency_hz), np.log(found.expected(slow))
+    return lambda f: np.asarray(np.exp(np.interp(np.log(f), at, level)))
+
+
+def _checked(samples: Array, before: int, source: str) -> Array:
+    """As float64. Raises DataError where one is no number."""
+    try:
+        samples = samples.astype(np.float64, casting="same_kind" if samples.dtype.kind == "f" else "safe")
+    except TypeError:
+        raise DataError(f"{source}: holds {samples.dtype}, not real numbers; save one column of real numbers") from None
+    finite = np.isfinite(samples)
+    if not finite.all():
+        row = int(np.argmin(finite))
+        raise DataError(
+            f"{source}: sample {before + row + 1} is {samples[row]:g}, not a number; "
+            "cut the record there and analyse a part without gaps"
+        )
+    return samples
+
+
+def _check_whole(n: int, means: Means, source: str) -> None:
+    if n < FEWEST:
+        raise TooFewRows(f"{source}: {n} samples; the noise of a record needs {FEWEST} or more: record for longer")
+    if not np.any(means.values()):
+        raise DataError(f"{source}: every sample is the same; is the sensor connected, powered and not at its limit?")

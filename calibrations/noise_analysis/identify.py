@@ -1,0 +1,157 @@
+"""Which processes a spectrum shows, how strong they are, and how strong the others could be without being seen.
+
+All are fitted; the one whose absence lowers the likelihood least is left out, as long as it is not missed. A process
+that is not there is then named in one record of two hundred: under the null hypothesis twice the gain in log-likelihood
+is zero or, half of the time, chi-square, since no power is negative. A Gauss-Markov process has a time constant too,
+found among many, and has to gain more.
+
+Source  Self and Liang, J. Am. Statist. Assoc. 82 (1987): likelihood ratios at a bound.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import brentq, minimize_scalar
+
+from calibrations.noise_analysis.bands import Bands
+from calibrations.noise_analysis.processes import GAUSS_MARKOV, LINEAR
+from calibrations.noise_analysis.whittle import information, maximise
+from calibrations.table import Array
+
+COST = 6.6  # twice the log-likelihood that a process has to gain
+COST_MARKOV = 16.0  # for two parameters, of which one is searched for
+BOUND = 2.71  # twice the log-likelihood that is lost at a bound with 95 %
+TIMES = 12  # time constants that are tried first
+FASTEST, LONGEST = 3.0, 0.1  # of them, in sampling intervals and in lengths of the record
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """Bands of one record that are fitted together."""
+
+    parts: tuple[Bands, ...]
+
+    @property
+    def frequency_hz(self) -> Array:
+        return np.concatenate([part.frequency_hz for part in self.parts])
+
+    @property
+    def density(self) -> Array:
+        """Two-sided, unit^2/Hz."""
+        return np.concatenate([part.density for part in self.parts])
+
+    @property
+    def freedom(self) -> Array:
+        return np.concatenate([part.freedom for part in self.parts])
+
+    def column(self, process: str, time_constant_s: float = 0.0) -> Array:
+        """What is expected of a process whose coefficient is 1."""
+        return np.concatenate([part.column(process, time_constant_s) for part in self.parts])
+
+
+@dataclass(frozen=True)
+class Mixture:
+    """Processes and their powers: squares of coefficients. `time_constant_s` is that of a Gauss-Markov process."""
+
+    power: Mapping[str, float]
+    log_likelihood: float
+    time_constant_s: float = 0.0
+
+    @property
+    def worth(self) -> float:
+        """Twice the log-likelihood, less what each process costs."""
+        return 2 * self.log_likelihood - sum(COST_MARKOV if name == GAUSS_MARKOV else COST for name in self.power)
+
+    def expected(self, of: Spectrum | Bands) -> Array:
+        """Its spectrum."""
+        parts = [v * of.column(name, self.time_constant_s) for name, v in self.power.items()]
+        return np.asarray(np.sum(parts, axis=0))
+
+
+def mixture(spectrum: Spectrum) -> Mixture:
+    """The processes that the spectrum shows."""
+    plain = _pruned(spectrum, _fitted(spectrum, tuple(LINEAR)))
+    with_markov = _pruned(spectrum, most_likely_markov(spectrum, tuple(LINEAR)))
+    return max(plain, with_markov, key=lambda each: each.worth)
+
+
+def most_likely_markov(spectrum: Spectrum, beside: Sequence[str]) -> Mixture:
+    """With a Gauss-Markov process of the most likely time constant among the others."""
+    slow = spectrum.parts[0]
+    shortest = FASTEST / spectrum.parts[-1].sampling.rate_hz
+    longest = max(LONGEST / (2 * slow.frequency_hz[0]), 2 * shortest)
+    names = (*beside, GAUSS_MARKOV)
+
+    def loss(log_s: float) -> float:
+        return -_fitted(spectrum, names, float(np.exp(log_s))).log_likelihood
+
+    tried = np.linspace(np.log(shortest), np.log(longest), TIMES)
+    best = int(np.argmin([loss(log_s) for log_s in tried]))
+    ends = tried[max(0, best - 1)], tried[min(TIMES - 1, best + 1)]
+    found = minimize_scalar(loss, bounds=ends, method="bounded", options={"xatol": 0.02})
+    return _fitted(spectrum, names, float(np.exp(found.x)))
+
+
+def _fitted(
+    spectrum: Spectrum, names: Sequence[str], time_constant_s: float = 0.0, base: Array | None = None
+) -> Mixture:
+    G = np.column_stack([spectrum.column(name, time_constant_s) for name in names])
+    base = np.zeros(len(G)) if base is None else base
+    theta, value = maximise(G, spectrum.density, spectrum.freedom, base)
+    return Mixture(dict(zip(names, theta.tolist(), strict=True)), float(value), time_constant_s)
+
+
+def _pruned(spectrum: Spectrum, found: Mixture) -> Mixture:
+    """Without the processes that are not missed; one stays."""
+    while len(found.power) > 1:
+        fewer = [
+            _fitted(spectrum, [n for n in found.power if n != name], found.time_constant_s) for name in found.power
+        ]
+        best = max(fewer, key=lambda each: each.worth)
+        if best.worth < found.worth:
+            break
+        found = best
+    return found
+
+
+def uncertainties(spectrum: Spectrum, found: Mixture) -> dict[str, float]:
+    """Standard deviation of each coefficient, and of the time constant, under `time_constant_s`."""
+    columns = [spectrum.column(name, found.time_constant_s) for name in found.power]
+    roots = [2 * np.sqrt(max(v, 1e-300)) for v in found.power.values()]  # by the coefficient, whose square is the power
+    G = np.column_stack([c * root for c, root in zip(columns, roots, strict=True)])
+    names = list(found.power)
+    if GAUSS_MARKOV in found.power:
+        small, t_s = 1e-3, found.time_constant_s
+        moved = spectrum.column(GAUSS_MARKOV, t_s * (1 + small)) - spectrum.column(GAUSS_MARKOV, t_s * (1 - small))
+        G = np.column_stack([G, found.power[GAUSS_MARKOV] * moved / (2 * small * t_s)])
+        names.append("time_constant_s")
+    J = information(G, found.expected(spectrum), spectrum.freedom)
+    scale = np.sqrt(np.diag(J))
+    variance = np.diag(np.linalg.pinv(J / np.outer(scale, scale))) / scale**2
+    return dict(zip(names, np.sqrt(variance).tolist(), strict=True))
+
+
+def upper_bound(spectrum: Spectrum, found: Mixture, name: str, time_constant_s: float = 0.0) -> float:
+    """The coefficient that a process which is not in the mixture stays below, with 95 %."""
+    t_s = time_constant_s or found.time_constant_s
+    column = spectrum.column(name, t_s)
+    most = _fitted(spectrum, (*found.power, name), t_s)
+
+    def loss(log_power: float) -> float:
+        rest = _fitted(spectrum, tuple(found.power), t_s, np.exp(log_power) * column)
+        return 2 * (most.log_likelihood - rest.log_likelihood) - BOUND
+
+    weight = column / found.expected(spectrum)
+    low = float(np.log(max(most.power[name], 1e-3 / np.sqrt(np.sum(spectrum.freedom * weight**2)))))
+    high = low + 1.0
+    while loss(high) < 0:
+        low, high = high, high + 1.0
+    return float(np.exp(brentq(loss, low, high, xtol=0.02) / 2)) if loss(low) < 0 else float(np.exp(low / 2))
+
+
+def settled(found: Mixture) -> Mixture:
+    """Without the zeros."""
+    return replace(found, power={name: v for name, v in found.power.items() if v > 0})

@@ -1,0 +1,117 @@
+"""The processes that noise is made of: spectrum and Allan variance of each, for a coefficient of 1.
+
+    process             spectrum S(f), two-sided    Allan variance        coefficient, unit of the values U
+    white-noise         N^2                         N^2 / tau             U/sqrt(Hz): angle or velocity random walk
+    flicker-noise       B^2 / (2 pi f)              (2 ln 2 / pi) B^2     U: bias instability
+    rate-random-walk    K^2 / (2 pi f)^2            K^2 tau / 3           U/sqrt(s)
+    quantisation-noise  (2 pi f)^2 Q^2 dt           3 Q^2 / tau^2         U s: of the values' sum, as of an angle
+    gauss-markov-noise  2 s^2 T / (1 + (2 pi f T)^2)                      U: standard deviation; T, s
+    sinusoidal-noise    a line                      a^2 sin^4/(..)^2      U: amplitude; frequency, Hz
+
+Spectra are those of means over `size` samples of the sampled process, folded at the means' own Nyquist frequency.
+
+Source  IEEE 952, annex C; IEEE 1293; Book 17.3, (17.4)-(17.5).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from calibrations.table import Array
+
+FOLDS = 32  # of the spectrum above the means' Nyquist frequency that are added, each way
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """Means over `size` samples, taken `rate_hz` a second."""
+
+    rate_hz: float
+    size: int = 1
+
+    @property
+    def interval_s(self) -> float:
+        """Between means."""
+        return self.size / self.rate_hz
+
+
+def white(f: Array, _: Sampling) -> Array:
+    """1 at every frequency."""
+    return np.ones_like(f)
+
+
+def flicker(f: Array, by: Sampling) -> Array:
+    """Fractionally differenced noise of order 1/2 (Kasdin, Proc. IEEE 83, 1995), which is 1 / (2 pi f) but near the
+    sampling frequency; folded."""
+    folds = min(FOLDS, by.size // 2)
+    step, total = 1 / by.rate_hz, np.zeros_like(f)
+    for fold in range(-folds, folds + 1 - (by.size % 2 == 0 and folds < FOLDS)):
+        sine = np.abs(np.sin(np.pi * (f + fold / by.interval_s) * step))
+        total += _kept(f, sine, by) * step / (2 * sine)
+    return total
+
+
+def _kept(f: Array, sine: Array, by: Sampling) -> Array:
+    """Power that a mean keeps of a frequency; `sine` is that of half its phase from sample to sample."""
+    return np.asarray((np.sin(np.pi * f * by.interval_s) / (by.size * sine)) ** 2)
+
+
+def random_walk(f: Array, by: Sampling) -> Array:
+    """Of steps at each sample: what means differ by has covariances at lags 0 and 1 only."""
+    s = by.size
+    phase = 2 * np.pi * f * by.interval_s
+    increments = (2 * s**2 + 1) / (3 * s) + np.cos(phase) * (s**2 - 1) / (3 * s)
+    return np.asarray(increments * by.interval_s / by.rate_hz / (4 * np.sin(phase / 2) ** 2))
+
+
+def quantisation(f: Array, by: Sampling) -> Array:
+    """Of the values' sum, rounded at each sample; of a mean only the ends count."""
+    return np.asarray(4 * np.sin(np.pi * f * by.interval_s) ** 2 / by.interval_s)
+
+
+def gauss_markov(f: Array, by: Sampling, time_constant_s: float) -> Array:
+    """First-order, of unit variance."""
+    a, s = 1 / (by.rate_hz * time_constant_s), by.size
+    phi, step = np.exp(-a), -np.expm1(-a)
+    whole = -np.expm1(-a * s)
+    variance = (1 + phi) / (step * s) - 2 * phi * whole / (s * step) ** 2
+    turn = np.exp(2j * np.pi * f * by.interval_s)
+    lagged = 2 * phi * (whole / (s * step)) ** 2 * (turn / (1 - (1 - whole) * turn)).real
+    return np.asarray(by.interval_s * (variance + lagged))
+
+
+@dataclass(frozen=True)
+class Process:
+    """Spectrum for a coefficient of 1, Allan variance likewise, and what to multiply a value's unit with."""
+
+    spectrum: Callable[[Array, Sampling], Array]
+    allan: Callable[[Array], Array]
+    per: str
+
+
+LINEAR: Mapping[str, Process] = MappingProxyType(
+    {
+        "white-noise": Process(white, lambda tau: 1 / tau, "/sqrt(Hz)"),
+        "flicker-noise": Process(flicker, lambda tau: np.full_like(tau, 2 * np.log(2) / np.pi), ""),
+        "rate-random-walk": Process(random_walk, lambda tau: tau / 3, "/sqrt(s)"),
+        "quantisation-noise": Process(quantisation, lambda tau: 3 / tau**2, "*s"),
+    }
+)
+GAUSS_MARKOV, SINUSOIDAL = "gauss-markov-noise", "sinusoidal-noise"
+
+
+def allan_gauss_markov(tau_s: Array, time_constant_s: float) -> Array:
+    """Allan variance of unit variance."""
+    r = tau_s / time_constant_s
+    brackets = 2 * r - 3 + 4 * np.exp(-r) - np.exp(-2 * r)
+    return np.asarray(np.where(r < 1e-3, 2 * r / 3, brackets / np.maximum(r, 1e-3) ** 2))
+
+
+def allan_sinusoid(tau_s: Array, frequency_hz: float) -> Array:
+    """Allan variance of unit amplitude."""
+    x = np.pi * frequency_hz * tau_s
+    return np.asarray((np.sin(x) ** 2 / x) ** 2)
