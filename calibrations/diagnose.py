@@ -54,9 +54,10 @@ def diagnose(table: Table, model: Model, effects: Mapping[str, Effect] | None = 
     effects = catalogue() if effects is None else effects
     path = find_path(model, table, effects, enough=MOST_LEFT)
     end = path.end
-    if path.steps and share_left(path.start, end) > MOST_LEFT:
-        end = settled(path, effects).end
     better = plainer(path.start, end)
+    if better is None and path.steps and share_left(path.start, end) > MOST_LEFT:
+        end = settled(path, effects).end
+        better = plainer(path.start, end)
     structure = better or structure_of(end)
     verdict, why_not = _verdict_of(path, end, structure, better is not None), undetermined(path.start)
     if verdict == "adequate" and why_not:

@@ -28,6 +28,9 @@ FINER_WIDTHS_DEG = (10.0, 15.0, 20.0, 25.0, 30.0, 40.0, 50.0, 60.0)
 LEVELS = 12  # of a column, that a step could be at
 NEIGHBOURS = 200  # of a step, at most, once it is found
 FEWEST_LEVELS = 12  # values of a column that has levels
+MOST_WAVES = 40  # along the record
+FINER_WAVES = 21
+BY_ANGLES = 10.0  # of twice the log-likelihood, for time rather than the angles that come round with it
 ONE_SIDED = 10.0  # of twice the log-likelihood, for one side rather than both: odds of 150 to 1
 
 
@@ -119,6 +122,22 @@ def _in_time(table: Table) -> Iterator[Pattern]:
         starts = np.quantile(t, np.linspace(0, 1, RAMPS + 2))
         for low, start, high in zip(starts[:-2], starts[1:-1], starts[2:], strict=True):
             yield replace(_ramp(t, start), finer=partial(_ramps, t, low, high))
+        for waves in np.arange(1.5, min(MOST_WAVES, table.n / 8), 0.5):
+            yield replace(_oscillation(t, waves), finer=partial(_oscillations, t, waves))
+
+
+def _oscillations(t: Array, waves: float) -> list[Pattern]:
+    return [_oscillation(t, waves + part) for part in np.linspace(-0.5, 0.5, FINER_WAVES)]
+
+
+def _oscillation(t: Array, waves: float) -> Pattern:
+    """So many waves along the record: mains beside the sampling's clock, a room that is heated in turns."""
+    period = (float(np.ptp(t)) or 1.0) / waves
+    rate = 2 * np.pi / period
+    expression = f"a*sin({rate:.6g}*t) + b*cos({rate:.6g}*t)"
+    return Pattern(
+        f"oscillation in time, period {period:.0f} s", _waves(rate * t), expression, price=BY_ANGLES, slow=True
+    )
 
 
 def _ramps(t: Array, low: float, high: float) -> list[Pattern]:
