@@ -170,8 +170,16 @@ def _result(problem: Problem, theta: Array, noise: Noise) -> Fit:
     found = Fit(model, problem, theta, noise, residual, jacobian)
     cautious = cautiously(found)
     informative = np.asarray(cautious.whitened[:, 1:] / cautious.birge)
-    wider = widening(cautious.noise, residual, jacobian, problem.layout.typical)
+    wider = _wider(cautious)
     return replace(found, model=estimates(model, problem.layout, theta, informative, wider))
+
+
+def _wider(cautious: Fit) -> Array:
+    """Factors on the standard uncertainties; none in a motion, whose parts tell what is slow from what is not."""
+    if cautious.table.kind == "motion":
+        return np.ones(len(cautious.theta))
+    layout = cautious.problem.layout
+    return widening(cautious.noise, cautious.residual, cautious.jacobian, layout.typical)
 
 
 def cautiously(found: Fit) -> Fit:
