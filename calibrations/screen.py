@@ -109,17 +109,28 @@ def reductions(model: Array, residual: Array, candidates: Sequence[Array]) -> Ar
     Q = _basis(model)
     left = _freed(residual, Q)
     known = np.column_stack([Q, left]).T
-    sums, least = _by_gram([(columns.T @ columns, known @ columns) for columns in candidates])
-    for k in map(int, np.flatnonzero(least < NEARLY)):
-        sums[k] = _reduction(_freed(candidates[k], Q), left, ROUNDING * np.linalg.norm(candidates[k], axis=0))
+    products = [(_gram(columns), known @ columns) for columns in candidates]
+    sums, least = _by_gram(products)
+    near = list(map(int, np.flatnonzero(least < NEARLY)))
+    sizes = [np.sqrt(np.diagonal(products[k][0])) for k in near]
+    sums[near] = _near_reductions([_freed(candidates[k], Q) for k in near], left, sizes)
     return sums
 
 
-def _reduction(free: Array, left: Array, rounding: Array) -> float:
-    """The same for one candidate freed of the model; columns no longer than `rounding` are none."""
-    free = free[:, np.linalg.norm(free, axis=0) > rounding]
-    sums, least = _by_gram([(free.T @ free, (left @ free)[None])])
-    return float(sums[0]) if least[0] >= NEARLY else float(np.sum((_basis(free).T @ left) ** 2))
+def _near_reductions(free: Sequence[Array], left: Array, sizes: Sequence[Array]) -> Array:
+    """The same for candidates freed of the model; `sizes` are their columns' lengths before, to know rounding by."""
+    products = [(_gram(columns), (left @ columns)[None]) for columns in free]
+    sums, least = _by_gram(products)
+    for k, (gram, _) in enumerate(products):
+        kept = np.sqrt(np.diagonal(gram)) > ROUNDING * sizes[k]
+        if least[k] < NEARLY or not kept.all():
+            sums[k] = np.sum((_basis(free[k][:, kept]).T @ left) ** 2)
+    return sums
+
+
+def _gram(columns: Array) -> Array:
+    """Products of columns with each other. Of a copy: the routine for a matrix with itself is slow on narrow ones."""
+    return np.asarray(columns.T @ columns.copy())
 
 
 def _by_gram(products: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
@@ -127,15 +138,16 @@ def _by_gram(products: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
 
     Products of each candidate: with itself (k, k), and with the model's basis and, last, the residual (p + 1, k).
     """
-    wide = max((len(gram) for gram, _ in products), default=0)
-    grams, sides = np.tile(np.eye(wide), (len(products), 1, 1)), np.zeros((len(products), wide, 1))
-    for free, side, (gram, projections) in zip(grams, sides, products, strict=True):
-        k, scale = len(gram), 1 / np.sqrt(np.maximum(np.diagonal(gram), np.finfo(float).tiny))
-        along = projections * scale
-        free[:k, :k] = gram * scale * scale[:, None] - along[:-1].T @ along[:-1]
-        side[:k, 0] = along[-1]
-    values, vectors = np.linalg.eigh(grams)
-    squares = (np.swapaxes(vectors, 1, 2) @ sides)[:, :, 0] ** 2 / np.maximum(values, NEARLY)
+    count, wide = len(products), max((len(gram) for gram, _ in products), default=0)
+    known = len(products[0][1]) if count else 1
+    grams, along = np.tile(np.eye(wide), (count, 1, 1)), np.zeros((count, known, wide))
+    for k, (gram, projections) in enumerate(products):
+        grams[k, : len(gram), : len(gram)], along[k, :, : len(gram)] = gram, projections
+    scale = 1 / np.sqrt(np.maximum(np.diagonal(grams, axis1=1, axis2=2), np.finfo(float).tiny))[:, None]
+    along *= scale
+    model, sides = along[:, :-1], along[:, -1:]
+    values, vectors = np.linalg.eigh(grams * scale * scale.swapaxes(1, 2) - model.swapaxes(1, 2) @ model)
+    squares = (sides @ vectors)[:, 0] ** 2 / np.maximum(values, NEARLY)
     return squares.sum(axis=1), np.min(values, axis=1, initial=1.0)
 
 
@@ -149,7 +161,7 @@ def _beside(columns: Array, basis: Array, least: float) -> Array:
 def _basis(columns: Array) -> Array:
     if not columns.size:
         return np.zeros((len(columns), 0))
-    norm = np.linalg.norm(columns, axis=0)
+    norm = np.sqrt(np.einsum("ij,ij->j", columns, columns))
     Q, R = np.linalg.qr(columns[:, norm > 0] / norm[norm > 0])
     U, s, _ = np.linalg.svd(R)
     rank = int(np.sum(s > 1e-9 * s[0])) if len(s) else 0

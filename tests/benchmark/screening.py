@@ -1,8 +1,8 @@
 """What each of 25 candidates would explain at 5000 rows: all at once, and by a least-squares solution each.
 
-The candidates are the catalogue's, on the table of a sweep of 2500 poses and two axes, made white: at most 20 of them, the others
-turned to within 1 - 1e-10 (cosine) of a column of the model. Two models are timed, the smallest and the one with most
-parameters, both ways in turns, by the least time of each, so that nothing else on the machine counts.
+The candidates are the catalogue's, on the table of a sweep of 2500 poses and two axes, made white: at most 20 of them.
+The others are turned to within 1 - 1e-10 (cosine) of a column of the model. Two models are timed, the smallest and the
+one with most parameters, both ways in turns, by the least time of each, so that nothing else on the machine counts.
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ POSES, CANDIDATES, NEAR = 2500, 25, 5
 COSINE = 1 - 1e-10
 REPEATS = 41
 LEAST_TIMES_FASTER = 6.0
-MOST_DIFFERENCE = 1e-9
+MOST_DIFFERENCE = 1e-9  # of what a candidate explains
+LITTLE = 1e-4  # of all squares: a candidate that explains less is compared to so much
 
 
 def table() -> Table:
@@ -98,7 +99,7 @@ def compared(name: str) -> dict[str, float | bool | int]:
     model = before.whitened[:, 1:] / np.linalg.norm(before.whitened[:, 1:], axis=0)
     columns = [each / np.linalg.norm(each, axis=0) for each in candidates(before)]
     quick, plain = reductions(model, residual, columns), by_solving(model, residual, columns)
-    difference = float(np.max(np.abs(quick - plain) / np.maximum(plain, 1e-6 * float(residual @ residual))))
+    difference = float(np.max(np.abs(quick - plain) / np.maximum(plain, LITTLE * float(residual @ residual))))
     ways = [partial(way, model, residual, columns) for way in (reductions, by_solving)]
     fast, slow = np.min([[seconds(way, 1)[0] for way in ways] for _ in range(REPEATS)], axis=0)
     return {
