@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -11,14 +11,15 @@ import numpy as np
 
 from calibrations.errors import DataError, TooFewRows
 from calibrations.noise_analysis.bands import Bands, fast_bands, slow_bands
+from calibrations.noise_analysis.clipping import Ends
 from calibrations.noise_analysis.decimated import Means
 from calibrations.noise_analysis.identify import (
     Mixture,
     Spectrum,
+    estimates,
     mixture,
     most_likely_markov,
     settled,
-    uncertainties,
     upper_bound,
 )
 from calibrations.noise_analysis.lines import MOST, Line, fast_lines, without_line
@@ -34,6 +35,7 @@ from calibrations.noise_analysis.processes import (
 from calibrations.noise_analysis.welch import Welch
 from calibrations.table import Array
 
+Estimates = Mapping[str, tuple[float, float]]
 FEWEST = 64  # samples below which nothing can be said
 
 
@@ -68,6 +70,7 @@ class NoiseAnalysis:
     lines: tuple[Line, ...]
     found: Mixture
     line_bound: float
+    corner_hz: float = np.inf
 
     @property
     def allan(self) -> Curve:
@@ -77,9 +80,9 @@ class NoiseAnalysis:
     @cached_property
     def coefficients(self) -> dict[str, Coefficient]:
         """Every process of the catalogue by its name."""
-        stds = uncertainties(self.spectrum, self.found)
-        each = {name: self._linear(name, stds) for name in LINEAR}
-        return each | {SINUSOIDAL: self._sinusoidal(), GAUSS_MARKOV: self._gauss_markov(stds)}
+        known = estimates(self.spectrum, self.found)
+        each = {name: self._linear(name, known) for name in LINEAR}
+        return each | {SINUSOIDAL: self._sinusoidal(), GAUSS_MARKOV: self._gauss_markov(known)}
 
     @property
     def misfit(self) -> float:
@@ -88,26 +91,31 @@ class NoiseAnalysis:
         return float(np.sqrt(np.mean(self.spectrum.freedom / 2 * off**2)))
 
     def modelled(self, tau_s: Array) -> Array:
-        """Allan deviation of the processes that were identified, shape of `tau_s`, without the output's filter."""
-        found = self.found
-        parts = [v * LINEAR[name].allan(tau_s) for name, v in found.power.items() if name in LINEAR]
-        if GAUSS_MARKOV in found.power:
-            parts.append(found.power[GAUSS_MARKOV] * allan_gauss_markov(tau_s, found.time_constant_s))
+        """Allan deviation of the processes that were identified, shape of `tau_s`."""
+        parts = [power * self.allan_of(name, tau_s) for name, power in self.found.power.items()]
         parts += [line.amplitude**2 * allan_sinusoid(tau_s, line.frequency_hz) for line in self.lines]
         return np.asarray(np.sqrt(np.sum(parts, axis=0)))
 
-    def _linear(self, name: str, stds: dict[str, float]) -> Coefficient:
+    def allan_of(self, process: str, tau_s: Array) -> Array:
+        """Allan variance of a process whose coefficient is 1; white noise behind a filter is Gauss-Markov."""
+        if process == GAUSS_MARKOV:
+            return allan_gauss_markov(tau_s, self.found.time_constant_s)
+        if process == "white-noise" and np.isfinite(self.corner_hz):
+            filter_s = 1 / (2 * np.pi * self.corner_hz)
+            return allan_gauss_markov(tau_s, filter_s) / (2 * filter_s)
+        return LINEAR[process].allan(tau_s)
+
+    def _linear(self, name: str, known: Estimates) -> Coefficient:
         unit = self.unit + LINEAR[name].per
-        if name in self.found.power:
-            return Coefficient(float(np.sqrt(self.found.power[name])), stds[name], unit)
+        if name in known:
+            return Coefficient(*known[name], unit)
         bound = upper_bound(self.spectrum, self.found, name)
         return Coefficient(0.0, bound / 1.645, unit, bound)
 
-    def _gauss_markov(self, stds: dict[str, float]) -> Coefficient:
+    def _gauss_markov(self, known: Estimates) -> Coefficient:
         found = self.found
-        if GAUSS_MARKOV in found.power:
-            value = float(np.sqrt(found.power[GAUSS_MARKOV]))
-            return Coefficient(value, stds[GAUSS_MARKOV], self.unit, None, found.time_constant_s)
+        if GAUSS_MARKOV in known:
+            return Coefficient(*known[GAUSS_MARKOV], self.unit, None, found.time_constant_s)
         time_s = most_likely_markov(self.spectrum, tuple(found.power)).time_constant_s
         bound = upper_bound(self.spectrum, found, GAUSS_MARKOV, time_s)
         return Coefficient(0.0, bound / 1.645, self.unit, bound, time_s)
@@ -127,12 +135,13 @@ def analyse(blocks: Iterable[Any], rate_hz: float, unit: str, source: str, corne
 
     Raises DataError naming the sample that is no number, or where all are the same; TooFewRows.
     """
-    octaves, means, welch = Octaves(rate_hz), Means(), Welch(rate_hz)
+    octaves, means, welch, ends = Octaves(rate_hz), Means(), Welch(rate_hz), Ends()
     for block in blocks:
         samples = _checked(np.asarray(block), octaves.n, source)
-        for each in (octaves, means, welch):
+        for each in (octaves, means, welch, ends):
             each.add(samples)
     _check_whole(octaves.n, means, source)
+    ends.check(source)
     return _analysed(octaves, means, welch, Record(rate_hz, unit, corner_hz))
 
 
@@ -159,8 +168,9 @@ def _analysed(octaves: Octaves, means: Means, welch: Welch, record: Record) -> N
     curves = {kind: octaves.curve(kind) for kind in KINDS}
     strongest = sorted([*lines, *slow], key=lambda line: -line.amplitude)
     return NoiseAnalysis(
-        record.rate_hz, octaves.n, record.unit, curves, spectrum, tuple(strongest), settled(found), bound
-    )
+        record.rate_hz, octaves.n, record.unit, curves, spectrum, tuple(strongest), settled(found), bound,
+        record.corner_hz,
+    )  # fmt: skip
 
 
 def _without_lines(

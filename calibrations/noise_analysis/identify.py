@@ -1,9 +1,9 @@
 """Which processes a spectrum shows, how strong they are, and how strong the others could be without being seen.
 
 All are fitted; the one whose absence lowers the likelihood least is left out, as long as it is not missed. A process
-that is not there is then named in one record of two hundred: under the null hypothesis twice the gain in log-likelihood
-is zero or, half of the time, chi-square, since no power is negative. A Gauss-Markov process has a time constant too,
-found among many, and has to gain more.
+that is not there is then named in one record of four hundred: under the null hypothesis twice the gain in
+log-likelihood is zero or, half of the time, chi-square, since no power is negative. A Gauss-Markov process has a time
+constant too, found among many, and has to gain more.
 
 Source  Self and Liang, J. Am. Statist. Assoc. 82 (1987): likelihood ratios at a bound.
 """
@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
@@ -21,8 +22,10 @@ from calibrations.noise_analysis.processes import GAUSS_MARKOV, LINEAR
 from calibrations.noise_analysis.whittle import information, maximise
 from calibrations.table import Array
 
-COST = 6.6  # twice the log-likelihood that a process has to gain
+COST = 7.88  # twice the log-likelihood that a process has to gain
 COST_MARKOV = 16.0  # for two parameters, of which one is searched for
+DOUBTED = ("flicker-noise", "rate-random-walk")  # they are alike where a record has few periods
+DOUBT = 2.0  # twice the log-likelihood that one of them has to gain for even odds
 BOUND = 2.71  # twice the log-likelihood that is lost at a bound with 95 %
 TIMES = 12  # time constants that are tried first
 FASTEST, LONGEST = 3.0, 0.1  # of them, in sampling intervals and in lengths of the record
@@ -132,6 +135,35 @@ def uncertainties(spectrum: Spectrum, found: Mixture) -> dict[str, float]:
     scale = np.sqrt(np.diag(J))
     variance = np.diag(np.linalg.pinv(J / np.outer(scale, scale))) / scale**2
     return dict(zip(names, np.sqrt(variance).tolist(), strict=True))
+
+
+def estimates(spectrum: Spectrum, found: Mixture) -> dict[str, tuple[float, float]]:
+    """(coefficient, its standard uncertainty) of each process that was found, and of the time constant.
+
+    Slow noise that is there but too weak to be identified would bias what is, if it were taken to be zero. So both are
+    means over all mixtures with some of the slow processes that were not identified, weighted by likelihood.
+
+    Source  Hoeting, Madigan, Raftery and Volinsky, Statist. Sci. 14 (1999).
+    """
+    others = [name for name in DOUBTED if name not in found.power]
+    chosen = [subset for k in range(len(others) + 1) for subset in combinations(others, k)]
+    fits = [_fitted(spectrum, (*found.power, *subset), found.time_constant_s) for subset in chosen]
+    fits = [fit for fit in fits if min(fit.power.values()) > 0] or [found]
+    doubts = np.array([fit.log_likelihood - DOUBT * len(fit.power) / 2 for fit in fits])
+    weights = np.exp(doubts - doubts.max())
+    weights /= weights.sum()
+    stds = [uncertainties(spectrum, fit) for fit in fits]
+    out = {}
+    for name in (*found.power, *(("time_constant_s",) if GAUSS_MARKOV in found.power else ())):
+        values = np.array([_value(fit, name) for fit in fits])
+        mean = float(weights @ values)
+        spread = np.array([each[name] for each in stds]) ** 2 + (values - mean) ** 2
+        out[name] = mean, float(np.sqrt(weights @ spread))
+    return out
+
+
+def _value(fit: Mixture, name: str) -> float:
+    return float(np.sqrt(fit.power[name])) if name in fit.power else fit.time_constant_s
 
 
 def upper_bound(spectrum: Spectrum, found: Mixture, name: str, time_constant_s: float = 0.0) -> float:

@@ -1,0 +1,101 @@
+"""Pictures of a noise analysis: how the noise averages, and its spectrum, each beside what the processes make of it."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from scipy.stats import chi2
+
+from calibrations.noise_analysis.analysis import NoiseAnalysis
+from calibrations.noise_analysis.freedom import COVERAGE
+from calibrations.noise_analysis.processes import GAUSS_MARKOV
+from calibrations.pictures.album import Picture
+from calibrations.pictures.style import AMBER, BLUE, GREEN, INK, QUIET, VERMILION, panels, styled
+from calibrations.table import Array
+
+COLOURS = {
+    "white-noise": BLUE,
+    "flicker-noise": AMBER,
+    "rate-random-walk": VERMILION,
+    "quantisation-noise": GREEN,
+    GAUSS_MARKOV: QUIET,
+}
+
+
+def noise_album(found: NoiseAnalysis) -> list[Picture]:
+    """Both pictures, with words for a page."""
+    averaging = (
+        "How much neighbouring means differ, over the time that each is taken over. Dots are measured, bars are "
+        "intervals of 95 %; the full line is the sum of the processes that were identified, broken lines are these."
+    )
+    spectrum = (
+        "Power over frequency, one-sided. Dots are averages over narrow bands, the grey band is where 95 % of them "
+        "should be; the full line is the sum of the processes, marks on top are lines that were taken off."
+    )
+    return [
+        Picture("allan", "Allan deviation", averaging, allan(found)),
+        Picture("spectrum", "Spectrum", spectrum, density(found)),
+    ]
+
+
+@styled
+def allan(found: NoiseAnalysis) -> Figure:
+    """The overlapping deviation with its interval, the processes and their sum; beside it the other deviations."""
+    figure, axes = panels(1, 2, 4.0, width_ratios=[3, 2], sharex=True, sharey=True)
+    ax, beside = axes[0]
+    curve = found.allan
+    bars = np.array([curve.deviation - curve.low, curve.high - curve.deviation])
+    ax.errorbar(
+        curve.tau_s, curve.deviation, bars, fmt="o", color=INK, elinewidth=0.8, ms=3.4, label="measured", zorder=3
+    )
+    tau_s = np.geomspace(curve.tau_s[0], curve.tau_s[-1], 300)
+    ax.plot(tau_s, found.modelled(tau_s), color=INK, lw=1.4, label="these processes")
+    for name, power in found.found.power.items():
+        ax.plot(tau_s, np.sqrt(power * found.allan_of(name, tau_s)), "--", color=COLOURS[name], label=name)
+    for kind, colour in (("modified", BLUE), ("hadamard", GREEN), ("total", VERMILION)):
+        other = found.curves[kind]
+        beside.plot(other.tau_s, other.deviation, "o-", color=colour, ms=2.6, label=kind)
+    beside.plot(curve.tau_s, curve.deviation, color=QUIET, label="Allan")
+    room = 2.0
+    ax.set(xscale="log", yscale="log", ylim=(curve.low.min() / room, curve.high.max() * room))
+    ax.set(xlabel="averaging time (s)", ylabel=f"deviation ({found.unit})", title="Allan deviation, overlapping")
+    beside.set(xlabel="averaging time (s)", title="other deviations")
+    for each in (ax, beside):
+        each.legend()
+    return figure
+
+
+@styled
+def density(found: NoiseAnalysis) -> Figure:
+    """Measured and expected one-sided amplitude densities."""
+    figure, axes = panels(1, 1, 4.0)
+    ax = axes[0, 0]
+    spectrum, order = found.spectrum, np.argsort(found.spectrum.frequency_hz)
+    f, freedom = spectrum.frequency_hz[order], spectrum.freedom[order]
+    expected = found.found.expected(spectrum)[order]
+    tail = (1 - COVERAGE) / 2
+    low, high = (_root(expected * chi2.ppf(p, freedom) / freedom) for p in (tail, 1 - tail))
+    ax.fill_between(f, low, high, color=QUIET, alpha=0.22, lw=0)
+    ax.plot(f, _root(spectrum.density[order]), "o", color=INK, ms=2.2, label="measured")
+    ax.plot(f, _root(expected), color=INK, lw=1.2, label="these processes")
+    for name, power in found.found.power.items():
+        column = spectrum.column(name, found.found.time_constant_s)[order]
+        ax.plot(f, _root(power * column), "--", color=COLOURS[name], label=name)
+    ax.set(xscale="log", yscale="log", ylim=(low.min() / 2, 2 * max(high.max(), _root(spectrum.density).max())))
+    _mark_lines(ax, found)
+    ax.set(xlabel="frequency (Hz)", ylabel=f"density ({found.unit}/√Hz)")
+    ax.legend()
+    return figure
+
+
+def _root(two_sided: Array) -> Array:
+    """One-sided amplitude density."""
+    return np.asarray(np.sqrt(2 * two_sided))
+
+
+def _mark_lines(ax: Axes, found: NoiseAnalysis) -> None:
+    for line in found.lines:
+        ax.axvline(line.frequency_hz, color=VERMILION, lw=0.7, ls=":")
+        ax.annotate(f"{line.frequency_hz:.4g} Hz", (line.frequency_hz, 1), xycoords=("data", "axes fraction"),
+                    rotation=90, ha="right", va="top", fontsize=8)  # fmt: skip

@@ -1,0 +1,50 @@
+"""noise: Allan deviation and noise coefficients of a still record."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from rig.cli.output import emit, json_option, notes
+
+
+@click.command("noise")
+@click.argument("data")
+@click.option("--channel", help="Of several channels: vx, vy ... Default: the first.")
+@click.option("--rate", "rate_hz", type=click.FloatRange(min=0, min_open=True), help="Samples a second, for an array.")
+@click.option("--pictures", "folder", type=click.Path(file_okay=False, path_type=Path), help="Write pictures here.")
+@click.option("--format", "form", type=click.Choice(["png", "svg"]), default="png", show_default=True)
+@json_option
+def command(
+    data: str, channel: str | None, rate_hz: float | None, folder: Path | None, form: str, as_json: bool
+) -> None:
+    """Show how the noise of DATA averages, and which processes it is made of.
+
+    DATA is a table of kind still, an array of samples (.npy, with --rate), or a run with a still record: noise-floor or
+    soak. It is read once, and never held in memory as a whole.
+    """
+    from calibrations.noise_analysis.analysis import analyse
+    from calibrations.noise_analysis.document import noise_document
+    from rig.cli.noise_words import remarks, summary
+    from rig.record.store import Record
+    from rig.still import stream
+
+    if Path(data).exists() or data.endswith(".npy"):
+        samples = stream(None, data, channel, rate_hz)
+        found = analyse(samples.blocks, samples.rate_hz, samples.unit, data, samples.corner_hz)
+    else:
+        with Record.to_find(data) as record:
+            samples = stream(record, data, channel, rate_hz)
+            found = analyse(samples.blocks, samples.rate_hz, samples.unit, f"run {data}", samples.corner_hz)
+    notes(remarks(samples, found))
+    if as_json:
+        emit(noise_document(found))
+    else:
+        click.echo(summary(samples, found))
+    if folder is not None:
+        from calibrations.pictures.noise import noise_album
+        from calibrations.pictures.save import save_all
+
+        written = save_all({picture.name: picture.figure for picture in noise_album(found)}, folder, form)
+        notes(f"written: {path}" for path in written)

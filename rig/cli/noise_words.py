@@ -1,0 +1,138 @@
+"""A noise analysis in words: coefficients in units that sensor engineers use, the Allan deviation as a table."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from calibrations.noise_analysis.analysis import Coefficient, NoiseAnalysis
+from calibrations.numerals import exponent
+from rig.cli.output import columns, duration
+from rig.still import Stream
+
+PREFIXES = ((1.0, ""), (1e3, "m"), (1e6, "u"), (1e9, "n"), (1e12, "p"))
+MEANS = {
+    "white-noise": "velocity or angle random walk",
+    "flicker-noise": "bias instability",
+    "rate-random-walk": "the bias wanders",
+    "quantisation-noise": "of the output's sum over time",
+    "sinusoidal-noise": "amplitude",
+    "gauss-markov-noise": "standard deviation",
+}
+MISFIT = 1.3  # of the spectrum, beyond which the processes do not describe it
+G_M_S2 = 9.80665
+Factor = tuple[float, str]
+
+
+def summary(samples: Stream, found: NoiseAnalysis) -> str:
+    """All that there is to say, for a terminal."""
+    length_s = found.n / found.rate_hz
+    head = (
+        f"{samples.source}, {samples.channel}: {found.n} samples at {found.rate_hz:g} Hz, {duration(length_s)}\n"
+        if length_s >= 1
+        else f"{samples.source}, {samples.channel}: {found.n} samples at {found.rate_hz:g} Hz\n"
+    )
+    return "\n".join([head, _coefficients(samples, found), "", _density(samples, found), "", _allan(found)])
+
+
+def remarks(samples: Stream, found: NoiseAnalysis) -> Iterable[str]:
+    """What was done to the data, and what to be careful about."""
+    if samples.others:
+        yield f"Channel {samples.channel}; --channel takes another: {', '.join(samples.others)}."
+    if samples.closed:
+        missing = sum(length for _, length in samples.closed)
+        yield (
+            f"{len(samples.closed)} gaps, {missing:.3g} s in all, are closed up: longer times are too short by up to "
+            f"{100 * missing * found.rate_hz / found.n:.2g} %."
+        )
+    if np.isfinite(samples.corner_hz):
+        yield (
+            f"Coefficients are those before the output's {samples.corner_hz:g} Hz low-pass, "
+            f"from what is slower than {samples.corner_hz / 2:.3g} Hz."
+        )
+    if found.misfit > MISFIT:
+        yield (
+            f"The spectrum is {found.misfit:.2g} times as far from these processes as chance leaves it: there is "
+            "something else (a filter, a resonance, a disturbance); look at the pictures (--pictures FOLDER)."
+        )
+
+
+def _coefficients(samples: Stream, found: NoiseAnalysis) -> str:
+    second = _engineering(found.unit, samples.scale_v_per_g)
+    rows = []
+    for name, each in found.coefficients.items():
+        beside = () if second is None else (_shown(each, *second),)
+        rows.append((name, _shown(each, 1.0, found.unit), *beside, MEANS[name] + _detail(each)))
+    head = ("process", "coefficient", *(() if second is None else ("or",)), "")
+    return columns(head, rows)
+
+
+def _engineering(unit: str, scale_v_per_g: float | None) -> Factor | None:
+    """What a value is multiplied with for a second unit, and that."""
+    if unit == "V" and scale_v_per_g:
+        return 1 / scale_v_per_g, "g"
+    known: dict[str, Factor] = {"m/s^2": (1 / G_M_S2, "g"), "m/s2": (1 / G_M_S2, "g"), "deg/s": (3600.0, "deg/h")}
+    return known.get(unit)
+
+
+def _detail(each: Coefficient) -> str:
+    if each.frequency_hz is not None:
+        return f", {each.frequency_hz:.6g} Hz"
+    return f", time constant {each.time_constant_s:.3g} s" if each.time_constant_s and each.identified else ""
+
+
+def _shown(each: Coefficient, factor: float, unit: str) -> str:
+    """`12.34(56) uV/sqrt(Hz)`, or the bound that it stays below."""
+    per = each.unit.removeprefix(_base(each.unit))
+    if each.upper is not None:
+        scale, prefix = _prefixed(each.upper * factor, unit)
+        return f"not identified, below {each.upper * factor * scale:.2g} {prefix}{unit}{per}"
+    value, std = each.value * factor, each.std * factor
+    scale, prefix = _prefixed(value, unit)
+    digits = min(9, max(0, 1 - exponent(float(f"{std * scale:.1e}"))))
+    last = round(std * scale * 10**digits)
+    return f"{value * scale:.{digits}f}({last}) {prefix}{unit}{per}"
+
+
+def _base(unit: str) -> str:
+    for per in ("/sqrt(Hz)", "/sqrt(s)", "*s"):
+        if unit.endswith(per):
+            return unit.removesuffix(per)
+    return unit
+
+
+def _prefixed(value: float, unit: str) -> Factor:
+    """The factor and prefix with which a value reads best; counts and compound units have none."""
+    if unit not in ("V", "g"):
+        return 1.0, ""
+    return next(((f, p) for f, p in PREFIXES if abs(value) * f >= 1), (1.0, ""))
+
+
+def _density(samples: Stream, found: NoiseAnalysis) -> str:
+    """White noise as data sheets give it: one-sided, and so sqrt(2) times the coefficient of the Allan deviation."""
+    white = found.coefficients["white-noise"]
+    if not white.identified:
+        return "No white noise was identified."
+    scaled = Coefficient(white.value * np.sqrt(2), white.std * np.sqrt(2), white.unit)
+    second = _engineering(found.unit, samples.scale_v_per_g)
+    shown = [_shown(scaled, 1.0, found.unit), *([] if second is None else [_shown(scaled, *second)])]
+    return f"Noise density as in data sheets (one-sided): {' or '.join(shown)}."
+
+
+def _allan(found: NoiseAnalysis) -> str:
+    curve = found.allan
+    modelled = found.modelled(curve.tau_s)
+    scale, prefix = _prefixed(float(curve.deviation.max()), found.unit)
+    rows = [
+        (f"{tau:.4g}", f"{d * scale:.4g}", f"{low * scale:.4g} .. {high * scale:.4g}", f"{m * scale:.4g}")
+        for tau, d, low, high, m in zip(curve.tau_s, curve.deviation, curve.low, curve.high, modelled, strict=True)
+    ]
+    lowest = int(np.argmin(curve.deviation))
+    end = (
+        f"\nLowest at {curve.tau_s[lowest]:.4g} s: averaging for longer does not help."
+        if lowest < len(rows) - 1
+        else ""
+    )
+    head = ("time (s)", f"Allan deviation ({prefix}{found.unit})", "95 % interval", "by these processes")
+    return columns(head, rows) + end

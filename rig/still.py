@@ -1,0 +1,206 @@
+"""DATA of a still sensor as a stream of samples: a table, an array in a file, or a run straight from its record."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrations.errors import DataError, nearest
+from calibrations.table import Array, Table
+from procedures.noise_floor import STILL
+from procedures.soak import HOLD
+from rig.data import load
+from rig.errors import RecordError
+from rig.record.measured import Measured
+from rig.record.store import Record
+from rig.record.values import Kept
+
+BLOCK = 1 << 17
+BESIDE = ("t_s", "temperature_c", "supply_v", "n", "direction", "path")  # columns that are no channels
+LATE = 0.5  # sampling intervals by which a sample may be off before that is a gap
+MOST_MISSING = 0.1  # of a record, in gaps that are closed up
+DISAGREE = 0.01  # of two rates
+UPRIGHT = 0.999  # g: a pose that is as good as along gravity
+
+
+@dataclass
+class Stream:
+    """Samples of one channel, in blocks that are read once. What was seen on the way is known when they are read."""
+
+    source: str
+    channel: str
+    rate_hz: float
+    unit: str
+    blocks: Iterator[NDArray[Any]]
+    corner_hz: float = np.inf
+    others: tuple[str, ...] = ()
+    closed: list[tuple[float, float]] = field(default_factory=list)  # gaps: where each begins and how long it is, s
+    upright_v: dict[int, float] = field(default_factory=dict)  # output along gravity, +1 and -1 g
+
+    @property
+    def scale_v_per_g(self) -> float | None:
+        """From poses of the same run at +1 and -1 g; None where it has none."""
+        if {1, -1} <= self.upright_v.keys() and self.upright_v[1] != self.upright_v[-1]:
+            return abs(self.upright_v[1] - self.upright_v[-1]) / 2
+        return None
+
+
+def stream(record: Record | None, data: str, channel: str | None, rate_hz: float | None) -> Stream:
+    """The samples that `data` names. `rate_hz` is for what does not say its own.
+
+    Raises DataError and RecordError: no such file, run or channel; a rate that is missing or disagrees; gaps.
+    """
+    path = Path(data)
+    if path.suffix == ".npy" and path.is_file():
+        return _of_array(path, rate_hz)
+    if path.suffix == ".npy":
+        raise DataError(f"{data}: there is no such file; a run is named as `rig runs` lists it")
+    if path.exists() or record is None:
+        return _of_table(load(data, "still" if path.suffix != "" else None), channel, rate_hz)
+    measured = Measured.named(record, data)
+    if record.columns(measured.run.run)[0]:
+        return _of_table(measured.table(), channel, rate_hz)
+    return _of_run(measured, channel, rate_hz)
+
+
+def _of_array(path: Path, rate_hz: float | None) -> Stream:
+    if rate_hz is None:
+        raise DataError(f"{path}: an array does not say how fast it was sampled; give --rate HZ")
+    try:
+        array = np.load(path, mmap_mode="r", allow_pickle=False)
+    except (ValueError, OSError, EOFError) as error:
+        raise DataError(f"{path}: is no array that numpy.save wrote: {error}") from None
+    if array.ndim == 2 and 1 in array.shape:
+        array = array.reshape(-1)
+    if array.ndim != 1:
+        raise DataError(f"{path}: holds an array of shape {array.shape}; save one channel, of shape (n,)")
+    return Stream(str(path), "values", rate_hz, "count", (array[i : i + BLOCK] for i in range(0, len(array), BLOCK)))
+
+
+def _of_table(table: Table, channel: str | None, rate_hz: float | None) -> Stream:
+    if table.kind != "still":
+        raise DataError(
+            f"{table.source}: a table of {table.kind}; noise needs single samples of a sensor at rest, a table of still"
+        )
+    channels = tuple(name for name in table.columns if name not in BESIDE)
+    chosen = _chosen(channels, channel, table.source)
+    stated = rate_hz or table.number("sample_rate_hz", 0.0)
+    closed: list[tuple[float, float]] = []
+    rate = _agreed(_rate_of(table, closed), stated, table.source)
+    unit = "V" if chosen.endswith("_v") else str(table.constants.get("unit", "count"))
+    corner_hz = table.number("filter_corner_hz", np.inf)
+    others = tuple(name for name in channels if name != chosen)
+    return Stream(table.source, chosen, rate, unit, iter([table.column(chosen)]), corner_hz, others, closed)
+
+
+def _chosen(channels: tuple[str, ...], channel: str | None, source: str) -> str:
+    """The channel asked for, or the first. Raises DataError."""
+    if not channels:
+        raise DataError(f"{source}: has no channel beside the time; add a column with the sensor's output")
+    wanted = channel or channels[0]
+    found = next((name for name in (wanted, f"{wanted}_v") if name in channels), None)
+    if found is None:
+        raise DataError(f'{source}: has no channel "{wanted}"{nearest(wanted, channels)}')
+    return found
+
+
+def _rate_of(table: Table, closed: list[tuple[float, float]]) -> float | None:
+    """From the column of times, whose gaps are added to `closed`; None without one. Raises DataError."""
+    if "t_s" not in table or table.n < 2:
+        return None
+    step_s = np.diff(table.column("t_s"))
+    typical = float(np.median(step_s))
+    if typical <= 0 or step_s.min() <= 0:
+        row = int(np.argmin(step_s > 0)) + 2
+        raise DataError(f"{table.source}: row {row}: the time does not go on; sort the rows and remove duplicates")
+    far = np.flatnonzero(np.abs(step_s - typical) > LATE * typical)
+    gaps = [(float(table.column("t_s")[i]), float(step_s[i] - typical)) for i in far]
+    uneven = [i for i in far if step_s[i] < typical]
+    if uneven:
+        raise DataError(
+            f"{table.source}: row {uneven[0] + 2} comes {step_s[uneven[0]]:g} s after the one before, others after "
+            f"{typical:g} s; samples must be evenly spaced: interpolate them onto equal steps first"
+        )
+    _check_gaps(gaps, (table.n - 1) * typical, table.source)
+    closed += gaps
+    return (table.n - 1 - len(far)) / float(np.sum(np.delete(step_s, far)))
+
+
+def _check_gaps(gaps: list[tuple[float, float]], length_s: float, source: str) -> None:
+    """Raises DataError where too much is missing to close the gaps up."""
+    missing = sum(length for _, length in gaps)
+    if missing > MOST_MISSING * length_s:
+        longest = max(gaps, key=lambda gap: gap[1])
+        raise DataError(
+            f"{source}: {len(gaps)} gaps, {missing:g} s in all beside {length_s:g} s of samples; the longest, of "
+            f"{longest[1]:g} s, is at t = {longest[0]:g} s: analyse the parts between gaps each by itself"
+        )
+
+
+def _agreed(measured: float | None, stated: float, source: str) -> float:
+    """The rate, Hz. Raises DataError where two disagree, or there is none."""
+    if measured is None and not stated > 0:
+        raise DataError(
+            f"{source}: its rate is not known; give --rate HZ, or a line `# sample_rate_hz: 100` above the header"
+        )
+    if measured is None:
+        return stated
+    if stated > 0 and abs(measured / stated - 1) > DISAGREE:
+        raise DataError(
+            f"{source}: {stated:g} samples a second are stated, the column t_s has {measured:g}; correct one of them"
+        )
+    return measured
+
+
+def _of_run(measured: Measured, channel: str | None, rate_hz: float | None) -> Stream:
+    first = next((kept for kept in measured.kept() if _is_still(kept)), None)
+    if first is None:
+        raise RecordError(
+            f"run {measured.name} holds no still record; `rig run noise-floor` or `rig run soak` makes one"
+        )
+    names = first.samples.channels
+    chosen = _chosen(tuple(names), (channel or "").removesuffix("_v") or None, f"run {measured.name}")
+    rate = _agreed(first.samples.rate_hz, rate_hz or 0.0, f"run {measured.name}")
+    corner = float(measured.constants.get("filter_corner_hz", np.inf))
+    outputs = tuple(name for name in names if name in ("vx", "vy", "vz") and name != chosen)
+    found = Stream(
+        measured.name, chosen, rate, "V", iter(()), corner if chosen in ("vx", "vy", "vz") else np.inf, outputs
+    )
+    found.blocks = _still_blocks(measured, found)
+    return found
+
+
+def _is_still(kept: Kept) -> bool:
+    return kept.pose.path.split(" ")[0] in (STILL, HOLD)
+
+
+def _still_blocks(measured: Measured, into: Stream) -> Iterator[NDArray[Any]]:
+    """Blocks of the still record one after the other; what else is met on the way is noted in `into`."""
+    next_s, length_s = None, 0.0
+    for kept in measured.kept():
+        samples = kept.samples
+        if into.channel not in samples.channels:
+            continue
+        volts = samples.volts[:, samples.channels.index(into.channel)]
+        if not _is_still(kept):
+            _note_upright(kept, volts, into)
+            continue
+        if next_s is not None and abs(samples.start_s - next_s) > LATE / into.rate_hz:
+            into.closed.append((next_s, samples.start_s - next_s))
+        next_s, length_s = samples.start_s + len(volts) / into.rate_hz, length_s + len(volts) / into.rate_hz
+        yield volts
+    _check_gaps(into.closed, length_s, f"run {measured.name}")
+
+
+def _note_upright(kept: Kept, volts: Array, into: Stream) -> None:
+    """The mean output of the channel's axis along gravity."""
+    alpha, beta = np.radians(kept.pose.alpha_deg), np.radians(kept.pose.beta_deg)
+    along: Mapping[str, float] = {"vx": np.sin(alpha) * np.cos(beta), "vy": np.sin(alpha) * np.sin(beta)}
+    g = along.get(into.channel, 0.0)
+    if abs(g) > UPRIGHT and kept.pose.flip == 0 and kept.pose.mount_deg == 0:
+        into.upright_v.setdefault(round(g), float(volts.mean()))
