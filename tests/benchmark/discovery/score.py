@@ -91,18 +91,18 @@ def precision(record: Record, said: Record) -> float | None:
 
 def within(record: Record, said: Record) -> bool | None:
     """Where there is no slow noise."""
-    return None if said["error"] is None or _wanders(record) or record["slow"] else said["error"] <= WITHIN
+    return None if said["error"] is None or _by_chance(record) or record["slow"] else said["error"] <= WITHIN
 
 
 def within_slow(record: Record, said: Record) -> bool | None:
     """Where there is: a constant of the sensor is known no better than the noise wanders, by the oracle neither."""
     best = record["answers"].get("oracle")
-    return None if best is None or _wanders(record) or not record["slow"] else said["error"] <= WITHIN * best["error"]
+    return None if best is None or _by_chance(record) or not record["slow"] else said["error"] <= WITHIN * best["error"]
 
 
-def _wanders(record: Record) -> bool:
-    """Whether a random walk is among the causes: no form describes one."""
-    return record["name"] == "sampled/kicks" or "wandering reference" in record["mechanisms"]
+def _by_chance(record: Record) -> bool:
+    """Whether a random walk, or a threshold that differs from pose to pose, is among the causes: no form foretells one."""
+    return record["name"] in ("sampled/kicks", "sampled/threshold") or "wandering reference" in record["mechanisms"]
 
 
 def quick(question: str, seconds: float) -> Judge:
