@@ -21,7 +21,13 @@ from calibrations.table import Array
 
 def blind_to(found: Fit, effects: Mapping[str, Effect]) -> tuple[str, ...]:
     """The effects, of the model or not, that this table has the columns for and whose parameters it leaves unknown."""
-    return tuple(name for name, effect in effects.items() if _can_be_asked(found, effect) and not _shows(found, effect))
+    return tuple(name for name, effect in effects.items() if _hidden(found, effect))
+
+
+def _hidden(found: Fit, effect: Effect) -> bool:
+    if found.table.content in effect.kinds and effect.lacks(found.table) is not None:
+        return True
+    return _can_be_asked(found, effect) and not _shows(found, effect)
 
 
 def _can_be_asked(found: Fit, effect: Effect) -> bool:

@@ -5,6 +5,8 @@
 Forward for `poses`, where the orientation is known, and for samples of `motion`, where the reference acceleration adds
 to gravity and the output filter and the converter's skew stand behind the transduction; backward for `positions`, where
 only the magnitude of gravity is known. The backward way solves the same functions, so that an effect is written once.
+What is a specific force for an accelerometer is the angular rate for a gyroscope, in deg/s, and for a magnetometer the
+field as a share of its strength.
 """
 
 from __future__ import annotations
@@ -17,6 +19,7 @@ import numpy as np
 from calibrations.effect import Effect, Values
 from calibrations.motion.output import sampled
 from calibrations.table import Array, Table
+from calibrations.turning import rate_deg_s
 
 Step = tuple[Effect, Values]
 
@@ -55,7 +58,9 @@ def specific_force(pose: Pose) -> Array:
 
 
 def force(table: Table, steps: Sequence[Step]) -> Array:
-    """Specific force along the sensing axes, g, shape (n, 3)."""
+    """Specific force along the sensing axes, g, shape (n, 3); of a gyroscope the angular rate, deg/s."""
+    if table.kind == "rates":
+        return sensed(rate_deg_s(table), table, steps)
     pose = nominal_pose(table)
     for effect, p in steps:
         if effect.pose is not None:

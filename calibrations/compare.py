@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc
 
 from calibrations.candidates import SIGNIFICANT
+from calibrations.chain import backward
 from calibrations.fit import Fit, evaluate, fit
 from calibrations.model import Model
 from calibrations.noise import rms
 from calibrations.path import MATERIAL
-from calibrations.table import Array, Table
+from calibrations.table import MILLI, Array, Table
 
 MOST_PLACES = 8
 STANDS_OUT = 1.1  # times the excess of the whole axis
@@ -31,7 +32,9 @@ WORDS: Mapping[str, tuple[str, str]] = {
     "direction": ("direction", ""),
     "time": ("t_s", "s"),
     "temperature": ("temperature_c", "degC"),
+    "rate": ("rate_deg_s", "deg/s"),
 }
+SIDES = ("+x", "-x", "+y", "-y", "+z", "-z")  # of the sensor, that gravity or the field points along
 
 
 @dataclass(frozen=True)
@@ -45,13 +48,16 @@ class Place:
     excess: float
     mean: float
     unit: str
-    scale: float  # output per g of that channel; 1 for a residual in g
+    scale: float  # output per g, field or deg/s of that channel; 1 for a residual in those
+    milli: str = "mg"  # a thousandth of what is sensed
     part: str = ""  # of a motion, such as " in phase at 10 Hz"
 
     @property
     def text(self) -> str:
-        """The place in words, with the mean residual there in the output's unit and in mg."""
-        if self.where == "direction":
+        """The place in words, with the mean residual there in the output's unit and in that of what is sensed."""
+        if self.where == "side":
+            place = f"side {SIDES[round(self.low)]}"
+        elif self.where == "direction":
             place = {1: "turning clockwise", -1: "turning anticlockwise", 0: "direction unknown"}[round(self.low)]
         else:
             unit = WORDS[self.where][1]
@@ -60,7 +66,8 @@ class Place:
             )  # fmt: skip
         mg = 1e3 * self.mean / self.scale
         own = f"{1e3 * self.mean:+.3g} mV" if self.unit == "V" else f"{self.mean:+.3g} {self.unit}"
-        value = f"{mg:+.3g} mg" if self.unit == "g" else f"{own} ({mg:+.3g} mg)"
+        sensed = self.unit in ("g", "field")
+        value = f"{mg:+.3g} {self.milli}" if sensed else f"{own} ({mg:+.3g} {self.milli})"
         return f"{place}: {self.axis}{self.part} is off by {value} on average, rms {self.excess:.3g} x the noise floor"
 
 
@@ -84,10 +91,10 @@ def compare(table: Table, model: Model) -> Comparison:
 
 
 def scales(found: Fit) -> Array:
-    """Output per g of each channel; 1 for a residual in g."""
+    """Output per g, or deg/s, of each channel; 1 for a residual in what is sensed."""
     if found.table.kind == "positions":
         return np.ones(1)
-    terms = [term for term in found.model.terms if term.name == "scale-factor"]
+    terms = [term for term in found.model.terms if term.name in ("scale-factor", "gyro-scale-factor")]
     values = {e.axis: abs(e.value) for term in terms for e in term.estimates}
     axes = [axis_of(channel) for channel in found.channels]
     return np.array([values.get(axis, values.get("", found.problem.layout.nominal)) for axis in axes])
@@ -102,16 +109,16 @@ def _fails(found: Fit) -> list[Place]:
     """Places where the residual is more than noise, worst first; at most one for each column and channel."""
     places, chances, each = [], [], []
     scale = scales(found)
-    unit = found.problem.unit
+    unit, milli = found.problem.unit, MILLI[found.table.input_unit]
     floor = found.noise.floor
     own = np.hypot(found.noise.floor, found.noise.slow) if found.noise.known else found.noise.floor
-    for where, low, high, rows in _parts(found.table):
+    for where, low, high, rows in (*_parts(found.table), *_sides(found)):
         for c, channel in enumerate(found.channels):
             axis = axis_of(channel)
             r = found.residual[c, rows]
             excess = float(rms(r) / floor[c])
             part = channel[len(axis) :]
-            places.append(Place(where, low, high, axis, excess, float(r.mean()), unit, float(scale[c]), part))
+            places.append(Place(where, low, high, axis, excess, float(r.mean()), unit, float(scale[c]), milli, part))
             chances.append(float(chdtrc(len(r), np.sum((r / own[c]) ** 2))))
             each.append((where, channel))
     if not places:
@@ -128,6 +135,18 @@ def _fails(found: Fit) -> list[Place]:
 def _stands_out(place: Place, excess: float, floor: float) -> bool:
     """Whether the residual there is larger than everywhere, or lies to one side."""
     return place.excess > STANDS_OUT * excess or abs(place.mean) > ONE_SIDED * excess * floor
+
+
+def _sides(found: Fit) -> Iterator[tuple[str, float, float, NDArray[np.intp]]]:
+    """Positions by the side of the sensor that gravity, or the field, came from."""
+    if found.table.kind != "positions":
+        return
+    a = backward(found.table, found.problem.layout.steps(found.theta))
+    along = np.argmax(np.abs(a), axis=1)
+    side = 2 * along + (a[np.arange(len(a)), along] < 0)
+    for k in range(len(SIDES)):
+        if len(rows := np.flatnonzero(side == k)):
+            yield "side", float(k), float(k), rows
 
 
 def _parts(table: Table) -> Iterator[tuple[str, float, float, NDArray[np.intp]]]:

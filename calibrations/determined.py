@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from calibrations.coverage import uncovered
 from calibrations.fit import Fit
 
 MOST_UNCERTAIN = 2.0  # variance on an unseen row over that of noise: parameters count for as much as noise
@@ -28,6 +29,8 @@ def unseen_variance(found: Fit) -> float:
 
 def undetermined(found: Fit) -> str | None:
     """Why a small residual is no proof on this data, in words; None where the data determine the model."""
+    if why := uncovered(found.table):
+        return why
     variance = unseen_variance(found)
     if variance <= MOST_UNCERTAIN:
         return None

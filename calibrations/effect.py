@@ -15,7 +15,8 @@ It has a docstring of the form
 a tuple PARAMETERS, and at least one of four functions, named by where in the signal chain it acts:
 
     pose(pose, table, p) -> Pose              the true stage angles and the true vertical
-    force(a, table, p) -> (n, 3)              the specific force along the sensing axes, g
+    force(a, table, p) -> (n, 3)              the specific force along the sensing axes, g; of a magnetometer the
+                                              field as a share of its strength, of a gyroscope the rate, deg/s
     transduction(a, table, p) -> (n, 3)       what the effect adds to the output, in the output's unit
     output(v, table, p) -> (n, 3)             what becomes of the output
 
@@ -23,8 +24,9 @@ a tuple PARAMETERS, and at least one of four functions, named by where in the si
 NEEDS (columns), KINDS (of tables), AFTER (effects without which in a model it means nothing); CONSTANTS: name ->
 function of the table, for reference values that are kept with the model and not fitted; STARTS: name -> function of
 the table, for starts from the data, (axes,) or (starts, axes); SEARCHED, a function of the table: how many starts
-that look different STARTS is the best of; and EXACT, where the form follows from geometry alone and needs no other
-effect to refine it.
+that look different STARTS is the best of; EXACT, where the form follows from geometry alone and needs no other
+effect to refine it; and LACKS, a function of the table: why its rows cannot show the effect whatever their number, or
+None. KINDS are kinds of tables, and "fields" for positions of a magnetometer.
 """
 
 from __future__ import annotations
@@ -56,10 +58,11 @@ Values = Mapping[str, Array]  # parameter name -> shape (3,) if per axis, else a
 class Parameter:
     """One declared parameter. `unit` may contain {out}, the unit of the output.
 
-    `typical` is the magnitude that a sensor may show (in g where the unit holds {out}, else in `unit`): the step
-    of numerical derivatives follows from it, and an estimate no better than this tells nothing new. `measured` names
-    an axis without which it does not exist, `where` one of the effect's CONSTANTS that is 0 where it does not, and
-    `scale` one that `typical` is a multiple of, where only data can tell.
+    `typical` is the magnitude that a sensor may show (in what is sensed where the unit holds {out}: g, the field's
+    strength or deg/s; else in `unit`): the step of numerical derivatives follows from it, and an estimate no better
+    than this tells nothing new. `measured` names an axis without which it does not exist, `where` one of the effect's
+    CONSTANTS that is 0 where it does not (for one axis, with the axis behind it: `turned_x`), and `scale` one that
+    `typical` is a multiple of, where only data can tell.
     """
 
     name: str
@@ -95,6 +98,11 @@ def _one(table: Table) -> float:  # noqa: ARG001
     return 1.0
 
 
+def _nothing(table: Table) -> str | None:  # noqa: ARG001
+    """Nothing is asked of the rows beforehand."""
+    return None
+
+
 @dataclass(frozen=True)
 class Effect:
     """One physical effect, as read from its module, or from its `expression`, which is then kept in model files."""
@@ -114,6 +122,7 @@ class Effect:
     starts: Mapping[str, Callable[[Table], Array]] = field(default_factory=dict)
     searched: Callable[[Table], float] = _one
     exact: bool = False
+    lacks: Callable[[Table], str | None] = _nothing
     pose: Callable[..., Any] | None = None
     force: Callable[..., Array] | None = None
     transduction: Callable[..., Array] | None = None
@@ -127,10 +136,10 @@ class Effect:
 
     def excluded(self, table: Table) -> str | None:
         """Why this effect cannot be asked of `table`, or None."""
-        if table.kind not in self.kinds:
-            return f"is not defined for {table.kind}"
+        if table.content not in self.kinds:
+            return f"is not defined for {table.content}"
         missing = [name for name in self.needs if name not in table]
-        return f"needs the column {', '.join(missing)}" if missing else None
+        return f"needs the column {', '.join(missing)}" if missing else self.lacks(table)
 
 
 @cache
@@ -212,6 +221,7 @@ def _from_module(module: ModuleType, path: Path) -> Effect:
         starts=dict(getattr(module, "STARTS", {})),
         searched=getattr(module, "SEARCHED", _one),
         exact=bool(getattr(module, "EXACT", False)),
+        lacks=getattr(module, "LACKS", _nothing),
         pose=hooks.get("pose"),
         force=hooks.get("force"),
         transduction=hooks.get("transduction"),

@@ -14,7 +14,8 @@ import numpy as np
 from calibrations.effect import Effect, Parameter, catalogue
 from calibrations.pictures.compact import sparing
 from calibrations.pictures.save import svg
-from calibrations.pictures.signature import picture, shown_value
+from calibrations.pictures.shown import shown_value
+from calibrations.pictures.signature import picture
 
 ACTS_ON = {
     "pose": "the pose: where the stages and the vertical really are",
@@ -85,15 +86,24 @@ def write(folder: Path) -> None:
 
 
 def _alternative(effect: Effect) -> str:
-    return f"What the linear model leaves of {effect.name}"
+    return f"What {_plain_model(effect)} leaves of {effect.name}"
+
+
+def _plain_model(effect: Effect) -> str:
+    """The model that the picture's residual is left by."""
+    if effect.kinds == ("fields",):
+        return "a magnetometer without error"
+    return "a gyroscope without error" if effect.kinds == ("rates",) else "the linear model"
 
 
 def _caption(effect: Effect) -> str:
     """What the picture shows, and of how large an effect."""
     kept = {"bias": "A model without a bias", "scale-factor": "A model without a scale factor"}
-    values = [_value(p, effect) for p in effect.parameters if not p.where]
+    plain, turned = _plain_model(effect), effect.kinds in (("fields",), ("rates",))
+    values = [_value(p, effect) for p in effect.parameters if turned or not p.where]
+    sensor = {"fields": " in a field of 1", "rates": " of 1 V/(deg/s)"}[effect.kinds[0]] if turned else " of 1 V/g"
     return (
-        f"{kept.get(effect.name, 'The linear model')} leaves this, noise aside, of a sensor of 1 V/g with "
+        f"{kept.get(effect.name, plain[0].upper() + plain[1:])} leaves this, noise aside, of a sensor{sensor} with "
         f"{', '.join(values)}."
     )
 
@@ -101,6 +111,8 @@ def _caption(effect: Effect) -> str:
 def _value(p: Parameter, effect: Effect) -> str:
     value = np.atleast_1d(shown_value(p, effect))
     unit = "" if p.unit == "1" else f" {p.unit.replace('{out}', 'V')}"
+    if effect.kinds == ("fields",):
+        unit = ""  # a share of the field
     own = f" ({value[1]:g} for y)" if len(value) > 1 and value[1] != value[0] else ""
     return f"{p.name.replace('_', ' ')} {value[0]:g}{unit}{own}"
 
@@ -129,7 +141,7 @@ def _row(p: Parameter) -> str:
 def _footnote(effect: Effect) -> str:
     if not any("{out}" in p.unit for p in effect.parameters):
         return ""
-    return "\n{out} is the unit of the sensor's output: V for poses and motion, the unit of the data for positions.\n"
+    return "\n{out} is the unit of the sensor's output: V for poses and motion, else the unit of the data.\n"
 
 
 if __name__ == "__main__":

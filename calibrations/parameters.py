@@ -14,6 +14,7 @@ from calibrations.chain import Step
 from calibrations.effect import Parameter
 from calibrations.model import Model, Term
 from calibrations.table import AXES, Array, Table
+from calibrations.turning import scales
 
 
 @dataclass(frozen=True)
@@ -33,16 +34,14 @@ class Layout:
     axes: tuple[str, ...]
     slots: tuple[Slot, ...]
     unit: str
-    nominal: float  # output per g, to give parameters in the output's unit a size
+    nominal: float  # output per g, field or deg/s, to give parameters in the output's unit a size
     from_data: Mapping[tuple[int, str, str], tuple[float, ...]]  # starts that effects take from the table
 
     @staticmethod
     def of(model: Model, table: Table) -> Layout:
         """The layout for `table`."""
         slots = tuple(slot for i, term in enumerate(model.terms) for slot in _slots(i, term, table))
-        spread = float(np.median(np.ptp(table.outputs, axis=0))) / 2
-        nominal = table.number("output_per_g", spread or 1.0)
-        return Layout(model, table.axes, slots, table.unit, nominal, _from_data(model, table))
+        return Layout(model, table.axes, slots, table.unit, _nominal(table), _from_data(model, table))
 
     @cached_property
     def typical(self) -> Array:
@@ -133,11 +132,24 @@ def _from_data(model: Model, table: Table) -> dict[tuple[int, str, str], tuple[f
     return starts
 
 
+def _nominal(table: Table) -> float:
+    """Output per unit of what is sensed, as the range of outputs has it."""
+    if table.kind == "rates":
+        return float(np.max(np.abs(scales(table)))) or 1.0
+    spread = float(np.median(np.ptp(table.outputs, axis=0))) / 2
+    return table.number("output_per_g", spread or 1.0)
+
+
+def _exists(constant: str, term: Term) -> bool:
+    """Whether a parameter exists: not where the constant that it names is 0."""
+    return bool(term.constants.get(constant, 1.0))
+
+
 def _slots(i: int, term: Term, table: Table) -> list[Slot]:
     slots = []
     for p in term.effect.parameters:
-        if (p.measured and p.measured not in table.axes) or (p.where and not term.constants.get(p.where)):
+        if (p.measured and p.measured not in table.axes) or not _exists(p.where, term):
             continue
         axes = table.axes if p.per_axis and not term.tied else ("",)
-        slots += [Slot(i, p, axis) for axis in axes]
+        slots += [Slot(i, p, axis) for axis in axes if _exists(f"{p.where}_{axis}", term)]
     return slots

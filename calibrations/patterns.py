@@ -247,7 +247,11 @@ def _in_stage(table: Table, channels: int) -> Iterator[Pattern]:
     It returns with the stage's own angle or, where the table rocks as the other turns, with that of beta.
     """
     pose = nominal_pose(table)
-    for angle, along, numbers in (("beta", "beta", HARMONICS), ("alpha", "alpha", OF_ALPHA), ("alpha", "beta", ROCKING)):
+    for angle, along, numbers in (
+        ("beta", "beta", HARMONICS),
+        ("alpha", "alpha", OF_ALPHA),
+        ("alpha", "beta", ROCKING),
+    ):
         turned = replace(pose, **{angle: getattr(pose, angle) + 1e-6})
         felt = ((specific_force(turned) - specific_force(pose)) / 1e-6).T[:channels, :, None]
         degrees = table.column(f"{along}_deg")

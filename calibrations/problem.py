@@ -1,7 +1,8 @@
 """A model and a table as a least-squares problem: residuals and their derivatives.
 
 For `poses` the residual is measured minus predicted output, one block of rows per axis, in the output's unit.
-For `positions` it is |a| - 1, where a is the specific force that the model makes of the output, in g.
+For `positions` it is |a| - 1, where a is the specific force that the model makes of the output, in g, or the field as
+a share of its strength. For `rates` it is as for poses.
 For `motion` it is what each stretch of the record holds of measured minus predicted output, part by part.
 """
 
@@ -21,7 +22,10 @@ from calibrations.mean_noise import norm_std, white_std
 from calibrations.model import Model
 from calibrations.motion.stretches import Stretches, stretches
 from calibrations.parameters import Layout
+from calibrations.scatter import scatter
 from calibrations.table import Array, Table
+
+KNOWN = ("poses", "rates")  # kinds of tables whose rows have a known specific force or rate
 
 
 @dataclass(frozen=True)
@@ -35,13 +39,19 @@ class Problem:
     def of(model: Model, table: Table) -> Problem:
         """The problem. Raises ModelError and TooFewRows where there is none to solve."""
         table = stretches(table) if table.kind == "motion" else table.in_order()
-        model = model.for_table(table)
-        if table.kind not in ("poses", "positions", "motion"):
+        if table.kind not in ("poses", "positions", "motion", "rates"):
             raise ModelError(
-                f"{table.source}: models are fitted to poses, positions or motion, not to a table of {table.kind}"
+                f"{table.source}: models are fitted to poses, positions, motion or rates, not to a table of "
+                f"{table.kind}"
             )
         if table.kind == "positions":
             _check_positions(table)
+        _check_coverage(model, table)
+        model = model.for_table(table)
+        if not model.terms:
+            raise ModelError(
+                f"{table.source}: no effect of {model.name} is defined for {table.content}; `rig models` lists others"
+            )
         layout = Layout.of(model, table)
         rows = table.n * len(_channels(table))
         if rows <= len(layout.slots):
@@ -59,7 +69,7 @@ class Problem:
     @property
     def unit(self) -> str:
         """Unit of the residual."""
-        return "g" if self.table.kind == "positions" else self.table.unit
+        return self.table.input_unit if self.table.kind == "positions" else self.table.unit
 
     def residual(self, theta: Array) -> Array:
         """Shape (channels, n)."""
@@ -70,7 +80,7 @@ class Problem:
         if isinstance(self.table, Stretches):
             samples = self.table.samples
             return self.table.parts(samples.outputs - forward(samples, steps))
-        if self.table.kind == "poses":
+        if self.table.kind in KNOWN:
             error = self.table.outputs - forward(self.table, steps)
         else:
             error = np.linalg.norm(backward(self.table, steps), axis=1)[:, None] - 1.0
@@ -95,7 +105,7 @@ class Problem:
         An entry of an effect that only adds to the output changes that effect's contribution and nothing else.
         """
         terms = self.layout.model.terms
-        if self.table.kind != "poses" or any(term.effect.output for term in terms):
+        if self.table.kind not in KNOWN or any(term.effect.output for term in terms):
             return lambda _, vector: self.residual(vector)
         a = force(self.table, self.layout.steps(theta))
 
@@ -116,13 +126,17 @@ class Problem:
         if isinstance(self.table, Stretches):
             return self.table.white
         std = white_std(self.table)
-        if self.table.kind == "poses" or std is None:
+        if std is None and self.table.content in ("fields", "rates"):
+            return scatter(self.table)
+        if self.table.kind in KNOWN or std is None:
             return None if std is None else std.T
         return norm_std(self.table, std).T / self.layout.nominal
 
     @cached_property
     def gap_s(self) -> Array:
-        """Time between each row and the one before it, s, shape (n,)."""
+        """Time between each row and the one before it, s, shape (n,); 0 where no time is given and none is needed."""
+        if self.table.content in ("fields", "rates") and "t_s" not in self.table:
+            return np.zeros(self.table.n)
         return np.diff(self.table.time_s, prepend=self.table.time_s[0])
 
     @cached_property
@@ -134,15 +148,23 @@ class Problem:
 def _channels(table: Table) -> tuple[str, ...]:
     if isinstance(table, Stretches):
         return table.channels
-    return table.axes if table.kind == "poses" else ("norm",)
+    return table.axes if table.kind in KNOWN else ("norm",)
+
+
+def _check_coverage(model: Model, table: Table) -> None:
+    """Raises DataError where the rows cannot show an effect of the model."""
+    for effect in (term.effect for term in model.terms if table.content in term.effect.kinds):
+        if why := effect.lacks(table):
+            raise DataError(f"{table.source}: {effect.name} is not fitted: {why}")
 
 
 def _check_positions(table: Table) -> None:
     """Positions turn each of three axes. Raises DataError."""
     if len(table.axes) < 3:
         raise DataError(
-            f"{table.source}: models of positions need the columns ax, ay, az; it has: {', '.join(table.columns)}"
+            f"{table.source}: models of positions need the columns ax, ay, az, or mx, my, mz; "
+            f"it has: {', '.join(table.columns)}"
         )
-    still = [name for name, spread in zip(("ax", "ay", "az"), np.ptp(table.outputs, axis=0), strict=True) if not spread]
+    still = [name for name, spread in zip(table.output_names, np.ptp(table.outputs, axis=0), strict=True) if not spread]
     if still:
         raise DataError(f'{table.source}: the column "{still[0]}" never changes; positions turn each axis up and down')

@@ -22,7 +22,7 @@ from calibrations.model import Estimate, Model
 from calibrations.motion.evaluate import MotionResult
 from calibrations.numerals import chance, measured, minus, plain, unit
 from calibrations.pictures.album import Picture, album
-from calibrations.pictures.view import mg, pooled_mg, rows_of
+from calibrations.pictures.view import mg, milli, pooled_mg, rows_of
 from calibrations.report_motion import head, section
 from calibrations.report_page import figure, page
 from calibrations.report_words import VERDICTS, capital, headline, key_figures, next_words, state, summary, unbroken
@@ -90,15 +90,20 @@ def spread_of_excess(fit: Fit) -> str:
     return plain(1 / np.sqrt(2 * max(fit.residual.size - len(fit.theta), 1)), 2)
 
 
+def _error_of(fit: Fit) -> str:
+    """The rms error with its unit."""
+    return f"{plain(pooled_mg(fit)[0], 2)} {milli(fit)}"
+
+
 def _first(found: Discovery) -> dict[str, str]:
     level = {"seen": plain(found.start.pooled_excess), "unseen": plain(held_out_excess(found.start))}
-    return {"name": found.start.model.name, "mg": plain(pooled_mg(found.start)[0], 2), "role": "as given", **level}
+    return {"name": found.start.model.name, "error": _error_of(found.start), "role": "as given", **level}
 
 
 def _step(step: Added, found: Discovery) -> dict[str, str]:
     level = {"seen": plain(step.after.pooled_excess), "unseen": plain(step.held_out_after)}
     role = "cause" if step.name in found.causes else "refines the form of a cause"
-    return {"name": f"+ {step.name}", "mg": plain(pooled_mg(step.after)[0], 2), "role": role, **level}
+    return {"name": f"+ {step.name}", "error": _error_of(step.after), "role": role, **level}
 
 
 def _candidate(c: Candidate, rank: int, out: str) -> dict[str, Any]:
@@ -130,7 +135,7 @@ def _errors(fit: Fit) -> list[dict[str, str]]:
         row = {"channel": channel, "excess": plain(fit.excess[c]), "tau": _time_constant(fit.noise.taus_s[c])}
         for name, values in noise.items():
             volts = f"{plain(1e3 * values[c])} m{fit.table.unit} = " if posed else ""
-            row[name] = f"{volts}{plain(mg(values, fit)[c])} mg" if values[c] > 0 else "none found"
+            row[name] = f"{volts}{plain(mg(values, fit)[c])} {milli(fit)}" if values[c] > 0 else "none found"
         if not fit.noise.slow[c] > 0:
             row["tau"] = "–"
         rows.append(row)

@@ -10,7 +10,7 @@ from calibrations.experiment import Experiment
 from calibrations.fit import Fit
 from calibrations.held_out import held_out_excess
 from calibrations.numerals import plain
-from calibrations.pictures.view import pooled_mg, rows_of
+from calibrations.pictures.view import milli, pooled_mg, rows_of
 
 MOST_NAMED = 3  # effects in the headline
 VERDICTS = {
@@ -49,17 +49,18 @@ def summary(found: Discovery) -> str:
 
 def _error(found: Discovery) -> str:
     kind, (error, floor) = rows_of(found.start.table), pooled_mg(found.start)
-    rows = f"{found.start.table.n} {kind}"
+    rows, unit = f"{found.start.table.n} {kind}", milli(found.start)
     if not found.steps:
         left = f" Left over: {found.residual_structure}." if found.residual_structure else ""
         return (
-            f"On {rows} its rms error is {plain(error, 2)} mg, {plain(found.start.pooled_excess)} × the noise floor "
-            f"of {plain(floor, 2)} mg.{left}"
+            f"On {rows} its rms error is {plain(error, 2)} {unit}, {plain(found.start.pooled_excess)} × the noise "
+            f"floor of {plain(floor, 2)} {unit}.{left}"
         )
     unseen = plain(held_out_excess(found.start)), plain(found.steps[-1].held_out_after)
     text = (
-        f"On {rows} the rms error falls from {plain(error, 2)} mg to {plain(pooled_mg(found.end)[0], 2)} mg; the noise "
-        f"floor is {plain(floor, 2)} mg. On unseen {kind} it falls from {unseen[0]} to {unseen[1]} × the noise floor."
+        f"On {rows} the rms error falls from {plain(error, 2)} {unit} to {plain(pooled_mg(found.end)[0], 2)} {unit}; "
+        f"the noise floor is {plain(floor, 2)} {unit}. On unseen {kind} it falls from {unseen[0]} to {unseen[1]} × the "
+        "noise floor."
     )
     if found.refinements:
         text += f" For the form of these effects the model also holds {joined(found.refinements)}."
@@ -68,14 +69,14 @@ def _error(found: Discovery) -> str:
 
 def key_figures(found: Discovery) -> list[tuple[str, str, str]]:
     """The few numbers to remember: (what, value, remark)."""
-    start, floor = found.start, pooled_mg(found.start)[1]
+    start, floor, unit = found.start, pooled_mg(found.start)[1], milli(found.start)
     first = "error before" if found.steps else "rms error"
-    shown = [(first, f"{plain(pooled_mg(start)[0], 2)} mg", _over_floor(start, held_out_excess(start)))]
+    shown = [(first, f"{plain(pooled_mg(start)[0], 2)} {unit}", _over_floor(start, held_out_excess(start)))]
     if found.steps:
         unseen = found.steps[-1].held_out_after
-        shown.append(("error after", f"{plain(pooled_mg(found.end)[0], 2)} mg", _over_floor(found.end, unseen)))
+        shown.append(("error after", f"{plain(pooled_mg(found.end)[0], 2)} {unit}", _over_floor(found.end, unseen)))
     kind = "white noise of one mean" if start.noise.known else "scatter: the white noise is not known"
-    return [*shown, ("noise floor", f"{plain(floor, 2)} mg", kind)]
+    return [*shown, ("noise floor", f"{plain(floor, 2)} {unit}", kind)]
 
 
 def _over_floor(fit: Fit, unseen: float) -> str:

@@ -23,7 +23,7 @@ SHAKEN = 10.0  # the same, reached when it is turned by hand; never reached in a
 
 
 def positions(log: Table, rate_hz: float) -> Table:
-    """The mean of each still interval of `log` (columns ax, ay, az, others averaged too).
+    """The mean of each still interval of `log` (columns ax, ay, az or mx, my, mz, others averaged too).
 
     `norm_std` is the noise of the magnitude alone: a hand that sways turns the sensor but leaves |a| as it is.
 
@@ -37,12 +37,12 @@ def positions(log: Table, rate_hz: float) -> Table:
         raise DataError(f"{log.source}: found {found}; {needed}")
     names = [name for name in log.columns if not name.endswith("_std")]
     columns: dict[str, list[float]] = {name: [] for name in names}
-    columns |= {f"{name}_std": [] for name in ("ax", "ay", "az", "norm")} | {"n": []}
-    centre = _sphere_centre(np.array([samples[first:last].mean(axis=0) for first, last in bounds]))
+    columns |= {f"{name}_std": [] for name in (*log.output_names, "norm")} | {"n": []}
+    centre = sphere_centre(np.array([samples[first:last].mean(axis=0) for first, last in bounds]))
     for first, last in bounds:
         for name in names:
             columns[name].append(float(np.mean(log.columns[name][first:last])))
-        for name in ("ax", "ay", "az"):
+        for name in log.output_names:
             columns[f"{name}_std"].append(_effective_std(log.columns[name][first:last]))
         columns["norm_std"].append(_effective_std(np.linalg.norm(samples[first:last] - centre, axis=1)))
         columns["n"].append(last - first)
@@ -52,7 +52,7 @@ def positions(log: Table, rate_hz: float) -> Table:
     return Table.from_columns("positions", columns, constants, log.source)
 
 
-def _sphere_centre(means: Array) -> Array:
+def sphere_centre(means: Array) -> Array:
     """Centre of the sphere through the means: |m|^2 = 2 m.c + const, linear in c."""
     middle: Array = means.mean(axis=0)
     offsets = means - middle

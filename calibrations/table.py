@@ -32,17 +32,25 @@ KINDS: Mapping[str, tuple[tuple[str, ...], ...]] = MappingProxyType(
     }
 )
 OUTPUTS: Mapping[str, tuple[str, ...]] = MappingProxyType(
-    {"poses": ("vx_v", "vy_v", "vz_v"), "positions": ("ax", "ay", "az"), "motion": ("vx_v", "vy_v")}
+    {
+        "poses": ("vx_v", "vy_v", "vz_v"),
+        "positions": ("ax", "ay", "az"),
+        "fields": ("mx", "my", "mz"),  # positions of a magnetometer
+        "motion": ("vx_v", "vy_v"),
+        "rates": ("gx", "gy", "gz"),
+    }
 )
 # fmt: off
 OPTIONAL = (
     "vy_v", "vz_v", "path", "t_s", "direction", "temperature_c", "supply_v", "mount_deg", "flip",
     "vx_std_v", "vy_std_v", "vz_std_v", "n", "ax_std", "ay_std", "az_std", "mx_std", "my_std", "mz_std",
-    "gx", "gy", "gz", "mx", "my", "mz", "alpha_set_deg", "beta_set_deg",
+    "gx", "gy", "gz", "gx_std", "gy_std", "gz_std", "mx", "my", "mz", "axis_x", "axis_y", "axis_z",
+    "alpha_set_deg", "beta_set_deg",
 )
 # fmt: on
 NUMBERS = {name for sets in KINDS.values() for wanted in sets for name in wanted} | set(OPTIONAL) - {"path"}
 AXES = ("x", "y", "z")
+MILLI = {"g": "mg", "field": "‰ of the field", "deg/s": "mdeg/s"}  # thousandths of what is sensed
 STANDARD_GRAVITY = 9.80665
 LARGEST = 1e30  # in any unit: what is measured is smaller, and its fourth power must still be a number
 
@@ -100,16 +108,30 @@ class Table:
             raise DataError(f'{self.source}: the constant "{name}" is {value!r}, not a number') from None
 
     @property
+    def content(self) -> str:
+        """What an effect may be defined for: the kind; of positions, "fields" where a magnetometer was turned."""
+        magnetic = self.kind == "positions" and "ax" not in self.columns and "mx" in self.columns
+        return "fields" if magnetic else self.kind
+
+    @property
+    def output_names(self) -> tuple[str, ...]:
+        """The columns of outputs that an axis each was measured in."""
+        return tuple(name for name in OUTPUTS.get(self.content, ()) if name in self)
+
+    @property
     def axes(self) -> tuple[str, ...]:
         """The sensing axes that were measured, of "x", "y", "z"."""
-        names = OUTPUTS.get(self.kind, ())
-        return tuple(axis for axis, name in zip(AXES, names, strict=False) if name in self.columns)
+        return tuple(axis for axis, name in zip(AXES, OUTPUTS.get(self.content, ()), strict=False) if name in self)
 
     @cached_property
     def outputs(self) -> Array:
         """The measured outputs in the table's unit, shape (n, axes)."""
-        names = OUTPUTS.get(self.kind, ())
-        return np.column_stack([self.columns[name] for name in names if name in self.columns])
+        return np.column_stack([self.columns[name] for name in self.output_names])
+
+    @property
+    def input_unit(self) -> str:
+        """Unit of what is sensed: g, the local field as 1, or deg/s."""
+        return {"fields": "field", "rates": "deg/s"}.get(self.content, "g")
 
     @property
     def unit(self) -> str:

@@ -19,7 +19,7 @@ from calibrations.effect import Parameter, Values
 from calibrations.lack_of_fit import smooth_columns
 from calibrations.table import Array, Table
 
-KINDS = ("poses", "positions")
+KINDS = ("poses", "positions", "fields", "rates")
 NEEDS = ("t_s",)
 HOUR_S = 3600.0
 WAVES = range(2, 8)

@@ -13,6 +13,7 @@ import numpy as np
 from calibrations.effect import Parameter, Values
 from calibrations.table import Array, Table
 
+KINDS = ("poses", "positions", "fields", "motion", "rates")
 NEEDS = ("temperature_c",)
 PARAMETERS = (Parameter("slope", "{out}/K", typical=0.005, doc="output per kelvin"),)
 CONSTANTS = {"reference_c": lambda table: float(np.mean(table.column("temperature_c")))}

@@ -15,7 +15,7 @@ from calibrations.effect import Parameter, Values
 from calibrations.table import Array, Table
 from calibrations.warm_up import TIME_CONSTANT, begin_s, left, time_constants_s
 
-KINDS = ("poses", "positions")
+KINDS = ("poses", "positions", "fields", "rates")
 NEEDS = ("t_s",)
 PARAMETERS = (
     Parameter("amplitude", "{out}", typical=0.01, doc="bias at the record's beginning less the final one"),

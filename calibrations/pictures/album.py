@@ -27,6 +27,17 @@ POSITIONS = (
 )
 
 
+RATES = (
+    "Dots are measured, crosses are what the model {} makes of the same turn.",
+    "The residual of the model {} over the rate of the turn.",
+)
+FIELDS = (
+    "What the model {} makes of each position: the magnitude of the field, 1 if it were right.",
+    "The residual of the model {} over the direction that the field came from; pale is near the noise.",
+)
+CAPTIONS = {"poses": POSES, "motion": MOTION, "rates": RATES, "fields": FIELDS}
+
+
 @dataclass(frozen=True)
 class Picture:
     """A figure, the name of its file without ending, and words for a page."""
@@ -43,8 +54,8 @@ def album(found: Discovery, beside: Comparison, shaken: MotionResult | None = No
     Before them stands what a run of the procedure motion found, if it is given.
     """
     fit = beside.fit
-    model, kind, rows = fit.model.name, fit.table.kind, rows_of(fit.table)
-    shown, mapped = {"poses": POSES, "motion": MOTION}.get(kind, POSITIONS)
+    model, rows = fit.model.name, rows_of(fit.table)
+    shown, mapped = CAPTIONS.get(fit.table.content, POSITIONS)
     fall = (
         "Error of the model before and after each effect, as a multiple of the noise floor: "
         f"bars on the {rows} that the fit used, diamonds on {rows} that it did not see."

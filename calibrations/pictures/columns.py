@@ -12,6 +12,7 @@ from calibrations.chain import backward, force
 from calibrations.effect import Effect
 from calibrations.fit import Fit
 from calibrations.pictures.style import quarters
+from calibrations.problem import KNOWN
 from calibrations.table import Array, Table
 
 LENGTHS = ((7200.0, 3600.0, "h"), (180.0, 60.0, "min"), (-1.0, 1.0, "s"))  # longer than, unit, its name
@@ -31,7 +32,7 @@ class Column:
 def specific_force(fit: Fit) -> Array:
     """Specific force along the sensing axes by the model, g, shape (n, 3)."""
     steps = fit.problem.layout.steps(fit.theta)
-    return force(fit.table, steps) if fit.table.kind == "poses" else backward(fit.table, steps)
+    return force(fit.table, steps) if fit.table.kind in KNOWN else backward(fit.table, steps)
 
 
 def columns(fit: Fit) -> list[Column]:
@@ -41,9 +42,13 @@ def columns(fit: Fit) -> list[Column]:
         found = [_same("beta", "β (deg)", table.column("beta_deg"), n)]
     elif table.kind == "motion":
         found = []
+    elif table.kind == "rates":
+        found = [_same("rate", "rate (deg/s)", table.column("rate_deg_s"), n)]
     else:
         forces = specific_force(fit).T
-        found = [_same(f"a{k}", f"specific force along {k} (g)", a, n) for k, a in zip("xyz", forces, strict=True)]
+        what = "share of the field" if table.content == "fields" else "specific force"
+        unit = "" if table.content == "fields" else " (g)"
+        found = [_same(f"a{k}", f"{what} along {k}{unit}", a, n) for k, a in zip("xyz", forces, strict=True)]
     return found + _others(table, n)
 
 
@@ -56,6 +61,10 @@ def telling_columns(fit: Fit, effect: Effect) -> list[Column]:
     needed = [_needed(table, name, n) for name in effect.needs if name not in SHOWN_OTHERWISE]
     if table.kind == "motion":  # what it explains returns in every stretch
         return columns(fit)[:1] + needed
+    if table.kind == "rates":
+        return [
+            _same(f"w{k}", f"rate about {k} (deg/s)", w, n) for k, w in zip("xyz", specific_force(fit).T, strict=True)
+        ] + needed
     if table.kind != "poses":
         return columns(fit)[:3] + needed
     a = specific_force(fit)

@@ -17,6 +17,7 @@ from calibrations.fit import Fit
 from calibrations.pictures import motion
 from calibrations.pictures.columns import specific_force
 from calibrations.pictures.style import INK, QUIET, SIGNED, panels, quarters, styled
+from calibrations.pictures.view import dots, groups, key
 from calibrations.table import Array
 
 WORDS = {1: "clockwise", -1: "anticlockwise", 0: ""}
@@ -28,6 +29,8 @@ def picture(fit: Fit) -> Figure:
     """A row of maps for each axis; for a motion the residual over one period."""
     if fit.table.kind == "motion":
         return motion.failure(fit)
+    if fit.table.kind == "rates":
+        return _rates(fit)
     return _poses(fit) if fit.table.kind == "poses" else _positions(fit)
 
 
@@ -83,7 +86,21 @@ def _norm(values: Array) -> Normalize:
     return Normalize(-reach, reach)
 
 
+def _rates(fit: Fit) -> Figure:
+    figure, axes = panels(1, len(fit.channels), 3.6, sharey=True)
+    over, rate = fit.residual / fit.noise.floor[:, None], fit.table.column("rate_deg_s")
+    for c, ax in enumerate(axes[0]):
+        ax.axhspan(-1, 1, color=QUIET, alpha=0.2, lw=0)
+        for group in groups(fit):
+            dots(ax, group, rate[group.rows], over[c, group.rows])
+        ax.set(title=f"axis {fit.channels[c]}", xlabel="rate (deg/s)")
+    axes[0, 0].set_ylabel("residual / noise floor")
+    key(figure, groups(fit))
+    return figure
+
+
 def _positions(fit: Fit) -> Figure:
+    unit = "share of the field" if fit.table.content == "fields" else "g"
     figure, axes = panels(1, 2, 4.6, sharey=True)
     figure.set_layout_engine("compressed")
     x, y, z = specific_force(fit).T
@@ -95,7 +112,7 @@ def _positions(fit: Fit) -> Figure:
         found = ax.scatter(x[side] * shrink, y[side] * shrink, c=over[side], cmap=SIGNED, norm=_norm(over), s=60,
                            edgecolors=INK, linewidths=0.6, clip_on=False)  # fmt: skip
         ax.set(title=f"z {word}", aspect="equal", xlim=(-1.1, 1.1), ylim=(-1.1, 1.1))
-        ax.set(xticks=[-1, 0, 1], yticks=[-1, 0, 1], xlabel="towards x (g, equal-area map)")
-    axes[0, 0].set_ylabel("towards y (g, equal-area map)")
+        ax.set(xticks=[-1, 0, 1], yticks=[-1, 0, 1], xlabel=f"towards x ({unit}, equal-area map)")
+    axes[0, 0].set_ylabel(f"towards y ({unit}, equal-area map)")
     figure.colorbar(found, ax=axes, label="residual / noise floor", aspect=30, pad=0.01)
     return figure

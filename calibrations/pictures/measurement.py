@@ -22,6 +22,8 @@ def picture(fit: Fit) -> Figure:
     """A panel for each axis, output in the table's unit on the left and in g on the right."""
     if fit.table.kind == "motion":
         return motion.measurement(fit)
+    if fit.table.kind == "rates":
+        return _rates(fit)
     return _poses(fit) if fit.table.kind == "poses" else _positions(fit)
 
 
@@ -37,6 +39,19 @@ def _poses(fit: Fit) -> Figure:
         ax.set(title=f"axis {fit.channels[c]}", xlabel="β (deg)", ylabel=f"output ({fit.table.unit})")
         quarters(ax)
         beside(ax, float(scales(fit)[c]), _zero(fit, c), "output in g, by bias and scale factor")
+    key(figure, groups(fit))
+    return figure
+
+
+def _rates(fit: Fit) -> Figure:
+    """Output over the rate of the turn: dots measured, crosses by the model, as rows share no curve."""
+    figure, axes = panels(1, len(fit.channels), 4.2)
+    rate, measured = fit.table.column("rate_deg_s"), fit.table.outputs.T
+    for c, ax in enumerate(axes.flat):
+        for group in groups(fit):
+            dots(ax, group, rate[group.rows], measured[c, group.rows])
+        ax.plot(rate, (measured - fit.residual)[c], "+", color=INK, ms=9, mew=0.8, zorder=3)
+        ax.set(title=f"axis {fit.channels[c]}", xlabel="rate (deg/s)", ylabel=f"output ({fit.table.unit})")
     key(figure, groups(fit))
     return figure
 
@@ -57,8 +72,10 @@ def _positions(fit: Fit) -> Figure:
         rows = group.rows
         line = dots(ax, group, at.values[0, rows], 1.0 + fit.residual[0, rows])
         ax.errorbar(line.get_xdata(), line.get_ydata(), fit.noise.white[0, rows], fmt="none", ecolor=QUIET, lw=0.9)
-    ax.set(title="magnitude of what the model makes of each position", xlabel=at.labels[0], ylabel="|a| (g)")
-    ax.annotate("gravity: 1 g", (1, 1.0), xycoords=("axes fraction", "data"), xytext=(-4, 4),
-                textcoords="offset points", ha="right", color=INK)  # fmt: skip
+    magnetic = fit.table.content == "fields"
+    ax.set(title="magnitude of what the model makes of each position", xlabel=at.labels[0],
+           ylabel="|m| (share of the field)" if magnetic else "|a| (g)")  # fmt: skip
+    ax.annotate("the field" if magnetic else "gravity: 1 g", (1, 1.0), xycoords=("axes fraction", "data"),
+                xytext=(-4, 4), textcoords="offset points", ha="right", color=INK)  # fmt: skip
     key(figure, groups(fit))
     return figure

@@ -5,15 +5,18 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, NullFormatter
 from scipy.stats import chi2
 
 from calibrations.noise_analysis.analysis import NoiseAnalysis
 from calibrations.noise_analysis.freedom import COVERAGE
 from calibrations.noise_analysis.processes import GAUSS_MARKOV
+from calibrations.numerals import plain
 from calibrations.pictures.album import Picture
 from calibrations.pictures.style import AMBER, BLUE, GREEN, INK, QUIET, VERMILION, panels, styled
 from calibrations.table import Array
 
+FEW_DECADES = 2.5
 COLOURS = {
     "white-noise": BLUE,
     "flicker-noise": AMBER,
@@ -63,6 +66,7 @@ def allan(found: NoiseAnalysis) -> Figure:
     beside.set(xlabel="averaging time (s)", title="other deviations")
     for each in (ax, beside):
         each.legend()
+        _mark_powers(each)
     return figure
 
 
@@ -86,7 +90,20 @@ def density(found: NoiseAnalysis) -> Figure:
     _mark_lines(ax, found)
     ax.set(xlabel="frequency (Hz)", ylabel=f"density ({found.unit}/√Hz)")
     ax.legend()
+    _mark_powers(ax)
     return figure
+
+
+def _mark_powers(ax: Axes) -> None:
+    """Marks of logarithmic axes in plain text: powers of ten, and 2 and 5 where there are few of these."""
+    for axis, (low, high) in ((ax.xaxis, ax.get_xlim()), (ax.yaxis, ax.get_ylim())):
+        axis.set_major_formatter(FuncFormatter(lambda value, _: plain(value, 1)))
+        few = np.log10(high / low) < FEW_DECADES
+        axis.set_minor_formatter(FuncFormatter(_of_two_and_five) if few else NullFormatter())
+
+
+def _of_two_and_five(value: float, _: int | None = None) -> str:
+    return plain(value, 1) if f"{value:.0e}"[0] in "25" else ""
 
 
 def _root(two_sided: Array) -> Array:

@@ -6,65 +6,30 @@ inclinations while the room warms and cools, or, for an effect that only motion 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator, MultipleLocator
-from numpy.typing import NDArray
 
 from calibrations.axes import other_in_plane
 from calibrations.chain import Step, force, forward
-from calibrations.effect import Effect, Parameter, catalogue
+from calibrations.effect import Effect, catalogue
+from calibrations.pictures.shown import Curve, Panel, shown
+from calibrations.pictures.signature_turned import of_field, of_rates
 from calibrations.pictures.style import BLUE, INCLINATION, INK, QUIET, styled
 from calibrations.table import Array, Table
 
 INCLINATIONS_DEG = (90.0, 30.0, 150.0, 60.0, 120.0)
 STEP_DEG = 9.0
-ACROSS = np.array([1.0, 0.6, 1.0])  # parameters of each axis, times those of x: no two are alike
 SMOOTH = 1.0  # von Neumann's ratio of a residual that is a function of a force; 2 where it is none
 SAME = 0.02  # of its range
 DIGITS = 4  # decimals of mV: what lies beyond depends on the machine
 CLOSE_S = (3.0, 4.0)  # of a motion, where its waves are to be seen
 LABELS = {"t_s": "time (min)", "temperature_c": "temperature (°C)", "supply_v": "supply voltage (V)"}
-
-# values for all axes that show an effect, where a parameter's typical one is only a step or a level
-SHOWN: Mapping[str, Mapping[str, float]] = {
-    "bias": {"bias": 0.02},
-    "scale-factor": {"scale": 0.02},
-    "quantisation": {"step": 0.5, "noise": 0.01, "offset": 0.07},
-    "saturation": {"high": 3.3, "low": 1.6},
-    "adc-nonlinearity": {"bend": -0.004},
-    "stage-zero-offset": {"beta": 0.5},
-    "stage-eccentricity": {"cosine": 0.1},
-    "base-tilt": {"y": 0.5},
-    "axis-misalignment": {"y": 1.0, "z": 0.5},
-    "temperature-hysteresis": {"play": 1.0},
-}
-
-
-@dataclass(frozen=True)
-class Curve:
-    """Rows that one line joins."""
-
-    label: str
-    colour: str
-    style: str
-    rows: NDArray[np.intp]
-
-
-@dataclass(frozen=True)
-class Panel:
-    """What is left of one axis, mV, shape (n,), over a column of that shape, and the rows that lines join."""
-
-    axis: str
-    left: Array
-    over: Array
-    label: str
-    curves: tuple[Curve, ...]
 
 
 @styled
@@ -78,12 +43,19 @@ def picture(effect: Effect) -> Figure:
         for curve in panel.curves:
             ax.plot(panel.over[curve.rows], panel.left[curve.rows], curve.style, color=curve.colour, lw=1.3)
         ax.set_xlabel(panel.label)
-        ax.set_title(f"{panel.axis} axis", loc="right", color=QUIET, fontsize=9, fontweight="normal", pad=4)
+        ax.set_title(
+            f"{panel.axis} axis" if len(panel.axis) == 1 else panel.axis,
+            loc="right",
+            color=QUIET,
+            fontsize=9,
+            fontweight="normal",
+            pad=4,
+        )
         ax.margins(x=0.02, y=0.08)
         ax.xaxis.set_major_locator(
             MultipleLocator(90) if panel.label.startswith("β") else MaxNLocator(5, steps=[1, 2, 5, 10])
         )
-    axes[0].set_ylabel("left over (mV)")
+    axes[0].set_ylabel(f"left over ({panels[0].unit})")
     if len(panels[0].curves) > 1:
         figure.legend(handles=_key(panels[0].curves), loc="outside upper left", ncols=7, handlelength=1.4)
     return figure
@@ -99,6 +71,10 @@ def _key(curves: tuple[Curve, ...]) -> list[Line2D]:
 
 def signature(effect: Effect) -> list[Panel]:
     """What the linear model leaves of the effect, axis by axis."""
+    if effect.kinds == ("fields",):
+        return [of_field(effect)]
+    if effect.kinds == ("rates",):
+        return of_rates(effect)
     known = catalogue()
     linear: list[Step] = [
         (known["bias"], {"bias": np.full(3, 2.5)}),
@@ -110,21 +86,6 @@ def signature(effect: Effect) -> list[Panel]:
     change = forward(table, [*linear, (effect, shown(effect, table))]) - v
     lefts = [(k, _left(table, change[:, k], v[:, k], effect.name)) for k in range(v.shape[1])]
     return [_panel(effect, table, a, k, left) for k, left in lefts if left.any()]
-
-
-def shown(effect: Effect, table: Table) -> dict[str, Array]:
-    """The values that are shown, and the effect's constants."""
-    constants = {name: np.asarray(make(table)) for name, make in effect.constants.items()}
-    return {**constants, **{p.name: shown_value(p, effect) for p in effect.parameters}}
-
-
-def shown_value(p: Parameter, effect: Effect) -> Array:
-    """What a sensor may typically show, of shape (3,) if per axis."""
-    typical = p.typical if p.starts == (0.0,) else p.starts[-1]
-    chosen = SHOWN.get(effect.name, {})
-    across = np.ones(3) if p.name in chosen else ACROSS
-    value = chosen.get(p.name, typical)
-    return value * across if p.per_axis else np.asarray(value)
 
 
 def _left(table: Table, change: Array, v: Array, name: str) -> Array:

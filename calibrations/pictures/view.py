@@ -20,7 +20,7 @@ from calibrations.compare import scales
 from calibrations.fit import Fit
 from calibrations.pictures.columns import specific_force
 from calibrations.pictures.style import BLUE, GREEN, INCLINATION, INK, MARKER, VERMILION, beside
-from calibrations.table import Array, Table
+from calibrations.table import MILLI, Array, Table
 
 MOST_KEYS = 16
 ROWS = {"motion": "stretches"}  # what the rows of a kind of table are called, where not as the kind
@@ -48,7 +48,8 @@ def groups(fit: Fit) -> list[Group]:
         return list(_by_inclination(fit.table))
     if fit.table.kind == "motion":
         return list(_by_attitude(fit.table))
-    return list(_by_axis(specific_force(fit)))
+    what = {"fields": "the field", "rates": "the axis of turn"}.get(fit.table.content, "gravity")
+    return list(_by_axis(specific_force(fit), what))
 
 
 def _by_inclination(table: Table) -> Iterator[Group]:
@@ -71,14 +72,14 @@ def _by_attitude(table: Table) -> Iterator[Group]:
         yield Group(f"α = {alpha:g}°, β = {beta:g}°", colour, 1, np.flatnonzero(number.ravel() == k))
 
 
-def _by_axis(a: Array) -> Iterator[Group]:
+def _by_axis(a: Array, what: str) -> Iterator[Group]:
     nearest = np.argmax(np.abs(a), axis=1)
     side = np.sign(np.take_along_axis(a, nearest[:, None], axis=1)[:, 0])
     for k, (axis, colour) in enumerate(zip("xyz", (BLUE, VERMILION, GREEN), strict=True)):
-        for s in (1, -1):
+        for s in (1, -1, 0):
             rows = np.flatnonzero((nearest == k) & (side == s))
             if len(rows):
-                yield Group(f"{axis} nearest to gravity", colour, s, rows)
+                yield Group(f"{axis} nearest to {what}", colour, s, rows)
 
 
 def dots(ax: Axes, group: Group, x: Array, y: Array, alpha: float = 1.0) -> Line2D:
@@ -108,14 +109,18 @@ def key(figure: Figure, found: list[Group]) -> None:
 
 def shown_unit(fit: Fit) -> str:
     """The unit that a residual is drawn in."""
-    return f"m{fit.problem.unit}"
+    return MILLI.get(fit.problem.unit, f"m{fit.problem.unit}")
 
 
 def label_of(fit: Fit, c: int) -> str:
     """The name of a channel's residual."""
     if fit.table.kind == "motion":
         return f"residual of {fit.channels[c]}".replace(" in ", "\nin ").replace(" with", "\nwith")
-    return "residual of |a|" if fit.table.kind == "positions" else f"residual of {fit.channels[c]}"
+    return (
+        f"residual of |{'m' if fit.table.content == 'fields' else 'a'}|"
+        if fit.table.kind == "positions"
+        else f"residual of {fit.channels[c]}"
+    )
 
 
 def label_residual(ax: Axes, fit: Fit, c: int, last: bool) -> None:
@@ -123,7 +128,7 @@ def label_residual(ax: Axes, fit: Fit, c: int, last: bool) -> None:
     if ax.get_subplotspec() is None or ax.get_subplotspec().is_first_col():  # type: ignore[union-attr]
         ax.set_ylabel(f"{label_of(fit, c)} ({shown_unit(fit)})")
     if last and fit.table.kind != "positions":
-        beside(ax, float(scales(fit)[c]), 0.0, "mg")
+        beside(ax, float(scales(fit)[c]), 0.0, MILLI[fit.table.input_unit])
 
 
 def row_height(fit: Fit) -> float:
@@ -131,8 +136,13 @@ def row_height(fit: Fit) -> float:
     return 3.0 if fit.table.kind != "motion" else 2.0
 
 
+def milli(fit: Fit) -> str:
+    """The unit of `mg`: of what the sensor senses."""
+    return MILLI[fit.table.input_unit]
+
+
 def mg(values: Array, fit: Fit) -> Array:
-    """Values per channel, in the residual's unit, as mg."""
+    """Values per channel, in the residual's unit, as mg; as thousandths of the field, or mdeg/s, of other sensors."""
     return np.asarray(1e3 * values / scales(fit))
 
 

@@ -15,7 +15,7 @@ from calibrations.fit import Fit
 from calibrations.held_out import held_out_excess
 from calibrations.numerals import plain
 from calibrations.pictures.style import AMBER, BAND, BLUE, GREEN, INK, QUIET, VERMILION, panels, styled
-from calibrations.pictures.view import pooled_mg, rows_of
+from calibrations.pictures.view import milli, pooled_mg, rows_of
 
 LARGE_FALL = 8.0  # from first to last: beyond this the last bars would vanish on a linear scale
 BAR = 0.62
@@ -24,23 +24,23 @@ MOST_LEVEL = 7  # names beside each other; more are written aslant
 
 @dataclass(frozen=True)
 class Level:
-    """The error at one point of the way, in multiples of the noise floor, and its rms in mg."""
+    """The error at one point of the way, in multiples of the noise floor, and its rms, such as "3.8 mg"."""
 
     name: str
     seen: float
     unseen: float
-    rms_mg: float
+    rms: str
 
 
 def levels(found: Discovery) -> list[Level]:
     """The model as it was, then each effect added."""
-    start = Level(found.start.model.name, found.start.pooled_excess, held_out_excess(found.start), _mg(found.start))
-    after = [Level(f"+ {s.name}", s.after.pooled_excess, s.held_out_after, _mg(s.after)) for s in found.steps]
+    start = Level(found.start.model.name, found.start.pooled_excess, held_out_excess(found.start), _rms(found.start))
+    after = [Level(f"+ {s.name}", s.after.pooled_excess, s.held_out_after, _rms(s.after)) for s in found.steps]
     return [start, *after]
 
 
-def _mg(fit: Fit) -> float:
-    return pooled_mg(fit)[0]
+def _rms(fit: Fit) -> str:
+    return f"{plain(pooled_mg(fit)[0], 2)} {milli(fit)}"
 
 
 @styled
@@ -58,7 +58,7 @@ def picture(found: Discovery) -> Figure:
     for k, level in enumerate(steps):
         _told(ax, k, level)
     _names(ax, [level.name for level in steps] + (["left"] if len(steps) > 1 else []))
-    floor = f"noise floor\n{plain(pooled_mg(found.start)[1], 2)} mg"
+    floor = f"noise floor\n{plain(pooled_mg(found.start)[1], 2)} {milli(found.start)}"
     ax.annotate(floor, (1, 1.0), (-4, 3), xycoords=("axes fraction", "data"), textcoords="offset points", ha="right")
     ax.legend(handles=[Patch(color=QUIET, label=f"on the {kind} of the fit"), diamonds], loc="upper right")
     return figure
@@ -100,7 +100,7 @@ def _bars(ax: Axes, seen: list[float], bottom: float, end: str) -> None:
 
 def _told(ax: Axes, k: int, level: Level) -> None:
     """The level in numbers: over the first bar, under the others."""
-    text = f"{plain(level.seen)} ×\n{plain(level.rms_mg, 2)} mg"
+    text = f"{plain(level.seen)} ×\n{level.rms}"
     side, align = (9, "bottom") if k == 0 else (-9, "top")
     ax.annotate(text, (k, level.seen), (0, side), textcoords="offset points", ha="center", va=align, fontsize=8.5,
                 zorder=5)  # fmt: skip

@@ -19,12 +19,20 @@ from calibrations.mean_noise import correlation_known
 from calibrations.model import Model
 from calibrations.model_file import dump_model, read_model
 from calibrations.table import Table
+from calibrations.turning import earth_unknown
 from calibrations.units import UNITS, unit_of
 from rig.cli.output import note
 from rig.data import load
 from rig.errors import OutputError
 
-DEFAULTS = {"poses": "linear", "positions": "common-scale", "motion": "linear", "still": "still"}
+DEFAULTS = {
+    "poses": "linear",
+    "positions": "common-scale",
+    "fields": "field",
+    "motion": "linear",
+    "rates": "gyroscope",
+    "still": "still",
+}
 
 
 def effects_of(bench_file: Path | None) -> Mapping[str, Effect]:
@@ -55,7 +63,9 @@ def asked(
             f"{table.source}: how the samples of a mean correlate is not known, and they are taken as independent; "
             "scatter of the poses beyond that counts as noise. Give the constants filter_corner_hz and sample_rate_hz."
         )
-    return table, chosen or read_model(DEFAULTS.get(table.kind, "linear"), effects), effects
+    if why := earth_unknown(table):
+        note(f"{table.source}: {why}")
+    return table, chosen or read_model(DEFAULTS.get(table.content, "linear"), effects), effects
 
 
 def _check_unit(model: Model, table: Table) -> None:

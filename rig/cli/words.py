@@ -58,7 +58,9 @@ def errors(found: Fit) -> str:
 
 
 def quantity(value: float, unit: str) -> str:
-    """A value with the prefix that reads best: 51.2 uV, 0.10 mg."""
+    """A value with the prefix that reads best: 51.2 uV, 0.10 mg; a share of the field in parts per thousand."""
+    if unit == "field":
+        return f"{1e3 * value:.3g} per mille"
     if unit not in ("V", "g") or value == 0:
         return f"{value:.3g} {unit}"
     factor, prefix = next((f, p) for f, p in PREFIXES if abs(value) * f >= 0.1 or p == "u")

@@ -13,7 +13,7 @@ from calibrations.errors import ModelError, UnknownName
 from calibrations.fit import fit
 from calibrations.model_file import read_model
 from calibrations.problem import Problem
-from calibrations.table import Table
+from calibrations.table import Array, Table
 from tests.calibrations import shaken, synthetic
 
 EFFECTS = pytest.mark.parametrize("effect", catalogue().values(), ids=catalogue())
@@ -30,9 +30,24 @@ def table_for(effect: Effect, kind: str) -> Table:
         moved = shaken.record(duration_s=4.0, attitudes=((45.0, 60.0),))
         needed = {name: np.linspace(4.9, 5.1, moved.n) for name in effect.needs if name not in moved}
         return Table.from_columns("motion", {**moved.columns, **needed}, moved.constants)
+    if kind == "rates":
+        return _turned_at_rates(needed)
     turned = Rotation.random(len(a), rng=np.random.default_rng(0)).as_matrix()[:, 0]
     needed |= {"t_s": columns["t_s"]}
-    return Table.from_columns(kind, dict(zip(("ax", "ay", "az"), turned.T, strict=True)) | needed)
+    names = ("mx", "my", "mz") if kind == "fields" else ("ax", "ay", "az")
+    return Table.from_columns("positions", dict(zip(names, turned.T, strict=True)) | needed)
+
+
+def _turned_at_rates(needed: dict[str, Array]) -> Table:
+    """Turns about each edge of the sensor, both ways, as it stands upright on a table."""
+    up, rate = np.repeat(np.eye(3), 40, axis=0), np.tile(np.linspace(-90.0, 90.0, 40), 3)
+    columns = {"rate_deg_s": rate, "t_s": np.arange(120.0)}
+    columns |= dict(zip(("ax", "ay", "az"), up.T, strict=True))
+    columns |= dict(zip(("gx", "gy", "gz"), 16.0 * (up * rate[:, None]).T, strict=True))
+    return Table.from_columns("rates", columns | {k: np.resize(v, 120) for k, v in needed.items() if k not in columns})
+
+
+STARTS = {"fields": "magnetometer", "rates": "gyroscope"}  # models that an effect is added to, where not to `linear`
 
 
 @EFFECTS
@@ -40,7 +55,7 @@ def test_every_parameter_changes_the_residual_smoothly(effect: Effect) -> None:
     for kind in effect.kinds:
         table = table_for(effect, kind)
         assert effect.excluded(table) is None
-        model = fit(read_model("linear"), table).model
+        model = fit(read_model(STARTS.get(kind, "linear")), table).model
         if kind == "motion":  # turned, so that y moves as well
             model = model.with_effect(catalogue()["axis-misalignment"])
         problem = Problem.of(model.with_effect(effect), table)
