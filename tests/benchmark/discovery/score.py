@@ -101,7 +101,7 @@ def within_slow(record: Record, said: Record) -> bool | None:
 
 
 def _by_chance(record: Record) -> bool:
-    """Whether a random walk, or a threshold that differs from pose to pose, is among the causes: no form foretells one."""
+    """Whether a random walk or a threshold that differs from pose to pose is a cause: no form foretells one."""
     return record["name"] in ("sampled/kicks", "sampled/threshold") or "wandering reference" in record["mechanisms"]
 
 
