@@ -88,7 +88,7 @@ def sharpened(pattern: Pattern, screen: Screen) -> Pattern:
 
 def _out(fit: Fit) -> list[Pattern]:
     """The poses that stand out; none where there are none, or too many."""
-    rows, n = standing_out(fit.residual), fit.table.n
+    rows, n = standing_out(fit.residual, np.hypot(fit.noise.floor, fit.noise.slow)), fit.table.n
     if fit.table.kind == "motion" or not 0 < len(rows) <= max(1, MOST_OUT * n):
         return []
     columns = per_channel(Pattern("", np.eye(n)[:, rows]), len(fit.channels)).columns
@@ -96,10 +96,14 @@ def _out(fit: Fit) -> list[Pattern]:
     return [Pattern(_named(fit, rows), columns, price=2 * float(choices), poses=tuple(map(int, rows)))]
 
 
-def standing_out(residual: Array) -> NDArray[np.intp]:
-    """Rows whose residual (channels, n) is too large to be noise of the others' spread, by medians."""
+def standing_out(residual: Array, noise: Array) -> NDArray[np.intp]:
+    """Rows whose residual (channels, n) is too large to be noise of the others' spread, by medians.
+
+    The spread is not less than `noise` (channels,), the white and the slow: medians of slow noise are uncertain.
+    """
     middle = np.median(residual, axis=1, keepdims=True)
     spread = 1.4826 * np.median(np.abs(residual - middle), axis=1, keepdims=True)
+    spread = np.maximum(spread, noise[:, None])
     most = norm.isf(SIGNIFICANT / 2 / residual.size)
     return np.flatnonzero(np.any(np.abs(residual - middle) > most * spread, axis=0))
 
