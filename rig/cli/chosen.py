@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+import shlex
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+import numpy as np
 from click import wrap_text
 
 from rig.cli.output import columns, duration
@@ -16,8 +18,8 @@ from rig.sweep_range import Judged
 HEAD = ("", "standard sweep", "chosen, same dwell", "chosen, same error")
 
 
-def lines(found: Optimal, out: str | None) -> Iterator[str]:
-    """For people; `out` is the file that the poses were written to."""
+def lines(found: Optimal, out: str | None, bench: str | None = None) -> Iterator[str]:
+    """For people; `out` is the file that the poses were written to, `bench` the bench file that was named."""
     model, count = found.over.fit.model.name, len(found.over.fit.theta)
     yield f"{model}, {count} parameters: {found.criterion}-optimal poses in the range of the standard sweep"
     yield ""
@@ -30,7 +32,7 @@ def lines(found: Optimal, out: str | None) -> Iterator[str]:
     yield ""
     yield from map(wrap_text, _about(found))
     yield ""
-    yield from _how_to_run(found, out)
+    yield from _how_to_run(found, out, bench)
 
 
 def document(found: Optimal) -> dict[str, Any]:
@@ -93,16 +95,19 @@ def _about(found: Optimal) -> Iterator[str]:
     )
 
 
-def _how_to_run(found: Optimal, out: str | None) -> Iterator[str]:
+def _how_to_run(found: Optimal, out: str | None, bench: str | None) -> Iterator[str]:
     settle_s = found.equal.plan.settings["settle_s"]
-    settle = f" --settle-s {settle_s:g}" if settle_s != 0.5 else ""
-    yield f"Run them:  rig run sweep --pose-list {out or 'poses.csv'} --dwell-s {found.equal.dwell_s:g}{settle}"
+    words = ["rig", "run", "sweep", "--pose-list", out or "poses.csv", "--dwell-s", f"{found.equal.dwell_s:g}"]
+    words += ["--settle-s", f"{settle_s:g}"] if settle_s != 0.5 else []
+    words += ["--bench", bench] if bench else []
+    yield f"Run them:  {shlex.join(words)}"
     if out is None:
         yield "           once the same command with --out poses.csv has written them"
 
 
 def _of_plan(found: Optimal, each: Judged) -> dict[str, Any]:
-    ratios = [float(ratio) for ratio in each.errors / found.standard.errors]
+    with np.errstate(invalid="ignore"):  # what neither tells is infinitely uncertain by both
+        ratios = [float(ratio) for ratio in each.errors / found.standard.errors]
     return {
         "poses": each.plan.poses,
         "dwell_s": each.dwell_s,

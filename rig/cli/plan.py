@@ -72,7 +72,7 @@ def command(
     found = find(procedure, bench.folders.procedures)
     settings = parse(found, read_settings(given, pairs, found.defaults))
     if optimal:
-        _optimal(bench, found, settings, Asked(model, poses, criterion, out, as_json))
+        _optimal(bench, found, settings, Asked(model, poses, criterion, out, bench_file, as_json))
         return
     if model or poses or criterion:
         raise click.UsageError("--model, --poses and --criterion go with --optimal")
@@ -94,6 +94,7 @@ class Asked:
     poses: int | None
     criterion: str | None
     out: Path | None
+    bench_file: Path | None
     as_json: bool
 
 
@@ -113,7 +114,8 @@ def _optimal(bench: Bench, procedure: Procedure, settings: Mapping[str, Any], as
     if asked.as_json:
         emit(_document(found.equal.plan) | {"optimal": document(found)})
     else:
-        click.echo("\n".join(lines(found, str(asked.out) if asked.out else None)))
+        files = (str(path) if path else None for path in (asked.out, asked.bench_file))
+        click.echo("\n".join(lines(found, *files)))
 
 
 def _write_poses(out: Path, planned: Plan) -> None:

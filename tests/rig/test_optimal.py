@@ -13,13 +13,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from calibrations.effect import catalogue
 from calibrations.model_file import read_model
 from procedures.catalogue import find
 from procedures.pose_list import written
 from procedures.session import Pose
 from procedures.settings import parse
 from rig.bench import read_bench
-from rig.cli.chosen import lines
+from rig.cli.chosen import document, lines
 from rig.errors import PlanError
 from rig.optimal import AGAIN, CHECK, DESIGN, Optimal, most_relative, optimal, relative
 from rig.planned import EXCHANGE_S
@@ -122,6 +123,18 @@ def test_people_are_told_what_it_saves_and_how_to_run_it() -> None:
     assert "physical, 16 parameters: I-optimal poses" in text
     assert "x less rig time at equal worst standard error" in text
     assert f"rig run sweep --pose-list poses.csv --dwell-s {chosen('physical').equal.dwell_s:g}" in text
+
+
+def test_the_printed_run_is_of_the_bench_that_was_planned_on() -> None:
+    *_, last = lines(chosen("physical"), "my poses.csv", "worm.yaml")
+    dwell = f"--dwell-s {chosen('physical').equal.dwell_s:g}"
+    assert last == f"Run them:  rig run sweep --pose-list 'my poses.csv' {dwell} --bench worm.yaml"
+
+
+def test_what_no_sweep_tells_has_no_ratio() -> None:
+    oven = read_model("linear").with_effect(catalogue()["temperature-bias"])  # a sweep keeps its temperature
+    found = optimal(read_bench(), find("sweep"), settings(**COARSE), oven, 40, "I")
+    assert document(found)["same_dwell"]["errors"]["temperature-bias slope x"] is None
 
 
 def test_the_command_writes_poses_that_a_run_takes(rig: Callable[..., Any], tmp_path: Path) -> None:
