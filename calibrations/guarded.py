@@ -15,7 +15,8 @@ from calibrations.errors import ModelError
 
 def fault(path: Path, error: BaseException) -> ModelError:
     """`error`, raised in the file `path`, with the line of that file where it arose."""
-    lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if Path(frame.filename) == path]
+    frames = traceback.extract_tb(error.__traceback__)
+    lines = [frame.lineno for frame in frames if Path(frame.filename).absolute() == path.absolute()]
     line = error.lineno if isinstance(error, SyntaxError) else lines[-1] if lines else None
     what = error.msg if isinstance(error, SyntaxError) else str(error)
     where = f"{path}, line {line}" if line else str(path)

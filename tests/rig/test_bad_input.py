@@ -206,6 +206,11 @@ def test_an_effect_of_ones_own_with_a_fault(
     refused("add", "sag", "--model", "linear", "--data", "good.csv", "--out", "o.yaml", "--bench", bench)
 
 
+def test_a_fault_in_the_file_of_an_effect_is_told_with_its_line(refused: Callable[..., str], work: Path) -> None:
+    (work / "sag.py").write_text(OWN.replace('p["cube"]', 'p["cub"]'))
+    assert "sag.py, line 17: KeyError" in refused("add", "sag.py", "--data", "good.csv", "--out", "o.yaml")
+
+
 @pytest.mark.sockets
 def test_an_instrument_that_cannot_be_reached(refused: Callable[..., str], bench_file: Callable[..., Path]) -> None:
     instruments = yaml.safe_load(DEFAULT.read_text())["instruments"]
