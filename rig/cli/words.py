@@ -24,7 +24,7 @@ def with_uncertainty(e: Estimate) -> str:
     """`2.500123(45) V`: the digits in brackets are the standard uncertainty of the last digits (GUM 7.2.2)."""
     if e.std is None or not e.std > 0:
         return f"{e.value:.6g} {e.unit}"
-    digits = max(0, 1 - math.floor(math.log10(e.std)))
+    digits = max(0, 1 - math.floor(math.log10(float(f"{e.std:.1e}"))))  # of the rounded one: 0.0998 is 0.10
     if digits > 12 or e.std >= 100:
         return f"{e.value:.6g} +- {e.std:.2g} {e.unit}"
     return f"{e.value:.{digits}f}({round(e.std * 10**digits)}) {e.unit}"
