@@ -16,11 +16,11 @@ from calibrations.noise_analysis.decimated import Means
 from calibrations.noise_analysis.identify import (
     Mixture,
     Spectrum,
+    bounded,
     estimates,
     mixture,
     most_likely_markov,
     settled,
-    upper_bound,
 )
 from calibrations.noise_analysis.lines import MOST, Line, fast_lines, without_line
 from calibrations.noise_analysis.octaves import KINDS, Curve, Octaves
@@ -36,14 +36,14 @@ from calibrations.noise_analysis.welch import Welch
 from calibrations.table import Array
 
 Estimates = Mapping[str, tuple[float, float]]
+ONE_SIDED = 1.645  # standard deviations to a bound of 95 %
 FEWEST = 64  # samples below which nothing can be said
 
 
 @dataclass(frozen=True)
 class Coefficient:
-    """One process. `value` is 0 where it is not identified: with 95 % it is then below `upper`.
-
-    `std` is the standard uncertainty of `value`. A Gauss-Markov process has a time constant, a sinusoid a frequency.
+    """One process: its most likely value, and the standard uncertainty of that. One that is not identified may as well
+    be 0, and is below `upper` with 95 %. A Gauss-Markov process has a time constant, a sinusoid a frequency.
     """
 
     value: float
@@ -109,20 +109,20 @@ class NoiseAnalysis:
         unit = self.unit + LINEAR[name].per
         if name in known:
             return Coefficient(*known[name], unit)
-        bound = upper_bound(self.spectrum, self.found, name)
-        return Coefficient(0.0, bound / 1.645, unit, bound)
+        value, upper = bounded(self.spectrum, self.found, name)
+        return Coefficient(value, (upper - value) / ONE_SIDED, unit, upper)
 
     def _gauss_markov(self, known: Estimates) -> Coefficient:
         found = self.found
         if GAUSS_MARKOV in known:
             return Coefficient(*known[GAUSS_MARKOV], self.unit, None, found.time_constant_s)
         time_s = most_likely_markov(self.spectrum, tuple(found.power)).time_constant_s
-        bound = upper_bound(self.spectrum, found, GAUSS_MARKOV, time_s)
-        return Coefficient(0.0, bound / 1.645, self.unit, bound, time_s)
+        value, upper = bounded(self.spectrum, found, GAUSS_MARKOV, time_s)
+        return Coefficient(value, (upper - value) / ONE_SIDED, self.unit, upper, time_s)
 
     def _sinusoidal(self) -> Coefficient:
         if not self.lines:
-            return Coefficient(0.0, self.line_bound / 1.645, self.unit, self.line_bound)
+            return Coefficient(0.0, self.line_bound / ONE_SIDED, self.unit, self.line_bound)
         line = self.lines[0]
         return Coefficient(line.amplitude, line.std, self.unit, None, None, line.frequency_hz)
 

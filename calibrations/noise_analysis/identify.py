@@ -23,7 +23,7 @@ from calibrations.noise_analysis.whittle import information, maximise
 from calibrations.table import Array
 
 COST = 7.88  # twice the log-likelihood that a process has to gain
-COST_MARKOV = 16.0  # for two parameters, of which one is searched for
+COST_MARKOV = 22.0  # for two parameters, of which one is searched for, and a shape that others together can take on
 DOUBTED = ("flicker-noise", "rate-random-walk")  # they are alike where a record has few periods
 DOUBT = 2.0  # twice the log-likelihood that one of them has to gain for even odds
 BOUND = 2.71  # twice the log-likelihood that is lost at a bound with 95 %
@@ -166,8 +166,8 @@ def _value(fit: Mixture, name: str) -> float:
     return float(np.sqrt(fit.power[name])) if name in fit.power else fit.time_constant_s
 
 
-def upper_bound(spectrum: Spectrum, found: Mixture, name: str, time_constant_s: float = 0.0) -> float:
-    """The coefficient that a process which is not in the mixture stays below, with 95 %."""
+def bounded(spectrum: Spectrum, found: Mixture, name: str, time_constant_s: float = 0.0) -> tuple[float, float]:
+    """(most likely, stays below with 95 %): the coefficient of a process that is not in the mixture."""
     t_s = time_constant_s or found.time_constant_s
     column = spectrum.column(name, t_s)
     most = _fitted(spectrum, (*found.power, name), t_s)
@@ -181,7 +181,8 @@ def upper_bound(spectrum: Spectrum, found: Mixture, name: str, time_constant_s: 
     high = low + 1.0
     while loss(high) < 0:
         low, high = high, high + 1.0
-    return float(np.exp(brentq(loss, low, high, xtol=0.02) / 2)) if loss(low) < 0 else float(np.exp(low / 2))
+    bound = brentq(loss, low, high, xtol=0.02) if loss(low) < 0 else low
+    return float(np.sqrt(most.power[name])), float(np.exp(bound / 2))
 
 
 def settled(found: Mixture) -> Mixture:

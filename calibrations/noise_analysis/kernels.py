@@ -57,8 +57,8 @@ def empty_tree() -> Tree:
 
 
 @njit(cache=True)
-def absorb(tree: Tree, samples: Array, offset: float) -> None:
-    """Take in more samples, less `offset`, which is the same each time."""
+def absorb(tree: Tree, samples: Array, offset: float, third: bool) -> None:
+    """Take in more samples, less `offset`, the same each time; `third`: with differences of the third order."""
     place = 0
     while place < len(samples):
         have = tree.filled[0]
@@ -68,15 +68,15 @@ def absorb(tree: Tree, samples: Array, offset: float) -> None:
         place += taken
         level = 0
         while level < LEVELS - 1 and tree.filled[level] >= TAIL + STEP:
-            _hand_up(tree, level)
+            _hand_up(tree, level, third)
             level += 1
 
 
 @njit(cache=True)
-def finish(tree: Tree) -> None:
+def finish(tree: Tree, third: bool) -> None:
     """Measure what is left in the buffers; samples that fill no bin of a level are not used there."""
     for level in range(LEVELS - 1):
-        _hand_up(tree, level)
+        _hand_up(tree, level, third)
 
 
 @njit(cache=True)
@@ -91,13 +91,15 @@ def _noted(tree: Tree, level: int, taken: int) -> None:
 
 
 @njit(cache=True)
-def _hand_up(tree: Tree, level: int) -> None:
+def _hand_up(tree: Tree, level: int, third: bool) -> None:
     """Measure a level, give the next one its pairs, and keep the tail."""
     n, size = tree.filled[level], 2.0**level
     b, p = tree.sums[level], tree.phases[level]
     if n == tree.measured[level]:
         return
-    _measure(tree, level)
+    _measure_second(tree, level)
+    if third:
+        _measure_third(tree, level)
     first, above = tree.paired[level], tree.filled[level + 1]
     pairs = (n - first) // 2
     b0, b1 = b[first : first + 2 * pairs : 2], b[first + 1 : first + 2 * pairs : 2]
@@ -113,22 +115,42 @@ def _hand_up(tree: Tree, level: int) -> None:
 
 
 @njit(cache=True)
-def _measure(tree: Tree, level: int) -> None:
-    """Add up the squares over all windows that end in a bin that is new."""
-    n, old, size = tree.filled[level], tree.measured[level], 2.0**level
-    b, p = tree.sums[level][:n], tree.phases[level][:n]
-    phase, summed = integrals(b, p, size)
+def _measure_second(tree: Tree, level: int) -> None:
+    """Add up the squares over all windows of two that end in a bin that is new, and the moments of new bins."""
+    n, old = tree.filled[level], tree.measured[level]
+    b = tree.sums[level][:n]
+    phase = running_sum(b, b.mean())
     for f in range(FACTORS if level == 0 else 1):
         k = 2**f if level == 0 else OVERLAP
         first = max(0, old - 2 * k + 1)
         tree.squares[level, f, ALLAN] += second_order(phase, k, first)
         tree.windows[level, f, ALLAN] += max(0, n - 2 * k + 1 - first)
+    _add_moments(b, old, tree.moments[level])
+
+
+@njit(cache=True)
+def _measure_third(tree: Tree, level: int) -> None:
+    """The same for windows of three."""
+    n, old = tree.filled[level], tree.measured[level]
+    phase, summed = integrals(tree.sums[level][:n], tree.phases[level][:n], 2.0**level)
+    for f in range(FACTORS if level == 0 else 1):
+        k = 2**f if level == 0 else OVERLAP
         first = max(0, old - 3 * k + 1)
         tree.squares[level, f, HADAMARD] += third_order(phase, k, first)
         tree.squares[level, f, MODIFIED] += third_order(summed, k, first)
         tree.windows[level, f, HADAMARD] += max(0, n - 3 * k + 1 - first)
         tree.windows[level, f, MODIFIED] += max(0, n - 3 * k + 1 - first)
-    _add_moments(b, old, tree.moments[level])
+
+
+@njit(cache=True)
+def running_sum(b: Array, mean: float) -> Array:
+    """Of bins less their mean, shape (n + 1,) from 0."""
+    phase = np.zeros(len(b) + 1)
+    x = 0.0
+    for i in range(len(b)):
+        x += b[i] - mean
+        phase[i + 1] = x
+    return phase
 
 
 @njit(cache=True)

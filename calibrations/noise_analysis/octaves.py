@@ -52,10 +52,14 @@ class Curve:
 
 
 class Octaves:
-    """What was seen of a record so far; blocks are added in order, `curve` is asked at the end."""
+    """What was seen of a record so far; blocks are added in order, `curve` is asked at the end.
 
-    def __init__(self, rate_hz: float) -> None:
+    Differences of the third order, for modified and hadamard, take as long again: False leaves them out.
+    """
+
+    def __init__(self, rate_hz: float, third_order: bool = True) -> None:
         self._rate_hz = rate_hz
+        self._third = third_order
         self._offset: float | None = None
         self._tree = empty_tree()
         self._whole: Tree | None = None
@@ -66,7 +70,7 @@ class Octaves:
             part = np.ascontiguousarray(samples[start : start + BLOCK], dtype=np.float64)
             if self._offset is None:
                 self._offset = float(part.mean())
-            absorb(self._tree, part, self._offset)
+            absorb(self._tree, part, self._offset, self._third)
         self._whole = None
 
     @property
@@ -78,7 +82,7 @@ class Octaves:
         """The deviation at 1, 2, 4 ... samples, as far as the record has two windows (hadamard: three)."""
         if self._whole is None:
             self._whole = deepcopy(self._tree)
-            finish(self._whole)
+            finish(self._whole, self._third)
         points = [_point(self._whole, kind, octave) for octave in range(self.n.bit_length())]
         rows = [point for point in points if point is not None]
         tau_s = np.array([2.0**octave for octave, _ in enumerate(rows)]) / self._rate_hz
@@ -89,7 +93,7 @@ class Octaves:
 
 def octaves(blocks: Iterable[Array], rate_hz: float, kind: str = "overlapping") -> Curve:
     """The curve of a record that comes in blocks, shape (n,) each."""
-    seen = Octaves(rate_hz)
+    seen = Octaves(rate_hz, KINDS[kind][0] != ALLAN)
     for block in blocks:
         seen.add(block)
     return seen.curve(kind)

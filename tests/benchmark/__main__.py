@@ -27,6 +27,7 @@ TARGET_S = {
 LEAST_TIMES_FASTER = 4.0  # samples of the simulated rig, against the same content out of numpy and scipy
 LEAST_TIMES_LESS = 1.8  # rig time of chosen poses, at equal worst standard error
 NEAR_PLAN = 1.2  # factor within which the parameters' real errors are those of the plan
+ALLAN_TARGETS = "10 and 4 times faster, 50 MB, variance 1.05 x that of every overlap, 1e-9 under a mean of 20000"
 MOST_OVERHEAD = 0.02  # of dwells and moves, in real time
 
 Figure = dict[str, Any]
@@ -63,6 +64,8 @@ def _figures(folder: Path) -> Iterator[tuple[str, Figure]]:
     yield "poses in real time", _overhead(folder)
     yield "chosen poses", _chosen_poses(folder)
     yield "live discovery", _live(folder)
+    yield "Allan deviation", _allan(folder)
+    yield "noise coefficients", _noise(folder)
     yield "100 kills", _inside("", subject(folder, "kills", "100"))
 
 
@@ -89,6 +92,28 @@ def _live(folder: Path) -> Figure:
     said = json.loads(subject(folder, "live", "2").out)
     met = said["live_right"] >= said["standard_right"] and said["times_less_rig_time"]["least"] > 1
     return {**said, "target": "as often right as the standard sweep, in less rig time", "met": met}
+
+
+def _allan(folder: Path) -> Figure:
+    """Twelve hours at 1 kHz, each program in a process of its own."""
+    file = str(folder / "still.npy")
+    subject(folder, "allan", "record", file)
+    said = {how: json.loads(subject(folder, "allan", how, file).out) for how in ("octaves", "exact", "allantools")}
+    said |= json.loads(subject(folder, "allan", "truth").out)
+    file_theirs, ours = said["allantools"], said["octaves"]
+    times = file_theirs["processor_s"] / ours["processor_s"], file_theirs["processor_s"] / said["exact"]["processor_s"]
+    met = times[0] >= 10 and times[1] >= 4 and ours["extra_mb"] <= 50
+    met = met and said["variance_ratio"] <= 1.05 and said["error_under_mean"] <= 1e-9
+    return {**said, "times_faster": times[0], "exact_times_faster": times[1], "targets": ALLAN_TARGETS, "met": met}
+
+
+def _noise(folder: Path) -> Figure:
+    said = json.loads(subject(folder, "noise", "100").out)
+    most = {"white-noise": 1.15, "flicker-noise": 1.15, "rate-random-walk": 1.25}
+    each = said["coefficients"]
+    near = all(each[name]["rms_over_bound"] <= most[name] and 0.9 <= each[name]["coverage"] <= 0.98 for name in most)
+    better = each["white-noise"]["times_better"] >= 4 and each["flicker-noise"]["times_better"] >= 2
+    return {**said, "target_rms_over_bound": most, "target_ms": 20, "met": near and better and said["median_ms"] <= 20}
 
 
 def _demo(folder: Path) -> Figure:
