@@ -16,6 +16,7 @@ from calibrations import report_budget
 from calibrations.candidates import SIGNIFICANT, Candidate
 from calibrations.compare import Comparison
 from calibrations.discover import Added, Discovery
+from calibrations.experiment import Experiment
 from calibrations.fit import Fit
 from calibrations.held_out import held_out_excess
 from calibrations.model import Estimate, Model
@@ -25,9 +26,20 @@ from calibrations.pictures.album import Picture, album
 from calibrations.pictures.view import mg, milli, pooled_mg, rows_of
 from calibrations.report_motion import head, section
 from calibrations.report_page import figure, page
-from calibrations.report_words import VERDICTS, capital, headline, key_figures, next_words, state, summary, unbroken
+from calibrations.report_words import (
+    VERDICTS,
+    capital,
+    headline,
+    key_figures,
+    next_takes,
+    next_words,
+    state,
+    summary,
+    unbroken,
+)
 
 EXPLAINED = 6  # candidates shown with formula and symptom, at most; the others in numbers only
+SHOWS = 1e-3  # share of the noise floor from which on a part of the noise is told
 SURE = 0.999  # probabilities beyond, on either side, are not told to more digits
 
 
@@ -64,13 +76,17 @@ def report(
         birge=f"{found.end.birge:.2f}" if found.end.birge > 1.05 else "",
         end_errors=_errors(found.end),
         known=found.end.noise.known,
-        next=next_words(found.next_experiment) if found.next_experiment else "",
+        next=_next(found.next_experiment) if found.next_experiment else None,
         structure=found.residual_structure,
         provenance=_provenance(found, date, program),
         motion=section(motion) if motion else None,
         pictures=shown,
         curves=[drawn for name, drawn in shown.items() if name.startswith("effect-")],
     )
+
+
+def _next(e: Experiment) -> dict[str, str]:
+    return {"words": next_words(e), "command": e.command, "takes": next_takes(e)}
 
 
 def _head(found: Discovery, model: str) -> dict[str, Any]:
@@ -135,8 +151,9 @@ def _errors(fit: Fit) -> list[dict[str, str]]:
         row = {"channel": channel, "excess": plain(fit.excess[c]), "tau": _time_constant(fit.noise.taus_s[c])}
         for name, values in noise.items():
             volts = f"{plain(1e3 * values[c])} m{fit.table.unit} = " if posed else ""
-            row[name] = f"{volts}{plain(mg(values, fit)[c])} {milli(fit)}" if values[c] > 0 else "none found"
-        if not fit.noise.slow[c] > 0:
+            shows = values[c] > SHOWS * fit.noise.floor[c]
+            row[name] = f"{volts}{plain(mg(values, fit)[c])} {milli(fit)}" if shows else "none found"
+        if row["slow"] == "none found":
             row["tau"] = "–"
         rows.append(row)
     return rows

@@ -12,6 +12,7 @@ from calibrations.inputs import contributions
 from calibrations.model import Estimate
 from calibrations.numerals import plain, unit
 
+NEGLIGIBLE = 1e-3  # share of the combined uncertainty, from which on a source shows in its digits
 MANY = 1e4  # degrees of freedom, told as no limit
 
 
@@ -54,16 +55,18 @@ def _parameter(drawn: Budget, k: int, effect: str, e: Estimate) -> dict[str, str
 
 
 def _sources(drawn: Budget, k: int, e: Estimate) -> dict[str, Any]:
-    return {"name": f"{_label(e)}, {unit(e.unit)}", "rows": [_source(line, k) for line in drawn.given]}
+    rows = [_source(line, k, float(drawn.combined[k])) for line in drawn.given]
+    return {"name": f"{_label(e)}, {unit(e.unit)}", "rows": rows}
 
 
-def _source(line: Line, k: int) -> dict[str, str]:
+def _source(line: Line, k: int, combined: float) -> dict[str, str]:
+    part = _of(line.std, k)
     return {
         "source": line.source,
         "kind": line.kind,
         "input": "–" if line.input_std is None else f"{plain(line.input_std, 2)} {unit(line.unit)}".strip(),
         "sensitivity": "–" if line.sensitivity is None else plain(line.sensitivity[k], 2),
-        "std": plain(_of(line.std, k), 2),
+        "std": plain(part, 2) if part > NEGLIGIBLE * combined else "negligible",
         "freedom": _freedom(line.freedom),
     }
 

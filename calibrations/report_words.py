@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable
 
 from calibrations.discover import Discovery
+from calibrations.expected import CERTAIN, told_apart
 from calibrations.experiment import Experiment
 from calibrations.fit import Fit
 from calibrations.held_out import held_out_excess
@@ -13,6 +14,7 @@ from calibrations.numerals import plain
 from calibrations.pictures.view import milli, pooled_mg, rows_of
 
 MOST_NAMED = 3  # effects in the headline
+LONG_MIN = 120  # from here on, a duration is told in hours
 VERDICTS = {
     "adequate": "nothing missing",
     "found": "effect found",
@@ -88,6 +90,20 @@ def next_words(e: Experiment) -> str:
     pairs = [f"{a} from {joined([y for x, y in e.separates if x == a], 'or')}" for a in dict(e.separates)]
     settings = ", ".join(f"{name} = {value}" for name, value in e.settings.items())
     return f"To tell {joined(pairs)}, run {e.procedure}{f' with {settings}' if settings else ''}: {e.why}."
+
+
+def next_takes(e: Experiment) -> str:
+    """How long it takes, and what it is expected to bring, as far as either is known."""
+    if e.duration_s is None:
+        return ""
+    minutes = e.duration_s / 60
+    takes = f"It takes {minutes:.0f} min" if minutes < LONG_MIN else f"It takes {minutes / 60:.1f} h"
+    if e.expected is None:
+        return f"{takes}; what it will tell cannot be computed beforehand."
+    alone = e.expected.probability_alone >= CERTAIN
+    told = 100 * told_apart(e.expected.alone if alone else e.expected.together)
+    whose = "its own data" if alone else "all data together"
+    return f"{takes}, and is expected to tell them apart with a probability of {min(told, 99.9):.3g} %, by {whose}."
 
 
 def joined(names: Iterable[str], word: str = "and") -> str:

@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from calibrations.compare import Comparison, compare
 from calibrations.discover import Discovery, discover
 from calibrations.effect import catalogue
+from calibrations.expected import Expected
 from calibrations.experiment import Experiment
 from calibrations.model import Estimate, Model, Term
 from calibrations.model_file import read_model
@@ -21,7 +22,7 @@ from calibrations.numerals import chance, measured, minus, plain, unit
 from calibrations.pictures.album import Picture
 from calibrations.pictures.view import pooled_mg
 from calibrations.report import report
-from calibrations.report_words import headline, joined, next_words, state, summary
+from calibrations.report_words import headline, joined, next_takes, next_words, state, summary
 from calibrations.table import Table
 from tests.calibrations.test_pictures import EFFECTS, by_hand, hand_table, warm, warm_table
 
@@ -182,9 +183,9 @@ def test_it_holds_the_noise() -> None:
     noise = warm().end.noise
     for c in range(2):
         assert f"{plain(1e3 * noise.floor[c])} mV" in text
-        if noise.scatter[c] > 0:
+        if noise.scatter[c] > 1e-3 * noise.floor[c]:
             assert f"{plain(1e3 * noise.scatter[c])} mV" in text
-    assert "own uncertainty is not known" in text
+    assert "those that explain it best" in text
 
 
 def test_it_holds_the_provenance_and_no_path_of_this_machine() -> None:
@@ -231,6 +232,19 @@ def test_doubt_is_said_so_with_the_experiment_that_ends_it() -> None:
     assert headline(found) == f"The model linear misses temperature-bias; {doubt}."
     assert next_words(e) == "To tell a from b or c, run sweep with flip = 1: it turns."
     assert next_words(e) in Page(report(found, beside(), "d", "p", blank())).text
+
+
+def test_the_next_experiment_stands_with_its_command_and_what_it_brings() -> None:
+    bare = Experiment("sweep", {}, (("temperature-bias", "warm-up-bias"),), "it turns")
+    e = replace(bare, command="rig run sweep --bench b.yaml", duration_s=3827.0, expected=Expected(1.0, 400.0, 1.0))
+    assert next_takes(bare) == ""
+    assert next_takes(replace(e, duration_s=50835.0, expected=None)).startswith("It takes 14.1 h; what it will tell")
+    brings = "It takes 64 min, and is expected to tell them apart with a probability of 99.9 %, by all data together."
+    assert next_takes(e) == brings
+    found = changed(warm(), verdict="ambiguous", alternatives={"temperature-bias": ("w",)}, next_experiment=e)
+    page = report(found, beside(), "d", "p", blank())
+    assert "<pre>rig run sweep --bench b.yaml</pre>" in page
+    assert brings in Page(page).text
 
 
 def test_what_is_not_explained_is_said_so() -> None:

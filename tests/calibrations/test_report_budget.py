@@ -23,11 +23,14 @@ def test_the_report_shows_sources_and_what_is_not_given() -> None:
 
 
 def test_the_section_says_what_counts_most() -> None:
-    table = given(measured(1), gain_std=2e-2)
+    table = given(measured(1), gain_std=0.2)
     found = section(fit(read_model("linear"), table))
     assert found is not None
     assert {row["largest"] for row in found["parameters"]} == {"gain of the converter"}
     assert [name for name, _ in found["groups"]] == ["bias", "scale-factor"]
+    scale = {row["source"]: row["std"] for row in found["groups"][1][1][0]["rows"]}
+    assert scale["gain of the converter"] == "0.20"
+    assert scale["scatter from row to row"] == "negligible"
 
 
 def test_the_document_is_json_and_adds_up() -> None:
