@@ -114,7 +114,8 @@ def one_sided(pattern: Pattern, table: Table) -> list[Pattern]:
 def _in_time(table: Table) -> Iterator[Pattern]:
     t, named = table.time_s, "t_s" in table
     u: Array = (t - t.mean()) / (float(np.ptp(t)) or 1.0)
-    yield Pattern("trend with time", np.column_stack([u, u**2]), "a*t + b*t**2" if named else "", slow=True)
+    trend, expression = ("trend with time", "a*t + b*t**2") if named else ("trend from row to row", "")
+    yield Pattern(trend, np.column_stack([u, u**2]), expression, slow=True)
     inner = np.unique(np.linspace(2, table.n - 3, min(STEPS, max(table.n - 4, 1))).astype(int))
     for k, near in zip(inner, _between(inner, table.n), strict=True):
         yield replace(_step(table, k), finer=partial(_steps, table, near))

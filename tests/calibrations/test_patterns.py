@@ -52,4 +52,4 @@ def test_every_pattern_has_words_of_its_own_and_columns_for_each_channel() -> No
 def test_positions_have_patterns_in_time_only() -> None:
     rng = np.random.default_rng(0)
     data = Table.from_columns("positions", dict(zip(("ax", "ay", "az"), rng.standard_normal((3, 30)), strict=True)))
-    assert all(p.text.startswith(("trend", "step at row")) for p in patterns(data, ("norm",)))
+    assert all(p.text.startswith(("trend from row", "step at row")) for p in patterns(data, ("norm",)))
