@@ -22,7 +22,7 @@ from calibrations.noise_analysis.identify import Mixture, Spectrum, bounded, est
 from calibrations.noise_analysis.processes import Sampling
 
 SAMPLES = 43_200
-TRUTH = {"white-noise": 1.0, "flicker-noise": 0.1, "rate-random-walk": 0.005}
+TRUTH = {"white-noise": 1.0, "flicker-noise": 0.5, "rate-random-walk": 0.02}
 THEIRS = {"white-noise": "white", "flicker-noise": "flicker", "rate-random-walk": "walk"}
 Array = NDArray[np.float64]
 
