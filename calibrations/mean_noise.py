@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from calibrations.table import OUTPUTS, Array, Table
+from calibrations.table import Array, Table
 
 WINDOW = 6.0  # lags summed, at least, and in correlation times: exp(-6) of an exponential's sum is left out
 NOTHING = 1e-3  # of the usual scatter: less is none, but for rounding
@@ -21,7 +21,7 @@ def white_std(table: Table) -> Array | None:
 
     Samples that a coarse converter all gave one code say nothing of their noise: it is taken as that of the others.
     """
-    names = [_std_name(name) for name in OUTPUTS[table.kind] if name in table]
+    names = [_std_name(name) for name in table.output_names]
     if "n" not in table or not all(name in table for name in names):
         return None
     std = np.column_stack([table.column(name) for name in names])

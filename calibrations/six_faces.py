@@ -28,7 +28,8 @@ class Faces:
 def faces(outputs: Array) -> Faces | None:
     """From still outputs (n, 3), rows of one face being averaged; None where an axis was not held up and down."""
     middle = (outputs.max(axis=0) + outputs.min(axis=0)) / 2
-    cosine = (outputs - middle) / np.linalg.norm(outputs - middle, axis=1, keepdims=True)
+    size = np.linalg.norm(outputs - middle, axis=1, keepdims=True)
+    cosine = (outputs - middle) / np.where(size > 0, size, 1.0)
     up, down = (_mean_along(outputs, side * cosine) for side in (1, -1))
     if up is None or down is None:
         return None

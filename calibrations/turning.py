@@ -67,13 +67,19 @@ def scales(table: Table) -> Array:
 
 
 def specific_force_g(table: Table) -> Array:
-    """Specific force by the columns ax, ay, az, g, shape (n, 3): by six faces where they were held, else by size."""
+    """Specific force by the columns ax, ay, az, g, shape (n, 3): by six faces where they were held, else by size.
+
+    Raises DataError where there is none.
+    """
     a = np.column_stack([table.column(f"a{axis}") for axis in AXES])
     still = table.column("rate_deg_s") == 0
     held = faces(a[still]) if still.any() else None
     if held is not None:
         return (a - held.bias) / held.scale
-    return np.asarray(a / np.median(np.linalg.norm(a, axis=1)))
+    gravity = float(np.median(np.linalg.norm(a, axis=1)))
+    if not gravity > 0:
+        raise DataError(f"{table.source}: ax, ay and az are 0; leave the columns out where no accelerometer was read")
+    return np.asarray(a / gravity)
 
 
 def earth_unknown(table: Table) -> str | None:

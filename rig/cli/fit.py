@@ -24,6 +24,7 @@ def command(data: str, model: str | None, out: Path | None, check: bool, bench_f
     from calibrations.fit import fit
     from calibrations.report_budget import document as in_parts
     from calibrations.unseen import unseen
+    from rig.cli import calibrated
     from rig.cli.asked import asked, tell_blind, write_model
     from rig.cli.checked import document, lines
     from rig.cli.words import errors, paper, parameters, warning
@@ -35,11 +36,12 @@ def command(data: str, model: str | None, out: Path | None, check: bool, bench_f
     tell_blind(found, effects)
     caution, checked = undetermined(found), unseen(start, table)
     if as_json:
-        emit(fit_document(found, str(out) if out else None) | document(checked) | {"budget": in_parts(found)})
+        more = document(checked) | calibrated.document(found) | {"budget": in_parts(found)}
+        emit(fit_document(found, str(out) if out else None) | more)
         notes(warning(caution))
     else:
         click.echo(f"{found.model.name} fitted to {table.n} rows of {table.source}\n\n{parameters(found.model)}\n")
-        told = [*warning(caution), *lines(checked, data)]
+        told = [*calibrated.lines(found), *warning(caution), *lines(checked, data)]
         click.echo("\n".join([errors(found), *(f"\n{line}" for line in told)]))
         if "cross-axis-bias" in start.effects and table.kind == "poses":
             click.echo(f"\n{paper(table)}")
