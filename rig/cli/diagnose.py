@@ -25,16 +25,14 @@ def command(data: str, model: str | None, check: bool, bench_file: Path | None, 
     """Find the physical effect that a model misses on DATA (a file or a run)."""
     from calibrations.diagnose import diagnose
     from calibrations.documents import diagnosis_document
-    from rig.bench import read_bench
     from rig.cli.asked import asked, tell_blind
+    from rig.cli.foresight import with_next
     from rig.cli.own_effect import own_effect, told
     from rig.cli.words import warning
-    from rig.next_experiment import proposed
 
     table, start, effects = asked(data, model, bench_file)
     result = diagnose(table, start, effects)
-    if result.next_experiment:
-        result = proposed(result, effects, read_bench(bench_file), bench_file)
+    result = with_next(result, data, effects, bench_file)
     tell_blind(result.fit, effects)
     name = model or start.name
     if as_json:

@@ -54,15 +54,13 @@ def _on_a_model(data: str, model: str | None, bench_file: Path | None, out: Path
     from calibrations.discover import discover
     from calibrations.pictures.album import album
     from calibrations.report import report
-    from rig.bench import read_bench
     from rig.cli.asked import asked, program, today
+    from rig.cli.foresight import with_next
     from rig.cli.shaken import shaken_of
-    from rig.next_experiment import proposed
 
     table, start, effects = asked(data, model, bench_file, out)
-    found, beside = discover(table, start, effects), compare(table, start)
-    if found.next_experiment:
-        found = proposed(found, effects, read_bench(bench_file), bench_file)
+    found = with_next(discover(table, start, effects), data, effects, bench_file)
+    beside = compare(table, start)
     shaken = shaken_of(data)
     pictures = album(found, beside, shaken)
     return pictures, lambda: report(found, beside, today(), program(), pictures, shaken)

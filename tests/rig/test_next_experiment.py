@@ -21,9 +21,11 @@ from procedures.catalogue import find
 from procedures.settings import parse
 from rig.bench import read_bench
 from rig.cli import rig as commands
+from rig.cli.foresight import with_next
 from rig.cli.settings import read_settings
 from rig.next_experiment import Dispute, chosen, command_line, planned_experiment, proposed
 from rig.planned_columns import columns
+from rig.record import Record
 from tests.hidden.quick_rig import QuickRig
 from tests.hidden.rigs import IDEAL
 from tests.rig.conftest import Ended
@@ -139,6 +141,20 @@ def test_the_commands_print_it(rig: Callable[..., Ended], tmp_path: Path) -> Non
         said = rig(command, data).out
         assert "    rig run sweep --face both --step-deg 45 --inclinations-deg 90,30,150\n    14:" in said
         assert "standard deviations apart, told with a probability of 99.9 %, by its own data" in said
+
+
+@pytest.mark.usefixtures("rig_home")
+@pytest.mark.parametrize(
+    ("bench", "told"), [({"name": "ours"}, True), ({"name": read_bench().name}, False), ({}, False)]
+)
+def test_another_bench_than_that_of_the_run_is_named(
+    capsys: pytest.CaptureFixture[str], bench: dict[str, str], told: bool
+) -> None:
+    about: dict[str, Any] = {"identities": {}, "configuration": "", "constants": {}, "source": ""}
+    with Record() as record:
+        run = record.begin("sweep", {}, bench=bench, **about)
+    assert with_next(turned(), run, catalogue(), None).next_experiment.command.startswith("rig run sweep")
+    assert (f'{run} was measured on the bench "ours", and the next' in capsys.readouterr().err) == told
 
 
 def test_the_same_data_counts_once(refused: Callable[..., str]) -> None:
