@@ -51,9 +51,9 @@ def directions(table: Table) -> Array:
     return np.asarray(away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), np.finfo(float).tiny))
 
 
-def mean_radius(table: Table) -> float:
-    """The mean magnitude of the outputs."""
-    return float(np.mean(np.linalg.norm(table.outputs, axis=1)))
+def radius(table: Table) -> float:
+    """Of the sphere that comes nearest to the outputs."""
+    return float(np.mean(np.linalg.norm(table.outputs - sphere_centre(table.outputs), axis=1))) or 1.0
 
 
 def worse(u: Array, degree: int) -> float:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrations.chain import Step
+from calibrations.coverage import radius
 from calibrations.effect import Parameter
 from calibrations.model import Model, Term
 from calibrations.table import AXES, Array, Table
@@ -136,6 +137,8 @@ def _nominal(table: Table) -> float:
     """Output per unit of what is sensed, as the range of outputs has it."""
     if table.kind == "rates":
         return float(np.max(np.abs(scales(table)))) or 1.0
+    if table.content == "fields":
+        return radius(table)
     spread = float(np.median(np.ptp(table.outputs, axis=0))) / 2
     return table.number("output_per_g", spread or 1.0)
 

@@ -2,7 +2,7 @@
 
 For `poses` the residual is measured minus predicted output, one block of rows per axis, in the output's unit.
 For `positions` it is |a| - 1, where a is the specific force that the model makes of the output, in g, or the field as
-a share of its strength. For `rates` it is as for poses.
+a share of its strength (that of the sphere nearest to the outputs). For `rates` it is as for poses.
 For `motion` it is what each stretch of the record holds of measured minus predicted output, part by part.
 """
 
@@ -25,6 +25,7 @@ from calibrations.parameters import Layout
 from calibrations.scatter import scatter
 from calibrations.table import Array, Table
 
+STRENGTH = "field-strength"
 KNOWN = ("poses", "rates")  # kinds of tables whose rows have a known specific force or rate
 
 
@@ -46,7 +47,7 @@ class Problem:
             )
         if table.kind == "positions":
             _check_positions(table)
-        _check_coverage(model, table)
+        _check_fields(model, table)
         model = model.for_table(table)
         if not model.terms:
             raise ModelError(
@@ -84,7 +85,15 @@ class Problem:
             error = self.table.outputs - forward(self.table, steps)
         else:
             error = np.linalg.norm(backward(self.table, steps), axis=1)[:, None] - 1.0
-        return error.T
+        return error.T * self._share(steps)
+
+    def _share(self, steps: Sequence[Step]) -> float:
+        """What a residual is given in: the field's strength as the outputs show it, whatever the model makes of it.
+
+        By its own measure a field without end would leave nothing of any magnitude.
+        """
+        strengths = [float(p["total"]) for effect, p in steps if effect.name == STRENGTH]
+        return strengths[0] / self.layout.nominal if strengths else 1.0
 
     def jacobian(self, theta: Array, of: NDArray[np.bool_] | None = None) -> Array:
         """d residual / d theta by central differences, shape (channels, n, p); only the entries `of` where given."""
@@ -151,8 +160,13 @@ def _channels(table: Table) -> tuple[str, ...]:
     return table.axes if table.kind in KNOWN else ("norm",)
 
 
-def _check_coverage(model: Model, table: Table) -> None:
-    """Raises DataError where the rows cannot show an effect of the model."""
+def _check_fields(model: Model, table: Table) -> None:
+    """Raises ModelError for a magnetometer without a field, DataError where the rows cannot show an effect."""
+    if table.content == "fields" and STRENGTH not in model.effects:
+        raise ModelError(
+            f"{table.source}: a model of magnetometers needs the effect {STRENGTH}, and {model.name} has "
+            f"{', '.join(model.effects)}; take the model field or magnetometer"
+        )
     for effect in (term.effect for term in model.terms if table.content in term.effect.kinds):
         if why := effect.lacks(table):
             raise DataError(f"{table.source}: {effect.name} is not fitted: {why}")

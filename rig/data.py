@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from calibrations.directions import one_for_each_direction
 from calibrations.duplicates import check_duplicates
 from calibrations.dwells import is_pose_log, pose_means
 from calibrations.errors import DataError
@@ -25,10 +26,15 @@ def averaged(log: Table, tell: Callable[[str], None]) -> Table:
     """
     table = _means(log)
     if table is not log:
-        what = "poses" if table.kind == "poses" else "still positions"
-        tell(f"{log.source} is a log of raw samples: the means of {table.n} {what}, out of {log.n} samples, are taken.")
+        tell(f"{log.source} is a log of raw samples: {_taken(table)}, out of {log.n} samples, are taken.")
     check_duplicates(table)
     return _included(table, tell)
+
+
+def _taken(table: Table) -> str:
+    if table.content == "fields":
+        return f"{table.n} samples, one for each direction of the field"
+    return f"the means of {table.n} {'poses' if table.kind == 'poses' else 'still positions'}"
 
 
 def _included(table: Table, tell: Callable[[str], None]) -> Table:
@@ -47,6 +53,8 @@ def _included(table: Table, tell: Callable[[str], None]) -> Table:
 def _means(log: Table) -> Table:
     if is_pose_log(log):
         return pose_means(log)
+    if is_raw_log(log) and log.content == "fields":
+        return one_for_each_direction(log)
     return positions(log, _rate_hz(log)) if is_raw_log(log) else log
 
 

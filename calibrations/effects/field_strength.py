@@ -10,13 +10,13 @@ Source    Book (17.6).
 
 import numpy as np
 
-from calibrations.coverage import mean_radius
+from calibrations.coverage import radius
 from calibrations.effect import Parameter, Values
 from calibrations.table import Array, Table
 
 KINDS = ("fields",)
 PARAMETERS = (Parameter("total", "{out}", typical=1.0, per_axis=False, starts=(1.0,), low=1e-12, doc="F (17.6)"),)
-STARTS = {"total": lambda table: np.full(3, mean_radius(table))}
+STARTS = {"total": lambda table: np.full(3, radius(table))}
 
 
 def transduction(a: Array, table: Table, p: Values) -> Array:
