@@ -83,9 +83,10 @@ def _of_array(path: Path, rate_hz: float | None) -> Stream:
 
 
 def _of_table(table: Table, channel: str | None, rate_hz: float | None) -> Stream:
-    if table.kind != "still":
+    if table.kind != "still" or "alpha_deg" in table:
+        kind = "poses" if table.kind == "still" else table.kind
         raise DataError(
-            f"{table.source}: a table of {table.kind}; noise needs single samples of a sensor at rest, a table of still"
+            f"{table.source}: a table of {kind}; noise needs single samples of a sensor at rest, a table of still"
         )
     channels = tuple(name for name in table.columns if name not in BESIDE)
     chosen = _chosen(channels, channel, table.source)

@@ -36,7 +36,7 @@ from calibrations.noise_analysis.welch import Welch
 from calibrations.table import Array
 
 Estimates = Mapping[str, tuple[float, float]]
-ONE_SIDED = 1.645  # standard deviations to a bound of 95 %
+TO_BOUND = 1.96  # standard deviations
 FEWEST = 64  # samples below which nothing can be said
 
 
@@ -110,7 +110,7 @@ class NoiseAnalysis:
         if name in known:
             return Coefficient(*known[name], unit)
         value, upper = bounded(self.spectrum, self.found, name)
-        return Coefficient(value, (upper - value) / ONE_SIDED, unit, upper)
+        return Coefficient(value, (upper - value) / TO_BOUND, unit, upper)
 
     def _gauss_markov(self, known: Estimates) -> Coefficient:
         found = self.found
@@ -118,11 +118,11 @@ class NoiseAnalysis:
             return Coefficient(*known[GAUSS_MARKOV], self.unit, None, found.time_constant_s)
         time_s = most_likely_markov(self.spectrum, tuple(found.power)).time_constant_s
         value, upper = bounded(self.spectrum, found, GAUSS_MARKOV, time_s)
-        return Coefficient(value, (upper - value) / ONE_SIDED, self.unit, upper, time_s)
+        return Coefficient(value, (upper - value) / TO_BOUND, self.unit, upper, time_s)
 
     def _sinusoidal(self) -> Coefficient:
         if not self.lines:
-            return Coefficient(0.0, self.line_bound / ONE_SIDED, self.unit, self.line_bound)
+            return Coefficient(0.0, self.line_bound / TO_BOUND, self.unit, self.line_bound)
         line = self.lines[0]
         return Coefficient(line.amplitude, line.std, self.unit, None, None, line.frequency_hz)
 

@@ -26,7 +26,8 @@ COST = 7.88  # twice the log-likelihood that a process has to gain
 COST_MARKOV = 22.0  # for two parameters, of which one is searched for, and a shape that others together can take on
 DOUBTED = ("flicker-noise", "rate-random-walk")  # they are alike where a record has few periods
 DOUBT = 2.0  # twice the log-likelihood that one of them has to gain for even odds
-BOUND = 2.71  # twice the log-likelihood that is lost at a bound with 95 %
+SURE = 4.0  # the same, for a slow process to be told from the other one
+BOUND = 3.84  # twice the log-likelihood that is lost at the ends of an interval of 95 %
 TIMES = 12  # time constants that are tried first
 FASTEST, LONGEST = 3.0, 0.1  # of them, in sampling intervals and in lengths of the record
 
@@ -138,7 +139,7 @@ def uncertainties(spectrum: Spectrum, found: Mixture) -> dict[str, float]:
 
 
 def estimates(spectrum: Spectrum, found: Mixture) -> dict[str, tuple[float, float]]:
-    """(coefficient, its standard uncertainty) of each process that was found, and of the time constant.
+    """(coefficient, its standard uncertainty) of each process that was identified, and of a time constant.
 
     Slow noise that is there but too weak to be identified would bias what is, if it were taken to be zero. So both are
     means over all mixtures with some of the slow processes that were not identified, weighted by likelihood.
@@ -154,7 +155,8 @@ def estimates(spectrum: Spectrum, found: Mixture) -> dict[str, tuple[float, floa
     weights /= weights.sum()
     stds = [uncertainties(spectrum, fit) for fit in fits]
     out = {}
-    for name in (*found.power, *(("time_constant_s",) if GAUSS_MARKOV in found.power else ())):
+    names = [name for name in found.power if not _might_be_another(spectrum, found, name)]
+    for name in (*names, *(("time_constant_s",) if GAUSS_MARKOV in names else ())):
         values = np.array([_value(fit, name) for fit in fits])
         mean = float(weights @ values)
         spread = np.array([each[name] for each in stds]) ** 2 + (values - mean) ** 2
@@ -162,18 +164,28 @@ def estimates(spectrum: Spectrum, found: Mixture) -> dict[str, tuple[float, floa
     return out
 
 
+def _might_be_another(spectrum: Spectrum, found: Mixture, name: str) -> bool:
+    """Whether the others, with the slow ones that were left out, explain as much without this slow process."""
+    others = tuple(each for each in dict.fromkeys((*found.power, *DOUBTED)) if each != name)
+    if name not in DOUBTED:
+        return False
+    without = _fitted(spectrum, others, found.time_constant_s)
+    return 2 * (found.log_likelihood - without.log_likelihood) < SURE
+
+
 def _value(fit: Mixture, name: str) -> float:
     return float(np.sqrt(fit.power[name])) if name in fit.power else fit.time_constant_s
 
 
 def bounded(spectrum: Spectrum, found: Mixture, name: str, time_constant_s: float = 0.0) -> tuple[float, float]:
-    """(most likely, stays below with 95 %): the coefficient of a process that is not in the mixture."""
+    """(most likely, stays below with 95 %): the coefficient of a process that is not identified."""
     t_s = time_constant_s or found.time_constant_s
+    others = tuple(each for each in dict.fromkeys((*found.power, *DOUBTED)) if each != name)
     column = spectrum.column(name, t_s)
-    most = _fitted(spectrum, (*found.power, name), t_s)
+    most = _fitted(spectrum, (*others, name), t_s)
 
     def loss(log_power: float) -> float:
-        rest = _fitted(spectrum, tuple(found.power), t_s, np.exp(log_power) * column)
+        rest = _fitted(spectrum, others, t_s, np.exp(log_power) * column)
         return 2 * (most.log_likelihood - rest.log_likelihood) - BOUND
 
     weight = column / found.expected(spectrum)

@@ -1,6 +1,6 @@
 """The spectrum of what is too fast for means: periodograms of short stretches under a Hann window, averaged.
 
-Stretches overlap by half, which leaves nine tenths of the degrees of freedom that there are.
+Stretches overlap by half; ordinates of neighbouring stretches then have a correlation of 1/36.
 
 Source  Welch, IEEE Trans. Audio Electroacoust. 15 (1967).
 """
@@ -12,7 +12,7 @@ import numpy as np
 from calibrations.table import Array
 
 LENGTH = 4096  # samples to a stretch
-KEPT = 0.9  # of the degrees of freedom
+ALIKE = 1 + 2 / 36
 WINDOW = np.sin(np.pi * (np.arange(LENGTH) + 0.5) / LENGTH) ** 2
 
 
@@ -39,4 +39,4 @@ class Welch:
         """(frequencies, Hz; two-sided densities, unit^2/Hz; degrees of freedom to each), without 0 and Nyquist."""
         frequency_hz = np.arange(1, LENGTH // 2) * self._rate_hz / LENGTH
         scale = self._rate_hz * np.sum(WINDOW**2) * max(self._stretches, 1)
-        return frequency_hz, self._power[1:-1] / scale, KEPT * (self._stretches + 1)
+        return frequency_hz, self._power[1:-1] / scale, 2 * max(self._stretches, 1) / ALIKE

@@ -51,6 +51,8 @@ def remarks(samples: Stream, found: NoiseAnalysis) -> Iterable[str]:
             f"Coefficients are those before the output's {samples.corner_hz:g} Hz low-pass, "
             f"from what is slower than {samples.corner_hz / 2:.3g} Hz."
         )
+    if doubtful := [name for name in found.found.power if not found.coefficients[name].identified]:
+        yield f"There is slow noise; the record cannot tell of which kind ({', '.join(doubtful)}?): record for longer."
     if found.misfit > MISFIT:
         yield (
             f"The spectrum is {found.misfit:.2g} times as far from these processes as chance leaves it: there is "

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Random = np.random.Generator
+PAST = 8
 
 
 def random_walk(random: Random, n: int) -> Array:
@@ -17,13 +18,11 @@ def random_walk(random: Random, n: int) -> Array:
 
 
 def flicker(random: Random, n: int) -> Array:
-    """1 / (2 pi f) by half an integration of white noise, with as long a past (Kasdin, Proc. IEEE 83, 1995)."""
-    response = np.ones(2 * n)
-    for k in range(1, 2 * n):
-        response[k] = response[k - 1] * (k - 0.5) / k
-    size = 4 * n
-    white = np.fft.rfft(random.standard_normal(2 * n), size)
-    return np.fft.irfft(white * np.fft.rfft(response, size), size)[n : 2 * n]
+    """1 / (2 pi f): white noise integrated by half, with a past of seven lengths (Kasdin, Proc. IEEE 83, 1995)."""
+    k = np.arange(1, PAST * n)
+    response = np.concatenate([[1.0], np.cumprod((k - 0.5) / k)])
+    white = np.fft.rfft(random.standard_normal(PAST * n), 2 * PAST * n)
+    return np.fft.irfft(white * np.fft.rfft(response, 2 * PAST * n), 2 * PAST * n)[(PAST - 1) * n : PAST * n]
 
 
 def quantisation(random: Random, n: int) -> Array:

@@ -1,0 +1,180 @@
+"""Coefficients of noise processes over seeds: near the Cramer-Rao bound, intervals that hold, no false ones."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+
+import numpy as np
+import pytest
+
+from calibrations.errors import DataError, TooFewRows
+from calibrations.noise_analysis.analysis import NoiseAnalysis, analyse
+from calibrations.noise_analysis.bands import slow_bands
+from calibrations.noise_analysis.identify import Spectrum, bounded, estimates, mixture
+from calibrations.noise_analysis.processes import Sampling
+from tests.calibrations import noises
+
+N, SEEDS = 8192, 100
+WHITE, FLICKER, WALK, QUANTUM, MARKOV = (
+    "white-noise", "flicker-noise", "rate-random-walk", "quantisation-noise", "gauss-markov-noise",
+)  # fmt: skip
+MIXTURES: tuple[Mapping[str, float], ...] = (
+    {WHITE: 1.0},
+    {WHITE: 1.0, FLICKER: 0.4},
+    {WHITE: 1.0, WALK: 0.03},
+    {WHITE: 1.0, FLICKER: 0.5, WALK: 0.08},
+    {WHITE: 0.5, QUANTUM: 1.0, FLICKER: 0.3},
+)
+Known = dict[str, tuple[float, float]]
+
+
+def record(truth: Mapping[str, float], seed: int, n: int = N) -> np.ndarray:
+    random = np.random.default_rng(seed)
+    made = {
+        WHITE: lambda: random.standard_normal(n),
+        FLICKER: lambda: noises.flicker(random, n),
+        WALK: lambda: noises.random_walk(random, n),
+        QUANTUM: lambda: noises.quantisation(random, n),
+        MARKOV: lambda: noises.gauss_markov(random, n, 60.0),
+    }
+    return np.sum([value * made[name]() for name, value in truth.items()], axis=0)
+
+
+def spectrum(samples: np.ndarray) -> Spectrum:
+    return Spectrum((slow_bands(samples - samples.mean(), Sampling(1.0)),))
+
+
+@cache
+def found(number: int) -> list[Known]:
+    """What is estimated of each record of a mixture."""
+    spectra = [spectrum(record(MIXTURES[number], seed)) for seed in range(SEEDS)]
+    return [estimates(each, mixture(each)) for each in spectra]
+
+
+def least_std(truth: Mapping[str, float]) -> dict[str, float]:
+    """The Cramer-Rao bound of all of a mixture's coefficients, from their spectra at every frequency."""
+    sine = 2 * np.sin(np.pi * np.arange(1, N) / (2 * N))
+    shapes = {WHITE: sine**0, FLICKER: 1 / sine, WALK: sine**-2, QUANTUM: sine**2}
+    columns = np.column_stack([shapes[name] for name in truth])
+    values = np.array(list(truth.values()))
+    scaled = 2 * values * columns / (columns @ values**2)[:, None]
+    return dict(zip(truth, np.sqrt(np.diag(np.linalg.inv(scaled.T @ scaled / 2))), strict=True))
+
+
+@pytest.mark.parametrize("number", range(len(MIXTURES)))
+def test_errors_are_near_the_bound_and_intervals_hold(number: int) -> None:
+    truth, bound = MIXTURES[number], least_std(MIXTURES[number])
+    for name, true in truth.items():
+        known = np.array([each[name] for each in found(number) if name in each])
+        assert len(known) >= 0.97 * SEEDS, name
+        errors = known[:, 0] - true
+        assert np.sqrt(np.mean(errors**2)) < 1.25 * bound[name], name  # 100 seeds alone scatter by 7 %
+        assert np.mean(np.abs(errors) < 1.96 * known[:, 1]) >= 0.88, name
+
+
+@pytest.mark.parametrize("number", range(len(MIXTURES)))
+def test_what_is_not_there_is_not_named(number: int) -> None:
+    false = [bool(each.keys() - MIXTURES[number].keys()) for each in found(number)]
+    assert np.mean(false) <= 0.03
+
+
+def test_a_bound_on_what_is_not_identified_holds_what_is_there() -> None:
+    """Flicker noise so weak that half of the records show it, and others what might as well be a random walk."""
+    truth, held, seen_in, false = {WHITE: 1.0, FLICKER: 0.06}, [], 0, 0
+    for seed in range(60):
+        seen = spectrum(record(truth, seed))
+        processes = mixture(seen)
+        known = estimates(seen, processes)
+        false += WALK in known
+        seen_in += FLICKER in known
+        if FLICKER in known:
+            value, std = known[FLICKER]
+            held.append(value + 1.96 * std >= truth[FLICKER])
+        else:
+            held.append(bounded(seen, processes, FLICKER)[1] >= truth[FLICKER])
+    assert 15 < seen_in < 50
+    assert false <= 3
+    assert np.mean(held) > 0.88
+
+
+def test_a_gauss_markov_process_with_its_time_constant() -> None:
+    all_found = [estimates(s, mixture(s)) for s in (spectrum(record({WHITE: 1.0, MARKOV: 0.5}, k)) for k in range(20))]
+    known = np.array([[*each[MARKOV], *each["time_constant_s"]] for each in all_found if MARKOV in each])
+    assert len(known) >= 18
+    assert np.mean(known[:, 0]) == pytest.approx(0.5, rel=0.05)
+    assert np.mean(known[:, 2]) == pytest.approx(60.0, rel=0.25)
+    assert np.mean(np.abs(known[:, 0] - 0.5) < 1.96 * known[:, 1]) >= 0.8
+
+
+def analysed(samples: np.ndarray, rate_hz: float = 1.0) -> NoiseAnalysis:
+    return analyse([samples], rate_hz, "V", "test")
+
+
+def test_a_sinusoid_with_its_frequency_is_taken_off() -> None:
+    samples = record({WHITE: 1.0}, 1) + 0.3 * noises.sinusoid(N, 0.0123)
+    found = analysed(samples)
+    line = found.coefficients["sinusoidal-noise"]
+    assert line.identified
+    assert line.value == pytest.approx(0.3, abs=3 * line.std)
+    assert line.frequency_hz == pytest.approx(0.0123, abs=0.1 / N)
+    assert found.coefficients[WHITE].value == pytest.approx(1.0, abs=0.03)
+    assert not analysed(record({WHITE: 1.0}, 1)).coefficients["sinusoidal-noise"].identified
+
+
+def test_of_a_long_record_what_is_fast_is_known_too() -> None:
+    """More samples than are kept as means: a line and quantisation noise beyond these."""
+    n = 600_000
+    samples = record({WHITE: 1.0, QUANTUM: 1.0}, 1, n) + 0.1 * noises.sinusoid(n, 0.3123)
+    samples += 0.002 * noises.random_walk(np.random.default_rng(2), n)
+    found = analysed(samples)
+    known = found.coefficients
+    assert set(found.found.power) == {WHITE, QUANTUM, WALK}
+    for name, true in ((WHITE, 1.0), (QUANTUM, 1.0), (WALK, 0.002), ("sinusoidal-noise", 0.1)):
+        assert known[name].value == pytest.approx(true, abs=3.5 * known[name].std), name
+    assert known["sinusoidal-noise"].frequency_hz == pytest.approx(0.3123, abs=2e-4)
+
+
+def test_units_go_with_the_rate() -> None:
+    """A record of 100 Hz: what is 1 per sample is 0.1 per root hertz."""
+    known = analysed(record({WHITE: 1.0, WALK: 0.05}, 3), rate_hz=100.0).coefficients
+    assert known[WHITE].value == pytest.approx(0.1, rel=0.03)
+    assert known[WHITE].unit == "V/sqrt(Hz)"
+    assert known[WALK].value == pytest.approx(0.5, rel=0.3)
+    assert known[WALK].unit == "V/sqrt(s)"
+
+
+def test_the_processes_give_the_allan_deviation_back() -> None:
+    found = analysed(record({WHITE: 1.0, WALK: 0.05}, 3))
+    curve = found.allan
+    held = (curve.low < found.modelled(curve.tau_s)) & (found.modelled(curve.tau_s) < curve.high)
+    assert np.mean(held) > 0.8
+    assert found.misfit == pytest.approx(1.0, abs=0.2)
+
+
+def test_a_spectrum_of_another_shape_is_a_misfit() -> None:
+    smooth = np.convolve(np.random.default_rng(1).standard_normal(N + 20), np.hanning(20), "same")[:N]
+    assert analysed(smooth + 1e-3 * record({WHITE: 1.0}, 2)).misfit > 1.3
+
+
+@pytest.mark.parametrize(
+    ("samples", "says"),
+    [
+        (np.zeros(1000), "every sample is the same"),
+        (np.where(np.arange(1000) == 700, np.inf, np.arange(1000.0)), "sample 701 is inf"),
+        (
+            np.clip(np.random.default_rng(1).standard_normal(1000), -2, 9),
+            "at the lowest value, -2: the channel is clipped",
+        ),
+        (np.arange(1000) * 1j, "holds complex128, not real numbers"),
+        (np.array(["a"] * 100), "not real numbers"),
+    ],
+)
+def test_records_that_tell_nothing(samples: np.ndarray, says: str) -> None:
+    with pytest.raises(DataError, match=says):
+        analysed(samples)
+
+
+def test_a_record_that_is_too_short() -> None:
+    with pytest.raises(TooFewRows, match="10 samples; the noise of a record needs 64 or more"):
+        analysed(np.arange(10.0))

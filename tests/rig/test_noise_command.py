@@ -1,0 +1,171 @@
+"""rig noise: of arrays, tables and runs; its document, its words, its pictures; and what it refuses."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rig.record import Record
+from rig.still import stream
+from tests.rig.conftest import Ended
+
+Rig = Callable[..., Ended]
+PROCESSES = {
+    "white-noise", "flicker-noise", "rate-random-walk", "quantisation-noise", "sinusoidal-noise", "gauss-markov-noise",
+}  # fmt: skip
+
+
+def document(ended: Ended) -> dict[str, Any]:
+    assert ended.status == 0, ended.err
+    return dict(json.loads(ended.out))
+
+
+def samples(n: int = 6000) -> np.ndarray:
+    """White noise of 0.1 at 50 Hz: 0.0141 per root hertz."""
+    return 2.5 + 0.1 * np.random.default_rng(1).standard_normal(n)
+
+
+def table(path: Path, t_s: np.ndarray, constants: str = "", **columns: np.ndarray) -> str:
+    names = ["t_s", *columns]
+    rows = zip(t_s.tolist(), *[c.tolist() for c in columns.values()], strict=True)
+    lines = [constants + ",".join(names), *(",".join(map(repr, row)) for row in rows)]
+    path.write_text("\n".join(lines))
+    return str(path)
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    np.save("still.npy", samples())
+    return tmp_path
+
+
+@pytest.mark.parametrize("kind", ["f8", "f4", "i4"])
+def test_the_document_of_an_array(rig: Rig, folder: Path, kind: str) -> None:
+    np.save("some.npy", (samples() * 1000).astype(kind))
+    said = document(rig("noise", "some.npy", "--rate", "50", "--json"))
+    assert set(said) == {"schema", "rate_hz", "n", "allan", "coefficients"}
+    assert (said["schema"], said["rate_hz"], said["n"]) == ("rig.noise/1", 50.0, 6000)
+    assert set(said["allan"]) == {"tau_s", "deviation", "low", "high"}
+    assert said["allan"]["tau_s"][:2] == [0.02, 0.04]
+    assert said["allan"]["deviation"][0] == pytest.approx(100, rel=0.03)
+    assert said["allan"]["low"][0] < said["allan"]["deviation"][0] < said["allan"]["high"][0]
+    assert set(said["coefficients"]) == PROCESSES
+    white = said["coefficients"]["white-noise"]
+    assert white["value"] == pytest.approx(100 / np.sqrt(50), abs=3 * white["std"])
+    assert (white["unit"], white["identified"]) == ("count/sqrt(Hz)", True)
+    for name in PROCESSES - {"white-noise"}:
+        assert not said["coefficients"][name]["identified"]
+        assert said["coefficients"][name]["upper"] > 0
+
+
+def test_a_table_with_its_rate_in_its_times(rig: Rig, folder: Path) -> None:
+    file = table(folder / "still.csv", np.arange(6000) / 50, vx_v=samples(), vy_v=2 * samples())
+    ended = rig("noise", file, "--channel", "vy", "--json")
+    assert document(ended)["coefficients"]["white-noise"]["value"] == pytest.approx(0.2 / np.sqrt(50), rel=0.05)
+    assert document(ended)["rate_hz"] == pytest.approx(50)
+    assert "Channel vy_v; --channel takes another: vx_v." in ended.err
+    assert '"vq"' in rig("noise", file, "--channel", "vq").err
+
+
+def test_words_and_pictures(rig: Rig, folder: Path) -> None:
+    ended = rig("noise", "still.npy", "--rate", "50", "--pictures", "pictures", "--format", "svg")
+    assert ended.status == 0, ended.err
+    assert "still.npy, values: 6000 samples at 50 Hz, 2:00" in ended.out
+    assert "white-noise         0.0141" in ended.out
+    assert "flicker-noise       not identified, below" in ended.out
+    assert "Allan deviation (count)  95 % interval" in ended.out
+    assert {path.name for path in (folder / "pictures").iterdir()} == {"allan.svg", "spectrum.svg"}
+    for path in (folder / "pictures").iterdir():
+        assert "white-noise" in path.read_text()
+        assert "mathdefault" not in path.read_text()
+
+
+@pytest.fixture(scope="module")
+def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("home")
+
+
+@pytest.fixture
+def run(rig: Rig, home: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """A noise-floor run, made once."""
+    monkeypatch.setenv("RIG_HOME", str(home))
+    if not (home / "record.db").exists():
+        made = rig("run", "noise-floor", "--duration-s", "30", "--unattended", "--json")
+        assert made.status == 0, made.err
+    with Record() as record:
+        return record.runs()[0].run
+
+
+def test_a_run_straight_from_its_record(rig: Rig, run: str) -> None:
+    ended = rig("noise", run)
+    assert ended.status == 0, ended.err
+    assert f"{run}, vx: 30000 samples at 1000 Hz, 0:30" in ended.out
+    assert "uV/sqrt(Hz)" in ended.out
+    assert "ug/sqrt(Hz)" in ended.out
+    assert "15.07 Hz low-pass" in ended.err
+    white = document(rig("noise", run, "--json"))["coefficients"]["white-noise"]
+    assert white["unit"] == "V/sqrt(Hz)"
+    assert white["value"] == pytest.approx(1.1e-4, rel=0.15)  # 3.1 mV peak to peak is 4 rms behind 15.07 Hz (Ang V)
+
+
+def test_no_block_of_a_run_is_read_twice(run: str) -> None:
+    with Record() as record:
+        still = stream(record, run, "vy", None)
+        lengths = [len(block) for block in still.blocks]
+    assert lengths == [10_000] * 3
+    assert still.scale_v_per_g == pytest.approx(1.0, rel=0.05)
+    assert still.closed == []
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("still.npy",), "does not say how fast it was sampled; give --rate HZ"),
+        (("nowhere.npy", "--rate", "5"), "nowhere.npy: there is no such file"),
+        (("square.npy", "--rate", "5"), "holds an array of shape (8, 8); save one channel"),
+        (("broken.npy", "--rate", "5"), "broken.npy: is no array that numpy.save wrote"),
+        (("hole.npy", "--rate", "5"), "sample 4001 is nan, not a number"),
+        (("short.npy", "--rate", "5"), "needs 64 or more"),
+        (("still.npy", "--rate", "0"), "0 is not in the range"),
+        (("rate.csv",), "100 samples a second are stated, the column t_s has 50"),
+        (("uneven.csv",), "row 301 comes 0.005 s after the one before, others after 0.02 s"),
+        (("torn.csv",), "1 gaps, 200 s in all beside 119.98 s of samples; the longest, of 200 s, is at t = 19.98 s"),
+        (("back.csv",), "row 501: the time does not go on"),
+        (("constant.csv",), "every sample is the same"),
+        (("poses.csv",), "a table of poses; noise needs single samples"),
+    ],
+)
+def test_bad_input_is_one_message(rig: Rig, folder: Path, words: tuple[str, ...], says: str) -> None:
+    t_s = np.arange(6000) / 50
+    hole = samples()
+    hole[4000] = np.nan
+    for name, values in {"square": np.ones((8, 8)), "hole": hole, "short": samples(9)}.items():
+        np.save(f"{name}.npy", values)
+    Path("broken.npy").write_bytes(b"no array at all")
+    late, torn, back = t_s.copy(), t_s.copy(), t_s.copy()
+    late[300:] -= 0.015
+    torn[1000:] += 200
+    back[500] = 0.0
+    table(folder / "rate.csv", t_s, "# sample_rate_hz: 100\n", vx_v=samples())
+    for name, times in {"uneven": late, "torn": torn, "back": back}.items():
+        table(folder / f"{name}.csv", times, vx_v=samples())
+    table(folder / "constant.csv", t_s, vx_v=np.full(6000, 2.5))
+    Path("poses.csv").write_text("alpha_deg,beta_deg,vx_v\n90,0,3.5\n90,180,1.5\n")
+    ended = rig("noise", *words)
+    assert (ended.status, ended.out) == (2, "")
+    assert says in ended.err
+    assert len(ended.err.strip().splitlines()) <= (4 if "Usage" in ended.err else 1)
+
+
+def test_short_gaps_are_closed_up_and_told(rig: Rig, folder: Path) -> None:
+    t_s = np.arange(6000) / 50
+    t_s[2000:] += 1.0
+    ended = rig("noise", table(folder / "gap.csv", t_s, vx_v=samples()), "--json")
+    assert document(ended)["rate_hz"] == pytest.approx(50)
+    assert "1 gaps, 1 s in all, are closed up" in ended.err
