@@ -23,7 +23,7 @@ from calibrations.outliers import caution, fit_without, told
 from calibrations.path import MATERIAL, Path, find_path, share_left
 from calibrations.patterns import Pattern
 from calibrations.plainer import plainer
-from calibrations.settle import Settled, cost, cost_of_sharing, settled
+from calibrations.settle import Settled, cost, first_order, settled
 from calibrations.structure import structure_of
 from calibrations.table import Table
 
@@ -150,7 +150,7 @@ def _causes(steps: tuple[Added, ...]) -> tuple[str, ...]:
         return ()
     tied = {term.name for term in steps[0].before.model.terms if term.tied}
     end = steps[-1].after
-    costs = {s.name: cost_of_sharing(end, s.name) if s.name in tied else cost(end, s.name)[0] for s in steps}
+    costs = {s.name: (first_order(end, s.name, shared=True) if s.name in tied else cost(end, s.name))[0] for s in steps}
     approximate = [s.name for s in steps if not s.after.model.terms[-1].effect.exact]
     greatest = max((costs[name] for name in approximate), default=0.0)
     return tuple(name for name, lost in costs.items() if name not in approximate or lost >= REFINEMENT * greatest)

@@ -13,6 +13,7 @@ from calibrations.patterns import Pattern, patterns
 from calibrations.screen import Screen
 from calibrations.structure import likelihood, sharpened, without_slow, worth
 
+CONTAINED = 0.98  # of the squares of what effects explain; of a random walk fitted to a step, 0.95 is the step's
 MARGIN = 10.0  # of twice the log-likelihood, beyond the price of parameters: odds of 150 to 1
 
 
@@ -30,9 +31,16 @@ def plainer(begin: Fit, end: Fit) -> Pattern | None:
     price = float(np.log(start.residual.size))
     tried = [(worth(p, screen) - price, p) for p in patterns(start.table, start.channels)]
     best, pattern = max(tried, key=lambda each: each[0], default=(-np.inf, None))
-    if pattern is None or not best > _by_effects(end, start) + MARGIN:
+    if pattern is None or not best > _by_effects(end, start) + MARGIN or _contains(pattern, begin, end, screen):
         return None
     return sharpened(pattern, screen)
+
+
+def _contains(pattern: Pattern, begin: Fit, end: Fit, screen: Screen) -> bool:
+    """Whether what the effects explain is part of the pattern: it then tells more of their form, and no other cause."""
+    explained = screen.freed(begin.residual - end.residual)
+    inside = screen.basis(pattern.columns).T @ explained
+    return float(inside @ inside) > CONTAINED * float(explained @ explained)
 
 
 def _by_effects(end: Fit, start: Fit) -> float:

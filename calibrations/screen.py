@@ -39,6 +39,10 @@ class Screen:
         """The whitened residual, freed of the model, shape (rows,)."""
         return _freed(self.fit.whitened[:, 0], self.explained)
 
+    def freed(self, residual: Array) -> Array:
+        """What the model cannot explain of a residual (channels, n), whitened, shape (rows,)."""
+        return _freed(self.fit.noise.whiten(residual[:, :, None])[:, 0], self.explained)
+
     def basis(self, columns: Array) -> Array:
         """Orthonormal basis of what `columns` (channels, n, k) could add to the model, shape (rows, rank)."""
         return _beside(self.fit.noise.whiten(columns), self.explained, SMALLEST)

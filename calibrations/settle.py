@@ -17,11 +17,12 @@ from calibrations.candidates import SIGNIFICANT, Candidate, added, candidates
 from calibrations.effect import Effect
 from calibrations.fit import Fit, refit
 from calibrations.held_out import held_out_excess
-from calibrations.noise_fit import deviance
+from calibrations.likelihood import likelihood
 from calibrations.path import Path, grown
 from calibrations.screen import chance
 
 MOST_ROUNDS = 6
+MOST_EXCHANGED = 6  # effects: so many are no longer sorted out one by one in the time that a person waits
 TRIED = 2  # candidates for one place
 NEARLY = 0.9  # of the best one's gain
 CLEARLY = 6.0  # of twice the log-likelihood beyond the price of parameters: odds of 20 to 1
@@ -43,6 +44,8 @@ def settled(path: Path, effects: Mapping[str, Effect]) -> Settled:
     beside: dict[str, Candidate] = {}
     for _ in range(MOST_ROUNDS):
         end, names = _needed(end, names, freed)
+        if len(names) > MOST_EXCHANGED:
+            return Settled(end, names, {})
         found = _beside(path, end, tuple(name for name in names if name not in freed), effects)
         beside = {name: c for name, others in found.items() for c in others if c.name == name}
         after = _exchanged(end, names, found, freed)
@@ -56,7 +59,8 @@ def settled(path: Path, effects: Mapping[str, Effect]) -> Settled:
 def _needed(present: Fit, names: tuple[str, ...], freed: set[str]) -> tuple[Fit, tuple[str, ...]]:
     """Without those of the added effects that the model does as well without, the least first."""
     while len([name for name in names if name not in freed]) > 1:
-        costs = {name: cost(present, name) for name in names if name not in freed}
+        of = cost if len(names) <= MOST_EXCHANGED else first_order
+        costs = {name: of(present, name) for name in names if name not in freed}
         name = min(costs, key=lambda n: costs[n][0] / max(costs[n][1], 1))
         smaller = _without(present, name)
         if chance(*costs[name]) < SIGNIFICANT and held_out_excess(smaller) > held_out_excess(present):
@@ -103,12 +107,6 @@ def _without(end: Fit, name: str) -> Fit:
     return refit(end, end.model.without(name))
 
 
-def likelihood(fit: Fit) -> float:
-    """Twice the restricted log-likelihood with the noise of the fit's own residual, a parameter costing log(rows)."""
-    price = len(fit.theta) * float(np.log(fit.residual.size))
-    return -deviance(fit.noise, fit.residual, fit.jacobian, np.zeros((fit.table.n, 0))) - price
-
-
 def cost(end: Fit, name: str) -> tuple[float, int]:
     """Growth of the whitened sum of squares when the model does without the effect, and the parameters that it has."""
     left = end.noise.whiten(_without(end, name).residual[:, :, None])[:, 0]
@@ -116,13 +114,13 @@ def cost(end: Fit, name: str) -> tuple[float, int]:
     return float(left @ left - present @ present), int(end.problem.layout.of_effect(name).sum())
 
 
-def cost_of_sharing(end: Fit, name: str) -> float:
-    """The same, to first order, when the axes share one value of each of its parameters."""
+def first_order(end: Fit, name: str, shared: bool = False) -> tuple[float, int]:
+    """The same to first order; `shared`: when the axes only share one value of each of its parameters."""
     white, mine = end.whitened[:, 1:], end.problem.layout.of_effect(name)
     size = np.linalg.norm(white, axis=0)
     white = white / np.where(size > 0, size, 1.0)
-    value = end.theta[mine]
-    signal = white[:, mine] @ ((value - value.mean()) * size[mine])
+    value = end.theta[mine] - (end.theta[mine].mean() if shared else 0.0)
+    signal = white[:, mine] @ (value * size[mine])
     others = white[:, ~mine]
     lost = signal - others @ np.linalg.lstsq(others, signal, rcond=1e-9)[0]
-    return float(lost @ lost)
+    return float(lost @ lost), int(mine.sum())
