@@ -35,7 +35,8 @@ def widening(noise: Noise, residual: Array, jacobian: Array, typical: Array) -> 
     turned = gain(flat.T @ (jacobian / noise.fast[:, :, None]).reshape(residual.size, -1), typical)
     white = noise.whiten(basis)
     own = _variance((white.T @ white)[None], turned)[0]
-    return np.sqrt(_mean(search, turned) / np.where(own > 0, own, 1.0))
+    wider = _mean(search, turned) / np.where(own > 0, own, np.inf)
+    return np.sqrt(np.where(wider > 0, wider, 1.0))  # what the data hardly determine has no variance to speak of
 
 
 def allowed(gap_s: Array) -> list[Point]:

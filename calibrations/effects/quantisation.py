@@ -1,6 +1,7 @@
 """quantisation: a coarse converter rounds each sample, and too little noise is there to hide it in the mean.
 
-    V <- V + (q / pi) sum_k (-1)^k / k sin(2 pi k (V - o) / q) exp(-2 (pi k s / q)^2)       q, o, s in {out}
+    V <- o + q (m + sum_j Phi((f - 1/2 - j) q / s) - Phi((-f - 1/2 - j) q / s))     q, o, s in {out}; j = 0, 1, 2
+                                                     m: the nearest code's number, f: (V - o) / q - m
 
 The mean of rounded samples with normal noise of standard deviation s, exactly; codes stand at o + m q.
 
@@ -14,6 +15,7 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtr
 
 from calibrations.effect import Parameter, Values
 from calibrations.lack_of_fit import smooth_columns
@@ -31,7 +33,8 @@ STARTS = {
     "offset": lambda table: _start(table, 1),
     "noise": lambda table: _start(table, 2),
 }
-HARMONICS = 12
+CODES = 3  # to either side, that noise may reach
+LEAST_NOISE = 1e-3  # of a step
 FINEST = 4.0  # points in a resolved interval of frequency
 MOST = 20_000  # frequencies
 TOGETHER = 64  # frequencies of one block
@@ -44,12 +47,14 @@ def SEARCHED(table: Table) -> float:  # noqa: N802
 
 
 def output(v: Array, table: Table, p: Values) -> Array:
-    turns = (v - p["offset"]) / p["step"]
-    faded = 2 * (np.pi * p["noise"] / p["step"]) ** 2
-    saw = np.zeros_like(v)
-    for k in range(1, HARMONICS + 1):
-        saw += (-1) ** k / k * np.exp(-faded * k**2) * np.sin(2 * np.pi * k * turns)
-    return v + p["step"] / np.pi * saw
+    codes = (v - p["offset"]) / p["step"]
+    nearest = np.round(codes)
+    beyond = codes - nearest
+    noise = max(float(p["noise"] / p["step"]), LEAST_NOISE)
+    mean = nearest
+    for j in range(CODES):
+        mean = mean + ndtr((beyond - 0.5 - j) / noise) - ndtr((-beyond - 0.5 - j) / noise)
+    return np.asarray(p["offset"] + p["step"] * mean)
 
 
 def _frequencies(table: Table) -> Array:
