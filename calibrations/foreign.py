@@ -21,6 +21,7 @@ from calibrations.text_file import text_file
 from calibrations.units import UNITS, Mapped, own_unit
 
 TRIADS = (("ax", "ay", "az"), ("mx", "my", "mz"))
+RATES = ("gx", "gy", "gz")
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,7 @@ def take(
     except MissingColumn as error:
         what = error if laid.named else "a header line with column names is missing"
         raise MissingColumn(f"{laid.name}, line {laid.line}: {what}{proposed(laid, kind, chosen)}") from None
-    known = {**laid.constants, **(constants or {})} | _output_unit(chosen, laid.name)
+    known = {**laid.constants, **(constants or {})} | _output_unit(chosen, kind, laid.name)
     taken = {m.theirs for m in chosen}
     numbers, texts = cells(laid, [name for name in laid.header if name not in taken and _is_text(laid, name)])
     columns = {m.name: _converted(numbers[m.theirs], m) for m in chosen}
@@ -157,9 +158,9 @@ def _check_units(table: Table, laid: Sheet, chosen: Sequence[Mapped]) -> None:
     )
 
 
-def _output_unit(mapped: Sequence[Mapped], source: str) -> dict[str, Constant]:
+def _output_unit(mapped: Sequence[Mapped], kind: str, source: str) -> dict[str, Constant]:
     """The unit of the three axes, where one is given. Raises DataError where they differ."""
-    for axes in TRIADS:
+    for axes in (RATES,) if kind == "rates" else TRIADS:
         given = {m.name: UNITS[m.unit][0] for m in mapped if m.unit}
         units = {axis: given.get(axis, "") for axis in axes}
         if len(set(units.values())) > 1:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -40,6 +40,14 @@ WORDS: Mapping[str, Sequence[tuple[str, str]]] = {
         (r"gyr|omega|rate|^g[xyz]$", "g{axis}"),
         (r"mag|^m[xyz]$", "m{axis}"),
     ),
+    "rates": (
+        (r"temp|thermo", "temperature_c"),
+        (r"^t(_?s)?$|time|elapsed|seconds", "t_s"),
+        (r"^n$|samples|averag", "n"),
+        (r"acc|^a[xyz]$", "a{axis}"),
+        (r"gyr|omega|^g[xyz]$", "g{axis}"),
+        (r"rate|speed|velocity", "rate_deg_s"),
+    ),
     "motion": (
         (r"displac|distance|position|stroke", "displacement_m"),
         (r"suppl|vdd|vcc|excitation", "supply_v"),
@@ -47,7 +55,7 @@ WORDS: Mapping[str, Sequence[tuple[str, str]]] = {
         (r"^t(_?s)?$|time|elapsed|seconds", "t_s"),
     ),
 }
-SCATTERS = {"poses": "v{axis}_std_v", "positions": "a{axis}_std"}
+SCATTERS = {"poses": "v{axis}_std_v", "positions": "a{axis}_std", "rates": "g{axis}_std"}
 
 
 def propose(laid: Sheet, kind: str | None = None, mapped: Sequence[Mapped] = ()) -> list[Mapped]:
@@ -66,9 +74,11 @@ def propose(laid: Sheet, kind: str | None = None, mapped: Sequence[Mapped] = ())
 
 
 def likely_kind(laid: Sheet, mapped: Iterable[Mapped] = ()) -> str:
-    """`poses` where there is an angle of a stage, `motion` where there is a displacement, `positions` where there are
-    three outputs; else `poses`."""
+    """`rates` where there are a rate and a gyroscope's outputs, `poses` where there is an angle of a stage, `motion`
+    where there is a displacement, `positions` where there are three outputs; else `poses`."""
     names = {*(m.name for m in mapped), *laid.bare, *(_by_name(bare, "poses") for bare in laid.bare)}
+    if {"rate_deg_s", "gx"} <= {*names, *(_by_name(bare, "rates") for bare in laid.bare)}:
+        return "rates"
     if {"alpha_deg", "beta_deg"} & names:
         return "poses"
     if "displacement_m" in {*names, *(_by_name(bare, "motion") for bare in laid.bare)}:
@@ -82,12 +92,12 @@ def likely_kind(laid: Sheet, mapped: Iterable[Mapped] = ()) -> str:
 def missing(kind: str | None, laid: Sheet, mapped: Iterable[Mapped]) -> list[str]:
     """The columns that a table of this kind needs and that neither header nor mapping gives."""
     given = {m.name for m in mapped} | set(laid.bare)
-    return [name for name in needed(kind) if name not in given]
+    return [name for name in needed(kind, given) if name not in given]
 
 
-def needed(kind: str | None) -> tuple[str, ...]:
-    """The columns that a table of this kind has at least."""
-    return KINDS[kind][0] if kind else ()
+def needed(kind: str | None, given: Collection[str]) -> tuple[str, ...]:
+    """The columns that a table of this kind has at least; of several such sets the one that `given` come nearest to."""
+    return min(KINDS[kind], key=lambda wanted: len(set(wanted) - set(given))) if kind else ()
 
 
 def command(laid: Sheet, kind: str | None, mapped: Sequence[Mapped], constants: Sequence[str] = ()) -> str:
@@ -109,7 +119,7 @@ def proposed(laid: Sheet, kind: str | None, mapped: Sequence[Mapped]) -> str:
     found = propose(laid, kind, mapped)
     kind = kind or likely_kind(laid, mapped)
     lacking = missing(kind, laid, found)
-    if not found or len(lacking) == len(needed(kind)):
+    if not found or len(lacking) == len(needed(kind, ())):
         return "; --column gives one of yours the name, as in vx_v=Vout:mV"
     line = command(laid, kind, [*found, *(Mapped(name, "YOURS") for name in lacking)])
     fill = f" (put your column's name for YOURS: {_choice(laid, found)})" if lacking else ""

@@ -18,7 +18,8 @@ from rig.cli.output import note
 LEAVE = "-"
 CHOICES = {
     "poses": "alpha_deg beta_deg vx_v vy_v vz_v direction t_s temperature_c supply_v vx_std_v vy_std_v n flip",
-    "positions": "ax ay az t_s temperature_c n",
+    "positions": "ax ay az t_s temperature_c n; of a magnetometer mx my mz",
+    "rates": "rate_deg_s gx gy gz ax ay az axis_x axis_y axis_z t_s temperature_c n",
     "motion": "t_s vx_v vy_v displacement_m temperature_c supply_v",
 }
 
@@ -33,7 +34,7 @@ def ask_mapping(
     note(f"{laid.name} has columns that are not called as here. Which is what?")
     if kind is None:
         kinds = click.Choice(sorted(CHOICES))
-        told = "Held at known stage angles (poses), put down by hand (positions), or shaken (motion)"
+        told = "Held at known stage angles (poses), put down by hand (positions), turned (rates), or shaken (motion)"
         kind = str(click.prompt(told, default=likely_kind(laid, mapped), type=kinds, err=True))
     note(
         f"\nOur columns: {CHOICES.get(kind, '')}\nEnter takes what stands in brackets, {LEAVE} none; or type a column,"

@@ -95,6 +95,25 @@ def test_a_displacement_makes_it_motion() -> None:
     assert likely_kind(laid(f"time;out_x;displacement\n{rows}")) == "motion"
 
 
+def test_a_magnetometer_is_told_by_its_names() -> None:
+    content = "MagX (uT),MagY (uT),MagZ (uT)\n12,-3,40\n11,-2,41\n"
+    assert proposed(content) == {"mx=MagX (uT):uT", "my=MagY (uT):uT", "mz=MagZ (uT):uT"}
+    with pytest.raises(MissingColumn, match="rig import theirs.csv --kind positions --column mx=MagX:uT"):
+        take(laid(content), "positions")
+
+
+def test_a_gyroscope_on_a_table_is_told_by_rate_and_outputs() -> None:
+    content = "Table rate (deg/s),acc_x,acc_y,acc_z,gyro_x,gyro_y,gyro_z\n0,1,0,0,1,2,3\n30,1,0,0,500,2,3\n"
+    assert likely_kind(laid(content)) == "rates"
+    outputs = {f"g{axis}=gyro_{axis}" for axis in "xyz"} | {f"a{axis}=acc_{axis}" for axis in "xyz"}
+    assert proposed(content) == outputs | {"rate_deg_s=Table rate (deg/s):deg/s"}
+    units = [Mapped.parse(m) for m in ("rate_deg_s=Table rate", "ax=acc_x:g", "ay=acc_y:g", "az=acc_z:g")]
+    units += [Mapped.parse(f"g{axis}=gyro_{axis}:rad/s") for axis in "xyz"]
+    table = take(laid(content), "rates", units).table
+    assert table.unit == "deg/s"
+    assert table.column("gx")[0] == pytest.approx(np.degrees(1.0))
+
+
 def test_what_is_given_already_stays() -> None:
     found = proposed(f"a;b;Vout\n{ROWS}", None, "alpha_deg=b", "beta_deg=a:rad")
     assert found == {"alpha_deg=b", "beta_deg=a:rad", "vx_v=Vout:mV"}
