@@ -98,7 +98,7 @@ def test_a_displacement_makes_it_motion() -> None:
 def test_a_magnetometer_is_told_by_its_names() -> None:
     content = "MagX (uT),MagY (uT),MagZ (uT)\n12,-3,40\n11,-2,41\n"
     assert proposed(content) == {"mx=MagX (uT):uT", "my=MagY (uT):uT", "mz=MagZ (uT):uT"}
-    with pytest.raises(MissingColumn, match="rig import theirs.csv --kind positions --column mx=MagX:uT"):
+    with pytest.raises(MissingColumn, match=r"rig import theirs\.csv --kind positions --column mx=MagX:uT"):
         take(laid(content), "positions")
 
 
