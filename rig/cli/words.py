@@ -17,6 +17,7 @@ from calibrations.stepwise import stepwise
 from calibrations.table import Table
 from rig.cli.output import columns, duration
 
+TOO_QUIET, SOME_ROWS = 0.5, 20  # error over the noise floor that many rows do not leave by chance
 PREFIXES = ((1.0, ""), (1e3, "m"), (1e6, "u"))
 
 
@@ -69,17 +70,25 @@ def quantity(value: float, unit: str) -> str:
 
 def discovery(result: Discovery) -> str:
     """The falling error, step by step, and the verdict."""
-    return "\n".join([falling(result), "", _verdict(result), *_rivals(result), *warning(result.caution)])
+    verdict = _verdict(result) + too_quiet(result.end)
+    return "\n".join([falling(result), "", verdict, *_rivals(result), *warning(result.caution)])
 
 
 def addition(result: Discovery, data: str, out: Path) -> str:
     """The falling error with one effect added, and whether more is missing."""
-    end = f"What is left is {result.end.pooled_excess:.2f} x the noise floor."
+    end = f"What is left is {result.end.pooled_excess:.2f} x the noise floor.{too_quiet(result.end)}"
     if result.verdict == "unexplained":
         end += (
             f" It is not noise: {result.residual_structure}.\nWhat else is missing: rig diagnose {data} --model {out}"
         )
     return "\n".join([falling(result), "", end, *_rivals(result), *warning(result.caution)])
+
+
+def too_quiet(found: Fit) -> str:
+    """A sentence for a residual below the noise floor, which only a wrong floor leaves; else nothing."""
+    if not found.noise.known or found.pooled_excess > TOO_QUIET or found.table.n < SOME_ROWS:
+        return ""
+    return " That is less than noise leaves: see whether the standard deviations and n are those of these means."
 
 
 def falling(result: Discovery) -> str:
