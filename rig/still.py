@@ -182,7 +182,7 @@ def _is_still(kept: Kept) -> bool:
 
 def _still_blocks(measured: Measured, into: Stream) -> Iterator[NDArray[Any]]:
     """Blocks of the still record one after the other; what else is met on the way is noted in `into`."""
-    next_s, length_s = None, 0.0
+    next_s = None
     for kept in measured.kept():
         samples = kept.samples
         if into.channel not in samples.channels:
@@ -193,9 +193,8 @@ def _still_blocks(measured: Measured, into: Stream) -> Iterator[NDArray[Any]]:
             continue
         if next_s is not None and abs(samples.start_s - next_s) > LATE / into.rate_hz:
             into.closed.append((next_s, samples.start_s - next_s))
-        next_s, length_s = samples.start_s + len(volts) / into.rate_hz, length_s + len(volts) / into.rate_hz
+        next_s = samples.start_s + len(volts) / into.rate_hz
         yield volts
-    _check_gaps(into.closed, length_s, f"run {measured.name}")
 
 
 def _note_upright(kept: Kept, volts: Array, into: Stream) -> None:

@@ -23,7 +23,10 @@ from calibrations.noise_analysis.whittle import information, maximise
 from calibrations.table import Array
 
 COST = 7.88  # twice the log-likelihood that a process has to gain
-COST_MARKOV = 22.0  # for two parameters, of which one is searched for, and a shape that others together can take on
+DEARER = {
+    "quantisation-noise": 12.0,  # one record in 4000: taken for white noise that is there, it would falsify that most
+    GAUSS_MARKOV: 22.0,  # two parameters, of which one is searched for, and a shape that others together can take on
+}
 DOUBTED = ("flicker-noise", "rate-random-walk")  # they are alike where a record has few periods
 DOUBT = 2.0  # twice the log-likelihood that one of them has to gain for even odds
 SURE = 4.0  # the same, for a slow process to be told from the other one
@@ -67,7 +70,7 @@ class Mixture:
     @property
     def worth(self) -> float:
         """Twice the log-likelihood, less what each process costs."""
-        return 2 * self.log_likelihood - sum(COST_MARKOV if name == GAUSS_MARKOV else COST for name in self.power)
+        return 2 * self.log_likelihood - sum(DEARER.get(name, COST) for name in self.power)
 
     def expected(self, of: Spectrum | Bands) -> Array:
         """Its spectrum."""
