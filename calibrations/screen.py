@@ -47,6 +47,12 @@ class Screen:
         """Orthonormal basis of what `columns` (channels, n, k) could add to the model, shape (rows, rank)."""
         return _beside(self.fit.noise.whiten(columns), self.explained, SMALLEST)
 
+    def reductions(self, columns: Sequence[Array]) -> Array:
+        """What the residual's sum of squares falls by with each of `columns` (channels, n, k), shape (len(columns),)."""
+        white = self.fit.noise.whiten(np.concatenate(columns, axis=2))
+        ends = np.cumsum([each.shape[2] for each in columns])[:-1]
+        return reductions(self.fit.whitened[:, 1:], self.fit.whitened[:, 0], np.split(white, ends, axis=1))
+
     @property
     def free(self) -> int:
         """Rows that the model leaves free."""

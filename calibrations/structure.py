@@ -82,7 +82,7 @@ def sharpened(pattern: Pattern, screen: Screen) -> Pattern:
     """The best of the pattern and those between it and its neighbours, on both sides or on one."""
     table, channels = screen.fit.table, len(screen.fit.channels)
     near = [pattern, *(per_channel(p, channels) for p in pattern.finer() if np.ptp(p.columns) > 0)]
-    best = max(near, key=lambda p: screen.statistic(screen.basis(p.columns)))
+    best = near[int(np.argmax(screen.reductions([p.columns for p in near])))]
     return max([best, *one_sided(best, table)], key=lambda p: worth(p, screen))
 
 
