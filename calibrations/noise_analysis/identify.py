@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
@@ -41,22 +42,29 @@ class Spectrum:
 
     parts: tuple[Bands, ...]
 
-    @property
+    @cached_property
     def frequency_hz(self) -> Array:
         return np.concatenate([part.frequency_hz for part in self.parts])
 
-    @property
+    @cached_property
     def density(self) -> Array:
         """Two-sided, unit^2/Hz."""
         return np.concatenate([part.density for part in self.parts])
 
-    @property
+    @cached_property
     def freedom(self) -> Array:
         return np.concatenate([part.freedom for part in self.parts])
 
     def column(self, process: str, time_constant_s: float = 0.0) -> Array:
         """What is expected of a process whose coefficient is 1."""
+        if process in LINEAR:
+            return self._linear[process]
         return np.concatenate([part.column(process, time_constant_s) for part in self.parts])
+
+    @cached_property
+    def _linear(self) -> dict[str, Array]:
+        """Columns that are needed for every fit."""
+        return {name: np.concatenate([part.column(name) for part in self.parts]) for name in LINEAR}
 
 
 @dataclass(frozen=True)
