@@ -111,11 +111,10 @@ def _of_poses() -> list[tuple[str, Contribution]]:
 
 
 def _of_any(table: Table) -> list[tuple[str, Contribution]]:
-    g = table.gravity_m_s2
-    found = [
-        ("gravity_std_m_s2", _common("gravity at the place", "m/s^2", of_step(_acting(force=_stronger(g)), 1e-3))),
-        ("gain_std", _common("gain of the converter", "1", of_step(_acting(output=_times), 1e-4))),
-    ]
+    found = [("gain_std", _common("gain of the converter", "1", of_step(_acting(output=_times), 1e-4)))]
+    if table.input_unit == "g":
+        stronger = of_step(_acting(force=_stronger(table.gravity_m_s2)), 1e-3)
+        found.insert(0, ("gravity_std_m_s2", _common("gravity at the place", "m/s^2", stronger)))
     if "temperature_c" in table:
         found.append(("temperature_std_c", _common("thermometer", "K", of_column("temperature_c", 1e-2))))
     return found

@@ -12,9 +12,11 @@ from __future__ import annotations
 import numpy as np
 
 from calibrations.coverage import SOFT_IRON, too_small
+from calibrations.mean_noise import white_std
 from calibrations.table import AXES, Array, Table
 from calibrations.turning import rate_deg_s, specific_force_g
 
+FORMS = {"fields": "an ellipsoid", "rates": "outputs linear in rates and specific forces"}
 FEWEST = 2  # rows more than the form has parameters
 
 
@@ -22,6 +24,18 @@ def scatter(table: Table) -> Array | None:
     """Standard deviation of each row in the residual's unit, shape (channels, n); None where rows are too few."""
     found = _of_field(table) if table.content == "fields" else _of_rates(table)
     return None if found is None or not np.all(found > 0) else np.tile(found[:, None], (1, table.n))
+
+
+def told(table: Table) -> str | None:
+    """What is taken for the noise of a table that does not say it, in words; None where it does, or is not asked."""
+    if table.content not in FORMS or white_std(table) is not None:
+        return None
+    if scatter(table) is None:
+        return "the noise of its means is not known, and its rows do not show it: what a model leaves is its noise"
+    return (
+        f"the noise of its means is not known: what {FORMS[table.content]} leaves is taken for it, and nothing beyond "
+        f"is looked for; give {table.output_names[0]}_std, and so on, and n"
+    )
 
 
 def _of_field(table: Table) -> Array | None:

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from calibrations import scatter
 from calibrations.effect import Effect, catalogue
 from calibrations.errors import ModelError
 from calibrations.fit import Fit
@@ -63,8 +64,8 @@ def asked(
             f"{table.source}: how the samples of a mean correlate is not known, and they are taken as independent; "
             "scatter of the poses beyond that counts as noise. Give the constants filter_corner_hz and sample_rate_hz."
         )
-    if why := earth_unknown(table):
-        note(f"{table.source}: {why}")
+    for why in filter(None, (earth_unknown(table), scatter.told(table))):
+        note(f"{table.source}: {why}.")
     return table, chosen or read_model(DEFAULTS.get(table.content, "linear"), effects), effects
 
 
