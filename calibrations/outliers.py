@@ -96,6 +96,6 @@ def caution(rows: tuple[int, ...]) -> str | None:
     if not rows:
         return None
     return (
-        f"{told(rows)}; set aside here, as accidents: look at them, then leave them out of every analysis "
-        "(`rig exclude RUN POSE --reason TEXT`; in a file, a column `excluded` that is 1 there)"
+        f"{told(rows)} (counted from 0, in order of time); set aside here, as accidents: look at them, then leave them "
+        "out of every analysis (`rig exclude RUN POSE --reason TEXT`; in a file, a column `excluded` that is 1 there)"
     )

@@ -65,6 +65,7 @@ def test_gross_outliers_are_listed_and_spoil_nothing(subject: str) -> None:
     assert result.causes == causes
     assert list(result.path.outliers) == rows
     assert all(f"#{row}" in str(result.caution) for row in rows)
+    assert "counted from 0" in str(result.caution)
     assert "rig exclude" in str(result.caution)
     std = np.array([e.std for term in clean.end.model.terms for e in term.estimates], dtype=float)
     assert np.all(np.abs(result.end.theta - clean.end.theta) < std)
