@@ -32,7 +32,7 @@ from calibrations.noise_analysis.processes import (
     allan_gauss_markov,
     allan_sinusoid,
 )
-from calibrations.noise_analysis.welch import Welch
+from calibrations.noise_analysis.welch import LENGTH, Welch
 from calibrations.table import Array
 
 Estimates = Mapping[str, tuple[float, float]]
@@ -142,6 +142,11 @@ def analyse(blocks: Iterable[Any], rate_hz: float, unit: str, source: str, corne
             each.add(samples)
     _check_whole(octaves.n, means, source)
     ends.check(source)
+    if corner_hz * octaves.n < FEWEST * rate_hz:
+        raise TooFewRows(
+            f"{source}: {octaves.n / rate_hz:.3g} s are too short behind a low-pass of {corner_hz:g} Hz, which lets "
+            f"through little noise in that time: record for {FEWEST / corner_hz:.3g} s or more"
+        )
     return _analysed(octaves, means, welch, Record(rate_hz, unit, corner_hz))
 
 
@@ -158,11 +163,12 @@ def _analysed(octaves: Octaves, means: Means, welch: Welch, record: Record) -> N
     sampling = Sampling(record.rate_hz, means.size)
     fast: list[Bands] = []
     lines: list[Line] = []
-    if means.size > 1:
-        above_hz = 0.5 / sampling.interval_s
+    slow_hz = 0.5 / sampling.interval_s  # what the means show; lines are looked for there where no filter is
+    above_hz = min(slow_hz, record.corner_hz / 2)
+    if above_hz < record.rate_hz / 2 and octaves.n >= 2 * LENGTH:
         f, density, freedom = welch.ordinates()
         density, lines = fast_lines(f, density, freedom, above_hz, octaves.n / record.rate_hz)
-        chosen = f > above_hz
+        chosen = f > slow_hz
         fast = [fast_bands(f[chosen], density[chosen], freedom, record.rate_hz, record.corner_hz)]
     spectrum, found, slow, bound = _without_lines(means.values(), sampling, fast, record.corner_hz)
     curves = {kind: octaves.curve(kind) for kind in KINDS}

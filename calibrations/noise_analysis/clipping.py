@@ -8,7 +8,7 @@ from calibrations.errors import DataError
 from calibrations.table import Array
 
 CLIPPED = 0.002  # of all samples at exactly the highest or the lowest value
-FINE = 64  # different values in the first block, below which the highest one is met often anyway
+MORE = 10.0  # times as many as have the same value anyway
 
 
 class Ends:
@@ -16,7 +16,7 @@ class Ends:
 
     def __init__(self) -> None:
         self._n = 0
-        self._fine = False
+        self._alike = 1.0  # share of samples that have one value
         self._ends: dict[str, tuple[float, int]] = {}
 
     def add(self, samples: Array) -> None:
@@ -24,7 +24,7 @@ class Ends:
         if not len(samples):
             return
         if not self._n:
-            self._fine = len(np.unique(samples)) >= FINE
+            self._alike = 1 / len(np.unique(samples))
         self._n += len(samples)
         for name, value in (("highest", float(samples.max())), ("lowest", float(samples.min()))):
             before, count = self._ends.get(name, (value, 0))
@@ -36,7 +36,7 @@ class Ends:
     def check(self, source: str) -> None:
         """Raises DataError where the channel is at a limit."""
         for name, (value, count) in self._ends.items():
-            if self._fine and count > max(CLIPPED * self._n, 3):
+            if count > max(CLIPPED * self._n, MORE * self._alike * self._n, 3):
                 raise DataError(
                     f"{source}: {count} of {self._n} samples are at the {name} value, {value:g}: the channel is "
                     "clipped; choose a wider range of the converter, or a part of the record within it"

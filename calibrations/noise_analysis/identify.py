@@ -30,6 +30,7 @@ DEARER = {
 }
 DOUBTED = ("flicker-noise", "rate-random-walk")  # they are alike where a record has few periods
 DOUBT = 2.0  # twice the log-likelihood that one of them has to gain for even odds
+LEAST = 1e-18  # of the greatest density: rounding
 SURE = 4.0  # the same, for a slow process to be told from the other one
 BOUND = 3.84  # twice the log-likelihood that is lost at the ends of an interval of 95 %
 TIMES = 12  # time constants that are tried first
@@ -48,8 +49,9 @@ class Spectrum:
 
     @cached_property
     def density(self) -> Array:
-        """Two-sided, unit^2/Hz."""
-        return np.concatenate([part.density for part in self.parts])
+        """Two-sided, unit^2/Hz; no band is quite without power."""
+        density = np.concatenate([part.density for part in self.parts])
+        return np.asarray(np.maximum(density, LEAST * density.max()))
 
     @cached_property
     def freedom(self) -> Array:

@@ -7,6 +7,8 @@ from functools import cache
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from calibrations.errors import DataError, TooFewRows
 from calibrations.noise_analysis.analysis import NoiseAnalysis, analyse
@@ -180,3 +182,43 @@ def test_records_that_tell_nothing(samples: np.ndarray, says: str) -> None:
 def test_a_record_that_is_too_short() -> None:
     with pytest.raises(TooFewRows, match="10 samples; the noise of a record needs 64 or more"):
         analysed(np.arange(10.0))
+
+
+def test_behind_a_low_pass_that_lets_through_too_little() -> None:
+    with pytest.raises(TooFewRows, match=r"1 s are too short behind a low-pass of 10 Hz.*record for 6.4 s or more"):
+        analyse([np.random.default_rng(1).standard_normal(1000)], 1000.0, "V", "test", corner_hz=10.0)
+
+
+def test_hum_beyond_a_low_pass_is_found() -> None:
+    """White noise behind a first-order low-pass of 15 Hz, and 50 Hz from the mains."""
+    n, rate_hz, corner_hz = 60_000, 1000.0, 15.0
+    random, kept, level = np.random.default_rng(1), np.exp(-2 * np.pi * corner_hz / rate_hz), 0.0
+    samples = np.empty(n)
+    for i, white in enumerate(random.standard_normal(n)):
+        level = kept * level + (1 - kept) * white
+        samples[i] = level
+    hum = 0.05 * noises.sinusoid(n, 50 / rate_hz)
+    found = analyse([samples + hum], rate_hz, "V", "test", corner_hz)
+    assert found.coefficients["sinusoidal-noise"].frequency_hz == pytest.approx(50, abs=0.05)
+    assert found.coefficients["sinusoidal-noise"].value == pytest.approx(0.05, rel=0.1)
+    assert found.coefficients[WHITE].value == pytest.approx(1 / np.sqrt(rate_hz), rel=0.1)
+    assert set(found.found.power) == {WHITE}
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    st.integers(64, 3000),
+    st.sampled_from(["ramp", "steps", "spike", "wave", "two values", "tiny", "huge", "cubic"]),
+    st.integers(0, 9),
+)
+def test_whatever_a_record_holds_all_numbers_are_finite(n: int, kind: str, seed: int) -> None:
+    random, k = np.random.default_rng(seed), np.arange(n, dtype=float)
+    made = {
+        "ramp": k, "steps": np.floor(k / 20), "spike": np.where(k == n // 2, 1.0, 0.0), "wave": np.sin(k / 9),
+        "two values": random.integers(0, 2, n), "tiny": 1e-12 * random.standard_normal(n),
+        "huge": 1e9 + 1e7 * random.standard_normal(n), "cubic": (k / n) ** 3,
+    }[kind]  # fmt: skip
+    found = analysed(made.astype(float))
+    numbers = [v for each in found.coefficients.values() for v in (each.value, each.std, each.upper) if v is not None]
+    assert np.all(np.isfinite([*numbers, *found.allan.low, *found.allan.high]))
+    assert min(numbers) >= 0
