@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,8 @@ BLOCK = 1 << 17
 BESIDE = ("t_s", "temperature_c", "supply_v", "n", "direction", "path")  # columns that are no channels
 LATE = 0.5  # sampling intervals by which a sample may be off before that is a gap
 MOST_MISSING = 0.1  # of a record, in gaps that are closed up
+FEW_GAPS = 0.01  # of all steps
+UNEVEN = 1e-3  # of a record, by which times may be off an even row: those of a computer that samples reach in bursts
 DISAGREE = 0.01  # of two rates
 UPRIGHT = 0.999  # g: a pose that is as good as along gravity
 
@@ -40,6 +42,7 @@ class Stream:
     corner_hz: float = np.inf
     others: tuple[str, ...] = ()
     closed: list[tuple[float, float]] = field(default_factory=list)  # gaps: where each begins and how long it is, s
+    uneven_s: float = 0.0  # by how much the times are off the even row that is taken for them
     upright_v: dict[int, float] = field(default_factory=dict)  # output along gravity, +1 and -1 g
 
     @property
@@ -91,12 +94,13 @@ def _of_table(table: Table, channel: str | None, rate_hz: float | None) -> Strea
     channels = tuple(name for name in table.columns if name not in BESIDE)
     chosen = _chosen(channels, channel, table.source)
     stated = rate_hz or table.number("sample_rate_hz", 0.0)
-    closed: list[tuple[float, float]] = []
-    rate = _agreed(_rate_of(table, closed), stated, table.source)
+    times = _times(table)
+    rate = _agreed(times.rate_hz if times else None, stated, table.source)
     unit = "V" if chosen.endswith("_v") else str(table.constants.get("unit", "count"))
     corner_hz = table.number("filter_corner_hz", np.inf)
     others = tuple(name for name in channels if name != chosen)
-    return Stream(table.source, chosen, rate, unit, iter([table.column(chosen)]), corner_hz, others, closed)
+    found = Stream(table.source, chosen, rate, unit, iter([table.column(chosen)]), corner_hz, others)
+    return replace(found, closed=list(times.gaps), uneven_s=times.uneven_s) if times else found
 
 
 def _chosen(channels: tuple[str, ...], channel: str | None, source: str) -> str:
@@ -110,29 +114,40 @@ def _chosen(channels: tuple[str, ...], channel: str | None, source: str) -> str:
     return found
 
 
-def _rate_of(table: Table, closed: list[tuple[float, float]]) -> float | None:
-    """From the column of times, whose gaps are added to `closed`; None without one. Raises DataError."""
+@dataclass(frozen=True)
+class _Times:
+    """What a column of times says: the rate, the gaps in it, and by how much an even row of times is off, s."""
+
+    rate_hz: float
+    gaps: tuple[tuple[float, float], ...] = ()
+    uneven_s: float = 0.0
+
+
+def _times(table: Table) -> _Times | None:
+    """None without a column of times. Raises DataError where they do not go on, or are too uneven."""
     if "t_s" not in table or table.n < 2:
         return None
-    step_s = np.diff(table.column("t_s"))
+    t_s = table.column("t_s")
+    step_s, length_s = np.diff(t_s), float(t_s[-1] - t_s[0])
     typical = float(np.median(step_s))
-    if typical <= 0 or step_s.min() <= 0:
+    if step_s.min() <= 0:
         row = int(np.argmin(step_s > 0)) + 2
         raise DataError(f"{table.source}: row {row}: the time does not go on; sort the rows and remove duplicates")
     far = np.flatnonzero(np.abs(step_s - typical) > LATE * typical)
-    gaps = [(float(table.column("t_s")[i]), float(step_s[i] - typical)) for i in far]
-    uneven = [i for i in far if step_s[i] < typical]
-    if uneven:
+    if len(far) <= FEW_GAPS * table.n and np.all(step_s[far] > typical):
+        gaps = tuple((float(t_s[i]), float(step_s[i] - typical)) for i in far)
+        _check_gaps(gaps, (table.n - 1) * typical, table.source)
+        return _Times((table.n - 1 - len(far)) / float(np.sum(np.delete(step_s, far))), gaps)
+    off_s = float(np.max(np.abs(t_s - np.linspace(t_s[0], t_s[-1], table.n))))
+    if off_s > UNEVEN * length_s:
         raise DataError(
-            f"{table.source}: row {uneven[0] + 2} comes {step_s[uneven[0]]:g} s after the one before, others after "
-            f"{typical:g} s; samples must be evenly spaced: interpolate them onto equal steps first"
+            f"{table.source}: row {far[0] + 2} comes {step_s[far[0]]:.3g} s after the one before, others after "
+            f"{typical:.3g} s; samples must be evenly spaced: interpolate them onto equal steps first"
         )
-    _check_gaps(gaps, (table.n - 1) * typical, table.source)
-    closed += gaps
-    return (table.n - 1 - len(far)) / float(np.sum(np.delete(step_s, far)))
+    return _Times((table.n - 1) / length_s, (), off_s)
 
 
-def _check_gaps(gaps: list[tuple[float, float]], length_s: float, source: str) -> None:
+def _check_gaps(gaps: Sequence[tuple[float, float]], length_s: float, source: str) -> None:
     """Raises DataError where too much is missing to close the gaps up."""
     missing = sum(length for _, length in gaps)
     if missing > MOST_MISSING * length_s:

@@ -46,6 +46,11 @@ def remarks(samples: Stream, found: NoiseAnalysis) -> Iterable[str]:
             f"{len(samples.closed)} gaps, {missing:.3g} s in all, are closed up: longer times are too short by up to "
             f"{100 * missing * found.rate_hz / found.n:.2g} %."
         )
+    if samples.uneven_s:
+        yield (
+            f"Times are uneven, as where samples reach a computer in bursts, and off by {samples.uneven_s:.2g} s at "
+            f"most; the samples are taken to be even, {samples.rate_hz:.6g} a second."
+        )
     if np.isfinite(samples.corner_hz):
         yield (
             f"Coefficients are those before the output's {samples.corner_hz:g} Hz low-pass, "
