@@ -109,9 +109,13 @@ class Table:
 
     @property
     def content(self) -> str:
-        """What an effect may be defined for: the kind; of positions, "fields" where a magnetometer was turned."""
-        magnetic = self.kind == "positions" and "ax" not in self.columns and "mx" in self.columns
-        return "fields" if magnetic else self.kind
+        """What an effect may be defined for: the kind; of positions, "fields" where a magnetometer was turned.
+
+        Where an accelerometer was read beside it, the constant `triad: m` says that the magnetometer is meant.
+        """
+        if self.kind != "positions" or "mx" not in self.columns:
+            return self.kind
+        return "fields" if "ax" not in self.columns or self.constants.get("triad") == "m" else self.kind
 
     @property
     def output_names(self) -> tuple[str, ...]:

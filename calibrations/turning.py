@@ -20,6 +20,7 @@ from calibrations.table import AXES, Array, Table
 
 EARTH_DEG_S = np.degrees(7.292115e-5)
 UPRIGHT = 0.94  # cosine between an edge and the vertical: 20 deg
+HARDLY = 0.01  # of the mean square rate about another axis: 6 deg off it
 DOMINANT = 0.8  # of all outputs' slopes over the rate, by the edge that was turned about
 
 
@@ -49,21 +50,21 @@ def axes_of_turn(table: Table) -> Array:
 
 def slopes(table: Table) -> Array:
     """Output of each axis per deg/s of the table's rate, shape (3,). Raises DataError where the rate never changes."""
-    rate = table.column("rate_deg_s")
-    if not np.ptp(rate):
-        raise DataError(
-            f'{table.source}: the column "rate_deg_s" never changes; a gyroscope is turned at several rates, both ways'
-        )
+    rate = _changing(table)
     away = rate - rate.mean()
     return np.asarray(away @ table.outputs / (away @ away))
 
 
 def scales(table: Table) -> Array:
-    """Output of each axis per deg/s about itself, shape (3,); 0 for an axis that was not turned about."""
-    rate = table.column("rate_deg_s")[:, None] * axes_of_turn(table)
+    """Output of each axis per deg/s about itself, shape (3,); 0 for an axis that was not turned about, or hardly.
+
+    Raises DataError where the rate never changes.
+    """
+    rate = _changing(table)[:, None] * axes_of_turn(table)
     away = rate - rate.mean(axis=0)
-    turned = np.sum(away**2, axis=0)
-    return np.asarray(np.sum(away * table.outputs, axis=0) / np.where(turned > 0, turned, 1.0))
+    squares = np.sum(away**2, axis=0)
+    turned = squares > HARDLY * squares.max()
+    return np.where(turned, np.sum(away * table.outputs, axis=0) / np.where(turned, squares, 1.0), 0.0)
 
 
 def specific_force_g(table: Table) -> Array:
@@ -90,6 +91,15 @@ def earth_unknown(table: Table) -> str | None:
         f"the earth's rotation, {EARTH_DEG_S:.4f} deg/s at most, is not taken off the rates, as the latitude is not "
         "known: it is in the bias; give the constant latitude_deg"
     )
+
+
+def _changing(table: Table) -> Array:
+    rate = table.column("rate_deg_s")
+    if not np.ptp(rate):
+        raise DataError(
+            f'{table.source}: the column "rate_deg_s" never changes; a gyroscope is turned at several rates, both ways'
+        )
+    return rate
 
 
 def _vertical_deg_s(table: Table) -> float:

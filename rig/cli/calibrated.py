@@ -16,6 +16,7 @@ from rig.cli.output import columns
 from rig.cli.words import with_uncertainty
 
 EQUATION = "G_c = M (S G_r + b)"
+FLAT = 0.2  # of the range of the other two outputs, by that of z: then it was a horizontal turn
 
 
 def lines(found: Fit) -> Iterator[str]:
@@ -30,17 +31,17 @@ def lines(found: Fit) -> Iterator[str]:
 
 
 def document(found: Fit) -> dict[str, Any]:
-    """The key `calibration` of a fit's document; a standard uncertainty that is not determined is null."""
-    made = general(found)
+    """The keys `calibration` and `by_hand` of a fit's document; an uncertainty that is not determined is null."""
+    made, extremes = general(found), _by_hand(found.table)
     if made is None:
-        return {}
+        return extremes
     parts = {
         "M": {"value": made.M.tolist(), "std": _nullable(made.M_std)},
         "S": {"value": np.diag(made.S).tolist(), "std": _nullable(np.diag(made.S_std))},
         "b": {"value": made.b.tolist(), "std": _nullable(made.b_std)},
     }
     units = {"from": found.table.unit, "to": made.unit}
-    return {"calibration": {"equation": EQUATION, "unit": units, **parts, "beyond": list(made.beyond)}}
+    return {"calibration": {"equation": EQUATION, "unit": units, **parts, "beyond": list(made.beyond)}} | extremes
 
 
 def _rows(made: General) -> Iterator[tuple[str, ...]]:
@@ -58,19 +59,30 @@ def _nullable(std: Array) -> Any:
     return [_nullable(row) for row in std] if std.ndim > 1 else [None if np.isnan(s) else float(s) for s in std]
 
 
+def _by_hand(table: Table) -> dict[str, Any]:
+    """The Book's hard iron and, of a horizontal turn, soft iron, and what they leave of the magnitude."""
+    if table.content != "fields":
+        return {}
+    middle = hard_iron(table.outputs)
+    told: dict[str, Any] = {"hard_iron": middle.tolist()}
+    left = table.outputs - middle
+    if np.ptp(table.outputs[:, 2]) < FLAT * np.ptp(table.outputs[:, :2]):
+        found = ellipse(left[:, :2])
+        angle = float(np.degrees(found.angle_rad))
+        told["soft_iron"] = {"greatest": found.greatest, "least": found.least, "angle_deg": angle}
+        left = by_hand(table.outputs)[:, :2]
+    size = np.linalg.norm(left, axis=1)
+    return {"by_hand": told | {"unit": table.unit, "left_per_mille": float(1e3 * size.std() / size.mean())}}
+
+
 def _book(table: Table) -> str:
-    """The Book's hard and soft iron, and what is left of the magnitude by them."""
-    outputs = table.outputs
-    middle = hard_iron(outputs)
-    found = ellipse((outputs - middle)[:, :2])
-    shown = ", ".join(f"{value:.5g}" for value in middle)
-    turn = not np.ptp(outputs[:, 2]) > 0.2 * np.ptp(outputs[:, :2])
-    told = f"The Book's way, from the extremes: hard iron {shown} {table.unit}"
-    if turn:
-        told += (
-            f"; soft iron in the plane: radii {found.greatest:.5g} and {found.least:.5g} {table.unit}, the greater at "
-            f"{np.degrees(found.angle_rad):.3g} deg from x"
+    """The same for people."""
+    told = _by_hand(table)["by_hand"]
+    shown = ", ".join(f"{value:.5g}" for value in told["hard_iron"])
+    text = f"The Book's way, from the extremes: hard iron {shown} {table.unit}"
+    if soft := told.get("soft_iron"):
+        text += (
+            f"; soft iron in the plane: radii {soft['greatest']:.5g} and {soft['least']:.5g} {table.unit}, the greater "
+            f"at {soft['angle_deg']:.3g} deg from x"
         )
-    corrected = by_hand(outputs)[:, :2] if turn else outputs - middle
-    size = np.linalg.norm(corrected, axis=1)
-    return f"{told}. The magnitude then varies by {1e3 * size.std() / size.mean():.3g} per mille."
+    return f"{text}. The magnitude then varies by {told['left_per_mille']:.3g} per mille."

@@ -95,7 +95,9 @@ def test_a_fit_tells_it_in_words_and_as_json() -> None:
     text = "\n".join(calibrated.lines(found))
     assert "General calibration, G_c = M (S G_r + b), from uT to field (Book 17.3)" in text
     assert "The Book's way, from the extremes: hard iron -0.1625, -2.0938, -12.31" in text
-    document = json.loads(json.dumps(calibrated.document(found), allow_nan=False))["calibration"]
+    whole = json.loads(json.dumps(calibrated.document(found), allow_nan=False))
+    assert whole["by_hand"]["hard_iron"] == pytest.approx([-0.1625, -2.09375, -12.3125])
+    document = whole["calibration"]
     assert np.array(document["M"]["value"]) == pytest.approx(made(general(found)).M)
     assert document["S"]["std"][0][0] > 0
     assert document["unit"] == {"from": "uT", "to": "field"}

@@ -110,6 +110,13 @@ def test_turns_about_one_axis_show_what_they_can() -> None:
     assert fit(again, about_z()).rmse == pytest.approx(found.end.rmse, rel=1e-6)
 
 
+def test_an_axis_that_was_hardly_turned_about_has_no_scale_factor_of_its_own() -> None:
+    table = about_z()
+    given = {"axis_x": np.full(20, 0.03), "axis_y": np.zeros(20), "axis_z": np.ones(20)}
+    found = fit(GYROSCOPE, Table.from_columns("rates", {**table.columns, **given}))
+    assert set(values(found, "gyro-scale-factor")) == {"scale z"}
+
+
 def test_the_earths_rotation_is_taken_off_where_the_latitude_is_known() -> None:
     table = about_z(latitude_deg=40.443)
     assert rate_deg_s(table)[0] == pytest.approx([0.0, 0.0, EARTH_DEG_S * np.sin(np.radians(40.443))])
@@ -134,6 +141,9 @@ def test_what_cannot_be_known_of_the_turns_is_said() -> None:
     half = {name: table.column(name)[:27] for name in ("rate_deg_s", "gx", "gy", "gz")}
     with pytest.raises(DataError, match=r"more than one output follows the rate.*add the columns axis_x"):
         fit(GYROSCOPE, Table.from_columns("rates", half))
+    upright = {f"a{axis}": table.column(f"a{axis}")[:27] for axis in "xyz"}
+    with pytest.raises(DataError, match='"rate_deg_s" never changes'):
+        fit(GYROSCOPE, Table.from_columns("rates", half | upright | {"rate_deg_s": np.zeros(27)}))
     with pytest.raises(DataError, match='"rate_deg_s" never changes; a gyroscope is turned at several rates'):
         fit(GYROSCOPE, about_z((30.0,)))
     oblique = {f"a{axis}": np.ones(27) for axis in "xyz"}

@@ -17,7 +17,7 @@ from calibrations.fit import fit
 from calibrations.horizontal_turn import by_hand, ellipse, hard_iron
 from calibrations.model_file import read_model
 from calibrations.stills import is_raw_log
-from calibrations.table import Array
+from calibrations.table import Array, Table
 from tests.calibrations import turned
 
 FIELD = read_model("field")
@@ -144,6 +144,13 @@ def test_the_way_by_hand_makes_a_circle_of_a_turn() -> None:
     assert (found.greatest, found.least) == pytest.approx((22.0, 18.0), abs=0.06)
     assert np.degrees(found.angle_rad) % 180.0 == pytest.approx(30.0, abs=2.0)
     assert np.ptp(np.linalg.norm(by_hand(outputs)[:, :2], axis=1)) < 0.2
+
+
+def test_beside_an_accelerometer_a_constant_says_which_is_meant() -> None:
+    mag = turned.sap6("BB")
+    columns = {**mag.columns, **{f"a{axis}": mag.column(f"m{axis}") for axis in "xyz"}}
+    assert Table.from_columns("positions", columns).output_names == ("ax", "ay", "az")
+    assert Table.from_columns("positions", columns, {"triad": "m"}).output_names == ("mx", "my", "mz")
 
 
 def test_elements_of_the_field() -> None:
