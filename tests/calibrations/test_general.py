@@ -49,7 +49,7 @@ def test_positions_give_the_matrices() -> None:
 def test_uncertainties_of_the_matrices_cover_them() -> None:
     model = read_model("linear").with_effect(catalogue()["axis-nonorthogonality"])
     errors: list[float] = []
-    for seed in range(30):
+    for seed in range(16):
         found = made(general(fit(model, positions(seed)[0])))
         off = (found.M - np.linalg.inv(AXES)) / np.where(found.M_std > 0, found.M_std, 1.0)
         errors += [off[1, 0], off[2, 0], off[2, 1], (found.S[0] - 1 / SCALE[0]) / found.S_std[0]]

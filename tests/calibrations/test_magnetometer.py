@@ -46,7 +46,7 @@ def test_a_magnet_and_iron_are_found_by_name_and_size() -> None:
 
 def test_uncertainties_of_the_offset_cover_it() -> None:
     errors = []
-    for seed in range(30):
+    for seed in range(16):
         found = fit(read_model("magnetometer"), turned.magnetometer(turned.in_iron(60, seed)))
         term = next(term for term in found.model.terms if term.name == "hard-iron")
         errors += [(e.value - t) / (e.std or 1) for e, t in zip(term.estimates, (12.0, -7.0, 21.0), strict=True)]
