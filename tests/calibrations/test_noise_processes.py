@@ -74,6 +74,8 @@ def test_the_first_coefficients_of_flicker_noise() -> None:
         wave = np.sqrt(2) * np.cos(np.pi * k * t)
         variance = wave @ (-2 * np.log(apart)) @ wave / n**2
         assert variance / (2 / k) == pytest.approx(flickering(np.array([float(k)]))[0], rel=0.02)
+    bands = slow_bands(np.random.default_rng(1).standard_normal(1000), Sampling(1.0))
+    assert bands.column("flicker-noise")[0] == pytest.approx(0.774 / (2 * np.pi / 2000), rel=1e-3)
 
 
 @pytest.mark.parametrize("name", LINEAR)
