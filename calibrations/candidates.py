@@ -224,7 +224,7 @@ def _bent(found: list[Candidate], known: tuple[str, ...], before: Fit) -> tuple[
     """Rivals of the first candidate, beside the known, that take up as much once their shape has been fitted."""
     best = found[0]
     rivals = [c for c in found[1:] if c.name not in known and c.rank <= best.rank + 1 and _has_shape(c.effect)]
-    rivals = [c for c in rivals if c.gain > HALF * best.gain]
+    rivals = [c for c in rivals if c.gain > HALF * best.gain and best.name not in c.effect.contains]
     if best.p_value >= SIGNIFICANT or not rivals:
         return ()
     own = twice_log_likelihood(added(before, best))

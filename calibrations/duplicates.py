@@ -4,28 +4,28 @@ from __future__ import annotations
 
 import numpy as np
 
-from calibrations.errors import DataError
 from calibrations.table import Table
 
 SHOWN = 3
 
 
-def check_duplicates(table: Table) -> None:
-    """Raises DataError for rows that agree in every number, the time among them.
+def without_copies(table: Table) -> tuple[Table, str | None]:
+    """The table without rows that agree with an earlier one in every number, the time among them; and which they were.
 
     A pose measured again has another time and another reading. Without a time equal rows may be repetitions, read to
     few digits: they stay.
     """
     if "t_s" not in table:
-        return
+        return table, None
     rows = np.column_stack(list(table.columns.values()))
-    _, first, which, count = np.unique(rows, axis=0, return_index=True, return_inverse=True, return_counts=True)
-    again = np.setdiff1d(np.flatnonzero(count[which.ravel()] > 1), first)
-    if not len(again):
-        return
-    pairs = [f"{row + 1} (as {first[which.ravel()[row]] + 1})" for row in again[:SHOWN]]
-    more = f" and {len(again) - SHOWN} more" if len(again) > SHOWN else ""
-    raise DataError(
-        f"{table.source}: rows that are there twice, the same to the last digit and at the same time: row "
-        f"{', '.join(pairs)}{more}; remove the copies. A pose measured twice may stay: it has a time of its own"
+    _, first, which = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+    copies = np.setdiff1d(np.arange(table.n), first)
+    if not len(copies):
+        return table, None
+    pairs = [f"{row + 1} (as {first[which.ravel()[row]] + 1})" for row in copies[:SHOWN]]
+    more = f" and {len(copies) - SHOWN} more" if len(copies) > SHOWN else ""
+    what = "is a copy of an earlier one and counts" if len(copies) == 1 else "are copies of earlier ones and count"
+    rows_said = f"row{'s' if len(copies) > 1 else ''} {', '.join(pairs)}{more}"
+    return table.rows(np.sort(first)), (
+        f"{table.source}: {rows_said} {what} once: the same to the last digit and at the same time."
     )

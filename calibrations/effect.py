@@ -24,9 +24,10 @@ a tuple PARAMETERS, and at least one of four functions, named by where in the si
 NEEDS (columns), KINDS (of tables), AFTER (effects without which in a model it means nothing); CONSTANTS: name ->
 function of the table, for reference values that are kept with the model and not fitted; STARTS: name -> function of
 the table, for starts from the data, (axes,) or (starts, axes); SEARCHED, a function of the table: how many starts
-that look different STARTS is the best of; EXACT, where the form follows from geometry alone and needs no other
-effect to refine it; and LACKS, a function of the table: why its rows cannot show the effect whatever their number, or
-None. KINDS are kinds of tables, and "fields" for positions of a magnetometer.
+that look different STARTS is the best of; CONTAINS, effects that it becomes where its shape vanishes; EXACT, where the
+form follows from geometry alone and needs no other effect to refine it; and LACKS, a function of the table: why its
+rows cannot show the effect whatever their number, or None. KINDS are kinds of tables, and "fields" for positions of a
+magnetometer.
 """
 
 from __future__ import annotations
@@ -121,6 +122,7 @@ class Effect:
     constants: Mapping[str, Callable[[Table], float]] = field(default_factory=dict)
     starts: Mapping[str, Callable[[Table], Array]] = field(default_factory=dict)
     searched: Callable[[Table], float] = _one
+    contains: tuple[str, ...] = ()
     exact: bool = False
     lacks: Callable[[Table], str | None] = _nothing
     pose: Callable[..., Any] | None = None
@@ -220,6 +222,7 @@ def _from_module(module: ModuleType, path: Path) -> Effect:
         constants=dict(getattr(module, "CONSTANTS", {})),
         starts=dict(getattr(module, "STARTS", {})),
         searched=getattr(module, "SEARCHED", _one),
+        contains=_words(module, "CONTAINS", (), path),
         exact=bool(getattr(module, "EXACT", False)),
         lacks=getattr(module, "LACKS", _nothing),
         pose=hooks.get("pose"),

@@ -89,7 +89,7 @@ def per_channel(pattern: Pattern, channels: int) -> Pattern:
 
 def one_sided(pattern: Pattern, table: Table) -> list[Pattern]:
     """The same on approaches from one side only, where both are in the table."""
-    if "direction" in pattern.text or pattern.poses:
+    if "direction" in pattern.text or pattern.poses or pattern.slow:
         return []
     direction = table.optional("direction", 0.0)
     sides = {"clockwise": ">", "anticlockwise": "<"} if np.ptp(direction) > 0 else {}

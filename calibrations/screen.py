@@ -48,7 +48,7 @@ class Screen:
         return _beside(self.fit.noise.whiten(columns), self.explained, SMALLEST)
 
     def reductions(self, columns: Sequence[Array]) -> Array:
-        """What the residual's sum of squares falls by with each of `columns` (channels, n, k), shape (len(columns),)."""
+        """What the residual's sum of squares falls by with each of `columns`, (channels, n, k) each."""
         white = self.fit.noise.whiten(np.concatenate(columns, axis=2))
         ends = np.cumsum([each.shape[2] for each in columns])[:-1]
         return reductions(self.fit.whitened[:, 1:], self.fit.whitened[:, 0], np.split(white, ends, axis=1))

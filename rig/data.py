@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from calibrations.directions import one_for_each_direction
-from calibrations.duplicates import check_duplicates
+from calibrations.duplicates import without_copies
 from calibrations.dwells import is_pose_log, pose_means
 from calibrations.errors import DataError
 from calibrations.read_csv import read_csv
@@ -22,12 +22,14 @@ EXCLUDED = "excluded"
 def averaged(log: Table, tell: Callable[[str], None]) -> Table:
     """The table itself, or the means of what a raw log holds still, which `tell` is then told.
 
-    Raises DataError where nothing holds still, and for rows that are there twice.
+    Rows that are there twice count once. Raises DataError where nothing holds still.
     """
     table = _means(log)
     if table is not log:
         tell(f"{log.source} is a log of raw samples: {_taken(table)}, out of {log.n} samples, are taken.")
-    check_duplicates(table)
+    table, copies = without_copies(table)
+    if copies is not None:
+        tell(copies)
     return _included(table, tell)
 
 

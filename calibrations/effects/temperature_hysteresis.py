@@ -15,6 +15,7 @@ from calibrations.table import Array, Table
 
 KINDS = ("poses", "positions")
 NEEDS = ("temperature_c", "t_s")
+CONTAINS = ("temperature-bias",)
 PARAMETERS = (
     Parameter("slope", "{out}/K", typical=0.001, doc="bias per kelvin, once the play is gone through"),
     Parameter("play", "K", typical=0.1, per_axis=False, starts=(0.3,), low=0.0, doc="half of its width"),

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from calibrations.duplicates import check_duplicates
+from calibrations.duplicates import without_copies
 from calibrations.errors import DataError
 from calibrations.foreign import take
 from calibrations.plausible import gravity_unit, looks_like_radians
@@ -124,9 +124,13 @@ def test_a_sensor_at_rest_shows_gravity() -> None:
 
 def test_rows_that_are_there_twice() -> None:
     columns = {"t_s": [0.0, 1, 2, 0, 1], "alpha_deg": [90.0] * 5, "beta_deg": [0.0, 30, 60, 0, 30], "vx_v": [1.0] * 5}
-    with pytest.raises(DataError, match=r"row 4 \(as 1\), 5 \(as 2\); remove the copies"):
-        check_duplicates(Table.from_columns("poses", columns, source="made"))
+    kept, said = without_copies(Table.from_columns("poses", columns, source="made"))
+    assert kept.n == 3
+    assert said is not None
+    assert said.startswith("made: rows 4 (as 1), 5 (as 2) are copies of earlier ones and count once")
     for name, values in {"t_s": [0.0, 1, 2, 3, 4], "vx_v": [1.0, 1, 1, 1.1, 1.1]}.items():  # measured again
-        check_duplicates(Table.from_columns("poses", {**columns, name: values}))
+        again = Table.from_columns("poses", {**columns, name: values})
+        assert without_copies(again) == (again, None)
     del columns["t_s"]
-    check_duplicates(Table.from_columns("poses", columns))  # maybe read to few digits
+    timeless = Table.from_columns("poses", columns)  # maybe read to few digits
+    assert without_copies(timeless) == (timeless, None)
