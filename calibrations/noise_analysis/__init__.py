@@ -2,6 +2,7 @@
 
     octaves      Allan deviations at octave times: one pass over blocks, constant memory
     exact        the same at any time, with every overlap, of an array at hand
+    asked_times  the Allan deviation at times that are asked for
     freedom      degrees of freedom of a deviation, and its interval
     noise_type   the power of frequency that a spectrum follows, from neighbouring means
     decimated    a record of any length as at most 2^17 means

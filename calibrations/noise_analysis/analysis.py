@@ -140,7 +140,10 @@ def analyse(blocks: Iterable[Any], rate_hz: float, unit: str, source: str, corne
         samples = _checked(np.asarray(block), octaves.n, source)
         for each in (octaves, means, welch, ends):
             each.add(samples)
-    _check_whole(octaves.n, means, source)
+    if octaves.n < FEWEST:
+        raise TooFewRows(
+            f"{source}: {octaves.n} samples; the noise of a record needs {FEWEST} or more: record for longer"
+        )
     ends.check(source)
     if corner_hz * octaves.n < FEWEST * rate_hz:
         raise TooFewRows(
@@ -217,10 +220,3 @@ def _checked(samples: Array, before: int, source: str) -> Array:
             "cut the record there and analyse a part without gaps"
         )
     return samples
-
-
-def _check_whole(n: int, means: Means, source: str) -> None:
-    if n < FEWEST:
-        raise TooFewRows(f"{source}: {n} samples; the noise of a record needs {FEWEST} or more: record for longer")
-    if not np.any(means.values()):
-        raise DataError(f"{source}: every sample is the same; is the sensor connected, powered and not at its limit?")

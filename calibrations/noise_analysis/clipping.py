@@ -34,7 +34,11 @@ class Ends:
                 self._ends[name] = value, count
 
     def check(self, source: str) -> None:
-        """Raises DataError where the channel is at a limit."""
+        """Raises DataError where the channel is at a limit, or does not change at all."""
+        if len({value for value, _ in self._ends.values()}) == 1:
+            raise DataError(
+                f"{source}: every sample is the same; is the sensor connected, powered and not at its limit?"
+            )
         for name, (value, count) in self._ends.items():
             if count > max(CLIPPED * self._n, MORE * self._alike * self._n, 3):
                 raise DataError(

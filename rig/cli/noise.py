@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -13,30 +15,48 @@ from rig.cli.output import emit, json_option, notes
 @click.argument("data")
 @click.option("--channel", help="Of several channels: vx, vy ... Default: the first.")
 @click.option("--rate", "rate_hz", type=click.FloatRange(min=0, min_open=True), help="Samples a second, for an array.")
+@click.option(
+    "--tau",
+    "tau_s",
+    type=float,
+    multiple=True,
+    help="Averaging time, s, with every overlap; repeatable. Default: octaves.",
+)
 @click.option("--pictures", "folder", type=click.Path(file_okay=False, path_type=Path), help="Write pictures here.")
 @click.option("--format", "form", type=click.Choice(["png", "svg"]), default="png", show_default=True)
 @json_option
 def command(
-    data: str, channel: str | None, rate_hz: float | None, folder: Path | None, form: str, as_json: bool
+    data: str,
+    channel: str | None,
+    rate_hz: float | None,
+    tau_s: tuple[float, ...],
+    folder: Path | None,
+    form: str,
+    as_json: bool,
 ) -> None:
     """Show how the noise of DATA averages, and which processes it is made of.
 
     DATA is a table of kind still, an array of samples (.npy, with --rate), or a run with a still record: noise-floor or
-    soak. It is read once, and never held in memory as a whole.
+    soak. It is read once, and never held in memory as a whole, unless times are asked for with --tau.
     """
+    import numpy as np
+
     from calibrations.noise_analysis.analysis import analyse
+    from calibrations.noise_analysis.asked_times import KIND, curve_at
     from calibrations.noise_analysis.document import noise_document
     from rig.cli.noise_words import remarks, summary
     from rig.record.store import Record
     from rig.still import stream
 
-    if Path(data).exists() or data.endswith(".npy"):
-        samples = stream(None, data, channel, rate_hz)
-        found = analyse(samples.blocks, samples.rate_hz, samples.unit, data, samples.corner_hz)
-    else:
-        with Record.to_find(data) as record:
-            samples = stream(record, data, channel, rate_hz)
-            found = analyse(samples.blocks, samples.rate_hz, samples.unit, f"run {data}", samples.corner_hz)
+    with nullcontext() if Path(data).exists() or data.endswith(".npy") else Record.to_find(data) as record:
+        samples = stream(record, data, channel, rate_hz)
+        source = data if record is None else f"run {data}"
+        if tau_s:
+            whole = np.concatenate([np.asarray(block, dtype=float) for block in samples.blocks])
+            samples = replace(samples, blocks=iter([whole]))
+        found = analyse(samples.blocks, samples.rate_hz, samples.unit, source, samples.corner_hz)
+        if tau_s:
+            found = replace(found, curves={**found.curves, KIND: curve_at(whole, found.rate_hz, tau_s, source)})
     notes(remarks(samples, found))
     if as_json:
         emit(noise_document(found))

@@ -164,7 +164,7 @@ def test_a_spectrum_of_another_shape_is_a_misfit() -> None:
 @pytest.mark.parametrize(
     ("samples", "says"),
     [
-        (np.zeros(1000), "every sample is the same"),
+        (np.full(1000, 0.1), "every sample is the same"),
         (np.where(np.arange(1000) == 700, np.inf, np.arange(1000.0)), "sample 701 is inf"),
         (
             np.clip(np.random.default_rng(1).standard_normal(1000), -2, 9),

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from calibrations.noise_analysis.exact import deviations
 from rig.record import Record
 from rig.still import stream
 from tests.rig.conftest import Ended
@@ -133,6 +134,8 @@ def test_no_block_of_a_run_is_read_twice(run: str) -> None:
         (("hole.npy", "--rate", "5"), "sample 4001 is nan, not a number"),
         (("short.npy", "--rate", "5"), "needs 64 or more"),
         (("still.npy", "--rate", "0"), "0 is not in the range"),
+        (("still.npy", "--rate", "50", "--tau", "100"), "an averaging time of 100 s needs a record of 200 s or more"),
+        (("still.npy", "--rate", "50", "--tau", "0.001"), "is below that of one sample, 0.02 s"),
         (("rate.csv",), "100 samples a second are stated, the column t_s has 50"),
         (("uneven.csv",), "s; samples must be evenly spaced: interpolate them onto equal steps first"),
         (("torn.csv",), "1 gaps, 200 s in all beside 119.98 s of samples; the longest, of 200 s, is at t = 19.98 s"),
@@ -178,3 +181,14 @@ def test_times_of_a_computer_that_samples_reach_in_bursts(rig: Rig, folder: Path
     ended = rig("noise", file, "--json")
     assert document(ended)["rate_hz"] == pytest.approx(50, rel=5e-3)
     assert "Times are uneven" in ended.err
+
+
+def test_times_that_are_asked_for(rig: Rig, folder: Path) -> None:
+    said = document(rig("noise", "still.npy", "--rate", "50", "--tau", "0.1", "--tau", "3", "--json"))["allan"]
+    assert said["tau_s"] == [0.1, 3.0]
+    assert said["deviation"] == pytest.approx(deviations(samples(), (5, 150)).tolist())
+    assert said["low"][1] < 0.1 / np.sqrt(150) < said["high"][1]
+    octaves = document(rig("noise", "still.npy", "--rate", "50", "--json"))["allan"]
+    again = document(rig("noise", "still.npy", "--rate", "50", "--tau", "0.16", "--json"))["allan"]
+    for name in ("deviation", "low", "high"):
+        assert again[name][0] == pytest.approx(octaves[name][3])
