@@ -27,6 +27,7 @@ from calibrations.settle import Settled, cost, first_order, settled
 from calibrations.structure import structure_of
 from calibrations.table import Table
 
+OF_FORM = 1 / 16  # of the excess variance: so little may be the form of the causes, known only approximately
 REFINEMENT = 0.02  # of the greatest cost: an effect that costs less to lose refines the form of another
 
 
@@ -65,6 +66,11 @@ class Discovery:
     pattern: Pattern | None = None  # that of the structure
 
     @property
+    def undecided(self) -> bool:
+        """Whether more data would tell which explanation is right; what is left over may only be a matter of form."""
+        return self.verdict == "ambiguous" and self.residual_structure is None
+
+    @property
     def end(self) -> Fit:
         """The fit of the final model."""
         return self.steps[-1].after if self.steps else self.start
@@ -78,7 +84,7 @@ class Discovery:
 def add(effect: Effect, model: Model, table: Table, effects: Mapping[str, Effect] | None = None) -> Discovery:
     """`model` with one effect more, both fitted to `table`. Raises what `fit` raises.
 
-    The verdict is on the model with the effect: `unexplained` where a pattern is left beyond noise.
+    The verdict is on the model with the effect: `unexplained` where more than its form is left beyond noise.
     """
     before, outliers = fit_without(model, table)
     found = candidates(before, catalogue() if effects is None else effects)
@@ -89,7 +95,7 @@ def add(effect: Effect, model: Model, table: Table, effects: Mapping[str, Effect
     return Discovery(
         start=before,
         steps=(step,),
-        verdict="unexplained" if left else "ambiguous" if rivals or undetermined(step.after) else "adequate",
+        verdict=_verdict(before, step.after, left, bool(rivals)),
         causes=(effect.name,),
         refinements=(),
         alternatives={effect.name: rivals} if rivals else {},
@@ -116,11 +122,10 @@ def discover(table: Table, model: Model, effects: Mapping[str, Effect] | None = 
     alternatives = {name: c.indistinguishable_from for name, c in stand.beside.items() if c.indistinguishable_from}
     causes = _causes(steps)
     ambiguous = next((stand.beside[name] for name in causes if name in alternatives), None)
-    uncertain = ambiguous or undetermined(stand.end)
     return Discovery(
         start=path.start,
         steps=steps,
-        verdict="unexplained" if left else "ambiguous" if uncertain else "adequate",
+        verdict=_verdict(path.start, stand.end, left, ambiguous is not None),
         causes=causes,
         refinements=tuple(s.name for s in steps if s.name not in causes),
         alternatives=alternatives,
@@ -129,6 +134,16 @@ def discover(table: Table, model: Model, effects: Mapping[str, Effect] | None = 
         path=path,
         pattern=structure if left else None,
     )
+
+
+def _verdict(start: Fit, end: Fit, left: bool, rivals: bool) -> str:
+    """The verdict on the final model. `left`: a pattern remains beyond noise; `rivals`: another cause would do as well.
+
+    What is left may be the form of the causes or one more of them: where it is little, that is not decided.
+    """
+    if left and share_left(start, end) > OF_FORM:
+        return "unexplained"
+    return "ambiguous" if left or rivals or undetermined(end) else "adequate"
 
 
 def _in_order(start: Fit, stand: Settled, effects: Mapping[str, Effect]) -> tuple[Added, ...]:

@@ -99,7 +99,7 @@ class Live:
 
 def stands(done: Sequence[Measurement]) -> bool:
     """Whether the last explanation was there before, perhaps among others, and the last data left it alone."""
-    if len(done) < 2 or done[-1].found.verdict == "ambiguous":
+    if len(done) < 2 or done[-1].found.undecided:
         return False
     before, now = done[-2].found, done[-1].found
     known = {*before.causes, *(name for names in before.alternatives.values() for name in names)}

@@ -77,7 +77,7 @@ def discovery(result: Discovery) -> str:
 def addition(result: Discovery, data: str, out: Path) -> str:
     """The falling error with one effect added, and whether more is missing."""
     end = f"What is left is {result.end.pooled_excess:.2f} x the noise floor.{too_quiet(result.end)}"
-    if result.verdict == "unexplained":
+    if result.residual_structure is not None:
         end += (
             f" It is not noise: {result.residual_structure}.\nWhat else is missing: rig diagnose {data} --model {out}"
         )
@@ -153,6 +153,12 @@ def _verdict(result: Discovery) -> str:
             f"{what}{extra}: the error falls to 1/{start / end:.0f}. {left} still has a pattern that no effect of the "
             f"catalogue describes: {result.residual_structure}."
         )
+    if result.residual_structure is not None:
+        return (
+            f"{what}{extra}: the error falls to 1/{start / end:.0f}. {left} still shows a pattern: "
+            f"{result.residual_structure}. It may be the form of {joined(result.causes, 'or')}, which the catalogue "
+            "has only approximately, or one more cause."
+        )
     return f"{what}{extra}. {left} has no pattern."
 
 
@@ -170,7 +176,7 @@ def paper(table: Table) -> str:
     return "The paper's stepwise estimate on the same data, rms error:\n" + columns(head, rows)
 
 
-def joined(names: Iterable[str]) -> str:
+def joined(names: Iterable[str], word: str = "and") -> str:
     """`a`, `a and b`, `a, b and c`."""
     names = list(names)
-    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+    return f" {word} ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
