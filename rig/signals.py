@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import signal
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
@@ -21,27 +20,30 @@ def stoppable() -> Iterator[None]:
     One that comes while the simulated world is computed or the screen is written waits for an instant.
     """
 
+    put_off: list[int] = []
+
     def stop(number: int, frame: FrameType | None) -> None:
         if _indivisible(frame):
-            threading.Timer(AGAIN_S, _signal_again, (number,)).start()
+            put_off[:] = [number]
+            signal.setitimer(signal.ITIMER_REAL, AGAIN_S)  # no thread: what it needs may be held where this interrupts
             return
         for each in SIGNALS:
             signal.signal(each, signal.SIG_IGN)
         raise KeyboardInterrupt(signal.Signals(number).name)
 
+    def again(_: int, frame: FrameType | None) -> None:
+        if put_off:
+            stop(put_off.pop(), frame)
+
     ignored = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN  # by nohup: a closed terminal shall not end it
     before = {each: signal.signal(each, stop) for each in SIGNALS if not (ignored and each == signal.SIGHUP)}
+    before[signal.SIGALRM] = signal.signal(signal.SIGALRM, again)
     try:
         yield
     finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
         for each, handler in before.items():
             signal.signal(each, handler)
-
-
-def _signal_again(number: int) -> None:
-    """To the main thread itself: only so does it wake from waiting."""
-    if (main := threading.main_thread().ident) is not None:
-        signal.pthread_kill(main, number)
 
 
 def _indivisible(frame: FrameType | None) -> bool:

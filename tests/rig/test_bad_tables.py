@@ -60,7 +60,10 @@ def test_a_table_with_a_fault(
         ),
         (b"north,east\n1,2\n", "bad.csv, line 1: columns north, east are of no known kind of table; poses need"),
         (bytes(range(256)), "bad.csv: is not text (byte 0 is 0x00); is it really a CSV file?"),
-        (b"rate_deg_s,gx,gy,gz\n1,2,3,4\n", "not to a table of rates"),
+        (
+            b"rate_deg_s,gx,gy,gz\n1,2,3,4\n",
+            'column "rate_deg_s" never changes; a gyroscope is turned at several rates',
+        ),
         (b"# filter_corner_hz: low\n# sample_rate_hz: 1000\nGOOD", "the constant \"filter_corner_hz\" is 'low', not a"),
     ],
 )
@@ -72,7 +75,7 @@ def test_a_file_that_is_no_table(refused: Callable[..., str], work: Path, text: 
 @pytest.mark.parametrize(
     ("head", "row", "says"),
     [
-        ("mx,my,mz", (1, 2, 3), "bad.csv: models of positions need the columns ax, ay, az; it has: mx, my, mz"),
+        ("mx,my,mz", (1, 2, 3), "magnetometers needs the effect field-strength, and linear has bias, scale-factor"),
         ("ax,ay,az", (1, 0, 3), 'bad.csv: the column "ay" never changes; positions turn each axis up and down'),
         ("ax,ay,az,n", (1, 2, 3, 0), 'bad.csv: row 1, column "n" is 0; it must be at least 1'),
     ],
