@@ -11,7 +11,7 @@ Source  Atkinson and Fedorov, Biometrika 62 (1975), 57-70; Dette, Melas and Guch
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -19,8 +19,8 @@ from scipy.special import ndtr
 
 from calibrations.candidates import NOT_TOLD_APART
 from calibrations.fit import Fit
+from calibrations.information import noise_on
 from calibrations.joined import joined
-from calibrations.noise import Noise, rms
 from calibrations.problem import Problem
 from calibrations.table import Array, Table
 
@@ -84,7 +84,7 @@ def one_way(right: Fit, wrong: Fit, table: Table) -> Expected:
     known, new = np.arange(whole.n) < right.table.n, np.arange(whole.n) >= right.table.n
     truth = Problem(whole, right.problem.layout).residual(right.theta)
     mistaken = Problem(whole, wrong.problem.layout)
-    noise = _noise_on(right, Problem(table, right.problem.layout))
+    noise = noise_on(right.noise, Problem(table, right.problem.layout))
 
     def white(columns: Array) -> tuple[Array, Array]:
         """Rows of the data at hand, and of the new; both (channels, n, k) -> (rows, k)."""
@@ -102,12 +102,3 @@ def one_way(right: Fit, wrong: Fit, table: Table) -> Expected:
         return 2 * float(found.cost)
 
     return Expected(least(slice(1, None)), least(slice(None)))
-
-
-def _noise_on(found: Fit, problem: Problem) -> Noise:
-    """The noise of a fit on other rows: white as their means will have it, scatter and slow noise as found."""
-    white = problem.white
-    if white is None:
-        white = np.zeros((len(problem.channels), problem.table.n))
-    noise = replace(found.noise, white=white, gap_s=problem.gap_s)
-    return replace(noise, ratio=found.noise.slow / rms(noise.fast))

@@ -49,11 +49,16 @@ def covariance_of(rows: Array) -> Array:
     return np.asarray(covariance)
 
 
+def noise_on(noise: Noise, problem: Problem) -> Noise:
+    """The noise found on some rows, on those of another problem: white as their means have it, the rest as found."""
+    white = np.zeros((len(problem.channels), problem.table.n)) if problem.white is None else problem.white
+    there = replace(noise, white=white, gap_s=problem.gap_s)
+    return replace(there, ratio=noise.slow / rms(there.fast))
+
+
 def _noise(fit: Fit, problem: Problem) -> Noise:
     """The fit's noise on the rows of another problem; with times, it flickers on as for the fit's own uncertainties."""
     found = fit.noise.prolonged() if "t_s" in problem.table else fit.noise
-    white = np.zeros((len(problem.channels), problem.table.n)) if problem.white is None else problem.white
-    noise = replace(found, white=white, gap_s=problem.gap_s)
     if "t_s" not in problem.table:
-        return replace(noise, scatter=np.hypot(found.scatter, found.slow), ratio=0 * found.ratio)
-    return replace(noise, ratio=found.slow / rms(noise.fast))
+        found = replace(found, scatter=np.hypot(found.scatter, found.slow), ratio=0 * found.ratio)
+    return noise_on(found, problem)

@@ -108,8 +108,8 @@ def next_takes(e: Experiment) -> str:
 
 def joined(names: Iterable[str], word: str = "and") -> str:
     """`a`, `a and b`, `a, b and c`."""
-    *head, last = names
-    return f"{', '.join(head)} {word} {last}" if head else last
+    names = list(names)
+    return f" {word} ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
 def _few(names: tuple[str, ...]) -> str:

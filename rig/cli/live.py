@@ -12,6 +12,7 @@ from calibrations.discover import Discovery
 from calibrations.documents import discovery_document
 from calibrations.experiment import Experiment
 from calibrations.model_file import read_model
+from calibrations.report_words import joined
 from calibrations.table import Table
 from procedures.catalogue import find
 from procedures.settings import parse
@@ -19,7 +20,7 @@ from rig.bench import Bench, read_bench
 from rig.cli.asked import effects_of, require_out, write_model
 from rig.cli.output import duration, emit, note, notes
 from rig.cli.watch import watching
-from rig.cli.words import discovery, joined, parameters, warning
+from rig.cli.words import discovery, parameters, warning
 from rig.live import FIRST, STANDARD, Live, Measurement, stands
 from rig.record import Record
 from rig.record.measured import Measured

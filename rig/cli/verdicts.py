@@ -8,8 +8,9 @@ from typing import Any
 
 from calibrations.model import Estimate
 from calibrations.numerals import bound
+from calibrations.report_words import joined
 from rig.cli.output import columns
-from rig.cli.words import joined, with_uncertainty
+from rig.cli.words import with_uncertainty
 from rig.record import Run
 
 # By the name of a result that is beyond its limit: what to look at. The first that fits counts.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from pathlib import Path
 
 from calibrations.discover import Discovery
@@ -13,6 +12,7 @@ from calibrations.experiment import Experiment
 from calibrations.fit import Fit
 from calibrations.held_out import held_out_excess
 from calibrations.model import Estimate, Model
+from calibrations.report_words import joined
 from calibrations.stepwise import stepwise
 from calibrations.table import Table
 from rig.cli.output import columns, duration
@@ -174,9 +174,3 @@ def paper(table: Table) -> str:
     ]
     head = ("axis", "manufacturer (1)-(3)", "paper (4)-(17)", "tilt that (20)-(21) would correct twice")
     return "The paper's stepwise estimate on the same data, rms error:\n" + columns(head, rows)
-
-
-def joined(names: Iterable[str], word: str = "and") -> str:
-    """`a`, `a and b`, `a, b and c`."""
-    names = list(names)
-    return f" {word} ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
