@@ -74,21 +74,20 @@ def _near(own: Array, apart: Array) -> bool:
 
 
 def fit_without(model: Model, table: Table) -> tuple[Fit, tuple[int, ...]]:
-    """The model fitted to all but gross outliers, and their numbers as `rig show RUN --poses` counts them.
-
-    That is in order of time, from 0. Raises what `fit` raises.
-    """
+    """The model fitted to all but gross outliers, and their numbers (`Table.numbered`). Raises what `fit` raises."""
     found = fit(model, table)
     rows = gross(found)
     if not len(rows):
         return found, ()
-    return fit(model, table.rows(np.delete(table.order, rows))), tuple(int(row) for row in rows)
+    return fit(model, table.rows(np.delete(table.order, rows))), tuple(map(int, found.table.numbered(rows)))
 
 
-def told(rows: tuple[int, ...]) -> str:
-    """The poses by their number."""
-    stand = "pose stands" if len(rows) == 1 else "poses stand"
-    return f"{len(rows)} {stand} out: {', '.join(f'#{row}' for row in rows)}"
+def told(numbers: tuple[int, ...], what: str = "poses", most: int | None = None) -> str:
+    """Rows that stand out, the first `most` of them by their numbers."""
+    listed = ", ".join(f"#{number}" for number in numbers[:most])
+    more = f" and {len(numbers) - most} more" if most is not None and len(numbers) > most else ""
+    who = f"{what.removesuffix('s')} stands" if len(numbers) == 1 else f"{what} stand"
+    return f"{len(numbers)} {who} out: {listed}{more}"
 
 
 def caution(rows: tuple[int, ...]) -> str | None:
@@ -96,6 +95,6 @@ def caution(rows: tuple[int, ...]) -> str | None:
     if not rows:
         return None
     return (
-        f"{told(rows)} (counted from 0, in order of time); set aside here, as accidents: look at them, then leave them "
-        "out of every analysis (`rig exclude RUN POSE --reason TEXT`; in a file, a column `excluded` that is 1 there)"
+        f"{told(rows)} (counted from 0, excluded ones too); set aside here, as accidents: look at them, then leave "
+        "them out of every analysis (`rig exclude RUN POSE --reason TEXT`; in a file, a column `excluded` that is 1)"
     )

@@ -18,6 +18,7 @@ from calibrations.candidates import SIGNIFICANT
 from calibrations.fit import Fit
 from calibrations.mean_noise import correlation_known
 from calibrations.noise import rms
+from calibrations.outliers import told
 from calibrations.patterns import Pattern, one_sided, patterns, per_channel
 from calibrations.screen import Screen, Search
 from calibrations.table import Array
@@ -93,7 +94,8 @@ def _out(fit: Fit) -> list[Pattern]:
         return []
     columns = per_channel(Pattern("", np.eye(n)[:, rows]), len(fit.channels)).columns
     choices = gammaln(n + 1) - gammaln(len(rows) + 1) - gammaln(n - len(rows) + 1)
-    return [Pattern(_named(fit, rows), columns, price=2 * float(choices), poses=tuple(map(int, rows)))]
+    numbers = tuple(map(int, fit.table.numbered(rows)))
+    return [Pattern(told(numbers, fit.table.kind, NAMED), columns, price=2 * float(choices), poses=numbers)]
 
 
 def standing_out(residual: Array, noise: Array) -> NDArray[np.intp]:
@@ -106,14 +108,6 @@ def standing_out(residual: Array, noise: Array) -> NDArray[np.intp]:
     spread = np.maximum(spread, noise[:, None])
     most = norm.isf(SIGNIFICANT / 2 / residual.size)
     return np.flatnonzero(np.any(np.abs(residual - middle) > most * spread, axis=0))
-
-
-def _named(fit: Fit, rows: NDArray[np.intp]) -> str:
-    """Poses by their number, as `rig show RUN --poses` counts them: in order of time, from 0."""
-    listed = ", ".join(f"#{row}" for row in rows[:NAMED])
-    more = f" and {len(rows) - NAMED} more" if len(rows) > NAMED else ""
-    what = fit.table.kind if len(rows) > 1 else fit.table.kind.removesuffix("s")
-    return f"{len(rows)} {what} stand{'s' if len(rows) == 1 else ''} out: {listed}{more}"
 
 
 def _patternless(fit: Fit) -> Pattern | None:

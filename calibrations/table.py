@@ -64,6 +64,7 @@ class Table:
     constants: Mapping[str, Constant] = field(default_factory=dict)
     source: str = ""
     labels: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    numbers: NDArray[np.intp] | None = None  # of the rows in what they were taken from; None: 0, 1, 2 ...
 
     @staticmethod
     def from_columns(
@@ -172,10 +173,14 @@ class Table:
 
     def rows(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> Table:
         """The same table with some of its rows."""
-        where = np.flatnonzero(chosen) if chosen.dtype == np.bool_ else chosen
+        where: NDArray[np.intp] = np.arange(self.n)[chosen]
         labels = {name: tuple(values[i] for i in where) for name, values in self.labels.items()}
         columns = {name: values[where] for name, values in self.columns.items()}
-        return replace(self, columns=MappingProxyType(columns), labels=labels)
+        return replace(self, columns=MappingProxyType(columns), labels=labels, numbers=self.numbered(where))
+
+    def numbered(self, rows: NDArray[np.intp]) -> NDArray[np.intp]:
+        """The numbers by which a person knows these rows: those of a run's poses, or of a file's rows, from 0."""
+        return rows if self.numbers is None else self.numbers[rows]
 
 
 def _check(table: Table) -> None:

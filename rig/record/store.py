@@ -274,4 +274,4 @@ def _kept(row: Row[Any]) -> Kept:
         raise RecordError(f"{where}: {error}; restore a copy of the record") from None
     pose = Pose(**{name: row._mapping[name] for name in _POSE})
     block = Block(volts, tuple(row.channels), row.rate_hz, row.start_s)
-    return Kept(pose, block, excluded=row.excluded, **{name: row._mapping[name] for name in _BESIDE})
+    return Kept(pose, block, excluded=row.excluded, number=row.number, **{name: row._mapping[name] for name in _BESIDE})

@@ -6,6 +6,7 @@ The displacement sensor is left out: of a carriage that stands still it tells no
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -26,11 +27,13 @@ def poses_table(run: Run, poses: Iterable[Kept]) -> Table:
     """A row for each of the run's `poses`. Raises RecordError where there is none yet."""
     rows: list[dict[str, float]] = []
     paths: list[str] = []
+    numbers: list[int] = []
     blocks: list[Samples] = []
     stride = 1 + run.rows // MOST_BLOCKS
     for number, kept in enumerate(poses):
         rows.append(_row(kept))
         paths.append(kept.pose.path)
+        numbers.append(kept.number)
         if number % stride == 0:
             blocks.append(kept.samples)
     if not rows:
@@ -40,7 +43,8 @@ def poses_table(run: Run, poses: Iterable[Kept]) -> Table:
     labels = {"path": tuple(paths)} if any(paths) else {}
     columns, angle_stds = as_they_were(run, columns)
     constants = {**run.constants, **angle_stds, "sample_rate_hz": blocks[0].rate_hz, **_inflations(blocks)}
-    return Table.from_columns(run.kind, _useful(columns), constants, run.run, labels)
+    table = Table.from_columns(run.kind, _useful(columns), constants, run.run, labels)
+    return replace(table, numbers=np.array(numbers))
 
 
 def _row(kept: Kept) -> dict[str, float]:

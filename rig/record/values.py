@@ -64,6 +64,7 @@ class Kept:
     excluded: str | None = None  # why it is left out of every analysis
     alpha_read_deg: float | None = None  # what the dial of a stage that is turned by hand showed
     beta_read_deg: float | None = None
+    number: int = 0  # in the run, from 0; excluded ones count
 
     @property
     def dwell(self) -> Dwell:

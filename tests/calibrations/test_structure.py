@@ -68,6 +68,15 @@ def test_poses_that_stand_out_are_listed() -> None:
     assert (pattern.text, pattern.expression) == ("3 poses stand out: #12, #140, #377", "")
 
 
+def test_poses_keep_their_numbers_when_others_are_left_out() -> None:
+    off = np.zeros(len(BETA))
+    off[[12, 140, 377]] = 60.0, -60.0, 60.0
+    table = changed(off)
+    _, pattern = found(table.rows(np.delete(np.arange(table.n), [3, 4, 200])))
+    assert pattern is not None
+    assert (pattern.text, pattern.poses) == ("3 poses stand out: #12, #140, #377", (12, 140, 377))
+
+
 def test_one_pose_and_many() -> None:
     off = np.zeros(len(BETA))
     off[7] = 60.0

@@ -73,6 +73,13 @@ def test_gross_outliers_are_listed_and_spoil_nothing(subject: str) -> None:
     assert (result.residual_structure is None) == bool(causes)
 
 
+def test_outliers_keep_their_numbers_when_other_poses_are_left_out() -> None:
+    table, rows = knocked(world("plate mismatch", 4))
+    out = next(row for row in range(table.n) if row not in rows)
+    result = diagnose(table.rows(np.delete(np.arange(table.n), out)), read_model("linear"))
+    assert list(result.path.outliers) == rows
+
+
 def test_a_diagnosis_lists_outliers_too() -> None:
     table, rows = knocked(world("plate mismatch", 4))
     result = diagnose(table, read_model("linear"))

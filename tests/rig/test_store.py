@@ -206,6 +206,7 @@ def test_an_excluded_pose_stays_with_its_reason_and_is_left_out() -> None:
         assert [kept.excluded for kept in record.kept(run)] == [None, "a lorry passed", None]
         assert [pose.beta_deg for pose in record.poses(run)] == [0.0, 20.0]
         assert list(table_of(record, run).column("beta_deg")) == [0.0, 20.0]
+        assert list(table_of(record, run).numbered(np.array([0, 1]))) == [0, 2]  # as `rig exclude` takes them
         assert record.next_number(run) == 3
         record.exclude(run, 1, None)
         assert len(record.poses(run)) == 3
