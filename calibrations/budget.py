@@ -25,9 +25,9 @@ from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from calibrations.fit import Fit, cautiously
-from calibrations.identify import gain
 from calibrations.inputs import Contribution
 from calibrations.noise import Noise
+from calibrations.search.identify import gain
 from calibrations.table import Array
 
 LEVEL = 0.95

@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
-from calibrations.candidates import SIGNIFICANT
 from calibrations.chain import backward
 from calibrations.fit import Fit, evaluate, fit
 from calibrations.model import Model
 from calibrations.noise import rms
-from calibrations.path import MATERIAL
+from calibrations.search.candidates import SIGNIFICANT
+from calibrations.search.path import MATERIAL
 from calibrations.table import MILLI, Array, Table
 
 MOST_PLACES = 8

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from calibrations.stills import sphere_centre
+from calibrations.reading.stills import sphere_centre
 from calibrations.table import Array, Table
 
 HARD_IRON, SOFT_IRON = 1, 2  # highest degree of what they add to the magnitude

@@ -11,19 +11,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from calibrations.candidates import Candidate
-from calibrations.determined import undetermined
 from calibrations.effect import Effect, catalogue
 from calibrations.experiment import Experiment, separating
 from calibrations.fit import Fit
-from calibrations.held_out import held_out_excess
 from calibrations.model import Model
-from calibrations.outliers import caution, told
-from calibrations.path import MATERIAL, Path, find_path, share_left
-from calibrations.patterns import Pattern
-from calibrations.plainer import plainer
-from calibrations.settle import settled
-from calibrations.structure import structure_of
+from calibrations.search.candidates import Candidate
+from calibrations.search.determined import undetermined
+from calibrations.search.held_out import held_out_excess
+from calibrations.search.outliers import caution, told
+from calibrations.search.path import MATERIAL, Path, find_path, share_left
+from calibrations.search.patterns import Pattern
+from calibrations.search.plainer import plainer
+from calibrations.search.settle import settled
+from calibrations.search.structure import structure_of
 from calibrations.table import Table
 
 MOST_LEFT = 1 / 5  # of the excess variance: more left than this, and the catalogue has not explained it

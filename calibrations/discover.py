@@ -11,20 +11,20 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from calibrations.candidates import candidates
-from calibrations.determined import undetermined
 from calibrations.diagnose import MOST_LEFT
 from calibrations.effect import Effect, catalogue
 from calibrations.experiment import Experiment, separating
 from calibrations.fit import Fit, refit
-from calibrations.held_out import held_out_excess
 from calibrations.model import Model
-from calibrations.outliers import caution, fit_without, told
-from calibrations.path import MATERIAL, Path, find_path, share_left
-from calibrations.patterns import Pattern
-from calibrations.plainer import plainer
-from calibrations.settle import Settled, cost, first_order, settled
-from calibrations.structure import structure_of
+from calibrations.search.candidates import candidates
+from calibrations.search.determined import undetermined
+from calibrations.search.held_out import held_out_excess
+from calibrations.search.outliers import caution, fit_without, told
+from calibrations.search.path import MATERIAL, Path, find_path, share_left
+from calibrations.search.patterns import Pattern
+from calibrations.search.plainer import plainer
+from calibrations.search.settle import Settled, cost, first_order, settled
+from calibrations.search.structure import structure_of
 from calibrations.table import Table
 
 OF_FORM = 1 / 16  # of the excess variance: so little may be the form of the causes, known only approximately

@@ -6,14 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from calibrations.candidates import Candidate
 from calibrations.compare import Comparison, axis_of
+from calibrations.design.expected import Expected
 from calibrations.diagnose import Diagnosis
 from calibrations.discover import Added, Discovery
-from calibrations.expected import Expected
 from calibrations.experiment import Experiment
 from calibrations.fit import Fit
 from calibrations.noise import rms
+from calibrations.search.candidates import Candidate
 from calibrations.table import Array
 
 Document = dict[str, Any]

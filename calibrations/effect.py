@@ -47,7 +47,7 @@ from typing import Any, TypedDict
 import numpy as np
 
 from calibrations.errors import ModelError, UnknownName, nearest
-from calibrations.guarded import fault, guarded
+from calibrations.expressions.guarded import fault, guarded
 from calibrations.table import Array, Table
 
 HOOKS = ("pose", "force", "transduction", "output")

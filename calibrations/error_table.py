@@ -22,8 +22,8 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
 from calibrations.errors import DataError
+from calibrations.reading.text_file import text_file
 from calibrations.table import Array
-from calibrations.text_file import text_file
 
 NAMES = ("angle_deg", "error_deg", "std_deg")
 TURN_DEG = 360.0

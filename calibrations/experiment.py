@@ -1,7 +1,7 @@
 """The experiment that tells apart two effects that the data at hand cannot.
 
 `separating` goes by the physics of the two alone. Where a bench is known, each experiment of MENU is planned on it, and
-`calibrations/expected.py` computes how far apart the two will lie.
+`calibrations/design/expected.py` computes how far apart the two will lie.
 """
 
 from __future__ import annotations
@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Set
 from dataclasses import dataclass
 
-from calibrations.candidates import Candidate
-from calibrations.expected import Expected
+from calibrations.design.expected import Expected
+from calibrations.search.candidates import Candidate
 
 TEMPERATURE = {"temperature-bias", "temperature-scale", "temperature-hysteresis"}
 TIME = {"warm-up-bias", "warm-up-scale", "bias-drift"}

@@ -13,12 +13,12 @@ from functools import cached_property
 import numpy as np
 from scipy.optimize import least_squares
 
-from calibrations.identify import RELATIVE_RANK, estimates
 from calibrations.model import Model
 from calibrations.noise import Noise, rms, white_only
-from calibrations.noise_average import widening
-from calibrations.noise_fit import estimate
+from calibrations.noise_estimation.noise_average import widening
+from calibrations.noise_estimation.noise_fit import estimate
 from calibrations.problem import Problem
+from calibrations.search.identify import RELATIVE_RANK, estimates
 from calibrations.table import Array, Table
 
 ROUNDS = 2

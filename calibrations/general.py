@@ -18,7 +18,7 @@ import numpy as np
 
 from calibrations.chain import respond, sensed
 from calibrations.fit import Fit, cautiously
-from calibrations.identify import covariance
+from calibrations.search.identify import covariance
 from calibrations.table import Array
 
 LINEAR = {

@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from calibrations.effect import Effect, catalogue, find
 from calibrations.errors import ModelError, UnknownName, nearest
-from calibrations.expression_effect import own_effect
+from calibrations.expressions.effect import own_effect
 from calibrations.model import Estimate, Model, Term
 from calibrations.table import NUMBERS
 

@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 
 from calibrations.chain import Step, backward, force, forward
 from calibrations.errors import DataError, ModelError, TooFewRows
-from calibrations.lack_of_fit import smooth_columns
-from calibrations.mean_noise import norm_std, white_std
 from calibrations.model import Model
 from calibrations.motion.stretches import Stretches, stretches
+from calibrations.noise_estimation.mean_noise import norm_std, white_std
+from calibrations.noise_estimation.scatter import scatter
 from calibrations.parameters import Layout
-from calibrations.scatter import scatter
+from calibrations.search.lack_of_fit import smooth_columns
 from calibrations.table import Array, Table
 
 STRENGTH = "field-strength"

@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from calibrations.errors import DataError
-from calibrations.six_faces import faces
+from calibrations.evaluations.six_faces import faces
 from calibrations.table import AXES, Array, Table
 
 EARTH_DEG_S = np.degrees(7.292115e-5)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from calibrations.control_chart import BASELINE, FEWEST, Chart, control_chart
+from calibrations.evaluations.control_chart import BASELINE, FEWEST, Chart, control_chart
 from rig.errors import RecordError, UnknownRun
 from rig.nearest import did_you_mean
 from rig.record import Run

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from calibrations.directions import one_for_each_direction
-from calibrations.duplicates import without_copies
-from calibrations.dwells import is_pose_log, pose_means
 from calibrations.errors import DataError
-from calibrations.read_csv import read_csv
-from calibrations.stills import is_raw_log, positions
+from calibrations.reading.directions import one_for_each_direction
+from calibrations.reading.duplicates import without_copies
+from calibrations.reading.dwells import is_pose_log, pose_means
+from calibrations.reading.read_csv import read_csv
+from calibrations.reading.stills import is_raw_log, positions
 from calibrations.table import Table
 from rig.errors import RecordError, UnknownRun
 

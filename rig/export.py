@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 from uuid import NAMESPACE_URL, uuid5
 
-from calibrations.read_csv import write_csv
+from calibrations.reading.read_csv import write_csv
 from calibrations.table import Table
 from rig.data import load
 from rig.errors import ExportError

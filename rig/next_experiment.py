@@ -14,14 +14,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
+from calibrations.design.expected import CERTAIN, Expected, expected, one_way, told_apart
+from calibrations.design.foreseen import foreseen
 from calibrations.diagnose import Diagnosis
 from calibrations.discover import Discovery
 from calibrations.effect import Effect
 from calibrations.errors import CalibrationError
-from calibrations.expected import CERTAIN, Expected, expected, one_way, told_apart
 from calibrations.experiment import MENU, Experiment
 from calibrations.fit import Fit, refit
-from calibrations.foreseen import foreseen
 from drivers.errors import LimitError
 from procedures.catalogue import find
 from procedures.errors import ProcedureError

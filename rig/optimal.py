@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
+from calibrations.design.optimal_design import Criterion, DOptimal, IOptimal, again, exchanged, farthest
+from calibrations.design.run_order import Tour, ordered
 from calibrations.model import Model
-from calibrations.optimal_design import Criterion, DOptimal, IOptimal, again, exchanged, farthest
-from calibrations.run_order import Tour, ordered
+from calibrations.search.unseen import MARK
 from calibrations.table import Array
-from calibrations.unseen import MARK
 from procedures.catalogue import Procedure
 from procedures.pose_list import written
 from procedures.session import Pose

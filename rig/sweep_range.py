@@ -16,16 +16,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrations.assumed import assumed
 from calibrations.chain import nominal_pose, specific_force
+from calibrations.design.assumed import assumed
+from calibrations.design.foreseen import foreseen
+from calibrations.design.information import covariance_of, information
+from calibrations.design.optimal_design import scaled
 from calibrations.fit import Fit
-from calibrations.foreseen import foreseen
-from calibrations.information import covariance_of, information
 from calibrations.model import Model
-from calibrations.optimal_design import scaled
 from calibrations.problem import Problem
+from calibrations.search.unseen import MARK
 from calibrations.table import AXES, Array, Table
-from calibrations.unseen import MARK
 from procedures.catalogue import Procedure
 from procedures.session import Pose
 from rig.bench import Bench

@@ -16,7 +16,7 @@ Source    Book 17.3.4 and 17.3.6; IEEE Std 528, drift; IEEE Std 1293, random wal
 import numpy as np
 
 from calibrations.effect import Parameter, Values
-from calibrations.lack_of_fit import smooth_columns
+from calibrations.search.lack_of_fit import smooth_columns
 from calibrations.table import Array, Table
 
 KINDS = ("poses", "positions", "fields", "rates")

@@ -12,7 +12,7 @@ import numpy as np
 
 from calibrations.coverage import HARD_IRON, too_small
 from calibrations.effect import Parameter, Values
-from calibrations.stills import sphere_centre
+from calibrations.reading.stills import sphere_centre
 from calibrations.table import Array, Table
 
 KINDS = ("fields",)

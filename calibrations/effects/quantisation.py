@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from calibrations.effect import Parameter, Values
-from calibrations.lack_of_fit import smooth_columns
+from calibrations.search.lack_of_fit import smooth_columns
 from calibrations.table import Array, Table
 
 KINDS = ("poses",)

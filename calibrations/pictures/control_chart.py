@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from calibrations.control_chart import Chart
+from calibrations.evaluations.control_chart import Chart
 from calibrations.pictures.style import BAND, BLUE, INK, QUIET, VERMILION, panels, styled
 from calibrations.table import Array
 

@@ -7,10 +7,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
+from calibrations.evaluations.soak import HOUR_S, Course, Soak
 from calibrations.numerals import measured
 from calibrations.pictures.album import Picture
 from calibrations.pictures.style import AMBER, BAND, BLUE, GREEN, INK, QUIET, VERMILION, panels, styled
-from calibrations.soak import HOUR_S, Course, Soak
 from calibrations.table import Array
 
 COLOURS = {"x": BLUE, "y": VERMILION}

@@ -12,10 +12,10 @@ from matplotlib.ticker import NullFormatter
 
 from calibrations.discover import Discovery
 from calibrations.fit import Fit
-from calibrations.held_out import held_out_excess
 from calibrations.numerals import plain
 from calibrations.pictures.style import AMBER, BAND, BLUE, GREEN, INK, QUIET, VERMILION, panels, styled
 from calibrations.pictures.view import milli, pooled_mg, rows_of
+from calibrations.search.held_out import held_out_excess
 
 LARGE_FALL = 8.0  # from first to last: beyond this the last bars would vanish on a linear scale
 BAR = 0.62

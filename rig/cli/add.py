@@ -70,7 +70,7 @@ def _chosen(effect: str, name: str | None, table: Table, effects: Mapping[str, E
     """The effect that was named, written, or is in a file. Raises UnknownName, ModelError, ExpressionError."""
     from calibrations.effect import find, read_effect
     from calibrations.errors import ModelError
-    from calibrations.expression_effect import effect_for
+    from calibrations.expressions.effect import effect_for
 
     if name is not None:
         if name in effects:

@@ -12,16 +12,16 @@ from pathlib import Path
 
 import numpy as np
 
-from calibrations import scatter
 from calibrations.effect import Effect, catalogue
 from calibrations.errors import ModelError
 from calibrations.fit import Fit
-from calibrations.mean_noise import correlation_known
 from calibrations.model import Model
 from calibrations.model_file import dump_model, read_model
+from calibrations.noise_estimation import scatter
+from calibrations.noise_estimation.mean_noise import correlation_known
+from calibrations.reading.units import UNITS, unit_of
 from calibrations.table import Table
 from calibrations.turning import earth_unknown
-from calibrations.units import UNITS, unit_of
 from rig.cli.output import note
 from rig.data import load
 from rig.errors import OutputError
@@ -91,7 +91,7 @@ def require_out(out: Path, *inputs: str | Path | None) -> None:
 
 def tell_blind(found: Fit, effects: Mapping[str, Effect]) -> None:
     """Name the effects that the data cannot show beside the model: no verdict holds for them."""
-    from calibrations.blind import blind_to
+    from calibrations.search.blind import blind_to
 
     hidden, table = blind_to(found, effects), found.table
     if not hidden:

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from calibrations.evaluations.horizontal_turn import by_hand, ellipse, hard_iron
 from calibrations.fit import Fit
 from calibrations.general import General, general
-from calibrations.horizontal_turn import by_hand, ellipse, hard_iron
 from calibrations.model import Estimate
 from calibrations.table import Array, Table
 from rig.cli.output import columns

@@ -18,8 +18,8 @@ from rig.cli.output import bench_option, check_option, emit, json_option, model_
 def command(data: str, model: str | None, check: bool, bench_file: Path | None, as_json: bool) -> int:
     """Set a model beside DATA (a file or a run) and say where it fails. A model without values is fitted first."""
     from calibrations.compare import compare
-    from calibrations.determined import undetermined
     from calibrations.documents import comparison_document
+    from calibrations.search.determined import undetermined
     from rig.cli.asked import asked
     from rig.cli.words import errors, warning
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from calibrations.control_chart import BASELINE, FEWEST
+from calibrations.evaluations.control_chart import BASELINE, FEWEST
 from calibrations.model import Estimate
 from rig.cli.output import columns, emit, json_option
 from rig.cli.words import with_uncertainty

@@ -25,7 +25,7 @@ def command(folder: Path, as_json: bool) -> None:
     from calibrations.documents import discovery_document
     from calibrations.model_file import read_model
     from calibrations.pictures.album import album
-    from calibrations.report import report
+    from calibrations.reports.report import report
     from procedures.catalogue import find
     from procedures.settings import parse
     from rig.bench import read_bench

@@ -74,7 +74,7 @@ def _told(result: Diagnosis, data: str, model: str, bench: str) -> str:
 
 def _more(result: Diagnosis) -> str:
     """What is left once the effect is added, where that is more than noise."""
-    from calibrations.path import MATERIAL
+    from calibrations.search.path import MATERIAL
 
     left = result.path.steps[0].held_out_after
     return f" More may be: with it, {left:.3g} x the noise floor is left on unseen poses." if left > MATERIAL else ""

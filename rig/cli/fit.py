@@ -19,11 +19,11 @@ from rig.cli.output import bench_option, check_option, emit, json_option, model_
 def command(data: str, model: str | None, out: Path | None, check: bool, bench_file: Path | None, as_json: bool) -> int:
     """Estimate the parameters of a model from DATA (a file or a run), with standard uncertainties."""
     from calibrations.compare import compare
-    from calibrations.determined import undetermined
     from calibrations.documents import fit_document
     from calibrations.fit import fit
-    from calibrations.report_budget import document as in_parts
-    from calibrations.unseen import unseen
+    from calibrations.reports.budget import document as in_parts
+    from calibrations.search.determined import undetermined
+    from calibrations.search.unseen import unseen
     from rig.cli import calibrated
     from rig.cli.asked import asked, tell_blind, write_model
     from rig.cli.checked import document, lines

@@ -24,10 +24,10 @@ def command(file: Path, kind: str | None, mapped: tuple[str, ...], given: tuple[
     A column is named by the file's header, or by its number from 1 where there is none. At a terminal the program
     proposes what is not given, and asks.
     """
-    from calibrations.foreign import needs_mapping, take
-    from calibrations.separated import sheet
-    from calibrations.text_file import text_file
-    from calibrations.units import Mapped
+    from calibrations.reading.foreign import needs_mapping, take
+    from calibrations.reading.separated import sheet
+    from calibrations.reading.text_file import text_file
+    from calibrations.reading.units import Mapped
     from rig.data import averaged
     from rig.record import Record
 

@@ -12,7 +12,7 @@ from calibrations.discover import Discovery
 from calibrations.documents import discovery_document
 from calibrations.experiment import Experiment
 from calibrations.model_file import read_model
-from calibrations.report_words import joined
+from calibrations.reports.words import joined
 from calibrations.table import Table
 from procedures.catalogue import find
 from procedures.settings import parse

@@ -8,11 +8,11 @@ from dataclasses import replace
 import click
 
 from calibrations.errors import DataError, nearest
-from calibrations.foreign import fitting
-from calibrations.proposal import command, likely_kind, missing, propose, values_of
-from calibrations.separated import Sheet
+from calibrations.reading.foreign import fitting
+from calibrations.reading.proposal import command, likely_kind, missing, propose, values_of
+from calibrations.reading.separated import Sheet
+from calibrations.reading.units import Mapped, unit_of
 from calibrations.table import NUMBERS
-from calibrations.units import Mapped, unit_of
 from rig.cli.output import note
 
 LEAVE = "-"

@@ -27,7 +27,7 @@ def night_of(data: str, date: str, program: str) -> Page | None:
         if data.partition("/")[0] not in {run.run for run in record.runs() if run.procedure == "soak"}:
             return None
         from calibrations.pictures.soak import soak_album
-        from calibrations.soak_report import soak_report
+        from calibrations.reports.soak import soak_report
         from rig.results.soak import night
 
         measured = Measured.named(record, data)

@@ -6,7 +6,7 @@ import shlex
 from pathlib import Path
 from typing import Any
 
-from calibrations.patterns import Pattern
+from calibrations.search.patterns import Pattern
 
 
 def own_effect(pattern: Pattern | None, model: str, data: str, bench_file: Path | None) -> dict[str, Any] | None:

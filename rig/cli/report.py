@@ -53,7 +53,7 @@ def _on_a_model(data: str, model: str | None, bench_file: Path | None, out: Path
     from calibrations.compare import compare
     from calibrations.discover import discover
     from calibrations.pictures.album import album
-    from calibrations.report import report
+    from calibrations.reports.report import report
     from rig.cli.asked import asked, program, today
     from rig.cli.foresight import with_next
     from rig.cli.shaken import shaken_of

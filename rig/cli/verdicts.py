@@ -8,7 +8,7 @@ from typing import Any
 
 from calibrations.model import Estimate
 from calibrations.numerals import bound
-from calibrations.report_words import joined
+from calibrations.reports.words import joined
 from rig.cli.output import columns
 from rig.cli.words import with_uncertainty
 from rig.record import Run

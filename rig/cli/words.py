@@ -5,15 +5,15 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+from calibrations.design.expected import CERTAIN, Expected, told_apart
 from calibrations.discover import Discovery
 from calibrations.errors import DataError
-from calibrations.expected import CERTAIN, Expected, told_apart
+from calibrations.evaluations.stepwise import stepwise
 from calibrations.experiment import Experiment
 from calibrations.fit import Fit
-from calibrations.held_out import held_out_excess
 from calibrations.model import Estimate, Model
-from calibrations.report_words import joined
-from calibrations.stepwise import stepwise
+from calibrations.reports.words import joined
+from calibrations.search.held_out import held_out_excess
 from calibrations.table import Table
 from rig.cli.output import columns, duration
 

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from calibrations.mean_noise import measured_inflation
+from calibrations.noise_estimation.mean_noise import measured_inflation
 from calibrations.table import Array, Table
 from procedures.session import Samples
 from rig.bench import D63

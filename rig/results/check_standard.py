@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from calibrations.tumble import tumbles
+from calibrations.evaluations.tumble import tumbles
 from rig.record.measured import Measured
 from rig.results.result import Result
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from calibrations.axis_search import Direction, correction, directions, non_orthogonality_deg
+from calibrations.evaluations.axis_search import Direction, correction, directions, non_orthogonality_deg
 from rig.record.measured import Measured
 from rig.results.result import Result
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from calibrations.errors import DataError
-from calibrations.noise_floor import hidden_inclination_deg, rms
+from calibrations.evaluations.noise_floor import hidden_inclination_deg, rms
 from procedures.noise_floor import STILL
 from rig.record import Kept
 from rig.record.measured import Measured

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from calibrations.repeatability import between
-from calibrations.tumble import tumbles
+from calibrations.evaluations.repeatability import between
+from calibrations.evaluations.tumble import tumbles
 from rig.record.measured import Measured
 from rig.results.result import Result
 

@@ -7,9 +7,9 @@ from itertools import groupby
 
 import numpy as np
 
-from calibrations.soak import AXES, HOUR_S, Course, Soak
-from calibrations.soak import soak as soak_of
-from calibrations.steady_state import COVERAGE, FEWEST, SteadyState
+from calibrations.evaluations.soak import AXES, HOUR_S, Course, Soak
+from calibrations.evaluations.soak import soak as soak_of
+from calibrations.evaluations.steady_state import COVERAGE, FEWEST, SteadyState
 from calibrations.table import Table
 from procedures.session import Dwell
 from procedures.soak import REVERSAL

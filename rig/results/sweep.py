@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from calibrations.trend import FEWEST, trend
+from calibrations.evaluations.trend import FEWEST, trend
 from procedures.sweep import REFERENCE
 from rig.record.measured import Measured
 from rig.results.result import Result

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from calibrations.temperature_coefficients import bias_coefficients, scale_coefficients
-from calibrations.tumble import tumbles
+from calibrations.evaluations.temperature_coefficients import bias_coefficients, scale_coefficients
+from calibrations.evaluations.tumble import tumbles
 from rig.record.measured import Measured
 from rig.results.result import Result
 

@@ -17,8 +17,8 @@ from calibrations.effect import catalogue
 from calibrations.fit import fit
 from calibrations.model import Model
 from calibrations.model_file import read_model
+from calibrations.search.unseen import MARK, unseen
 from calibrations.table import Array, Table
-from calibrations.unseen import MARK, unseen
 from drivers.simulation.config import WorldConfig
 from drivers.simulation.defects import DEFECTS
 from drivers.simulation.world import World

@@ -16,7 +16,7 @@ from calibrations.effect import catalogue
 from calibrations.fit import Fit, fit
 from calibrations.model_file import read_model
 from calibrations.problem import Problem
-from calibrations.screen import reductions
+from calibrations.search.screen import reductions
 from calibrations.table import Array, Table
 from tests.benchmark.timed import seconds
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from calibrations.allan import allan_deviation
+from calibrations.evaluations.allan import allan_deviation
 
 
 def test_white_noise_falls_with_the_square_root_of_time() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrations.assumed import SAMPLE_STD_V, assumed
+from calibrations.design.assumed import SAMPLE_STD_V, assumed
 from calibrations.effect import catalogue
 from calibrations.fit import Fit, fit
 from calibrations.model_file import read_model

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from calibrations.axis_search import correction, directions, non_orthogonality_deg
 from calibrations.errors import DataError
-from calibrations.misalignment import along_reference, search_angles_x, search_angles_y, theta_x, theta_y
+from calibrations.evaluations.axis_search import correction, directions, non_orthogonality_deg
+from calibrations.evaluations.misalignment import along_reference, search_angles_x, search_angles_y, theta_x, theta_y
 from calibrations.table import Table
 from procedures.misalignment import Centre, around
 

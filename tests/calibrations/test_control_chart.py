@@ -7,8 +7,8 @@ import pytest
 from numpy.polynomial.legendre import leggauss
 from scipy.stats import norm
 
-from calibrations.control_chart import D2, D4, LAMBDA, Chart, K, L, control_chart
 from calibrations.errors import TooFewRows
+from calibrations.evaluations.control_chart import D2, D4, LAMBDA, Chart, K, L, control_chart
 
 # NIST/SEMATECH e-Handbook 6.3.2.2, flow rates of ten batches
 FLOWRATE = (49.6, 47.6, 49.9, 51.3, 47.8, 51.2, 52.6, 52.4, 53.6, 52.1)

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from calibrations.determined import undetermined, unseen_variance
 from calibrations.diagnose import diagnose
 from calibrations.discover import add, discover
 from calibrations.effect import catalogue
 from calibrations.fit import fit
 from calibrations.model import Model
 from calibrations.model_file import read_model
-from calibrations.report_words import headline, summary
+from calibrations.reports.words import headline, summary
+from calibrations.search.determined import undetermined, unseen_variance
 from calibrations.table import Table
 from tests.calibrations.test_real_data import mikoff, suarez, xsens
 

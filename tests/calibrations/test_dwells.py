@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from calibrations.dwells import dwells, is_pose_log, pose_means
 from calibrations.errors import DataError
+from calibrations.reading.dwells import dwells, is_pose_log, pose_means
 from calibrations.table import Array, Table
 
 RATE_HZ = 100.0

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from calibrations.design.expected import CERTAIN, Expected, expected, one_way, told_apart
+from calibrations.design.foreseen import foreseen
 from calibrations.effect import catalogue
-from calibrations.expected import CERTAIN, Expected, expected, one_way, told_apart
 from calibrations.fit import Fit, fit, refit
-from calibrations.foreseen import foreseen
 from calibrations.joined import joined
 from calibrations.model import Model
 from calibrations.model_file import read_model

@@ -10,9 +10,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from calibrations.errors import ExpressionError
-from calibrations.expression import Apply, Name, Number, evaluate, nodes, parse
-from calibrations.expression_shape import linear
-from calibrations.expression_words import FUNCTIONS
+from calibrations.expressions.expression import Apply, Name, Number, evaluate, nodes, parse
+from calibrations.expressions.shape import linear
+from calibrations.expressions.words import FUNCTIONS
 
 T = np.array([-2.0, 0.0, 0.5, 3.0])
 VALUES = [

@@ -11,7 +11,7 @@ from calibrations.compare import compare
 from calibrations.diagnose import diagnose
 from calibrations.effect import Effect, catalogue
 from calibrations.errors import ExpressionError, ModelError
-from calibrations.expression_effect import effect_for, own_effect
+from calibrations.expressions.effect import effect_for, own_effect
 from calibrations.fit import Fit, fit
 from calibrations.model_file import dump_model, parse_model, read_model
 from calibrations.table import Array, Table

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from calibrations.errors import DataError, MissingColumn
-from calibrations.foreign import read_foreign
-from calibrations.read_csv import read_csv, write_csv
+from calibrations.reading.foreign import read_foreign
+from calibrations.reading.read_csv import read_csv, write_csv
+from calibrations.reading.units import Mapped
 from calibrations.table import Table
-from calibrations.units import Mapped
 from tests.calibrations.synthetic import components, poses, turns
 
 THREE = [Mapped(name, str(k)) for k, name in enumerate(("ax", "ay", "az"), start=1)]

@@ -11,9 +11,9 @@ from scipy.spatial.transform import Rotation
 from calibrations.discover import discover
 from calibrations.effect import catalogue
 from calibrations.errors import DataError
+from calibrations.evaluations.six_faces import faces
 from calibrations.fit import Fit, fit
 from calibrations.model_file import dump_model, parse_model, read_model
-from calibrations.six_faces import faces
 from calibrations.table import Table
 from calibrations.turning import EARTH_DEG_S, axes_of_turn, earth_unknown, rate_deg_s
 from tests.calibrations import turned

@@ -7,9 +7,9 @@ import pytest
 
 from calibrations.chain import nominal_pose, specific_force
 from calibrations.fit import fit
-from calibrations.held_out import folds, held_out, held_out_excess
 from calibrations.model_file import read_model
 from calibrations.noise import white_only
+from calibrations.search.held_out import folds, held_out, held_out_excess
 from calibrations.table import Table
 from tests.calibrations import synthetic
 

@@ -6,9 +6,9 @@ import numpy as np
 
 from calibrations.effect import catalogue
 from calibrations.fit import fit
-from calibrations.identify import covariance
 from calibrations.model import Estimate, Model
 from calibrations.model_file import read_model
+from calibrations.search.identify import covariance
 from calibrations.table import Table
 from tests.calibrations import synthetic
 

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from calibrations.design.foreseen import foreseen
+from calibrations.design.information import covariance_of, information
 from calibrations.effect import catalogue
 from calibrations.errors import DataError, MissingColumn
 from calibrations.fit import Fit, fit
-from calibrations.foreseen import foreseen
-from calibrations.information import covariance_of, information
 from calibrations.model_file import read_model
 from calibrations.noise import white_only
 from calibrations.table import Table

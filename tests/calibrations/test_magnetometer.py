@@ -8,15 +8,15 @@ import pytest
 from calibrations.compare import compare
 from calibrations.coverage import directions, harmonics, too_small, worse
 from calibrations.diagnose import diagnose
-from calibrations.directions import one_for_each_direction
 from calibrations.discover import discover
 from calibrations.effect import catalogue
 from calibrations.errors import DataError, ModelError
+from calibrations.evaluations.horizontal_turn import by_hand, ellipse, hard_iron
 from calibrations.field import components, declination_deg, horizontal, inclination_deg, total
 from calibrations.fit import fit
-from calibrations.horizontal_turn import by_hand, ellipse, hard_iron
 from calibrations.model_file import read_model
-from calibrations.stills import is_raw_log
+from calibrations.reading.directions import one_for_each_direction
+from calibrations.reading.stills import is_raw_log
 from calibrations.table import Array, Table
 from tests.calibrations import turned
 

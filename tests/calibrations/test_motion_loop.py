@@ -10,9 +10,9 @@ from calibrations.diagnose import diagnose
 from calibrations.discover import discover
 from calibrations.documents import comparison_document
 from calibrations.fit import fit
-from calibrations.held_out import held_out_excess
 from calibrations.model import Model
 from calibrations.model_file import parse_model, read_model
+from calibrations.search.held_out import held_out_excess
 from calibrations.table import Table
 from tests.calibrations import shaken
 

@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import minimize
 
 from calibrations.noise import white_only
-from calibrations.noise_fit import (
+from calibrations.noise_estimation.noise_fit import (
     FLICKER_PROCESSES,
     FLICKER_RATIOS,
     NOT_TOLD_APART,

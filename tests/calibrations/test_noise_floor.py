@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import lfilter
 
 from calibrations.errors import DataError
-from calibrations.noise_floor import hidden_inclination_deg, rms
+from calibrations.evaluations.noise_floor import hidden_inclination_deg, rms
 
 SEEDS = 200
 

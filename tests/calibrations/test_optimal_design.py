@@ -7,7 +7,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from calibrations.optimal_design import Chosen, Criterion, DOptimal, IOptimal, again, exchanged, farthest, scaled
+from calibrations.design.optimal_design import Chosen, Criterion, DOptimal, IOptimal, again, exchanged, farthest, scaled
 from calibrations.table import Array
 
 X = np.linspace(-1, 1, 21)

@@ -7,8 +7,8 @@ import pytest
 
 from calibrations.fit import fit
 from calibrations.model_file import read_model
-from calibrations.patterns import patterns
-from calibrations.structure import structure_of
+from calibrations.search.patterns import patterns
+from calibrations.search.structure import structure_of
 from calibrations.table import Array, Table
 from tests.calibrations import synthetic
 

@@ -8,14 +8,14 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from calibrations.duplicates import without_copies
 from calibrations.errors import DataError
-from calibrations.foreign import take
-from calibrations.plausible import gravity_unit, looks_like_radians
-from calibrations.separated import sheet
+from calibrations.reading.duplicates import without_copies
+from calibrations.reading.foreign import take
+from calibrations.reading.plausible import gravity_unit, looks_like_radians
+from calibrations.reading.separated import sheet
+from calibrations.reading.text_file import text
+from calibrations.reading.units import Mapped
 from calibrations.table import Table
-from calibrations.text_file import text
-from calibrations.units import Mapped
 
 TURN = np.arange(0.0, 361.0, 30.0)
 

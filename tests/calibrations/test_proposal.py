@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from calibrations.errors import MissingColumn
-from calibrations.foreign import needs_mapping, take
-from calibrations.proposal import command, likely_kind, propose
-from calibrations.separated import Sheet, sheet
-from calibrations.text_file import text
-from calibrations.units import Mapped, name_and_unit, unit_of
+from calibrations.reading.foreign import needs_mapping, take
+from calibrations.reading.proposal import command, likely_kind, propose
+from calibrations.reading.separated import Sheet, sheet
+from calibrations.reading.text_file import text
+from calibrations.reading.units import Mapped, name_and_unit, unit_of
 
 
 def laid(content: str) -> Sheet:

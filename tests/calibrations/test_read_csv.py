@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from calibrations.errors import CalibrationError, DataError
-from calibrations.read_csv import parse_csv, read_csv, require_kind, write_csv
+from calibrations.reading.read_csv import parse_csv, read_csv, require_kind, write_csv
 from calibrations.table import Table
 
 HEADER = "alpha_deg,beta_deg,vx_v"

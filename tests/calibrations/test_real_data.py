@@ -11,11 +11,11 @@ from calibrations.diagnose import diagnose
 from calibrations.discover import discover
 from calibrations.effect import Effect, catalogue
 from calibrations.fit import Fit, fit
-from calibrations.foreign import read_foreign
 from calibrations.model_file import read_model
-from calibrations.stills import positions
+from calibrations.reading.foreign import read_foreign
+from calibrations.reading.stills import positions
+from calibrations.reading.units import Mapped
 from calibrations.table import Table
-from calibrations.units import Mapped
 
 DATA = Path(__file__).parent.parent / "data"
 

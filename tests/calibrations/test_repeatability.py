@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from calibrations.errors import DataError
-from calibrations.repeatability import between
+from calibrations.evaluations.repeatability import between
+from calibrations.evaluations.temperature_coefficients import bias_coefficients, scale_coefficients
+from calibrations.evaluations.tumble import Tumble, tumbles
 from calibrations.table import Table
-from calibrations.temperature_coefficients import bias_coefficients, scale_coefficients
-from calibrations.tumble import Tumble, tumbles
 from procedures.tumbles import tumble
 
 WHITE_V = 50e-6

@@ -12,17 +12,17 @@ import pytest
 from matplotlib.figure import Figure
 
 from calibrations.compare import Comparison, compare
+from calibrations.design.expected import Expected
 from calibrations.discover import Discovery, discover
 from calibrations.effect import catalogue
-from calibrations.expected import Expected
 from calibrations.experiment import Experiment
 from calibrations.model import Estimate, Model, Term
 from calibrations.model_file import read_model
 from calibrations.numerals import chance, measured, minus, plain, unit
 from calibrations.pictures.album import Picture
 from calibrations.pictures.view import pooled_mg
-from calibrations.report import report
-from calibrations.report_words import headline, joined, next_takes, next_words, state, summary
+from calibrations.reports.report import report
+from calibrations.reports.words import headline, joined, next_takes, next_words, state, summary
 from calibrations.table import Table
 from tests.calibrations.test_pictures import EFFECTS, by_hand, hand_table, warm, warm_table
 

@@ -8,8 +8,8 @@ from calibrations.compare import compare
 from calibrations.discover import discover
 from calibrations.fit import fit
 from calibrations.model_file import read_model
-from calibrations.report import report
-from calibrations.report_budget import document, section
+from calibrations.reports.budget import document, section
+from calibrations.reports.report import report
 from tests.calibrations.test_budget import given, measured
 
 

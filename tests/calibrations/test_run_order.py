@@ -7,7 +7,7 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from calibrations.run_order import Order, Tour, ordered
+from calibrations.design.run_order import Order, Tour, ordered
 from calibrations.table import Array
 
 

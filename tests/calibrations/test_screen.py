@@ -11,7 +11,7 @@ from scipy.stats import kstest
 from calibrations.fit import Fit, fit
 from calibrations.model_file import read_model
 from calibrations.noise import Noise
-from calibrations.screen import SMALLEST, Screen, Search, of_search, reductions
+from calibrations.search.screen import SMALLEST, Screen, Search, of_search, reductions
 from calibrations.table import Array
 from tests.calibrations import synthetic
 from tests.calibrations.test_kernels import covariance

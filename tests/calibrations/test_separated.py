@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from calibrations.cells import cells
 from calibrations.errors import DataError
-from calibrations.read_csv import parse_csv, read_csv
-from calibrations.separated import Sheet, sheet
-from calibrations.text_file import LARGEST_BYTES, text, text_file
+from calibrations.reading.cells import cells
+from calibrations.reading.read_csv import parse_csv, read_csv
+from calibrations.reading.separated import Sheet, sheet
+from calibrations.reading.text_file import LARGEST_BYTES, text, text_file
 
 HEADER = "alpha_deg;beta_deg;vx_v"
 EXPECTED = {"alpha_deg": [90.0, 90.0], "beta_deg": [0.0, 30.0], "vx_v": [3.4987, 3.3614]}
@@ -64,7 +64,7 @@ def test_what_stands_above_the_header_is_kept() -> None:
 
 @pytest.mark.parametrize("cell", ["1.25", "1,25"])
 def test_a_file_takes_no_memory_but_for_its_numbers(tmp_path: Path, cell: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delattr("calibrations.cells._one_by_one")  # numpy takes it all
+    monkeypatch.delattr("calibrations.reading.cells._one_by_one")  # numpy takes it all
     path = tmp_path / "log.csv"
     path.write_text("ax;ay;az\n" + f"{cell};2;3\n" * 50_000)
     layout = sheet(text_file(path))

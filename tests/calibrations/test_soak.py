@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from calibrations.errors import TooFewRows
+from calibrations.evaluations.soak import soak
 from calibrations.numerals import measured
 from calibrations.pictures.soak import soak_album
-from calibrations.soak import soak
-from calibrations.soak_report import soak_report
+from calibrations.reports.soak import soak_report
 from tests.calibrations.soaks import BLOCK_S, soak_table
 
 FACTS = {"sensor": "a <sensor>", "run": "a night"}

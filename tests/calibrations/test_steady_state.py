@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from calibrations.errors import TooFewRows
-from calibrations.steady_state import SteadyState, steady_state
+from calibrations.evaluations.steady_state import SteadyState, steady_state
 from tests.calibrations.soaks import WHITE_V, noise, times_s
 
 SEEDS = 20

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from calibrations.errors import DataError, MissingColumn
-from calibrations.stepwise import stepwise
+from calibrations.evaluations.stepwise import stepwise
 from calibrations.table import Array, Table
 from tests.calibrations import synthetic
 

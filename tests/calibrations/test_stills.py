@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from calibrations.errors import DataError
-from calibrations.stills import is_raw_log, positions, still_intervals
+from calibrations.reading.stills import is_raw_log, positions, still_intervals
 from calibrations.table import Array, Table
 
 RATE_HZ = 100.0

@@ -7,11 +7,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from calibrations.expression_effect import effect_for
+from calibrations.expressions.effect import effect_for
 from calibrations.fit import Fit, fit
 from calibrations.model_file import read_model
-from calibrations.patterns import Pattern
-from calibrations.structure import structure_of
+from calibrations.search.patterns import Pattern
+from calibrations.search.structure import structure_of
 from calibrations.table import Array, Table
 from tests.hidden import sampled
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from calibrations.errors import TooFewRows
-from calibrations.trend import trend
+from calibrations.evaluations.trend import trend
 
 
 def test_its_standard_error_is_the_scatter_over_many_records() -> None:

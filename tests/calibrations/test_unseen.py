@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from calibrations.model_file import read_model
+from calibrations.search.unseen import unseen
 from calibrations.table import Array, Table
-from calibrations.unseen import unseen
 from tests.calibrations.synthetic import NOISE_V, components, poses, turns
 
 LINEAR = read_model("linear")

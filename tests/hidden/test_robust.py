@@ -10,9 +10,9 @@ import pytest
 from calibrations.diagnose import diagnose
 from calibrations.discover import Discovery, discover
 from calibrations.fit import fit
-from calibrations.mean_noise import white_std
 from calibrations.model_file import read_model
-from calibrations.outliers import gross
+from calibrations.noise_estimation.mean_noise import white_std
+from calibrations.search.outliers import gross
 from calibrations.table import Array, Table
 from tests.hidden import rigs, sampled
 from tests.hidden.intervals import CAUSES

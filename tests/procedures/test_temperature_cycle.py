@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from calibrations.temperature_coefficients import bias_coefficients, scale_coefficients
-from calibrations.tumble import tumbles
+from calibrations.evaluations.temperature_coefficients import bias_coefficients, scale_coefficients
+from calibrations.evaluations.tumble import tumbles
 from drivers.simulation.config import WorldConfig
 from drivers.simulation.world import World
 from procedures.errors import SafetyLimit, SettingError

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from calibrations.read_csv import write_csv
+from calibrations.reading.read_csv import write_csv
 from rig.bench import DEFAULT
 from rig.cli import main
 from rig.record import Record

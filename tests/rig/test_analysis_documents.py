@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from calibrations.read_csv import write_csv
+from calibrations.reading.read_csv import write_csv
 from calibrations.table import Table
 from rig.record import Record
 from tests.calibrations.synthetic import components, poses, turns

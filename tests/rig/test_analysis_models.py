@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from calibrations.model_file import read_model
-from calibrations.read_csv import read_csv, write_csv
+from calibrations.reading.read_csv import read_csv, write_csv
 from calibrations.table import Table
 from tests.calibrations.synthetic import components, poses, turns
 

@@ -12,7 +12,7 @@ import pytest
 import yaml
 
 from calibrations.error_table import ErrorTable
-from calibrations.read_csv import read_csv
+from calibrations.reading.read_csv import read_csv
 from rig.bench import DEFAULT
 from rig.record import Record
 from rig.record.angles import as_they_were

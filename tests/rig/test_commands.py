@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 import yaml
 
-from calibrations.read_csv import read_csv
+from calibrations.reading.read_csv import read_csv
 from rig.bench import DEFAULT, read_bench
 from rig.home import home
 from rig.record import Record

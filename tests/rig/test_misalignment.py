@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import yaml
 
-from calibrations.misalignment import along_reference
+from calibrations.evaluations.misalignment import along_reference
 from procedures.catalogue import find
 from procedures.settings import parse
 from rig.bench import DEFAULT, Bench, read_bench

@@ -133,7 +133,7 @@ def test_the_oven_warms_over_minutes_and_time_goes_on() -> None:
 
 
 def test_the_commands_print_it(rig: Callable[..., Ended], tmp_path: Path) -> None:
-    from calibrations.read_csv import write_csv
+    from calibrations.reading.read_csv import write_csv
 
     data = str(tmp_path / "turned.csv")
     write_csv(turned().fit.table, Path(data))

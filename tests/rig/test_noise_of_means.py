@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from calibrations.mean_noise import inflation, measured_inflation, white_std
+from calibrations.noise_estimation.mean_noise import inflation, measured_inflation, white_std
 from drivers.simulation.config import WorldConfig
 from drivers.simulation.world import World
 from procedures.session import Pose

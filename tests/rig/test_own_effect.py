@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import yaml
 
-from calibrations.read_csv import write_csv
+from calibrations.reading.read_csv import write_csv
 from tests.calibrations.synthetic import NOISE_V, components, poses, turns
 
 Rig = Callable[..., Any]

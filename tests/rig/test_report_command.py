@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from calibrations.read_csv import write_csv
+from calibrations.reading.read_csv import write_csv
 from tests.calibrations.test_pictures import warm_table
 
 NAMES = ["waterfall", "measurement", "residual", "failure", "effect-temperature-bias"]

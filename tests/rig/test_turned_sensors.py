@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from calibrations.read_csv import write_csv
+from calibrations.reading.read_csv import write_csv
 from calibrations.table import Table
 from tests.calibrations import turned
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from calibrations.mean_noise import white_std
+from calibrations.noise_estimation.mean_noise import white_std
 from calibrations.table import Table
 from drivers.simulation.defects import DEFECTS, UNEXPLAINED
 from tests.benchmark.discovery.cases import Truth

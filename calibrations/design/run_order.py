@@ -1,0 +1,127 @@
+"""In which order to visit poses: short ways, and nothing that follows time looking like something of the poses.
+
+Both are counted in seconds of rig time. The way costs its moves. A drift that nobody knows, a parabola in time on each
+output, takes information away from parameters that changed with time; that costs the dwell which would regain it for
+the parameter that lost most.
+
+The order is improved from the nearest-neighbour way by turning stretches of it round and by putting poses elsewhere,
+with a slowly falling chance to accept what is worse (simulated annealing).
+
+Source  Tack and Vandebroek, J. Statistical Planning and Inference 98 (2001), 293-310, on orders that resist a trend at
+        low cost; Lin and Kernighan, Operations Research 21 (1973), 498-516, on exchanges along a way.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrations.search.identify import RELATIVE_RANK
+from calibrations.table import Array
+
+PROPOSALS = 250  # for each pose
+WARM_S, COLD_S = 10.0, 0.05  # rig time that is given away for a better order later: at the beginning, at the end
+DEGREES = (1, 2)  # of time: what a drift may be
+Order = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class Tour:
+    """Poses to be ordered.
+
+    start_s   from where the stages stand to each pose, shape (n,)
+    move_s    from pose to pose, shape (n, n), not the same both ways
+    rows      their information, shape (n, axes, p), white; 0 for a pose that no fit sees
+    dwell_s   of all poses together
+    """
+
+    start_s: Array
+    move_s: Array
+    rows: Array
+    dwell_s: float
+
+    def cost_s(self, order: Order) -> float:
+        """Moves, and the dwell that makes up for a drift."""
+        return self.travel_s(order) + self.dwell_s * self.drift_loss(order)
+
+    def travel_s(self, order: Order) -> float:
+        """Time of all moves."""
+        return float(self.start_s[order[0]] + self.move_s[order[:-1], order[1:]].sum())
+
+    def drift_loss(self, order: Order) -> float:
+        """How much the variance of the parameter that suffers most grows where a drift has to be fitted beside all.
+
+        Relative: 0 if no order of time is in the poses' order.
+        """
+        axes, p = self.rows.shape[1:]
+        lost = (self._trend.T @ self._rooted[order]).reshape(len(DEGREES) * axes, p)
+        left = np.eye(len(lost)) - lost @ lost.T
+        if np.linalg.eigvalsh(left)[0] < RELATIVE_RANK:
+            return float("inf")
+        spread = lost @ self._root.T
+        return float(np.max(np.sum(spread * np.linalg.solve(left, spread), axis=0) / self._variance))
+
+    @cached_property
+    def _root(self) -> Array:
+        """R (p, p) with R R' the covariance without a drift, in units in which each parameter's rows have length 1."""
+        _, s, Vt = np.linalg.svd(self._flat, full_matrices=False)
+        good = s > RELATIVE_RANK * s[0]
+        return np.asarray(Vt.T * np.where(good, 1 / np.where(good, s, 1.0), 0.0))
+
+    @cached_property
+    def _flat(self) -> Array:
+        flat = self.rows.reshape(-1, self.rows.shape[2])
+        size = np.linalg.norm(flat, axis=0)
+        return np.asarray(flat / np.where(size > 0, size, 1.0))
+
+    @cached_property
+    def _rooted(self) -> Array:
+        """Rows of an orthonormal basis, (n, axes * p)."""
+        return np.asarray((self._flat @ self._root).reshape(len(self.rows), -1))
+
+    @cached_property
+    def _variance(self) -> Array:
+        variance = np.sum(self._root**2, axis=1)
+        return np.where(variance > 0, variance, np.inf)
+
+    @cached_property
+    def _trend(self) -> Array:
+        """Orthonormal polynomials over the places of an order that are seen at equal distances, (n, degrees)."""
+        u = np.linspace(-1.0, 1.0, len(self.rows))
+        return np.asarray(np.linalg.qr(np.vander(u, max(DEGREES) + 1, increasing=True))[0][:, list(DEGREES)])
+
+
+def ordered(tour: Tour, seed: int = 0) -> Order:
+    """An order of low cost, shape (n,). The same tour gives the same order."""
+    rng = np.random.default_rng(seed)
+    present = best = _nearest_neighbours(tour)
+    cost = least = tour.cost_s(present)
+    for warmth_s in np.geomspace(WARM_S, COLD_S, PROPOSALS * len(present)):
+        tried, most = _changed(present, rng), cost + warmth_s * rng.exponential()
+        if tour.travel_s(tried) < most and (tried_cost := tour.cost_s(tried)) < most:
+            present, cost = tried, tried_cost
+            if cost < least:
+                best, least = present, cost
+    return best
+
+
+def _nearest_neighbours(tour: Tour) -> Order:
+    order = [int(np.argmin(tour.start_s))]
+    left = set(range(len(tour.start_s))) - set(order)
+    while left:
+        order.append(min(left, key=lambda k: (tour.move_s[order[-1], k], k)))
+        left.remove(order[-1])
+    return np.array(order, dtype=np.intp)
+
+
+def _changed(order: Order, rng: np.random.Generator) -> Order:
+    """A stretch turned round, or taken out and put in elsewhere."""
+    i, j = np.sort(rng.integers(0, len(order) + 1, 2))
+    if rng.random() < 0.5:
+        return np.concatenate([order[:i], order[i:j][::-1], order[j:]])
+    rest = np.concatenate([order[:i], order[j:]])
+    k = rng.integers(0, len(rest) + 1)
+    return np.concatenate([rest[:k], order[i:j], rest[k:]])

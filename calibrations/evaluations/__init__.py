@@ -1,0 +1,1 @@
+"""What each procedure was run for: its own result, from the table that it recorded."""

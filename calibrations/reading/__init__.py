@@ -1,0 +1,1 @@
+"""Anybody's files as our tables: columns named, units converted, doubts told."""

@@ -1,0 +1,119 @@
+"""Effects added one after another, as long as each is significant and lowers the error on unseen poses."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from calibrations.effect import Effect
+from calibrations.fit import Fit
+from calibrations.model import Model
+from calibrations.search.candidates import SIGNIFICANT, Candidate, added, best_pair, candidates
+from calibrations.search.held_out import held_out_excess
+from calibrations.search.outliers import fit_without
+from calibrations.table import Table
+
+MOST_EFFECTS = 14
+LEAST_SHARE = 0.05  # of what is left beyond noise: a smaller gain may be the wrong form of something strong
+MATERIAL = 1.15  # times the noise floor: a residual below is as good as noise
+
+
+@dataclass(frozen=True)
+class Step:
+    """One effect added: the fits before and after, all candidates of that moment, and the one that was taken."""
+
+    before: Fit
+    after: Fit
+    candidates: tuple[Candidate, ...]
+    taken: Candidate
+
+    @cached_property
+    def held_out_before(self) -> float:
+        """Pooled excess on unseen poses without the effect."""
+        return held_out_excess(self.before)
+
+    @property
+    def held_out_after(self) -> float:
+        """Pooled excess on unseen poses with it."""
+        return self.taken.held_out_after
+
+
+@dataclass(frozen=True)
+class Path:
+    """The way from a model to the last one that an effect could be added to."""
+
+    start: Fit
+    steps: tuple[Step, ...]
+    left: tuple[Candidate, ...]  # candidates of the last search
+    outliers: tuple[int, ...] = ()  # poses that were set aside
+
+    @property
+    def end(self) -> Fit:
+        """The last fit."""
+        return self.steps[-1].after if self.steps else self.start
+
+    @property
+    def first(self) -> tuple[Candidate, ...]:
+        """Candidates on top of the model that was given."""
+        return self.steps[0].candidates if self.steps else self.left
+
+
+def find_path(model: Model, table: Table, effects: Mapping[str, Effect], enough: float = 0.0) -> Path:
+    """Add the best effect until none is significant, or no more than `enough` of the excess variance is left.
+
+    Raises what `fit` raises.
+    """
+    start, outliers = fit_without(model, table)
+    return grown(Path(start, (), (), outliers), effects, enough)
+
+
+def grown(path: Path, effects: Mapping[str, Effect], enough: float = 0.0) -> Path:
+    """The path, as far as it goes on from its end."""
+    present, steps = path.end, list(path.steps)
+    found = candidates(present, effects)
+    while len(steps) < MOST_EFFECTS:
+        step = _next(present, found)
+        if step is None:
+            break
+        steps.append(step)
+        present = step.after
+        if share_left(path.start, present) <= enough:
+            break
+        found = candidates(present, effects)
+    return Path(path.start, tuple(steps), tuple(found), path.outliers)
+
+
+def share_left(start: Fit, present: Fit) -> float:
+    """Part of the excess variance at the start that the present fit has not explained."""
+    return max(present.pooled_excess**2 - 1, 0.0) / max(start.pooled_excess**2 - 1, 1e-9)
+
+
+def _next(present: Fit, found: list[Candidate]) -> Step | None:
+    """The best candidate that is significant and still helps on unseen poses once refitted.
+
+    Where there is none though much is left, the stronger of the best pair: the other then follows by itself.
+    """
+    for c in found[:3]:
+        if c.p_value >= SIGNIFICANT or _share(present, c.excess_after) < LEAST_SHARE / 2:
+            continue
+        step = _taken(present, found, c)
+        if step.held_out_after < step.held_out_before and _share(present, step.after.pooled_excess) >= LEAST_SHARE:
+            return step
+    if present.table.kind == "poses" or present.pooled_excess <= MATERIAL:
+        return None  # with known orientation an effect is seen beside others
+    pair = best_pair(present, found)
+    return _taken(present, found, pair[0]) if pair else None
+
+
+def _share(present: Fit, excess_after: float) -> float:
+    """Part of what is left beyond the noise floor that an effect explains; 1 where hardly anything is left."""
+    before = present.pooled_excess**2
+    return (before - excess_after**2) / (before - 1) if before > MATERIAL**2 else 1.0
+
+
+def _taken(present: Fit, found: list[Candidate], c: Candidate) -> Step:
+    """The step that adds `c`; its errors are then those of the full fit."""
+    after = added(present, c)
+    full = replace(c, excess_after=after.pooled_excess, held_out_after=held_out_excess(after))
+    return Step(present, after, tuple(full if other is c else other for other in found), full)
