@@ -16,7 +16,7 @@ from rig.cli.output import bench_option, columns, emit, json_option
 def command(effect: str | None, bench_file: Path | None, as_json: bool) -> None:
     """List the catalogue of physical effects, or show one EFFECT in full."""
     from calibrations.effect import Effect, find
-    from rig.cli.asked import effects_of
+    from rig.asked import effects_of
 
     known = effects_of(bench_file)
 

@@ -16,8 +16,9 @@ from calibrations.reports.words import joined
 from calibrations.table import Table
 from procedures.catalogue import find
 from procedures.settings import parse
+from rig.asked import effects_of
 from rig.bench import Bench, read_bench
-from rig.cli.asked import effects_of, require_out, write_model
+from rig.cli.asked import require_out, write_model
 from rig.cli.output import duration, emit, note, notes
 from rig.cli.watch import watching
 from rig.cli.words import discovery, parameters, warning

@@ -35,7 +35,8 @@ def command(
     if out is None and folder is None:
         raise click.UsageError("nothing to write: give --out FILE.html, --pictures FOLDER, or both")
     from calibrations.pictures.save import save_all
-    from rig.cli.asked import program, today, write_whole
+    from rig.cli.asked import write_whole
+    from rig.provenance import program, today
 
     asked_for = night_of(data, today(), program()) if model is None else None
     pictures, page = asked_for or _on_a_model(data, model, bench_file, out)
@@ -54,9 +55,10 @@ def _on_a_model(data: str, model: str | None, bench_file: Path | None, out: Path
     from calibrations.discover import discover
     from calibrations.pictures.album import album
     from calibrations.reports.report import report
-    from rig.cli.asked import asked, program, today
+    from rig.cli.asked import asked
     from rig.cli.foresight import with_next
     from rig.cli.shaken import shaken_of
+    from rig.provenance import program, today
 
     table, start, effects = asked(data, model, bench_file, out)
     found = with_next(discover(table, start, effects), data, effects, bench_file)

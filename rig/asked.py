@@ -1,0 +1,86 @@
+"""What the analysis is asked: data, a model, the user's own effects. Command line and workbench ask alike."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from calibrations.effect import Effect, catalogue
+from calibrations.errors import ModelError
+from calibrations.fit import Fit
+from calibrations.model import Model
+from calibrations.model_file import read_model
+from calibrations.noise_estimation import scatter
+from calibrations.noise_estimation.mean_noise import correlation_known
+from calibrations.reading.units import UNITS, unit_of
+from calibrations.search.blind import blind_to
+from calibrations.table import Table
+from calibrations.turning import earth_unknown
+from rig.data import load
+
+DEFAULTS = {
+    "poses": "linear",
+    "positions": "common-scale",
+    "fields": "field",
+    "motion": "linear",
+    "rates": "gyroscope",
+    "still": "still",
+}
+
+
+def effects_of(bench_file: Path | None) -> Mapping[str, Effect]:
+    """The catalogue, with the effects in the folder that the bench file names."""
+    if bench_file is None:
+        return catalogue()
+    from rig.bench import read_bench
+
+    return catalogue(read_bench(bench_file).folders.effects)
+
+
+def asked(
+    data: str, model: str | None, bench_file: Path | None, tell: Callable[[str], None]
+) -> tuple[Table, Model, Mapping[str, Effect]]:
+    """The table, the model (by default that of its kind) and the effects; `tell` hears what a person should know.
+
+    Raises DataError, UnknownRun, ModelError, UnknownName.
+    """
+    effects = effects_of(bench_file)
+    chosen = read_model(model, effects) if model is not None else None
+    table = load(data, tell=tell)
+    if chosen is not None:
+        _check_unit(chosen, table)
+    if table.kind == "poses" and not correlation_known(table):
+        tell(
+            f"{table.source}: how the samples of a mean correlate is not known, and they are taken as independent; "
+            "scatter of the poses beyond that counts as noise. Give the constants filter_corner_hz and sample_rate_hz."
+        )
+    for why in filter(None, (earth_unknown(table), scatter.told(table))):
+        tell(f"{table.source}: {why}.")
+    return table, chosen or read_model(DEFAULTS.get(table.content, "linear"), effects), effects
+
+
+def blind(found: Fit, effects: Mapping[str, Effect]) -> str | None:
+    """The effects that the data cannot show beside the model, for which no verdict holds; None where it shows all."""
+    hidden, table = blind_to(found, effects), found.table
+    if not hidden:
+        return None
+    one = table.kind == "poses" and not np.ptp(table.column("alpha_deg"))
+    why = (
+        f" It holds one inclination only, alpha = {table.column('alpha_deg')[0]:g} deg; measure at others."
+        if one
+        else ""
+    )
+    return f"This data cannot show, beside {found.model.name}: {', '.join(hidden)}.{why}"
+
+
+def _check_unit(model: Model, table: Table) -> None:
+    """Values in counts say nothing of volts. Raises ModelError."""
+    fitted = any(term.estimates for term in model.terms)
+    ours, theirs = (UNITS.get(unit_of(unit), (unit,))[0] for unit in (model.unit, table.unit))
+    if fitted and ours and ours != theirs:
+        raise ModelError(
+            f"{model.name}: its values are for outputs in {model.unit}, and {table.source} is in {table.unit}; "
+            "take a model that was fitted to data in this unit, or a shipped one (`rig models`)"
+        )

@@ -1,0 +1,36 @@
+"""Where a result comes from: the program, the day, and what a model file says of its making."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import UTC, datetime
+from importlib.metadata import version
+
+from calibrations.fit import Fit
+from calibrations.model import Model
+
+
+def program() -> str:
+    """Name and version of this program, as results carry it."""
+    return f"inertial-rig {version('inertial-rig')}"
+
+
+def today() -> str:
+    """The date, for a page that a person reads."""
+    return datetime.now(UTC).date().isoformat()
+
+
+def with_provenance(found: Fit, parent: Model) -> Model:
+    """The fitted model, and what data, what model before it and what program it was made from."""
+    return replace(
+        found.model,
+        provenance={
+            "data": found.table.source,
+            "data_sha256": found.table.digest,
+            "rows": found.table.n,
+            "parent": parent.name,
+            "program": program(),
+            "created": datetime.now(UTC).isoformat(timespec="seconds"),
+            "excess": round(found.pooled_excess, 4),
+        },
+    )
