@@ -84,8 +84,9 @@ class Packets:
         numbers = np.concatenate([self._last, transactions])
         steps = np.mod(np.diff(numbers), 65536)
         if (gaps := np.flatnonzero(steps != 1)).size:
-            before = self._seen - len(self._last) + gaps[0]
-            raise StreamError(f"{self._name}: packets are missing after packet {before} of the record", REMEDY)
+            step, before = int(steps[gaps[0]]), self._seen - len(self._last) + gaps[0]
+            wrong = "are missing" if 1 < step < 32768 else "come twice or out of order"
+            raise StreamError(f"{self._name}: packets {wrong} after packet {before} of the record", REMEDY)
         self._last = numbers[-1:]
 
 

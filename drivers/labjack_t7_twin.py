@@ -116,6 +116,10 @@ class Stream:
         self._rest = samples[count * self.per_packet :]
         return self._pack(samples[: count * self.per_packet].reshape(count, self.per_packet))
 
+    def stand_still(self, seconds: float) -> None:
+        """All scans to come are so much later; nothing tells."""
+        self._start_ns += round(1e9 * seconds)
+
     def due_s(self) -> float:
         """When the next packet is full: at its last scan."""
         return self._time_s(-(-(self._packets + 1) * self.per_packet // self._channels) - 1)
@@ -151,6 +155,8 @@ class Converter:
     def advance(self, now_s: float) -> None:
         if self.faults.once("restart", now_s):
             self._restart()
+        if self._stream and (strike := self.faults.once("clock-step", now_s)):
+            self._stream.stand_still(strike.size)
         if self._stream and (packets := self._stream.packets_until(now_s)):
             self._send(spoilt(packets, self._stream.per_packet, self.faults, now_s) if self.faults else packets, now_s)
 

@@ -8,12 +8,13 @@ from typing import Any, Protocol
 
 from drivers.links.address import Address
 from drivers.links.faults import Faults, Kind
-from drivers.links.modbus_server import ILLEGAL_ADDRESS, Refusal, modbus_port
+from drivers.links.modbus_server import ILLEGAL_ADDRESS, MODBUS_FAULTS, Refusal, modbus_port
 from drivers.links.server import Server
 from drivers.omega_cn7500 import CONTROL_METHOD, PROCESS_VALUE, RUN_BIT, SET_POINT, Settings
 
 LISTEN = "pty:?baud=9600"
 FAULTS = {
+    **MODBUS_FAULTS,
     "lies": Kind("shows this much more", 100.0, "K"),
     "stale": Kind("shows and goes by the temperature that it had"),
     "no-temperature": Kind("shows the code of a fault", 0x8003),

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 from drivers import oriental_az_table as az
 from drivers.links.address import Address
 from drivers.links.faults import Faults, Kind
-from drivers.links.modbus_server import modbus_port
+from drivers.links.modbus_server import MODBUS_FAULTS, modbus_port
 from drivers.links.register import Register
 from drivers.links.server import Server
 from drivers.oriental_az import Settings
@@ -22,6 +22,7 @@ HOMING_DEG_S2 = 40.0
 IN_POSITION_DEG = 0.018  # the width of IN-POS around the command, +-
 THINKING_S = 0.003  # transmission waiting time of the drive
 FAULTS = {
+    **MODBUS_FAULTS,
     "alarm": Kind("stops with the alarm of this code, once", 0x30),
     "restart": Kind("is without power for a moment: stops, and does not know where it is any more, once"),
     "stuck": Kind("does not turn, and finds itself in position"),

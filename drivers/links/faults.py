@@ -5,8 +5,9 @@ A fault of the instrument itself is its twin's own: a twin module declares them 
 any looks into its `faults`.
 
 A fault begins at a time of the simulated clock or after so many requests, and lasts a time or a number of requests.
-Nothing about it is random, and what it has to remember is part of its server's state: a resumed run meets it as an
-undisturbed one would.
+With a `probability` it is there now and then: drawn from its `seed`, the time and the number of requests, so that the
+same run meets it at the same moments. What it has to remember is part of its server's state: a resumed run meets it
+as an undisturbed one would.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from random import Random
 from typing import Any, NamedTuple
 
 
@@ -21,7 +23,8 @@ from typing import Any, NamedTuple
 class Fault:
     """What goes wrong, from `at_s` on for `for_s`, and from the request after the first `after` on for `times` of them.
 
-    Times are the simulated clock's. None is for ever; a `size` of None is the usual one of its kind.
+    Times are the simulated clock's. None is for ever; a `size` of None is the usual one of its kind. Each time that it
+    could be there it is, with a `probability` of less than 1 only now and then, as the `seed` has it.
     Raises ValueError for a time or a number that cannot be.
     """
 
@@ -31,12 +34,23 @@ class Fault:
     after: int = 0
     times: int | None = None
     size: float | None = None
+    probability: float = 1.0
+    seed: int = 0
 
     def __post_init__(self) -> None:
         if not (0 <= self.at_s < math.inf and self.after >= 0):
             raise ValueError("at_s and after must not be negative")
         if (self.for_s is not None and not self.for_s > 0) or (self.times is not None and self.times < 1):
             raise ValueError("for_s and times must be positive")
+        if not 0 < self.probability <= 1:
+            raise ValueError("probability must be above 0, and at most 1")
+        if self.size is not None and not math.isfinite(self.size):
+            raise ValueError("size must be a number")
+
+    def happens(self, *moment: float) -> bool:
+        """Whether it is there at this moment, as its probability has it."""
+        draw = f"{self.what} {self.seed} {moment}"
+        return self.probability == 1 or Random(draw).random() < self.probability  # noqa: S311 - nothing is secret
 
     def has_begun(self, now_s: float, asked: int) -> bool:
         """Whether it is there by `now_s`, when its instrument has been asked `asked` times."""
@@ -50,11 +64,22 @@ class Fault:
 
 @dataclass(frozen=True)
 class Kind:
-    """A fault that can be asked for: what it does, its usual size, and what that is a size of."""
+    """A fault that can be asked for: what it does, its usual size, what that is a size of, and the least size."""
 
     doc: str
     size: float = 0.0
     unit: str = ""
+    least: float = -math.inf
+
+    def refusal(self, size: float | None) -> str | None:
+        """Why it cannot have this size; None where it can."""
+        if size is None or (self.size and size >= self.least):
+            return None
+        return (
+            f"must be at least {self.least:g} {self.unit}".rstrip()
+            if self.size
+            else "this fault has no size; remove it"
+        )
 
 
 class Strike(NamedTuple):
@@ -84,14 +109,16 @@ class Faults:
     def size(self, what: str, now_s: float) -> float | None:
         """The size of a fault that is there now; None where it is not."""
         for fault, size in self._faults:
-            if fault.what == what and fault.has_begun(now_s, self._asked) and not fault.has_ended(now_s, self._asked):
+            there = fault.has_begun(now_s, self._asked) and not fault.has_ended(now_s, self._asked)
+            if fault.what == what and there and fault.happens(now_s, self._asked):
                 return size
         return None
 
     def once(self, what: str, now_s: float) -> Strike | None:
         """A fault that has begun and has not been told yet."""
         for k, (fault, size) in enumerate(self._faults):
-            if fault.what == what and k not in self._struck and fault.has_begun(now_s, self._asked):
+            begun = k not in self._struck and fault.has_begun(now_s, self._asked)
+            if fault.what == what and begun and fault.happens(self._asked):
                 self._struck.append(k)
                 return Strike(size, now_s if fault.after else fault.at_s)
         return None

@@ -14,10 +14,12 @@ from pymodbus.pdu import DecodePDU, ExceptionResponse, ModbusPDU
 from pymodbus.pdu import bit_message as bits
 from pymodbus.pdu import register_message as words
 
+from drivers.links.faults import Faults, Kind
 from drivers.links.server import Connection, Port
 from drivers.links.url import Url
 from drivers.links.wire_faults import Wire
 
+MODBUS_FAULTS = {"exception": Kind("declines whatever it is asked with this exception", 4, least=1)}
 ILLEGAL_FUNCTION, ILLEGAL_ADDRESS, ILLEGAL_VALUE, DEVICE_FAILURE = 1, 2, 3, 4
 
 
@@ -32,6 +34,7 @@ class Refusal(Exception):
 class Device(Protocol):
     """A unit's registers. Raises Refusal for what it does not have."""
 
+    faults: Faults
     functions: frozenset[int]  # the Modbus functions it knows: no other is asked of it
     thinking_s: float  # from the end of a request to the start of its answer
 
@@ -109,6 +112,8 @@ class Responder:
 
 def respond(device: Device, request: ModbusPDU, now_s: float) -> ModbusPDU:
     """The device's answer, an exception answer included."""
+    if (code := device.faults.size("exception", now_s)) is not None:
+        return ExceptionResponse(request.function_code, int(code))
     handler = HANDLERS.get(request.function_code)
     if handler is None or request.function_code not in device.functions:
         return ExceptionResponse(request.function_code, ILLEGAL_FUNCTION)

@@ -82,8 +82,11 @@ class Connection:
     def send(self, data: bytes, due_s: float) -> None:
         """Send `data` at `due_s`, after all that was sent before; a fault of the wire may make it other data, later."""
         self._last_s = max(self._last_s, due_s)
-        for said in self._leaving(Said(data, self._last_s)):
-            heapq.heappush(self._outbox, (said.due_s, next(self._order), said.data))
+        pieces = list(self._leaving(Said(data, self._last_s)))
+        for piece in pieces:
+            heapq.heappush(self._outbox, (piece.due_s, next(self._order), piece.data))
+        if pieces and b"".join(piece.data for piece in pieces) == data:  # what is only late is not overtaken
+            self._last_s = pieces[-1].due_s
 
     def emit(self, now_s: float) -> None:
         """Write what is due, as far as the kernel takes it."""

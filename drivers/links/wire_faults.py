@@ -18,6 +18,7 @@ from drivers.links.person import PERSON
 
 MENDED_S = 0.2  # until TCP sends a spoilt segment again
 BABBLE_S = 60.0  # how long it babbles for one message
+MOST_PIECES = 1000  # of a message
 
 
 class Said(NamedTuple):
@@ -64,6 +65,33 @@ def babble(said: Said, size: float, wire: Wire) -> list[Said]:
     return [Said(long.data[k : k + 1], said.due_s + k * size) for k in range(len(long.data))]
 
 
+def truncated(said: Said, size: float, _wire: Wire) -> list[Said]:
+    """The first `size` bytes of it."""
+    return [Said(said.data[: int(size)], said.due_s)]
+
+
+def merged(said: Said, _size: float, _wire: Wire) -> list[Said]:
+    """The message and its copy in one piece."""
+    return [Said(2 * said.data, said.due_s)]
+
+
+def trickled(said: Said, size: float, _wire: Wire) -> list[Said]:
+    """Byte by byte, one every `size` s; a long one in MOST_PIECES equal pieces."""
+    step = -(-len(said.data) // MOST_PIECES)
+    starts = range(0, len(said.data), step)
+    return [Said(said.data[k : k + step], said.due_s + place * size) for place, k in enumerate(starts)]
+
+
+def after_noise(said: Said, size: float, wire: Wire) -> list[Said]:
+    """The message behind so many other bytes, in one piece."""
+    return [Said(noise(said, size, wire)[0].data + said.data, said.due_s)]
+
+
+def before_noise(said: Said, size: float, wire: Wire) -> list[Said]:
+    """The message before so many other bytes, in one piece."""
+    return [Said(said.data + noise(said, size, wire)[0].data, said.due_s)]
+
+
 def flipped(said: Said, size: float, wire: Wire) -> list[Said]:
     """One bit turned over; on TCP the segment comes again."""
     if wire.mends:
@@ -81,12 +109,20 @@ def other_unit(said: Said, size: float, wire: Wire) -> list[Said]:
 
 EFFECTS: dict[str, tuple[Kind, Effect]] = {
     "silence": (Kind("hears nothing and says nothing, as with a cable that is out"), nothing),
-    "disconnect": (Kind("the connection is closed as soon as it is asked"), nothing),
+    "disconnect": (Kind("the connection is closed as soon as it is asked; it can be opened again"), nothing),
     "lost-answers": (Kind("hears and obeys, but nothing that it says arrives"), nothing),
-    "delay": (Kind("all that it says comes later", 0.7, "s"), later),
-    "garbage": (Kind("says noise in place of what it should", 8, "byte"), noise),
-    "babble": (Kind("for each thing that it should say, a minute of noise, a byte each interval", 0.01, "s"), babble),
-    "flipped-bit": (Kind("the bit of this number is turned over in all that it says; TCP mends it", 13), flipped),
+    "delay": (Kind("all that it says comes later", 0.7, "s", least=0), later),
+    "garbage": (Kind("says noise in place of what it should", 8, "byte", least=1), noise),
+    "garbage-before": (Kind("so much noise comes before what it says", 3, "byte", least=1), after_noise),
+    "garbage-after": (Kind("so much noise comes after what it says", 3, "byte", least=1), before_noise),
+    "babble": (
+        Kind("for each thing that it should say, a minute of noise, a byte each interval", 0.01, "s", least=0.001),
+        babble,
+    ),
+    "truncated": (Kind("only the first bytes of what it says arrive", 4, "byte", least=1), truncated),
+    "merged": (Kind("what it says comes together with a copy of it"), merged),
+    "trickle": (Kind("what it says comes byte by byte, at this interval", 0.002, "s", least=0), trickled),
+    "flipped-bit": (Kind("this bit is turned over in all that it says; TCP mends it", 13, "bit", least=0), flipped),
     "wrong-unit": (Kind("another unit answers, whose number is larger by this", 1), other_unit),
 }
 

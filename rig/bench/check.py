@@ -58,6 +58,8 @@ def _check_faults(key: str, instrument: Instrument) -> None:
     for k, fault in enumerate(instrument.faults):
         if fault.what not in (kinds := kinds_of(instrument.driver)):
             raise BenchError(f"{key}.{k}.what: no fault {fault.what!r}.{did_you_mean(fault.what, kinds)}")
+        if refusal := kinds[fault.what].refusal(fault.size):
+            raise BenchError(f"{key}.{k}.size: {refusal}")
 
 
 def _check_worlds(bench: Bench, path: Path) -> None:

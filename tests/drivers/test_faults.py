@@ -41,7 +41,13 @@ def test_a_fault_has_its_time(fault: Fault, there: list[Any], not_there: list[An
         assert is_there == ((now_s, asked) in there), (now_s, asked)
 
 
-@pytest.mark.parametrize("wrong", [{"at_s": -1.0}, {"at_s": float("nan")}, {"after": -1}, {"for_s": 0.0}, {"times": 0}])
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"at_s": -1.0}, {"at_s": float("nan")}, {"after": -1}, {"for_s": 0.0}, {"times": 0},
+        {"probability": 0.0}, {"probability": 1.5}, {"size": float("nan")},
+    ],
+)  # fmt: skip
 def test_a_time_that_cannot_be_is_refused(wrong: dict[str, Any]) -> None:
     with pytest.raises(ValueError, match="must"):
         Fault("x", **wrong)
@@ -54,6 +60,39 @@ def test_what_happens_once_happens_once_and_what_is_held_is_let_go() -> None:
     assert faults.once("alarm", 7.0) is None
     assert [faults.held("stuck", t, t) for t in (1.0, 2.5, 3.5, 4.5)] == [1.0, 2.5, 2.5, 4.5]
     assert [faults.size("stuck", t) for t in (1.0, 3.0)] == [None, 7.0]
+
+
+def test_a_fault_with_a_probability_is_there_now_and_then_and_at_the_same_moments_again() -> None:
+    def there(seed: int) -> list[bool]:
+        faults = Faults([Fault("stuck", probability=0.3, seed=seed)], KINDS)
+        return [faults.size("stuck", 0.1 * k) is not None for k in range(1000)]
+
+    assert 250 < sum(there(1)) < 350
+    assert there(1) == there(1) != there(2)
+
+
+def test_what_happens_once_with_a_probability_is_drawn_at_each_request() -> None:
+    faults = Faults([Fault("alarm", probability=0.1, seed=3)], KINDS)
+    struck = 0
+    for asked in range(1, 200):
+        faults.asked()
+        assert [faults.once("alarm", 0.01 * k) for k in range(50)].count(None) >= 49  # however often it is looked at
+        struck = struck or (asked if faults.state()["struck"] else 0)
+    assert 1 < struck < 60
+
+
+@pytest.mark.parametrize(
+    ("kind", "size", "said"),
+    [
+        (Kind("x", 8, "byte", least=1), 0, "must be at least 1 byte"),
+        (Kind("x", 8, "byte", least=1), 1, None),
+        (Kind("x", 1.0, "deg"), -3.0, None),
+        (Kind("x"), 2.0, "this fault has no size; remove it"),
+        (Kind("x"), None, None),
+    ],
+)
+def test_a_size_that_a_fault_cannot_have(kind: Kind, size: float | None, said: str | None) -> None:
+    assert kind.refusal(size) == said
 
 
 def test_what_faults_remember_goes_on() -> None:
@@ -79,6 +118,9 @@ def test_a_fault_that_a_twin_cannot_have_is_refused() -> None:
         ("silence", RTU, []),
         ("lost-answers", RTU, []),
         ("delay", RTU, [(ANSWER, 1.7)]),
+        ("truncated", RTU, [(ANSWER[:4], 1.0)]),
+        ("merged", RTU, [(2 * ANSWER, 1.0)]),
+        ("trickle", RTU, [(ANSWER[k : k + 1], 1.0 + 0.002 * k) for k in range(len(ANSWER))]),
         ("flipped-bit", RTU, [(bytes.fromhex("01230400000000FA33"), 1.0)]),
         ("flipped-bit", TCP, [(ANSWER, 1.2)]),  # the kernel mends it
         ("wrong-unit", RTU, [(bytes.fromhex("02030400000000C933"), 1.0)]),  # with a checksum that is right
@@ -94,6 +136,55 @@ def test_noise_is_the_same_every_time() -> None:
     (noise,) = disturbed(Said(ANSWER, 1.0), faults, RTU)
     assert (len(noise.data), noise.due_s) == (5, 1.0)
     assert disturbed(Said(ANSWER, 1.0), faults, RTU) == [noise]
+
+
+def test_noise_stands_before_or_after_what_is_said() -> None:
+    (before,) = disturbed(Said(ANSWER, 1.0), faults_of("oriental_az", [Fault("garbage-before")]), RTU)
+    (after,) = disturbed(Said(ANSWER, 1.0), faults_of("oriental_az", [Fault("garbage-after")]), RTU)
+    assert (before.data[3:], after.data[:-3], len(before.data)) == (ANSWER, ANSWER, len(ANSWER) + 3)
+
+
+def test_a_long_message_trickles_in_at_most_a_thousand_pieces() -> None:
+    pieces = disturbed(Said(bytes(32768), 0.0), faults_of("labjack_t7", [Fault("trickle")]), TCP)
+    assert len(pieces) <= 1000
+    assert b"".join(piece.data for piece in pieces) == bytes(32768)
+
+
+@pytest.mark.parametrize("name", ["oriental_az", "labjack_t7", "omega_cn7500"])
+def test_an_exception_is_told_with_its_number(afflicted: Callable[..., Any], name: str) -> None:
+    instrument, _ = afflicted(name, Fault("exception", size=6))
+    with pytest.raises(Refused, match=r"alpha: .*exception 6, it is busy. Wait until it has finished") as refused:
+        instrument.identify()
+    assert refused.value.code == 6
+
+
+@pytest.mark.parametrize(
+    ("name", "what"),
+    [
+        *((name, what) for name in ("oriental_az", "omega_cn7500") for what in ("merged", "trickle", "garbage-after")),
+        ("dpg2", "trickle"), ("labjack_t7", "trickle"), ("pi_e727", "trickle"),
+    ],
+)  # fmt: skip
+def test_what_can_still_be_read_is_read(afflicted: Callable[..., Any], name: str, what: str) -> None:
+    """On a line with checksums, or of whole lines of text, an answer that is not spoilt is the answer."""
+    instrument, _ = afflicted(name, Fault(what))
+    assert instrument.identify().model
+
+
+STREAMS = [
+    ("duplicated-packet", "alpha: packets come twice or out of order after packet 1 of the record"),
+    ("swapped-packets", "alpha: packets are missing after packet 0 of the record"),
+    ("lost-packet", "alpha: packets are missing after packet 0 of the record"),
+    ("clock-step", r"alpha: scans came 0\.50 s later than the rate of the stream says. Find out whether its clock"),
+]
+
+
+@pytest.mark.parametrize(("what", "said"), STREAMS)
+def test_a_stream_that_is_not_what_it_should_be(afflicted: Callable[..., Any], what: str, said: str) -> None:
+    converter, clock = afflicted("labjack_t7", Fault(what, at_s=0.5))
+    clock.sleep(0.4)
+    with pytest.raises(StreamError, match=said):
+        converter.acquire(3.0)
 
 
 def test_faults_add_up() -> None:

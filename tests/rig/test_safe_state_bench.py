@@ -35,6 +35,9 @@ def with_faults(role: str, *faults: dict[str, Any], **part: Any) -> dict[str, ob
         ),
         ("alpha", {"at_s": 3}, "key instruments.alpha.faults.0.what: is missing"),
         ("alpha", {"what": "alarm", "at_s": -1}, "at_s and after must not be negative"),
+        ("alpha", {"what": "alarm", "probability": 2}, "probability must be above 0, and at most 1"),
+        ("oven", {"what": "garbage", "size": 0}, "key instruments.oven.faults.0.size: must be at least 1 byte"),
+        ("oven", {"what": "silence", "size": 3}, "faults.0.size: this fault has no size; remove it"),
     ],
 )
 def test_a_fault_that_cannot_be_is_refused(
