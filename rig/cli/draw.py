@@ -39,8 +39,8 @@ def command(alpha: float, beta: float, mount: float, flip: int, out: Path | None
 
     Without --out, a sketch of the table in the terminal.
     """
-    from rig.cli.asked import write_whole
     from rig.drawings import Attitude, page, sketch
+    from rig.files import write_whole
 
     attitude = Attitude(alpha, beta, mount, flip)
     if out is not None:

@@ -22,10 +22,10 @@ from procedures.errors import BadAnswer, Declined, NoAnswer
 from procedures.questions import Choice, Question
 from procedures.session import Reading
 from rig.bench import Bench
-from rig.cli.asked import write_whole
 from rig.cli.before import before, drawn, free_bytes, mounting
 from rig.cli.screen import Seen, screen
 from rig.drawings import Attitude, drawing_of, page
+from rig.files import write_whole
 from rig.home import home
 from rig.plan import Plan
 from rig.record import Kept

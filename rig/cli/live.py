@@ -18,10 +18,11 @@ from procedures.catalogue import find
 from procedures.settings import parse
 from rig.asked import effects_of
 from rig.bench import Bench, read_bench
-from rig.cli.asked import require_out, write_model
+from rig.cli.asked import write_model
 from rig.cli.output import duration, emit, note, notes
 from rig.cli.watch import watching
 from rig.cli.words import discovery, parameters, warning
+from rig.files import require_out
 from rig.live import FIRST, STANDARD, Live, Measurement, stands
 from rig.record import Record
 from rig.record.measured import Measured

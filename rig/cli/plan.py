@@ -119,7 +119,7 @@ def _optimal(bench: Bench, procedure: Procedure, settings: Mapping[str, Any], as
 
 
 def _write_poses(out: Path, planned: Plan) -> None:
-    from rig.cli.asked import write_whole
+    from rig.files import write_whole
 
     write_whole(out, "\n".join([*written(held.pose for held in planned.held), ""]))
 

@@ -35,7 +35,7 @@ def command(
     if out is None and folder is None:
         raise click.UsageError("nothing to write: give --out FILE.html, --pictures FOLDER, or both")
     from calibrations.pictures.save import save_all
-    from rig.cli.asked import write_whole
+    from rig.files import write_whole
     from rig.provenance import program, today
 
     asked_for = night_of(data, today(), program()) if model is None else None
