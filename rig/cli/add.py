@@ -12,7 +12,6 @@ import click
 from rig.cli.output import bench_option, emit, json_option, note, notes
 
 if TYPE_CHECKING:
-    from calibrations.discover import Discovery
     from calibrations.effect import Effect
     from calibrations.table import Table
 
@@ -42,6 +41,7 @@ def command(
     from calibrations.errors import ModelError
     from rig.cli.asked import asked, write_model
     from rig.cli.words import addition, parameters, warning
+    from rig.trail import require_new
 
     table, start, effects = asked(data, model, bench_file, out)
     chosen = _chosen(effect, name, table, effects)
@@ -51,7 +51,7 @@ def command(
         raise ModelError(f"{chosen.name} {why}; {table.source} is a table of {table.kind}: {', '.join(table.columns)}")
     result = add(chosen, start, table, {**effects, chosen.name: chosen})
     if chosen.expression:
-        _check_new(result, chosen.name, model)
+        require_new(result.end, chosen.name, model)
     write_model(result.end, start, out)
     if as_json:
         emit(discovery_document(result, str(out)))
@@ -81,16 +81,3 @@ def _chosen(effect: str, name: str | None, table: Table, effects: Mapping[str, E
     if effect not in effects and not PLAIN.fullmatch(effect):
         raise ModelError(f'"{effect}" is no name of an effect; if it is an expression, name it: --name my-effect')
     return find(effect, effects)
-
-
-def _check_new(result: Discovery, name: str, model: str) -> None:
-    """An expression has to add something. Raises ModelError."""
-    from calibrations.errors import ModelError
-
-    estimates = next(term.estimates for term in result.end.model.terms if term.name == name)
-    if all(e.std is None for e in estimates):
-        e = estimates[0]
-        raise ModelError(
-            f"{name} adds nothing that {model} does not have: {e.name}{f' of {e.axis}' if e.axis else ''}: {e.why}; "
-            "nothing was written"
-        )
