@@ -11,6 +11,7 @@
     ├── InstrumentError    the instrument
     │   ├── StageAlarm     the drive stands still with an alarm
     │   ├── StageLost      the stage does not know where it is any more
+    │   ├── Interlocked    an emergency stop or a guard is open, or a limit of the drive itself is not the one set
     │   ├── NotSettled     the stage did not arrive
     │   ├── StreamError    scans were lost, or packets are not what was asked for
     │   ├── OverRange      the converter was at an end of its range
@@ -79,6 +80,12 @@ class StageAlarm(InstrumentError):
 
 class StageLost(InstrumentError):
     """The stage has lost its coordinates; it is not moved blindly."""
+
+
+class Interlocked(InstrumentError):
+    """What keeps the rig safe says no: an open contact, a stop input, a limit that the drive has not taken."""
+
+    exit_status = 4  # a safety limit
 
 
 class NotSettled(InstrumentError):

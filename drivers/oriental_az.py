@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from drivers import oriental_az_table as az
-from drivers.errors import LimitError, NotSettled, StageAlarm, StageLost
+from drivers.errors import Interlocked, LimitError, NotSettled, StageAlarm, StageLost
 from drivers.instrument import Check, Identity
 from drivers.links import Address, Links
 from drivers.links.modbus import Unit
@@ -22,6 +22,7 @@ POLL_S = 0.02
 PATIENCE_S = 2.0  # beyond the expected end of a move
 HOMING_S = 120.0  # a full turn at a drive's slowest usual homing speed
 STOPPING_S = 10.0
+READY_S = 0.5  # for a drive to be ready again after a move [M]
 BEATS = 4  # in a communication time-out, so that one lost answer is no silence
 WARM_C = 85.0  # the drive's own alarm limit [M]
 
@@ -33,6 +34,9 @@ class Settings:
     With a `communication_timeout_s`, the drive stops by itself (alarm 85) when its controller falls silent for so long
     in the middle of a move; 0 is off. It is off unless the bench file sets it, since the address of the drive's
     parameter "Communication timeout (Modbus)", which counts ms, is from memory [M]: look it up first.
+
+    With `own_limits`, `limits_deg` are written into the drive as its software limits and read back, before the first
+    move: it brakes there by itself, whoever sent it. Off unless the bench file sets it, for the same reason.
 
     Raises ValueError for what no stage can be.
     """
@@ -46,6 +50,7 @@ class Settings:
     current_percent: float = 100.0
     communication_timeout_s: float = 0.0
     communication_timeout_register: int = 0x138A  # [M]
+    own_limits: bool = False
 
     def __post_init__(self) -> None:
         positive = ("steps_per_turn", "speed_deg_s", "acceleration_deg_s2", "settle_deg", "current_percent")
@@ -80,6 +85,7 @@ class RotaryStage:
         self._unit, self._clock = unit, links.clock
         self._target_deg = math.nan
         self._expected_end_s = 0.0
+        self._limited = not settings.own_limits  # whether the drive has its limits, where it is to have them
 
     def identify(self) -> Identity:
         """The drive has no register that names it: that it answers is all there is to know."""
@@ -131,11 +137,13 @@ class RotaryStage:
         """Start turning to `angle_deg` and return at once; False where it stands there already.
 
         With a communication time-out, `wait` must follow within it. Raises LimitError before anything is sent,
-        StageAlarm, StageLost.
+        StageAlarm, StageLost, Interlocked.
         """
         self._require_within_limits(angle_deg)
         outputs = self._status()
         self._require_coordinates(outputs)
+        self._require_ready(outputs)
+        self._limit()
         distance_deg = abs(angle_deg - self.angle_deg())
         self._target_deg, self._expected_end_s = angle_deg, self._clock.now()
         if _stands(outputs, az.IN_POSITION) and distance_deg < 180 / self.settings.steps_per_turn:
@@ -148,9 +156,14 @@ class RotaryStage:
         return True
 
     def wait(self) -> None:
-        """Return when the move that was started has ended where it should. Raises StageAlarm, NotSettled."""
+        """Return when the move that was started has ended where it should.
+
+        Raises StageAlarm, StageLost, Interlocked, NotSettled.
+        """
         self._until_expected_end()
-        self._require_coordinates(self._poll_until(az.IN_POSITION, PATIENCE_S, "is still moving, or not in position,"))
+        outputs = self._poll_until(az.IN_POSITION, PATIENCE_S, "is still moving, or not in position,")
+        self._require_coordinates(outputs)
+        self._require_ready(outputs)
         self._watch(False)
         angle = self.angle_deg()
         if abs(angle - self._target_deg) > self.settings.settle_deg:
@@ -161,12 +174,17 @@ class RotaryStage:
             )
 
     def require_steady(self) -> None:
-        """Raises StageAlarm, StageLost or NotSettled where it does not stand in position any more."""
+        """Raises StageAlarm, StageLost, Interlocked or NotSettled where it does not stand in position any more."""
         outputs = self._status()
         self._require_coordinates(outputs)
         if not _stands(outputs, az.IN_POSITION):
             remedy = "Find out what moves it: the load's balance, a hand, the drive's current; then resume the run"
             raise NotSettled(f"{self.name}: has not stood still", remedy)
+        self._require_ready(outputs)
+
+    def look(self) -> None:
+        """Raises StageAlarm: what others do not wait for, while they wait."""
+        self._status()
 
     def halt(self) -> None:
         """Let it brake, whatever it is doing, and return at once; `stop` must follow."""
@@ -204,6 +222,34 @@ class RotaryStage:
                 f"{self.name}: does not know where it is, and is not sent anywhere",
                 "Find out whether it was without power or was stopped while homing; it is homed when the run resumes",
             )
+
+    def _require_ready(self, outputs: int) -> None:
+        """A drive that stands without an alarm and yet is not ready is kept from moving."""
+        deadline = self._clock.now() + READY_S
+        while not outputs & az.READY:
+            if self._clock.now() >= deadline:
+                raise Interlocked(
+                    f"{self.name}: stands without an alarm and is not ready to move: its stop input is on, "
+                    "or its motor is without current",
+                    "Pull out the emergency stop and close the guards; when nobody is near, resume the run",
+                )
+            self._clock.sleep(POLL_S)
+            outputs = self._status()
+
+    def _limit(self) -> None:
+        """Have the drive keep the limits too, once; what it does not take is found when it is read back."""
+        if self._limited:
+            return
+        low, high = (round(deg * self.settings.steps_per_turn / 360) for deg in self.settings.limits_deg)
+        wanted = (az.BRAKE_AND_ALARM, high, low)
+        self._unit.write_block(*zip(az.OWN_LIMITS, wanted, strict=True))
+        if (found := self._unit.read_block(*az.OWN_LIMITS)) != list(wanted):
+            told = ", ".join(f"{value:g} in {register}" for register, value in zip(az.OWN_LIMITS, found, strict=True))
+            raise Interlocked(
+                f"{self.name}: has not taken its own limits of {low} .. {high} steps: it shows {told}",
+                "Compare the addresses with the drive's manual, or take own_limits out of the bench file",
+            )
+        self._limited = True
 
     def _require_no_alarm(self, alarm: Alarm | None) -> None:
         if alarm is not None:

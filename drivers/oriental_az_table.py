@@ -30,6 +30,13 @@ HOME_END = 1 << 4  # [M] on while coordinates are set
 READY, ALARM_ON, BUSY = (1 << bit for bit in (5, 7, 8))
 MOVE, IN_POSITION = (1 << bit for bit in (13, 14))
 
+# The drive's own limits; steps. Addresses are those of the same maker's CVD drives, for the AZ they are [M].
+OVERTRAVEL = Register(0x0386, "int32", "action at a software limit")
+BRAKE_AND_ALARM = 3  # [M] brake, then alarm 67
+HIGH_LIMIT = Register(0x0388, "int32", "positive software limit", "step")
+LOW_LIMIT = Register(0x038A, "int32", "negative software limit", "step")
+OWN_LIMITS = (OVERTRAVEL, HIGH_LIMIT, LOW_LIMIT)
+
 # Monitors.
 ALARM = Register(0x0080, "uint32", "present alarm")
 COMMUNICATION_ERROR = Register(0x00AC, "uint32", "present communication error")
@@ -59,6 +66,7 @@ class Alarm:
 
 COORDINATES_NOT_SET = 0x4A
 COMMUNICATION_TIMEOUT = 0x85
+SOFTWARE_OVERTRAVEL = 0x67
 BAD_OPERATION_DATA = 0x70
 _LIMITS = "Turn the stage by hand away from its limit, then home it"
 _POWER = "Switch the drive's power off, wait a minute and switch it on; if it returns, have the drive serviced"
@@ -78,7 +86,7 @@ _WORDS: dict[int, tuple[str, str]] = {
     0x63: ("no home position found", "Check the home sensor, then home again"),
     0x64: ("home, timing or slit signal missing", "Check the home sensor, then home again"),
     0x66: ("hardware overtravel", _LIMITS),
-    0x67: ("software overtravel", _LIMITS),
+    SOFTWARE_OVERTRAVEL: ("software overtravel", _LIMITS),
     BAD_OPERATION_DATA: ("bad operation data", "Check speed and acceleration in the bench file"),
     0x84: ("RS-485 communication error", "Check shielding, termination, baud rate and parity of the line"),
     COMMUNICATION_TIMEOUT: (

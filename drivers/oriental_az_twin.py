@@ -26,6 +26,7 @@ FAULTS = {
     "alarm": Kind("stops with the alarm of this code, once", 0x30),
     "restart": Kind("is without power for a moment: stops, and does not know where it is any more, once"),
     "stuck": Kind("does not turn, and finds itself in position"),
+    "e-stop": Kind("its stop input is on: it brakes, and does not start"),
     "busy": Kind("says that it moves, whatever it does"),
     "lies": Kind("shows a position that is off by this", 1.0, "deg"),
 }
@@ -55,7 +56,7 @@ class Drive:
         self._plan = at_rest(world.motor_angle_deg(axis))
         self._words: dict[int, int] = {}
         self._alarm = 0
-        self._referenced = self._homing = False
+        self._referenced = self._homing = self._beyond = False
         self._timeout = settings.communication_timeout
         self._heard_s = 0.0
 
@@ -67,6 +68,10 @@ class Drive:
         timeout_s = self._value(self._timeout)
         if timeout_s and now_s > self._heard_s + timeout_s and not self._alarm:
             self._fail(az.COMMUNICATION_TIMEOUT, self._heard_s + timeout_s)
+        if self._beyond and now_s >= self._plan.end_s:
+            self._fail(az.SOFTWARE_OVERTRAVEL, self._plan.end_s)
+        if strike := self.faults.once("e-stop", now_s):
+            self._follow(self._plan.stopped(max(strike.at_s, self._plan.start_s)))
         if strike := self.faults.once("alarm", now_s):
             self._fail(int(strike.size), strike.at_s)
         if strike := self.faults.once("restart", now_s):
@@ -82,6 +87,7 @@ class Drive:
             "plan": asdict(self._plan),
             "referenced": self._referenced,
             "homing": self._homing,
+            "beyond": self._beyond,
             "heard_s": self._heard_s,
             "words": [[address, word] for address, word in self._words.items()],
         }
@@ -90,6 +96,7 @@ class Drive:
         """Without its alarm: who goes on with a run has reset it."""
         self._plan = Trajectory(**state["plan"])
         self._alarm, self._referenced, self._homing = 0, state["referenced"], state["homing"]
+        self._beyond = state.get("beyond", False)  # states of before there were limits
         self._heard_s, self._words = state["heard_s"], dict(state["words"])
 
     def read_words(self, address: int, count: int, now_s: float) -> list[int]:
@@ -137,7 +144,7 @@ class Drive:
         near = abs(self._world.motor_angle_deg(self._axis) - self._plan.angle_deg(now_s)) <= IN_POSITION_DEG
         return (
             az.HOME_END * self._referenced
-            | az.READY * (not moving and not self._alarm)
+            | az.READY * (not moving and not self._alarm and not self._held(now_s))
             | az.ALARM_ON * (self._alarm != 0)
             | az.MOVE * moving
             | az.IN_POSITION * (near and not moving)
@@ -146,7 +153,7 @@ class Drive:
     def _inputs(self, rising: int, now_s: float) -> None:
         if rising & az.STOP:
             self._follow(self._plan.stopped(now_s))
-        elif rising & az.ZHOME and not self._alarm:
+        elif rising & az.ZHOME and not self._alarm and not self._held(now_s):
             self._homing, self._referenced = True, False
             self._turn(Trajectory(now_s, self._angle_deg(), 0.0, HOMING_DEG_S, HOMING_DEG_S2))
         elif rising & az.ALARM_RESET:
@@ -164,7 +171,7 @@ class Drive:
 
     def _start(self, now_s: float) -> None:
         """Begin the move of the direct data; what is not allowed raises the drive's alarm."""
-        if self._alarm or self._words.get(az.INPUTS.address, 0) & az.STOP:
+        if self._alarm or self._held(now_s) or self._words.get(az.INPUTS.address, 0) & az.STOP:
             return
         kind = int(self._value(az.TYPE))
         speed, rate = (self._value(r) / self._steps_per_deg for r in (az.SPEED, az.ACCELERATION))
@@ -179,7 +186,20 @@ class Drive:
             self._fail(az.COORDINATES_NOT_SET, now_s)
         else:
             target = origins[kind]() + self._value(az.POSITION) / self._steps_per_deg
-            self._turn(Trajectory(now_s, self._angle_deg(), target, speed, rate))
+            within = self._within(target)
+            self._turn(Trajectory(now_s, self._angle_deg(), within, speed, rate))
+            self._beyond = within != target
+
+    def _within(self, target_deg: float) -> float:
+        """The target, or the drive's own limit before it; limits are kept once coordinates and an action are set."""
+        if not self._referenced or self._value(az.OVERTRAVEL) != az.BRAKE_AND_ALARM:
+            return target_deg
+        low, high = (self._value(limit) / self._steps_per_deg for limit in (az.LOW_LIMIT, az.HIGH_LIMIT))
+        return min(max(target_deg, low), high)
+
+    def _held(self, now_s: float) -> bool:
+        """Whether the stop input is on."""
+        return self.faults.size("e-stop", now_s) is not None
 
     def _fail(self, code: int, at_s: float) -> None:
         self._alarm = code
@@ -190,7 +210,7 @@ class Drive:
             self._follow(way)
 
     def _follow(self, plan: Trajectory) -> None:
-        self._plan = plan
+        self._plan, self._beyond = plan, False
         self._world.move_stage(self._axis, plan)
 
     def _angle_deg(self) -> float:

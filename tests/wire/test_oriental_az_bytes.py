@@ -10,7 +10,7 @@ import pytest
 
 from drivers import oriental_az
 from drivers.clock import SimulatedClock
-from drivers.errors import LimitError, NotSettled, StageAlarm, StageLost
+from drivers.errors import Interlocked, LimitError, NotSettled, StageAlarm, StageLost
 from drivers.links import Address, Links
 from drivers.oriental_az import RotaryStage, Settings
 
@@ -145,3 +145,33 @@ def test_whether_it_is_referenced(stage: Stages) -> None:
     drive = stage([(ask, "01 03 02 40 30 89 90"), (ask, "01 03 02 00 20 B9 9C")])
     assert drive.referenced()
     assert not drive.referenced()
+
+
+LIMITS = (
+    "01 10 03 86 00 06 0C "  # 6 registers from 0386
+    "00 00 00 03 "  # brake, then alarm
+    "00 00 27 10 "  # 10000 steps, 100 deg
+    "FF FF DC D8 "  # -9000 steps, -90 deg
+    "93 7F"
+)
+SET_LIMITS = (LIMITS, "01 10 03 86 00 06 A1 A6")
+ASK_LIMITS = "01 03 03 86 00 06 24 65"
+KEPT = "01 03 0C 00 00 00 03 00 00 27 10 FF FF DC D8 18 2A"
+NOT_KEPT = "01 03 0C 00 00 00 03 00 00 00 00 00 00 00 00 87 80"
+
+
+def limited(script: Callable[..., Address], links: Links, answer: str, *more: tuple[str, str]) -> RotaryStage:
+    """A stage that is about to begin its first move."""
+    exchanges = [(ASK_STATUS, HOMED), SET_LIMITS, (ASK_LIMITS, answer), *more]
+    return oriental_az.connect(script(exchanges), links, dataclasses.replace(SETTINGS, own_limits=True), "alpha")
+
+
+def test_the_drives_own_limits_are_written_and_read_back_before_the_first_move(
+    script: Callable[..., Address], links: Links
+) -> None:
+    assert limited(script, links, KEPT, *START[1:]).start(85.0)
+
+
+def test_limits_that_are_not_kept_let_nothing_move(script: Callable[..., Address], links: Links) -> None:
+    with pytest.raises(Interlocked, match="it shows 3 in register 0x0386"):
+        limited(script, links, NOT_KEPT).start(85.0)

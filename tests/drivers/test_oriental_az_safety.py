@@ -1,0 +1,101 @@
+"""What keeps a stage safe beside its driver: the drive's own limits, its stop input, its watch over the controller."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from drivers import oriental_az, oriental_az_twin
+from drivers.clock import SimulatedClock
+from drivers.errors import Interlocked, LimitError, StageAlarm
+from drivers.links import Links
+from drivers.links.faults import Fault
+from drivers.links.server import Server
+from drivers.links.wire_faults import faults_of
+
+LIMITED = oriental_az.Settings(steps_per_turn=36000, limits_deg=(-90.0, 100.0), own_limits=True)
+CARELESS = oriental_az.Settings(steps_per_turn=36000, limits_deg=(-1000.0, 1000.0))
+Make = Callable[..., oriental_az.RotaryStage]
+
+
+@pytest.fixture
+def clock() -> SimulatedClock:
+    return SimulatedClock()
+
+
+@pytest.fixture
+def server(small_world: Any, clock: SimulatedClock) -> Iterator[Server]:
+    served = oriental_az_twin.serve(small_world, {"alpha": (1, LIMITED)})
+    clock.attach(served)
+    yield served
+    served.close()
+
+
+@pytest.fixture
+def stage(server: Server, clock: SimulatedClock) -> Iterator[Make]:
+    """Makes a driver with settings, on the same drive, homed."""
+    links = Links(clock)
+
+    def make(settings: oriental_az.Settings = LIMITED) -> oriental_az.RotaryStage:
+        made = oriental_az.connect(server.addresses["alpha"], links, settings, "alpha")
+        made.home()
+        return made
+
+    yield make
+    links.close()
+
+
+def test_a_drive_with_limits_of_its_own_stops_whoever_sends_it_too_far(stage: Make) -> None:
+    """The driver's limits are those of its settings; another program's are wider."""
+    mine = stage()
+    mine.move_to(100.0)
+    with pytest.raises(LimitError, match="nothing was sent"):
+        mine.start(101.0)
+    other = stage(CARELESS)
+    other.start(500.0)
+    with pytest.raises(StageAlarm, match=r"alarm 67, software overtravel. Turn the stage by hand away from its limit"):
+        other.wait()
+    assert other.angle_deg() == pytest.approx(100.0, abs=0.01)
+
+
+def test_without_them_it_goes_wherever_it_is_sent(stage: Make) -> None:
+    stage(CARELESS).move_to(200.0)
+
+
+def test_limits_that_the_drive_does_not_take_are_found_before_the_first_move(
+    stage: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    limited = stage()
+    monkeypatch.setattr(oriental_az_twin.Drive, "write_words", lambda *_: None)
+    with pytest.raises(Interlocked, match=r"has not taken its own limits of -9000 .. 10000 steps: it shows 0 in reg"):
+        limited.start(50.0)
+
+
+def test_a_stop_input_brakes_the_stage_and_keeps_it_from_starting(
+    stage: Make, server: Server, clock: SimulatedClock, small_world: Any
+) -> None:
+    """As an emergency stop does that the drive itself is wired to."""
+    moving = stage()
+    server.afflict("alpha", faults_of("oriental_az", [Fault("e-stop", at_s=clock.now() + 1.0, for_s=60.0)]))
+    moving.start(90.0)
+    with pytest.raises(Interlocked, match="alpha: stands without an alarm and is not ready to move: its stop input"):
+        moving.wait()
+    stood_deg = small_world.motor_angle_deg("alpha")
+    assert 10.0 < stood_deg < 60.0
+    for act in (moving.require_steady, lambda: moving.start(90.0)):
+        with pytest.raises(Interlocked, match="Pull out the emergency stop"):
+            act()
+    clock.sleep(60.0)
+    assert small_world.motor_angle_deg("alpha") == stood_deg, "it does not go on by itself"
+    moving.require_steady()
+    moving.move_to(90.0)
+
+
+def test_an_alarm_is_seen_by_whoever_looks(stage: Make, server: Server, clock: SimulatedClock) -> None:
+    sound = stage()
+    sound.look()
+    server.afflict("alpha", faults_of("oriental_az", [Fault("alarm", at_s=clock.now(), size=0x10)]))
+    with pytest.raises(StageAlarm, match="alarm 10, excessive position deviation"):
+        sound.look()
