@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers import labjack_t7_table as t7
-from drivers.errors import DriverError, LimitError, OverRange, Refused, StreamError
+from drivers.errors import DriverError, Interlocked, LimitError, OverRange, Refused, StreamError
 from drivers.instrument import Check, Identity
 from drivers.labjack_t7_reception import Reception
 from drivers.labjack_t7_stream import Calibration
@@ -34,6 +34,8 @@ class Settings:
     """Channels as {name: AIN number}, in the order of the scan; one range for all.
 
     `interchannel_s` is from one channel of a scan to the next [M: measure it with one signal on two channels].
+    `interlocks` are the digital lines of contacts that must be closed while anything moves, as {name: DIO number}. A
+    closed contact pulls its line to ground; an open one, or a broken wire, lets it go high.
     Raises ValueError for what no T7 has or can do.
     """
 
@@ -42,6 +44,7 @@ class Settings:
     range_v: float = 10.0
     power_dio: int | None = None  # the digital line that switches the sensor's power
     interchannel_s: float = t7.INTERCHANNEL_S
+    interlocks: Mapping[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not self.channels or not set(self.channels.values()) <= set(range(t7.INPUTS)):
@@ -52,6 +55,9 @@ class Settings:
             raise ValueError(f"range_v must be one of {', '.join(f'{r:g}' for r in t7.RANGES_V)} V")
         if self.power_dio is not None and self.power_dio not in range(t7.LINES):
             raise ValueError(f"power_dio must be a digital line, 0 to {t7.LINES - 1}")
+        lines = [*self.interlocks.values(), *([] if self.power_dio is None else [self.power_dio])]
+        if not set(lines) <= set(range(t7.LINES)) or len(set(lines)) < len(lines):
+            raise ValueError(f"interlocks must be digital lines, 0 to {t7.LINES - 1}, each with one purpose")
         if not self.interchannel_s >= 0:
             raise ValueError("interchannel_s must be a time of 0 s or more")
 
@@ -90,11 +96,13 @@ class T7:
     def self_test(self) -> list[Check]:
         """The test register, the model, the calibration."""
         test, product = int(self._unit.read(t7.TEST)), self._unit.read(t7.PRODUCT_ID)
-        c = self._calibration
+        c, contacts = self._calibration, self._open_interlocks() if self.settings.interlocks else None
+        told = f"open: {', '.join(contacts)}" if contacts else "closed"
         return [
             Check("registers", test == t7.TEST_VALUE, f"TEST reads 0x{test:08X}"),
             Check("model", product == 7.0, f"product {product:g}"),
             Check("calibration", c.plausible, f"{c.positive_slope * 1e6:.3f} uV a code, center {c.center:.1f}"),
+            *([] if contacts is None else [Check("interlocks", not contacts, told)]),
         ]
 
     def close(self) -> None:
@@ -109,6 +117,19 @@ class T7:
         if self.settings.power_dio is None:
             raise LimitError(f"{self.name}: no line switches the power", "Set power_dio in the bench file")
         self._unit.write(t7.dio(self.settings.power_dio), int(on))
+
+    def look(self) -> None:
+        """Raises Interlocked where a contact that must be closed is open: what others look at while they wait."""
+        if self.settings.interlocks and (contacts := self._open_interlocks()):
+            lines = ", ".join(f"{name} (DIO{self.settings.interlocks[name]})" for name in contacts)
+            raise Interlocked(
+                f"{self.name}: the interlock {lines} is open",
+                "Pull out the emergency stop and close the guards; when nobody is near, resume the run",
+            )
+
+    def _open_interlocks(self) -> list[str]:
+        state = int(self._unit.read(t7.LINES_STATE))
+        return [name for name, line in self.settings.interlocks.items() if state >> line & 1]
 
     def acquire(self, duration_s: float) -> Samples:
         """Record all channels for `duration_s`, rounded to whole scans; raises as `stream`."""

@@ -31,6 +31,7 @@ def dio(number: int) -> Register:
     return Register(2000 + number, "uint16", f"DIO{number}")
 
 
+LINES_STATE = Register(2800, "uint32", "DIO_STATE")  # bit n is DIOn; reading it makes no line an input or output
 INPUTS, LINES = 14, 23
 SINGLE_ENDED = 199
 

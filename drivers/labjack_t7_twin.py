@@ -149,6 +149,7 @@ class Converter:
         self.ports = [stream_port]
         self._world, self._power_dio, self._port = world, settings.power_dio, stream_port
         self._inputs = Inputs(world, {number: name for name, number in settings.channels.items()})
+        self._closed = sum(1 << line for line in settings.interlocks.values())
         self._stream: Stream | None = None
         self._words = _initial_words()
 
@@ -176,6 +177,7 @@ class Converter:
         if address == t7.FLASH:
             return self._read_flash(count)
         self._set(t7.CORE_TIMER, round(now_s * t7.CORE_HZ) % 2**32)
+        self._set(t7.LINES_STATE, self._lines(now_s))
         return [self._known(a) for a in range(address, address + count)]
 
     def write_words(self, address: int, values: Sequence[int], now_s: float) -> None:
@@ -273,6 +275,13 @@ class Converter:
     def _value(self, register: Register) -> float:
         return register.decode([self._words[register.address + i] for i in range(register.count)])
 
+    def _lines(self, now_s: float) -> int:
+        """The digital lines: high, but for contacts that are closed and outputs that are off."""
+        line = self.faults.size("open-interlock", now_s)
+        closed = self._closed & ~(0 if line is None else 1 << int(line))
+        off = sum(1 << n for n in range(t7.LINES) if not self._value(t7.dio(n)))
+        return (1 << t7.LINES) - 1 & ~closed & ~off
+
     def _set(self, register: Register, value: float) -> None:
         self._words.update(zip(range(register.address, register.address + 2), register.encode(value), strict=True))
 
@@ -281,6 +290,7 @@ def _initial_words() -> dict[int, int]:
     """All registers that exist, by address, as after power-on."""
     values: dict[Register, float] = {t7.ain_range(n): 10.0 for n in range(t7.INPUTS)}
     values |= {t7.ain_negative(n): t7.SINGLE_ENDED for n in range(t7.INPUTS)}
+    values |= {t7.LINES_STATE: 0}
     values |= {t7.dio(n): 1 for n in range(t7.LINES)}
     values |= {t7.scan_list(k): 0 for k in range(t7.MOST_ADDRESSES)}
     values |= {t7.TEST: t7.TEST_VALUE, t7.PRODUCT_ID: 7.0, t7.FIRMWARE: FIRMWARE, t7.SERIAL_NUMBER: SERIAL}

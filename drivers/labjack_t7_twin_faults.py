@@ -21,6 +21,7 @@ FAULTS = {
     "clock-step": Kind("its clock stands still for so long in the middle of a stream, once", 0.5, "s", least=0.001),
     "over-range": Kind("has the first input beyond its range now and then"),
     "endless": Kind("streams on when it is told to stop"),
+    "open-interlock": Kind("the contact at this digital line opens", 4, least=0),
     "restart": Kind("is without power for a moment: forgets all, and drops its connections, once"),
 }
 

@@ -11,10 +11,13 @@ import pytest
 
 from drivers import labjack_t7, labjack_t7_twin
 from drivers.clock import SimulatedClock
-from drivers.errors import OverRange, Refused
+from drivers.errors import Interlocked, OverRange, Refused
+from drivers.instrument import Check
 from drivers.labjack_t7 import Settings
 from drivers.links import Links
+from drivers.links.faults import Fault
 from drivers.links.link import open_link
+from drivers.links.wire_faults import faults_of
 
 STEP_V = 3.2e-4  # one code in the range of 10 V
 
@@ -159,3 +162,50 @@ def test_who_it_is(bench: Any) -> None:
     identity = bench.adc.identify()
     assert (identity.model, identity.serial) == ("LabJack T7", str(labjack_t7_twin.SERIAL))
     assert all(check.ok for check in bench.adc.self_test())
+
+
+GUARDED = Settings(channels={"supply": 5}, power_dio=3, interlocks={"e-stop": 4, "door": 7})
+
+
+@pytest.fixture
+def guarded(small_world: Any) -> Iterator[Callable[..., labjack_t7.T7]]:
+    """A converter with interlocks, which has faults."""
+    opened: list[Any] = []
+
+    def make(*faults: Fault) -> labjack_t7.T7:
+        clock = SimulatedClock()
+        server, links = labjack_t7_twin.serve(small_world, {"adc": (1, GUARDED)}), Links(clock)
+        clock.attach(server)
+        opened.extend([links, server])
+        converter = labjack_t7.connect(server.addresses["adc"], links, GUARDED, "adc")
+        server.afflict("adc", faults_of("labjack_t7", faults))
+        return converter
+
+    yield make
+    for one in opened:
+        one.close()
+
+
+def test_interlocks_are_closed_whatever_else_is_switched(guarded: Callable[..., labjack_t7.T7]) -> None:
+    converter = guarded()
+    for on in (False, True):
+        converter.power(on)
+        converter.look()
+    assert converter.self_test()[-1] == Check("interlocks", True, "closed")
+
+
+def test_an_open_interlock_is_named_with_its_line(guarded: Callable[..., labjack_t7.T7]) -> None:
+    converter = guarded(Fault("open-interlock", size=7))
+    with pytest.raises(Interlocked, match=r"adc: the interlock door \(DIO7\) is open. Pull out the emergency stop"):
+        converter.look()
+    assert converter.self_test()[-1] == Check("interlocks", False, "open: door")
+
+
+def test_a_line_of_no_interlock_is_not_looked_at(guarded: Callable[..., labjack_t7.T7]) -> None:
+    guarded(Fault("open-interlock", size=9)).look()
+
+
+@pytest.mark.parametrize("lines", [{"a": 23}, {"a": -1}, {"a": 3}, {"a": 4, "b": 4}])
+def test_a_line_that_cannot_be_an_interlock_is_refused(lines: dict[str, int]) -> None:
+    with pytest.raises(ValueError, match="interlocks must be digital lines, 0 to 22, each with one purpose"):
+        Settings(power_dio=3, interlocks=lines)
