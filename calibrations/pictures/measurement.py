@@ -38,7 +38,7 @@ def _poses(fit: Fit) -> Figure:
             dots(ax, group, beta[rows], measured[c, rows])
         ax.set(title=f"axis {fit.channels[c]}", xlabel="β (deg)", ylabel=f"output ({fit.table.unit})")
         quarters(ax)
-        beside(ax, float(scales(fit)[c]), _zero(fit, c), "output in g, by bias and scale factor")
+        beside(ax, float(scales(fit)[c]), zero(fit, c), "output in g, by bias and scale factor")
     key(figure, groups(fit))
     return figure
 
@@ -56,7 +56,7 @@ def _rates(fit: Fit) -> Figure:
     return figure
 
 
-def _zero(fit: Fit, c: int) -> float:
+def zero(fit: Fit, c: int) -> float:
     """The output at 0 g: the model's bias, else the middle of what was measured."""
     terms = [term for term in fit.model.terms if term.name == "bias"]
     values = {e.axis: e.value for term in terms for e in term.estimates}

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Protocol
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import NullFormatter
 
-from calibrations.discover import Discovery
+from calibrations.discover import Added, Discovery
 from calibrations.fit import Fit
 from calibrations.numerals import plain
 from calibrations.pictures.style import AMBER, BAND, BLUE, GREEN, INK, QUIET, VERMILION, panels, styled
@@ -32,7 +33,17 @@ class Level:
     rms: str
 
 
-def levels(found: Discovery) -> list[Level]:
+class Falling(Protocol):
+    """A fit, and the steps from there: a discovery, or a model that a person lets grow."""
+
+    @property
+    def start(self) -> Fit: ...
+
+    @property
+    def steps(self) -> tuple[Added, ...]: ...
+
+
+def levels(found: Falling) -> list[Level]:
     """The model as it was, then each effect added."""
     start = Level(found.start.model.name, found.start.pooled_excess, held_out_excess(found.start), _rms(found.start))
     after = [Level(f"+ {s.name}", s.after.pooled_excess, s.held_out_after, _rms(s.after)) for s in found.steps]
