@@ -8,8 +8,9 @@ Source: T-series datasheet; see labjack_t7_table and labjack_t7_stream.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Generator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Generator, Mapping, Sequence
+from copy import copy
+from dataclasses import dataclass, field, replace
 from typing import TypeVar
 from urllib.parse import urlsplit
 
@@ -33,6 +34,7 @@ Read = TypeVar("Read")
 class Settings:
     """Channels as {name: AIN number}, in the order of the scan; one range for all.
 
+    Those `on_request` are wired too, and are sampled only for who asks for them, see `T7.only`.
     `interchannel_s` is from one channel of a scan to the next [M: measure it with one signal on two channels].
     `interlocks` are the digital lines of contacts that must be closed while anything moves, as {name: DIO number}. A
     closed contact pulls its line to ground; an open one, or a broken wire, lets it go high.
@@ -40,6 +42,7 @@ class Settings:
     """
 
     channels: Mapping[str, int] = field(default_factory=lambda: {"vx": 0, "vy": 1, "supply": 2})
+    on_request: Mapping[str, int] = field(default_factory=dict)
     rate_hz: float = 1000.0
     range_v: float = 10.0
     power_dio: int | None = None  # the digital line that switches the sensor's power
@@ -47,8 +50,10 @@ class Settings:
     interlocks: Mapping[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if not self.channels or not set(self.channels.values()) <= set(range(t7.INPUTS)):
+        if not self.channels or not set(self.wired.values()) <= set(range(t7.INPUTS)):
             raise ValueError(f"channels must name analog inputs, 0 to {t7.INPUTS - 1}, and at least one")
+        if twice := self.channels.keys() & self.on_request.keys():
+            raise ValueError(f"{', '.join(sorted(twice))} is a channel anyway; leave it out of on_request")
         if not 0 < self.rate_hz * len(self.channels) <= t7.MOST_SAMPLES_PER_S:
             raise ValueError(f"rate_hz must give at most {t7.MOST_SAMPLES_PER_S} samples a second in all")
         if self.range_v not in t7.RANGES_V:
@@ -60,6 +65,24 @@ class Settings:
             raise ValueError(f"interlocks must be digital lines, 0 to {t7.LINES - 1}, each with one purpose")
         if not self.interchannel_s >= 0:
             raise ValueError("interchannel_s must be a time of 0 s or more")
+
+    @property
+    def wired(self) -> Mapping[str, int]:
+        """All inputs by name: the channels, and those on request."""
+        return {**self.channels, **self.on_request}
+
+    def only(self, name: str, outputs: Sequence[str]) -> Settings:
+        """Settings of a converter `name` whose channels are these; of a batch `a1.mx`, `a2.mx` are both `mx`.
+
+        Raises LimitError for an output that no input is wired to.
+        """
+        chosen = {each: k for each, k in self.wired.items() if each.rpartition(".")[2] in outputs}
+        if missing := [each for each in outputs if each not in {key.rpartition(".")[2] for key in chosen}]:
+            raise LimitError(
+                f"{name}: no input is wired to {', '.join(missing)}; there are {', '.join(self.wired)}",
+                "Name the inputs in the bench file, under channels or on_request of the converter's settings",
+            )
+        return replace(self, channels=chosen, on_request={})
 
     def lag_s(self, channel: str) -> float:
         """How long after the beginning of a scan this channel is sampled."""
@@ -83,7 +106,8 @@ class T7:
         self.name = unit.name
         self.settings = settings
         self._unit, self._stream, self._clock = unit, stream, stream.clock
-        self._prepare_inputs()
+        self._stop()  # a stream that a dead program left behind
+        self._prepare_inputs(settings.channels)
         self._calibration = self._read_calibration()
         self._volts = self._calibration.table()
 
@@ -131,6 +155,13 @@ class T7:
         state = int(self._unit.read(t7.LINES_STATE))
         return [name for name, line in self.settings.interlocks.items() if state >> line & 1]
 
+    def only(self, *outputs: str) -> T7:
+        """The same device with these channels and no others. Raises LimitError for one that is not wired."""
+        chosen = copy(self)
+        chosen.settings = self.settings.only(self.name, outputs)
+        chosen._prepare_inputs(chosen.settings.channels)
+        return chosen
+
     def acquire(self, duration_s: float) -> Samples:
         """Record all channels for `duration_s`, rounded to whole scans; raises as `stream`."""
         (samples,) = self.stream(duration_s, duration_s)
@@ -142,9 +173,16 @@ class T7:
             blocks = [next(stream)]
             read = reading()
             blocks += stream
-        first = blocks[0]
-        volts = np.concatenate([block.volts for block in blocks])
-        return Samples(volts, first.channels, first.rate_hz, first.start_s), read
+        return _joined(blocks), read
+
+    def acquire_watched(self, duration_s: float, watch: Callable[[], object], every_s: float) -> Samples:
+        """The same as `acquire`; `watch` is called about every `every_s`, and at the end. What it raises ends it."""
+        blocks = []
+        with contextlib.closing(self.stream(duration_s, every_s)) as stream:
+            for block in stream:
+                watch()
+                blocks.append(block)
+        return _joined(blocks)
 
     def stream(self, duration_s: float, block_s: float) -> Generator[Samples, None, None]:
         """Record all channels for `duration_s` without a gap, and hand it out in blocks of `block_s`.
@@ -220,10 +258,9 @@ class T7:
             why = t7.ERRORS.get(detail, "see the list of error codes in its datasheet")
             raise Refused(f"{refused.what}; device error {detail}: {why}", refused.remedy, refused.code) from refused
 
-    def _prepare_inputs(self) -> None:
-        """End a stream that a dead program left behind; ranges and ground of all channels."""
-        self._stop()
-        for number in self.settings.channels.values():
+    def _prepare_inputs(self, channels: Mapping[str, int]) -> None:
+        """Ranges and ground."""
+        for number in channels.values():
             self._unit.write(t7.ain_range(number), self.settings.range_v)
             self._unit.write(t7.ain_negative(number), t7.SINGLE_ENDED)
 
@@ -240,6 +277,12 @@ class T7:
             known = ", ".join(self.settings.channels)
             raise LimitError(f"{self.name}: no channel {name!r}; there are {known}", "Correct the name")
         return self.settings.channels[name]
+
+
+def _joined(blocks: Sequence[Samples]) -> Samples:
+    first = blocks[0]
+    volts = np.concatenate([block.volts for block in blocks])
+    return Samples(volts, first.channels, first.rate_hz, first.start_s)
 
 
 def _scans_per_packet(scans: int, channels: int) -> int:

@@ -148,7 +148,7 @@ class Converter:
         self.faults = Faults()
         self.ports = [stream_port]
         self._world, self._power_dio, self._port = world, settings.power_dio, stream_port
-        self._inputs = Inputs(world, {number: name for name, number in settings.channels.items()})
+        self._inputs = Inputs(world, {number: name for name, number in settings.wired.items()})
         self._closed = sum(1 << line for line in settings.interlocks.values())
         self._stream: Stream | None = None
         self._words = _initial_words()

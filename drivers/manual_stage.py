@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NoReturn
 
 from drivers.errors import LimitError, LinkRefused, NotSettled
 from drivers.instrument import Check, Identity
@@ -42,6 +43,13 @@ class Settings:
     def move_s(self, distance_deg: float) -> float:  # noqa: ARG002 a hand is as quick on any way
         """How long a move takes."""
         return self.seconds_per_move
+
+    def way_of_turn(self, name: str, rate_deg_s: float, first_deg: float, last_deg: float) -> NoReturn:
+        """Raises LimitError: no hand turns at a constant rate."""
+        raise LimitError(
+            f"{name}: is turned by hand, not at a constant {rate_deg_s:g} deg/s from {first_deg:g} to {last_deg:g} deg",
+            "Use a stage with a motor for this procedure",
+        )
 
 
 class ManualStage:
@@ -99,6 +107,10 @@ class ManualStage:
                 f"Set it to within {reach:g} deg, and read it again",
             )
         self._set_deg, self.read_deg = angle_deg, read_deg
+
+    def turning(self, rate_deg_s: float, first_deg: float, last_deg: float) -> NoReturn:
+        """Raises LimitError: no hand turns at a constant rate."""
+        self.settings.way_of_turn(self.name, rate_deg_s, first_deg, last_deg)
 
     def stop(self) -> None:
         """It turns only while a person turns it."""

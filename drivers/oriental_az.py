@@ -7,16 +7,19 @@ is never cleared silently, and a stop can always be sent. Source: AZ function ma
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
 
 from drivers import oriental_az_table as az
-from drivers.errors import Interlocked, LimitError, NotSettled, StageAlarm, StageLost
+from drivers.errors import DriverError, Interlocked, LimitError, NotSettled, StageAlarm, StageLost
 from drivers.instrument import Check, Identity
 from drivers.links import Address, Links
 from drivers.links.modbus import Unit
-from drivers.links.register import Register
+from drivers.oriental_az_settings import LEAD_S, Settings
 from drivers.oriental_az_table import Alarm
+
+__all__ = ["RotaryStage", "Settings", "Turn", "connect"]
 
 POLL_S = 0.02
 PATIENCE_S = 2.0  # beyond the expected end of a move
@@ -24,56 +27,21 @@ HOMING_S = 120.0  # a full turn at a drive's slowest usual homing speed
 STOPPING_S = 10.0
 READY_S = 0.5  # for a drive to be ready again after a move [M]
 BEATS = 4  # in a communication time-out, so that one lost answer is no silence
+OFF_RATE = 0.01  # of a constant rate; a step a second of rounding comes on top
+UNWATCHED_S = 1.0  # between two looks at a turn of a drive that does not watch over its controller
 WARM_C = 85.0  # the drive's own alarm limit [M]
 
 
 @dataclass(frozen=True)
-class Settings:
-    """One stage: gear and resolution, limits of the motor angle and speed, how it moves, when it counts as settled.
+class Turn:
+    """A turn that goes on: its rate as the drive makes it, and how often `require` has to be called meanwhile.
 
-    With a `communication_timeout_s`, the drive stops by itself (alarm 85) when its controller falls silent for so long
-    in the middle of a move; 0 is off. It is off unless the bench file sets it, since the address of the drive's
-    parameter "Communication timeout (Modbus)", which counts ms, is from memory [M]: look it up first.
-
-    With `own_limits`, `limits_deg` are written into the drive as its software limits and read back, before the first
-    move: it brakes there by itself, whoever sent it. Off unless the bench file sets it, for the same reason.
-
-    Raises ValueError for what no stage can be.
+    `require` raises StageAlarm, StageLost, or NotSettled where the stage does not turn at the rate.
     """
 
-    steps_per_turn: int = 18000  # 1.2 arcmin a step [M]
-    limits_deg: tuple[float, float] = (-400.0, 400.0)
-    speed_deg_s: float = 30.0
-    speed_limit_deg_s: float = 1200.0  # 200 r/min of a DGII's table [M]; less for what stands on it
-    acceleration_deg_s2: float = 60.0
-    settle_deg: float = 0.05
-    current_percent: float = 100.0
-    communication_timeout_s: float = 0.0
-    communication_timeout_register: int = 0x138A  # [M]
-    own_limits: bool = False
-
-    def __post_init__(self) -> None:
-        positive = ("steps_per_turn", "speed_deg_s", "acceleration_deg_s2", "settle_deg", "current_percent")
-        if wrong := [name for name in positive if not getattr(self, name) > 0]:
-            raise ValueError(f"{', '.join(wrong)} must be positive")
-        if not self.limits_deg[0] < self.limits_deg[1]:
-            raise ValueError("limits_deg must be the lower limit, then the upper one")
-        if self.speed_deg_s > self.speed_limit_deg_s:
-            raise ValueError(f"speed_deg_s must be at most speed_limit_deg_s, {self.speed_limit_deg_s:g}")
-        if self.communication_timeout_s and not 0.5 <= self.communication_timeout_s <= 10:
-            raise ValueError("communication_timeout_s must be 0 for none, or 0.5 to 10")
-
-    @property
-    def communication_timeout(self) -> Register:
-        """The drive's own parameter."""
-        return Register(self.communication_timeout_register, "uint32", "communication time-out", "s", 0.001)
-
-    def move_s(self, distance_deg: float) -> float:
-        """How long a move takes: a trapezoid of speed, or a triangle when the way is short."""
-        speed, acceleration = self.speed_deg_s, self.acceleration_deg_s2
-        if distance_deg < speed**2 / acceleration:
-            return 2 * math.sqrt(distance_deg / acceleration)
-        return distance_deg / speed + speed / acceleration
+    rate_deg_s: float
+    beat_s: float
+    require: Callable[[], None]
 
 
 class RotaryStage:
@@ -140,27 +108,14 @@ class RotaryStage:
         StageAlarm, StageLost, Interlocked.
         """
         self._require_within_limits(angle_deg)
-        outputs = self._status()
-        self._require_coordinates(outputs)
-        self._require_ready(outputs)
-        self._limit()
-        distance_deg = abs(angle_deg - self.angle_deg())
-        self._target_deg, self._expected_end_s = angle_deg, self._clock.now()
-        if _stands(outputs, az.IN_POSITION) and distance_deg < 180 / self.settings.steps_per_turn:
-            return False
-        self._watch(True)
-        asked_s = self._clock.now()
-        self._unit.write_block(*self._direct_operation(angle_deg))
-        begun_s = (asked_s + self._clock.now()) / 2  # it starts when it has the request, and then answers
-        self._expected_end_s = begun_s + self.settings.move_s(distance_deg)
-        return True
+        return self._start(angle_deg, self.settings) is not None
 
     def wait(self) -> None:
         """Return when the move that was started has ended where it should.
 
         Raises StageAlarm, StageLost, Interlocked, NotSettled.
         """
-        self._until_expected_end()
+        self._until(self._expected_end_s)
         outputs = self._poll_until(az.IN_POSITION, PATIENCE_S, "is still moving, or not in position,")
         self._require_coordinates(outputs)
         self._require_ready(outputs)
@@ -172,6 +127,31 @@ class RotaryStage:
                 f"more than {self.settings.settle_deg:g} deg away",
                 "Free the stage of what holds it, check the load's balance, then repeat the move",
             )
+
+    @contextmanager
+    def turning(self, rate_deg_s: float, first_deg: float, last_deg: float) -> Iterator[Turn]:
+        """Turn from `first_deg` to `last_deg` at a constant rate, which it has when the body begins.
+
+        The body has the turn's time, and half a second more; it must call the turn's `require`. A stage with limits
+        is sent to an angle within them at that speed, where it ends by itself, whatever becomes of this program; one
+        without turns on until it is stopped, and watches over its controller. However the body ends, the stage stands
+        afterwards. Raises LimitError before anything is sent, StageAlarm, StageLost, NotSettled.
+        """
+        start_deg, end_deg = self.settings.way_of_turn(self.name, rate_deg_s, first_deg, last_deg)
+        rate = math.copysign(self.settings.rate_deg_s(abs(rate_deg_s)), last_deg - first_deg)
+        self.move_to(start_deg)
+        try:
+            begun_s = self._begin_turn(rate, end_deg)
+            self._until(begun_s + abs(rate) / self.settings.acceleration_deg_s2 + LEAD_S)
+            yield Turn(rate, min(self._beat_s, UNWATCHED_S), lambda: self._require_turning(rate))
+            if self.settings.endless:
+                self.stop()
+            else:
+                self.wait()
+        except BaseException:
+            with suppress(DriverError):  # what went wrong first is to be told
+                self.stop()
+            raise
 
     def require_steady(self) -> None:
         """Raises StageAlarm, StageLost, Interlocked or NotSettled where it does not stand in position any more."""
@@ -223,6 +203,14 @@ class RotaryStage:
                 "Find out whether it was without power or was stopped while homing; it is homed when the run resumes",
             )
 
+    def _require_movable(self) -> int:
+        """The outputs of a drive that can be sent somewhere, and keeps its limits. Raises what it cannot be sent for."""
+        outputs = self._status()
+        self._require_coordinates(outputs)
+        self._require_ready(outputs)
+        self._limit()
+        return outputs
+
     def _require_ready(self, outputs: int) -> None:
         """A drive that stands without an alarm and yet is not ready is kept from moving."""
         deadline = self._clock.now() + READY_S
@@ -264,25 +252,59 @@ class RotaryStage:
                 alarm.code,
             )
 
-    def _direct_operation(self, angle_deg: float) -> list[tuple[Register, float]]:
-        """The block that moves to an absolute angle; rates in steps per second, which are its counts."""
+    def _start(self, angle_deg: float, settings: Settings) -> float | None:
+        """Start turning to an angle within the limits, with the speed of `settings`: when it began; see `start`."""
+        outputs = self._require_movable()
+        distance_deg = abs(angle_deg - self.angle_deg())
+        self._target_deg, self._expected_end_s = angle_deg, self._clock.now()
+        if _stands(outputs, az.IN_POSITION) and distance_deg < 180 / settings.steps_per_turn:
+            return None
+        self._watch(True)
+        begun_s = self._operate(az.ABSOLUTE, angle_deg, settings.speed_deg_s)
+        self._expected_end_s = begun_s + settings.move_s(distance_deg)
+        return begun_s
+
+    def _begin_turn(self, rate_deg_s: float, end_deg: float) -> float:
+        """Start turning at a rate, to `end_deg` or on and on; when it began."""
+        if self.settings.endless:
+            self._require_movable()
+            self._watch(True)
+            return self._operate(az.CONTINUOUS, 0.0, rate_deg_s)
+        return self._start(end_deg, replace(self.settings, speed_deg_s=abs(rate_deg_s))) or self._clock.now()
+
+    def _operate(self, kind: int, angle_deg: float, speed_deg_s: float) -> float:
+        """Write the direct operation, speeds in steps per second, which are its counts; when it began, s."""
         per_deg = self.settings.steps_per_turn / 360
-        rate = self.settings.acceleration_deg_s2 * per_deg
-        speed = self.settings.speed_deg_s * per_deg
-        percent = self.settings.current_percent
-        values = (0, az.ABSOLUTE, angle_deg * per_deg, speed, rate, rate, percent, az.TRIGGER_ALL)
-        return list(zip(az.DIRECT, values, strict=True))
+        rate, percent = self.settings.acceleration_deg_s2 * per_deg, self.settings.current_percent
+        values = (0, kind, angle_deg * per_deg, speed_deg_s * per_deg, rate, rate, percent, az.TRIGGER_ALL)
+        asked_s = self._clock.now()
+        self._unit.write_block(*zip(az.DIRECT, values, strict=True))
+        return (asked_s + self._clock.now()) / 2  # it starts when it has the request, and then answers
+
+    def _require_turning(self, rate_deg_s: float) -> None:
+        self._require_coordinates(self._status())
+        per_deg = self.settings.steps_per_turn / 360
+        speed = self._unit.read(az.FEEDBACK_SPEED) / per_deg
+        if abs(speed - rate_deg_s) > OFF_RATE * abs(rate_deg_s) + 1 / per_deg:
+            raise NotSettled(
+                f"{self.name}: turns at {speed:.3f} deg/s instead of {rate_deg_s:.3f} deg/s",
+                "Free the stage of what holds it, check the load's balance, then resume the run",
+            )
 
     def _watch(self, on: bool) -> None:
         """Have the drive watch over its controller, or not: while it stands, nobody needs to talk to it."""
         if self.settings.communication_timeout_s:
             self._unit.write(self.settings.communication_timeout, on * self.settings.communication_timeout_s)
 
-    def _until_expected_end(self) -> None:
-        """Let the move take its time, and let the drive hear of its controller meanwhile if it watches over it."""
-        beat_s = self.settings.communication_timeout_s / BEATS or math.inf
-        while (left_s := self._expected_end_s - self._clock.now()) > beat_s:
-            self._clock.sleep(beat_s)
+    @property
+    def _beat_s(self) -> float:
+        """How often a drive has to hear of its controller if it watches over it."""
+        return self.settings.communication_timeout_s / BEATS or math.inf
+
+    def _until(self, end_s: float) -> None:
+        """Let a move take its time until `end_s`, and let the drive hear of its controller meanwhile."""
+        while (left_s := end_s - self._clock.now()) > self._beat_s:
+            self._clock.sleep(self._beat_s)
             self._status()
         self._clock.sleep(left_s)
 

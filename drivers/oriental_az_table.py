@@ -20,6 +20,7 @@ CURRENT = Register(0x0064, "uint32", "operating current", "%", 0.1)
 TRIGGER = Register(0x0066, "int32", "trigger of the direct data operation")
 DIRECT = (DATA_NUMBER, TYPE, POSITION, SPEED, ACCELERATION, DECELERATION, CURRENT, TRIGGER)
 ABSOLUTE, FROM_COMMAND, FROM_FEEDBACK = 1, 2, 3  # operation types
+CONTINUOUS = 7  # at a position that goes on and on, the way that the sign of the speed says, until STOP
 TRIGGER_ALL = 1
 
 # Remote inputs and outputs: one bit each in the lower word.
@@ -42,6 +43,7 @@ ALARM = Register(0x0080, "uint32", "present alarm")
 COMMUNICATION_ERROR = Register(0x00AC, "uint32", "present communication error")
 COMMAND_POSITION = Register(0x00C6, "int32", "command position", "step")  # [M]
 FEEDBACK_POSITION = Register(0x00CC, "int32", "feedback position", "step")
+FEEDBACK_SPEED = Register(0x00D0, "int32", "feedback speed", "step/s")
 DRIVER_TEMPERATURE = Register(0x00F8, "int32", "driver temperature", "C", 0.1)
 MOTOR_TEMPERATURE = Register(0x00FA, "int32", "motor temperature", "C", 0.1)
 

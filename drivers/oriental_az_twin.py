@@ -20,6 +20,7 @@ LISTEN = "pty:"
 HOMING_DEG_S = 20.0
 HOMING_DEG_S2 = 40.0
 IN_POSITION_DEG = 0.018  # the width of IN-POS around the command, +-
+FOR_EVER_DEG = 1e7  # days at any speed
 THINKING_S = 0.003  # transmission waiting time of the drive
 FAULTS = {
     **MODBUS_FAULTS,
@@ -134,6 +135,7 @@ class Drive:
             az.ALARM: self._alarm,
             az.COMMAND_POSITION: self._plan.angle_deg(now_s) * self._steps_per_deg,
             az.FEEDBACK_POSITION: (self._angle_deg() + (self.faults.size("lies", now_s) or 0.0)) * self._steps_per_deg,
+            az.FEEDBACK_SPEED: self._plan.rate_deg_s(now_s) * self._steps_per_deg,
             az.DRIVER_TEMPERATURE: 35.0,
             az.MOTOR_TEMPERATURE: 40.0,
         }
@@ -180,7 +182,10 @@ class Drive:
             az.FROM_COMMAND: lambda: self._plan.angle_deg(now_s),
             az.FROM_FEEDBACK: self._angle_deg,
         }
-        if kind not in origins or speed <= 0 or rate <= 0:
+        if kind == az.CONTINUOUS and speed != 0 and rate > 0:
+            there = self._angle_deg() + math.copysign(FOR_EVER_DEG, speed)
+            self._turn(Trajectory(now_s, self._angle_deg(), there, abs(speed), rate))
+        elif kind not in origins or speed <= 0 or rate <= 0:
             self._fail(az.BAD_OPERATION_DATA, now_s)
         elif kind == az.ABSOLUTE and not self._referenced:
             self._fail(az.COORDINATES_NOT_SET, now_s)

@@ -20,7 +20,7 @@ from drivers.simulation.positioner import Command
 from drivers.simulation.trajectory import Trajectory
 from drivers.simulation.world import World
 
-OWN = ("sensor", "noise")  # what may differ from sensor to sensor
+OWN = ("sensor", "noise", "magnetometer", "gyroscope")  # what may differ from sensor to sensor
 
 
 class Batch:
@@ -62,10 +62,10 @@ class Batch:
         """What the position sensor of `axis` shows."""
         return self._first.positioner_um(axis, times_s)
 
-    def mount_sensor(self, mount_deg: float = 0.0, flip: int = 0) -> None:
+    def mount_sensor(self, mount_deg: float = 0.0, flip: int = 0, up: str = "z") -> None:
         """Put the plate with all sensors on the table."""
         for world in self._worlds.values():
-            world.mount_sensor(mount_deg, flip)
+            world.mount_sensor(mount_deg, flip, up)
 
     def power(self, on: bool) -> None:
         """Switch the supply of all sensors."""

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from drivers.simulation import gravity, mechanics
+from drivers.simulation import gravity, gyroscope, laboratory, magnetometer, mechanics
 from drivers.simulation.config import WorldConfig
 from drivers.simulation.heat import Heat
 from drivers.simulation.kernel import record
@@ -22,6 +22,10 @@ def beginning(config: WorldConfig, numbers: WorldConfig, room: np.random.Generat
     world.powered_ns = -round(1e9 * config.heat.powered_for_s)
     world.up = gravity.vertical(config.base)
     world.mount = gravity.mounting(config.sensor.package, 0.0, 0)
+    world.board = gravity.mounting(gravity.Package(), 0.0, 0)
+    world.earth_deg_s = laboratory.rotation_deg_s(config.laboratory, config.base)
+    world.field_ut = laboratory.field_ut(config.laboratory, config.base)
+    world.plates, world.die = magnetometer.normals(config.magnetometer), gyroscope.die(config.gyroscope)
     world.white = slow.standard_normal(2)
     world.flicker_v = config.noise.flicker_v * slow.standard_normal(world.flicker_v.shape)
     world.slow_v = world.flicker_v.sum(axis=1)

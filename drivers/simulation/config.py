@@ -17,8 +17,11 @@ from drivers.simulation.errors import BadSetting, UnknownSetting, nearest
 from drivers.simulation.fibre_probe import FibreProbe
 from drivers.simulation.friction import Friction
 from drivers.simulation.gravity import Base, Package
+from drivers.simulation.gyroscope import Gyroscope
 from drivers.simulation.heat import Heat, Oven
+from drivers.simulation.laboratory import Laboratory
 from drivers.simulation.level import Level
+from drivers.simulation.magnetometer import Magnetometer
 from drivers.simulation.noise import Noise
 from drivers.simulation.oddities import Oddities
 from drivers.simulation.plates import Plates
@@ -68,6 +71,9 @@ class WorldConfig:
     base: Base = field(default_factory=Base)
     seating: Seating = field(default_factory=Seating)
     sensor: Sensor = field(default_factory=Sensor)
+    laboratory: Laboratory = field(default_factory=Laboratory)
+    magnetometer: Magnetometer = field(default_factory=Magnetometer)
+    gyroscope: Gyroscope = field(default_factory=Gyroscope)
     heat: Heat = field(default_factory=Heat)
     oven: Oven = field(default_factory=Oven)
     supply: Supply = field(default_factory=Supply)
@@ -177,6 +183,23 @@ ADXL203: dict[str, Any] = {
                 "height_step_nm": -2.0,
             },
         },
+    },
+    "magnetometer": {
+        "x": {"volts_per_ut": 0.0204, "offset_v": 0.013},
+        "y": {"volts_per_ut": 0.0197, "offset_v": -0.021},
+        "z": {"volts_per_ut": 0.0201, "offset_v": 0.034},
+        "y_off_square_deg": 0.4,
+        "z_off_square_deg": -0.3,
+        "magnet": {"x_mm": 28.0, "y_mm": -12.0, "moment_x_ma_m2": 1.6, "moment_z_ma_m2": -2.1},
+        "iron": {"x_mm": 9.0, "y_mm": 17.0, "z_mm": -4.0, "radius_mm": 7.0},
+    },
+    "gyroscope": {
+        "turn_x_deg": 0.6,
+        "turn_y_deg": -0.9,
+        "turn_z_deg": 0.4,
+        "x": {"off_square_ppm": 2.0, "off_square_per_nm": 40.0, "unbalance_fraction": 0.02, "demodulator_deg": 4.0},
+        "y": {"off_square_ppm": -1.2, "off_square_per_nm": 40.0, "unbalance_fraction": -0.03, "demodulator_deg": 3.0},
+        "z": {"off_square_ppm": 0.8, "off_square_per_nm": 40.0, "unbalance_fraction": 0.01, "demodulator_deg": 5.0},
     },
     "heat": {
         "board_rise_k": 6.0,

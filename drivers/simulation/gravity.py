@@ -1,8 +1,8 @@
 """Gravity as the sensor's package feels it: base, stages, mount, package.
 
-    a = P F Rz(mount) Rz(beta) Ry(alpha) up        in g, with the true angles
+    a = P E F Rz(mount) Rz(beta) Ry(alpha) up        in g, with the true angles
 
-`up` is the vertical in the base (tilted by two angles), F turns the sensor face down, P is the
+`up` is the vertical in the base (tilted by two angles), F turns the sensor face down, E puts it on an edge, P is the
 package's own small rotation on its mount. At rest the specific force is 1 g upward.
 """
 
@@ -48,11 +48,15 @@ def vertical(base: Base) -> Floats:
     return rotation(base.tilt_x_deg, base.tilt_y_deg, 0.0)[:, 2]
 
 
-def mounting(package: Package, mount_deg: float, flip: int) -> Floats:
-    """Package from table, shape (3, 3): the mount's turn, face down if `flip`, the package's own rotation."""
+def mounting(package: Package, mount_deg: float, flip: int, up: str = "z") -> Floats:
+    """Package from table, shape (3, 3): the mount's turn, face down if `flip`, on edge, the package's own rotation.
+
+    `up` names the edge that stands along the table's normal; with x up, y and z lie along the table's x and y.
+    """
     face = np.diag([1.0, -1.0, -1.0]) if flip else np.eye(3)
+    edge = np.roll(np.eye(3), "zxy".index(up), axis=0)
     turned = rotation(package.turn_x_deg, package.turn_y_deg, package.turn_z_deg)
-    return np.asarray(turned @ face @ rotation(0, 0, mount_deg))
+    return np.asarray(turned @ edge @ face @ rotation(0, 0, mount_deg))
 
 
 @kernel
@@ -64,7 +68,7 @@ def along_y(package: Package, gx: float, gy: float) -> float:
 
 @kernel
 def felt_g(up: Floats, mount: Floats, alpha_rad: float, beta_rad: float) -> tuple[float, float, float]:
-    """Specific force in the package's frame, in g, at true stage angles."""
+    """Specific force in the package's frame, in g, at true stage angles; any other vector of the base alike."""
     ca, sa = math.cos(alpha_rad), math.sin(alpha_rad)
     cb, sb = math.cos(beta_rad), math.sin(beta_rad)
     x, y, z = ca * up[0] + sa * up[2], up[1], ca * up[2] - sa * up[0]

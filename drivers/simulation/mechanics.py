@@ -14,7 +14,19 @@ from __future__ import annotations
 
 from numpy.random import Generator
 
-from drivers.simulation import friction, gravity, heat, noise, oddities, plates, positioner, springs, stage, supply
+from drivers.simulation import (
+    friction,
+    gravity,
+    heat,
+    noise,
+    oddities,
+    plates,
+    positioner,
+    springs,
+    stage,
+    supply,
+    turned,
+)
 from drivers.simulation.config import SensingAxis, WorldConfig
 from drivers.simulation.kernel import Floats, kernel
 from drivers.simulation.state import State
@@ -85,6 +97,7 @@ def update(world: State, config: WorldConfig, t_ns: int) -> None:
     on, sx, sy = world.powered, config.sensor.x, config.sensor.y
     world.volts[0] = on * plates.read_v(sx.plates, sx.springs.resonance_hz, x, y, sag, world.supply_v)
     world.volts[1] = on * plates.read_v(sy.plates, sy.springs.resonance_hz, y, x, sag, world.supply_v)
+    turned.update(world, config, t_ns, heat.die_c(world) - REFERENCE_C)
 
 
 @kernel

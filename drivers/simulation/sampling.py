@@ -13,8 +13,8 @@ from drivers.simulation.kernel import Floats, Ints, kernel
 from drivers.simulation.mechanics import STEP_NS, next_event_ns, run_to
 from drivers.simulation.state import State
 
-INPUTS = ("vx", "vy", "supply", "thermistor", "ground", "d63")
-SUPPLY, THERMISTOR, D63 = 2, 3, 5
+INPUTS = ("vx", "vy", "supply", "thermistor", "ground", "d63", "mx", "my", "mz", "gx", "gy", "gz")
+SUPPLY, THERMISTOR, D63, FIELD, RATE = 2, 3, 5, 6, 9
 
 # A 10 kOhm thermistor at the package, below a 10 kOhm resistor on the sensor's supply.
 THERMISTOR_B_K = 3950.0
@@ -53,6 +53,10 @@ def convert(
                 analog = noise.output_v(world, config.noise, channels[k], t_ns, random.standard_normal())
             elif channels[k] == D63:
                 analog = displacement_v(world, config, times_ns[i] + late_ns[k], random.standard_normal())
+            elif channels[k] >= RATE:
+                analog = steady[channels[k]] + config.gyroscope.noise_v * random.standard_normal()
+            elif channels[k] >= FIELD:
+                analog = steady[channels[k]] + config.magnetometer.noise_v * random.standard_normal()
             else:
                 analog = steady[channels[k]]
             noisy = analog + config.converter.noise_v * random.standard_normal()
@@ -70,9 +74,11 @@ def displacement_v(world: State, config: WorldConfig, t_ns: int, normal: float) 
 
 @kernel
 def steady_v(world: State) -> Floats:
-    """Voltages of INPUTS that change at events only; 0 for the others."""
+    """Voltages of INPUTS that change at events only, without noise; 0 for the others."""
     volts = np.zeros(len(INPUTS))
     volts[SUPPLY] = world.supply_v * world.powered
+    volts[FIELD:RATE] = world.field_v * world.powered
+    volts[RATE:] = world.rate_v * world.powered
     volts[THERMISTOR] = thermistor_v(world.body_c + world.board_k, volts[SUPPLY])
     return volts
 

@@ -33,6 +33,7 @@ class State:
     table_deg: Floats = field(default_factory=zeros(2))  # behind the gear play
     up: Floats = field(default_factory=zeros(3))  # the vertical in the base
     mount: Floats = field(default_factory=zeros(3, 3))  # package from table
+    board: Floats = field(default_factory=zeros(3, 3))  # board from table, which magnetometer and gyroscope lie on
     grip_nm: Floats = field(default_factory=zeros(2))  # displacement by the clamp that holds the package
     carriage: Floats = field(default_factory=zeros(3, positioner.PIECES, positioner.TERMS))  # its motion in x, y, z
     carriage_rest_ns: Ints = field(default_factory=zeros(3, dtype=int))  # when it has settled
@@ -66,6 +67,15 @@ class State:
     kept_ns: int = 0  # the filter's last step, and its answers
     kept: float = 1.0  # share of the old
     fresh: float = 0.0  # share of new white noise, in rms
+
+    earth_deg_s: Floats = field(default_factory=zeros(3))  # its rotation in the base
+    field_ut: Floats = field(default_factory=zeros(3))  # magnetic, in the base
+    plates: Floats = field(default_factory=zeros(3, 3))  # of the magnetometer, their normals on the board
+    die: Floats = field(default_factory=zeros(3, 3))  # of the gyroscope, from the board
+    turned_rad: Floats = field(default_factory=zeros(2))  # where the tables stood at the last step
+    turned_ns: int = 0
+    field_v: Floats = field(default_factory=zeros(3))  # of the magnetometer, without noise
+    rate_v: Floats = field(default_factory=zeros(3))  # of the gyroscope, without noise
 
     seat: float = 0.5  # of a mount that rocks
     lid_in: float = 0.0  # 1 while a lid is popped in

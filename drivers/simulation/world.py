@@ -78,13 +78,16 @@ class World:
         salt = self._seed * len(positioner.AXES) + number
         return positioner.read_um(self._numbers.positioner, self._world.carriage[number], times, salt)
 
-    def mount_sensor(self, mount_deg: float = 0.0, flip: int = 0) -> None:
-        """Put the sensor on the table turned by `mount_deg` about its z axis, face down if `flip`; see seating.
+    def mount_sensor(self, mount_deg: float = 0.0, flip: int = 0, up: str = "z") -> None:
+        """Put the sensor on the table turned by `mount_deg` about its normal, face down if `flip`; see seating.
+
+        `up` is the edge of the board that stands along the normal, see `gravity.mounting`.
 
         Like `power`, it shows in the outputs from the next tick on, within 0.1 s.
         """
         tilt, grip_nm = seating.seated(self.config.seating, self._seed, self._number, int(self._world.now_ns))
-        self._world.mount = gravity.mounting(self.config.sensor.package, mount_deg, flip) @ tilt
+        self._world.mount = gravity.mounting(self.config.sensor.package, mount_deg, flip, up) @ tilt
+        self._world.board = gravity.mounting(gravity.Package(), mount_deg, flip, up) @ tilt
         self._world.grip_nm = grip_nm
 
     def power(self, on: bool) -> None:
@@ -117,7 +120,7 @@ class World:
 
         Scan i begins at `start_s + i * interval_s`; an input follows as many times the converter's skew later as its
         place in the scan says, which are 0, 1, .. unless given. The world is at the last scan afterwards. Inputs:
-        vx, vy, supply, thermistor, ground, d63.
+        vx, vy, supply, thermistor, ground, d63, mx, my, mz of the magnetometer, gx, gy, gz of the gyroscope.
 
         Raises:
             UnknownInput: an input of another name.

@@ -47,6 +47,7 @@ def test_settings_are_frozen() -> None:
 
 
 UNITS = ("v", "g", "g2", "deg", "nm", "um", "um2", "pm", "hz", "s", "k", "h", "c", "ohm", "farad", "fraction", "cycles")
+UNITS += ("mm", "m2", "ut", "mt2", "ppm", "ratio")
 
 
 def leaves(settings: object) -> list[tuple[str, float]]:

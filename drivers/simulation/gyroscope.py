@@ -1,0 +1,75 @@
+"""A gyroscope: for each axis two proof masses that swing against each other, and are pushed aside by Coriolis forces.
+
+The drive keeps the masses swinging at its resonance. A rate about the input axis pushes them to opposite sides, at the
+same frequency; the sense mode, a little above it, answers. Springs that are not square to each other push as well
+(quadrature), a quarter period apart, and an imperfect demodulator lets some of it through. A load along the sense
+direction displaces both masses alike, but for their unbalance; the springs of a displaced mass are less square.
+
+Source  Acar and Shkel, MEMS Vibratory Gyroscopes (2009), chapters 3 and 4.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from drivers.simulation.gravity import rotation
+from drivers.simulation.kernel import Floats, kernel
+from drivers.simulation.springs import STANDARD_GRAVITY_M_S2
+
+
+@dataclass(frozen=True)
+class Tines:
+    """The pair of masses of one axis, its drive, its pick-up and its demodulator."""
+
+    drive_um: float = 6.0  # amplitude
+    drive_ppm_per_k: float = 0.0  # how the amplitude's control drifts
+    drive_hz: float = 15e3
+    split_hz: float = 300.0  # of the sense resonance above the drive's
+    off_square_ppm: float = 0.0  # stiffness that couples drive to sense, over the sense mode's own
+    off_square_per_nm: float = 0.0  # its growth by a displacement of the mass, ppm
+    unbalance_fraction: float = 0.0  # of the two masses, relative
+    demodulator_deg: float = 0.0  # error of its phase
+    gap_nm: float = 2000.0  # of the pick-up's plates
+    volts_per_nm: float = 0.11  # with the gap: about 6 mV for 1 deg/s
+    zero_v: float = 2.5
+
+
+@dataclass(frozen=True)
+class Gyroscope:
+    """Three pairs; that of x senses along y, that of y along z, that of z along x. How the chip lies on the board."""
+
+    x: Tines = field(default_factory=Tines)
+    y: Tines = field(default_factory=Tines)
+    z: Tines = field(default_factory=Tines)
+    turn_x_deg: float = 0.0
+    turn_y_deg: float = 0.0
+    turn_z_deg: float = 0.0
+    noise_v: float = 1.5e-3  # rms of a sample
+
+
+def die(sensor: Gyroscope) -> Floats:
+    """Die from board, shape (3, 3)."""
+    return rotation(sensor.turn_x_deg, sensor.turn_y_deg, sensor.turn_z_deg)
+
+
+@kernel
+def read_v(sensor: Gyroscope, rate: Floats, load: Floats, warmer_k: float, volts: Floats) -> None:
+    """Fill `volts` (3,) at a rate (3,), deg/s, and a specific force (3,), g, both in the die's frame."""
+    volts[0] = sensed_v(sensor.x, rate[0], load[1], warmer_k)
+    volts[1] = sensed_v(sensor.y, rate[1], load[2], warmer_k)
+    volts[2] = sensed_v(sensor.z, rate[2], load[0], warmer_k)
+
+
+@kernel
+def sensed_v(tines: Tines, rate_deg_s: float, load_g: float, warmer_k: float) -> float:
+    """Output of one pair at a rate about its input axis, under a load along its sense direction."""
+    drive, sense = 2 * math.pi * tines.drive_hz, 2 * math.pi * (tines.drive_hz + tines.split_hz)
+    swing_nm = 1e3 * tines.drive_um * (1 + 1e-6 * tines.drive_ppm_per_k * warmer_k)
+    aside_nm = 1e9 * tines.unbalance_fraction * load_g * STANDARD_GRAVITY_M_S2 / sense**2
+    coupled = 1e-6 * (tines.off_square_ppm + tines.off_square_per_nm * aside_nm) * sense**2
+    answer_nm = swing_nm / (sense**2 - drive**2)
+    coriolis_nm = 2 * math.radians(rate_deg_s) * drive * answer_nm
+    error = math.radians(tines.demodulator_deg)
+    moved_nm = coriolis_nm * math.cos(error) + coupled * answer_nm * math.sin(error)
+    return tines.zero_v + tines.volts_per_nm * moved_nm / (1 - (moved_nm / tines.gap_nm) ** 2)
