@@ -204,7 +204,7 @@ class RotaryStage:
             )
 
     def _require_movable(self) -> int:
-        """The outputs of a drive that can be sent somewhere, and keeps its limits. Raises what it cannot be sent for."""
+        """The outputs of a drive that can be sent somewhere; raises why it cannot. It keeps its limits from now on."""
         outputs = self._status()
         self._require_coordinates(outputs)
         self._require_ready(outputs)
