@@ -1,4 +1,4 @@
-"""A stage that turns at a constant rate, on the simulated drive: to an end by itself, or on and on until it is stopped."""
+"""A stage that turns at a constant rate: to an end by itself, or on and on until it is stopped."""
 
 from __future__ import annotations
 
