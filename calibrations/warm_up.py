@@ -25,4 +25,5 @@ def time_constants_s(table: Table) -> Array:
 
 def left(table: Table, p: Values) -> Array:
     """(n,) the share of the approach that is still to come."""
-    return np.asarray(np.exp(-(table.time_s - p["begin_s"]) / p["time_constant"]))
+    share: Array = np.exp(-(table.time_s - p["begin_s"]) / p["time_constant"])
+    return share

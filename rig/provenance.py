@@ -9,6 +9,8 @@ from importlib.metadata import version
 from calibrations.fit import Fit
 from calibrations.model import Model
 
+OF_THE_SENSOR = ("sensor", "serial", "gravity_m_s2")  # constants of the data that a model file keeps
+
 
 def program() -> str:
     """Name and version of this program, as results carry it."""
@@ -28,6 +30,7 @@ def with_provenance(found: Fit, parent: Model) -> Model:
             "data": found.table.source,
             "data_sha256": found.table.digest,
             "rows": found.table.n,
+            **{name: found.table.constants[name] for name in OF_THE_SENSOR if name in found.table.constants},
             "parent": parent.name,
             "program": program(),
             "created": datetime.now(UTC).isoformat(timespec="seconds"),

@@ -20,6 +20,7 @@ from calibrations.search.lack_of_fit import smooth_columns
 from calibrations.table import Array, Table
 
 KINDS = ("poses", "positions", "fields", "rates")
+LEFT_OUT = "the drift of one record says nothing of the next"
 NEEDS = ("t_s",)
 HOUR_S = 3600.0
 WAVES = range(2, 8)

@@ -20,4 +20,4 @@ STARTS = {"total": lambda table: np.full(3, radius(table))}
 
 
 def transduction(a: Array, table: Table, p: Values) -> Array:
-    return np.asarray(a * p["total"])
+    return a * p["total"]

@@ -15,6 +15,7 @@ from calibrations.table import AXES, Array, Table
 from calibrations.turning import specific_force_g
 
 KINDS = ("rates",)
+LEFT_OUT = "it follows the specific force by an accelerometer with a calibration of its own"
 NEEDS = ("ax", "ay", "az")
 PARAMETERS = tuple(
     Parameter(axis, "{out}/g", typical=0.1, doc=f"output per g of specific force along {axis}") for axis in AXES

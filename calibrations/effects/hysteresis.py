@@ -20,6 +20,7 @@ from calibrations.table import Array, Table
 from calibrations.visits import turning_points
 
 KINDS = ("poses",)
+LEFT_OUT = "it follows the way on which a specific force was reached"
 NEEDS = ("direction",)
 PARAMETERS = (
     Parameter("height", "{out}", typical=0.01, doc="half the opening of the loop"),

@@ -16,6 +16,7 @@ from calibrations.motion.spectrum import first_order
 from calibrations.table import Array, Table
 
 KINDS = ("motion",)
+LEFT_OUT = "it follows what came before: it is a filter, and belongs to the sampling"
 PARAMETERS = (Parameter("off_nominal", "Hz", typical=2.0, low=-10.0, high=100.0, doc="corner less its nominal value"),)
 
 

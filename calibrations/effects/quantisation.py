@@ -22,6 +22,7 @@ from calibrations.search.lack_of_fit import smooth_columns
 from calibrations.table import Array, Table
 
 KINDS = ("poses",)
+LEFT_OUT = "what was rounded off is lost"
 AFTER = ("bias", "scale-factor")
 PARAMETERS = (
     Parameter("step", "{out}", typical=1e-6, per_axis=False, starts=(1e-3,), low=1e-9, doc="from one code to the next"),

@@ -14,6 +14,7 @@ from calibrations.motion.spectrum import delayed
 from calibrations.table import Array, Table
 
 KINDS = ("motion",)
+LEFT_OUT = "it is a matter of time, and belongs to the sampling"
 PARAMETERS = (Parameter("delay", "s", typical=1e-3, low=-0.05, high=0.05, doc="age of the sensor's samples"),)
 
 

@@ -25,7 +25,8 @@ STARTS = {"high": lambda table: _levels(table, 1), "low": lambda table: _levels(
 
 
 def output(v: Array, table: Table, p: Values) -> Array:
-    return np.asarray(v - p["loss"] * (np.maximum(v - p["high"], 0.0) + np.minimum(v - p["low"], 0.0)))
+    left: Array = v - p["loss"] * (np.maximum(v - p["high"], 0.0) + np.minimum(v - p["low"], 0.0))
+    return left
 
 
 def _levels(table: Table, side: int) -> Array:

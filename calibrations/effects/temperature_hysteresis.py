@@ -14,6 +14,7 @@ from calibrations.effect import Parameter, Values
 from calibrations.table import Array, Table
 
 KINDS = ("poses", "positions")
+LEFT_OUT = "it follows the way on which a temperature was reached"
 NEEDS = ("temperature_c", "t_s")
 CONTAINS = ("temperature-bias",)
 PARAMETERS = (

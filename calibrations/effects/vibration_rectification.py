@@ -16,6 +16,7 @@ from calibrations.motion.records import records
 from calibrations.table import Array, Table
 
 KINDS = ("motion",)
+LEFT_OUT = "it follows the mean square of a motion over a second"
 PARAMETERS = (Parameter("coefficient", "{out}/g^2", typical=1.0, doc="shift per mean square of the acceleration"),)
 SECOND = 1.0
 

@@ -1,0 +1,105 @@
+"""How fast the way back closes in on the specific force, proved over the whole range.
+
+    a <- a + C (V - G(a)),   from a = 0        C: the inverse of dG/da at 0 g, in the middle of what else is given
+
+G is the model from specific force to output. For each box of the range the slopes of this step, 1 - C G'(a), are
+bounded by interval arithmetic; q is the greatest row sum of their magnitudes. A true a within +-r of 0 on every axis is
+a fixed point; the first step comes within q r of it, and every step by the factor q nearer (Banach), as long as q was
+found on the range and that margin around it: n steps leave less than q^n r, in the maximum norm.
+
+Source  Krawczyk, Computing 4 (1969); Moore, Kearfott and Cloud (2009), chapter 8.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibrations.compensation.graph import Node, names
+from calibrations.compensation.interval import Interval, over, point
+from calibrations.table import Array
+
+MARGINS = (0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 0.95)  # of the range, tried in turn
+PARTS, PARTS_OF_OTHERS, MOST_BOXES = 8, 4, 20_000
+MOST_STEPS = 200
+
+
+@dataclass(frozen=True)
+class Bound:
+    """`q` is the factor by which each step comes nearer, `steps` how many leave less than `within`, both proved.
+
+    `C` has shape (axes, axes), in g per unit of output.
+    """
+
+    C: Array
+    q: float
+    steps: int
+    within: float
+
+
+def bound(
+    outputs: Sequence[Node],
+    sought: tuple[str, ...],
+    reach: float,
+    others: Mapping[str, tuple[float, float]],
+    want: float,
+) -> Bound | None:
+    """The bound for a true value of each of `sought` within +-`reach` and of `others` within their ranges.
+
+    None where the steps cannot be shown to close in.
+    """
+    others = {name: others[name] for name in names(outputs) if name not in sought}
+    slopes = _slopes_in_the_middle(outputs, sought, others)
+    if not np.isfinite(slopes).all() or abs(np.linalg.det(slopes / (np.max(np.abs(slopes)) or 1.0))) < 1e-9:
+        return None
+    C = np.asarray(np.linalg.inv(slopes), dtype=np.float64)
+    for margin in MARGINS:
+        q = _greatest(outputs, sought, (1 + margin) * reach, others, C)
+        if q <= margin:
+            steps = max(1, math.ceil(math.log(want / reach) / math.log(max(q, 1e-12))))
+            return Bound(C, q, steps, q**steps * reach) if steps <= MOST_STEPS else None
+    return None
+
+
+def _slopes_in_the_middle(
+    outputs: Sequence[Node], sought: tuple[str, ...], others: Mapping[str, tuple[float, float]]
+) -> Array:
+    """d output / d a at 0 g, shape (axes, axes)."""
+    at = {name: point(np.zeros(1)) for name in sought}
+    at |= {name: point(np.array([(low + high) / 2])) for name, (low, high) in others.items()}
+    found = over(outputs, at, sought)
+    return np.array([(d.low[:, 0] + d.high[:, 0]) / 2 for _, d in found])
+
+
+def _greatest(
+    outputs: Sequence[Node], sought: tuple[str, ...], reach: float, others: Mapping[str, tuple[float, float]], C: Array
+) -> float:
+    """The greatest row sum of |1 - C G'| over the boxes that the range is cut into."""
+    ranges = _boxes(dict.fromkeys(sought, (-reach, reach)), others)
+    slopes = [d for _, d in over(outputs, ranges, sought)]
+    boxes = slopes[0].low.shape[1]
+    worst = np.zeros(boxes)
+    for i in range(len(sought)):
+        row = np.zeros(boxes)
+        for j in range(len(sought)):
+            entry = point(np.full(boxes, float(i == j)))
+            for k, d in enumerate(slopes):
+                entry = entry - point(np.full(boxes, C[i, k])) * Interval(d.low[j], d.high[j])
+            row += entry.magnitude
+        worst = np.maximum(worst, row)
+    return float(np.max(worst)) if np.isfinite(worst).all() else math.inf
+
+
+def _boxes(sought: Mapping[str, tuple[float, float]], others: Mapping[str, tuple[float, float]]) -> dict[str, Interval]:
+    """The range cut into boxes, every combination of parts of each variable."""
+    parts = [PARTS] * len(sought) + [PARTS_OF_OTHERS] * len(others)
+    while math.prod(parts) > MOST_BOXES:
+        parts = [max(1, n // 2) for n in parts]
+    everything = {**sought, **others}
+    cuts = [np.linspace(low, high, n + 1) for (low, high), n in zip(everything.values(), parts, strict=True)]
+    lows = np.meshgrid(*(cut[:-1] for cut in cuts), indexing="ij")
+    highs = np.meshgrid(*(cut[1:] for cut in cuts), indexing="ij")
+    return {name: Interval(low.ravel(), high.ravel()) for name, low, high in zip(everything, lows, highs, strict=True)}

@@ -1,0 +1,157 @@
+"""What a compensation does not know costs, over a simulated sweep: effects left out, an axis that is not measured,
+and the uncertainties of its parameters.
+
+The sweep holds the sensor in gravity alone, with every effect of the model but those of the rig, at angles approached
+from both sides while the temperature goes up and down.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calibrations.chain import Step, nominal_pose, respond, sensed, specific_force
+from calibrations.compensation.forward import FORCES, LEFT_OUT, Forward, steps_of
+from calibrations.compensation.program import Program
+from calibrations.errors import CalibrationError
+from calibrations.model import Estimate, Model, Term
+from calibrations.table import Array, Table
+
+INCLINATIONS_DEG = (90, 30, 150, 60, 120, 10, 170)
+STEP_DEG = 15.0
+WARMER_K, MORE_SUPPLY = 20.0, 0.01  # either side of the model's own reference
+SHIFT = 1e-3  # of a standard uncertainty: steps of derivatives
+PASSES = 3  # by which the axis that is not measured is found in gravity
+
+
+@dataclass(frozen=True)
+class Size:
+    """An error's root mean square and greatest magnitude over the sweep, worst axis."""
+
+    rms: float
+    most: float
+
+
+@dataclass(frozen=True)
+class Cost:
+    """`left_out` by effect, None where a sweep does not show it; `out_of_gravity` of an axis found from the others;
+    `parameters` the standard uncertainty of what is sensed by those of the parameters, taken as independent.
+    """
+
+    left_out: Mapping[str, Size | None]
+    out_of_gravity: Size | None
+    parameters: Size | None
+
+
+def costs(model: Model, forward: Forward, program: Program, reach: float, unit: str) -> Cost:
+    """All costs of a compensation, in `unit`."""
+    table = _sweep(model, program)
+    a = specific_force(nominal_pose(table)) * (1.0 if unit != "deg/s" else reach)
+    fates = {fate.effect: fate.how for fate in forward.fates}
+    followed = [step for step in steps_of(model) if fates[step[0].name] not in (LEFT_OUT, "of the rig")]
+    left = {name: _of_left_out(name, model, followed, table, a, forward, program) for name in forward.left_out}
+    hidden = unit == "g" and len(forward.axes) == 2 and "az" in program.inputs
+    return Cost(
+        left,
+        _of_gravity(followed, table, a, forward, program) if hidden else None,
+        _of_parameters(model, forward, followed, table, a),
+    )
+
+
+def in_gravity(program: Program, inputs: Mapping[str, Array], side: Array) -> dict[str, Array]:
+    """What the program finds where only gravity acts and z is not measured: |a| = 1, z on the `side` +1 or -1.
+
+    Source  Ang (5)-(7), with the model in place of the linear estimate. Fixed passes, as the written sources do.
+    """
+    found = program.run({**inputs, "az": np.zeros(np.shape(side))})
+    for _ in range(PASSES):
+        az = side * np.sqrt(np.maximum(0.0, 1 - found["ax"] ** 2 - found["ay"] ** 2))
+        found = program.run({**inputs, "az": az})
+    return found
+
+
+def inputs_of(table: Table, v: Array, a: Array, program: Program) -> dict[str, Array]:
+    """The program's inputs for outputs `v` and specific force `a`, both (n, 3), of a table's rows."""
+    known = {f"v{axis}": v[:, k] for k, axis in enumerate("xyz")}
+    known |= {name: a[:, k] for k, name in enumerate(FORCES)}
+    return {name: known[name] if name in known else table.column(name) for name in program.inputs}
+
+
+def _sweep(model: Model, program: Program) -> Table:
+    """A table of poses: a turn each way at each inclination, 7 s a pose."""
+    up = np.arange(0.0, 360.0 + STEP_DEG / 2, STEP_DEG)
+    alpha = np.repeat(np.array(INCLINATIONS_DEG, float), 2 * len(up))
+    beta = np.tile(np.concatenate([up, up[::-1]]), len(INCLINATIONS_DEG))
+    n = len(alpha)
+    wave = np.sin(np.linspace(0, 4 * np.pi, n))
+    at = {name: value for term in model.terms for name, value in term.constants.items()}
+    columns = {
+        "alpha_deg": alpha,
+        "beta_deg": beta,
+        "direction": np.tile(np.repeat([1.0, -1.0], len(up)), len(INCLINATIONS_DEG)),
+        "t_s": at.get("middle_s", 0.0) + 7.0 * (np.arange(n) - n / 2) + 3.5 * n * ("middle_s" not in at),
+        "temperature_c": at.get("reference_c", 25.0) + WARMER_K * wave,
+        "supply_v": at.get("reference_v", 5.0) * (1 + MORE_SUPPLY * wave),
+        "vx_v": np.zeros(n),
+    }
+    columns |= {name: wave for name in program.inputs if name not in columns and name[0] not in "va"}
+    return Table.from_columns("poses", columns, source="a simulated sweep")
+
+
+def _errors(found: Mapping[str, Array], a: Array, forward: Forward) -> Array:
+    return np.column_stack([found[f"a{axis}"] - a[:, "xyz".index(axis)] for axis in forward.axes])
+
+
+def _size(errors: Array) -> Size:
+    return Size(float(np.sqrt(np.mean(errors**2, axis=0)).max()), float(np.abs(errors).max()))
+
+
+def _of_left_out(
+    name: str, model: Model, followed: Sequence[Step], table: Table, a: Array, forward: Forward, program: Program
+) -> Size | None:
+    """By the whole model with this effect, compensated without it."""
+    steps = [s for s in steps_of(model) if s[0].name == name or any(s[0] is other[0] for other in followed)]
+    try:
+        v = respond(sensed(a, table, steps), table, steps)
+    except CalibrationError:  # it needs what no sweep has, such as a motion
+        return None
+    return _size(_errors(program.run(inputs_of(table, v, a, program)), a, forward))
+
+
+def _of_gravity(followed: Sequence[Step], table: Table, a: Array, forward: Forward, program: Program) -> Size:
+    v = respond(sensed(a, table, followed), table, followed)
+    found = in_gravity(program, inputs_of(table, v, a, program), np.where(a[:, 2] < 0, -1.0, 1.0))
+    return _size(_errors(found, a, forward))
+
+
+def _of_parameters(model: Model, forward: Forward, followed: Sequence[Step], table: Table, a: Array) -> Size | None:
+    """u^2(a) = sum over parameters of (J^-1 dG/dp u(p))^2, with J = dG/da (GUM 5.1.2)."""
+    names = {step[0].name for step in followed}
+    kept = replace(model, terms=tuple(term for term in model.terms if term.name in names))
+    k = [("xyz").index(axis) for axis in forward.axes]
+
+    def output(of: Model, at: Array) -> Array:
+        steps = steps_of(of)
+        return respond(sensed(at, table, steps), table, steps)[:, k]
+
+    h = 1e-5
+    J = np.stack([(output(kept, a + h * e) - output(kept, a - h * e)) / (2 * h) for e in np.eye(3)[k]], axis=2)
+    inverse = np.linalg.inv(J)
+    variance, known = np.zeros((table.n, len(k))), False
+    for i, term in enumerate(kept.terms):
+        for j, e in enumerate(term.estimates):
+            if e.std and e.identified:
+                known = True
+                moved = output(_moved(kept, i, j, SHIFT * e.std), a) - output(_moved(kept, i, j, -SHIFT * e.std), a)
+                variance += np.einsum("nij,nj->ni", inverse, moved / (2 * SHIFT)) ** 2
+    return _size(np.sqrt(variance)) if known else None
+
+
+def _moved(model: Model, i: int, j: int, by: float) -> Model:
+    """The model with one estimate moved."""
+    term: Term = model.terms[i]
+    moved: Estimate = replace(term.estimates[j], value=term.estimates[j].value + by)
+    estimates = (*term.estimates[:j], moved, *term.estimates[j + 1 :])
+    return replace(model, terms=(*model.terms[:i], replace(term, estimates=estimates), *model.terms[i + 1 :]))

@@ -1,0 +1,136 @@
+"""A model's way from specific force to output, as a graph of each output; and what becomes of each of its effects.
+
+inverted    the effect acts on force, transduction or output, and its function can be written down
+of the rig  it acts on the pose alone: the stages' errors are not the sensor's, and drop out
+left out    it says itself why a product cannot follow it, its function cannot be written down, or it was asked for
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from calibrations.chain import Step
+from calibrations.compensation.graph import Node, given
+from calibrations.compensation.traced import NotTraced, RunTime, Traced, nodes_traced
+from calibrations.compensation.written import added
+from calibrations.errors import ModelError
+from calibrations.model import Model, Term
+from calibrations.table import AXES, NUMBERS
+
+INVERTED, OF_THE_RIG, LEFT_OUT = "inverted", "of the rig", "left out"
+KNOWN = ("temperature_c", "supply_v", "t_s")  # what a product may know beside the outputs
+FORCES = ("ax", "ay", "az")
+
+
+@dataclass(frozen=True)
+class Fate:
+    """What becomes of an effect: one of the three, and why where it is left out."""
+
+    effect: str
+    how: str
+    why: str = ""
+
+
+@dataclass(frozen=True)
+class Forward:
+    """Outputs of the measured `axes` as graphs of ax, ay, az (those along `axes` are sought) and of what is given."""
+
+    model: Model
+    axes: tuple[str, ...]
+    outputs: tuple[Node, ...]
+    fates: tuple[Fate, ...]
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        return tuple(fate.effect for fate in self.fates if fate.how == LEFT_OUT)
+
+    @property
+    def sought(self) -> tuple[str, ...]:
+        """Names of what is sought, as the graphs have them."""
+        return tuple(f"a{axis}" for axis in self.axes)
+
+
+def measured_axes(model: Model) -> tuple[str, ...]:
+    """The axes that the model has values for; all three where one value serves all.
+
+    Raises ModelError for a model without values.
+    """
+    named = {e.axis for term in model.terms for e in term.estimates}
+    if not named:
+        raise ModelError(
+            f"{model.name}: has no values yet; `rig fit DATA --model {model.name} --out FILE` gives it some"
+        )
+    found = tuple(axis for axis in AXES if axis in named)
+    return found or AXES
+
+
+def steps_of(model: Model) -> list[Step]:
+    """Effects with the values that the model has, as the signal chain takes them."""
+    return [(term.effect, _values(term)) for term in model.terms]
+
+
+def input_unit(model: Model) -> str:
+    """Unit of what is sensed: g, the field's strength, or deg/s."""
+    kinds = {kind for term in model.terms for kind in term.effect.kinds if len(term.effect.kinds) == 1}
+    return {"fields": "field", "rates": "deg/s"}.get(next(iter(kinds), ""), "g") if len(kinds) == 1 else "g"
+
+
+def forward_of(model: Model, without: Collection[str] = ()) -> Forward:
+    """The graphs of a fitted model; the effects in `without` are left out."""
+    axes, steps = measured_axes(model), steps_of(model)
+    own = {name for effect, _ in steps for name in effect.needs if name not in NUMBERS}
+    table = RunTime(axes, {name: name for name in (*KNOWN, *sorted(own))})
+    fates = [_fate(step, table, without) for step in steps]
+    taken = [step for step, fate in zip(steps, fates, strict=True) if fate.how == INVERTED]
+    outputs = _outputs(taken, table)
+    return Forward(model, axes, tuple(outputs.nodes[0, : len(axes)]), tuple(fates))
+
+
+def _values(term: Term) -> dict[str, Any]:
+    """Constants and parameters by name, a parameter per axis of shape (3,); 0 where there is none."""
+    values: dict[str, Any] = {name: np.asarray(value) for name, value in term.constants.items()}
+    values |= {p.name: np.zeros(3 if p.per_axis else ()) for p in term.effect.parameters}
+    for e in term.estimates:
+        if not e.axis:
+            values[e.name] = np.full_like(values[e.name], e.value)
+        else:
+            values[e.name][AXES.index(e.axis)] = e.value
+    return values
+
+
+def _fate(step: Step, table: RunTime, without: Collection[str]) -> Fate:
+    effect, _ = step
+    if effect.name in without:
+        return Fate(effect.name, LEFT_OUT, "as was asked")
+    if effect.left_out:
+        return Fate(effect.name, LEFT_OUT, effect.left_out)
+    if effect.acts_on == "pose" and not (effect.force or effect.transduction or effect.output):
+        return Fate(effect.name, OF_THE_RIG)
+    try:
+        _outputs([step], table)
+    except NotTraced as error:
+        return Fate(effect.name, LEFT_OUT, str(error))
+    except ModelError as error:  # of a user's own file, whose faults are told as theirs
+        return Fate(effect.name, LEFT_OUT, str(error.__cause__ or error))
+    return Fate(effect.name, INVERTED)
+
+
+def _outputs(steps: Sequence[Step], runtime: RunTime) -> Traced:
+    """Outputs of all three axes, shape (1, 3): the signal chain of `calibrations.chain`, without its poses."""
+    table: Any = runtime
+    a: Any = Traced([[given(name) for name in FORCES]])
+    for effect, p in steps:
+        if effect.force is not None:
+            a = effect.force(a, table, p)
+    v: Any = nodes_traced(np.zeros((1, 3)))
+    for effect, p in steps:
+        if effect.transduction is not None:
+            v = v + (added(effect, a, table, p) if effect.expression else effect.transduction(a, table, p))
+    for effect, p in steps:
+        if effect.output is not None:
+            v = effect.output(v, table, p)
+    return nodes_traced(v)
