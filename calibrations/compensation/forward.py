@@ -92,6 +92,8 @@ def forward_of(model: Model, without: Collection[str] = ()) -> Forward:
 
 def _values(term: Term) -> dict[str, Any]:
     """Constants and parameters by name, a parameter per axis of shape (3,); 0 where there is none."""
+    if missing := [name for name in term.effect.constants if name not in term.constants]:
+        raise ModelError(f"{term.name}: the constant {missing[0]} is missing; `rig fit` writes it into the model file")
     values: dict[str, Any] = {name: np.asarray(value) for name, value in term.constants.items()}
     values |= {p.name: np.zeros(3 if p.per_axis else ()) for p in term.effect.parameters}
     for e in term.estimates:

@@ -1,0 +1,225 @@
+"""A model turned round gives back what it was made of, over the whole range; and says what it cannot."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from calibrations.chain import respond, sensed
+from calibrations.compensation.forward import INVERTED, LEFT_OUT, OF_THE_RIG, steps_of
+from calibrations.compensation.inverse import Compensation, Range, invert
+from calibrations.effect import Effect, catalogue, read_effect
+from calibrations.errors import ModelError
+from calibrations.expressions.effect import own_effect
+from calibrations.model import Model
+from calibrations.model_file import read_model
+from calibrations.table import Array, Table
+from tests.calibrations.fitted import LINEAR, PHYSICAL, model
+
+THERMAL = {"temperature-bias": {"slope": (0.001, -0.002)}, "temperature-scale": {"slope": (3e-4, -2e-4)}}
+EVERYTHING = {
+    **PHYSICAL,
+    **THERMAL,
+    "cubic-nonlinearity": {"cube": (0.003, -0.002)},
+    "scale-factor-asymmetry": {"kink": (0.004, 0.003)},
+    "odd-quadratic-nonlinearity": {"square": (0.002, 0.001)},
+    "cross-axis-scale": {"slope": (0.004, 0.002)},
+    "warm-up-bias": {"amplitude": (0.01, 0.02), "time_constant": 600.0},
+    "supply-sensitivity": {"share": (0.9, 1.1)},
+}
+
+
+def drawn(made: Compensation, n: int, seed: int) -> tuple[Table, Array]:
+    """Rows all over the range, and specific force (n, 3): by the library's own chain, and not by the graph."""
+    rng = np.random.default_rng(seed)
+    a = made.range.reach * rng.uniform(-1, 1, (n, 3))
+    columns = {name: rng.uniform(low, high, n) for name, (low, high) in made.beside.items() if name[0] != "a"}
+    return Table.from_columns("poses", columns | {k: np.zeros(n) for k in ("alpha_deg", "beta_deg", "vx_v", "vy_v")}), a
+
+
+def error(made: Compensation, within: Model, n: int = 500, seed: int = 0) -> float:
+    """The greatest error of what the program makes of the outputs of `within`, in the unit of what is sensed."""
+    table, a = drawn(made, n, seed)
+    steps = steps_of(within)
+    v = respond(sensed(a, table, steps), table, steps)
+    known = {f"v{axis}": v[:, k] for k, axis in enumerate("xyz")} | {
+        f"a{axis}": a[:, k] for k, axis in enumerate("xyz")
+    }
+    found = made.program.run({name: known.get(name, table.columns.get(name)) for name in made.program.inputs})
+    return max(float(np.abs(found[f"a{axis}"] - a[:, "xyz".index(axis)]).max()) for axis in made.forward.axes)
+
+
+@pytest.mark.parametrize("values", [LINEAR, PHYSICAL, EVERYTHING], ids=["linear", "physical", "everything"])
+def test_it_gives_back_what_the_model_was_given(values: Any) -> None:
+    fitted = model(values)
+    made = invert(fitted)
+    assert {fate.how for fate in made.forward.fates} == {INVERTED}
+    assert error(made, fitted) < 1e-9
+    assert made.bound.q**made.bound.steps * 1.5 == pytest.approx(made.bound.within)
+
+
+@settings(max_examples=15)
+@given(
+    st.lists(st.floats(-0.02, 0.02), min_size=10, max_size=10),
+    st.tuples(*[st.floats(-3, 3)] * 3),
+    st.integers(0, 1000),
+)
+def test_whatever_the_sensor(bent: list[float], turned: tuple[float, float, float], seed: int) -> None:
+    shapes = ("quadratic-nonlinearity", "cross-axis-bias", "z-axis-bias", "odd-quadratic-nonlinearity")
+    values: dict[str, Any] = {name: {"square": tuple(bent[2 * k : 2 * k + 2])} for k, name in enumerate(shapes)}
+    values |= {
+        "cubic-nonlinearity": {"cube": tuple(bent[8:])},
+        "axis-misalignment": dict(zip("xyz", turned, strict=True)),
+    }
+    fitted = model({**LINEAR, **values})
+    made = invert(fitted)
+    assert error(made, fitted, 50, seed) < 1e-9
+
+
+def test_three_axes_need_nothing_beside() -> None:
+    bias, scale = (0.1, -0.2, 0.3), (1.0, 1.1, 0.9)
+    bent = {"axis-nonorthogonality": {"xy": 1.0, "xz": -0.5, "yz": 2.0}, "z-axis-bias": {"square": (0.01, 0.02, 0.01)}}
+    fitted = model({"bias": {"bias": bias}, "scale-factor": {"scale": scale}, **bent})
+    made = invert(fitted)
+    assert made.program.inputs == ("vx", "vy", "vz")
+    assert error(made, fitted) < 1e-9
+
+
+def test_one_axis_is_told_the_others() -> None:
+    fitted = model(
+        {"bias": {"bias": (2.5,)}, "scale-factor": {"scale": (1.0,)}, "axis-misalignment": {"x": 0, "y": 1, "z": 1}}
+    )
+    made = invert(fitted)
+    assert made.program.inputs == ("vx", "ay", "az")
+    assert error(made, fitted) < 1e-9
+
+
+def test_magnetometers_and_gyroscopes() -> None:
+    iron = {
+        "hard-iron": {"offset": (10.0, -5.0, 3.0)},
+        "soft-iron": {"xx": 0.1, "yy": -0.05, "xy": 0.03, "xz": 0.0, "yz": 0.02},
+    }
+    magnetometer = model({"field-strength": {"total": 48.0}, **iron})
+    turned = {f"turned_{axis}": 1.0 for axis in "xyz"} | {"assumed": 16.0}
+    pairs = {"xy": 1.0, "xz": -2.0, "yx": 0.5, "yz": 0.0, "zx": 0.3, "zy": 1.0}
+    gyroscope = model(
+        {
+            "gyro-bias": {"bias": (3.0, -1.0, 2.0)},
+            "gyro-scale-factor": {"scale": (16.0, 16.5, 15.5)},
+            "gyro-misalignment": pairs,
+        },
+        constants=turned,
+    )
+    for fitted, unit, reach in ((magnetometer, "field", 1.5), (gyroscope, "deg/s", 300.0)):
+        made = invert(fitted)
+        assert (made.unit, made.range.reach) == (unit, reach)
+        assert error(made, fitted) < 1e-9 * reach
+
+
+@pytest.mark.parametrize("name", catalogue())
+def test_every_effect_is_inverted_or_says_why_not(name: str) -> None:
+    effect = catalogue()[name]
+    values = {p.name: (0.01, 0.02) if p.per_axis else 0.01 for p in effect.parameters}
+    (*_, fate) = invert_or_tell(model({**LINEAR, name: values} if name not in LINEAR else LINEAR))
+    if effect.acts_on == "pose":
+        assert fate.how == OF_THE_RIG
+    elif effect.left_out:
+        assert (fate.how, fate.why) == (LEFT_OUT, effect.left_out)
+    else:
+        assert fate.how == INVERTED, fate.why
+
+
+def invert_or_tell(fitted: Model) -> Any:
+    """What becomes of the effects, whether or not there is an inverse."""
+    from calibrations.compensation.forward import forward_of
+
+    return forward_of(fitted).fates
+
+
+def test_what_is_left_out_comes_with_its_cost() -> None:
+    slips = {"hysteresis": {"height": (0.003, 0.002), "reach": 0.1, "spread": 0.5, "pressing": 0.0}}
+    made = invert(model({**PHYSICAL, **slips, "stage-zero-offset": {"alpha": 0.1, "beta": 0.2}}))
+    size = made.costs.left_out["hysteresis"]
+    assert size is not None
+    assert 0.001 < size.rms < size.most < 1.1 * 0.003 / 1.01  # all elements slip: the whole height, in g
+    assert made.forward.left_out == ("hysteresis",)
+
+
+def test_an_axis_found_out_of_gravity_costs_little() -> None:
+    size = invert(model(PHYSICAL)).costs.out_of_gravity
+    assert size is not None
+    assert 0 < size.most < 1e-4
+    assert invert(model(LINEAR)).costs.out_of_gravity is None
+
+
+def test_uncertainties_reach_the_result() -> None:
+    size = invert(model(LINEAR, std=1e-3)).costs.parameters
+    assert size is not None
+    assert size.most == pytest.approx(1e-3 * np.sqrt(2) / 0.98, rel=0.02)  # bias and scale factor, at 1 g
+    assert invert(model(LINEAR, std=None)).costs.parameters is None
+
+
+def test_what_is_not_contractive_is_refused_with_the_way_out() -> None:
+    fitted = model({**LINEAR, "dead-zone": {"width": (0.01, 0.02)}})
+    with pytest.raises(ModelError, match=r"not contractive within \+-1.5 g.*--leave-out dead-zone"):
+        invert(fitted)
+    size = invert(fitted, without=["dead-zone"]).costs.left_out["dead-zone"]
+    assert size is not None
+    assert size.most == pytest.approx(0.02)
+    bent = model({**LINEAR, "cubic-nonlinearity": {"cube": (-0.4, 0.0)}})  # falls from 0.92 g on
+    with pytest.raises(ModelError, match="not contractive"):
+        invert(bent)
+    assert error(made := invert(bent, Range.for_model(bent, 0.5)), bent) < 1e-9
+    assert made.bound.q > 0.2
+
+
+def test_part_of_a_saturation_is_inverted() -> None:
+    fitted = model({**LINEAR, "saturation": {"high": (3.2, 3.2), "low": (1.7, 1.7), "loss": 0.2}})
+    assert error(invert(fitted), fitted) < 1e-9
+
+
+def test_own_expressions_are_inverted_where_a_product_knows_their_variables() -> None:
+    texts = {
+        "own-bend": "v += a*ax*ay + b*exp(-t/600) + c*max(ax, 0)**2",
+        "own-wet": "vx += k*humidity_pct*(1 + step(temperature - 30))",
+        "own-gear": "beta_deg += a*sin(5*beta)",
+        "own-angle": "vy += a*sin(5*alpha)",
+    }
+    own = {name: own_effect(name, text, ("humidity_pct",) if "pct" in text else ()) for name, text in texts.items()}
+    values = {"own-bend": {"a": (0.01, 0.0), "b": (0.01, 0.02), "c": (0.0, 0.01)}, "own-wet": {"k": 1e-4}}
+    fitted = model({**LINEAR, **values, "own-gear": {"a": 0.1}, "own-angle": {"a": 0.001}}, own)
+    with pytest.raises(ModelError, match="--input humidity_pct=LOW:HIGH"):
+        invert(fitted)
+    made = invert(fitted, Range.for_model(fitted, humidity_pct=(0.0, 100.0)))
+    how = {fate.effect: (fate.how, fate.why) for fate in made.forward.fates}
+    assert how["own-gear"] == (OF_THE_RIG, "")
+    assert how["own-angle"] == (LEFT_OUT, "it needs alpha_deg, which is not known at run time")
+    assert how["own-bend"] == how["own-wet"] == (INVERTED, "")
+    assert error(made, model({**LINEAR, **values}, own)) < 1e-9
+
+
+def test_an_effect_of_the_users_own_file(tmp_path: Path) -> None:
+    parameters = 'PARAMETERS = (Parameter("k", "{out}", typical=0.01),)'
+    doc = '"""own: x.\n\n    V += k\n\nSymptom   s.\nExcited by  e.\nConfused with  c.\nSource    s.\n"""\n'
+    head = f"{doc}import numpy as np\nfrom calibrations.effect import Parameter\n{parameters}\n"
+    made = {}
+    for name, formula in (("good", "np.sin(a) ** 2 * p['k']"), ("bad", "np.round(a) * p['k']")):
+        (tmp_path / f"{name}.py").write_text(f"{head}\ndef transduction(a, table, p):\n    return {formula}\n")
+        own: dict[str, Effect] = {name: read_effect(tmp_path / f"{name}.py")}
+        fitted = model({**LINEAR, name: {"k": (0.02, 0.01)}}, own)
+        made[name] = invert(fitted)
+        if name == "good":
+            assert error(made[name], fitted) < 1e-9
+    assert made["bad"].forward.fates[-1].why == "its function uses np.round"
+
+
+def test_a_model_without_values_is_refused() -> None:
+    with pytest.raises(ModelError, match="linear: has no values yet; `rig fit"):
+        invert(read_model("linear"))
+    with pytest.raises(ModelError, match="has no effect colour to leave out"):
+        invert(model(LINEAR), without=["colour"])
