@@ -15,6 +15,7 @@ from typing import Any, TypeVar
 from drivers.simulation.converter import Converter
 from drivers.simulation.errors import BadSetting, UnknownSetting, nearest
 from drivers.simulation.fibre_probe import FibreProbe
+from drivers.simulation.floor import Floor
 from drivers.simulation.friction import Friction
 from drivers.simulation.gravity import Base, Package
 from drivers.simulation.gyroscope import Gyroscope
@@ -22,12 +23,12 @@ from drivers.simulation.heat import Heat, Oven
 from drivers.simulation.laboratory import Laboratory
 from drivers.simulation.level import Level
 from drivers.simulation.magnetometer import Magnetometer
-from drivers.simulation.noise import Noise
+from drivers.simulation.noise import Noises
 from drivers.simulation.oddities import Oddities
 from drivers.simulation.plates import Plates
 from drivers.simulation.positioner import Positioner
-from drivers.simulation.scatter import Spread
 from drivers.simulation.seating import Seating
+from drivers.simulation.spread import Spread
 from drivers.simulation.springs import Springs
 from drivers.simulation.stage import Stage
 from drivers.simulation.supply import Supply
@@ -77,7 +78,8 @@ class WorldConfig:
     heat: Heat = field(default_factory=Heat)
     oven: Oven = field(default_factory=Oven)
     supply: Supply = field(default_factory=Supply)
-    noise: Noise = field(default_factory=Noise)
+    noise: Noises = field(default_factory=Noises)
+    floor: Floor = field(default_factory=Floor)
     converter: Converter = field(default_factory=Converter)
     level: Level = field(default_factory=Level)
     positioner: Positioner = field(default_factory=Positioner)
@@ -130,10 +132,17 @@ def _value(present: Any, value: Any, where: str) -> Any:
     if is_dataclass(present):
         if not isinstance(value, Mapping):
             raise BadSetting(f"{where} of the simulated world is {value!r}", f"Give a mapping of {_names(present)}")
-        return changed(present, value, f"{where}.")
+        return _noises(present, value, where) if isinstance(present, Noises) else changed(present, value, f"{where}.")
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
         raise BadSetting(f"{where} of the simulated world is {value!r}", "Give a finite number")
     return float(value)
+
+
+def _noises(present: Noises, value: Mapping[str, Any], where: str) -> Noises:
+    """What names no output is meant for both."""
+    both = {name: each for name, each in value.items() if name not in ("x", "y")}
+    alike = Noises(changed(present.x, both, f"{where}."), changed(present.y, both, f"{where}."))
+    return changed(alike, {name: each for name, each in value.items() if name not in both}, f"{where}.")
 
 
 def _names(settings: Any) -> str:

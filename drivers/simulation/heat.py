@@ -8,12 +8,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from drivers.simulation.kernel import kernel
-
-if TYPE_CHECKING:
-    from drivers.simulation.state import State
+from drivers.simulation.relaxation import lagged, wandered
 
 
 @dataclass(frozen=True)
@@ -47,10 +44,20 @@ class Oven:
     integral_s: float = 1200.0
 
 
-@kernel
-def lagged(value: float, target: float, step_s: float, lag_s: float) -> float:
-    """`value` after following a constant `target` for `step_s`."""
-    return target if lag_s <= 0 else target + (value - target) * math.exp(-step_s / lag_s)
+@dataclass
+class Warmth:
+    """The present temperatures, in C; what the sensor's own heat adds, in K; the oven's controller."""
+
+    wander_k: float = 0.0  # of the room
+    chamber_c: float = 0.0
+    body_c: float = 0.0
+    board_k: float = 0.0  # self-heating
+    package_k: float = 0.0  # self-heating
+    glue_c: float = 0.0  # the temperature that the package stress follows
+    thermocouple_c: float = 0.0
+    oven_set_c: float = 0.0
+    oven_running: int = 0
+    oven_integral: float = 0.0
 
 
 @kernel
@@ -61,40 +68,33 @@ def ambient_c(heat: Heat, t_s: float, wander_k: float) -> float:
 
 
 @kernel
-def heater_power(world: State, oven: Oven, step_s: float) -> float:
+def heater_power(warmth: Warmth, oven: Oven, step_s: float) -> float:
     """Power of the heater, 0 to 1; the integral waits while the heater is at a limit."""
-    if world.oven_running == 0:
-        world.oven_integral = 0.0
+    if warmth.oven_running == 0:
+        warmth.oven_integral = 0.0
         return 0.0
-    error = world.oven_set_c - world.thermocouple_c
-    wanted = oven.gain_per_k * error + world.oven_integral
+    error = warmth.oven_set_c - warmth.thermocouple_c
+    wanted = oven.gain_per_k * error + warmth.oven_integral
     if 0 <= wanted <= 1:
-        world.oven_integral += oven.gain_per_k * error * step_s / oven.integral_s
+        warmth.oven_integral += oven.gain_per_k * error * step_s / oven.integral_s
     return min(max(wanted, 0.0), 1.0)
 
 
 @kernel
-def tick(world: State, heat: Heat, oven: Oven, t_s: float, step_s: float, normal: float) -> None:
-    """Advance all temperatures by one tick that ends at `t_s`."""
-    world.wander_k = wandered(world.wander_k, heat.ambient_wander_k, heat.ambient_wander_s, step_s, normal)
-    heated = ambient_c(heat, t_s, world.wander_k) + oven.heater_k * heater_power(world, oven, step_s)
-    world.chamber_c = lagged(world.chamber_c, heated, step_s, heat.chamber_lag_s)
-    world.body_c = lagged(world.body_c, world.chamber_c, step_s, heat.body_lag_s)
-    world.board_k = lagged(world.board_k, world.powered * heat.board_rise_k, step_s, heat.board_rise_s)
-    world.package_k = lagged(world.package_k, world.powered * heat.package_rise_k, step_s, heat.package_rise_s)
-    outside = world.body_c + world.board_k + heat.thermocouple_offset_k
-    world.thermocouple_c = lagged(world.thermocouple_c, outside, step_s, heat.thermocouple_lag_s)
-    world.glue_c = min(max(world.glue_c, die_c(world) - heat.glue_play_k / 2), die_c(world) + heat.glue_play_k / 2)
+def tick(warmth: Warmth, heat: Heat, oven: Oven, powered: int, t_s: float, step_s: float, normal: float) -> None:
+    """Advance all temperatures by one tick that ends at `t_s`, during which the sensor was `powered` or not."""
+    warmth.wander_k = wandered(warmth.wander_k, heat.ambient_wander_k, heat.ambient_wander_s, step_s, normal)
+    heated = ambient_c(heat, t_s, warmth.wander_k) + oven.heater_k * heater_power(warmth, oven, step_s)
+    warmth.chamber_c = lagged(warmth.chamber_c, heated, step_s, heat.chamber_lag_s)
+    warmth.body_c = lagged(warmth.body_c, warmth.chamber_c, step_s, heat.body_lag_s)
+    warmth.board_k = lagged(warmth.board_k, powered * heat.board_rise_k, step_s, heat.board_rise_s)
+    warmth.package_k = lagged(warmth.package_k, powered * heat.package_rise_k, step_s, heat.package_rise_s)
+    outside = warmth.body_c + warmth.board_k + heat.thermocouple_offset_k
+    warmth.thermocouple_c = lagged(warmth.thermocouple_c, outside, step_s, heat.thermocouple_lag_s)
+    warmth.glue_c = min(max(warmth.glue_c, die_c(warmth) - heat.glue_play_k / 2), die_c(warmth) + heat.glue_play_k / 2)
 
 
 @kernel
-def die_c(world: State) -> float:
+def die_c(warmth: Warmth) -> float:
     """Temperature of the silicon."""
-    return world.body_c + world.board_k + world.package_k
-
-
-@kernel
-def wandered(value: float, rms: float, time_s: float, step_s: float, normal: float) -> float:
-    """An Ornstein-Uhlenbeck process, one exact step on: correlation time `time_s`, stationary `rms`."""
-    kept = math.exp(-step_s / time_s)
-    return kept * value + rms * math.sqrt(1 - kept * kept) * normal
+    return warmth.body_c + warmth.board_k + warmth.package_k

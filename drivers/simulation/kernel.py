@@ -16,6 +16,7 @@ from typing import Any, TypeVar, cast
 import numba
 import numpy as np
 from numba.core import config as settings
+from numba.extending import register_jitable
 from numpy.typing import NDArray
 from platformdirs import user_cache_path
 
@@ -35,6 +36,11 @@ def kernel(function: Function) -> Function:
         return cast(Function, numba.njit(cache=True, error_model="numpy")(function))
     finally:
         settings.CACHE_DIR = kept  # type: ignore[attr-defined]
+
+
+def shared(function: Function) -> Function:
+    """A function that kernels compile as a part of them, and that Python runs as it is: on settings and on records."""
+    return register_jitable(function)
 
 
 @cache

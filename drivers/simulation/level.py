@@ -8,15 +8,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from drivers.simulation import gravity, stage
-
-if TYPE_CHECKING:
-    from drivers.simulation.config import WorldConfig
-    from drivers.simulation.state import State
+from drivers.simulation.gravity import felt_g
+from drivers.simulation.kernel import Floats
 
 ON_THE_PLATE = np.eye(3)
 
@@ -30,16 +26,14 @@ class Level:
     noise_deg: float = 0.003  # rms of one reading
 
 
-def inclination_deg(world: State, config: WorldConfig) -> tuple[float, float]:
-    """True inclination of the plate's x and y axis, in deg; `config` as the kernels read it."""
-    alpha = stage.true_angle_rad(config.stages.alpha, world.table_deg[0])
-    beta = stage.true_angle_rad(config.stages.beta, world.table_deg[1])
-    x, y, z = gravity.felt_g(world.up, ON_THE_PLATE, alpha, beta)
+def inclination_deg(up: Floats, alpha_rad: float, beta_rad: float) -> tuple[float, float]:
+    """True inclination of the plate's x and y axis, in deg: the vertical in the base, the stages' true angles."""
+    x, y, z = felt_g(up, ON_THE_PLATE, alpha_rad, beta_rad)
     return math.degrees(math.atan2(x, z)), math.degrees(math.atan2(y, z))
 
 
-def shown_deg(world: State, config: WorldConfig, seed: int) -> tuple[float, float]:
+def shown_deg(level: Level, inclined_deg: tuple[float, float], seed: int, t_ns: int) -> tuple[float, float]:
     """What the level makes of it. Its noise hangs on seed and time alone, so looking at it disturbs nothing."""
-    noise = config.level.noise_deg * np.random.default_rng([seed, 3, int(world.now_ns)]).standard_normal(2)
-    x, y = inclination_deg(world, config)
-    return float(x + config.level.offset_x_deg + noise[0]), float(y + config.level.offset_y_deg + noise[1])
+    noise = level.noise_deg * np.random.default_rng([seed, 3, t_ns]).standard_normal(2)
+    x, y = inclined_deg
+    return float(x + level.offset_x_deg + noise[0]), float(y + level.offset_y_deg + noise[1])

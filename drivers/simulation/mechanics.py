@@ -27,8 +27,10 @@ from drivers.simulation import (
     supply,
     turned,
 )
-from drivers.simulation.config import SensingAxis, WorldConfig
+from drivers.simulation.config import SensingAxis, Stages, WorldConfig
+from drivers.simulation.floor import acceleration_g, passed, shakes
 from drivers.simulation.kernel import Floats, kernel
+from drivers.simulation.relaxation import lagged
 from drivers.simulation.state import State
 
 TICK_NS = 100_000_000
@@ -44,8 +46,7 @@ def run_to(world: State, config: WorldConfig, t_ns: int, step_ns: int, room: Gen
     """Let everything due up to `t_ns` happen; ticks draw from `room` what all sensors share, the rest from `slow`."""
     event_ns = next_event_ns(world, step_ns)
     while event_ns <= t_ns:
-        noise.charge(world, config.noise, 0, event_ns)
-        noise.charge(world, config.noise, 1, event_ns)
+        charge(world, config, event_ns)
         if event_ns == (world.ticks + 1) * TICK_NS:
             world.ticks += 1
             tick(world, config, room, slow)
@@ -72,19 +73,25 @@ def next_event_ns(world: State, step_ns: int) -> int:
 @kernel
 def interrupt(world: State, config: WorldConfig) -> None:
     """Let the filters follow what has been until now, before the carriage gets another motion."""
-    noise.charge(world, config.noise, 0, world.now_ns)
-    noise.charge(world, config.noise, 1, world.now_ns)
+    charge(world, config, world.now_ns)
+
+
+@kernel
+def charge(world: State, config: WorldConfig, t_ns: int) -> None:
+    """Let the filters of both outputs follow what has stood in front of them until `t_ns`."""
+    noise.charge(world.x, config.noise.x, world.volts[0], t_ns)
+    noise.charge(world.y, config.noise.y, world.volts[1], t_ns)
 
 
 @kernel
 def tick(world: State, config: WorldConfig, room: Generator, slow: Generator) -> None:
     """Advance the slow processes to the present tick."""
     t_s = world.ticks * TICK_S
-    heat.tick(world, config.heat, config.oven, t_s, TICK_S, room.standard_normal())
+    heat.tick(world.warmth, config.heat, config.oven, world.powered, t_s, TICK_S, room.standard_normal())
     supply.tick(world, config.supply, t_s, TICK_S, room.standard_normal())
-    world.charged = heat.lagged(world.charged, world.powered, TICK_S, config.sensor.charging_s)
+    world.charged = lagged(world.charged, world.powered, TICK_S, config.sensor.charging_s)
     oddities.tick(world, config.oddities, TICK_S, slow.standard_normal())
-    noise.tick(world, config.noise, TICK_S, slow)
+    noise.tick(world.x, world.y, config.noise, t_s, TICK_S, slow)
 
 
 @kernel
@@ -97,7 +104,9 @@ def update(world: State, config: WorldConfig, t_ns: int) -> None:
     on, sx, sy = world.powered, config.sensor.x, config.sensor.y
     world.volts[0] = on * plates.read_v(sx.plates, sx.springs.resonance_hz, x, y, sag, world.supply_v)
     world.volts[1] = on * plates.read_v(sy.plates, sy.springs.resonance_hz, y, x, sag, world.supply_v)
-    turned.update(world, config, t_ns, heat.die_c(world) - REFERENCE_C)
+    turned.update(world, config, t_ns, heat.die_c(world.warmth) - REFERENCE_C)
+    if shakes(config.floor):
+        shake(world, config)
 
 
 @kernel
@@ -108,8 +117,7 @@ def load_g(world: State, config: WorldConfig, t_ns: int) -> tuple[float, float, 
     b_motor = stage.motor_angle_deg(world.pieces[1], t_s)
     world.table_deg[0] = stage.engaged_deg(config.stages.alpha, world.table_deg[0], a_motor)
     world.table_deg[1] = stage.engaged_deg(config.stages.beta, world.table_deg[1], b_motor)
-    alpha = stage.true_angle_rad(config.stages.alpha, world.table_deg[0])
-    beta = stage.true_angle_rad(config.stages.beta, world.table_deg[1])
+    alpha, beta = true_angles_rad(world, config.stages)
     gx, gy, gz = gravity.felt_g(world.up, world.mount, alpha, beta)
     for axis in range(3):
         if t_ns < world.carriage_rest_ns[axis]:
@@ -118,6 +126,24 @@ def load_g(world: State, config: WorldConfig, t_ns: int) -> tuple[float, float, 
             gy += world.mount[1, axis] * shaken
             gz += world.mount[2, axis] * shaken
     return gx, gravity.along_y(config.sensor.package, gx, gy), gz
+
+
+@kernel
+def true_angles_rad(world: State, stages: Stages) -> tuple[float, float]:
+    """Where alpha and beta really point."""
+    alpha = stage.true_angle_rad(stages.alpha, world.table_deg[0])
+    return alpha, stage.true_angle_rad(stages.beta, world.table_deg[1])
+
+
+@kernel
+def shake(world: State, config: WorldConfig) -> None:
+    """What the floor's shaking comes to at both outputs, as the sensor stands now."""
+    alpha, beta = true_angles_rad(world, config.stages)
+    gx, gy, _ = gravity.felt_g(acceleration_g(config.floor), world.mount, alpha, beta)
+    gain_x, _ = passed(config.floor, noise.filter_s(config.noise.x))
+    gain_y, _ = passed(config.floor, noise.filter_s(config.noise.y))
+    world.pickup_x.shaken_v = world.powered * gain_x * config.sensor.x.plates.sensitivity_v_per_g * gx
+    world.pickup_y.shaken_v = world.powered * gain_y * config.sensor.y.plates.sensitivity_v_per_g * gy
 
 
 @kernel
@@ -133,7 +159,7 @@ def displaced_nm(
 ) -> tuple[float, float, float]:
     """Displacements of the proof mass in x, y and z."""
     sx, sy, odd = config.sensor.x, config.sensor.y, config.oddities
-    x, y = springs.balanced_nm(sx.springs, sy.springs, gx, gy, heat.die_c(world) - REFERENCE_C)
+    x, y = springs.balanced_nm(sx.springs, sy.springs, gx, gy, heat.die_c(world.warmth) - REFERENCE_C)
     sag = gz * springs.per_g_nm(config.sensor.sag_resonance_hz)
     fault = oddities.displacement_nm(world, odd, world.table_deg[1], t_s)
     moved_x = fault + world.grip_nm[0] + moved_nm(world, sx, odd, world.seats_nm[0], x, y, gy, sag)
@@ -154,6 +180,6 @@ def moved_nm(
 ) -> float:
     """Where a finger ends up, given where the springs alone would balance the loads."""
     stuck = friction.drag_nm(axis.friction, seats_nm, own_nm, neighbour_g)
-    drawn = springs.drawn_aside_nm(axis.springs, neighbour_nm, sag_nm, world.glue_c - REFERENCE_C)
+    drawn = springs.drawn_aside_nm(axis.springs, neighbour_nm, sag_nm, world.warmth.glue_c - REFERENCE_C)
     charged = 1e-3 * axis.plates.charging_pm * world.charged
     return own_nm - stuck + drawn + charged + oddities.stopped_nm(odd, own_nm)

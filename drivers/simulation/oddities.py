@@ -9,12 +9,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from drivers.simulation.kernel import kernel
-
-if TYPE_CHECKING:
-    from drivers.simulation.state import State
+from drivers.simulation.state import State
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,11 @@ from drivers.simulation import converter, fibre_probe, noise, positioner
 from drivers.simulation.config import WorldConfig
 from drivers.simulation.kernel import Floats, Ints, kernel
 from drivers.simulation.mechanics import STEP_NS, next_event_ns, run_to
+from drivers.simulation.pickup import with_pickup_v
 from drivers.simulation.state import State
 
 INPUTS = ("vx", "vy", "supply", "thermistor", "ground", "d63", "mx", "my", "mz", "gx", "gy", "gz")
-SUPPLY, THERMISTOR, D63, FIELD, RATE = 2, 3, 5, 6, 9
+VX, VY, SUPPLY, THERMISTOR, D63, FIELD, RATE = 0, 1, 2, 3, 5, 6, 9
 
 # A 10 kOhm thermistor at the package, below a 10 kOhm resistor on the sensor's supply.
 THERMISTOR_B_K = 3950.0
@@ -48,11 +49,19 @@ def convert(
     steady = steady_v(world)
     for i in range(len(times_ns)):
         for k in range(len(channels)):
-            if channels[k] < SUPPLY:
-                t_ns = times_ns[i] + late_ns[k]
-                analog = noise.output_v(world, config.noise, channels[k], t_ns, random.standard_normal())
+            t_ns = times_ns[i] + late_ns[k]
+            if channels[k] == VX:
+                normal = random.standard_normal()
+                analog = noise.output_v(world.x, config.noise.x, world.volts[0], t_ns, normal)
+                if world.pickup_x.is_any:
+                    analog = with_pickup_v(world.pickup_x, config.noise.x, config.floor, analog, t_ns, random)
+            elif channels[k] == VY:
+                normal = random.standard_normal()
+                analog = noise.output_v(world.y, config.noise.y, world.volts[1], t_ns, normal)
+                if world.pickup_y.is_any:
+                    analog = with_pickup_v(world.pickup_y, config.noise.y, config.floor, analog, t_ns, random)
             elif channels[k] == D63:
-                analog = displacement_v(world, config, times_ns[i] + late_ns[k], random.standard_normal())
+                analog = displacement_v(world, config, t_ns, random.standard_normal())
             elif channels[k] >= RATE:
                 analog = steady[channels[k]] + config.gyroscope.noise_v * random.standard_normal()
             elif channels[k] >= FIELD:
@@ -79,7 +88,7 @@ def steady_v(world: State) -> Floats:
     volts[SUPPLY] = world.supply_v * world.powered
     volts[FIELD:RATE] = world.field_v * world.powered
     volts[RATE:] = world.rate_v * world.powered
-    volts[THERMISTOR] = thermistor_v(world.body_c + world.board_k, volts[SUPPLY])
+    volts[THERMISTOR] = thermistor_v(world.warmth.body_c + world.warmth.board_k, volts[SUPPLY])
     return volts
 
 

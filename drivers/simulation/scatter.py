@@ -3,25 +3,16 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields, is_dataclass, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import fields, is_dataclass, replace
+from typing import Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from drivers.simulation.config import SensingAxis, WorldConfig
+from drivers.simulation.config import SensingAxis, WorldConfig
+from drivers.simulation.spread import Spread
 
 # What a factory or a designer fixes: no imperfection, so no scatter.
 EXACT = {"resonance_hz", "sag_resonance_hz", "charging_s", "gap_um", "zero_g_v", "sensitivity_v_per_g", "worm_cycles"}
-
-
-@dataclass(frozen=True)
-class Spread:
-    """Standard deviations from rig to rig."""
-
-    zero_g_v: float = 0.02
-    sensitivity_fraction: float = 0.01
-    imperfection_fraction: float = 0.1  # of every imperfection of stages, base and sensor that is not 0
 
 
 def individual(config: WorldConfig, seed: int, place: int = 0) -> WorldConfig:

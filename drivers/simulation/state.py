@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any
 
 import numpy as np
 
-from drivers.simulation import friction, noise, positioner, stage
+from drivers.simulation import friction, positioner, stage
 from drivers.simulation.errors import BadSetting
+from drivers.simulation.heat import Warmth
 from drivers.simulation.kernel import Floats, Ints, record
+from drivers.simulation.noise import Fluctuation
+from drivers.simulation.pickup import Pickup
 
 JSON = dict[str, "JSON"] | list["JSON"] | str | float | int | bool | None
 
@@ -44,29 +47,14 @@ class State:
     powered_ns: int = 0  # since when
     charged: float = 0.0  # share of the charge that has crept into the plates' oxide
 
-    wander_k: float = 0.0  # of the room
-    chamber_c: float = 0.0
-    body_c: float = 0.0
-    board_k: float = 0.0  # self-heating
-    package_k: float = 0.0  # self-heating
-    glue_c: float = 0.0  # the temperature that the package stress follows
-    thermocouple_c: float = 0.0
-    oven_set_c: float = 0.0
-    oven_running: int = 0
-    oven_integral: float = 0.0
+    warmth: Warmth = field(default_factory=Warmth)
     supply_v: float = 0.0
     supply_wander_v: float = 0.0
 
-    flicker_v: Floats = field(default_factory=zeros(2, noise.DECADES))
-    walk_v: Floats = field(default_factory=zeros(2))
-    slow_v: Floats = field(default_factory=zeros(2))  # sum of both
-    filtered_v: Floats = field(default_factory=zeros(2))  # on the filter's capacitors, without white noise
-    filtered_ns: Ints = field(default_factory=zeros(2, dtype=int))
-    white: Floats = field(default_factory=zeros(2))  # behind the filter, in units of its rms
-    white_ns: Ints = field(default_factory=zeros(2, dtype=int))
-    kept_ns: int = 0  # the filter's last step, and its answers
-    kept: float = 1.0  # share of the old
-    fresh: float = 0.0  # share of new white noise, in rms
+    x: Fluctuation = field(default_factory=Fluctuation)  # noise of each output
+    y: Fluctuation = field(default_factory=Fluctuation)
+    pickup_x: Pickup = field(default_factory=Pickup)
+    pickup_y: Pickup = field(default_factory=Pickup)
 
     earth_deg_s: Floats = field(default_factory=zeros(3))  # its rotation in the base
     field_ut: Floats = field(default_factory=zeros(3))  # magnetic, in the base
@@ -82,8 +70,8 @@ class State:
 
 
 def to_json(world: State) -> dict[str, JSON]:
-    """The record as plain numbers and lists."""
-    return {f.name: np.asarray(getattr(world, f.name)).tolist() for f in fields(State)}
+    """The record as plain numbers and lists, one mapping for each part."""
+    return _plain(world, State())
 
 
 def from_json(values: dict[str, Any]) -> State:
@@ -92,11 +80,24 @@ def from_json(values: dict[str, Any]) -> State:
     Raises:
         BadSetting: names are missing or unknown, as in a state kept by another version.
     """
-    names = {f.name for f in fields(State)}
-    if values.keys() != names:
-        odd = ", ".join(sorted(values.keys() ^ names))
-        raise BadSetting(f"The kept world does not fit this version ({odd})", "Start the run anew")
     world = record(State())
-    for name, value in values.items():
-        setattr(world, name, value)
+    _fill(world, values, State())
     return world
+
+
+def _plain(part: Any, like: Any) -> dict[str, Any]:
+    """`part` is a record with the names of the dataclass `like`."""
+    pairs = [(f.name, getattr(part, f.name), getattr(like, f.name)) for f in fields(like)]
+    return {name: _plain(own, of) if is_dataclass(of) else np.asarray(own).tolist() for name, own, of in pairs}
+
+
+def _fill(part: Any, values: Any, like: Any) -> None:
+    names = {f.name for f in fields(like)}
+    if not isinstance(values, dict) or values.keys() != names:
+        odd = ", ".join(sorted(set(values) ^ names)) if isinstance(values, dict) else repr(values)
+        raise BadSetting(f"The kept world does not fit this version ({odd})", "Start the run anew")
+    for name, value in values.items():
+        if is_dataclass(getattr(like, name)):
+            _fill(getattr(part, name), value, getattr(like, name))
+        else:
+            setattr(part, name, value)

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-from drivers.simulation.heat import wandered
 from drivers.simulation.kernel import kernel
-
-if TYPE_CHECKING:
-    from drivers.simulation.state import State
+from drivers.simulation.relaxation import wandered
+from drivers.simulation.state import State
 
 
 @dataclass(frozen=True)

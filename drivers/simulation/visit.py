@@ -18,7 +18,8 @@ from drivers.simulation.state import State
 from drivers.simulation.trajectory import Trajectory, at_rest
 
 STEP_NS = 25_000_000  # of the mechanics while a stage turns: half a degree at 20 deg/s
-MEANS = 6  # of a dwell: x, y without noise; slow noise of x, y; thermocouple; supply
+# Of a dwell: both outputs without noise; their slow noise, its mean square; what the floor does; thermocouple; supply
+VOLTS, SLOW, SLOW_SQUARE, SHAKEN, THERMOCOUPLE, SUPPLY, MEANS = 0, 2, 4, 6, 8, 9, 10
 
 
 @dataclass(frozen=True)
@@ -124,10 +125,19 @@ def hold(
     while t_ns < end_ns:
         after_ns = min(next_event_ns(world, STEP_NS), end_ns)
         share = (after_ns - t_ns) / (end_ns - start_ns)
-        for axis in range(2):
-            means[axis] += share * world.volts[axis]
-            means[2 + axis] += share * world.slow_v[axis]
-        means[4] += share * world.thermocouple_c
-        means[5] += share * world.supply_v * world.powered
+        add(world, share, means)
         run_to(world, config, after_ns, STEP_NS, room, slow)
         t_ns = after_ns
+
+
+@kernel
+def add(world: State, share: float, means: Floats) -> None:
+    """Add the present, which lasts for `share` of the dwell, to its `means`."""
+    means[VOLTS : VOLTS + 2] += share * world.volts
+    for axis, slow_v in ((0, world.x.slow_v), (1, world.y.slow_v)):
+        means[SLOW + axis] += share * slow_v
+        means[SLOW_SQUARE + axis] += share * slow_v * slow_v
+    means[SHAKEN] += share * world.pickup_x.shaken_v
+    means[SHAKEN + 1] += share * world.pickup_y.shaken_v
+    means[THERMOCOUPLE] += share * world.warmth.thermocouple_c
+    means[SUPPLY] += share * world.supply_v * world.powered

@@ -102,16 +102,18 @@ class World:
 
     def oven_set(self, set_point_c: float, running: bool) -> None:
         """Give the oven's controller a set point, and run it or not."""
-        self._world.oven_set_c = set_point_c
-        self._world.oven_running = int(running)
+        self._world.warmth.oven_set_c = set_point_c
+        self._world.warmth.oven_running = int(running)
 
     def thermometer_c(self) -> float:
         """What the thermocouple on the sensor's package shows now."""
-        return float(self._world.thermocouple_c)
+        return float(self._world.warmth.thermocouple_c)
 
     def level_deg(self) -> tuple[float, float]:
         """What a level on the turntable shows now: how far the positive ends of its x and y axis are up, in deg."""
-        return level.shown_deg(self._world, self._numbers, self._seed)
+        angles_rad = mechanics.true_angles_rad(self._world, self._numbers.stages)
+        inclined_deg = level.inclination_deg(self._world.up, *angles_rad)
+        return level.shown_deg(self.config.level, inclined_deg, self._seed, int(self._world.now_ns))
 
     def adc_volts(
         self, inputs: Sequence[str], start_s: float, interval_s: float, n: int, places: Sequence[int] | None = None
@@ -160,7 +162,7 @@ class World:
         means = visit.visit(self._world, self._numbers, *motions, self._room, self._slow)
         middle_s = 1e-9 * plan.dwell_ns.mean(axis=1)
         random = None if noise_free else self._fast
-        measured = dwell.columns(means, middle_s, self.config.noise, self.config.converter, pace, random)
+        measured = dwell.columns(means, middle_s, self.config, pace, random)
         return vars(visited) | measured | {"t_s": middle_s - 1e-9 * self._world.powered_ns}
 
     def state(self) -> dict[str, state.JSON]:

@@ -55,7 +55,7 @@ def by_numpy(channels: tuple[str, ...]) -> Callable[[], Codes]:
 
 def output_v(random: np.random.Generator) -> NDArray[np.float64]:
     """White noise and six slow processes behind the filter."""
-    noise = CONFIG.noise
+    noise = CONFIG.noise.x
     kept = math.exp(-INTERVAL_S / (noise.filter_ohm * noise.filter_farad))
     white_v = noise.white_v * math.sqrt((1 + kept) / (1 - kept))
     volts = 2.5 + white_v * random.standard_normal(SCANS)

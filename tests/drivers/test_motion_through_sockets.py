@@ -63,7 +63,7 @@ def test_sensor_displacement_sensor_and_recorder_tell_of_one_motion(bench: Bench
     measured = swing(record.position_um[500:4500], really_hz, 1 / record.interval_s)
     assert abs(measured) == pytest.approx(30.0, rel=0.01)
     assert abs(seen) == pytest.approx(abs(measured), rel=1e-3)
-    noise = WorldConfig.ideal().noise
+    noise = WorldConfig.ideal().noise.x
     filtered = 1 / (1 + 2j * np.pi * really_hz * noise.filter_ohm * noise.filter_farad)
     lag = np.exp(-2j * np.pi * really_hz * 2 * WorldConfig.ideal().converter.skew_s)  # vx is sampled before d63
     acceleration_g = -((2 * np.pi * really_hz) ** 2) * 1e-6 * seen * lag / 9.80665

@@ -36,7 +36,7 @@ def sweep() -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]
 
 def noise_floor_v(config: WorldConfig = IDEAL) -> float:
     """Standard deviation of one dwell's mean."""
-    return dwell.spreads(config.noise, config.converter, Timing())[0]
+    return dwell.spreads(config.noise.x, config.converter, Timing())[0]
 
 
 def clean_rig(seed: int) -> Table:

@@ -42,7 +42,7 @@ def shaken(world: World, axis: str = "x", frequency_hz: float = HZ, start_s: flo
 
 def filtered(frequency_hz: float, config: WorldConfig) -> complex:
     """What the resistor and the capacitor make of a frequency."""
-    noise = config.noise
+    noise = config.noise.x
     return 1 / (1 + 2j * math.pi * frequency_hz * noise.filter_ohm * noise.filter_farad)
 
 
