@@ -6,11 +6,11 @@ All simulated, `state` and `restore` continue a rig where it was, sample for sam
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from typing import Any, cast
 
-from drivers.clock import Clock, SimulatedClock
+from drivers.clock import SimulatedClock
 from drivers.errors import DriverError
 from drivers.instrument import Check, Identity
 from drivers.instrument import Instrument as Driver
@@ -24,8 +24,10 @@ from procedures.session import Dwell, Host, Session
 from rig.attended import AtTheRig
 from rig.bench import ROLES, Bench
 from rig.errors import InstrumentFailed
+from rig.guard import NOW_AND_THEN_S, GuardedClock, Look
 from rig.wiring import Wiring, wired
 
+OVEN_TAKES_S = 0.5  # an answer of the oven, with room to spare
 MOVING = ("alpha", "beta", "positioner")
 
 
@@ -63,7 +65,7 @@ class Rig:
 
     bench: Bench
     drivers: Mapping[str, Driver]
-    clock: Clock
+    clock: GuardedClock
     world: World | Batch | None  # of the simulated instruments
     servers: tuple[Server, ...]
     person: PersonLink
@@ -96,17 +98,42 @@ class Rig:
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Put a simulated bench back to where `state` was taken."""
-        if self.world is None or not isinstance(self.clock, SimulatedClock):
+        clock = self.clock.inner
+        if self.world is None or not isinstance(clock, SimulatedClock):
             return
         self.world.restore(state["world"])
         for server, kept in zip(self.servers, state["servers"], strict=True):
             server.restore(kept)
-        self.clock.restore(state["clock_s"])
+        clock.restore(state["clock_s"])
 
     def require_steady(self) -> None:
         """Raises the error of a stage that stands no longer where it was sent, or of an oscillation that has ended."""
         for driver in self._moving():
             getattr(driver, "require_steady", _nothing)()
+
+    def look(self) -> None:
+        """Raises what keeps this rig from moving: an open interlock, an alarm."""
+        for driver in self._watched():
+            driver.look()
+
+    def guarded(self, session: Session) -> AbstractContextManager[None]:
+        """Inside, every wait looks at interlocks, alarms and the oven, and raises what it finds."""
+        looks = [Look(driver.look) for driver in self._watched()]
+        if "oven" in self.drivers:
+            looks.append(
+                Look(lambda: session.check_temperature(session.oven.temperature_c()), NOW_AND_THEN_S, OVEN_TAKES_S)
+            )
+        return self.clock.guarded(looks)
+
+    def _watched(self) -> list[Any]:
+        """Drivers that can be looked at.
+
+        In simulated time none is where there are no interlocks: then the end of a move is soon enough for an alarm.
+        """
+        adc = self.bench.instruments.get("adc")
+        if self.bench.simulated and not (adc and adc.typed_settings().interlocks):
+            return []
+        return [driver for driver in self.drivers.values() if hasattr(driver, "look")]
 
     def stop(self) -> list[str]:
         """Stop all that moves, at once and whatever else is wrong, then the oven's heat; what could not be stopped.

@@ -15,7 +15,7 @@ from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from typing import Any, Literal, Protocol
 
-from drivers.errors import DriverError
+from drivers.errors import DriverError, Interlocked
 from procedures.catalogue import Procedure, find
 from procedures.errors import Declined, NoAnswer, ProcedureError, SafetyLimit
 from procedures.questions import Question
@@ -198,13 +198,16 @@ def _perform(record: Record, rig: Rig, run: Run, procedure: Procedure, watch: Wa
     state = record.state(run.run)
     host = RunHost(record, rig, run, watch, state)
     session = rig.session(host)
-    if state is None:
-        session.reference()
-        host.keep_state()
-    else:
-        rig.restore(state["rig"])
     settings = parse(procedure, run.settings)
-    return {name: returned(name, result) for name, result in (procedure.function(session, **settings) or {}).items()}
+    rig.look()
+    if state is not None:
+        rig.restore(state["rig"])
+    with rig.guarded(session):
+        if state is None:
+            session.reference()
+            host.keep_state()
+        results = procedure.function(session, **settings) or {}
+    return {name: returned(name, result) for name, result in results.items()}
 
 
 class RunHost:
@@ -308,7 +311,7 @@ def _stop(rig: Rig) -> list[str]:
 
 
 def _state(error: Exception) -> str:
-    return "stopped" if isinstance(error, (Stopped, SafetyLimit, NoAnswer, Declined)) else "failed"
+    return "stopped" if isinstance(error, (Stopped, SafetyLimit, Interlocked, NoAnswer, Declined)) else "failed"
 
 
 def _plain(settings: Mapping[str, Any]) -> dict[str, Any]:

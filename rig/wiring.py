@@ -27,6 +27,7 @@ from drivers.simulation.config import WorldConfig
 from drivers.simulation.world import World
 from rig.bench import Bench
 from rig.errors import InstrumentFailed
+from rig.guard import GuardedClock
 from rig.home import home
 from rig.lease import lease
 
@@ -36,7 +37,7 @@ class Wiring:
     """What the instruments of a bench are connected by; `servers` by the roles that each plays."""
 
     bench: Bench
-    clock: Clock
+    clock: GuardedClock
     links: Links
     world: World | Batch
     servers: Mapping[str, Server]
@@ -69,8 +70,8 @@ def wired(bench: Bench) -> Iterator[Wiring]:
         servers = serve(bench, world)
         for server in servers.values():
             stack.callback(server.close)
-        clock: Clock = SimulatedClock() if bench.simulated else WallClock()
-        stack.enter_context(_pumped(list(servers.values()), clock))
+        clock = GuardedClock(SimulatedClock() if bench.simulated else WallClock())
+        stack.enter_context(_pumped(list(servers.values()), clock.inner))
         links = Links(clock)
         stack.callback(links.close)
         yield Wiring(bench, clock, links, world, servers)

@@ -43,6 +43,14 @@ def watched_bench() -> Bench:
     return bench.model_copy(update={"instruments": {**bench.instruments, **watched}})
 
 
+def guarded_bench() -> Bench:
+    """The same with an emergency stop and a door at lines of the converter."""
+    bench = watched_bench()
+    adc = bench.instruments["adc"]
+    guarded = adc.model_copy(update={"settings": adc.settings | {"interlocks": {"e-stop": 4, "door": 5}}})
+    return bench.model_copy(update={"instruments": {**bench.instruments, "adc": guarded}})
+
+
 def afflicted(bench: Bench, role: str, *faults: Fault) -> Bench:
     """The bench with faults of one instrument."""
     part = bench.instruments[role].model_copy(update={"faults": faults})

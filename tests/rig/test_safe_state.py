@@ -20,6 +20,7 @@ from procedures.errors import ProcedureError
 from procedures.session import Limits
 from rig.bench import read_bench
 from rig.cli.failure import status_of
+from rig.guard import GuardedClock
 from rig.instruments import Rig
 from rig.record import Record
 from rig.runner import resume
@@ -194,7 +195,8 @@ class Mover:
 def test_all_are_told_to_stop_before_the_first_is_waited_for() -> None:
     log: list[str] = []
     movers: dict[str, Any] = {"alpha": Mover("alpha", log, "halt"), "beta": Mover("beta", log, "stop")}
-    rig = Rig(BENCH, movers | {"oven": Mover("oven", log)}, SimulatedClock(), None, (), PersonLink())
+    clock = GuardedClock(SimulatedClock())
+    rig = Rig(BENCH, movers | {"oven": Mover("oven", log)}, clock, None, (), PersonLink())
     assert rig.stop() == ["beta may still move: whatever it is"]
     assert log == ["alpha halt", "beta halt", "alpha stop", "beta stop", "oven run False"]
 
