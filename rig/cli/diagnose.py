@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from rig.cli.output import bench_option, check_option, columns, emit, json_option, model_option, notes
+from rig.cli.output import bench_option, check_option, columns, emit, json_option, model_option, note, notes
 
 if TYPE_CHECKING:
     from calibrations.diagnose import Diagnosis
@@ -26,13 +26,13 @@ def command(data: str, model: str | None, check: bool, bench_file: Path | None, 
     from calibrations.diagnose import diagnose
     from calibrations.documents import diagnosis_document
     from rig.cli.asked import asked, tell_blind
-    from rig.cli.foresight import with_next
     from rig.cli.own_effect import own_effect, told
     from rig.cli.words import warning
+    from rig.foresight import with_next
 
     table, start, effects = asked(data, model, bench_file)
     result = diagnose(table, start, effects)
-    result = with_next(result, data, effects, bench_file)
+    result = with_next(result, data, effects, bench_file, note)
     tell_blind(result.fit, effects)
     name = model or start.name
     if as_json:

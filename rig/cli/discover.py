@@ -54,15 +54,15 @@ def _discover(
     from calibrations.discover import discover
     from calibrations.documents import discovery_document
     from rig.cli.asked import asked, write_model
-    from rig.cli.foresight import with_next
     from rig.cli.own_effect import own_effect, told
     from rig.cli.words import discovery, parameters, warning
+    from rig.foresight import with_next
     from rig.several import load_all
 
     table, start, effects = asked(data[0], model, bench_file, out)
     table = load_all(data, note) if len(data) > 1 else table
     result = discover(table, start, effects)
-    result = with_next(result, data[0], effects, bench_file)
+    result = with_next(result, data[0], effects, bench_file, note)
     if out is not None:
         write_model(result.end, start, out)
     reached = str(out) if out else model or start.name

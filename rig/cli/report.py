@@ -6,8 +6,7 @@ from pathlib import Path
 
 import click
 
-from rig.cli.night import Page, night_of
-from rig.cli.output import bench_option, emit, json_option, model_option
+from rig.cli.output import bench_option, emit, json_option, model_option, note
 
 
 @click.command("report")
@@ -35,11 +34,12 @@ def command(
     if out is None and folder is None:
         raise click.UsageError("nothing to write: give --out FILE.html, --pictures FOLDER, or both")
     from calibrations.pictures.save import save_all
-    from rig.files import write_whole
-    from rig.provenance import program, today
+    from rig.files import require_out, write_whole
+    from rig.reported import reported
 
-    asked_for = night_of(data, today(), program()) if model is None else None
-    pictures, page = asked_for or _on_a_model(data, model, bench_file, out)
+    if out is not None:
+        require_out(out, data, model, bench_file)
+    pictures, page = reported(data, model, bench_file, note)
     if out is not None:
         write_whole(out, page())
     written = save_all({picture.name: picture.figure for picture in pictures}, folder, form) if folder else []
@@ -48,21 +48,3 @@ def command(
     else:
         for path in [*([out] if out else []), *written]:
             click.echo(f"written: {path}")
-
-
-def _on_a_model(data: str, model: str | None, bench_file: Path | None, out: Path | None) -> Page:
-    from calibrations.compare import compare
-    from calibrations.discover import discover
-    from calibrations.pictures.album import album
-    from calibrations.reports.report import report
-    from rig.cli.asked import asked
-    from rig.cli.foresight import with_next
-    from rig.cli.shaken import shaken_of
-    from rig.provenance import program, today
-
-    table, start, effects = asked(data, model, bench_file, out)
-    found = with_next(discover(table, start, effects), data, effects, bench_file)
-    beside = compare(table, start)
-    shaken = shaken_of(data)
-    pictures = album(found, beside, shaken)
-    return pictures, lambda: report(found, beside, today(), program(), pictures, shaken)

@@ -24,12 +24,12 @@ from procedures.errors import ProcedureError, SettingError
 from procedures.motion import KIND, STILL, SWEEP
 from procedures.settings import parse
 from rig.bench import Bench, read_bench
-from rig.cli.shaken import shaken_of
 from rig.plan import plan
 from rig.record import Kept, Record
 from rig.record.measured import Measured
 from rig.results.names import names
 from rig.runner import Outcome, resume, start
+from rig.shaken import shaken_of
 from tests.rig.rigging import Onlooker
 
 pytestmark = pytest.mark.sockets

@@ -2,26 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from calibrations.effect import Effect
 from rig.bench import read_bench
-from rig.cli.output import note
 from rig.next_experiment import Answer, proposed
 from rig.record import Record
 
 
-def with_next(result: Answer, data: str, effects: Mapping[str, Effect], bench_file: Path | None) -> Answer:
+def with_next(
+    result: Answer, data: str, effects: Mapping[str, Effect], bench_file: Path | None, tell: Callable[[str], None]
+) -> Answer:
     """The answer with its next experiment as a command; the same where nothing is in dispute.
 
-    A command that measures on another bench than the data came from would tell nothing, and is said to be one.
+    A command that measures on another bench than the data came from would tell nothing, and `tell` hears it.
     """
     if result.next_experiment is None:
         return result
     bench = read_bench(bench_file)
     if (theirs := _measured_on(data)) not in (None, bench.name):
-        note(
+        tell(
             f'{data} was measured on the bench "{theirs}", and the next experiment is planned on "{bench.name}"; '
             "name that bench's file with --bench."
         )
