@@ -26,7 +26,7 @@ setup: .venv/ready
 .venv/ready: pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test]'
-	if [ "$$(id -u)" = 0 ] && ! command -v mbpoll >/dev/null; then apt-get -qq update && apt-get -qq install -y mbpoll || true; fi
+	for tool in mbpoll gcc clang; do [ "$$(id -u)" != 0 ] || command -v $$tool >/dev/null || { apt-get -qq update && apt-get -qq install -y $$tool || true; }; done
 	$(BIN)/python -m rig.warm
 	touch $@
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from decimal import ROUND_CEILING, Context
 from textwrap import wrap
 
 from calibrations.compensation.cost import Size
@@ -12,6 +13,7 @@ from calibrations.compensation.inverse import Compensation
 from calibrations.model import Estimate
 
 WIDTH = 112
+UPWARD = Context(prec=3, rounding=ROUND_CEILING)  # bounds are not rounded down
 IN = {
     "g": "g, the local gravity of the calibration",
     "field": "shares of the field at the calibration",
@@ -44,6 +46,11 @@ def shown(value: float, unit: str) -> str:
     return f"{1e3 * value:.2g} mg" if unit == "g" else f"{value:.2g} {unit}"
 
 
+def upward(bound: float) -> str:
+    """A bound to three digits, never less than it is."""
+    return f"{float(UPWARD.create_decimal(bound)):.3g}"
+
+
 def unit_of_input(name: str, made: Compensation) -> str:
     """The unit of one of the program's inputs."""
     if name[0] == "v" and name[1:] in made.forward.axes:
@@ -61,7 +68,9 @@ def operations(made: Compensation) -> str:
 
 def _wrapped(text: str) -> list[str]:
     indent = " " * (len(text) - len(text.lstrip()))
-    return wrap(text.strip(), WIDTH, initial_indent=indent, subsequent_indent=indent + "  ") or [""]
+    return wrap(
+        text.strip(), WIDTH, initial_indent=indent, subsequent_indent=indent + "  ", break_on_hyphens=False
+    ) or [""]
 
 
 def _what(made: Compensation, origin: Origin) -> Iterator[str]:
@@ -107,8 +116,8 @@ def _how(made: Compensation) -> Iterator[str]:
     bound = made.bound
     yield (
         f"Method: a <- a + C (v - G(a)), {bound.steps} steps from a = 0. Each step comes nearer by the factor "
-        f"q <= {bound.q:.3g}, proved over the whole range by interval arithmetic; what is left after the last is below "
-        f"q^{bound.steps} x {made.range.reach:g} {made.unit} = {bound.within:.2g} {made.unit}, rounding aside."
+        f"q <= {upward(bound.q)}, proved over the whole range by interval arithmetic; what is left after the last is below "
+        f"q^{bound.steps} x {made.range.reach:g} {made.unit} = {upward(bound.within)} {made.unit}, rounding aside."
     )
     yield f"Operations: {operations(made)}."
 

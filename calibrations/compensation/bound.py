@@ -4,9 +4,9 @@
 
 G is the model from specific force to output. For each box of the range the slopes of this step, 1 - C G'(a), are
 bounded by interval arithmetic; the greatest row sum of their magnitudes is p on the range +-r itself. A true a within
-it is a fixed point, and the way from 0 to it lies within: the first step comes within p r of a. With q the same on the range made
-wider by p, no later step leaves that, and each comes nearer by the factor q < 1 (Banach): n steps leave less than q^n r,
-in the maximum norm.
+it is a fixed point, and the way from 0 to it lies within: the first step comes within p r of a. With q the same on the
+range made wider by p, no later step leaves that, and each comes nearer by the factor q < 1 (Banach): n steps leave less
+than q^n r, in the maximum norm.
 
 Source  Krawczyk, Computing 4 (1969); Moore, Kearfott and Cloud (2009), chapter 8.
 """

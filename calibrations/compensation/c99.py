@@ -24,7 +24,7 @@ def files(made: Compensation, origin: Origin, checks: Vectors) -> dict[str, str]
 
 def _header(made: Compensation, origin: Origin) -> str:
     n, program = origin.name, made.program
-    about = "\n".join(f" * {line}".rstrip() for line in lines(made, origin)).replace("*/", "* /")
+    about = "\n".join(f" * {line}".rstrip() for line in lines(made, origin)).replace("*/", "* /").replace("/*", "/ *")
     inputs = "\n".join(f"    {n}_real {name}; /* {unit_of_input(name, made)} */" for name in program.inputs)
     outputs = "\n".join(f"    {n}_real {name}; /* {made.unit} */" for name in program.sought)
     return f"""/*

@@ -60,10 +60,9 @@ def measured_axes(model: Model) -> tuple[str, ...]:
     Raises ModelError for a model without values.
     """
     named = {e.axis for term in model.terms for e in term.estimates}
-    if not named:
-        raise ModelError(
-            f"{model.name}: has no values yet; `rig fit DATA --model {model.name} --out FILE` gives it some"
-        )
+    if empty := [term.name for term in model.terms if not term.estimates]:
+        what = f"{empty[0]} has no value" if named else "has no values"
+        raise ModelError(f"{model.name}: {what} yet; `rig fit DATA --model {model.name} --out FILE` gives it some")
     found = tuple(axis for axis in AXES if axis in named)
     return found or AXES
 

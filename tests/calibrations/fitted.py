@@ -18,8 +18,18 @@ PHYSICAL = LINEAR | {
     "axis-nonorthogonality": {"xy": 0.4},
 }
 REFERENCES = {
-    **{"reference_c": 25.0, "reference_v": 5.0, "begin_s": 100.0, "middle_s": 3600.0, "span_s": 7200.0, "wanders": 0.0},
-    **{"middle": 2.5, "half_span": 1.0, "turned_x": 1.0, "turned_y": 1.0, "turned_z": 1.0, "assumed": 1.0},
+    "reference_c": 25.0,
+    "reference_v": 5.0,
+    "begin_s": 100.0,
+    "middle_s": 3600.0,
+    "span_s": 7200.0,
+    "wanders": 0.0,
+    "middle": 2.5,
+    "half_span": 1.0,
+    "turned_x": 1.0,
+    "turned_y": 1.0,
+    "turned_z": 1.0,
+    "assumed": 1.0,
 }
 
 

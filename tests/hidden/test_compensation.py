@@ -1,0 +1,55 @@
+"""Compensated, a simulated sensor errs far less on unseen poses than by the manufacturer's formula (Ang Fig. 12)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from calibrations.compensation.inverse import invert
+from calibrations.compensation.residual import residual
+from calibrations.effect import catalogue
+from calibrations.fit import fit
+from calibrations.model_file import read_model
+from calibrations.pictures.compensation import compensated
+from calibrations.pictures.save import save
+from calibrations.table import Table
+from drivers.simulation.config import WorldConfig
+from drivers.simulation.world import World
+
+CONSTANTS = {"sample_rate_hz": 1000.0, "filter_corner_hz": 15.07}
+FAULTY = WorldConfig.ideal().changed(
+    {
+        "sensor": {
+            "package": {"turn_x_deg": 0.5, "turn_y_deg": -0.3, "turn_z_deg": 0.4},
+            "x": {"plates": {"plate_mismatch_fraction": 0.3}, "springs": {"stress_pm_per_k": 5}},
+            "y": {"plates": {"plate_mismatch_fraction": -0.4}, "springs": {"stress_pm_per_k": -4}},
+        },
+        "spread": {"imperfection_fraction": 0.0},
+        "heat": {"ambient_cycle_k": 2.5, "ambient_cycle_s": 2300.0, "chamber_lag_s": 60.0},
+    }
+)
+
+
+def turned(world: World, inclinations_deg: tuple[float, ...], step_deg: float) -> Table:
+    """A turn each way at each inclination."""
+    up = np.arange(0.0, 361.0, step_deg)
+    alpha = np.repeat(inclinations_deg, 2 * len(up))
+    beta = np.tile(np.concatenate([up, up[::-1]]), len(inclinations_deg))
+    direction = np.tile(np.repeat([1, -1], len(up)), len(inclinations_deg))
+    return Table.from_columns("poses", world.dwell_mean(alpha, beta, direction=direction), CONSTANTS, "simulated")
+
+
+def test_the_error_on_unseen_poses_falls_to_a_fiftieth(tmp_path: Path) -> None:
+    world = World(FAULTY, seed=7)
+    seen = turned(world, (90.0, 30.0, 150.0, 60.0), 30.0)
+    model = read_model("linear")
+    for name in ("axis-misalignment", "quadratic-nonlinearity", "temperature-bias"):
+        model = model.with_effect(catalogue()[name])
+    unseen = turned(world, (120.0, 70.0, 40.0), 20.0)
+    left = residual(invert(fit(model, seen).model), unseen)
+    for linear, compensated_ in left.rmse.values():
+        assert 30 < linear < 100  # mm/s^2
+        assert compensated_ < linear / 50
+    save(compensated(left), tmp_path / "residual.png")
+    assert (tmp_path / "residual.png").stat().st_size > 10_000

@@ -1,0 +1,69 @@
+"""rig compensate, as a shell sees it."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from calibrations.model_file import dump_model
+from tests.calibrations.fitted import PHYSICAL, model
+
+Rig = Callable[..., Any]
+
+
+@pytest.fixture
+def physical(work: Path) -> Path:
+    (work / "ADXL203 no. 17.yaml").write_text(dump_model(model(PHYSICAL)))
+    return work / "ADXL203 no. 17.yaml"
+
+
+def test_each_language_has_its_files(rig: Rig, physical: Path) -> None:
+    for language, names in (
+        ("c", ["adxl203_no_17.h", "adxl203_no_17.c", "adxl203_no_17_self_test.c"]),
+        ("python", ["adxl203_no_17.py"]),
+        ("json", ["adxl203_no_17.json"]),
+    ):
+        ended = rig("compensate", str(physical), "--language", language, "--out", language)
+        assert ended.status == 0, ended.err
+        assert [line.partition("/")[2] for line in ended.out.splitlines() if line.startswith("written")] == names
+        assert "az is not measured; found from gravity it costs" in ended.out
+    done = subprocess.run([sys.executable, "python/adxl203_no_17.py"], capture_output=True, text=True, check=True)
+    assert done.stdout == "0 of 16 reference vectors fail\n"
+
+
+def test_json_tells_the_same(rig: Rig, physical: Path) -> None:
+    said = json.loads(
+        rig("compensate", str(physical), "--language", "c", "--out", "c", "--precision", "float", "--json").out
+    )
+    assert said["schema"] == "rig.compensation/1"
+    assert (said["precision"], said["outputs"], said["residual"]) == ("float", ["ax", "ay"], None)
+    assert said["bound"]["q"] < 0.1
+    assert [Path(path).name for path in said["files"]] == [
+        "adxl203_no_17.h",
+        "adxl203_no_17.c",
+        "adxl203_no_17_self_test.c",
+    ]
+
+
+def test_what_it_leaves_of_unseen_poses_is_shown(rig: Rig, work: Path) -> None:
+    (work / "fitted.yaml").write_text(
+        dump_model(model({"bias": {"bias": (2.5, 2.5)}, "scale-factor": {"scale": (1.0, 1.0)}}))
+    )
+    words = ("--language", "json", "--out", "made", "--data", "good.csv", "--picture", "left.svg")
+    ended = rig("compensate", "fitted.yaml", *words)
+    assert "x: rms error" in ended.out
+    assert "compensated" in (work / "left.svg").read_text()
+
+
+def test_what_it_cannot_do_is_refused_before_anything_is_written(refused: Callable[..., str], work: Path) -> None:
+    words = ("--language", "c", "--out", "made")
+    assert "mine: scale-factor has no value yet" in refused("compensate", "mine.yaml", *words)
+    assert "linear: has no values yet; `rig fit" in refused("compensate", "linear", *words)
+    assert "--picture draws what --data shows" in refused("compensate", "linear", *words, "--picture", "p.png")
+    assert "write NAME=LOW:HIGH" in refused("compensate", "linear", *words, "--input", "temperature_c=5")
