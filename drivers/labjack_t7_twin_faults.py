@@ -42,11 +42,11 @@ def spoilt(data: bytes, samples: int, faults: Faults, now_s: float) -> bytes:
 
 def _order(numbers: NDArray[np.int64], faults: Faults, now_s: float) -> NDArray[np.intp]:
     """In which order packets of these transaction numbers are sent, as indices: the second is the one that suffers."""
-    order = np.arange(len(numbers))
+    order = np.arange(len(numbers), dtype=np.intp)
     if faults.size("lost-packet", now_s) is not None:
         return order[numbers != 1]
     if faults.size("duplicated-packet", now_s) is not None:
-        return np.repeat(order, np.where(numbers == 1, 2, 1))
+        return np.asarray(np.repeat(order, np.where(numbers == 1, 2, 1)))
     if faults.size("swapped-packets", now_s) is not None:
         return np.argsort(np.where(numbers == 1, 2.5, numbers), kind="stable")
     return order
