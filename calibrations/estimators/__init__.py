@@ -1,0 +1,8 @@
+"""Estimators: unknowns from measurements that are linear in them, all at once or one after another.
+
+    least_squares   all at once, weighted
+    recursive       one after another, with the same answer; old ones may be forgotten
+    kalman          unknowns that change by themselves: prediction and correction
+
+Source  Book 18.2-18.4, equations (18.1)-(18.10).
+"""

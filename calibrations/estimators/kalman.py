@@ -1,0 +1,89 @@
+"""The discrete Kalman filter: unknowns that change by themselves, from measurements that are linear in them.
+
+    x(k+1) = A x(k) + w(k)      w of covariance Q       prediction, Book (18.9)
+    z(k)   = H x(k) + v(k)      v of covariance R       correction, Book (18.10)
+
+The covariance is corrected in Joseph's form, which keeps it symmetric and positive whatever the gain is rounded to.
+
+Source  Book (18.9)-(18.10); Bucy and Joseph, Filtering for Stochastic Processes (1968); Bar-Shalom, Li and Kirubarajan,
+        Estimation with Applications to Tracking and Navigation (2001), 5.4: consistency of innovations; Rauch, Tung and
+        Striebel, AIAA Journal 3 (1965) 1445: the smoother.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2
+
+from calibrations.table import Array
+
+
+@dataclass(frozen=True)
+class Belief:
+    """What is known of the unknowns: mean (n,) and covariance (n, n)."""
+
+    mean: Array
+    covariance: Array
+
+
+@dataclass(frozen=True)
+class Correction:
+    """A belief after a measurement; the innovation (m,), its covariance (m, m)."""
+
+    belief: Belief
+    innovation: Array
+    innovation_covariance: Array
+
+    @property
+    def nis(self) -> float:
+        """Normalised innovation squared: chi-square of m degrees of freedom where the model holds."""
+        return float(self.innovation @ np.linalg.solve(self.innovation_covariance, self.innovation))
+
+    @property
+    def log_likelihood(self) -> float:
+        """Of the measurement, given those before."""
+        logdet = float(np.linalg.slogdet(2 * np.pi * self.innovation_covariance)[1])
+        return -(self.nis + logdet) / 2
+
+
+def predicted(belief: Belief, transition: Array, noise: Array) -> Belief:
+    """One step on: A `transition`, Q `noise`, both (n, n)."""
+    covariance = transition @ belief.covariance @ transition.T + noise
+    return Belief(transition @ belief.mean, (covariance + covariance.T) / 2)
+
+
+def corrected(belief: Belief, measured: Array, matrix: Array, noise: Array) -> Correction:
+    """After `measured` (m,) = H x + v: H `matrix` (m, n), R `noise` (m, m)."""
+    innovation = measured - matrix @ belief.mean
+    cross = belief.covariance @ matrix.T
+    covariance = matrix @ cross + noise
+    gain = np.linalg.solve(covariance, cross.T).T
+    kept = np.eye(len(belief.mean)) - gain @ matrix
+    joseph = kept @ belief.covariance @ kept.T + gain @ noise @ gain.T
+    return Correction(Belief(belief.mean + gain @ innovation, (joseph + joseph.T) / 2), innovation, covariance)
+
+
+def smoothed(
+    predictions: Sequence[Belief], corrections: Sequence[Belief], transitions: Sequence[Array]
+) -> list[Belief]:
+    """What all measurements say of each time: `predictions[k]` and `corrections[k]` before and after measurement k,
+    `transitions[k]` from k to k + 1."""
+    beliefs = [corrections[-1]]
+    for k in range(len(corrections) - 2, -1, -1):
+        now, ahead, later = corrections[k], predictions[k + 1], beliefs[0]
+        gain = np.linalg.solve(ahead.covariance, transitions[k] @ now.covariance).T
+        covariance = now.covariance + gain @ (later.covariance - ahead.covariance) @ gain.T
+        beliefs.insert(0, Belief(now.mean + gain @ (later.mean - ahead.mean), (covariance + covariance.T) / 2))
+    return beliefs
+
+
+def consistency(corrections: Sequence[Correction]) -> float:
+    """Probability that innovations of the right size, and no trend of their own, come out as large as these, or larger.
+
+    Near 0, they are larger than the model says; near 1, smaller.
+    """
+    freedom = sum(len(each.innovation) for each in corrections)
+    return float(chi2.sf(sum(each.nis for each in corrections), freedom))
