@@ -26,7 +26,8 @@ setup: .venv/ready
 .venv/ready: pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test]'
-	for tool in mbpoll gcc clang; do [ "$$(id -u)" != 0 ] || command -v $$tool >/dev/null || { apt-get -qq update && apt-get -qq install -y $$tool || true; }; done
+	for tool in mbpoll gcc clang chromium; do [ "$$(id -u)" != 0 ] || command -v $$tool >/dev/null || { apt-get -qq update && apt-get -qq install -y $$tool || true; }; done
+	command -v chromium >/dev/null || $(BIN)/python -m playwright install chromium || true
 	$(BIN)/python -m rig.warm
 	touch $@
 

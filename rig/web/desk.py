@@ -1,0 +1,61 @@
+"""What lies open on the desk. The server has one: a page that is closed and opened again finds everything as it was."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rig.home import home
+from rig.record import Record, Run
+from rig.record.store import FILE
+
+if TYPE_CHECKING:
+    from rig.trail import Trail
+
+MOST_OPEN = 6  # trails that are kept: each holds its data
+MODELS = "models"  # the folder in the home where the workbench saves models
+FILES = "files"  # the folder of files that were given to the workbench
+
+
+@dataclass
+class Desk:
+    """`dark`: None as the browser likes it. `trails`: the models that grow, by data and model, last used last."""
+
+    bench_file: Path | None
+    dark: bool | None = None
+    trails: OrderedDict[tuple[str, str], Trail] = field(default_factory=OrderedDict)
+
+    def open(self, data: str, model: str) -> Trail:
+        """The trail that lies open, or a new one; `model` "" is the one by default. Raises what `trail` raises."""
+        from rig.trail import trail
+
+        found = self.trails.get((data, model)) or trail(data, model or None, self.bench_file)
+        self.keep(data, model, found)
+        return found
+
+    def keep(self, data: str, model: str, trail: Trail) -> None:
+        """How far the model has grown."""
+        self.trails[data, model] = trail
+        self.trails.move_to_end((data, model))
+        while len(self.trails) > MOST_OPEN:
+            self.trails.popitem(last=False)
+
+    def forget(self, data: str) -> None:
+        """Begin anew with `data`, which may have changed."""
+        for key in [key for key in self.trails if key[0] == data]:
+            del self.trails[key]
+
+
+def runs() -> list[Run]:
+    """Every run, newest first; none where nothing is recorded yet. Raises RecordError."""
+    if not (home() / FILE).is_file():
+        return []
+    with Record() as record:
+        return record.runs()
+
+
+def saved_models() -> dict[str, str]:
+    """Models that the workbench saved: their files, and names for people."""
+    return {str(path): f"{path.stem} (saved)" for path in sorted((home() / MODELS).glob("*.yaml"))}

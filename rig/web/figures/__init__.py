@@ -1,0 +1,11 @@
+"""Pictures of the workbench as plain values that Plotly draws: one a file, each a function `figure(...)`.
+
+    measurement   output beside the model
+    residual      what the model leaves, against any column, with the curve of an effect that is considered
+    failure       the map of where the model fails
+    waterfall     the error falling as effects are added, down to the noise floor
+    series        values of a run over time, thinned
+
+Those of a model show the same rows in the same order (`rows.Shown`), so that a selection in one holds in all. Colours
+of text and grid are the page's (`workbench.css`), which knows whether it is dark.
+"""

@@ -1,0 +1,51 @@
+"""The falling error: one bar for the model as it was, one more for each effect added, down to the noise floor."""
+
+from __future__ import annotations
+
+from math import log10
+
+from calibrations.numerals import plain
+from calibrations.pictures.view import rows_of
+from calibrations.pictures.waterfall import Falling, levels
+from rig.web.figures.style import FLOOR, GOOD, MEASURED, MODEL, UNSEEN, Figure, Trace, figure
+
+BELOW = 0.5  # times the floor: where the logarithmic axis begins
+NEAR = 1.15  # times the floor: as good as noise
+
+
+def waterfall(found: Falling) -> Figure:
+    """Errors over the noise floor: bars on the rows of the fit, diamonds on rows that it did not see."""
+    steps, kind = levels(found), rows_of(found.start.table)
+    names, seen = [level.name for level in steps], [level.seen for level in steps]
+    colours = [MODEL, *(GOOD if value < NEAR else MEASURED for value in seen[1:])]
+    bars: Trace = {
+        "type": "bar",
+        "orientation": "h",
+        "y": names,
+        "x": [max(value - BELOW, 0.0) for value in seen],
+        "base": BELOW,
+        "marker": {"color": colours},
+        "width": 0.6,
+        "text": [f"\u2003{plain(level.seen)} × ({level.rms})\u2003" for level in steps],
+        "textposition": "auto",
+        "insidetextanchor": "start",
+        "hovertemplate": [f"{level.name}: {plain(level.seen)} × the floor on the {kind} of the fit" for level in steps],
+        "name": "",
+    }
+    diamonds: Trace = {
+        "type": "scatter",
+        "mode": "markers",
+        "y": names,
+        "x": [level.unseen for level in steps],
+        "marker": {"symbol": "diamond", "size": 10, "color": UNSEEN, "line": {"width": 1, "color": "#1f2933"}},
+        "hovertemplate": [f"{plain(level.unseen)} × the floor on unseen {kind}" for level in steps],
+        "name": "",
+    }
+    reach = 2.2 * max(*seen, *(level.unseen for level in steps), 2.0)
+    x = {"type": "log", "range": [log10(BELOW), log10(reach)], "dtick": 1, "exponentformat": "none"}
+    y = {"autorange": "reversed", "title": {"text": ""}}
+    floor = {"type": "rect", "layer": "below", "fillcolor": FLOOR, "line": {"width": 0}, "yref": "paper"}
+    shapes = [{**floor, "x0": BELOW, "x1": 1, "y0": 0, "y1": 1}]
+    return figure(
+        [bars, diamonds], "rms error / noise floor", "", "waterfall", xaxis=x, yaxis=y, dragmode=False, shapes=shapes
+    )

@@ -1,0 +1,99 @@
+"""What all pages share: the way between them, the run that is under way, light and dark, and the keys."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from nicegui import app, ui
+from nicegui.events import KeyEventArguments
+
+from rig.web.desk import Desk
+
+STATIC = Path(__file__).parent / "static"
+WAYS = {"/": "Model", "/run": "Run", "/record": "Record"}
+THEMES = {None: ("brightness_auto", "light or dark as the browser likes it"), False: ("light_mode", "light"),
+          True: ("dark_mode", "dark")}  # fmt: skip
+NEXT = {None: False, False: True, True: None}
+
+
+@dataclass(frozen=True)
+class Key:
+    """What a key does on a page, in words and by doing it."""
+
+    does: str
+    act: Callable[[], Any]
+
+
+def static_files() -> None:
+    """Serve the style sheet."""
+    app.add_static_files("/static", STATIC)
+
+
+@contextmanager
+def frame(desk: Desk, here: str) -> Iterator[dict[str, Key]]:
+    """A page's head; inside, its content, and the keys that the page may add its own to."""
+    keys = {str(k): Key(f"go to {title}", partial(ui.navigate.to, to)) for k, (to, title) in enumerate(WAYS.items(), 1)}
+    ui.add_head_html('<link rel="stylesheet" href="/static/workbench.css">')
+    ui.colors(primary="#0067a3")
+    with ui.element("header").classes("bar"):
+        ui.label("rig workbench").classes("name")
+        with ui.element("nav").classes("ways"):
+            for to, title in WAYS.items():
+                ui.link(title, to).classes("here" if to == here else "")
+        ui.element("div").classes("space")
+        _keys(keys)
+        _theme(desk)
+    with ui.element("div").classes("column sheet"):
+        yield keys
+
+
+def _theme(desk: Desk) -> None:
+    """The switch between light, dark, and as the browser likes it; kept as long as the server runs."""
+    dark = ui.dark_mode(desk.dark)
+
+    def switch() -> None:
+        desk.dark = NEXT[desk.dark]
+        dark.set_value(desk.dark)
+        show()
+
+    def show() -> None:
+        icon, words = THEMES[desk.dark]
+        button.props(f"icon={icon}")
+        tip.set_text(f"Colours: {words}")
+
+    button = ui.button(on_click=switch).props("flat round dense aria-label='Light or dark'")
+    with button:
+        tip = ui.tooltip("")
+    show()
+
+
+def _keys(keys: Mapping[str, Key]) -> None:
+    """Does what a key is for, and lists the keys under `?`."""
+
+    def listed() -> None:
+        with ui.dialog() as dialog, ui.card():
+            ui.label("Keys").classes("title")
+            with ui.element("div").classes("facts"):
+                for key, each in keys.items():
+                    ui.label(key).classes("k number")
+                    ui.label(each.does)
+        dialog.open()
+
+    async def pressed(event: KeyEventArguments) -> None:
+        if not event.action.keydown or event.modifiers.ctrl or event.modifiers.alt or event.modifiers.meta:
+            return
+        if event.key.name == "?":
+            listed()
+        elif (each := keys.get(event.key.name)) is not None:
+            done = each.act()
+            if done is not None:
+                await done
+
+    ui.keyboard(on_key=pressed, ignore=["input", "select", "textarea"])
+    with ui.button(icon="keyboard", on_click=listed).props("flat round dense aria-label='Keys'"):
+        ui.tooltip("Keys (?)")

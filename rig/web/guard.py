@@ -1,0 +1,118 @@
+"""Who may speak to the workbench: whoever has its token, by its own name, from its own pages.
+
+A browser runs pages of strangers too. Such a page can send requests to 127.0.0.1, but it does not know the token, it
+cannot send our cookie along (SameSite), and a name of its own that it lets point to 127.0.0.1 is none of ours (DNS
+rebinding). All of this holds for websockets as for requests. What the pages themselves may load is only ours, too.
+"""
+
+from __future__ import annotations
+
+import hmac
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from http.cookies import CookieError, SimpleCookie
+from urllib.parse import parse_qsl, urlencode
+
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+TOKEN = "token"  # noqa: S105 the name of the query's field
+POLICY = "; ".join(
+    (
+        "default-src 'none'",
+        "script-src 'self' 'unsafe-inline' 'unsafe-eval'",  # Vue compiles its templates in the page
+        "style-src 'self' 'unsafe-inline'",
+        "img-src 'self' data: blob:",
+        "font-src 'self' data:",
+        "connect-src 'self'",
+        "worker-src 'self' blob:",
+        "base-uri 'none'",
+        "form-action 'self'",
+        "frame-ancestors 'none'",
+    )
+)
+HEADERS = (
+    (b"content-security-policy", POLICY.encode()),
+    (b"x-content-type-options", b"nosniff"),
+    (b"x-frame-options", b"DENY"),
+    (b"referrer-policy", b"no-referrer"),
+    (b"cross-origin-opener-policy", b"same-origin"),
+    (b"cross-origin-resource-policy", b"same-origin"),
+)
+UNKNOWN = "This page needs its token. Open the address that `rig web` printed; a new start has a new one."
+ELSEWHERE = "This address is not the workbench's own. Open the one that `rig web` printed."
+
+
+@dataclass(frozen=True)
+class Guard:
+    """`app` for those who have `token` and come by one of `hosts` ("127.0.0.1:8473")."""
+
+    app: ASGIApp
+    token: str
+    hosts: frozenset[str]
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] not in ("http", "websocket"):
+            await self.app(scope, receive, send)
+            return
+        headers = {name.decode("latin-1"): value.decode("latin-1") for name, value in scope["headers"]}
+        query = dict(parse_qsl(scope["query_string"].decode("latin-1")))
+        if not self._is_ours(headers):
+            await _refuse(scope, send, 403, ELSEWHERE)
+        elif scope["type"] == "http" and TOKEN in query and self._fits(query.pop(TOKEN)):
+            await self._let_in(scope, send, query)
+        elif not self._fits(_cookies(headers).get(self.cookie, "")):
+            await _refuse(scope, send, 401, UNKNOWN)
+        else:
+            await self.app(scope, receive, _with_headers(send))
+
+    @property
+    def cookie(self) -> str:
+        """Its name; cookies are shared by all ports of a host, so the port is part of it."""
+        return f"rig-{min(self.hosts).rpartition(':')[2]}"
+
+    def _is_ours(self, headers: Mapping[str, str]) -> bool:
+        """Whether the request was sent to one of our names and, where it says from where, from there."""
+        host, origin = headers.get("host", ""), headers.get("origin")
+        return host in self.hosts and origin in (None, f"http://{host}")
+
+    def _fits(self, given: str) -> bool:
+        return hmac.compare_digest(given.encode(), self.token.encode())
+
+    async def _let_in(self, scope: Scope, send: Send, query: Mapping[str, str]) -> None:
+        """The token becomes a cookie, and leaves the address, which a history keeps and a person may pass on."""
+        place = scope["path"] + (f"?{urlencode(query)}" if query else "")
+        cookie = f"{self.cookie}={self.token}; HttpOnly; SameSite=Strict; Path=/"
+        given = [(b"location", place.encode()), (b"set-cookie", cookie.encode()), (b"content-length", b"0")]
+        await send({"type": "http.response.start", "status": 303, "headers": [*given, *HEADERS]})
+        await send({"type": "http.response.body", "body": b""})
+
+
+def names(host: str, port: int) -> frozenset[str]:
+    """The names by which a server at `host` and `port` is asked for."""
+    own: Iterable[str] = ("127.0.0.1", "localhost") if host in ("127.0.0.1", "localhost") else (host,)
+    return frozenset(f"{name}:{port}" for name in own)
+
+
+def _cookies(headers: Mapping[str, str]) -> Mapping[str, str]:
+    try:
+        return {name: each.value for name, each in SimpleCookie(headers.get("cookie", "")).items()}
+    except CookieError:
+        return {}
+
+
+def _with_headers(send: Send) -> Send:
+    async def sending(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            message = {**message, "headers": [*message["headers"], *HEADERS]}
+        await send(message)
+
+    return sending
+
+
+async def _refuse(scope: Scope, send: Send, status: int, why: str) -> None:
+    if scope["type"] == "websocket":
+        await send({"type": "websocket.close", "code": 1008, "reason": why[:100]})
+        return
+    headers = [(b"content-type", b"text/plain; charset=utf-8"), (b"cache-control", b"no-store"), *HEADERS]
+    await send({"type": "http.response.start", "status": status, "headers": headers})
+    await send({"type": "http.response.body", "body": why.encode()})

@@ -1,0 +1,165 @@
+"""The head of the page Model: which data, which model; undo, save, report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from nicegui import events, ui
+
+from calibrations.errors import CalibrationError
+from rig.errors import RigError
+from rig.home import home
+from rig.web.desk import FILES, MODELS, runs, saved_models
+from rig.web.parts import box, off_loop, words
+from rig.web.told import message
+
+if TYPE_CHECKING:
+    from rig.trail import Trail
+    from rig.web.pages.model import Workbench
+
+MOST_BYTES = 200_000_000
+
+
+class Choice:
+    """Selects data and model by going to their address; acts on the model that is there."""
+
+    def __init__(self, page: Workbench) -> None:
+        self.page = page
+        with box("chosen"):
+            self.data = ui.select(
+                _data(page.data), label="Data: a run, or a file's path", value=page.data or None, with_input=True,
+                new_value_mode="add-unique", on_change=lambda e: self._chose(e.value, page.model),
+            ).classes("data").props("dense options-dense")  # fmt: skip
+            self.model = ui.select(
+                _models(page.model),
+                label="Model",
+                value=page.model,
+                on_change=lambda e: self._chose(page.data, e.value),
+            )
+            ui.button(icon="upload_file", on_click=self._ask_file).props("flat dense aria-label='Open a file'").tooltip(
+                "Open a file of this computer"
+            )
+            ui.button(icon="refresh", on_click=self._again).props("flat dense aria-label='Read again'").tooltip(
+                "Read the data again"
+            )
+            self.undo = ui.button("Undo", icon="undo", on_click=page.undo).props("outline dense")
+            self.save = ui.button("Save model", icon="save", on_click=self._ask_name).props("outline dense")
+            self.report = ui.button("Report", icon="description", on_click=self._report).props("outline dense")
+        for button in (self.undo, self.save, self.report):
+            button.disable()
+
+    def _chose(self, data: str | None, model: str | None) -> None:
+        if (data or "", model or "") != (self.page.data, self.page.model):
+            self.page.go(data or "", model or "")
+
+    def opened(self, trail: Trail) -> None:
+        """What lies open has a name, even where the address has none."""
+        data = self.page.data
+        self.data.set_options({**_data(data)}, value=data)
+        if not self.page.model:
+            self.model.set_options({**_models(""), "": f"{trail.model.name} (by default)"}, value="")
+        self.save.enable()
+        self.report.enable()
+
+    def grown(self, trail: Trail) -> None:
+        """Undo is there as soon as there is something to undo."""
+        self.undo.set_enabled(bool(trail.steps))
+        self.undo.set_text(f"Undo {trail.steps[-1].name}" if trail.steps else "Undo")
+
+    def _again(self) -> None:
+        self.page.desk.forget(self.page.data)
+        self.page.go(self.page.data, self.page.model)
+
+    def _ask_file(self) -> None:
+        with ui.dialog() as dialog, ui.card():
+            words("Open a file", "title")
+            words("A CSV table with a header (alpha_deg, beta_deg, vx_v ...). Other names: rig import.", "quiet small")
+            ui.upload(on_upload=self._uploaded, auto_upload=True, max_file_size=MOST_BYTES).props("flat bordered")
+        dialog.open()
+
+    async def _uploaded(self, event: events.UploadEventArguments) -> None:
+        folder = home() / FILES
+        folder.mkdir(parents=True, exist_ok=True)
+        path = folder / Path(event.file.name).name
+        await event.file.save(path)
+        self.page.desk.forget(str(path))
+        self.page.go(str(path), "")
+
+    def _ask_name(self) -> None:
+        """A name for the model; the file is then there for this page and for the command line."""
+        with ui.dialog() as dialog, ui.card().style("min-width: 420px"):
+            words("Save the model as it is now", "title")
+            name = ui.input("Name", value="complete").props("autofocus").classes("grow")
+            where = words(f"It is written to {home() / MODELS}.", "quiet small")
+
+            def save() -> None:
+                try:
+                    path = self._saved(str(name.value))
+                except (RigError, CalibrationError, OSError) as error:
+                    where.set_text(message(error))
+                    return
+                dialog.close()
+                self.model.set_options({**self.model.options, **saved_models()})  # type: ignore[dict-item]
+                ui.notify(f"written: {path}", type="positive")
+
+            with ui.element("div").classes("row-of"):
+                ui.button("Save", on_click=save)
+                ui.button("Download", on_click=lambda: ui.download.content(self._text(), f"{name.value}.yaml")).props(
+                    "outline"
+                )
+                ui.button("Cancel", on_click=dialog.close).props("flat")
+        dialog.open()
+
+    def _text(self) -> str:
+        from calibrations.model_file import dump_model
+        from rig.provenance import with_provenance
+
+        trail = self.page.trail
+        assert trail is not None  # noqa: S101 the button is enabled with the trail
+        return dump_model(with_provenance(trail.end, trail.model))
+
+    def _saved(self, name: str) -> Path:
+        from rig.files import write_whole
+
+        plain = "".join(c if c.isalnum() or c in "-_." else "-" for c in name.strip()).strip(".") or "model"
+        folder = home() / MODELS
+        folder.mkdir(parents=True, exist_ok=True)
+        write_whole(path := folder / f"{plain}.yaml", self._text())
+        return path
+
+    async def _report(self) -> None:
+        """The report of `rig report`, as a file of the browser's."""
+        from rig.reported import reported
+
+        page, trail = self.page, self.page.trail
+        hint = ui.notification("Making the report: all pictures, all candidates", spinner=True, timeout=None)
+        try:
+            notes: list[str] = []
+            _, made = await off_loop(reported, page.data, page.model or None, page.desk.bench_file, notes.append)
+            text = await off_loop(made)
+            ui.download.content(text, f"{Path(page.data).stem}-{trail.model.name if trail else 'model'}.html")
+        except Exception as error:
+            ui.notify(message(error), type="negative", multi_line=True, timeout=0, close_button="Close")
+        finally:
+            hint.dismiss()
+
+
+def _data(chosen: str) -> dict[str, str]:
+    """Runs by id, each with what it is; what is chosen is among them."""
+    found = {chosen: chosen} if chosen else {}
+    try:
+        listed = runs()
+    except RigError:
+        listed = []
+    for run in listed:
+        for name in [f"{run.run}/{sensor}" for sensor in run.bench.get("sensors", {})] or [run.run]:
+            found[name] = f"{name}  ({run.extent}, {run.state})"
+    return found
+
+
+def _models(chosen: str) -> dict[str, Any]:
+    from calibrations.model_file import shipped_names
+
+    found = {"": "by kind of data", **{name: name for name in shipped_names()}, **saved_models()}
+    return found if chosen in found else {**found, chosen: chosen}

@@ -1,0 +1,203 @@
+"""What is missing: the candidates as cards, the next experiment, what is left unexplained, an effect of one's own."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+from urllib.parse import urlencode
+
+from nicegui import ui
+
+from calibrations.numerals import chance, plain
+from calibrations.reports.words import capital, next_takes, next_words
+from calibrations.search.candidates import SIGNIFICANT
+from rig.web.pages.model_own import Own
+from rig.web.parts import box, div, facts, failed, off_loop, waiting, words
+from rig.web.told import message
+
+if TYPE_CHECKING:
+    from calibrations.diagnose import Diagnosis
+    from calibrations.discover import Added
+    from calibrations.search.candidates import Candidate
+    from rig.web.counted import Counted
+    from rig.web.pages.model import Workbench
+
+FIRST = 6  # cards that are shown at once
+PROGRESS_S = 0.15
+
+
+class Missing:
+    """The side of the page on which a person decides."""
+
+    def __init__(self, page: Workbench) -> None:
+        self.page = page
+        self.looked_at: Candidate | None = None
+        self.tried: dict[str, Added] = {}
+        with div("side"):
+            words("What is missing", "title")
+            self.cards = div("column")
+            self.own = Own(page)
+
+    def wait(self, counted: Counted) -> None:
+        """A search is on its way: how far it is."""
+        self.cards.clear()
+        self.own.begin()
+        with self.cards, box():
+            hint = waiting("fitting")
+            ui.timer(PROGRESS_S, lambda: hint.set_text(counted.told))
+            for _ in range(3):
+                ui.skeleton(height="58px").style("margin-top: 8px")
+
+    def fail(self, why: str) -> None:
+        """The search ended in an error."""
+        self.cards.clear()
+        with self.cards:
+            failed("The search for effects failed", why)
+
+    async def show(self, result: Diagnosis) -> None:
+        """The candidates, best first; the best is looked at where there is one to add."""
+        self.cards.clear()
+        self.tried, self.looked_at = {}, None
+        self.own.begin(result.pattern)
+        missing = result.verdict in ("effect-missing", "ambiguous") and bool(result.path.steps)
+        with self.cards:
+            if not missing:
+                self._nothing_to_add(result)
+            cards = [Card(self, c, result, missing and not k) for k, c in enumerate(result.candidates[:FIRST])]
+            if len(result.candidates) > FIRST:
+                self._others(result)
+            if result.next_experiment is not None:
+                await self._next(result)
+        if missing and cards:
+            await cards[0].open()
+
+    def _nothing_to_add(self, result: Diagnosis) -> None:
+        good = result.verdict == "adequate"
+        with box("verdict good" if good else "verdict doubt"):
+            if good:
+                words("Nothing is missing: save the model, or see below what was tried.")
+            elif result.residual_structure:
+                words(f"Unexplained: {result.residual_structure}. What it may be, you can write below; what was tried:")
+            else:
+                words("Nothing shows that an effect is missing; what was tried:")
+
+    def _others(self, result: Diagnosis) -> None:
+        rest = result.candidates[FIRST:]
+        with ui.expansion(f"{len(rest)} more, less likely").props("dense"):
+            for c in rest:
+                Card(self, c, result, best=False)
+
+    async def _next(self, result: Diagnosis) -> None:
+        """The experiment that would tell, planned on the bench."""
+        from rig.bench import read_bench
+        from rig.next_experiment import proposed
+
+        page = self.page
+        assert page.trail is not None  # noqa: S101 a diagnosis is of a trail
+        with box("note"):
+            words("Next experiment", "title")
+            hint = waiting("Planning it on the bench")
+        try:
+            bench = read_bench(page.desk.bench_file)
+            found = await off_loop(proposed, result, page.trail.effects, bench, page.desk.bench_file)
+            experiment = found.next_experiment
+            assert experiment is not None  # noqa: S101 it had one before
+            hint.set_text(f"{next_words(experiment)} {next_takes(experiment)}")
+            given = {name: _written(value) for name, value in experiment.settings.items()}
+            to = f"/run?{urlencode({'procedure': experiment.procedure, **given})}"
+            with hint.parent_slot.parent:  # type: ignore[union-attr]
+                ui.button("Prepare it", icon="science", on_click=lambda: ui.navigate.to(to)).props("outline dense")
+        except Exception as error:
+            hint.set_text(message(error))
+
+    async def look_at(self, c: Candidate) -> None:
+        """Draw the candidate's curve through the residual."""
+        self.looked_at = c
+        step = await self.step_of(c)
+        if step is not None and self.looked_at is c:
+            self.page.pictures.consider(step)
+
+    async def step_of(self, c: Candidate) -> Added | None:
+        """The candidate fitted in full; None where that fails, which is told."""
+        trail = self.page.trail
+        if c.name not in self.tried and trail is not None:
+            try:
+                self.tried[c.name] = await off_loop(trail.tried, c.effect)
+            except Exception as error:
+                ui.notify(message(error), type="negative", multi_line=True)
+        return self.tried.get(c.name)
+
+    async def add_shown(self) -> None:
+        """Add what is looked at."""
+        if self.looked_at is not None:
+            await self.add(self.looked_at)
+
+    async def add(self, c: Candidate) -> None:
+        """The model gains this effect."""
+        step = await self.step_of(c)
+        if step is not None:
+            await self.page.add(step)
+
+
+class Card:
+    """One candidate: what it is, what it does to the error, and the button that adds it."""
+
+    def __init__(self, side: Missing, c: Candidate, result: Diagnosis, best: bool) -> None:
+        self.side, self.c = side, c
+        with div("card first" if best else "card"):
+            with ui.element("button").classes("head").props("type=button aria-expanded=false") as self.head:
+                words(c.name, "what")
+                words(f"{plain(result.held_out_before)} → {plain(c.held_out_after)} ×", "fall small")
+                ui.icon("expand_more")
+            self.head.on("click", self.toggle)
+            self.body = div("body")
+            self.body.set_visibility(False)
+            with self.body:
+                self._told(result)
+                with div("row-of"):
+                    ui.button(f"Add {c.name}", icon="add", on_click=lambda: side.add(c)).props("dense unelevated")
+                    ui.button("Show its curve", on_click=lambda: side.look_at(c)).props("dense flat")
+
+    def _told(self, result: Diagnosis) -> None:
+        c, unit = self.c, result.fit.table.unit
+        words(capital(c.effect.summary))
+        words(c.effect.formula.replace("{out}", unit), "formula")
+        with div("chance"):
+            div("").style(f"width: {100 * c.probability:.1f}%")
+        rivals = ", ".join(c.indistinguishable_from)
+        facts(
+            {
+                "Symptom": capital(c.effect.symptom),
+                "Error, rows of the fit": f"{plain(result.excess_before)} → {plain(c.excess_after)} × the noise floor",
+                "Error, unseen rows": f"{plain(result.held_out_before)} → {plain(c.held_out_after)} × the noise floor",
+                "Probability": f"{_share(c.probability)}; by chance {chance(c.p_value)}"
+                + ("" if c.p_value < SIGNIFICANT else ", which is not significant"),
+                "Cannot be told from": rivals or "nothing in the catalogue",
+                "Source": c.effect.source or "–",
+            }
+        )
+
+    async def open(self) -> None:
+        """Unfold the card, and draw the candidate's curve."""
+        self.body.set_visibility(True)
+        self.head.props("aria-expanded=true")
+        await self.side.look_at(self.c)
+
+    async def toggle(self) -> None:
+        """Unfold or fold."""
+        if self.body.visible:
+            self.body.set_visibility(False)
+            self.head.props("aria-expanded=false")
+        else:
+            await self.open()
+
+
+def _share(probability: float) -> str:
+    """Only approximate: neither certain nor impossible."""
+    return (
+        "above 99.9 %" if probability > 0.999 else "below 0.1 %" if probability < 1e-3 else f"{100 * probability:.2g} %"
+    )
+
+
+def _written(value: object) -> str:
+    """A setting as it is written on the command line."""
+    return ",".join(f"{part:g}" for part in value) if isinstance(value, (list, tuple)) else str(value)

@@ -1,0 +1,180 @@
+"""The four pictures of the page Model, linked: what is selected in one is selected in all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+from nicegui import events, ui
+
+from calibrations.pictures.candidate import most_telling
+from calibrations.pictures.columns import Column
+from rig.web.figures.failure import failure
+from rig.web.figures.measurement import measurement
+from rig.web.figures.residual import residual
+from rig.web.figures.rows import Shown, choices, first_choices
+from rig.web.figures.style import Figure
+from rig.web.figures.waterfall import waterfall
+from rig.web.parts import box, div, words
+
+if TYPE_CHECKING:
+    from calibrations.discover import Added
+    from calibrations.fit import Fit
+    from rig.trail import Trail
+
+LINKED = ("measurement", "residual", "failure")
+TITLES = {
+    "measurement": "Measurement beside model",
+    "residual": "What the model leaves",
+    "failure": "Where it fails",
+    "waterfall": "The falling error; ◆ on poses that the fit did not see",
+}
+FOLLOWED = "followed"  # the column that a candidate's curve follows
+POINTS = (
+    "(e) => { if (e && e.points) emit(e.points.map(p => p.customdata).filter(k => k !== undefined && k !== null)) }"
+)
+
+
+class Pictures:
+    """Draws a fit; knows what it is drawn against, in which unit, and which rows are selected."""
+
+    def __init__(self) -> None:
+        self.fit: Fit | None = None
+        self.trail: Trail | None = None
+        self.step: Added | None = None
+        self.columns: dict[str, Column] = {}
+        self.selected: list[int] = []
+        self.plots: dict[str, ui.plotly] = {}
+        with div("pictures"):
+            self._controls()
+            for name in TITLES:
+                self._picture(name)
+
+    def _controls(self) -> None:
+        with box("controls row-of"):
+            self.axis = ui.toggle({0: "x"}, value=0, on_change=self.draw).props("dense no-caps")
+            self.unit = ui.toggle({False: "V", True: "g"}, value=False, on_change=self.draw).props("dense no-caps")
+            self.x = self._column("against")
+            self.colour = self._column("coloured by")
+            self.told = words("", "quiet small grow")
+            self.clear = ui.button("Select nothing", on_click=lambda: self.select([])).props("flat dense")
+            self.clear.set_visibility(False)
+
+    def _column(self, label: str) -> ui.select:
+        return ui.select({}, label=label, on_change=self.draw).props("dense options-dense").style("min-width: 150px")
+
+    def _picture(self, name: str) -> None:
+        with box("picture"):
+            with div("title"):
+                words(TITLES[name])
+                if name == "residual":
+                    self.considered = ui.button(icon="close", on_click=lambda: self.consider(None))
+                    self.considered.props("flat dense size=sm icon-right=close").props(remove="icon")
+                    self.considered.set_visibility(False)
+            plot = ui.plotly({"data": [], "layout": {}}).classes("plot").props(f'aria-label="{TITLES[name]}"')
+            self.plots[name] = plot
+        if name in LINKED:
+            plot.on("plotly_selected", self._brushed, js_handler=POINTS)
+            plot.on("plotly_deselect", lambda: self.select([]), js_handler="() => emit()")
+
+    def show(self, fit: Fit, trail: Trail) -> None:
+        """A new fit: what was chosen stays chosen where it can."""
+        if self.fit is None or self.fit.table.n != fit.table.n:
+            self.selected = []
+        self.fit, self.trail, self.step = fit, trail, None
+        self.columns = choices(fit)
+        x, colour = first_choices(list(self.columns))
+        self.axis.set_options(
+            dict(enumerate(fit.channels)), value=min(int(self.axis.value or 0), len(fit.channels) - 1)
+        )
+        self.unit.set_options(_units(fit), value=fit.table.kind == "positions" or bool(self.unit.value))
+        for select, first in ((self.x, x), (self.colour, colour)):
+            value = select.value if select.value in self.columns else first
+            select.set_options({name: column.labels[0] for name, column in self.columns.items()}, value=value)
+        self.considered.set_visibility(False)
+        self.draw()
+
+    def consider(self, step: Added | None) -> None:
+        """Draw the curve of an effect through the residual, against what it follows; None takes it away."""
+        self.step = step
+        self.columns.pop(FOLLOWED, None)
+        if step is not None:
+            column = most_telling(step)
+            same = next((name for name in self.columns if name == column.name), None)
+            if same is None:
+                self.columns[FOLLOWED] = column
+            self.considered.set_text(step.name)
+        self.considered.set_visibility(step is not None)
+        value = self.x.value if self.x.value in self.columns else next(iter(self.columns))
+        if step is not None:
+            value = same or FOLLOWED
+        self.x.set_options({name: column.labels[self.c] for name, column in self.columns.items()}, value=value)
+        self.draw()
+
+    @property
+    def c(self) -> int:
+        """The channel that is shown."""
+        return int(self.axis.value or 0)
+
+    @property
+    def shown(self) -> Shown:
+        """The rows as they are drawn."""
+        assert self.fit is not None  # noqa: S101 nothing is drawn before there is a fit
+        return Shown(self.fit, min(self.c, len(self.fit.channels) - 1), bool(self.unit.value))
+
+    def draw(self) -> None:
+        """All pictures anew."""
+        if self.fit is None or self.trail is None or self.x.value not in self.columns:
+            return
+        shown, colour = self.shown, self.columns.get(self.colour.value or "", self.columns[self.x.value])
+        plain = self.columns[self.x.value if self.x.value != FOLLOWED else next(iter(self.columns))]
+        drawn: dict[str, Callable[[], Figure]] = {
+            "measurement": lambda: measurement(shown, plain, colour),
+            "residual": lambda: residual(shown, self.columns[self.x.value], colour, self.step),
+            "failure": lambda: failure(shown),
+            "waterfall": lambda: waterfall(self.trail),  # type: ignore[arg-type] # checked above
+        }
+        for name, make in drawn.items():
+            figure = make()
+            if name in LINKED and self.selected:
+                figure["data"][0]["selectedpoints"] = self.selected
+            self.plots[name].update_figure(figure)
+        self._tell(shown)
+
+    def next_axis(self) -> None:
+        """The next channel."""
+        if self.fit is not None:
+            self.axis.set_value((self.c + 1) % len(self.fit.channels))
+
+    def other_unit(self) -> None:
+        """V to g, or back."""
+        if len(self.unit.options) > 1:
+            self.unit.set_value(not self.unit.value)
+
+    def _brushed(self, event: events.GenericEventArguments) -> None:
+        self.select(event.args if isinstance(event.args, list) else [])
+
+    def select(self, points: Sequence[Any]) -> None:
+        """Mark these points in all pictures; none unmarks all."""
+        if self.fit is None:
+            return
+        self.selected = sorted({int(point) for point in points})
+        for name in LINKED:
+            self.plots[name].figure["data"][0]["selectedpoints"] = self.selected or None
+            marked = {"selectedpoints": [self.selected or None]}
+            self.plots[name].run_plot_method("restyle", marked, [0])
+            if not self.selected:
+                self.plots[name].run_plot_method("relayout", {"selections": []})
+        self._tell(self.shown)
+
+    def _tell(self, shown: Shown) -> None:
+        """What is selected, or that not all is drawn, or what can be done."""
+        self.clear.set_visibility(bool(self.selected))
+        self.told.set_text(shown.summary(self.selected) if self.selected else shown.thinned or
+                           "Draw a box in a picture to select poses in all of them.")  # fmt: skip
+
+
+def _units(fit: Fit) -> dict[bool, str]:
+    """What a residual can be given in."""
+    sensed = fit.table.input_unit
+    return {True: sensed} if fit.table.kind == "positions" else {False: fit.table.unit, True: sensed}

@@ -1,0 +1,81 @@
+"""Small parts that pages are made of: boxes, and the states of having nothing, waiting, and having failed."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import ParamSpec, TypeVar
+
+from nicegui import ui
+from nicegui.element import Element
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+def box(classes: str = "") -> Element:
+    """A sheet of paper on the page."""
+    return ui.element("section").classes(f"box {classes}")
+
+
+def div(classes: str) -> Element:
+    """A plain container."""
+    return ui.element("div").classes(classes)
+
+
+def words(text: str, classes: str = "") -> ui.label:
+    """A line of text."""
+    return ui.label(text).classes(classes)
+
+
+@contextmanager
+def state(title: str, why: str = "", kind: str = "") -> Iterator[None]:
+    """A box in place of what is not there, which says what to do; inside, what to press."""
+    with box(f"state {kind}").props("role=status"):
+        words(title, "title")
+        if why:
+            words(why, "why quiet")
+        with div("row-of"):
+            yield
+
+
+def waiting(text: str) -> ui.label:
+    """Something is on its way; the label may be told how far."""
+    with div("row-of").props("role=status"):
+        ui.spinner(size="1.4em")
+        return words(text, "quiet")
+
+
+def failed(title: str, why: str) -> None:
+    """An error state."""
+    with box("error").props("role=alert"):
+        words(title, "title")
+        words(why, "why quiet").style("white-space: pre-wrap")
+
+
+def facts(rows: Mapping[str, str]) -> None:
+    """Names and what they are, in two columns."""
+    with div("facts"):
+        for name, value in rows.items():
+            words(name, "k")
+            words(value)
+
+
+def table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
+    """A plain table of text."""
+    with ui.element("table").classes("plain-table"):
+        with ui.element("tr"):
+            for name in head:
+                with ui.element("th"):
+                    words(name)
+        for row in rows:
+            with ui.element("tr"):
+                for cell in row:
+                    with ui.element("td"):
+                        words(cell)
+
+
+async def off_loop(call: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
+    """What takes long, in a thread: the page stays alive."""
+    return await asyncio.to_thread(call, *args, **kwargs)

@@ -1,0 +1,107 @@
+"""The workbench's server: one process, one address, pages for whoever has the token."""
+
+from __future__ import annotations
+
+import secrets
+import signal
+import socket
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from types import FrameType
+
+import uvicorn
+from fastapi import FastAPI
+from nicegui import run, ui
+
+from rig.errors import RigError
+from rig.web.desk import Desk
+from rig.web.guard import TOKEN, Guard, names
+from rig.web.pages import register
+
+LOCAL = "127.0.0.1"
+PORT = 8473  # taken where it is free, so that a page that was left open finds its server again
+TOKEN_BYTES = 24
+TITLE = "rig workbench"
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where the workbench listens, and the token that lets a browser in."""
+
+    host: str
+    port: int
+    token: str
+
+    @property
+    def url(self) -> str:
+        """The address to open."""
+        return f"http://{self.host}:{self.port}/?{TOKEN}={self.token}"
+
+
+def serve(desk: Desk, host: str, port: int | None, ready: Callable[[Place], None]) -> None:
+    """Serve until SIGINT or SIGTERM; `ready` is told the address as soon as pages can be opened.
+
+    Raises RigError where the address cannot be had; without `port` another is taken instead.
+    """
+    listener = _listen(host, port)
+    place = Place(host, listener.getsockname()[1], secrets.token_urlsafe(TOKEN_BYTES))
+    app = FastAPI(openapi_url=None)
+    register(desk)
+    run.process_pool_start_method = "spawn"  # nothing is computed there; this keeps it from saying so
+    ui.run_with(
+        app,
+        title=TITLE,
+        dark=None,
+        tailwind=False,
+        show_welcome_message=False,
+        reconnect_timeout=10.0,
+        gzip_middleware_factory=None,
+    )
+    guarded = Guard(app, place.token, names(host, place.port))
+    config = uvicorn.Config(
+        guarded, log_level="warning", access_log=False, timeout_graceful_shutdown=1, ws_max_size=1 << 24
+    )
+    with _signals_end_it(), listener:
+        _Server(config, lambda: ready(place)).run(sockets=[listener])
+
+
+class _Server(uvicorn.Server):
+    """A server that says when it is up."""
+
+    def __init__(self, config: uvicorn.Config, ready: Callable[[], None]) -> None:
+        super().__init__(config)
+        self._ready = ready
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        await super().startup(sockets)
+        self._ready()
+
+
+def _listen(host: str, port: int | None) -> socket.socket:
+    """A socket at the address asked for. Raises RigError."""
+    listener = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listener.bind((host, PORT if port is None else port))
+    except OSError as error:
+        if port is None:
+            listener.bind((host, 0))
+            return listener
+        listener.close()
+        raise RigError(f"cannot listen at {host}:{port}: {error.strerror}; name another --port or --host") from None
+    return listener
+
+
+@contextmanager
+def _signals_end_it() -> Iterator[None]:
+    """A signal ends the server, which raises it again afterwards: inside it then does nothing more."""
+
+    def nothing_more(number: int, frame: FrameType | None) -> None: ...
+
+    before = {each: signal.signal(each, nothing_more) for each in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for each, handler in before.items():
+            signal.signal(each, handler)
