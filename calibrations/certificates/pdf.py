@@ -1,0 +1,113 @@
+"""The certificate as a PDF, A4: the same sections, in DejaVu Sans, which matplotlib brings along."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from pathlib import Path
+
+import matplotlib as mpl
+from fpdf import FPDF
+from fpdf.enums import TableBordersLayout, TextEmphasis
+from fpdf.fonts import FontFace
+
+from calibrations.certificates.content import Certificate
+from calibrations.certificates.sections import Section, Table, sections, verdict
+
+FONT = "DejaVu"
+FILES = {"": "DejaVuSans.ttf", "B": "DejaVuSans-Bold.ttf"}
+SIZE, SMALL, TINY = 9.0, 7.5, 6.5
+QUIET = (97, 110, 124)
+INK = (31, 41, 51)
+
+
+class _Page(FPDF):
+    """A page with the certificate's number and its own at its foot."""
+
+    def __init__(self, number: str) -> None:
+        super().__init__(format="A4")
+        self._number = number
+
+    def footer(self) -> None:
+        self.set_y(-12)
+        self.set_font(FONT, size=TINY)
+        self.set_text_color(*QUIET)
+        self.cell(0, 5, f"Certificate {self._number}")
+        self.cell(0, 5, f"page {self.page_no()} of {{nb}}", align="R")
+
+
+def pdf(c: Certificate) -> bytes:
+    """The document; the same certificate gives the same bytes."""
+    page = _Page(c.number)
+    folder = Path(mpl.get_data_path()) / "fonts" / "ttf"
+    for style, file in FILES.items():
+        page.add_font(FONT, style, folder / file)
+    page.set_creation_date(datetime.fromisoformat(f"{c.issued}T00:00:00").replace(tzinfo=UTC))
+    page.set_title(f"Calibration certificate {c.number}")
+    page.set_creator(c.program)
+    page.set_margins(15, 15)
+    page.set_auto_page_break(True, margin=16)
+    page.add_page()
+    _head(page, c)
+    for section in sections(c):
+        _section(page, section)
+    return bytes(page.output())
+
+
+def _head(page: FPDF, c: Certificate) -> None:
+    _write(page, c.laboratory.name, SMALL, QUIET)
+    _write(page, "Calibration certificate", 18, INK, "B")
+    _write(page, f"No. {c.number}, issued {c.issued}", SIZE, INK)
+    told = verdict(c)
+    conformity = f" Conformity with its limits: {told}." if told else ""
+    _write(page, f"{c.sensor}, serial number {c.serial}, calibrated on {c.ended[:10]}.{conformity}", SIZE + 1, INK)
+
+
+def _section(page: FPDF, section: Section) -> None:
+    page.ln(2)
+    if page.will_page_break(20):
+        page.add_page()
+    _write(page, section.title, 12, INK, "B")
+    for text in section.words:
+        _write(page, text, SMALL, INK)
+    if section.facts:
+        _facts(page, section)
+    for table in section.tables:
+        _table(page, table)
+
+
+def _facts(page: FPDF, section: Section) -> None:
+    page.set_font(FONT, size=SMALL)
+    with page.table(
+        borders_layout=TableBordersLayout.NONE, first_row_as_headings=False, col_widths=(1, 4), line_height=4.2,
+        text_align="LEFT",
+    ) as cells:  # fmt: skip
+        for name, value in section.facts:
+            row = cells.row()
+            row.cell(name, style=FontFace(color=QUIET))
+            row.cell(value or "–")
+
+
+def _table(page: FPDF, table: Table) -> None:
+    _write(page, table.title, SMALL, INK, "B")
+    page.set_font(FONT, size=TINY)
+    aligned = tuple("RIGHT" if k in table.numbers else "LEFT" for k in range(len(table.head)))
+    with page.table(
+        borders_layout=TableBordersLayout.HORIZONTAL_LINES, col_widths=_widths(table), line_height=3.4,
+        text_align=aligned, headings_style=FontFace(emphasis=TextEmphasis.B),
+    ) as cells:  # fmt: skip
+        for row in (table.head, *table.rows):
+            cells.row(row)
+    page.ln(1.5)
+
+
+def _widths(table: Table) -> tuple[float, ...]:
+    """Shares of the width by the longest cell of each column; long texts are broken."""
+    longest = [max(len(row[k]) for row in (table.head, *table.rows)) for k in range(len(table.head))]
+    return tuple(float(min(max(length, 5), 40)) for length in longest)
+
+
+def _write(page: FPDF, text: str, size: float, colour: tuple[int, int, int], style: str = "") -> None:
+    page.set_font(FONT, style, size)
+    page.set_text_color(*colour)
+    page.multi_cell(0, size * 0.5, text, new_x="LMARGIN", new_y="NEXT")
+    page.set_text_color(*INK)

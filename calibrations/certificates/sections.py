@@ -1,0 +1,253 @@
+"""A certificate as headings, facts and tables: one text, which HTML and PDF set each in its way."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from calibrations.certificates.content import Certificate, Outcome, Source
+from calibrations.certificates.decision import RULE, Decision
+from calibrations.numerals import measured, minus, plain, unit
+
+MANY = 1e4  # degrees of freedom, told as no limit
+NEGLIGIBLE = 1e-3  # of the combined uncertainty
+HEAVIEST = 3  # poses that weigh most, named with a result
+METHOD = (
+    "Terms and symbols as in IEEE Std 1293 (linear single-axis accelerometers) and IEEE Std 2700 (performance parameters "
+    "of sensors). The parameters are estimated jointly, by least squares under the noise that the data show."
+)
+EXPANDED = (
+    "As left. U is the expanded uncertainty for a coverage probability of about 95 %: k = 2, or Student's factor for the "
+    "effective degrees of freedom where that is more. g is the local gravity."
+)
+BUDGET = (
+    "After the GUM (JCGM 100): type A from the noise of the data themselves, type B from what is stated of inputs that no "
+    "data can show; effective degrees of freedom by Welch and Satterthwaite."
+)
+TRIALS = (
+    "The propagation of distributions (GUM Supplement 1, JCGM 101) with {trials} trials is set beside the budget; where "
+    "its interval reaches further, by more than half a unit of u's first digit, it is taken."
+)
+ROWS = (
+    "Every figure follows from the rows below, each the mean of a block of samples in the record. The digest is the "
+    "beginning of the SHA-256 of the block's samples; the machine-readable certificate has it whole, with the weight of "
+    "every row in every result."
+)
+NO_LIMITS = "No limits were given: nothing is said of conformity."
+STATEMENTS = {
+    "pass": "pass",
+    "conditionalPass": "conditional pass",
+    "conditionalFail": "conditional fail",
+    "fail": "fail",
+}
+
+
+@dataclass(frozen=True)
+class Table:
+    """`numbers` are the columns that stand to the right. `long` may be folded where there is room to unfold it."""
+
+    title: str
+    head: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    numbers: tuple[int, ...] = ()
+    long: bool = False
+
+
+@dataclass(frozen=True)
+class Section:
+    """A heading, sentences, facts by name, and tables; in this order."""
+
+    title: str
+    words: tuple[str, ...] = ()
+    facts: tuple[tuple[str, str], ...] = ()
+    tables: tuple[Table, ...] = ()
+
+
+def sections(c: Certificate) -> list[Section]:
+    """Everything that the certificate says, in order."""
+    return [
+        _identification(c),
+        _procedure(c),
+        _environment(c),
+        _results(c),
+        _found(c),
+        _uncertainty(c),
+        _traceability(c),
+    ]
+
+
+def verdict(c: Certificate) -> str:
+    """The worst statement of conformity; nothing where no result has a limit."""
+    stated = {o.decision.statement for o in c.figures.outcomes if o.decision is not None}
+    return next((text for key, text in reversed(STATEMENTS.items()) if key in stated), "")
+
+
+def _identification(c: Certificate) -> Section:
+    lab = c.laboratory
+    place = ", ".join(filter(None, (lab.street, f"{lab.post_code} {lab.city}".strip(), lab.country)))
+    head = ("role", "instrument", "serial number", "firmware", "certificate", "due")
+    rows = tuple(
+        (i.role, i.model, i.serial or "–", i.firmware or "–", i.certificate or "none given",
+         f"{i.due or '–'}{', expired' if i.expired else ''}")
+        for i in c.instruments
+    )  # fmt: skip
+    facts = (
+        ("laboratory", f"{lab.name}, {place}"),
+        ("responsible", f"{lab.person}, {lab.role}"),
+        ("customer", c.customer),
+        ("sensor", c.sensor),
+        ("serial number", c.serial),
+        ("manufacturer", c.manufacturer),
+        ("rig", c.rig),
+    )
+    tables = (
+        (Table("Instruments, and the certificates that their values are traceable by", head, rows),) if rows else ()
+    )
+    return Section("Identification", (), facts, tables)
+
+
+def _procedure(c: Certificate) -> Section:
+    facts = (
+        ("procedure", c.procedure),
+        ("begun", c.began),
+        ("ended", c.ended),
+        ("model", c.figures.model),
+        *c.facts.items(),
+    )
+    return Section("Procedure", (METHOD,), facts)
+
+
+def _environment(c: Certificate) -> Section:
+    rows = tuple(
+        (each.name, *(minus(f"{value:.6g}") for value in (each.low, each.mean, each.high)), unit(each.unit))
+        for each in c.conditions
+    )
+    head = ("influence", "lowest", "mean", "highest", "unit")
+    tables = (Table("During the measurement", head, rows, (1, 2, 3)),) if rows else ()
+    return Section("Environment", (), (("local gravity", f"{c.gravity_m_s2:.6g} m/s²"),), tables)
+
+
+def _results(c: Certificate) -> Section:
+    outcomes = c.figures.outcomes
+    rows = tuple(
+        (_name(o), measured(o.value, o.expanded), unit(o.unit), f"{o.coverage:.2f}", _freedom(o.freedom),
+         *(("–", "–") if o.decision is None else (_limits(o.decision), _statement(o.decision))))
+        for o in outcomes
+    )  # fmt: skip
+    head = ("quantity", "value ± U", "unit", "k", "ν_eff", "limits", "conformity")
+    words = (
+        EXPANDED,
+        *([RULE] if any(o.decision for o in outcomes) else [NO_LIMITS]),
+        *c.figures.remarks,
+        *c.remarks,
+    )
+    return Section("Results", words, (), (Table("Results, as left", head, rows, (1, 3, 4)),))
+
+
+def _found(c: Certificate) -> Section:
+    """As found, where an earlier calibration is known; the error of indication in any case."""
+    outcomes = [o for o in c.figures.outcomes if o.found is not None]
+    changes = tuple(
+        (_name(o), plain(o.found[0], 6), plain(o.value, 6), plain(o.value - o.found[0], 2), unit(o.unit),
+         f"{abs(o.value - o.found[0]) / o.expanded:.1f}")
+        for o in outcomes if o.found is not None
+    )  # fmt: skip
+    errors = tuple(
+        (e.axis, *([plain(x) for x in e.found] if e.found else ["–", "–"]), *(plain(x) for x in e.left), e.unit)
+        for e in c.figures.errors
+    )
+    head = ("axis", "rms as found", "greatest as found", "rms as left", "greatest as left", "unit")
+    tables = [Table("Error of indication over the poses of this calibration", head, errors, (1, 2, 3, 4))]
+    if changes:
+        changed = ("quantity", "as found", "as left", "change", "unit", "change / U")
+        tables.insert(0, Table("Change since the calibration before", changed, changes, (1, 2, 3, 5)))
+    words = f"As found: by {c.before}." if c.before else "As found is not known: no earlier calibration was given."
+    return Section("As found and as left", (words,), (), tuple(tables))
+
+
+def _uncertainty(c: Certificate) -> Section:
+    head = ("source", "type", "its standard uncertainty", "sensitivity", "contribution", "ν")
+    budgets = tuple(
+        Table(
+            f"{_name(o)}, {unit(o.unit) or '1'}", head, tuple(_line(s, o) for s in o.sources), (2, 3, 4, 5), long=True
+        )
+        for o in c.figures.outcomes
+    )
+    trials = tuple(
+        (_name(o), plain(o.std, 2), plain(o.simulated.std, 2), measured(o.value, o.expanded),
+         f"{_like(o.simulated.low, o)} to {_like(o.simulated.high, o)}", unit(o.unit),
+         "confirmed" if o.simulated.agrees else "widened to the simulation")
+        for o in c.figures.outcomes
+    )  # fmt: skip
+    check = ("quantity", "u by the budget", "u simulated", "value ± U", "95 % simulated", "unit", "budget")
+    words = (
+        BUDGET,
+        *(
+            [f"Not given, and so not in these numbers: {', '.join(c.figures.not_given)}."]
+            if c.figures.not_given
+            else []
+        ),
+        TRIALS.format(trials=c.figures.trials),
+    )
+    return Section(
+        "Uncertainty", words, (), (Table("Check by simulation", check, trials, (1, 2, 3, 4), False), *budgets)
+    )
+
+
+def _traceability(c: Certificate) -> Section:
+    heavy = tuple(
+        (_name(o), ", ".join(f"{number} ({100 * share:.0f} %)" for number, share in o.weights[:HEAVIEST]))
+        for o in c.figures.outcomes
+    )
+    rows = tuple(
+        (str(s.number), "–" if s.t_s is None else f"{s.t_s:.1f}", s.place,
+         "  ".join(minus(f"{v:.6f}") for v in s.means), str(s.n), s.sha256[:16])
+        for s in c.samples
+    )  # fmt: skip
+    facts = (
+        ("data", c.data),
+        ("SHA-256 of the data", c.data_sha256),
+        ("SHA-256 of the model", c.model_sha256),
+        ("issued by", c.program),
+    )
+    return Section(
+        "Traceability",
+        (ROWS,),
+        facts,
+        (
+            Table("Rows that weigh most in each result", ("quantity", "number of the row (its share)"), heavy),
+            Table("Rows", ("row", "t, s", "pose", "mean outputs", "n", "SHA-256"), rows, (0, 1, 4), long=True),
+        ),
+    )
+
+
+def _name(o: Outcome) -> str:
+    return f"{o.term}{f', {o.axis}' if o.axis else ''}"
+
+
+def _freedom(freedom: float) -> str:
+    return f"{freedom:.0f}" if freedom < MANY else "∞"
+
+
+def _like(value: float, o: Outcome) -> str:
+    """A value to as many digits as the result has."""
+    return measured(value, o.expanded).partition(" ±")[0].strip("(")
+
+
+def _limits(d: Decision) -> str:
+    return minus(f"{d.low:g} to {d.high:g}")
+
+
+def _statement(d: Decision) -> str:
+    chance = "over 99.9" if d.probability > 0.999 else f"{100 * d.probability:.1f}"
+    return f"{STATEMENTS[d.statement]} ({chance} %)"
+
+
+def _line(s: Source, o: Outcome) -> tuple[str, ...]:
+    return (
+        s.name,
+        s.kind,
+        "–" if s.std is None else f"{plain(s.std, 2)} {unit(s.unit)}".strip(),
+        "–" if s.sensitivity is None else plain(s.sensitivity, 2),
+        plain(s.contribution, 2) if s.contribution > NEGLIGIBLE * o.std else "negligible",
+        _freedom(s.freedom),
+    )
