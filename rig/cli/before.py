@@ -17,8 +17,8 @@ from rich.text import Text
 from procedures.catalogue import Procedure
 from rig.bench import Bench
 from rig.certificates import expired
-from rig.cli.output import duration, size
 from rig.drawings import Attitude, drawing_of, sketch
+from rig.numerals import duration, size
 from rig.plan import Plan
 from rig.stretches import stretches
 

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from click import wrap_text
 
-from rig.cli.output import columns, duration
+from rig.cli.output import columns
+from rig.numerals import duration
 from rig.optimal import AGAIN, CHECK, DESIGN, Optimal, most_relative, relative
 from rig.sweep_range import Judged
 

@@ -6,17 +6,10 @@ import math
 
 from rich.text import Text
 
+from rig.seen import nearness
+
 WIDTH = 15  # characters, the ends included
-NEAR = 0.1  # of the span: so near to a limit, a value is marked
 STYLES = {"": "green", "near its limit": "yellow", "beyond its limit": "bold red"}
-
-
-def nearness(value: float, low: float, high: float) -> str:
-    """ "" | near its limit | beyond its limit"""
-    inside = min(value - low, high - value)
-    if not inside >= 0:  # nor is what is no number
-        return "beyond its limit"
-    return "near its limit" if inside < NEAR * (high - low) else ""
 
 
 def gauge(value: float, low: float, high: float) -> Text:

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import statistics
 import time
-from collections import defaultdict, deque
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import replace
 from datetime import UTC, datetime
 from types import TracebackType
 from typing import Self, cast
@@ -23,17 +20,17 @@ from procedures.questions import Choice, Question
 from procedures.session import Reading
 from rig.bench import Bench
 from rig.cli.before import before, drawn, free_bytes, mounting
-from rig.cli.screen import Seen, screen
+from rig.cli.screen import screen
 from rig.drawings import Attitude, drawing_of, page
 from rig.files import write_whole
 from rig.home import home
 from rig.plan import Plan
 from rig.record import Kept
 from rig.runner import Outcome, Wish
+from rig.seen import Sight
 
 BEGIN = Choice("begin", "Begin?", choices=("go", "cancel"))
 GO_ON = Choice("interrupted", "What now?", choices=("resume", "repeat", "end"))
-REMEMBERED = 200  # dwells of a kind that say what scatter is usual
 FRAMES_HZ = 8
 
 
@@ -45,11 +42,8 @@ class Guide:
     ) -> None:
         self._procedure, self._bench, self._answers = procedure, bench, answers
         self._console = console or Console(stderr=True)
-        self._scatter: dict[tuple[str, str], deque[float]] = defaultdict(lambda: deque(maxlen=REMEMBERED))
         self._drawn: Attitude | None = None
-        adc = bench.instruments.get("adc")
-        range_v = getattr(adc.typed_settings(), "range_v", None) if adc else None
-        self._seen = Seen(procedure.name, bench.limits, range_v, bench.simulated)
+        self._sight = Sight(procedure.name, bench)
         self._live = Live(
             get_renderable=self._screen, console=self._console, refresh_per_second=FRAMES_HZ, transient=True
         )
@@ -64,8 +58,7 @@ class Guide:
 
     def planned(self, plan: Plan) -> None:
         """One screen of what will happen; raises Declined where the person cancels it."""
-        way = replace(self._seen.way, at_s=tuple(held.start_s for held in plan.held), end_s=plan.duration_s)
-        self._seen = replace(self._seen, way=way)
+        self._sight.planned(plan)
         self._console.print(before(plan, self._procedure, self._bench, free_bytes(home()), datetime.now(UTC).date()))
         self._draw(mounting(plan), "mounting")
         if self.ask(BEGIN, "go") == "cancel":
@@ -73,29 +66,21 @@ class Guide:
 
     def begun(self, run: str) -> None:
         """The run begins, or goes on."""
-        way = self._seen.way.begin(time.monotonic())
-        self._seen = replace(self._seen, title=f"{self._procedure.name}  {run}", way=way)
+        self._sight.begun(f"{self._procedure.name}  {run}")
         self._live.start()
 
     def doing(self, text: str) -> None:
-        self._seen = replace(self._seen, now=text)
+        self._sight.doing(text)
 
     def expect(self, total: int, done: int) -> None:
-        self._seen = replace(self._seen, way=self._seen.way.expect(total, done))
+        self._sight.expect(total, done)
 
     def kept(self, kept: Kept) -> None:
         """The last dwell's values, beside what was usual before it."""
-        kind = kept.pose.path.partition(" ")[0]
-        usual = {}
-        for name, std in kept.dwell.stds.items():
-            before_it = self._scatter[name, kind]
-            if before_it:
-                usual[name] = statistics.median(before_it)
-            before_it.append(std)
-        self._seen = replace(self._seen, kept=kept, usual_v=usual, way=self._seen.way.step(time.monotonic()))
+        self._sight.kept(kept)
 
     def read(self, reading: Reading) -> None:
-        self._seen = replace(self._seen, tilt={**self._seen.tilt, reading.name: reading.value})
+        self._sight.read(reading)
         self._console.print(f"{reading.name} = {reading.value:g} {reading.unit}", highlight=False)
 
     def ask(self, question: Question, instead: str | None) -> str:
@@ -113,7 +98,7 @@ class Guide:
         for complaint in outcome.moving:
             self._console.print(complaint, style="bold red", highlight=False)
         self._console.print(str(outcome.error), style="yellow", highlight=False)
-        self._console.print(_choices(self._seen.kept, outcome))
+        self._console.print(_choices(self._sight.seen.kept, outcome))
         try:
             return cast(Wish, self._asked(GO_ON, "resume"))
         except NoAnswer:
@@ -151,7 +136,7 @@ class Guide:
         self._drawn = attitude
 
     def _screen(self) -> RenderableType:
-        return screen(self._seen, time.monotonic())
+        return screen(self._sight.seen, time.monotonic())
 
 
 def _choices(kept: Kept | None, outcome: Outcome) -> Text:

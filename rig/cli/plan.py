@@ -16,9 +16,10 @@ from procedures.errors import SafetyLimit
 from procedures.pose_list import written
 from procedures.settings import parse
 from rig.bench import Bench, read_bench
-from rig.cli.output import bench_option, duration, emit, json_option, model_option, size
+from rig.cli.output import bench_option, emit, json_option, model_option
 from rig.cli.settings import PASS_ON, read_settings, settings_arguments
 from rig.errors import BeyondLimits
+from rig.numerals import duration, size
 from rig.plan import Plan, plan
 from rig.stretches import Stretch, stretches
 

@@ -15,7 +15,8 @@ from calibrations.model import Estimate, Model
 from calibrations.reports.words import joined
 from calibrations.search.held_out import held_out_excess
 from calibrations.table import Table
-from rig.cli.output import columns, duration
+from rig.cli.output import columns
+from rig.numerals import duration
 
 TOO_QUIET, SOME_ROWS = 0.5, 20  # error over the noise floor that many rows do not leave by chance
 PREFIXES = ((1.0, ""), (1e3, "m"), (1e6, "u"))

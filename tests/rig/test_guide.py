@@ -19,17 +19,19 @@ from procedures.questions import Choice, Confirm, Mounting, Number
 from procedures.session import Limits, Pose, Reading
 from rig.bench import Bench, read_bench
 from rig.cli.before import before, checks, free_bytes, mounting
-from rig.cli.gauge import WIDTH, gauge, nearness
+from rig.cli.gauge import WIDTH, gauge
 from rig.cli.guide import Guide
-from rig.cli.output import columns, duration, size
-from rig.cli.screen import Seen, screen
+from rig.cli.output import columns
+from rig.cli.screen import screen
 from rig.cli.watch import Quiet, watching
-from rig.cli.way import Way
 from rig.drawings import Attitude, page
 from rig.errors import Stopped
+from rig.numerals import duration, size
 from rig.plan import Plan, plan
 from rig.record import Block, Kept
 from rig.runner import Outcome
+from rig.seen import Seen, nearness
+from rig.way import Way
 from tests.rig.rigging import POSES, small_sweep
 
 TODAY = date(2026, 11, 21)
