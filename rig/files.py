@@ -18,11 +18,11 @@ def require_out(out: Path, *inputs: str | Path | None) -> None:
             raise OutputError(f"{out}: would overwrite {given}, which this is made from; name another file")
 
 
-def write_whole(out: Path, text: str) -> None:
+def write_whole(out: Path, content: str | bytes) -> None:
     """Write a file so that it appears whole or not at all. Raises OutputError."""
     beside = out.with_name(f".{out.name}.{os.getpid()}")
     try:
-        beside.write_text(text, encoding="utf-8")
+        beside.write_bytes(content.encode() if isinstance(content, str) else content)
         beside.replace(out)
     except OSError as error:
         with suppress(OSError):

@@ -12,25 +12,26 @@ MANY = 1e4  # degrees of freedom, told as no limit
 NEGLIGIBLE = 1e-3  # of the combined uncertainty
 HEAVIEST = 3  # poses that weigh most, named with a result
 METHOD = (
-    "Terms and symbols as in IEEE Std 1293 (linear single-axis accelerometers) and IEEE Std 2700 (performance parameters "
-    "of sensors). The parameters are estimated jointly, by least squares under the noise that the data show."
+    "Terms and symbols as in IEEE Std 1293 (linear single-axis accelerometers) and IEEE Std 2700 (performance "
+    "parameters of sensors). The parameters are estimated jointly, by least squares under the noise that the data "
+    "show."
 )
 EXPANDED = (
-    "As left. U is the expanded uncertainty for a coverage probability of about 95 %: k = 2, or Student's factor for the "
-    "effective degrees of freedom where that is more. g is the local gravity."
+    "As left. U is the expanded uncertainty for a coverage probability of about 95 %: k = 2, or Student's factor "
+    "for the effective degrees of freedom where that is more. g is the local gravity."
 )
 BUDGET = (
-    "After the GUM (JCGM 100): type A from the noise of the data themselves, type B from what is stated of inputs that no "
-    "data can show; effective degrees of freedom by Welch and Satterthwaite."
+    "After the GUM (JCGM 100): type A from the noise of the data themselves, type B from what is stated of inputs "
+    "that no data can show; effective degrees of freedom by Welch and Satterthwaite."
 )
 TRIALS = (
-    "The propagation of distributions (GUM Supplement 1, JCGM 101) with {trials} trials is set beside the budget; where "
-    "its interval reaches further, by more than half a unit of u's first digit, it is taken."
+    "The propagation of distributions (GUM Supplement 1, JCGM 101) with {trials} trials is set beside the budget; "
+    "where its interval reaches further, by more than half a unit of u's first digit, it is taken."
 )
 ROWS = (
     "Every figure follows from the rows below, each the mean of a block of samples in the record. The digest is the "
-    "beginning of the SHA-256 of the block's samples; the machine-readable certificate has it whole, with the weight of "
-    "every row in every result."
+    "beginning of the SHA-256 of the block's samples; the machine-readable certificate has it whole, with the "
+    "weight of every row in every result."
 )
 NO_LIMITS = "No limits were given: nothing is said of conformity."
 STATEMENTS = {
@@ -126,21 +127,26 @@ def _environment(c: Certificate) -> Section:
     return Section("Environment", (), (("local gravity", f"{c.gravity_m_s2:.6g} m/s²"),), tables)
 
 
-def _results(c: Certificate) -> Section:
-    outcomes = c.figures.outcomes
+def results_table(c: Certificate) -> Table:
+    """The results as left: what a certificate is asked for first."""
     rows = tuple(
         (_name(o), measured(o.value, o.expanded), unit(o.unit), f"{o.coverage:.2f}", _freedom(o.freedom),
          *(("–", "–") if o.decision is None else (_limits(o.decision), _statement(o.decision))))
-        for o in outcomes
+        for o in c.figures.outcomes
     )  # fmt: skip
-    head = ("quantity", "value ± U", "unit", "k", "ν_eff", "limits", "conformity")
+    return Table(
+        "Results, as left", ("quantity", "value ± U", "unit", "k", "ν_eff", "limits", "conformity"), rows, (1, 3, 4)
+    )
+
+
+def _results(c: Certificate) -> Section:
     words = (
         EXPANDED,
-        *([RULE] if any(o.decision for o in outcomes) else [NO_LIMITS]),
+        *([RULE] if any(o.decision for o in c.figures.outcomes) else [NO_LIMITS]),
         *c.figures.remarks,
         *c.remarks,
     )
-    return Section("Results", words, (), (Table("Results, as left", head, rows, (1, 3, 4)),))
+    return Section("Results", words, (), (results_table(c),))
 
 
 def _found(c: Certificate) -> Section:

@@ -77,6 +77,7 @@ class Sensor(Strict):
 
     name: str = "sensor"
     serial: str = ""
+    manufacturer: str = ""
     gravity_m_s2: float = 9.80665
     filter_corner_hz: float | None = None
     world: dict[str, Any] = {}
@@ -101,6 +102,20 @@ class Uncertainty(Strict):
     gain_std: float | None = Field(default=None, ge=0)  # of the converter, relative
     offset_std_v: float | None = Field(default=None, ge=0)
     temperature_std_c: float | None = Field(default=None, ge=0)
+
+
+class Laboratory(Strict):
+    """Who signs certificates; `country` is its ISO 3166 code of two letters, `customer` who asked for them."""
+
+    name: str = "not stated"
+    person: str = "not stated"
+    role: str = "head of the laboratory"
+    email: str = ""
+    street: str = ""
+    post_code: str = ""
+    city: str = "not stated"
+    country: str = Field(default="ZZ", pattern="^[A-Z]{2}$")
+    customer: str = ""
 
 
 class Displacement(Strict):

@@ -1,0 +1,204 @@
+"""A certificate's facts out of the record: who, what, with which instruments, when, where, and the samples behind it.
+
+DATA that is a file has no rig: then the certificate says so, and its rows have digests of their own numbers.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from datetime import UTC, date, datetime
+from pathlib import Path
+
+import numpy as np
+
+from calibrations.certificates.content import (
+    UNSTATED,
+    Certificate,
+    Condition,
+    Figures,
+    Instrument,
+    Laboratory,
+    Sample,
+)
+from calibrations.fit import Fit
+from calibrations.model_file import dump_model
+from calibrations.table import Table
+from procedures.session import Samples
+from rig.bench import Bench
+from rig.certificates import EXPIRED, certificates
+from rig.errors import UnknownRun
+from rig.provenance import program, today
+from rig.record import Kept, Record, Run
+from rig.record.measured import Measured
+
+# condition's column -> name and unit
+CONDITIONS = {"temperature_c": ("temperature", "C"), "supply_v": ("supply voltage", "V")}
+PLACES = ("alpha_deg", "beta_deg", "direction", "path")
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What a person may say of a certificate: its number, who it is for, and what `before` was in use until now."""
+
+    number: str = ""
+    customer: str = ""
+    before: str = ""
+
+
+def issue(data: str, found: Fit, figures: Figures, bench: Bench | None, asked: Asked) -> Certificate:
+    """The certificate of a fit to `data`, with the bench's laboratory (that of the run where None is given)."""
+    measured = None if Path(data).is_file() else _measured(data)
+    try:
+        return _issued(data, found, figures, bench, asked, measured)
+    finally:
+        if measured is not None:
+            measured.record.close()
+
+
+def limits(data: str, bench: Bench | None) -> Mapping[str, float | tuple[float, float]]:
+    """What the results are judged by: the limits of the bench that is given, else of the run's own."""
+    if bench is not None:
+        return bench.result_limits
+    measured = None if Path(data).is_file() else _measured(data)
+    if measured is None:
+        return {}
+    with measured.record:
+        return _bench(measured.run).result_limits if measured.run.bench else {}
+
+
+def _issued(
+    data: str, found: Fit, figures: Figures, given: Bench | None, asked: Asked, measured: Measured | None
+) -> Certificate:
+    table, run = found.table, measured.run if measured is not None else None
+    bench = given or (_bench(run) if run is not None and run.bench else None)
+    lab = bench.laboratory if bench is not None else None
+    text = dump_model(found.model)
+    constant = {name: str(value) for name, value in table.constants.items()}
+    ended = (run.ended or run.created) if run is not None else datetime.now(UTC).isoformat(timespec="seconds")
+    digest = hashlib.sha256(f"{table.digest}{hashlib.sha256(text.encode()).hexdigest()}".encode()).hexdigest()
+    customer = asked.customer or (lab.customer if lab is not None else "")
+    return Certificate(
+        number=asked.number or f"{Path(data).stem.replace('/', '-')}-{digest[:8]}",
+        issued=today(),
+        program=program(),
+        laboratory=Laboratory(**lab.model_dump(exclude={"customer"})) if lab is not None else Laboratory(),
+        customer=customer or UNSTATED,
+        sensor=constant.get("sensor", UNSTATED),
+        serial=constant.get("serial", UNSTATED),
+        manufacturer=constant.get("manufacturer", UNSTATED),
+        rig=bench.name if bench is not None else "measured elsewhere",
+        instruments=tuple(_instruments(run, ended[:10])) if run is not None else (),
+        procedure=run.procedure if run is not None else "data of a file",
+        facts=_facts(run, table),
+        began=run.created if run is not None else ended,
+        ended=ended,
+        gravity_m_s2=table.gravity_m_s2,
+        conditions=tuple(_conditions(table)),
+        before=asked.before,
+        figures=figures,
+        samples=tuple(_samples(table, measured)),
+        data=data if run is not None else Path(data).name,
+        data_sha256=table.digest,
+        model_sha256=hashlib.sha256(text.encode()).hexdigest(),
+        remarks=tuple(_remarks(run, lab is not None and lab.name != UNSTATED)),
+    )
+
+
+def _measured(data: str) -> Measured:
+    """The run, in a record that stays open."""
+    record = Record.to_find(data)
+    try:
+        return Measured.named(record, data)
+    except UnknownRun:
+        record.close()
+        raise
+
+
+def _bench(run: Run) -> Bench:
+    return Bench.model_validate(run.bench)
+
+
+def _instruments(run: Run, on: str) -> Iterator[Instrument]:
+    """Every instrument of the run, as it identified itself, and what has a certificate and no role."""
+    if not run.bench:
+        return
+    bench = _bench(run)
+    papers = certificates(bench)
+    for role, part in bench.instruments.items():
+        said = run.identities.get(role, {})
+        paper = papers.pop(role, None)
+        number, due = (paper.number, str(paper.due)) if paper is not None else ("", "")
+        expired = paper is not None and paper.due < date.fromisoformat(on)
+        yield Instrument(
+            role,
+            said.get("model") or part.driver,
+            said.get("serial", ""),
+            said.get("firmware", ""),
+            number,
+            due,
+            expired,
+        )
+    for name, paper in papers.items():
+        yield Instrument(name, name, "", "", paper.number, str(paper.due), paper.due < date.fromisoformat(on))
+
+
+def _facts(run: Run | None, table: Table) -> dict[str, str]:
+    """How it was measured."""
+    facts = {"rows": str(table.n), "columns": ", ".join(table.columns)}
+    if run is None:
+        return facts
+    settings = {name.replace("_", " "): _shown(value) for name, value in run.settings.items() if _shown(value)}
+    return {"run": run.run, "state": run.state, **facts, **settings}
+
+
+def _shown(value: object) -> str:
+    if isinstance(value, list | tuple):
+        return ", ".join(str(each) for each in value)
+    return "" if value is None or isinstance(value, Mapping) else str(value)
+
+
+def _conditions(table: Table) -> Iterator[Condition]:
+    for column, (name, unit) in CONDITIONS.items():
+        if column in table:
+            values = table.column(column)
+            yield Condition(name, unit, float(values.min()), float(values.mean()), float(values.max()))
+
+
+def _remarks(run: Run | None, stated: bool) -> Iterator[str]:
+    if run is not None and EXPIRED in run.constants:
+        yield f"{run.constants[EXPIRED]}: what was measured with it is not traceable by it."
+    if run is not None and run.state != "complete":
+        yield f"The run is {run.state}, and the certificate is of what it holds."
+    if not stated:
+        yield "The bench file does not say which laboratory this is (its key laboratory)."
+
+
+def _samples(table: Table, measured: Measured | None) -> Iterator[Sample]:
+    """Every row of the table, with the digest of its block of samples, or of its own numbers where there is none."""
+    blocks = {kept.number: kept for kept in measured.kept()} if measured is not None and measured.run.bench else {}
+    numbers = table.numbered(np.arange(table.n))
+    for i, number in enumerate(numbers.tolist()):
+        kept: Kept | None = blocks.get(number)
+        values = np.array([column[i] for column in table.columns.values()])
+        yield Sample(
+            number=number,
+            t_s=float(table.column("t_s")[i]) if "t_s" in table else None,
+            place=_place(table, i),
+            means=tuple(table.outputs[i].tolist()),
+            n=int(table.optional("n", 1.0)[i]),
+            sha256=digest_of(kept.samples) if kept is not None else hashlib.sha256(values.tobytes()).hexdigest(),
+        )
+
+
+def digest_of(samples: Samples) -> str:
+    """SHA-256 of a block: its channels' names, then its samples as little-endian float64, one sample after another."""
+    h = hashlib.sha256(",".join(samples.channels).encode())
+    h.update(np.ascontiguousarray(samples.volts, "<f8").tobytes())
+    return h.hexdigest()
+
+
+def _place(table: Table, i: int) -> str:
+    words = [f"{name.removesuffix('_deg')} {table.column(name)[i]:g}" for name in PLACES[:3] if name in table]
+    return ", ".join([*words, *([table.labels["path"][i]] if "path" in table.labels else [])]) or "–"
