@@ -18,6 +18,9 @@ FILES = {"": "DejaVuSans.ttf", "B": "DejaVuSans-Bold.ttf"}
 SIZE, SMALL, TINY = 9.0, 7.5, 6.5
 QUIET = (97, 110, 124)
 INK = (31, 41, 51)
+LINE = (217, 222, 228)
+TITLE_AND_ROWS = 16  # mm: a title does not stand alone at the foot of a page
+LONGEST, ROOM = 34, 2  # letters of a cell, and what stands about it
 
 
 class _Page(FPDF):
@@ -88,11 +91,14 @@ def _facts(page: FPDF, section: Section) -> None:
 
 
 def _table(page: FPDF, table: Table) -> None:
+    if page.will_page_break(TITLE_AND_ROWS):
+        page.add_page()
     _write(page, table.title, SMALL, INK, "B")
     page.set_font(FONT, size=TINY)
+    page.set_draw_color(*LINE)
     aligned = tuple("RIGHT" if k in table.numbers else "LEFT" for k in range(len(table.head)))
     with page.table(
-        borders_layout=TableBordersLayout.HORIZONTAL_LINES, col_widths=_widths(table), line_height=3.4,
+        borders_layout=TableBordersLayout.HORIZONTAL_LINES, col_widths=_widths(table), line_height=3.2, padding=0.4,
         text_align=aligned, headings_style=FontFace(emphasis=TextEmphasis.B),
     ) as cells:  # fmt: skip
         for row in (table.head, *table.rows):
@@ -101,9 +107,11 @@ def _table(page: FPDF, table: Table) -> None:
 
 
 def _widths(table: Table) -> tuple[float, ...]:
-    """Shares of the width by the longest cell of each column; long texts are broken."""
-    longest = [max(len(row[k]) for row in (table.head, *table.rows)) for k in range(len(table.head))]
-    return tuple(float(min(max(length, 5), 40)) for length in longest)
+    """Shares of the width by the longest cell of each column; words are not broken, and long texts of words are."""
+    columns = [[row[k] for row in (table.head, *table.rows)] for k in range(len(table.head))]
+    longest = [max(map(len, column)) for column in columns]
+    words = [max(len(word) for cell in column for word in cell.split(" ")) for column in columns]
+    return tuple(float(max(min(whole, LONGEST), word) + ROOM) for whole, word in zip(longest, words, strict=True))
 
 
 def _write(page: FPDF, text: str, size: float, colour: tuple[int, int, int], style: str = "") -> None:

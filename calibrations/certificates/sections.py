@@ -153,7 +153,7 @@ def _found(c: Certificate) -> Section:
     """As found, where an earlier calibration is known; the error of indication in any case."""
     outcomes = [o for o in c.figures.outcomes if o.found is not None]
     changes = tuple(
-        (_name(o), plain(o.found[0], 6), plain(o.value, 6), plain(o.value - o.found[0], 2), unit(o.unit),
+        (_name(o), _like(o.found[0], o), _like(o.value, o), plain(o.value - o.found[0], 2), unit(o.unit),
          f"{abs(o.value - o.found[0]) / o.expanded:.1f}")
         for o in outcomes if o.found is not None
     )  # fmt: skip
@@ -236,7 +236,8 @@ def _freedom(freedom: float) -> str:
 
 def _like(value: float, o: Outcome) -> str:
     """A value to as many digits as the result has."""
-    return measured(value, o.expanded).partition(" ±")[0].strip("(")
+    head, _, tail = measured(value, o.expanded).partition(" ±")
+    return head.strip("(") + tail.partition(")")[2]
 
 
 def _limits(d: Decision) -> str:
