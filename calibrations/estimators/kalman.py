@@ -23,7 +23,7 @@ from calibrations.table import Array
 
 @dataclass(frozen=True)
 class Belief:
-    """What is known of the unknowns: mean (n,) and covariance (n, n)."""
+    """What is known of the unknowns: mean (..., n) and covariance (..., n, n); of one filter, or of many side by side."""
 
     mean: Array
     covariance: Array
@@ -31,39 +31,45 @@ class Belief:
 
 @dataclass(frozen=True)
 class Correction:
-    """A belief after a measurement; the innovation (m,), its covariance (m, m)."""
+    """A belief after a measurement; the innovation (..., m), its covariance (..., m, m)."""
 
     belief: Belief
     innovation: Array
     innovation_covariance: Array
 
     @property
-    def nis(self) -> float:
-        """Normalised innovation squared: chi-square of m degrees of freedom where the model holds."""
-        return float(self.innovation @ np.linalg.solve(self.innovation_covariance, self.innovation))
+    def nis(self) -> Array:
+        """Normalised innovation squared, (...): chi-square of m degrees of freedom where the model holds."""
+        solved = np.linalg.solve(self.innovation_covariance, self.innovation[..., None])[..., 0]
+        return np.asarray(np.sum(self.innovation * solved, axis=-1))
 
     @property
-    def log_likelihood(self) -> float:
-        """Of the measurement, given those before."""
-        logdet = float(np.linalg.slogdet(2 * np.pi * self.innovation_covariance)[1])
-        return -(self.nis + logdet) / 2
+    def log_likelihood(self) -> Array:
+        """Of the measurement, given those before, (...)."""
+        return -(self.nis + np.linalg.slogdet(2 * np.pi * self.innovation_covariance)[1]) / 2
 
 
 def predicted(belief: Belief, transition: Array, noise: Array) -> Belief:
-    """One step on: A `transition`, Q `noise`, both (n, n)."""
-    covariance = transition @ belief.covariance @ transition.T + noise
-    return Belief(transition @ belief.mean, (covariance + covariance.T) / 2)
+    """One step on: A `transition`, Q `noise`, both (..., n, n)."""
+    covariance = transition @ belief.covariance @ _turned(transition) + noise
+    return Belief((transition @ belief.mean[..., None])[..., 0], (covariance + _turned(covariance)) / 2)
 
 
 def corrected(belief: Belief, measured: Array, matrix: Array, noise: Array) -> Correction:
-    """After `measured` (m,) = H x + v: H `matrix` (m, n), R `noise` (m, m)."""
-    innovation = measured - matrix @ belief.mean
-    cross = belief.covariance @ matrix.T
+    """After `measured` (..., m) = H x + v: H `matrix` (..., m, n), R `noise` (..., m, m)."""
+    innovation = measured - (matrix @ belief.mean[..., None])[..., 0]
+    cross = belief.covariance @ _turned(matrix)
     covariance = matrix @ cross + noise
-    gain = np.linalg.solve(covariance, cross.T).T
-    kept = np.eye(len(belief.mean)) - gain @ matrix
-    joseph = kept @ belief.covariance @ kept.T + gain @ noise @ gain.T
-    return Correction(Belief(belief.mean + gain @ innovation, (joseph + joseph.T) / 2), innovation, covariance)
+    gain = _turned(np.linalg.solve(covariance, _turned(cross)))
+    kept = np.eye(belief.mean.shape[-1]) - gain @ matrix
+    joseph = kept @ belief.covariance @ _turned(kept) + gain @ noise @ _turned(gain)
+    mean = belief.mean + (gain @ innovation[..., None])[..., 0]
+    return Correction(Belief(mean, (joseph + _turned(joseph)) / 2), innovation, covariance)
+
+
+def _turned(matrix: Array) -> Array:
+    """Transposed."""
+    return np.swapaxes(matrix, -1, -2)
 
 
 def smoothed(
@@ -86,4 +92,4 @@ def consistency(corrections: Sequence[Correction]) -> float:
     Near 0, they are larger than the model says; near 1, smaller.
     """
     freedom = sum(len(each.innovation) for each in corrections)
-    return float(chi2.sf(sum(each.nis for each in corrections), freedom))
+    return float(chi2.sf(sum(float(each.nis) for each in corrections), freedom))
