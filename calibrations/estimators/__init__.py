@@ -3,6 +3,7 @@
     least_squares   all at once, weighted
     recursive       one after another, with the same answer; old ones may be forgotten
     kalman          unknowns that change by themselves: prediction and correction
+    approach        an exponential approach to a steady state, followed by a bank of Kalman filters
 
 Source  Book 18.2-18.4, equations (18.1)-(18.10).
 """

@@ -23,7 +23,7 @@ from calibrations.table import Array
 
 @dataclass(frozen=True)
 class Belief:
-    """What is known of the unknowns: mean (..., n) and covariance (..., n, n); of one filter, or of many side by side."""
+    """What is known of the unknowns: mean (..., n), covariance (..., n, n); of one filter, or of many side by side."""
 
     mean: Array
     covariance: Array
@@ -46,7 +46,7 @@ class Correction:
     @property
     def log_likelihood(self) -> Array:
         """Of the measurement, given those before, (...)."""
-        return -(self.nis + np.linalg.slogdet(2 * np.pi * self.innovation_covariance)[1]) / 2
+        return np.asarray(-(self.nis + np.linalg.slogdet(2 * np.pi * self.innovation_covariance)[1]) / 2)
 
 
 def predicted(belief: Belief, transition: Array, noise: Array) -> Belief:
@@ -60,7 +60,7 @@ def corrected(belief: Belief, measured: Array, matrix: Array, noise: Array) -> C
     innovation = measured - (matrix @ belief.mean[..., None])[..., 0]
     cross = belief.covariance @ _turned(matrix)
     covariance = matrix @ cross + noise
-    gain = _turned(np.linalg.solve(covariance, _turned(cross)))
+    gain = _turned(np.asarray(np.linalg.solve(covariance, _turned(cross))))
     kept = np.eye(belief.mean.shape[-1]) - gain @ matrix
     joseph = kept @ belief.covariance @ _turned(kept) + gain @ noise @ _turned(gain)
     mean = belief.mean + (gain @ innovation[..., None])[..., 0]
