@@ -44,7 +44,7 @@ def _order(numbers: NDArray[np.int64], faults: Faults, now_s: float) -> NDArray[
     """In which order packets of these transaction numbers are sent, as indices: the second is the one that suffers."""
     order = np.arange(len(numbers), dtype=np.intp)
     if faults.size("lost-packet", now_s) is not None:
-        return order[numbers != 1]
+        return np.flatnonzero(numbers != 1)
     if faults.size("duplicated-packet", now_s) is not None:
         return np.asarray(np.repeat(order, np.where(numbers == 1, 2, 1)))
     if faults.size("swapped-packets", now_s) is not None:

@@ -14,6 +14,7 @@ from drivers.clock import SimulatedClock
 from drivers.errors import DriverError
 from drivers.instrument import Check, Identity
 from drivers.instrument import Instrument as Driver
+from drivers.links.link import Tap
 from drivers.links.person import PersonLink
 from drivers.links.server import Server
 from drivers.manual_stage import ManualStage
@@ -173,12 +174,13 @@ def _at_rest(dwells: Sequence[Dwell], oven_c: float) -> bool:
 
 
 @contextmanager
-def connected(bench: Bench) -> Iterator[Rig]:
+def connected(bench: Bench, tap: Tap | None = None) -> Iterator[Rig]:
     """The bench with every instrument connected; all wires and servers are closed at the end.
 
+    `tap` is told of every message.
     Raises InstrumentFailed with role, address and remedy; Busy where another process uses a real instrument.
     """
-    with wired(bench) as wiring:
+    with wired(bench, tap) as wiring:
         drivers = {role: wiring.connect(role) for role in bench.instruments}
         servers = tuple(wiring.servers.values())
         yield Rig(bench, drivers, wiring.clock, wiring.world if servers else None, servers, wiring.links.person)

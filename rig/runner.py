@@ -10,63 +10,32 @@ Whoever looks on may have an interrupted run go on at once. That is the same way
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager
-from dataclasses import asdict, dataclass
+from contextlib import AbstractContextManager, suppress
+from dataclasses import asdict, replace
 from datetime import UTC, datetime
-from typing import Any, Literal, Protocol
+from typing import Any
 
 from drivers.errors import DriverError, Interlocked
 from procedures.catalogue import Procedure, find
 from procedures.errors import Declined, NoAnswer, ProcedureError, SafetyLimit
-from procedures.questions import Question
-from procedures.session import Dwell, Pose, Reading, Samples
 from procedures.settings import parse
 from rig.bench import Bench
 from rig.certificates import EXPIRED, expired
-from rig.errors import RigError, RunMismatch, Stopped
+from rig.errors import RecordError, RigError, RunMismatch, Stopped
 from rig.instruments import Rig, connected
 from rig.lease import lease
 from rig.onward import leave_as
-from rig.plan import Plan, plan
-from rig.record import Kept, Record, Run
-from rig.record.measured import Measured, of_sensor
+from rig.plan import plan
+from rig.record import Record, Run
 from rig.results import Result, documents, judged, returned
+from rig.run_host import RunHost
 from rig.signals import stoppable
-from rig.technician import answer
+from rig.trace import Trace
+from rig.watch import Outcome, Watch, Wish
 
-Wish = Literal["resume", "repeat", "end"]
+__all__ = ["REPEATED", "Outcome", "RunHost", "Watch", "Wish", "resume", "start"]
+
 REPEATED = "repeated by hand"
-
-
-class Watch(Protocol):
-    """Who looks on: a terminal, a test, nobody."""
-
-    def planned(self, plan: Plan) -> None:
-        """All that a new run will do, before it begins. Raises Declined where a person does not want it."""
-
-    def begun(self, run: str) -> None: ...
-    def doing(self, text: str) -> None: ...
-    def expect(self, total: int, done: int) -> None: ...
-    def kept(self, kept: Kept) -> None: ...
-    def read(self, reading: Reading) -> None: ...
-
-    def ask(self, question: Question, instead: str | None) -> str:
-        """A person's checked answer, or `instead` of one where nobody looks on. Raises NoAnswer where there is none."""
-
-    def interrupted(self, outcome: Outcome) -> Wish:
-        """The run does not go on and all stands still: resume it, repeat its last pose and go on, or end it."""
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """How a run ended: complete, stopped or failed; `error` says why it is not complete.
-
-    `moving` names what could not be stopped.
-    """
-
-    run: Run
-    error: Exception | None = None
-    moving: tuple[str, ...] = ()
 
 
 def start(
@@ -76,8 +45,11 @@ def start(
     settings: Mapping[str, Any],
     watch: Watch,
     after: str | None = None,
+    trace: bool = False,
 ) -> Outcome:
     """Run `procedure` from the beginning. Whatever is wrong before its first move leaves the record untouched.
+
+    With `trace`, the run's log has every message to and from instruments.
 
     A simulated bench begins anew, or goes on from where the run `after` left it, as a real one always does.
 
@@ -86,13 +58,20 @@ def start(
     planned = plan(bench, procedure, settings)  # every move within its limits, or an error here
     with stoppable():
         watch.planned(planned)
-        return _as_wished(record, _begun(record, bench, procedure, settings, watch, after), watch)
+        trail = Trace(record) if trace else None
+        return _as_wished(record, _begun(record, bench, procedure, settings, watch, after, trail), watch, trace)
 
 
 def _begun(
-    record: Record, bench: Bench, procedure: Procedure, settings: Mapping[str, Any], watch: Watch, after: str | None
+    record: Record,
+    bench: Bench,
+    procedure: Procedure,
+    settings: Mapping[str, Any],
+    watch: Watch,
+    after: str | None,
+    trace: Trace | None,
 ) -> Outcome:
-    with stoppable(), connected(bench) as rig:
+    with stoppable(), connected(bench, trace) as rig:
         identities = {role: asdict(identity) for role, identity in rig.identities().items()}
         faults = expired(bench, datetime.now(UTC).date())
         run = record.begin(
@@ -105,6 +84,8 @@ def _begun(
             identities=identities,
             kind=procedure.kind,
         )
+        if trace is not None:
+            trace.begin(run, rig.clock)
         for fault in faults:
             record.note(run, EXPIRED, fault)
         if after is not None:
@@ -113,16 +94,16 @@ def _begun(
             return _carry_out(record, rig, record.run(run), procedure, watch)
 
 
-def resume(record: Record, run_id: str, watch: Watch, bench: Bench | None = None) -> Outcome:
+def resume(record: Record, run_id: str, watch: Watch, bench: Bench | None = None, trace: bool = False) -> Outcome:
     """Go on with a run at its first missing pose, on the bench that it was begun with.
 
     Raises Busy, RunMismatch where `bench` or an instrument is another one, and the errors of connection.
     """
     with stoppable():
-        return _as_wished(record, _resumed(record, run_id, watch, bench), watch)
+        return _as_wished(record, _resumed(record, run_id, watch, bench, trace), watch, trace)
 
 
-def _resumed(record: Record, run_id: str, watch: Watch, bench: Bench | None = None) -> Outcome:
+def _resumed(record: Record, run_id: str, watch: Watch, bench: Bench | None = None, trace: bool = False) -> Outcome:
     run = record.run(run_id)
     if run.state == "complete":
         return Outcome(run)
@@ -130,19 +111,22 @@ def _resumed(record: Record, run_id: str, watch: Watch, bench: Bench | None = No
         raise RunMismatch(f"run {run_id} was begun with another bench; resume it without --bench, or with that file")
     own = bench or Bench.model_validate(run.bench)  # the same, but for faults that have been repaired
     procedure = find(run.procedure, own.folders.procedures)
-    with stoppable(), _held(record, run_id), connected(own) as rig:
+    trail = Trace(record) if trace else None
+    with stoppable(), _held(record, run_id), connected(own, trail) as rig:
+        if trail is not None:
+            trail.begin(run_id, rig.clock)
         _same_instruments(run, rig)
         return _carry_out(record, rig, run, procedure, watch)
 
 
-def _as_wished(record: Record, outcome: Outcome, watch: Watch) -> Outcome:
+def _as_wished(record: Record, outcome: Outcome, watch: Watch, trace: bool) -> Outcome:
     """An interrupted run goes on for as long as who looks on wants it to."""
     while outcome.error is not None and (wish := _wish(outcome, watch)) != "end":
         run = outcome.run.run
         if wish == "repeat" and outcome.run.rows:
             record.exclude(run, record.next_number(run) - 1, REPEATED)
         try:
-            outcome = _resumed(record, run, watch)
+            outcome = _resumed(record, run, watch, trace=trace)
         except (DriverError, RigError) as error:  # such as an instrument that still does not answer
             outcome = Outcome(record.run(run), error)
     return outcome
@@ -165,22 +149,39 @@ def _held(record: Record, run: str) -> AbstractContextManager[None]:
 
 def _carry_out(record: Record, rig: Rig, run: Run, procedure: Procedure, watch: Watch) -> Outcome:
     """The run itself; however it ends, the stages stand still and the record says how."""
+
+    def log(what: str, text: str) -> None:
+        record.log(run.run, rig.clock.now(), "run", what, text)
+
+    log("begun", f"{procedure.name} at pose {run.rows}")
     record.set_state(run.run, "running")
     watch.begun(run.run)
     try:
         own = _perform(record, rig, run, procedure, watch)
         results, why = (documents(own, rig.bench.result_limits), None) if own else judged(record, run)
     except BaseException as failure:
-        complaints = _stop(rig)
         error = _told(failure, run)
-        for complaint in complaints:
-            record.note(run.run, "not stopped", complaint)
-        record.set_state(run.run, _state(error), str(error))
+        log("error", f"{type(error).__name__}: {error}")
+        complaints = _stop(rig)
+        log("stopped", "; ".join(complaints) or "all stands still")
+        with suppress(RecordError):  # what has failed may be the record, and that is told already
+            for complaint in complaints:
+                record.note(run.run, "not stopped", complaint)
+            record.set_state(run.run, _state(error), str(error))
         if isinstance(failure, Exception) and error is not failure:
             raise  # a fault of the program is not the run's
-        return Outcome(record.run(run.run), error, tuple(complaints))
+        return _interrupted(record, run, error, complaints)
+    log("complete", why or f"{len(results)} results")
     record.set_state(run.run, "complete", why and f"results: {why}", results)
     return Outcome(record.run(run.run))
+
+
+def _interrupted(record: Record, run: Run, error: Exception, complaints: Sequence[str]) -> Outcome:
+    """What there is to say of a run that did not end well, even where its record cannot be read any more."""
+    try:
+        return Outcome(record.run(run.run), error, tuple(complaints))
+    except RecordError:
+        return Outcome(replace(run, state=_state(error), message=str(error)), error, tuple(complaints))
 
 
 def _told(failure: BaseException, run: Run) -> Exception:
@@ -208,89 +209,6 @@ def _perform(record: Record, rig: Rig, run: Run, procedure: Procedure, watch: Wa
             host.keep_state()
         results = procedure.function(session, **settings) or {}
     return {name: returned(name, result) for name, result in results.items()}
-
-
-class RunHost:
-    """The session's host that keeps what the procedure measures in the record."""
-
-    def __init__(self, record: Record, rig: Rig, run: Run, watch: Watch, state: Mapping[str, Any] | None) -> None:
-        self._record, self._rig, self._run, self._watch = record, rig, run.run, watch
-        self._poses = record.poses(run.run)
-        self._next = record.next_number(run.run)
-        self._measured = Measured(record, run, rig.bench.first_sensor)
-        self._dwells: list[Dwell] | None = None  # read from the record only if the procedure asks for them
-        self._answers = {e.what: e.text for e in record.events(run.run) if e.what.startswith("answer ")}
-        self._zero_s = state["zero_s"] if state else _zero_s(rig, run)
-
-    def kept(self) -> Sequence[Pose]:
-        return self._poses
-
-    def measured(self) -> Sequence[Dwell]:
-        if self._dwells is None:
-            self._dwells = [kept.dwell for kept in self._measured.kept()]
-        return self._dwells
-
-    def readings(self) -> Sequence[Reading]:
-        return self._record.readings(self._run)
-
-    def expect(self, missing: int) -> None:
-        self._watch.expect(missing + len(self._poses), len(self._poses))
-
-    def keep(self, pose: Pose, samples: Samples, temperature_c: float | None) -> None:
-        middle_s = samples.start_s + len(samples.volts) / samples.rate_hz / 2
-        dials = self._rig.read_deg()
-        kept = Kept(
-            pose,
-            samples,
-            middle_s - self._zero_s,
-            temperature_c,
-            alpha_read_deg=dials.get("alpha"),
-            beta_read_deg=dials.get("beta"),
-        )
-        self._record.keep(self._run, self._next, kept, self._state())
-        self._next += 1
-        self._poses.append(pose)
-        if self._dwells is not None:
-            self._dwells.append(of_sensor(kept, self._measured.sensor).dwell)
-        self._watch.kept(kept)
-
-    def keep_readings(self, *readings: Reading) -> None:
-        self._record.keep_readings(self._run, readings, self._state())
-        for reading in readings:
-            self._watch.read(reading)
-
-    def keep_state(self) -> None:
-        """The bench is ready and nothing is measured yet."""
-        if (state := self._state()) is not None:
-            self._record.keep_state(self._run, state)
-
-    def ask(self, question: Question) -> str:
-        key = f"answer {question.name}"
-        if key in self._answers and not question.repeated:
-            return self._answers[key]
-        given = question.checked(self._watch.ask(question, answer(question, self._rig)))
-        if given != "no":  # what was refused is asked again when the run goes on
-            self._answers[key] = given
-            self._record.note(self._run, key, given)
-        return given
-
-    def doing(self, text: str) -> None:
-        self._watch.doing(text)
-
-    def _state(self) -> dict[str, Any] | None:
-        """What is kept with all that is kept: of a bench that stands as it was told, else it was measured elsewhere."""
-        self._rig.require_steady()
-        rig = self._rig.state()
-        return None if rig is None else {"rig": rig, "zero_s": self._zero_s}
-
-
-def _zero_s(rig: Rig, run: Run) -> float:
-    """The clock's reading at t = 0: when the sensor was powered or, where nobody knows, when the run began."""
-    powered_s = rig.power_on_s()
-    if powered_s is not None:
-        return powered_s
-    age = datetime.now(UTC) - datetime.fromisoformat(run.created)
-    return rig.clock.now() - age.total_seconds()
 
 
 def _same_instruments(run: Run, rig: Rig) -> None:

@@ -19,6 +19,7 @@ from drivers.clock import Clock, SimulatedClock, WallClock, serve_forever
 from drivers.errors import LinkRefused
 from drivers.instrument import Instrument as Driver
 from drivers.links import Address, Links
+from drivers.links.link import Tap
 from drivers.links.person import PERSON
 from drivers.links.server import Server
 from drivers.links.wire_faults import faults_of
@@ -58,10 +59,11 @@ class Wiring:
 
 
 @contextmanager
-def wired(bench: Bench) -> Iterator[Wiring]:
+def wired(bench: Bench, tap: Tap | None = None) -> Iterator[Wiring]:
     """The bench's wires, before any instrument is connected; all wires and servers are closed at the end.
 
-    Raises Busy where another process uses a real instrument, which connecting to it would disturb.
+    `tap` is told of every message. Raises Busy where another process uses a real instrument, which connecting to it
+    would disturb.
     """
     with ExitStack() as stack:
         for url in sorted({i.url for i in bench.instruments.values() if not i.simulated} - {PERSON}):
@@ -72,7 +74,7 @@ def wired(bench: Bench) -> Iterator[Wiring]:
             stack.callback(server.close)
         clock = GuardedClock(SimulatedClock() if bench.simulated else WallClock())
         stack.enter_context(_pumped(list(servers.values()), clock.inner))
-        links = Links(clock)
+        links = Links(clock, tap)
         stack.callback(links.close)
         yield Wiring(bench, clock, links, world, servers)
 

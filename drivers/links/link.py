@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import socket
 import termios
-from typing import Protocol
+from collections.abc import Callable
+from typing import Literal, Protocol
 
 import serial
 
@@ -21,6 +22,7 @@ from drivers.links.url import Url
 
 CONNECT_TIMEOUT_S = 5.0
 DISCARD_S = 1.0
+Tap = Callable[[str, Literal["sent", "heard"], bytes], None]  # told of every message: on which wire, which way, what
 LOST = (OSError, termios.error, serial.SerialException)  # what a dead connection raises
 
 
@@ -63,10 +65,11 @@ class Link:
     A connection that is lost is an error once; what is sent after that opens it anew, so that a stop can be sent.
     """
 
-    def __init__(self, url: Url, clock: Clock, name: str = "") -> None:
+    def __init__(self, url: Url, clock: Clock, name: str = "", tap: Tap | None = None) -> None:
         """`name` is the instrument's, for its errors. Raises LinkRefused when nobody is there."""
         self.url, self.clock = url.text, clock
         self._parsed, self._place = url, f"{name}: {url.text}" if name else url.text
+        self._name, self._tap = name or url.text, tap
         self._closed = False
         self._line: Connected | None = self._opened()
 
@@ -78,6 +81,8 @@ class Link:
         except LOST as error:
             raise self._lost(error) from error
         line.sent += len(data)
+        if self._tap:
+            self._tap(self._name, "sent", data)
 
     def read(self, timeout_s: float) -> bytes:
         """What arrives first, or nothing when `timeout_s` is over. Raises LinkRefused at the end."""
@@ -91,6 +96,8 @@ class Link:
         if not data:
             raise self._lost("the other side closed it")
         line.received += len(data)
+        if self._tap:
+            self._tap(self._name, "heard", data)
         return data
 
     def discard(self, quiet_s: float = 0.0) -> int:
@@ -194,9 +201,9 @@ def connection_key(client: tuple[str, int], server: tuple[str, int]) -> str:
     return f"{client[0]}:{client[1]} > {server[0]}:{server[1]}"
 
 
-def open_link(url: str, clock: Clock, name: str = "") -> Link:
+def open_link(url: str, clock: Clock, name: str = "", tap: Tap | None = None) -> Link:
     """Open a wire. Raises LinkRefused when nobody is there, or the url is not one."""
-    return Link(Url.parse(url), clock, name)
+    return Link(Url.parse(url), clock, name, tap)
 
 
 def _open_port(url: Url) -> SocketPort | SerialPort:

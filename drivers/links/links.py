@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from drivers.clock import Clock
 from drivers.links.address import Address
-from drivers.links.link import Link, open_link
+from drivers.links.link import Link, Tap, open_link
 from drivers.links.modbus import Bus, Unit
 from drivers.links.person import PersonLink
 
@@ -12,8 +12,10 @@ from drivers.links.person import PersonLink
 class Links:
     """Opens every wire once: instruments with the same url share it, as two drives share their RS-485 line."""
 
-    def __init__(self, clock: Clock) -> None:
+    def __init__(self, clock: Clock, tap: Tap | None = None) -> None:
+        """`tap` is told of every message."""
         self.clock = clock
+        self._tap = tap
         self.person = PersonLink()
         self._buses: dict[str, Bus] = {}
         self._links: list[Link] = []
@@ -26,7 +28,7 @@ class Links:
 
     def link(self, url: str, name: str = "") -> Link:
         """A wire of bytes that is not shared; `name` is the instrument's."""
-        self._links.append(open_link(url, self.clock, name))
+        self._links.append(open_link(url, self.clock, name, self._tap))
         return self._links[-1]
 
     def close(self) -> None:

@@ -1,6 +1,6 @@
 """The record: every run, pose and sample in one SQLite file that survives a kill at any moment."""
 
 from rig.record.store import Record
-from rig.record.values import Block, Event, Kept, Run
+from rig.record.values import Block, Event, Kept, Line, Run
 
-__all__ = ["Block", "Event", "Kept", "Record", "Run"]
+__all__ = ["Block", "Event", "Kept", "Line", "Record", "Run"]

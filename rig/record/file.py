@@ -1,37 +1,78 @@
 """Opening the record's file: one SQLite database that a kill cannot tear.
 
-Write-ahead log and synchronous=FULL: what a transaction has returned from is on the disk.
+Write-ahead log and synchronous=FULL: what a transaction has returned from is on the disk. Where the disk, its folder
+or the file itself fails, now or later, that is a RecordError which says so.
 """
 
 from __future__ import annotations
 
+import os
+import sqlite3
 from pathlib import Path
-from typing import Any
 
-from sqlalchemy import Engine, create_engine, event, text
-from sqlalchemy.exc import DatabaseError, OperationalError
+from sqlalchemy import Connection, Engine, ExceptionContext, create_engine, event, text
 
 from rig.errors import RecordError
 from rig.record.schema import MIGRATIONS, SCHEMA, metadata
+
+RECOVER = "move it away, or `rig doctor --recover FOLDER` copies what can still be read"
+FAILURES = {  # primary code of SQLite: what has happened, and what to do
+    sqlite3.SQLITE_FULL: "cannot be written: the disk is full; free some space, then go on with `rig resume`",
+    sqlite3.SQLITE_READONLY: "cannot be written: it is read-only; make file and folder writable, or name another "
+    "folder in RIG_HOME",
+    sqlite3.SQLITE_IOERR: "cannot be read or written: the file system fails; look at the disk or the network share, "
+    "then go on with `rig resume`",
+    sqlite3.SQLITE_CANTOPEN: "cannot be opened; check RIG_HOME and the permissions of the folder",
+    sqlite3.SQLITE_BUSY: "another process has been writing to it for long; let that finish, then try again",
+    sqlite3.SQLITE_CORRUPT: f"the record is damaged; {RECOVER}",
+    sqlite3.SQLITE_NOTADB: "the record is damaged, or no record at all; " + RECOVER,
+}
 
 
 def open_file(path: Path) -> Engine:
     """The file's engine; its tables are made where there are none, and brought up to date where they are older.
 
-    Raises RecordError where it cannot be opened, is damaged, or was written by a newer program.
+    In a folder that this user may not write, it is opened for reading alone. Raises RecordError where it cannot be
+    opened, is damaged, or was written by a newer program; what is done with the engine later raises it too.
     """
-    engine = create_engine(f"sqlite:///{path}")
-    event.listen(engine, "connect", _prepare)
+    engine = create_engine(f"sqlite:///{path}", creator=lambda: _connected(path))
+    event.listen(engine, "handle_error", lambda context: _tell(context, path))
+    event.listen(engine, "begin", lambda connection: _require_there(connection, path))
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        _make_tables(engine, path)
-    except (OSError, OperationalError) as error:
-        reason = error.orig if isinstance(error, OperationalError) else error.strerror
-        raise RecordError(f"{path}: the record cannot be opened: {reason}; check RIG_HOME") from None
-    except DatabaseError as error:
-        reason = error.orig
-        raise RecordError(f"{path}: the record is damaged ({reason}); move it away or restore a copy") from None
+    except OSError as error:
+        raise RecordError(f"{path}: the record cannot be opened: {error.strerror}; check RIG_HOME") from None
+    _make_tables(engine, path)
     return engine
+
+
+def _connected(path: Path) -> sqlite3.Connection:
+    """A new connection: a busy file is waited for, a commit reaches the disk."""
+    if path.exists() and not os.access(path.parent, os.W_OK):
+        return sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro&immutable=1", uri=True, check_same_thread=False)
+    connection = sqlite3.connect(path, check_same_thread=False)
+    for pragma in ("busy_timeout = 10000", "journal_mode = WAL", "synchronous = FULL", "foreign_keys = ON"):
+        connection.execute(f"PRAGMA {pragma}")
+    return connection
+
+
+def _require_there(connection: Connection, path: Path) -> None:
+    """SQLite writes on into a file that was removed, and nobody would ever read it. Raises RecordError."""
+    try:
+        inode = path.stat().st_ino
+    except OSError as error:
+        raise RecordError(f"{path}: is not there any more ({error.strerror}); look where its folder is") from None
+    if connection.info.setdefault("inode", inode) != inode:
+        raise RecordError(f"{path}: is another file than before; let nobody exchange it while a command runs")
+
+
+def _tell(context: ExceptionContext, path: Path) -> None:
+    """Raises RecordError for what the file or its disk is to blame for."""
+    error = context.original_exception
+    if isinstance(error, sqlite3.DatabaseError):
+        code = getattr(error, "sqlite_errorcode", 0) & 0xFF
+        if code in FAILURES:
+            raise RecordError(f"{path}: {FAILURES[code]} ({error})") from None
 
 
 def _make_tables(engine: Engine, path: Path) -> None:
@@ -47,11 +88,3 @@ def _make_tables(engine: Engine, path: Path) -> None:
             for statement in (each for old in range(version or SCHEMA, SCHEMA) for each in MIGRATIONS[old]):
                 to.execute(text(statement))
             to.execute(text(f"PRAGMA user_version = {SCHEMA:d}"))
-
-
-def _prepare(connection: Any, _: Any) -> None:
-    """What every connection does: a busy file is waited for, a commit reaches the disk."""
-    connection.execute("PRAGMA busy_timeout = 10000")
-    connection.execute("PRAGMA journal_mode = WAL")
-    connection.execute("PRAGMA synchronous = FULL")
-    connection.execute("PRAGMA foreign_keys = ON")

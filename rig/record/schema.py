@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sqlalchemy import JSON, Column, Float, ForeignKey, Index, Integer, LargeBinary, MetaData, String, Table
 
-SCHEMA = 3
+SCHEMA = 4
 metadata = MetaData()
 
 runs = Table(
@@ -95,8 +95,22 @@ events = Table(
     Index("events_of_run", "run"),
 )
 
+log = Table(  # of what happened in a run, step by step; and of messages on the wires, where they were asked for
+    "log",
+    metadata,
+    Column("line", Integer, primary_key=True),
+    Column("run", ForeignKey("runs.run"), nullable=False),
+    Column("at", String, nullable=False),  # ISO 8601, UTC
+    Column("clock_s", Float, nullable=False),  # of the rig: simulated time on a simulated bench
+    Column("who", String, nullable=False),  # the run, or an instrument's role
+    Column("what", String, nullable=False),  # doing, kept, read, sent, heard, error, ...
+    Column("text", String, nullable=False),
+    Index("log_of_run", "run"),
+)
+
 # What brings an older file to the next version. Tables that are wholly new are made before.
 MIGRATIONS = {
     1: ("ALTER TABLE poses ADD COLUMN excluded VARCHAR",),
     2: tuple(f"ALTER TABLE poses ADD COLUMN {role}_read_deg FLOAT" for role in ("alpha", "beta")),
+    3: (),  # a new table
 }

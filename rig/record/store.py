@@ -28,10 +28,11 @@ from rig.lease import is_held
 from rig.nearest import did_you_mean
 from rig.record import codec
 from rig.record.file import open_file
-from rig.record.schema import blocks, columns, events, poses, readings, runs, states
-from rig.record.values import Block, Event, Kept, Run
+from rig.record.schema import blocks, columns, events, log, poses, readings, runs, states
+from rig.record.values import Block, Event, Kept, Line, Run
 
 FILE = "record.db"
+MOST_LINES = 1000  # of the log that wait
 _POSE = ("alpha_deg", "beta_deg", "direction", "path", "mount_deg", "flip")
 _BESIDE = ("t_s", "temperature_c", "alpha_read_deg", "beta_read_deg")
 
@@ -46,6 +47,7 @@ class Record:
         self.folder = folder or home()
         self.path = self.folder / FILE
         self._engine = open_file(self.path)
+        self._lines: list[dict[str, Any]] = []  # of the log, on their way into the file
 
     @classmethod
     def to_find(cls, run: str) -> Self:
@@ -97,6 +99,7 @@ class Record:
             to.execute(insert(blocks), key | samples)
             if state is not None:
                 _put_state(to, run, state)
+            self._put_lines(to)
 
     def keep_readings(self, run: str, read: Iterable[Reading], state: Mapping[str, Any] | None) -> None:
         """Readings and the simulated bench's `state`, in one transaction; a name that is there is replaced."""
@@ -105,6 +108,15 @@ class Record:
                 _put(to, readings, {"run": run, "at": _now(), **vars(reading)}, ("run", "name"))
             if state is not None:
                 _put_state(to, run, state)
+            self._put_lines(to)
+
+    def log(self, run: str, clock_s: float, who: str, what: str, text: str) -> None:
+        """A line of a run's log. It is on the disk with what is kept next, or when MOST_LINES wait for that."""
+        line = {"run": run, "at": _now(), "clock_s": clock_s, "who": who, "what": what, "text": text}
+        self._lines.append(line)
+        if len(self._lines) >= MOST_LINES:
+            with self._engine.begin() as to:
+                self._put_lines(to)
 
     def exclude(self, run: str, number: int, reason: str | None) -> None:
         """Leave a pose out of every analysis, with a reason that stays as an event; None takes it in again.
@@ -131,6 +143,7 @@ class Record:
         values = {"state": state, "message": message, "ended": ended, "results": dict(results or {})}
         with self._engine.begin() as to:
             to.execute(update(runs).where(runs.c.run == run).values(values))
+            self._put_lines(to)
 
     def set_results(self, run: str, results: Mapping[str, Any]) -> None:
         """Results that were made anew after the end of a run."""
@@ -194,6 +207,12 @@ class Record:
             highest = at.execute(select(func.max(poses.c.number)).where(poses.c.run == run)).scalar_one()
         return 0 if highest is None else int(highest) + 1
 
+    def last_t_s(self, run: str) -> float | None:
+        """The time of the last kept pose; None before the first."""
+        with self._engine.connect() as at:
+            last: float | None = at.execute(select(func.max(poses.c.t_s)).where(poses.c.run == run)).scalar_one()
+        return last
+
     def readings(self, run: str) -> list[Reading]:
         """The run's readings, in the order of their names."""
         names = ("name", "value", "unit", "std")
@@ -221,6 +240,12 @@ class Record:
         with self._engine.connect() as at:
             return [Event(*row) for row in at.execute(query.order_by(events.c.event))]
 
+    def lines(self, run: str) -> list[Line]:
+        """A run's log, in order."""
+        columns = [log.c[name] for name in ("at", "clock_s", "who", "what", "text")]
+        with self._engine.connect() as at:
+            return [Line(*row) for row in at.execute(select(*columns).where(log.c.run == run).order_by(log.c.line))]
+
     def columns(self, run: str) -> tuple[dict[str, NDArray[np.float64]], dict[str, tuple[str, ...]]]:
         """The columns of an imported table: numbers, and texts, by name."""
         query = select(columns).where(columns.c.run == run).order_by(columns.c.position)
@@ -228,6 +253,12 @@ class Record:
             rows = at.execute(query).all()
         numbers = {row.name: np.frombuffer(row.numbers, "<f8") for row in rows if row.numbers is not None}
         return numbers, {row.name: tuple(row.texts) for row in rows if row.numbers is None}
+
+    def _put_lines(self, to: Connection) -> None:
+        """Lines of the log that wait are written; where that fails they are not tried again."""
+        lines, self._lines = self._lines, []
+        if lines:
+            to.execute(insert(log), lines)
 
     def _seen(self, run: Run) -> Run:
         """A run that says "running" though no process holds it was killed: it is stopped, and can be resumed."""

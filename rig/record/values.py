@@ -78,6 +78,17 @@ class Kept:
 
 
 @dataclass(frozen=True)
+class Line:
+    """One line of a run's log: when (ISO 8601, UTC, and the rig's clock), who, what, and its text."""
+
+    at: str
+    clock_s: float
+    who: str
+    what: str
+    text: str
+
+
+@dataclass(frozen=True)
 class Event:
     """Something that happened in a run."""
 

@@ -1,0 +1,121 @@
+"""What must hold of a run whatever one of its instruments does: it is complete and right, or it stops safely, says why,
+and goes on to the same end once the fault is gone. Used by a sample in the tests and by the whole in the benchmark.
+"""
+
+from __future__ import annotations
+
+import random
+import zlib
+from functools import cache
+from typing import Any, Literal
+
+import numpy as np
+
+from drivers.errors import DriverError
+from drivers.links.faults import Fault
+from drivers.links.wire_faults import kinds_of
+from procedures.catalogue import paths
+from procedures.errors import ProcedureError
+from procedures.session import Reading
+from rig.bench import Bench
+from rig.cli.failure import status_of
+from rig.record import Kept, Record
+from rig.runner import Outcome, resume
+from tests.rig.misbehaving import STRETCHES, Aftermath, afflicted, digest, guarded_bench, looking_on, short, watched_bench
+from tests.rig.rigging import Onlooker
+
+End = Literal["complete", "stopped", "not begun"]
+PROCEDURES = sorted(paths())
+BENCH = watched_bench()
+FAULTS = [(role, what) for role, part in BENCH.instruments.items() for what in kinds_of(part.driver)]
+NEEDS_A_GUARD = {"open-interlock"}  # felt only by a bench that has interlocks
+OTHER_NOISE = {"delay", "endless", "trickle"}  # after which a run may go on, at other times: as good, but not the same
+NAMES: dict[str, str] = {}  # what a message calls an instrument, where it is not the role
+NEAR_V = 5e-3  # of a dwell's mean: ten times its noise
+NEAR = 0.05  # of a reading, deg
+
+
+@cache
+def undisturbed(procedure: str, guarded: bool = False) -> tuple[list[Any], list[Kept], list[Reading], float]:
+    """What a procedure measures on the sound bench: its digest, poses and readings, and when it has ended."""
+    with Record() as record:
+        run = short(record, bench_for(guarded), procedure).run
+        state = record.state(run.run)
+        assert run.state == "complete"
+        assert state
+        kept = list(record.kept(run.run))
+        return digest(record, run.run), kept, record.readings(run.run), state["rig"]["clock_s"]
+
+
+def bench_for(guarded: bool) -> Bench:
+    """The sound bench."""
+    return guarded_bench() if guarded else BENCH
+
+
+def moment(procedure: str, role: str, what: str, seed: int = 0) -> float:
+    """Some time of the run, the same for the same seed."""
+    luck = random.Random(zlib.crc32(f"{procedure} {role} {what}".encode()) + seed)
+    return round(luck.uniform(0.02, 0.95) * undisturbed(procedure)[-1], 3)
+
+
+def endured(procedure: str, role: str, fault: Fault) -> End:
+    """Run it with the fault, and see what must hold; raises AssertionError where it does not."""
+    guarded = fault.what in NEEDS_A_GUARD
+    with Record() as record, looking_on() as aftermath:
+        try:
+            outcome = short(record, afflicted(bench_for(guarded), role, fault), procedure)
+        except DriverError as refused:  # while the instruments said who they are
+            _require_told(refused, role)
+            assert not record.runs()
+            return "not begun"
+        if outcome.error is None:
+            _require_right(record, outcome, procedure, guarded)
+            return "complete"
+        _require_safe(outcome, role, fault, aftermath)
+        done = resume(record, outcome.run.run, Onlooker(), bench_for(guarded))
+        assert (done.run.state, done.error) == ("complete", None)
+        if procedure in STRETCHES:
+            return "stopped"
+        if fault.what in OTHER_NOISE or (role, fault.what) == ("level", "lies"):  # what the level said is read again
+            _require_right(record, done, procedure, guarded)
+        else:
+            assert digest(record, done.run.run) == undisturbed(procedure, guarded)[0], "goes on as if nothing had been"
+    return "stopped"
+
+
+def _require_right(record: Record, outcome: Outcome, procedure: str, guarded: bool) -> None:
+    """A run that noticed nothing has measured what an undisturbed one does, or a result of it says so."""
+    assert outcome.run.state == "complete"
+    _, sound, readings, _ = undisturbed(procedure, guarded)
+    kept = list(record.kept(outcome.run.run))
+    assert [each.pose for each in kept] == [each.pose for each in sound]
+    means = [[list(each.dwell.means.values()) for each in run] for run in (kept, sound)]
+    wrong = bool(kept) and bool(np.abs(np.subtract(*means)).max() > NEAR_V)
+    found = {reading.name: reading.value for reading in record.readings(outcome.run.run)}
+    wrong = wrong or any(abs(found[reading.name] - reading.value) > NEAR for reading in readings)
+    marked = any(result["verdict"] == "fail" for result in outcome.run.results.values()) or outcome.run.message
+    assert not wrong or marked, "a wrong number without a mark"
+
+
+def _require_safe(outcome: Outcome, role: str, fault: Fault, aftermath: Aftermath) -> None:
+    """All stands still, and the message helps."""
+    assert outcome.error
+    _require_told(outcome.error, role)
+    assert not aftermath.turning
+    assert not aftermath.swinging or any(said.startswith("positioner may") for said in aftermath.complaints)
+    assert not aftermath.heating or any(said.startswith("oven may still heat") for said in aftermath.complaints)
+    assert {said.split()[0] for said in aftermath.complaints} <= {role, *_beside(role, fault)}
+
+
+def _require_told(error: Exception, role: str) -> None:
+    """The message names the instrument, the cause and what to do."""
+    assert isinstance(error, (DriverError, ProcedureError))
+    assert NAMES.get(role, role) in str(error), "names the instrument"
+    assert status_of(error) in (3, 4)
+    assert str(error).count(". ") + str(error).count("; ") >= 1, "says what to do"
+
+
+def _beside(role: str, fault: Fault) -> set[str]:
+    """Who else cannot be reached: noise and a lost connection are felt by all on the wire."""
+    shared = {"alpha", "beta"}
+    return shared if role in shared and fault.what in ("disconnect", "babble", "delay", "trickle") else set()
