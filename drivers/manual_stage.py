@@ -44,6 +44,10 @@ class Settings:
         """How long a move takes."""
         return self.seconds_per_move
 
+    def rate_deg_s(self, asked_deg_s: float) -> float:
+        """The rate asked for: `way_of_turn` refuses it."""
+        return asked_deg_s
+
     def way_of_turn(self, name: str, rate_deg_s: float, first_deg: float, last_deg: float) -> NoReturn:
         """Raises LimitError: no hand turns at a constant rate."""
         raise LimitError(
@@ -107,6 +111,10 @@ class ManualStage:
                 f"Set it to within {reach:g} deg, and read it again",
             )
         self._set_deg, self.read_deg = angle_deg, read_deg
+
+    def rate_deg_s(self, asked_deg_s: float) -> float:
+        """The rate asked for: `turning` refuses it."""
+        return asked_deg_s
 
     def turning(self, rate_deg_s: float, first_deg: float, last_deg: float) -> NoReturn:
         """Raises LimitError: no hand turns at a constant rate."""

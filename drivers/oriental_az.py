@@ -128,6 +128,10 @@ class RotaryStage:
                 "Free the stage of what holds it, check the load's balance, then repeat the move",
             )
 
+    def rate_deg_s(self, asked_deg_s: float) -> float:
+        """The rate nearest to the one asked for that the drive can have: a whole number of steps a second."""
+        return self.settings.rate_deg_s(asked_deg_s)
+
     @contextmanager
     def turning(self, rate_deg_s: float, first_deg: float, last_deg: float) -> Iterator[Turn]:
         """Turn from `first_deg` to `last_deg` at a constant rate, which it has when the body begins.

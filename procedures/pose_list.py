@@ -11,13 +11,14 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import astuple, fields
+from dataclasses import fields
 from typing import Any
 
 from procedures.errors import SettingError, nearest
 from procedures.session import Pose
 
-NAMES = tuple(field.name for field in fields(Pose))
+# A sensor on edge and a table that turns give no poses.
+NAMES = tuple(field.name for field in fields(Pose) if field.name not in ("up", "rate_deg_s"))
 
 
 def listed(lines: Sequence[str]) -> list[Pose]:
@@ -38,7 +39,7 @@ def listed(lines: Sequence[str]) -> list[Pose]:
 
 def written(poses: Iterable[Pose]) -> tuple[str, ...]:
     """The lines that give `poses` back."""
-    return (",".join(NAMES), *(",".join(map(_text, astuple(pose))) for pose in poses))
+    return (",".join(NAMES), *(",".join(_text(getattr(pose, name)) for name in NAMES) for pose in poses))
 
 
 def _pose(number: int, head: Sequence[str], row: Sequence[str]) -> Pose:

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 
 from procedures.errors import BadAnswer, nearest
 
+EDGES = ("z", "x", "y")  # one stands along the table's normal, the next in turn lies along the table's x
+
 
 @dataclass(frozen=True)
 class Question:
@@ -53,16 +55,25 @@ class Confirm(Question):
 
 @dataclass(frozen=True)
 class Mounting(Confirm):
-    """The sensor is taken off and put back: turned by `mount_deg` about its z axis, face down if `flip`."""
+    """The sensor is taken off and put back: turned by `mount_deg` about the table's normal, face down if `flip`.
+
+    `up` is the edge that stands along the normal: on edge, the next one in turn lies along the table's x.
+    """
 
     repeated: bool = True
     mount_deg: float = 0.0
     flip: int = 0
+    up: str = "z"
 
     @staticmethod
-    def of(mount_deg: float, flip: int) -> Mounting:
+    def of(mount_deg: float, flip: int, up: str = "z") -> Mounting:
         """The question for one way of mounting it."""
         side = "down" if flip else "up"
+        if up != "z":
+            along = EDGES[(EDGES.index(up) + 1) % 3]
+            text = f"Does the sensor stand on edge, its {up} axis {side} and its {along} axis along the table's x"
+            text += f", turned by {mount_deg:g} deg?" if mount_deg else "?"
+            return Mounting(f"mount-{mount_deg:g}-{up}-{side}", text, "", mount_deg=mount_deg, flip=flip, up=up)
         text = f"Is the sensor mounted face {side}, turned by {mount_deg:g} deg about its z axis?"
         drawing = f"face-{side}"
         return Mounting(f"mount-{mount_deg:g}-{side}", text, drawing, mount_deg=mount_deg, flip=flip)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from typing import Protocol, TypeVar
 
@@ -15,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from procedures.errors import Declined, SafetyLimit
-from procedures.questions import Confirm, Mounting, Number, Question
+from procedures.questions import EDGES, Confirm, Mounting, Number, Question
 
 Read = TypeVar("Read")
 SHORTEST_APPROACH_DEG = 0.5  # a stage that is nearer to a pose has not come from its side
@@ -25,7 +26,9 @@ SHORTEST_APPROACH_DEG = 0.5  # a stage that is nearer to a pose has not come fro
 class Pose:
     """A position of the sensor to hold. Angles in deg; `direction` +1 while beta grows, -1 while it falls.
 
-    `mount_deg` is the sensor's turn about its z axis on the stage, `flip` 1 when it is mounted face down.
+    `mount_deg` is the sensor's turn about the table's normal, `flip` 1 when it is mounted face down. `up` is the edge
+    that stands along that normal, z but for a sensor on edge. Beta turns from `beta_deg` on at a `rate_deg_s` that is
+    not 0: then it is a turn that is kept, and no pose.
     """
 
     alpha_deg: float
@@ -34,6 +37,8 @@ class Pose:
     path: str = ""
     mount_deg: float = 0.0
     flip: int = 0
+    up: str = "z"
+    rate_deg_s: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -87,6 +92,17 @@ class Samples(Protocol):
     def start_s(self) -> float: ...
 
 
+class Turn(Protocol):
+    """A turn at a constant rate that goes on; `require` is called every `beat_s`, and raises where it does not."""
+
+    @property
+    def rate_deg_s(self) -> float: ...
+    @property
+    def beat_s(self) -> float: ...
+    @property
+    def require(self) -> Callable[[], None]: ...
+
+
 class Stage(Protocol):
     """One rotary stage."""
 
@@ -95,6 +111,11 @@ class Stage(Protocol):
     def home(self) -> None: ...
     def referenced(self) -> bool: ...
     def stop(self) -> None: ...
+    def rate_deg_s(self, asked_deg_s: float) -> float:
+        """The rate nearest to the one asked for that it can turn at."""
+
+    def turning(self, rate_deg_s: float, first_deg: float, last_deg: float) -> AbstractContextManager[Turn]:
+        """At a constant rate from one angle to another: it has the rate when the body begins, and stands after it."""
 
 
 class Adc(Protocol):
@@ -103,6 +124,12 @@ class Adc(Protocol):
     def acquire(self, duration_s: float) -> Samples: ...
     def acquire_with(self, duration_s: float, reading: Callable[[], Read]) -> tuple[Samples, Read]:
         """The same, and what `reading` gives in the middle of it."""
+
+    def acquire_watched(self, duration_s: float, watch: Callable[[], object], every_s: float) -> Samples:
+        """The same; `watch` is called every so often, and at the end."""
+
+    def only(self, *outputs: str) -> Adc:
+        """The converter with the channels of these outputs alone; raises where one is not wired."""
 
     def stream(self, duration_s: float, block_s: float) -> Iterator[Samples]:
         """The same without a gap between blocks of `block_s`."""
@@ -226,7 +253,7 @@ class Session:
 
         A person is asked where the sensor is mounted otherwise. Raises Declined, NoAnswer.
         """
-        self.mount(pose.mount_deg, pose.flip)
+        self.mount(pose.mount_deg, pose.flip, pose.up)
         self.host.doing(f"moving to alpha {pose.alpha_deg:g}, beta {pose.beta_deg:g} deg")
         self.alpha.move_to(pose.alpha_deg)
         way_deg = (pose.beta_deg - self.beta.angle_deg()) * pose.direction
@@ -242,15 +269,27 @@ class Session:
         samples, temperature_c = self.adc.acquire_with(dwell_s, self.oven.temperature_c)
         self.keep(pose, samples=samples, temperature_c=temperature_c)
 
-    def mount(self, mount_deg: float, flip: int) -> None:
+    def turn(self, pose: Pose, turn_deg: float) -> None:
+        """Turn beta at the pose's rate by `turn_deg` from its angle on, and keep the samples of it."""
+        self.mount(pose.mount_deg, pose.flip, pose.up)
+        self.alpha.move_to(pose.alpha_deg)
+        self.host.doing(f"turning beta at {pose.rate_deg_s:g} deg/s, alpha {pose.alpha_deg:g} deg")
+        last_deg = pose.beta_deg + math.copysign(turn_deg, pose.rate_deg_s)
+        with self.beta.turning(abs(pose.rate_deg_s), pose.beta_deg, last_deg) as turn:
+            samples = self.adc.acquire_watched(turn_deg / abs(turn.rate_deg_s), turn.require, turn.beat_s)
+        self.keep(pose, samples=samples, temperature_c=self.oven.temperature_c())
+
+    def mount(self, mount_deg: float, flip: int, up: str = "z") -> None:
         """Have the sensor mounted so, at alpha = 0 where it lies flat; nothing where it is."""
-        if (mount_deg, flip) == (self.reading("mount") or 0.0, self.reading("flip") or 0.0):
+        wanted = {"mount": mount_deg, "flip": flip, "edge": EDGES.index(up)}
+        if all((self.reading(name) or 0.0) == value for name, value in wanted.items()):
             return
         self.alpha.move_to(0.0)
-        question = Mounting.of(mount_deg, flip)
+        question = Mounting.of(mount_deg, flip, up)
         if self.host.ask(question) == "no":
             raise Declined(f"{question.name}: the sensor is not mounted so; mount it, then resume the run")
-        self.keep_readings(Reading("mount", mount_deg, "deg"), Reading("flip", flip, ""))
+        units = {"mount": "deg"}
+        self.keep_readings(*(Reading(name, value, units.get(name, "")) for name, value in wanted.items()))
 
     def keep(self, pose: Pose, *, samples: Samples, temperature_c: float | None = None) -> None:
         """Put `pose` into the record. Raises SafetyLimit for a temperature outside the bench's limits."""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -66,6 +68,21 @@ class StageSettings(Protocol):
 
     def move_s(self, distance_deg: float) -> float: ...
 
+    def way_of_turn(self, name: str, rate_deg_s: float, first_deg: float, last_deg: float) -> tuple[float, float]: ...
+
+    def rate_deg_s(self, asked_deg_s: float) -> float: ...
+
+
+@dataclass(frozen=True)
+class PlannedTurn:
+    """A turn that goes on for as long as a plan wants it to."""
+
+    rate_deg_s: float
+    beat_s: float = math.inf
+
+    def require(self) -> None:
+        """It turns."""
+
 
 class PlannedStage:
     """A stage that counts: it stands where it was told, and refuses what its driver would refuse."""
@@ -88,6 +105,20 @@ class PlannedStage:
             self._ledger.add(f"{self._name} from {self._at_deg:g} to {deg:g} deg", move_s + EXCHANGE_S)
         self._at_deg = deg
         self.reach = (min(self.reach[0], deg), max(self.reach[1], deg))
+
+    def rate_deg_s(self, asked_deg_s: float) -> float:
+        return self._settings.rate_deg_s(asked_deg_s)
+
+    @contextmanager
+    def turning(self, rate_deg_s: float, first_deg: float, last_deg: float) -> Iterator[PlannedTurn]:
+        start_deg, end_deg = self._settings.way_of_turn(self._name, rate_deg_s, first_deg, last_deg)
+        self.move_to(start_deg)
+        self._ledger.add(f"{self._name} turns to {end_deg:g} deg at {rate_deg_s:g} deg/s", EXCHANGE_S)
+        yield PlannedTurn(math.copysign(rate_deg_s, last_deg - first_deg))
+        outside_deg = abs(end_deg - start_deg) - abs(last_deg - first_deg)
+        self._ledger.add(f"{self._name} brakes", outside_deg / rate_deg_s + EXCHANGE_S)
+        self._at_deg = end_deg
+        self.reach = (min(self.reach[0], end_deg), max(self.reach[1], end_deg))
 
     def angle_deg(self) -> float:
         return self._at_deg
@@ -119,6 +150,12 @@ class PlannedAdc:
 
     def acquire_with(self, duration_s: float, reading: Callable[[], Any]) -> tuple[Samples, None]:  # noqa: ARG002
         return self.acquire(duration_s), None
+
+    def acquire_watched(self, duration_s: float, watch: Callable[[], object], every_s: float) -> Samples:  # noqa: ARG002
+        return self.acquire(duration_s)
+
+    def only(self, *outputs: str) -> PlannedAdc:
+        return PlannedAdc(self._name, self._settings.only(self._name, outputs), self._ledger)
 
     def stream(self, duration_s: float, block_s: float) -> Iterator[Samples]:
         names, rate_hz = tuple(self._settings.channels), self._settings.rate_hz

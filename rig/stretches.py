@@ -10,7 +10,9 @@ from itertools import groupby
 from procedures.session import Pose
 from rig.plan import Plan
 
-PLAIN = re.compile(r"(alpha|beta) (from|seeks)|adc records|wait |level is read")  # steps that go without saying
+PLAIN = re.compile(
+    r"(alpha|beta) (from|seeks|turns|brakes)|adc records|wait |level is read"
+)  # steps that go without saying
 COUNTER = re.compile(r"\s*(\d+)$")  # of a path: "still 3" is the third of one stretch
 LONG_WAIT_S = 30.0
 
@@ -70,5 +72,7 @@ def _named(poses: Sequence[Pose]) -> Iterator[str]:
     counted = [*dict.fromkeys(numbers)]
     if path:
         yield f"{path} {' to '.join(counted)}".rstrip()
+    if rates := sorted({abs(pose.rate_deg_s) for pose in poses} - {0.0}):
+        yield f"at {', '.join(f'{rate:g}' for rate in rates)} deg/s both ways"
     if poses[0].mount_deg or poses[0].flip:
         yield f"mounted face {'down' if poses[0].flip else 'up'}, turned by {poses[0].mount_deg:g} deg"

@@ -40,7 +40,7 @@ def _(question: Choice, rig: Rig, world: World | Batch) -> str:  # noqa: ARG001
 
 @_done.register
 def _(question: Mounting, rig: Rig, world: World | Batch) -> str:  # noqa: ARG001
-    world.mount_sensor(question.mount_deg, question.flip)
+    world.mount_sensor(question.mount_deg, question.flip, question.up)
     return "yes"
 
 

@@ -15,7 +15,6 @@ from calibrations.effect import Parameter, Values
 from calibrations.table import Array, Table
 
 KINDS = ("fields",)
-AFTER = ("hard-iron",)
 EXACT = True
 PARAMETERS = (
     Parameter("xx", "1", typical=0.1, per_axis=False, doc="gain along x over the mean of the three"),

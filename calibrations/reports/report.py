@@ -21,7 +21,7 @@ from calibrations.motion.evaluate import MotionResult
 from calibrations.numerals import chance, measured, minus, plain, unit
 from calibrations.pictures.album import Picture, album
 from calibrations.pictures.view import mg, milli, pooled_mg, rows_of
-from calibrations.reports import budget
+from calibrations.reports import budget, general
 from calibrations.reports.motion import head, section
 from calibrations.reports.page import figure, page
 from calibrations.reports.words import (
@@ -72,6 +72,7 @@ def report(
         before=(plain(found.start.pooled_excess), plain(held_out_excess(found.start))),
         model=found.end.model.name,
         parameters=_parameters(found.end.model, {s.name for s in found.steps}),
+        general=general.section(found.end),
         budget=budget.section(found.end),
         birge=f"{found.end.birge:.2f}" if found.end.birge > 1.05 else "",
         end_errors=_errors(found.end),

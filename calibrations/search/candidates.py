@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc
 
+from calibrations.coverage import uncovered
 from calibrations.effect import Effect
 from calibrations.fit import Fit, refit
 from calibrations.noise import rms
@@ -114,10 +115,15 @@ def added(before: Fit, c: Candidate) -> Fit:
 
 
 def _applies(effect: Effect, before: Fit) -> bool:
-    """Whether the model can miss it, and the data can have it."""
+    """Whether the model can miss it, and the data can have it.
+
+    Where iron cannot be asked for, as directions leave parts of the sphere out, it looks like anything else that
+    changed from one direction to the next: nothing but iron is asked for then.
+    """
     model = before.model
-    known = set(effect.after) <= set(model.effects)
-    return known and not model.holds(effect.name) and effect.excluded(before.table) is None
+    known = set(effect.after) <= set(model.effects) and not model.holds(effect.name)
+    askable = effect.kinds == ("fields",) or uncovered(before.table) is None
+    return known and askable and effect.excluded(before.table) is None
 
 
 def _fits(before: Fit, *added: Effect) -> bool:

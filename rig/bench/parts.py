@@ -80,6 +80,9 @@ class Sensor(Strict):
     manufacturer: str = ""
     gravity_m_s2: float = 9.80665
     filter_corner_hz: float | None = None
+    latitude_deg: float | None = Field(
+        default=None, ge=-90, le=90
+    )  # of the laboratory: a gyroscope feels the earth turn
     world: dict[str, Any] = {}
 
     @property

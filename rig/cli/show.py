@@ -55,7 +55,8 @@ def _ranges(record: Record, run: Run) -> Ranges:
 
 def _pose(number: int, kept: Kept) -> dict[str, Any]:
     """One pose as JSON; its outputs are means, V."""
-    angles = {name: getattr(kept.pose, name) for name in ("alpha_deg", "beta_deg", "direction", "mount_deg", "flip")}
+    names = ("alpha_deg", "beta_deg", "direction", "mount_deg", "flip", "up", "rate_deg_s")
+    angles = {name: getattr(kept.pose, name) for name in names}
     about = {"t_s": kept.t_s, "temperature_c": kept.temperature_c, "excluded": kept.excluded}
     return {"pose": number, "path": kept.pose.path, **angles, **about, "means_v": dict(kept.dwell.means)}
 

@@ -9,7 +9,10 @@ NAMED = {"face-up": Attitude(), "face-down": Attitude(flip=1), "on-positioner": 
 
 
 def drawing_of(question: Question) -> Attitude | None:
-    """How the sensor is to be mounted; None for a question without a drawing, or with one that is not known here."""
-    if isinstance(question, Mounting):
+    """How the sensor is to be mounted; None for a question without a drawing, or with one that is not known here.
+
+    A sensor on edge has none: its words say where two of its axes point.
+    """
+    if isinstance(question, Mounting) and question.up == "z":
         return Attitude(mount_deg=question.mount_deg, flip=question.flip)
     return NAMED.get(question.drawing)

@@ -19,7 +19,11 @@ from rig.record import displacement
 from rig.record.raw import samples_table
 from rig.record.store import Record
 from rig.record.tables import poses_table
+from rig.record.turned import positions_table, rates_table
 from rig.record.values import Block, Kept, Run
+
+# Tables of which a row is a pose or a turn; of the others it is a sample.
+MADE = {"poses": poses_table, "positions": positions_table, "rates": rates_table}
 
 
 @dataclass(frozen=True)
@@ -73,7 +77,7 @@ class Measured:
         run = replace(self.run, run=self.name, constants=self.constants, kind=kind)
         on_s = self._power_on_s()
         poses = (replace(kept, t_s=kept.t_s - on_s) for kept in self.kept() if kept.pose.path.startswith(path))
-        return (poses_table if kind == "poses" else samples_table)(run, poses)
+        return MADE.get(kind, samples_table)(run, poses)
 
     def _power_on_s(self) -> float:
         """When the run itself switched the sensor on, on its clock: 0 where it did not.

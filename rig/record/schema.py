@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sqlalchemy import JSON, Column, Float, ForeignKey, Index, Integer, LargeBinary, MetaData, String, Table
 
-SCHEMA = 4
+SCHEMA = 5
 metadata = MetaData()
 
 runs = Table(
@@ -42,6 +42,8 @@ poses = Table(
     Column("excluded", String),  # why a person took it out of every analysis; it stays in the record
     Column("alpha_read_deg", Float),  # what the dial of a stage that is turned by hand showed
     Column("beta_read_deg", Float),
+    Column("up", String, nullable=False, server_default="z"),  # the edge that stands along the table's normal
+    Column("rate_deg_s", Float, nullable=False, server_default="0"),  # of beta, in a turn that was kept
 )
 
 readings = Table(  # numbers that belong to a run and to none of its poses
@@ -112,5 +114,9 @@ log = Table(  # of what happened in a run, step by step; and of messages on the 
 MIGRATIONS = {
     1: ("ALTER TABLE poses ADD COLUMN excluded VARCHAR",),
     2: tuple(f"ALTER TABLE poses ADD COLUMN {role}_read_deg FLOAT" for role in ("alpha", "beta")),
-    3: (),  # a new table
+    3: (
+        "ALTER TABLE poses ADD COLUMN up VARCHAR NOT NULL DEFAULT 'z'",
+        "ALTER TABLE poses ADD COLUMN rate_deg_s FLOAT NOT NULL DEFAULT 0",
+    ),
+    4: (),  # a new table
 }

@@ -33,7 +33,7 @@ from rig.record.values import Block, Event, Kept, Line, Run
 
 FILE = "record.db"
 MOST_LINES = 1000  # of the log that wait
-_POSE = ("alpha_deg", "beta_deg", "direction", "path", "mount_deg", "flip")
+_POSE = ("alpha_deg", "beta_deg", "direction", "path", "mount_deg", "flip", "up", "rate_deg_s")
 _BESIDE = ("t_s", "temperature_c", "alpha_read_deg", "beta_read_deg")
 
 

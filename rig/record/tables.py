@@ -42,7 +42,7 @@ def poses_table(run: Run, poses: Iterable[Kept]) -> Table:
     columns = {name: np.array([row[name] for row in rows]) for name in names}
     labels = {"path": tuple(paths)} if any(paths) else {}
     columns, angle_stds = as_they_were(run, columns)
-    constants = {**run.constants, **angle_stds, "sample_rate_hz": blocks[0].rate_hz, **_inflations(blocks)}
+    constants = {**run.constants, **angle_stds, "sample_rate_hz": blocks[0].rate_hz, **inflations(blocks)}
     table = Table.from_columns(run.kind, _useful(columns), constants, run.run, labels)
     return replace(table, numbers=np.array(numbers))
 
@@ -67,11 +67,11 @@ def _useful(columns: dict[str, Array]) -> dict[str, Array]:
     return {k: column for k, column in columns.items() if k not in ("mount_deg", "flip") or column.any()}
 
 
-def _inflations(blocks: Sequence[Samples]) -> dict[str, float]:
+def inflations(blocks: Sequence[Samples], axes: Sequence[str] = AXES) -> dict[str, float]:
     """How much more a mean scatters than one of independent samples, from the blocks as long as the first."""
     first = blocks[0]
-    places = [k for k, name in enumerate(first.channels) if name in AXES]
+    places = [k for k, name in enumerate(first.channels) if name in axes]
     alike = np.stack([b.volts[:, places] for b in blocks if b.volts.shape == first.volts.shape])
-    names = [f"noise_inflation_{first.channels[k].removeprefix('v')}" for k in places]
+    names = [f"noise_inflation_{first.channels[k][1:]}" for k in places]
     found = zip(names, *measured_inflation(alike), strict=True)
     return {name: float(factor) for name, factor, std in found if std < SURE * factor}

@@ -40,7 +40,9 @@ class Run:
         """How much it holds, for people; a record without gaps is kept as many blocks."""
         if not self.bench:
             return f"{self.rows} rows"
-        return f"{self.rows} poses" if self.kind == "poses" else f"{self.rows} poses and blocks"
+        return {"poses": f"{self.rows} poses", "positions": f"{self.rows} positions", "rates": f"{self.rows} turns"}.get(
+            self.kind, f"{self.rows} poses and blocks"
+        )
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +15,7 @@ from drivers.simulation.trajectory import Trajectory
 from drivers.simulation.world import World
 from procedures.questions import Mounting, Question
 from procedures.session import Dwell, Limits, Pose, Reading, Samples, Session
+from rig.planned import PlannedTurn
 from rig.record.values import Block, Kept
 
 CHANNELS = ("vx", "vy", "supply")
@@ -35,6 +38,21 @@ class Stage:
     def angle_deg(self) -> float:
         return self.world.motor_angle_deg(self.axis)
 
+    def rate_deg_s(self, asked_deg_s: float) -> float:
+        return asked_deg_s
+
+    @contextmanager
+    def turning(self, rate_deg_s: float, first_deg: float, last_deg: float) -> Iterator[PlannedTurn]:
+        """Two seconds of run-up on either side, at 60 deg/s^2."""
+        way = math.copysign(1.0, last_deg - first_deg)
+        beyond_deg = rate_deg_s**2 / 120.0 + 2.0 * rate_deg_s
+        self.move_to(first_deg - way * beyond_deg)
+        turn = Trajectory(self.world.now_s, self.angle_deg(), last_deg + way * beyond_deg, rate_deg_s, 60.0)
+        self.world.move_stage(self.axis, turn)
+        self.world.advance(self.world.now_s + rate_deg_s / 60.0 + 2.0)
+        yield PlannedTurn(way * rate_deg_s)
+        self.world.advance(turn.end_s)
+
     def home(self) -> None: ...
 
     def referenced(self) -> bool:
@@ -49,12 +67,19 @@ class Adc:
 
     world: World
     power_log: list[bool] = field(default_factory=list)
+    channels: tuple[str, ...] = CHANNELS
 
     def acquire(self, duration_s: float) -> Samples:
         start_s, n = self.world.now_s, round(duration_s * RATE_HZ)
-        volts = self.world.adc_volts(CHANNELS, start_s, 1 / RATE_HZ, n)
+        volts = self.world.adc_volts(self.channels, start_s, 1 / RATE_HZ, n)
         step_v = self.world.config.converter.step_v
-        return Block(np.rint(volts / step_v) * step_v, CHANNELS, RATE_HZ, start_s)
+        return Block(np.rint(volts / step_v) * step_v, self.channels, RATE_HZ, start_s)
+
+    def acquire_watched(self, duration_s: float, watch: Callable[[], object], every_s: float) -> Samples:
+        return self.acquire(duration_s)
+
+    def only(self, *outputs: str) -> Adc:
+        return replace(self, channels=outputs)
 
     def acquire_with(self, duration_s: float, reading: Callable[[], Any]) -> tuple[Samples, Any]:
         return self.acquire(duration_s), reading()
@@ -106,6 +131,7 @@ class Book:
 
     world: World
     dwells: list[Dwell] = field(default_factory=list)
+    blocks: list[Kept] = field(default_factory=list)
     read: list[Reading] = field(default_factory=list)
     asked: list[str] = field(default_factory=list)
 
@@ -122,7 +148,8 @@ class Book:
 
     def keep(self, pose: Pose, samples: Samples, temperature_c: float | None) -> None:
         middle_s = samples.start_s + len(samples.volts) / samples.rate_hz / 2
-        self.dwells.append(Kept(pose, samples, middle_s, temperature_c).dwell)
+        self.blocks.append(Kept(pose, samples, middle_s, temperature_c, number=len(self.blocks)))
+        self.dwells.append(self.blocks[-1].dwell)
 
     def keep_readings(self, *readings: Reading) -> None:
         names = {reading.name for reading in readings}
@@ -131,7 +158,7 @@ class Book:
     def ask(self, question: Question) -> str:
         self.asked.append(question.name)
         if isinstance(question, Mounting):
-            self.world.mount_sensor(question.mount_deg, question.flip)
+            self.world.mount_sensor(question.mount_deg, question.flip, question.up)
         return question.checked("yes")
 
     def doing(self, text: str) -> None: ...

@@ -167,7 +167,7 @@ def test_a_record_of_the_first_version_is_brought_up_to_date(tmp_path: Path) -> 
         run = begin(record)
         record.keep(run, 0, Kept(Pose(90, 0), block([[2.0, 1.0]]), 3.5, 21.5), None)
     with closing(sqlite3.connect(tmp_path / "record.db")) as connection:
-        for column in ("excluded", "alpha_read_deg", "beta_read_deg"):
+        for column in ("excluded", "alpha_read_deg", "beta_read_deg", "up", "rate_deg_s"):
             connection.execute(f"ALTER TABLE poses DROP COLUMN {column}")
         connection.executescript("DROP TABLE readings; PRAGMA user_version = 1")
     with Record(tmp_path) as record:

@@ -1,0 +1,108 @@
+"""magnetometer-turn: hard and soft iron, by the ellipsoid and by hand; the elements of the field."""
+
+from __future__ import annotations
+
+from math import hypot
+
+import numpy as np
+
+from calibrations.coverage import uncovered
+from calibrations.evaluations.magnetometer_turn import ByHand, by_hand, elements
+from calibrations.fit import Fit
+from calibrations.general import general
+from calibrations.noise import rms
+from calibrations.noise_estimation.mean_noise import white_std
+from calibrations.table import Array, Table
+from procedures.session import Pose
+from rig.record.measured import Measured
+from rig.record.turned import sensor_from_base
+from rig.results.result import Missing, Result
+from rig.results.turned import estimates, fitted, result
+
+AXES = "xyz"
+SOFT = ("xx", "yy", "xy", "xz", "yz")
+ELEMENTS = {"F": "field-total", "H": "field-horizontal", "D": "field-declination", "I": "field-inclination"}
+NAMES = (
+    *("hard-iron-{axis}", "hard-iron-by-hand-{axis}", "soft-iron-by-hand", "soft-iron-angle-by-hand"),
+    *(f"soft-iron-{pair}" for pair in SOFT),
+    *ELEMENTS.values(),
+    *("left-by-ellipsoid", "left-by-hand"),
+)
+
+
+def evaluate(measured: Measured) -> dict[str, Result | Missing]:
+    """By the ellipsoid of all directions:
+
+    hard-iron                V, of each axis
+    soft-iron                relative, as in the effect soft-iron
+    left-by-ellipsoid        rms of what is left of the magnitude, per mille of the field
+    field-total, -horizontal F and H, V                 (17.6)
+    field-declination        D, deg from the base's x axis, clockwise seen from above    (17.9)
+    field-inclination        I, deg below the horizontal    (17.10)
+
+    and by hand, from the extremes of each turn, (17.11)-(17.15):
+
+    hard-iron-by-hand        V
+    soft-iron-by-hand        least over greatest radius of the turn about z
+    soft-iron-angle-by-hand  deg from x to its major axis
+    left-by-hand             what the magnitude then varies by, per mille
+
+    Where the directions cover too little of the sphere, what the ellipsoid gives is missing and says so.
+    """
+    table, poses = measured.table(), [kept.pose for kept in measured.kept()]
+    extremes = by_hand(table.outputs, [p.up for p in poses], [p.path for p in poses], _std_v(table))
+    why = uncovered(table)
+    ellipsoid = _all_missing(why) if why else _by_ellipsoid(table, poses)
+    return ellipsoid | _by_extremes(extremes)
+
+
+def _std_v(table: Table) -> float:
+    """Of one position's mean, V; 0 where a single sample was all of it."""
+    white = white_std(table)
+    return 0.0 if white is None else float(np.sqrt(np.mean(white**2)))
+
+
+def _all_missing(why: str) -> dict[str, Result | Missing]:
+    names = (*(f"hard-iron-{axis}" for axis in AXES), *(f"soft-iron-{pair}" for pair in SOFT), *ELEMENTS.values())
+    return {name: Missing(why) for name in names}
+
+
+def _by_ellipsoid(table: Table, poses: list[Pose]) -> dict[str, Result | Missing]:
+    found = fitted(table, "magnetometer")
+    results = {f"hard-iron-{e.axis}": result(e) for e in estimates(found, "hard-iron")}
+    results |= {f"soft-iron-{e.name}": result(e) for e in estimates(found, "soft-iron")}
+    results["left-by-ellipsoid"] = Result(float(1e3 * rms(found.residual)[0]), "per mille")
+    return results | _elements(found, table, poses)
+
+
+def _elements(found: Fit, table: Table, poses: list[Pose]) -> dict[str, Result | Missing]:
+    made = general(found)
+    if made is None:
+        return {name: Missing("the ellipsoid gives no calibration") for name in ELEMENTS.values()}
+    (strength,) = estimates(found, "field-strength")
+    attitudes: Array = np.array([sensor_from_base(pose) for pose in poses])
+    turned = elements(strength.value * made(table.outputs), attitudes, [p.path for p in poses])
+    units = {"F": "V", "H": "V", "D": "deg", "I": "deg"}
+    results: dict[str, Result | Missing] = {}
+    for name, value in turned.value.items():
+        std, of_strength = (
+            turned.std[name],
+            (strength.std or 0.0) * value / strength.value if units[name] == "V" else 0.0,
+        )
+        results[ELEMENTS[name]] = Result(value, units[name], None if std is None else hypot(std, of_strength))
+    return results
+
+
+def _by_extremes(found: ByHand) -> dict[str, Result | Missing]:
+    results: dict[str, Result | Missing] = {}
+    for k, axis in enumerate(AXES):
+        value, std = float(found.hard_iron[k]), float(found.hard_iron_std[k])
+        results[f"hard-iron-by-hand-{axis}"] = (
+            Result(value, "V", std)
+            if np.isfinite(value)
+            else Missing(f"{axis} was upright throughout; use more mounts")
+        )
+    ratio = found.soft_iron.least / found.soft_iron.greatest
+    results["soft-iron-by-hand"] = Result(ratio, "")
+    results["soft-iron-angle-by-hand"] = Result(float(np.degrees(found.soft_iron.angle_rad)), "deg")
+    return results | {"left-by-hand": Result(found.left_per_mille, "per mille")}

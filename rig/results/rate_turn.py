@@ -1,0 +1,45 @@
+"""rate-turn: bias, scale factor, misalignment and sensitivity to specific force of a gyroscope."""
+
+from __future__ import annotations
+
+from itertools import permutations
+
+from calibrations.noise import rms
+from rig.record.measured import Measured
+from rig.results.result import Missing, Result
+from rig.results.turned import estimates, fitted, result
+
+AXES = "xyz"
+PAIRS = tuple(own + other for own, other in permutations(AXES, 2))
+NAMES = (
+    *("gyro-bias-{axis}", "gyro-bias-rate-{axis}", "gyro-scale-{axis}", "rate-residual-{axis}"),
+    *(f"gyro-misalignment-{pair}" for pair in PAIRS),
+    *(f"gyro-g-sensitivity-{own}{other}" for own in AXES for other in AXES),
+)
+
+
+def evaluate(measured: Measured) -> dict[str, Result | Missing]:
+    """Of each axis:
+
+    gyro-bias                V, the output at rest under no specific force
+    gyro-scale               V/(deg/s)
+    gyro-misalignment-xy     deg, what x feels of a turn about y, as a sine
+    gyro-g-sensitivity-xy    (deg/s)/g, what x shows of a specific force along y
+    rate-residual            deg/s, rms of what the four leave over all turns and rests
+
+    The earth's rotation is taken off where the bench knows its latitude. An axis that was not turned about has no scale
+    factor, and no misalignment of the others is seen by it: they are missing, and say so.
+    """
+    table = measured.table()
+    found = fitted(table, "gyroscope", "gyro-misalignment", "gyro-g-sensitivity")
+    results = {f"gyro-bias-{e.axis}": result(e) for e in estimates(found, "gyro-bias")}
+    scales = {e.axis: e for e in estimates(found, "gyro-scale-factor")}
+    results |= {f"gyro-scale-{axis}": result(scale) for axis, scale in scales.items()}
+    results |= {f"gyro-misalignment-{e.name}": result(e) for e in estimates(found, "gyro-misalignment")}
+    left = dict(zip(found.channels, rms(found.residual), strict=True))
+    for axis, scale in scales.items():
+        if scale.identified and scale.value:
+            for e in (e for e in estimates(found, "gyro-g-sensitivity") if e.axis == axis):
+                results[f"gyro-g-sensitivity-{axis}{e.name}"] = result(e, "(deg/s)/g", scale.value)
+            results[f"rate-residual-{axis}"] = Result(abs(float(left[axis]) / scale.value), "deg/s")
+    return results
