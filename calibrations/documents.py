@@ -73,7 +73,7 @@ def diagnosis_document(result: Diagnosis, model: str) -> Document:
         "verdict": result.verdict,
         "candidates": [_candidate(c, result) for c in result.candidates],
         "residual_structure": result.residual_structure,
-        "next_experiment": _experiment(result.next_experiment),
+        "next_experiment": experiment_document(result.next_experiment),
     }
 
 
@@ -88,7 +88,7 @@ def discovery_document(result: Discovery, path: str | None) -> Document:
         "refinements": list(result.refinements),
         "alternatives": {name: list(names) for name, names in result.alternatives.items()},
         "residual_structure": result.residual_structure,
-        "next_experiment": _experiment(result.next_experiment),
+        "next_experiment": experiment_document(result.next_experiment),
         "model": path,
     }
 
@@ -144,7 +144,7 @@ def why(c: Candidate, result: Diagnosis) -> str:
     return f"{c.effect.summary} Symptom: {c.effect.symptom} Here {fall}."
 
 
-def _experiment(e: Experiment | None) -> Document | None:
+def experiment_document(e: Experiment | None) -> Document | None:
     if e is None:
         return None
     return {

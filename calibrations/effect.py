@@ -12,13 +12,19 @@ It has a docstring of the form
     Confused with  what else looks like it, and what tells them apart.
     Source    where it is described.
 
-a tuple PARAMETERS, and at least one of four functions, named by where in the signal chain it acts:
+a tuple PARAMETERS, and at least one of these functions, named by where in the signal chain it acts:
 
     pose(pose, table, p) -> Pose              the true stage angles and the true vertical
     force(a, table, p) -> (n, 3)              the specific force along the sensing axes, g; of a magnetometer the
                                               field as a share of its strength, of a gyroscope the rate, deg/s
     transduction(a, table, p) -> (n, 3)       what the effect adds to the output, in the output's unit
     output(v, table, p) -> (n, 3)             what becomes of the output
+
+A noise process acts on no sample but on the spectrum of a still record; it has one of
+
+    spectrum(at, p) -> (b,)                   two-sided density in the bands `at`, in the output's unit^2/Hz, in
+                                              proportion to the square of its first parameter, its strength
+    lines(p) -> ((Hz, amplitude), ...)        sinusoids, taken off the record before its spectrum
 
 `p` maps a parameter's name to its value: shape (3,) if per axis, else a float. Optional are
 NEEDS (columns), KINDS (of tables), AFTER (effects without which in a model it means nothing); CONSTANTS: name ->
@@ -51,7 +57,7 @@ from calibrations.errors import ModelError, UnknownName, nearest
 from calibrations.expressions.guarded import fault, guarded
 from calibrations.table import Array, Table
 
-HOOKS = ("pose", "force", "transduction", "output")
+HOOKS = ("pose", "force", "transduction", "output", "spectrum", "lines")
 KINDS = ("poses", "positions", "motion")  # of tables, where an effect does not say
 Values = Mapping[str, Array]  # parameter name -> shape (3,) if per axis, else a scalar
 
@@ -130,6 +136,8 @@ class Effect:
     force: Callable[..., Array] | None = None
     transduction: Callable[..., Array] | None = None
     output: Callable[..., Array] | None = None
+    spectrum: Callable[..., Array] | None = None
+    lines: Callable[..., tuple[tuple[float, float], ...]] | None = None
     expression: str = ""
     left_out: str = ""
 
@@ -232,6 +240,8 @@ def _from_module(module: ModuleType, path: Path) -> Effect:
         force=hooks.get("force"),
         transduction=hooks.get("transduction"),
         output=hooks.get("output"),
+        spectrum=hooks.get("spectrum"),
+        lines=hooks.get("lines"),
         **_sections(module.__doc__ or "", path),
     )
 

@@ -137,20 +137,23 @@ def analyse(blocks: Iterable[Any], rate_hz: float, unit: str, source: str, corne
     """
     octaves, means, welch, ends = Octaves(rate_hz), Means(), Welch(rate_hz), Ends()
     for block in blocks:
-        samples = _checked(np.asarray(block), octaves.n, source)
+        samples = checked(np.asarray(block), octaves.n, source)
         for each in (octaves, means, welch, ends):
             each.add(samples)
-    if octaves.n < FEWEST:
-        raise TooFewRows(
-            f"{source}: {octaves.n} samples; the noise of a record needs {FEWEST} or more: record for longer"
-        )
+    check_length(octaves.n, rate_hz, corner_hz, source)
     ends.check(source)
-    if corner_hz * octaves.n < FEWEST * rate_hz:
+    return _analysed(octaves, means, welch, Record(rate_hz, unit, corner_hz))
+
+
+def check_length(n: int, rate_hz: float, corner_hz: float, source: str) -> None:
+    """Raises TooFewRows for a record that is too short to show noise, behind a filter or without one."""
+    if n < FEWEST:
+        raise TooFewRows(f"{source}: {n} samples; the noise of a record needs {FEWEST} or more: record for longer")
+    if corner_hz * n < FEWEST * rate_hz:
         raise TooFewRows(
-            f"{source}: {octaves.n / rate_hz:.3g} s are too short behind a low-pass of {corner_hz:g} Hz, which lets "
+            f"{source}: {n / rate_hz:.3g} s are too short behind a low-pass of {corner_hz:g} Hz, which lets "
             f"through little noise in that time: record for {FEWEST / corner_hz:.3g} s or more"
         )
-    return _analysed(octaves, means, welch, Record(rate_hz, unit, corner_hz))
 
 
 @dataclass(frozen=True)
@@ -169,7 +172,8 @@ def _analysed(octaves: Octaves, means: Means, welch: Welch, record: Record) -> N
     slow_hz = 0.5 / sampling.interval_s  # what the means show; lines are looked for there where no filter is
     above_hz = min(slow_hz, record.corner_hz / 2)
     if above_hz < record.rate_hz / 2 and octaves.n >= 2 * LENGTH:
-        f, density, freedom = welch.ordinates()
+        seen = welch.segments()
+        f, density, freedom = seen.frequency_hz, seen.density, seen.freedom
         density, lines = fast_lines(f, density, freedom, above_hz, octaves.n / record.rate_hz)
         chosen = f > slow_hz
         fast = [fast_bands(f[chosen], density[chosen], freedom, record.rate_hz, record.corner_hz)]
@@ -206,7 +210,7 @@ def _between(slow: Bands, found: Mixture) -> Callable[[Array], Array]:
     return lambda f: np.asarray(np.exp(np.interp(np.log(f), at, level)))
 
 
-def _checked(samples: Array, before: int, source: str) -> Array:
+def checked(samples: Array, before: int, source: str) -> Array:
     """As float64. Raises DataError where one is no number."""
     try:
         samples = samples.astype(np.float64, casting="same_kind" if samples.dtype.kind == "f" else "safe")

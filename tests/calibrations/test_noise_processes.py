@@ -111,8 +111,9 @@ def test_short_stretches_have_the_density_whatever_the_blocks() -> None:
     whole.add(samples)
     for part in np.split(samples, [1, 5000, 100_001]):
         parts.add(part)
-    f, density, freedom = whole.ordinates()
-    assert parts.ordinates()[1] == pytest.approx(density)
+    seen = whole.segments()
+    f, density, freedom = seen.frequency_hz, seen.density, seen.freedom
+    assert parts.segments().density == pytest.approx(density)
     assert density.mean() == pytest.approx(0.1, rel=0.01)
     assert freedom == pytest.approx(2 * density.mean() ** 2 / density.var(), rel=0.2)
     bands = fast_bands(f, density, freedom, 10.0, np.inf)

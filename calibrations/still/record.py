@@ -1,0 +1,137 @@
+"""A still record, reduced in one pass to what the likelihood of a noise model needs."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from calibrations.noise_analysis.analysis import check_length, checked
+from calibrations.noise_analysis.clipping import Ends
+from calibrations.noise_analysis.decimated import Means
+from calibrations.noise_analysis.octaves import Curve, Octaves
+from calibrations.noise_analysis.processes import Sampling
+from calibrations.noise_analysis.welch import Segments, Welch
+from calibrations.table import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """One output: its means (m,) less their mean, and the spectra of what is faster.
+
+    `corner_hz` is that of the output's first-order low-pass, infinite where there is none or it is not known.
+    """
+
+    axis: str
+    unit: str
+    rate_hz: float
+    corner_hz: float
+    n: int
+    means: Array
+    size: int  # samples to a mean
+    segments: Segments
+
+    @property
+    def sampling(self) -> Sampling:
+        """Of the means."""
+        return Sampling(self.rate_hz, self.size)
+
+    @property
+    def length_s(self) -> float:
+        """Of the record."""
+        return self.n / self.rate_hz
+
+    @property
+    def highest_hz(self) -> float:
+        """Up to which its spectrum is fitted: behind a filter the converter's own noise begins to show beyond."""
+        return min(self.rate_hz / 2, self.corner_hz / 2)
+
+    def halves(self) -> tuple[Channel, Channel]:
+        """The first and the second half of the record, each a record of its own."""
+        middle, parts = len(self.means) // 2, len(self.segments.stretches)
+        return (
+            self._part(self.means[:middle], self.segments.part(0, parts // 2)),
+            self._part(self.means[middle:], self.segments.part(parts // 2, parts)),
+        )
+
+    def _part(self, means: Array, segments: Segments) -> Channel:
+        return replace(self, n=len(means) * self.size, means=means - means.mean(), segments=segments)
+
+
+@dataclass(frozen=True, eq=False)
+class Still:
+    """A still record of one sensor: its channels, and the overlapping Allan deviation of each by its axis."""
+
+    source: str
+    unit: str
+    channels: tuple[Channel, ...]
+    allan: Mapping[str, Curve]
+    digest: str  # SHA-256 of all samples
+
+    @property
+    def n(self) -> int:
+        """Samples of a channel."""
+        return self.channels[0].n
+
+    @property
+    def rate_hz(self) -> float:
+        """Samples a second."""
+        return self.channels[0].rate_hz
+
+    @property
+    def length_s(self) -> float:
+        """From the first sample to the last."""
+        return self.channels[0].length_s
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Of the channels."""
+        return tuple(channel.axis for channel in self.channels)
+
+
+@dataclass(frozen=True)
+class Samples:
+    """One channel's samples in blocks (n,) each, in order, and what is known of them."""
+
+    axis: str
+    blocks: Iterable[Any]
+    rate_hz: float
+    unit: str
+    corner_hz: float = np.inf
+
+
+def reduced(each: Iterable[Samples], source: str) -> Still:
+    """All channels, one after the other, each read once.
+
+    Raises DataError naming a sample that is no number, or a channel that is constant or clipped; TooFewRows.
+    """
+    digest, channels, curves, unit = hashlib.sha256(), [], {}, ""
+    for samples in each:
+        octaves, means = Octaves(samples.rate_hz, third_order=False), Means()
+        welch, ends = Welch(samples.rate_hz), Ends()
+        where = f"{source}, channel {samples.axis}"
+        for block in samples.blocks:
+            values = checked(np.asarray(block), octaves.n, where)
+            for part in (octaves, means, welch, ends):
+                part.add(values)
+            digest.update(np.ascontiguousarray(values).tobytes())
+        check_length(octaves.n, samples.rate_hz, samples.corner_hz, where)
+        ends.check(where)
+        channels.append(
+            Channel(
+                samples.axis,
+                samples.unit,
+                samples.rate_hz,
+                samples.corner_hz,
+                octaves.n,
+                means.values(),
+                means.size,
+                welch.segments(),
+            )
+        )
+        curves[samples.axis] = octaves.curve()
+        unit = samples.unit
+    return Still(source, unit, tuple(channels), curves, digest.hexdigest())

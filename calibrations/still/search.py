@@ -1,0 +1,139 @@
+"""What a noise model is missing on a record: lines, a mixture of processes, and what is no process at all.
+
+1. lines that stand out above the widest mixture are taken off, if the catalogue can name them;
+2. every mixture beside the model is fitted to what is left (`mixtures`);
+3. a step or a drift is taken off as well where it makes needless a process that would stand for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from calibrations.effect import Effect
+from calibrations.model import Model
+from calibrations.search.candidates import NOT_TOLD_APART
+from calibrations.still.bands import Lines
+from calibrations.still.channel_fit import ChannelFit
+from calibrations.still.fit import NoiseFit, fitted, lines_of, most_lines, noise_terms, seen, tried
+from calibrations.still.mixtures import Mixture, Mixtures
+from calibrations.still.patterns import Pattern, pattern_of
+from calibrations.still.record import Still
+
+NEARLY = 0.5  # of the longest time constant
+CERTAIN = 60.0  # what a pattern has to gain beyond its price to be no chance beside whatever was fitted
+
+
+@dataclass(frozen=True)
+class Search:
+    """What was found beside a model: lines and patterns, which are off `still`, and mixtures of processes on the rest."""
+
+    still: Still
+    model: Model
+    effects: Mapping[str, Effect]  # of noise, by name
+    lines: tuple[Lines, ...]  # per channel
+    patterns: tuple[Pattern, ...]
+    mixtures: Mixtures
+
+    @property
+    def mixture(self) -> Mixture:
+        """The one that is worth most."""
+        return self.mixtures.best
+
+    @cached_property
+    def liner(self) -> Effect | None:
+        """The effect that lines are named by, where the model does not hold it and there are some."""
+        missing = (e for e in self.effects.values() if e.lines is not None and e.name not in self.model.effects)
+        return next(missing, None) if any(self.lines) else None
+
+    @cached_property
+    def gains(self) -> dict[str, float]:
+        """The effects that are missed, and what each gains beside the others; those that gain most first."""
+        gains = {name: self.mixtures.lost_without(self.mixture, name) for name in self.mixture.names}
+        if self.liner is not None:
+            gains[self.liner.name] = sum((line.amplitude / line.std) ** 2 for lines in self.lines for line in lines)
+        return dict(sorted(gains.items(), key=lambda item: -item[1]))
+
+    @cached_property
+    def rivals(self) -> dict[str, tuple[str, ...]]:
+        """Of each process that is missed, those that would do as well in its place."""
+        return {effect.name: tuple(self._rivals(effect)) for effect in self.mixture.effects}
+
+    @property
+    def end(self) -> NoiseFit:
+        """The model with all that it misses."""
+        model = self.model
+        for name in self.gains:
+            model = model.with_effect(self.effects[name])
+        return fitted(model, self.still, self.mixture.channels)
+
+    def _rivals(self, effect: Effect) -> list[str]:
+        rest = [e for e in self.mixture.effects if e is not effect]
+        found = []
+        for other in self.mixtures.others:
+            if other in self.mixture.effects:
+                continue
+            swapped = self.mixtures.of([*rest, other])
+            if effect.name in other.contains and _at_its_end(swapped, other):
+                continue
+            if self.mixture.gain - swapped.gain < NOT_TOLD_APART and not _idle(swapped, other):
+                found.append(other.name)
+        return found
+
+
+def _idle(mixture: Mixture, effect: Effect) -> bool:
+    """Whether an effect of a mixture adds nothing in any channel."""
+    return all(each.values[effect.name][effect.parameters[0].name] == 0 for each in mixture.channels)
+
+
+def _at_its_end(mixture: Mixture, effect: Effect) -> bool:
+    """Whether an effect's shape is the longest that the record can show: it then is what it contains, by another name."""
+    shape = effect.parameters[1].name
+    return all(
+        each.values[effect.name][shape] > NEARLY * tried(effect, shape, each.channel)[-1] for each in mixture.channels
+    )
+
+
+def search(still: Still, model: Model, effects: Mapping[str, Effect]) -> Search:
+    """Raises ModelError for a model without noise."""
+    given = tuple(term.effect for term in noise_terms(model))
+    known = {name: effect for name, effect in effects.items() if "still" in effect.kinds}
+    known |= {effect.name: effect for effect in given}
+    plain = _searched(still, model, known, given)
+    beside = [patterns for patterns in map(_patterns, (plain.mixture.channels, plain.mixtures.base)) if patterns]
+    tried = [replace(_searched(_without(still, each), model, known, given), patterns=each) for each in beside]
+    best = max(tried, key=_worth, default=plain)
+    needless = len(best.gains) < len(plain.gains) and _worth(best) > _worth(plain)
+    certain = any(pattern.gain - pattern.price > CERTAIN for pattern in _patterns(plain.mixture.channels))
+    return best if needless or certain else plain
+
+
+def _patterns(channels: tuple[ChannelFit, ...]) -> tuple[Pattern, ...]:
+    """The pattern that stands out in each channel, where one does."""
+    return tuple(filter(None, map(pattern_of, channels)))
+
+
+def _without(still: Still, patterns: tuple[Pattern, ...]) -> Still:
+    """The record without them."""
+    channels = still.channels
+    for pattern in patterns:
+        channels = tuple(pattern.taken_off(channel) for channel in channels)
+    return replace(still, channels=channels)
+
+
+def _worth(found: Search) -> float:
+    """Twice the log-likelihood of the best mixture, less the prices of its effects and of the patterns."""
+    price = sum(found.mixtures.prices[name] for name in found.mixture.names)
+    price += sum(pattern.price for pattern in found.patterns)
+    return 2 * sum(each.log_likelihood for each in found.mixture.channels) - price
+
+
+def _searched(still: Still, model: Model, known: Mapping[str, Effect], given: tuple[Effect, ...]) -> Search:
+    smooth = tuple(effect for effect in given if effect.spectrum is not None)
+    others = tuple(e for e in known.values() if e.spectrum is not None and e not in smooth)
+    plain = tuple(effect for effect in (*smooth, *others) if len(effect.parameters) == 1)
+    most = most_lines(known.values())
+    lines = tuple(lines_of(channel, plain, most)[0] if most else () for channel in still.channels)
+    shown = tuple(seen(channel, each) for channel, each in zip(still.channels, lines, strict=True))
+    return Search(still, model, known, lines, (), Mixtures(shown, smooth, others))
