@@ -12,16 +12,19 @@ from pathlib import Path
 import numpy as np
 
 from calibrations.effect import Effect, Parameter, catalogue
+from calibrations.pictures import signature, signature_noise
 from calibrations.pictures.compact import sparing
 from calibrations.pictures.save import svg
 from calibrations.pictures.shown import shown_value
-from calibrations.pictures.signature import picture
+from calibrations.pictures.signature_noise import shown_noise
 
 ACTS_ON = {
     "pose": "the pose: where the stages and the vertical really are",
     "force": "the specific force: what of it each sensing axis feels",
     "transduction": "the transduction: from specific force to output",
     "output": "the output: what becomes of it before it is a number",
+    "spectrum": "the spectrum of a still record: noise",
+    "lines": "the spectrum of a still record: lines in it",
 }
 
 SOURCES = """
@@ -58,7 +61,7 @@ def index(effects: Mapping[str, Effect]) -> str:
         "# The catalogue of physical effects\n\n"
         "Made by `python -m calibrations.pages docs/effects` from the files in `calibrations/effects`;\n"
         "`rig effects NAME` shows the same in a terminal. The pictures show what the linear model leaves of each,\n"
-        "noise aside.\n\n"
+        "noise aside; those of noise, what it adds to white noise.\n\n"
         f"| effect | acts on | what happens | what it leaves |\n| --- | --- | --- | --- |\n{rows}\n{SOURCES}"
     )
 
@@ -71,7 +74,13 @@ def pages(effects: Mapping[str, Effect]) -> dict[str, str]:
 
 def drawing(effect: Effect) -> str:
     """The effect's picture as an SVG document; the same effect gives the same text."""
-    return sparing(svg(picture(effect)).decode())
+    draw = signature_noise if _is_noise(effect) else signature
+    return sparing(svg(draw.picture(effect)).decode())
+
+
+def _is_noise(effect: Effect) -> bool:
+    """Whether it acts on no sample but on the spectrum of a still record."""
+    return effect.kinds == ("still",)
 
 
 def write(folder: Path) -> None:
@@ -86,6 +95,8 @@ def write(folder: Path) -> None:
 
 
 def _alternative(effect: Effect) -> str:
+    if _is_noise(effect):
+        return f"What {effect.name} adds to white noise"
     return f"What {_plain_model(effect)} leaves of {effect.name}"
 
 
@@ -98,6 +109,8 @@ def _plain_model(effect: Effect) -> str:
 
 def _caption(effect: Effect) -> str:
     """What the picture shows, and of how large an effect."""
+    if _is_noise(effect):
+        return _caption_of_noise(effect)
     kept = {"bias": "A model without a bias", "scale-factor": "A model without a scale factor"}
     plain, turned = _plain_model(effect), effect.kinds in (("fields",), ("rates",))
     values = [_value(p, effect) for p in effect.parameters if turned or not p.where]
@@ -105,6 +118,15 @@ def _caption(effect: Effect) -> str:
     return (
         f"{kept.get(effect.name, plain[0].upper() + plain[1:])} leaves this, noise aside, of a sensor{sensor} with "
         f"{', '.join(values)}."
+    )
+
+
+def _caption_of_noise(effect: Effect) -> str:
+    own = {p.name: p.unit.replace("{out}", "V") for p in effect.parameters}
+    values = [f"{name.replace('_', ' ')} {value:g} {own[name]}" for name, value in shown_noise(effect).items()]
+    return (
+        "Allan deviation, and one-sided density, of a still record at 10 Hz: broken of white noise alone (coefficient "
+        f"1 V/sqrt(Hz)), full with {', '.join(values)}{'' if effect.name == 'white-noise' else ' beside it'}."
     )
 
 

@@ -50,7 +50,7 @@ def asked(
     chosen = read_model(model, effects) if model is not None else None
     table = load(data, tell=tell)
     if chosen is not None:
-        _check_unit(chosen, table)
+        check_unit(chosen, table.unit, table.source)
     if table.kind == "poses" and not correlation_known(table):
         tell(
             f"{table.source}: how the samples of a mean correlate is not known, and they are taken as independent; "
@@ -75,12 +75,12 @@ def blind(found: Fit, effects: Mapping[str, Effect]) -> str | None:
     return f"This data cannot show, beside {found.model.name}: {', '.join(hidden)}.{why}"
 
 
-def _check_unit(model: Model, table: Table) -> None:
+def check_unit(model: Model, unit: str, source: str) -> None:
     """Values in counts say nothing of volts. Raises ModelError."""
     fitted = any(term.estimates for term in model.terms)
-    ours, theirs = (UNITS.get(unit_of(unit), (unit,))[0] for unit in (model.unit, table.unit))
+    ours, theirs = (UNITS.get(unit_of(own), (own,))[0] for own in (model.unit, unit))
     if fitted and ours and ours != theirs:
         raise ModelError(
-            f"{model.name}: its values are for outputs in {model.unit}, and {table.source} is in {table.unit}; "
+            f"{model.name}: its values are for outputs in {model.unit}, and {source} is in {unit}; "
             "take a model that was fitted to data in this unit, or a shipped one (`rig models`)"
         )

@@ -65,7 +65,7 @@ def proposed(result: Answer, effects: Mapping[str, Effect], bench: Bench, bench_
         result.path.start.model.effects
     )  # a value for each axis, and adds nothing
     if best.table.kind != "poses" or frees:
-        return replace(result, next_experiment=_as_told(e, bench, bench_file))
+        return replace(result, next_experiment=as_told(e, bench, bench_file))
     return replace(result, next_experiment=chosen(Dispute.of(best, e.separates, effects), e, bench, bench_file))
 
 
@@ -119,7 +119,7 @@ def chosen(
     its data will be judged alone or with those at hand, in order of preference.
     """
     foreseeable = [_foreseen(dispute, each, bench, bench_file) for each in menu]
-    return best_of([e for e in foreseeable if e is not None], judged) or _as_told(by_physics, bench, bench_file)
+    return best_of([e for e in foreseeable if e is not None], judged) or as_told(by_physics, bench, bench_file)
 
 
 def best_of(experiments: Sequence[Experiment], judged: Sequence[str]) -> Experiment | None:
@@ -158,7 +158,7 @@ def _foreseen(dispute: Dispute, e: Experiment, bench: Bench, bench_file: Path | 
     return replace(e, separates=tuple(told), expected=worst)
 
 
-def _as_told(e: Experiment, bench: Bench, bench_file: Path | None) -> Experiment:
+def as_told(e: Experiment, bench: Bench, bench_file: Path | None) -> Experiment:
     """Proposed by its physics; where the bench cannot do it, that is said too."""
     try:
         return planned_experiment(e, bench, bench_file)[0]

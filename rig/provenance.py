@@ -8,6 +8,7 @@ from importlib.metadata import version
 
 from calibrations.fit import Fit
 from calibrations.model import Model
+from calibrations.still.fit import NoiseFit
 
 OF_THE_SENSOR = ("sensor", "serial", "gravity_m_s2")  # constants of the data that a model file keeps
 
@@ -22,15 +23,16 @@ def today() -> str:
     return datetime.now(UTC).date().isoformat()
 
 
-def with_provenance(found: Fit, parent: Model) -> Model:
+def with_provenance(found: Fit | NoiseFit, parent: Model) -> Model:
     """The fitted model, and what data, what model before it and what program it was made from."""
+    data = found.still if isinstance(found, NoiseFit) else found.table
     return replace(
         found.model,
         provenance={
-            "data": found.table.source,
-            "data_sha256": found.table.digest,
-            "rows": found.table.n,
-            **{name: found.table.constants[name] for name in OF_THE_SENSOR if name in found.table.constants},
+            "data": data.source,
+            "data_sha256": data.digest,
+            "rows": data.n,
+            **{name: data.constants[name] for name in OF_THE_SENSOR if name in data.constants},
             "parent": parent.name,
             "program": program(),
             "created": datetime.now(UTC).isoformat(timespec="seconds"),

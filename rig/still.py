@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrations.errors import DataError, nearest
-from calibrations.table import Array, Table
+from calibrations.table import AXES, Array, Table
 from procedures.noise_floor import STILL
 from procedures.soak import HOLD
 from rig.data import load
@@ -27,6 +28,7 @@ MOST_MISSING = 0.1  # of a record, in gaps that are closed up
 FEW_GAPS = 0.01  # of all steps
 UNEVEN = 1e-3  # of a record, by which times may be off an even row: those of a computer that samples reach in bursts
 DISAGREE = 0.01  # of two rates
+AXIS = re.compile(r"(v|a|g|m|)([xyz])(|_v)")  # of a channel, by its name
 UPRIGHT = 0.999  # g: a pose that is as good as along gravity
 
 
@@ -44,6 +46,7 @@ class Stream:
     closed: list[tuple[float, float]] = field(default_factory=list)  # gaps: where each begins and how long it is, s
     uneven_s: float = 0.0  # by how much the times are off the even row that is taken for them
     upright_v: dict[int, float] = field(default_factory=dict)  # output along gravity, +1 and -1 g
+    constants: Mapping[str, str | float] = field(default_factory=dict)
 
     @property
     def scale_v_per_g(self) -> float | None:
@@ -58,17 +61,57 @@ def stream(record: Record | None, data: str, channel: str | None, rate_hz: float
 
     Raises DataError and RecordError: no such file, run or channel; a rate that is missing or disagrees; gaps.
     """
+    return _source(record, data, rate_hz)(channel)
+
+
+def axes(record: Record | None, data: str, channel: str | None, rate_hz: float | None) -> dict[str, Stream]:
+    """The samples of one sensor's axes by their names: the one asked for, or the first and those that go with it.
+
+    A channel whose name has no axis in it is called x. Raises what `stream` raises.
+    """
+    source = _source(record, data, rate_hz)
+    first = source(channel)
+    if channel is not None or (named := AXIS.fullmatch(first.channel)) is None:
+        return {_axis(first.channel): first}
+    alike = [f"{named[1]}{axis}{named[3]}" for axis in AXES]
+    return {_axis(name): source(name) for name in alike if name in (first.channel, *first.others)}
+
+
+def repairs(samples: Stream, n: int) -> Iterable[str]:
+    """What was done to the samples before anything was computed."""
+    if samples.closed:
+        missing = sum(length for _, length in samples.closed)
+        yield (
+            f"{len(samples.closed)} gaps, {missing:.3g} s in all, are closed up: longer times are too short by up to "
+            f"{100 * missing * samples.rate_hz / n:.2g} %."
+        )
+    if samples.uneven_s:
+        yield (
+            f"Times are uneven, as where samples reach a computer in bursts, and off by {samples.uneven_s:.2g} s at "
+            f"most; the samples are taken to be even, {samples.rate_hz:.6g} a second."
+        )
+
+
+def _axis(channel: str) -> str:
+    named = AXIS.fullmatch(channel)
+    return named[2] if named else AXES[0]
+
+
+def _source(record: Record | None, data: str, rate_hz: float | None) -> Callable[[str | None], Stream]:
+    """What gives the stream of a channel; a table is read once for all of them."""
     path = Path(data)
-    if path.suffix == ".npy" and path.is_file():
-        return _of_array(path, rate_hz)
     if path.suffix == ".npy":
-        raise DataError(f"{data}: there is no such file; a run is named as `rig runs` lists it")
+        if not path.is_file():
+            raise DataError(f"{data}: there is no such file; a run is named as `rig runs` lists it")
+        return lambda _: _of_array(path, rate_hz)
     if path.exists() or record is None:
-        return _of_table(load(data, "still" if path.suffix != "" else None), channel, rate_hz)
+        table = load(data, "still" if path.suffix != "" else None)
+        return lambda channel: _of_table(table, channel, rate_hz)
     measured = Measured.named(record, data)
     if record.columns(measured.run.run)[0]:
-        return _of_table(measured.table(), channel, rate_hz)
-    return _of_run(measured, channel, rate_hz)
+        table = measured.table()
+        return lambda channel: _of_table(table, channel, rate_hz)
+    return lambda channel: _of_run(measured, channel, rate_hz)
 
 
 def _of_array(path: Path, rate_hz: float | None) -> Stream:
@@ -99,7 +142,9 @@ def _of_table(table: Table, channel: str | None, rate_hz: float | None) -> Strea
     unit = "V" if chosen.endswith("_v") else str(table.constants.get("unit", "count"))
     corner_hz = table.number("filter_corner_hz", np.inf)
     others = tuple(name for name in channels if name != chosen)
-    found = Stream(table.source, chosen, rate, unit, iter([table.column(chosen)]), corner_hz, others)
+    found = Stream(
+        table.source, chosen, rate, unit, iter([table.column(chosen)]), corner_hz, others, constants=table.constants
+    )
     return replace(found, closed=list(times.gaps), uneven_s=times.uneven_s) if times else found
 
 
@@ -187,7 +232,7 @@ def _of_run(measured: Measured, channel: str | None, rate_hz: float | None) -> S
     found = Stream(
         measured.name, chosen, rate, "V", iter(()), corner if chosen in ("vx", "vy", "vz") else np.inf, outputs
     )
-    found.blocks = _still_blocks(measured, found)
+    found.blocks, found.constants = _still_blocks(measured, found), measured.constants
     return found
 
 

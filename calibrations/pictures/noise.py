@@ -66,7 +66,7 @@ def allan(found: NoiseAnalysis) -> Figure:
     beside.set(xlabel="averaging time (s)", title="other deviations")
     for each in (ax, beside):
         each.legend()
-        _mark_powers(each)
+        mark_powers(each)
     return figure
 
 
@@ -79,22 +79,22 @@ def density(found: NoiseAnalysis) -> Figure:
     f, freedom = spectrum.frequency_hz[order], spectrum.freedom[order]
     expected = found.found.expected(spectrum)[order]
     tail = (1 - COVERAGE) / 2
-    low, high = (_root(expected * chi2.ppf(p, freedom) / freedom) for p in (tail, 1 - tail))
+    low, high = (root(expected * chi2.ppf(p, freedom) / freedom) for p in (tail, 1 - tail))
     ax.fill_between(f, low, high, color=QUIET, alpha=0.22, lw=0)
-    ax.plot(f, _root(spectrum.density[order]), "o", color=INK, ms=2.2, label="measured")
-    ax.plot(f, _root(expected), color=INK, lw=1.2, label="these processes")
+    ax.plot(f, root(spectrum.density[order]), "o", color=INK, ms=2.2, label="measured")
+    ax.plot(f, root(expected), color=INK, lw=1.2, label="these processes")
     for name, power in found.found.power.items():
         column = spectrum.column(name, found.found.time_constant_s)[order]
-        ax.plot(f, _root(power * column), "--", color=COLOURS[name], label=name)
-    ax.set(xscale="log", yscale="log", ylim=(low.min() / 2, 2 * max(high.max(), _root(spectrum.density).max())))
+        ax.plot(f, root(power * column), "--", color=COLOURS[name], label=name)
+    ax.set(xscale="log", yscale="log", ylim=(low.min() / 2, 2 * max(high.max(), root(spectrum.density).max())))
     _mark_lines(ax, found)
     ax.set(xlabel="frequency (Hz)", ylabel=f"density ({found.unit}/√Hz)")
     ax.legend()
-    _mark_powers(ax)
+    mark_powers(ax)
     return figure
 
 
-def _mark_powers(ax: Axes) -> None:
+def mark_powers(ax: Axes) -> None:
     """Marks of logarithmic axes in plain text: powers of ten, and 2 and 5 where there are few of these."""
     for axis, (low, high) in ((ax.xaxis, ax.get_xlim()), (ax.yaxis, ax.get_ylim())):
         axis.set_major_formatter(FuncFormatter(lambda value, _: plain(value, 1)))
@@ -106,7 +106,7 @@ def _of_two_and_five(value: float, _: int | None = None) -> str:
     return plain(value, 1) if f"{value:.0e}"[0] in "25" else ""
 
 
-def _root(two_sided: Array) -> Array:
+def root(two_sided: Array) -> Array:
     """One-sided amplitude density."""
     return np.asarray(np.sqrt(2 * two_sided))
 

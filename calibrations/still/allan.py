@@ -89,8 +89,10 @@ def parts(found: ChannelFit, tau_s: Array) -> dict[str, Array]:
         effect.name: np.array([w @ spectrum_of(effect, (at,), found.values[effect.name]) for at, w in weighted])
         for effect in found.effects
     }
-    for k, line in enumerate(found.lines, 1):
-        each[f"line {k}"] = line.amplitude**2 * _of_line(line.frequency_hz / found.channel.rate_hz, steps)
+    for line in found.lines:
+        each[f"{line.frequency_hz:.4g} Hz"] = line.amplitude**2 * _of_line(
+            line.frequency_hz / found.channel.rate_hz, steps
+        )
     return each
 
 

@@ -28,7 +28,7 @@ TIME, FREQUENCY = "averaging time", "frequency"
 
 @dataclass(frozen=True)
 class Place:
-    """Averaging times or frequencies at which one channel is not as the model. `excess`: in standard deviations, rms."""
+    """Averaging times or frequencies at which a channel is not as the model. `excess`: in standard deviations, rms."""
 
     where: str
     low: float

@@ -17,7 +17,6 @@ from calibrations.diagnose import MOST_LEFT
 from calibrations.effect import Effect, catalogue
 from calibrations.experiment import Experiment
 from calibrations.model import Model
-from calibrations.search.candidates import SIGNIFICANT
 from calibrations.still.chance import chance, tube
 from calibrations.still.experiment import separating
 from calibrations.still.fit import NoiseFit, fit
@@ -47,7 +46,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """The verdict on a model, the candidates behind it (best first), and what is left when the missing ones are added."""
+    """The verdict on a model, the candidates behind it, best first, and what is left with the missing ones."""
 
     fit: NoiseFit
     verdict: str
@@ -141,8 +140,3 @@ def _p_value(effect: Effect, gain: float, before: NoiseFit, tried: int) -> float
         ordinates = sum(each.channel.n / 2 for each in before.channels)
         return float(min(1.0, tried * ordinates * np.exp(-gain / 2)))
     return min(1.0, tried * chance(gain, [tube(each, effect) for each in before.channels]))
-
-
-def significant(c: Candidate) -> bool:
-    """Whether noise alone would hardly make it look present."""
-    return c.p_value < SIGNIFICANT

@@ -90,7 +90,8 @@ def add(effect: Effect, model: Model, still: Still, effects: Mapping[str, Effect
 
 def _steps(start: NoiseFit, found: Search) -> list[Added]:
     """The effects one after another, the last fit being that of the search."""
-    steps, present = [], start
+    steps: list[Added] = []
+    present = start
     for name in found.gains:
         last = len(steps) == len(found.gains) - 1
         after = found.end if last else fit(present.model.with_effect(found.effects[name]), found.still)

@@ -1,7 +1,8 @@
 """Results on still records as documents of the same schemas as those of poses.
 
-`rmse` is the rms mismatch of the spectrum, as a share of it, each band weighted by its degrees of freedom; `noise_floor`
-is what chance alone leaves of that, and `excess` their ratio. There is no `slow_noise`: it is what the model is about.
+`rmse` is the rms mismatch of the spectrum, as a share of it, each band weighted by its degrees of freedom;
+`noise_floor` is what chance alone leaves of that, and `excess` their ratio. There is no `slow_noise`: it is what the
+model is about.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -70,6 +70,7 @@ class Still:
     channels: tuple[Channel, ...]
     allan: Mapping[str, Curve]
     digest: str  # SHA-256 of all samples
+    constants: Mapping[str, str | float] = field(default_factory=dict)  # what is known of the sensor
 
     @property
     def n(self) -> int:
@@ -103,7 +104,7 @@ class Samples:
     corner_hz: float = np.inf
 
 
-def reduced(each: Iterable[Samples], source: str) -> Still:
+def reduced(each: Iterable[Samples], source: str, constants: Mapping[str, str | float] | None = None) -> Still:
     """All channels, one after the other, each read once.
 
     Raises DataError naming a sample that is no number, or a channel that is constant or clipped; TooFewRows.
@@ -134,4 +135,4 @@ def reduced(each: Iterable[Samples], source: str) -> Still:
         )
         curves[samples.axis] = octaves.curve()
         unit = samples.unit
-    return Still(source, unit, tuple(channels), curves, digest.hexdigest())
+    return Still(source, unit, tuple(channels), curves, digest.hexdigest(), constants or {})

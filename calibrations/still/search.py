@@ -27,7 +27,7 @@ CERTAIN = 60.0  # what a pattern has to gain beyond its price to be no chance be
 
 @dataclass(frozen=True)
 class Search:
-    """What was found beside a model: lines and patterns, which are off `still`, and mixtures of processes on the rest."""
+    """What was found beside a model: lines and patterns, taken off `still`, and mixtures of processes on the rest."""
 
     still: Still
     model: Model
@@ -88,7 +88,7 @@ def _idle(mixture: Mixture, effect: Effect) -> bool:
 
 
 def _at_its_end(mixture: Mixture, effect: Effect) -> bool:
-    """Whether an effect's shape is the longest that the record can show: it then is what it contains, by another name."""
+    """Whether an effect's shape is the longest that a record shows: it then is what it contains, by another name."""
     shape = effect.parameters[1].name
     return all(
         each.values[effect.name][shape] > NEARLY * tried(effect, shape, each.channel)[-1] for each in mixture.channels
@@ -134,6 +134,9 @@ def _searched(still: Still, model: Model, known: Mapping[str, Effect], given: tu
     others = tuple(e for e in known.values() if e.spectrum is not None and e not in smooth)
     plain = tuple(effect for effect in (*smooth, *others) if len(effect.parameters) == 1)
     most = most_lines(known.values())
-    lines = tuple(lines_of(channel, plain, most)[0] if most else () for channel in still.channels)
-    shown = tuple(seen(channel, each) for channel, each in zip(still.channels, lines, strict=True))
-    return Search(still, model, known, lines, (), Mixtures(shown, smooth, others))
+    each = [lines_of(channel, plain, most) if most else ((), 0.0) for channel in still.channels]
+    shown = tuple(
+        replace(seen(channel, lines), line_bound=bound)
+        for channel, (lines, bound) in zip(still.channels, each, strict=True)
+    )
+    return Search(still, model, known, tuple(lines for lines, _ in each), (), Mixtures(shown, smooth, others))

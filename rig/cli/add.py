@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from rig.cli.output import bench_option, emit, json_option, note, notes
+from rig.cli.output import Sampled, bench_option, emit, json_option, note, notes, sampled_options
 
 if TYPE_CHECKING:
     from calibrations.effect import Effect
@@ -25,9 +25,17 @@ PLAIN = re.compile(r"[A-Za-z0-9_-]+")  # what no expression that means anything 
 @click.option("--data", required=True, help="A file or a run.")
 @click.option("--out", required=True, type=click.Path(dir_okay=False, path_type=Path), help="The new model file.")
 @bench_option
+@sampled_options
 @json_option
 def command(
-    effect: str, name: str | None, model: str, data: str, out: Path, bench_file: Path | None, as_json: bool
+    effect: str,
+    name: str | None,
+    model: str,
+    data: str,
+    out: Path,
+    bench_file: Path | None,
+    as_json: bool,
+    sampled: Sampled,
 ) -> None:
     """Add EFFECT to a model, fit both to the data, and write the new model; the old one stays.
 
@@ -40,9 +48,13 @@ def command(
     from calibrations.documents import discovery_document
     from calibrations.errors import ModelError
     from rig.cli.asked import asked, write_model
+    from rig.cli.still import of_still, told_add
     from rig.cli.words import addition, parameters, warning
     from rig.trail import require_new
 
+    if (still := of_still(data, model, bench_file, sampled, out)) is not None:
+        told_add(still, effect, out, as_json, data)
+        return
     table, start, effects = asked(data, model, bench_file, out)
     chosen = _chosen(effect, name, table, effects)
     if start.holds(chosen.name):

@@ -9,6 +9,7 @@ from calibrations.effect import Effect
 from calibrations.fit import Fit
 from calibrations.model import Model
 from calibrations.model_file import dump_model
+from calibrations.still.fit import NoiseFit
 from calibrations.table import Table
 from rig.asked import asked as read_asked
 from rig.asked import blind
@@ -35,7 +36,7 @@ def tell_blind(found: Fit, effects: Mapping[str, Effect]) -> None:
         note(hidden)
 
 
-def write_model(found: Fit, parent: Model, out: Path) -> Model:
+def write_model(found: Fit | NoiseFit, parent: Model, out: Path) -> Model:
     """Write the fitted model with its provenance; the file appears whole or not at all. Returns what was written."""
     model = with_provenance(found, parent)
     write_whole(out, dump_model(model))

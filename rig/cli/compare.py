@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from rig.cli.output import bench_option, check_option, emit, json_option, model_option, notes
+from rig.cli.output import Sampled, bench_option, check_option, emit, json_option, model_option, notes, sampled_options
 
 
 @click.command("compare")
@@ -14,15 +14,19 @@ from rig.cli.output import bench_option, check_option, emit, json_option, model_
 @model_option
 @check_option
 @bench_option
+@sampled_options
 @json_option
-def command(data: str, model: str | None, check: bool, bench_file: Path | None, as_json: bool) -> int:
+def command(data: str, model: str | None, check: bool, bench_file: Path | None, as_json: bool, sampled: Sampled) -> int:
     """Set a model beside DATA (a file or a run) and say where it fails. A model without values is fitted first."""
     from calibrations.compare import compare
     from calibrations.documents import comparison_document
     from calibrations.search.determined import undetermined
     from rig.cli.asked import asked
+    from rig.cli.still import of_still, told_compare
     from rig.cli.words import errors, warning
 
+    if (still := of_still(data, model, bench_file, sampled)) is not None:
+        return told_compare(still, model, check, as_json, data)
     table, start, _ = asked(data, model, bench_file)
     result = compare(table, start)
     caution = undetermined(result.fit)

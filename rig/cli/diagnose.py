@@ -7,7 +7,18 @@ from typing import TYPE_CHECKING
 
 import click
 
-from rig.cli.output import bench_option, check_option, columns, emit, json_option, model_option, note, notes
+from rig.cli.output import (
+    Sampled,
+    bench_option,
+    check_option,
+    columns,
+    emit,
+    json_option,
+    model_option,
+    note,
+    notes,
+    sampled_options,
+)
 
 if TYPE_CHECKING:
     from calibrations.diagnose import Diagnosis
@@ -20,16 +31,20 @@ SHOWN = 6
 @model_option
 @check_option
 @bench_option
+@sampled_options
 @json_option
-def command(data: str, model: str | None, check: bool, bench_file: Path | None, as_json: bool) -> int:
+def command(data: str, model: str | None, check: bool, bench_file: Path | None, as_json: bool, sampled: Sampled) -> int:
     """Find the physical effect that a model misses on DATA (a file or a run)."""
     from calibrations.diagnose import diagnose
     from calibrations.documents import diagnosis_document
     from rig.cli.asked import asked, tell_blind
     from rig.cli.own_effect import own_effect, told
+    from rig.cli.still import of_still, told_diagnose
     from rig.cli.words import warning
     from rig.foresight import with_next
 
+    if (still := of_still(data, model, bench_file, sampled)) is not None:
+        return told_diagnose(still, model, bench_file, check, as_json, data)
     table, start, effects = asked(data, model, bench_file)
     result = diagnose(table, start, effects)
     result = with_next(result, data, effects, bench_file, note)

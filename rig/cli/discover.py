@@ -6,7 +6,17 @@ from pathlib import Path
 
 import click
 
-from rig.cli.output import bench_option, check_option, emit, json_option, model_option, note, notes
+from rig.cli.output import (
+    Sampled,
+    bench_option,
+    check_option,
+    emit,
+    json_option,
+    model_option,
+    note,
+    notes,
+    sampled_options,
+)
 from rig.cli.watch import watch_options
 
 
@@ -19,6 +29,7 @@ from rig.cli.watch import watch_options
 @watch_options
 @check_option
 @bench_option
+@sampled_options
 @json_option
 def command(
     data: tuple[str, ...],
@@ -31,6 +42,7 @@ def command(
     check: bool,
     bench_file: Path | None,
     as_json: bool,
+    sampled: Sampled,
 ) -> int:
     """Diagnose and add until nothing is missing on DATA (a file or a run; several are judged together).
 
@@ -45,6 +57,12 @@ def command(
         return discover_live(model, out, minutes, unattended, answers, check, bench_file, as_json)
     if not data:
         raise click.UsageError("name DATA (a file or a run), or --live to measure it")
+    from rig.cli.still import of_still, told_discover
+
+    if (still := of_still(data[0], model, bench_file, sampled, out)) is not None:
+        if len(data) > 1:
+            raise click.UsageError("still records are judged one at a time; name one")
+        return told_discover(still, out, bench_file, check, as_json, data[0])
     return _discover(data, model, out, check, bench_file, as_json)
 
 

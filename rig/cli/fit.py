@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from rig.cli.output import bench_option, check_option, emit, json_option, model_option, notes
+from rig.cli.output import Sampled, bench_option, check_option, emit, json_option, model_option, notes, sampled_options
 
 
 @click.command("fit")
@@ -15,8 +15,17 @@ from rig.cli.output import bench_option, check_option, emit, json_option, model_
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="Write the fitted model to this file.")
 @check_option
 @bench_option
+@sampled_options
 @json_option
-def command(data: str, model: str | None, out: Path | None, check: bool, bench_file: Path | None, as_json: bool) -> int:
+def command(
+    data: str,
+    model: str | None,
+    out: Path | None,
+    check: bool,
+    bench_file: Path | None,
+    as_json: bool,
+    sampled: Sampled,
+) -> int:
     """Estimate the parameters of a model from DATA (a file or a run), with standard uncertainties."""
     from calibrations.compare import compare
     from calibrations.documents import fit_document
@@ -27,8 +36,11 @@ def command(data: str, model: str | None, out: Path | None, check: bool, bench_f
     from rig.cli import calibrated
     from rig.cli.asked import asked, tell_blind, write_model
     from rig.cli.checked import document, lines
+    from rig.cli.still import of_still, told_fit
     from rig.cli.words import errors, paper, parameters, warning
 
+    if (still := of_still(data, model, bench_file, sampled, out)) is not None:
+        return told_fit(still, out, check, as_json)
     table, start, effects = asked(data, model, bench_file, out)
     found = fit(start, table)
     if out is not None:

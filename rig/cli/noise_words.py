@@ -10,7 +10,7 @@ from calibrations.noise_analysis.analysis import Coefficient, NoiseAnalysis
 from calibrations.numerals import exponent
 from rig.cli.output import columns
 from rig.numerals import duration
-from rig.still import Stream
+from rig.still import Stream, repairs
 
 PREFIXES = ((1.0, ""), (1e3, "m"), (1e6, "u"), (1e9, "n"), (1e12, "p"))
 MEANS = {
@@ -41,17 +41,7 @@ def remarks(samples: Stream, found: NoiseAnalysis) -> Iterable[str]:
     """What was done to the data, and what to be careful about."""
     if samples.others:
         yield f"Channel {samples.channel}; --channel takes another: {', '.join(samples.others)}."
-    if samples.closed:
-        missing = sum(length for _, length in samples.closed)
-        yield (
-            f"{len(samples.closed)} gaps, {missing:.3g} s in all, are closed up: longer times are too short by up to "
-            f"{100 * missing * found.rate_hz / found.n:.2g} %."
-        )
-    if samples.uneven_s:
-        yield (
-            f"Times are uneven, as where samples reach a computer in bursts, and off by {samples.uneven_s:.2g} s at "
-            f"most; the samples are taken to be even, {samples.rate_hz:.6g} a second."
-        )
+    yield from repairs(samples, found.n)
     if np.isfinite(samples.corner_hz):
         yield (
             f"Coefficients are those before the output's {samples.corner_hz:g} Hz low-pass, "

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from functools import wraps
 from pathlib import Path
 from typing import Any
 
 import click
 
+Sampled = tuple[str | None, float | None]  # --channel and --rate
 json_option = click.option("--json", "as_json", is_flag=True, help="One JSON document on standard output.")
 check_option = click.option("--check", is_flag=True, help="Exit with 1 unless the model is adequate.")
 model_option = click.option(
@@ -20,6 +22,18 @@ bench_option = click.option(
     type=click.Path(dir_okay=False, path_type=Path),
     help="The bench file; without it the simulated rig.",
 )
+
+
+def sampled_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """--channel and --rate, as one argument `sampled`: of a still record."""
+
+    @wraps(function)
+    def inside(*args: Any, channel: str | None, rate_hz: float | None, **kwargs: Any) -> Any:
+        return function(*args, sampled=(channel, rate_hz), **kwargs)
+
+    positive = click.FloatRange(min=0, min_open=True)
+    inside = click.option("--rate", "rate_hz", type=positive, help="Samples a second, for an array (.npy).")(inside)
+    return click.option("--channel", help="Of a still record: vx, vy ... Default: every axis.")(inside)
 
 
 def emit(document: dict[str, Any]) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from rig.cli.output import bench_option, emit, json_option, model_option, note
+from rig.cli.output import Sampled, bench_option, emit, json_option, model_option, note, sampled_options
 
 
 @click.command("report")
@@ -16,6 +16,7 @@ from rig.cli.output import bench_option, emit, json_option, model_option, note
 @click.option("--pictures", "folder", type=click.Path(file_okay=False, path_type=Path), help="Write all pictures here.")
 @click.option("--format", "form", type=click.Choice(["png", "svg"]), default="png", show_default=True)
 @bench_option
+@sampled_options
 @json_option
 def command(
     data: str,
@@ -25,6 +26,7 @@ def command(
     form: str,
     bench_file: Path | None,
     as_json: bool,
+    sampled: Sampled,
 ) -> None:
     """Write a page on DATA (a file or a run) and a model: what the model misses, and the model with it.
 
@@ -39,7 +41,7 @@ def command(
 
     if out is not None:
         require_out(out, data, model, bench_file)
-    pictures, page = reported(data, model, bench_file, note)
+    pictures, page = reported(data, model, bench_file, note, sampled)
     if out is not None:
         write_whole(out, page())
     written = save_all({picture.name: picture.figure for picture in pictures}, folder, form) if folder else []

@@ -1,0 +1,99 @@
+"""Pictures of a noise model beside a still record: how its noise averages, and its spectrum, before and after."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from scipy.special import chdtri
+
+from calibrations.noise_analysis.freedom import COVERAGE
+from calibrations.pictures.album import Picture
+from calibrations.pictures.noise import COLOURS, mark_powers, root
+from calibrations.pictures.style import BAND, INK, QUIET, VERMILION, panels, styled
+from calibrations.still.allan import deviation, parts
+from calibrations.still.channel_fit import ChannelFit
+from calibrations.still.discover import Discovery
+from calibrations.still.fit import NoiseFit
+
+POINTS = 200
+ROOM = 4.0  # above and below a spectrum
+HEIGHT = 3.6
+OTHER = "#7b5ea7"  # of effects that are not in the catalogue
+
+
+def still_album(found: Discovery, given: NoiseFit) -> list[Picture]:
+    """Both pictures, with words for a page. `given` is the model as it was given."""
+    name = found.end.model.name
+    averaging = (
+        "How much neighbouring means differ, over the time that each is taken over. Dots are measured, bars are "
+        f"intervals of 95 %. The broken grey line is the model {given.model.name}, the full line {name}; thin lines "
+        "are its parts."
+    )
+    spectrum = (
+        "Power over frequency, one-sided, less the lines that were found. Dots are averages over narrow bands; the "
+        f"grey band is where 95 % of them should be by the model {name}, the broken grey line is the model "
+        f"{given.model.name}."
+    )
+    return [
+        Picture("allan", "Allan deviation beside the model", averaging, allan(found.end, given)),
+        Picture("spectrum", "Spectrum beside the model", spectrum, density(found.end, given)),
+    ]
+
+
+@styled
+def allan(end: NoiseFit, given: NoiseFit) -> Figure:
+    """Measured and expected deviations, a panel for each axis."""
+    figure, axes = panels(1, len(end.channels), HEIGHT, sharex=True, sharey=True)
+    for ax, after, before in zip(axes[0], end.channels, given.channels, strict=True):
+        curve = end.still.allan[after.channel.axis]
+        bars = np.array([curve.deviation - curve.low, curve.high - curve.deviation])
+        ax.errorbar(curve.tau_s, curve.deviation, bars, fmt="o", color=INK, elinewidth=0.8, label="measured", zorder=3)
+        steps = np.geomspace(1, curve.tau_s[-1] * after.channel.rate_hz, POINTS)
+        tau_s = np.unique(np.round(steps)).astype(np.float64) / after.channel.rate_hz
+        ax.plot(tau_s, deviation(before, tau_s), "--", color=QUIET, lw=1.4, label=given.model.name)
+        ax.plot(tau_s, deviation(after, tau_s), color=INK, lw=1.4, label=end.model.name)
+        if len(after.effects) + len(after.lines) > 1:
+            for name, variance in parts(after, tau_s).items():
+                ax.plot(tau_s, np.sqrt(variance), color=COLOURS.get(name, OTHER), lw=0.8, label=name)
+        low, high = curve.low.min(), curve.high[curve.edf > 1].max()
+        ax.set(xscale="log", yscale="log", ylim=(low / 2, high * 2), xlabel="averaging time (s)")
+        _named(ax, end, after)
+    axes[0, 0].set_ylabel(f"Allan deviation ({end.still.unit})")
+    return figure
+
+
+@styled
+def density(end: NoiseFit, given: NoiseFit) -> Figure:
+    """Measured and expected one-sided amplitude densities, a panel for each axis."""
+    figure, axes = panels(1, len(end.channels), HEIGHT, sharex=True, sharey=True)
+    tail = (1 - COVERAGE) / 2
+    for ax, after, before in zip(axes[0], end.channels, given.channels, strict=True):
+        order = np.argsort(after.frequency_hz)
+        f, nu, expected = after.frequency_hz[order], after.freedom[order], after.expected[order]
+        low, high = (root(expected * chdtri(nu, p) / nu) for p in (1 - tail, tail))
+        ax.fill_between(f, low, high, color=BAND, lw=0)
+        ax.plot(f, root(after.seen[order]), "o", color=INK, ms=2.0, label="measured")
+        there = np.argsort(before.frequency_hz)
+        ax.plot(
+            before.frequency_hz[there], root(before.expected[there]), "--", color=QUIET, lw=1.4, label=given.model.name
+        )
+        ax.plot(f, root(expected), color=INK, lw=1.2, label=end.model.name)
+        for effect in after.effects if len(after.effects) > 1 else ():
+            shown = root(after.part_of(effect)[order])
+            ax.plot(f, shown, color=COLOURS.get(effect.name, OTHER), lw=0.8, label=effect.name)
+        for line in after.lines:
+            ax.axvline(line.frequency_hz, color=VERMILION, lw=0.7, ls=":")
+        ax.set(xscale="log", yscale="log", xlabel="frequency (Hz)")
+        _named(ax, end, after)
+    levels = np.concatenate([root(each.expected) for each in end.channels])
+    axes[0, 0].set_ylim(levels.min() / ROOM, ROOM * levels.max())
+    axes[0, 0].set_ylabel(f"density ({end.still.unit}/√Hz)")
+    return figure
+
+
+def _named(ax: Axes, end: NoiseFit, channel: ChannelFit) -> None:
+    ax.legend()
+    mark_powers(ax)
+    if len(end.channels) > 1:
+        ax.set_title(f"axis {channel.channel.axis}")

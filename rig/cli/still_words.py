@@ -1,0 +1,138 @@
+"""Results on still records in words, for a terminal."""
+
+from __future__ import annotations
+
+from calibrations.still.allan import averaged
+from calibrations.still.compare import Comparison
+from calibrations.still.diagnose import Diagnosis
+from calibrations.still.discover import Discovery
+from calibrations.still.documents import mismatch, why
+from calibrations.still.fit import NoiseFit
+from calibrations.still.held_out import held_out_excess
+from calibrations.still.words import headline, of_record
+from rig.cli.output import columns
+from rig.cli.words import experiment, parameters, quantity
+
+SHOWN = 6
+
+
+def compared(result: Comparison, model: str, data: str) -> str:
+    """Allan deviations measured and modelled, and where they differ."""
+    lines = [f"{model} beside {of_record(result.fit.still)}", "", _errors(result.fit), "", _curves(result), ""]
+    if result.adequate:
+        return "\n".join([*lines, "The model fails nowhere: what is left is chance."])
+    lines.append("It fails, worst first:\n" + "\n".join(f"  {place.text}" for place in result.fails))
+    return "\n".join([*lines, "", f"Which noise is missing: rig diagnose {data} --model {model}"])
+
+
+def fitted(found: NoiseFit, out: str | None) -> str:
+    """Coefficients with their uncertainties."""
+    head = f"{found.model.name} fitted to {of_record(found.still)}\n\n{parameters(found.model)}\n\n{_errors(found)}"
+    return f"{head}\n\nwritten to {out}" if out else head
+
+
+def diagnosed(result: Diagnosis, model: str, data: str, bench: str) -> str:
+    """The verdict, the candidates, and what to do."""
+    lines = [f"{model} on {of_record(result.fit.still)}: {headline(result)}", ""]
+    rows = [
+        (
+            c.name,
+            f"{result.held_out_before:.3g} -> {c.held_out_after:.3g}",
+            f"{c.gain / 2:.4g}",
+            f"{c.p_value:.1g}",
+            f"{c.probability:.3f}",
+            ", ".join(c.indistinguishable_from) or "-",
+        )
+        for c in result.candidates[:SHOWN]
+    ]
+    head = (
+        "candidate",
+        "mismatch on the other half / chance",
+        "log-likelihood",
+        "p-value",
+        "probability",
+        "not told apart from",
+    )
+    lines += [columns(head, rows), ""] if rows else []
+    if result.missing and result.verdict in ("effect-missing", "ambiguous"):
+        best = next(c for c in result.candidates if c.name == result.missing[0])
+        lines += [f"{best.name}: {why(best, result)}", "", f"    {best.effect.formula.splitlines()[0]}", ""]
+        lines.append(f"Add it: rig add {best.name} --model {model} --data {data} --out model.yaml{bench}")
+    if result.next_experiment:
+        lines += experiment(result.next_experiment, data)
+    return "\n".join(lines).rstrip()
+
+
+def discovered(result: Discovery, data: str, out: str | None) -> str:
+    """The falling error, the verdict, and the final model."""
+    lines = [of_record(result.start.still), "", _falling(result), "", _verdict(result)]
+    lines += [f"This record cannot tell {a} from {' or '.join(b)}." for a, b in result.alternatives.items()]
+    lines += experiment(result.next_experiment, data) if result.next_experiment else []
+    lines += ["", parameters(result.end.model)]
+    return "\n".join([*lines, *(["", f"written to {out}"] if out else [])])
+
+
+def added(result: Discovery, data: str, out: str) -> str:
+    """The falling error with one effect added, and whether more is missing."""
+    lines = [f"{result.steps[0].name} added to {result.start.model.name}", "", _falling(result), ""]
+    lines += [f"This record cannot tell {a} from {' or '.join(b)}." for a, b in result.alternatives.items()]
+    if result.residual_structure:
+        lines.append(f"Something is left: {result.residual_structure}.")
+        lines.append(f"What else is missing: rig diagnose {data} --model {out}")
+    else:
+        lines.append("Nothing more is missing.")
+    return "\n".join([*lines, "", parameters(result.end.model), "", f"written to {out}"])
+
+
+def _verdict(result: Discovery) -> str:
+    names = " and ".join(result.causes)
+    if result.verdict == "unexplained":
+        beside = f"Beside {names}, there" if names else "There"
+        return f"Unexplained. {beside} is something that no mixture of noise is: {result.residual_structure}."
+    if not result.steps:
+        return "Nothing is missing: what is left is chance."
+    left = f" What is left still shows something: {result.residual_structure}." if result.residual_structure else ""
+    return f"Missing {'was' if len(result.causes) == 1 else 'were'} {names}.{left}"
+
+
+def _falling(result: Discovery) -> str:
+    first = result.start
+    rows = [_row(first.model.name, first, held_out_excess(first.model, first.still), first)]
+    rows += [_row(f"+ {s.name}", s.after, s.held_out_after, first) for s in result.steps]
+    head = ("model", "log-likelihood", "mismatch / chance", "on the other half", "mismatch of the Allan deviation")
+    return columns(head, rows)
+
+
+def _row(name: str, found: NoiseFit, unseen: float, first: NoiseFit) -> tuple[str, ...]:
+    gained = found.log_likelihood - first.log_likelihood
+    off = ", ".join(f"{100 * value:.3g} %" for value in mismatch(found).values())
+    return name, f"{gained:+.5g}" if gained else "0", f"{found.pooled_excess:.2f}", f"{unseen:.2f}", off
+
+
+def _errors(found: NoiseFit) -> str:
+    rows = []
+    for each in found.channels:
+        curve = averaged(each, found.still.allan[each.channel.axis])
+        rows.append(
+            (
+                each.channel.axis,
+                f"{100 * each.mismatch:.3g} %",
+                f"{100 * each.floor:.3g} %",
+                f"{each.excess:.2f}",
+                f"{100 * curve.mismatch:.3g} %",
+                f"{100 * curve.by_chance:.3g} %",
+            )
+        )
+    return columns(
+        ("axis", "mismatch of the spectrum", "by chance", "ratio", "of the Allan deviation", "by chance"), rows
+    )
+
+
+def _curves(result: Comparison) -> str:
+    unit, rows = result.fit.still.unit, []
+    for each, curve in zip(result.fit.channels, result.averaged, strict=True):
+        for k, tau in enumerate(curve.tau_s):
+            shown = [quantity(float(x[k]), unit) for x in (curve.measured, curve.low, curve.high, curve.modelled)]
+            off = f"{curve.deviations[k]:+.1f}" if abs(curve.deviations[k]) >= 0.05 else "0"
+            rows.append((each.channel.axis, f"{tau:.4g}", shown[0], f"{shown[1]} .. {shown[2]}", shown[3], off))
+    return columns(("axis", "time (s)", "Allan deviation", "95 % interval", "model", "deviations off"), rows)
