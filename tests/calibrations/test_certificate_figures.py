@@ -1,0 +1,126 @@
+"""Figures of a certificate: true, uncertain by as much as they scatter, judged as the standards say."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from calibrations.certificates.decision import decide
+from calibrations.certificates.monte_carlo import agrees, interval, simulate
+from calibrations.certificates.results import figures
+from calibrations.certificates.si import in_si
+from calibrations.certificates.terms import name, names, term
+from calibrations.effect import catalogue
+from calibrations.errors import DataError, ModelError
+from calibrations.fit import fit
+from calibrations.inputs import contributions
+from calibrations.model_file import read_model
+from tests.calibrations.certified import LIMITS, before, certificate, fitted, table
+
+BY_NAME = {o.name: o for o in certificate().figures.outcomes}
+
+
+def test_results_are_the_truth_within_their_uncertainty() -> None:
+    for key, true in (("bias-x", 2.5), ("bias-y", 2.45), ("scale-factor-x", 1.001), ("scale-factor-y", 0.98)):
+        assert abs(BY_NAME[key].value - true) < BY_NAME[key].expanded
+    assert BY_NAME["bias-x"].term == "bias K0 (zero-g offset)"
+    assert all(o.coverage >= 2 for o in BY_NAME.values())
+
+
+def test_the_budget_adds_up() -> None:
+    for o in BY_NAME.values():
+        assert np.sqrt(sum(s.contribution**2 for s in o.sources)) == pytest.approx(o.std)
+        gain = next(s for s in o.sources if s.name == "gain of the converter")
+        assert (gain.kind, gain.std) == ("B", 1e-4)
+        assert gain.contribution == pytest.approx(1e-4 * abs(o.value), rel=1e-3)  # all outputs larger by 1e-4
+    assert "thermometer" in certificate().figures.not_given
+
+
+def test_the_simulation_agrees_with_the_budget_where_the_model_is_straight() -> None:
+    for o in BY_NAME.values():
+        assert o.simulated.std == pytest.approx(o.std, rel=0.15)
+        assert o.simulated.low < o.value < o.simulated.high
+
+
+def test_the_simulation_scatters_as_repeated_calibrations_do() -> None:
+    found = fit(read_model("linear"), table())
+    trials = simulate(found, contributions(found.table), 400)
+    again = np.array([fit(read_model("linear"), table(seed=100 + k)).theta for k in range(40)])
+    assert np.allclose(trials.std(axis=0), again.std(axis=0), rtol=0.45)
+    low, high = interval(trials)
+    assert np.all((low < found.theta) & (found.theta < high))
+
+
+def test_agreement_is_within_half_a_unit_of_the_first_digit() -> None:
+    assert agrees(1.0, 0.02, 0.01, 0.975, 1.02)
+    assert not agrees(1.0, 0.02, 0.01, 0.974, 1.02)
+    assert agrees(1.0, 0.05, 0.01, 0.98, 1.02)  # it may reach further
+
+
+def test_what_the_simulation_finds_wider_is_wider() -> None:
+    found = fitted()
+    tight = figures(found, None, {}, trials=8)  # so few trials that intervals are off by chance
+    for o in tight.outcomes:
+        reach = max(o.value - o.simulated.low, o.simulated.high - o.value)
+        assert o.simulated.agrees or o.expanded == pytest.approx(reach)
+
+
+@pytest.mark.parametrize(
+    ("value", "statement", "probability"),
+    [(0.5, "pass", 1.0), (0.95, "conditionalPass", 0.8413), (1.05, "conditionalFail", 0.1587), (1.2, "fail", 3.2e-5)],
+)
+def test_guarded_acceptance(value: float, statement: str, probability: float) -> None:
+    found = decide(value, 0.05, 0.1, 1.0)
+    assert (found.low, found.high, found.statement) == (-1.0, 1.0, statement)
+    assert found.probability == pytest.approx(probability, rel=0.02)
+    assert decide(value + 3, 0.05, 0.1, (2.0, 4.0)).statement == statement
+
+
+def test_limits_are_found_by_the_name_of_a_result() -> None:
+    stated = {key: o.decision.statement for key, o in BY_NAME.items() if o.decision is not None}
+    assert stated == {"bias-x": "pass", "scale-factor-x": "pass", "scale-factor-y": "fail"}
+    assert set(stated) == set(LIMITS)
+    effects = catalogue()
+    assert name(effects["z-axis-scale"], "slope", "x") == "z-axis-scale-slope-x"
+    assert name(effects["axis-misalignment"], "z", "") == "axis-misalignment-z"
+    assert "bias-y" in names(effects["bias"])
+    assert term(effects["z-axis-scale"], effects["z-axis-scale"].parameters[0]).endswith("K_io K1, slope")
+
+
+def test_as_found_is_what_the_model_before_says() -> None:
+    bias = BY_NAME["bias-x"]
+    assert bias.found is not None
+    assert bias.value - bias.found[0] == pytest.approx(0.002, abs=1e-4)
+    (error, _) = certificate().figures.errors
+    assert error.found is not None
+    assert error.found[0] == pytest.approx(2.0, rel=0.05)  # mg
+    assert error.left[0] < 0.1
+    assert figures(fitted(), None, {}, trials=8).errors[0].found is None
+    assert before().terms[0].estimates[0].std is not None
+
+
+def test_every_result_names_the_rows_behind_it() -> None:
+    for o in BY_NAME.values():
+        assert sum(share for _, share in o.weights) == pytest.approx(1.0)
+        assert sorted(number for number, _ in o.weights) == list(range(fitted().table.n))
+    heaviest = fitted().table.column("beta_deg")[BY_NAME["scale-factor-x"].weights[0][0]]
+    assert heaviest % 180 == 0  # where x is vertical
+
+
+@pytest.mark.parametrize(
+    ("unit", "factor", "si"),
+    [("V", 1.0, r"\volt"), ("V/g", 1 / 9.81, r"\volt\metre\tothe{-1}\second\tothe{2}"),
+     ("V/g^2", 9.81**-2, r"\volt\metre\tothe{-2}\second\tothe{4}"), ("V/K", 1.0, r"\volt\kelvin\tothe{-1}"),
+     ("V/h", 1 / 3600, r"\volt\second\tothe{-1}"), ("1", 1.0, r"\one"), ("deg", 1.0, r"\degree"), ("", 1.0, r"\one")],
+)  # fmt: skip
+def test_units_in_si(unit: str, factor: float, si: str) -> None:
+    assert in_si(unit, 9.81) == (pytest.approx(factor), si)
+
+
+def test_what_cannot_be_certified_is_refused() -> None:
+    with pytest.raises(DataError, match='the unit "furlong"'):
+        in_si("furlong", 9.81)
+    rates = fit(read_model("linear"), table())
+    object.__setattr__(rates.problem.table, "kind", "rates")
+    with pytest.raises(ModelError, match="for poses or positions, not for rates"):
+        figures(rates, None, {})

@@ -1,0 +1,136 @@
+"""The certificate as HTML, PDF and XML: read back by others' programs, with the figures that were written."""
+
+from __future__ import annotations
+
+import base64
+import importlib
+import io
+import json
+import re
+import sys
+import types
+import warnings
+import xml.etree.ElementTree as ET
+from pathlib import Path
+from typing import Any
+
+import pypdf
+import pytest
+import xmlschema
+
+from calibrations.certificates.dcc import dcc
+from calibrations.certificates.html import html
+from calibrations.certificates.pdf import pdf
+from calibrations.certificates.sections import sections, verdict
+from tests.calibrations.certified import certificate
+
+SCHEMAS = Path(__file__).parents[1] / "data" / "dcc"
+PLACES = {
+    "https://ptb.de/si/v2.1.0/SI_Format.xsd": "SI_Format.xsd",
+    "https://www.w3.org/TR/xmldsig-core/xmldsig-core-schema.xsd": "xmldsig-core-schema.xsd",
+}
+
+
+@pytest.fixture
+def pydcc(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """The package's reader, which here neither fetches schemas from the network nor checks signatures.
+
+    For signatures alone it wants a library that cannot tell the version of OpenSSL from 3.0.10 on.
+    """
+    stub = types.ModuleType("certvalidator")
+    for name in ("CertificateValidator", "ValidationContext", "errors"):
+        setattr(stub, name, None)
+    monkeypatch.setitem(sys.modules, "certvalidator", stub)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        module = importlib.import_module("dcc.dcc")
+    monkeypatch.setattr(module, "DCCXMLValidator", lambda: None)
+    return module.DCC
+
+
+def test_pydcc_reads_back_what_was_written(pydcc: Any, tmp_path: Path) -> None:
+    c = certificate()
+    (tmp_path / "c.xml").write_text(dcc(c), encoding="utf-8")
+    read = pydcc(xml_file_name=str(tmp_path / "c.xml"))
+    assert (read.uid(), read.version(), read.mandatory_language()) == ("C-2026-17", "3.2.0", "en")
+    assert read.calibration_laboratory_name() == "Lab <&> Co"
+    assert f"{read.calibration_date():%Y-%m-%d}" == "2026-11-20"
+    assert read.item_id()["identifications"]["identification"]["value"] == "17"
+    results = {
+        words.split()[-1]: found["real"] for words, found in read.get_calibration_results("name") if "left" in words
+    }
+    for o in c.figures.outcomes:
+        factor = 1 / 9.81 if o.unit == "V/g" else 1.0
+        assert float(results[o.name]["value"]) == pytest.approx(factor * o.value)
+        unc = results[o.name]["expandedUnc"]
+        assert float(unc["uncertainty"]) == pytest.approx(factor * o.expanded)
+        assert (float(unc["coverageFactor"]), unc["coverageProbability"]) == (
+            pytest.approx(o.coverage, abs=1e-4),
+            "0.95",
+        )
+
+
+def test_it_is_valid_by_the_schema_of_ptb() -> None:
+    places = {address: (SCHEMAS / name).as_uri() for address, name in PLACES.items()}
+    schema = xmlschema.XMLSchema(str(SCHEMAS / "dcc.xsd"), uri_mapper=places, allow="local")
+    assert [f"{e.path}: {e.reason}" for e in schema.iter_errors(dcc(certificate()))] == []
+    assert not schema.is_valid(dcc(certificate()).replace("dcc:uniqueIdentifier>", "dcc:number>"))
+
+
+def test_the_xml_holds_budget_conformity_and_every_row() -> None:
+    root = ET.fromstring(dcc(certificate()))  # noqa: S314 we wrote it
+    space = {"d": "https://ptb.de/dcc"}
+    stated = [e.text for e in root.iterfind(".//d:conformity", space)]
+    assert stated == ["pass", "pass", "fail"]
+    said = " ".join(e.text or "" for e in root.iterfind(".//d:metaData/d:declaration/d:content", space))
+    assert "gain of the converter: type B" in said
+    assert "effective degrees of freedom" in said
+    valid = [e.text for e in root.iterfind(".//d:measuringEquipment/d:certificate/d:inValidityRange", space)]
+    assert valid == ["true", "false"]
+    whole = json.loads(base64.b64decode(root.findtext("d:document/d:dataBase64", "", space)))
+    assert whole["schema"] == "rig.certificate/1"
+    assert whole["samples"][5]["sha256"] == f"{5:064x}"
+    assert sum(whole["outcomes"][0]["weights"].values()) == pytest.approx(1.0)
+
+
+def test_html_says_everything_and_takes_nothing_literally() -> None:
+    page = html(certificate())
+    for text in (
+        "C-2026-17",
+        "Lab &lt;&amp;&gt; Co",
+        "470",
+        "CAL-8",
+        "2020-01-01, expired",
+        "Decision rule",
+        "as found",
+    ):
+        assert text in page
+    assert "Lab <&>" not in page
+    assert not re.search(r'(src|href)="http', page)
+    assert verdict(certificate()) == "fail"
+    assert page == html(certificate())
+
+
+def test_the_pdf_holds_the_same_text() -> None:
+    made = pdf(certificate())
+    assert made == pdf(certificate())
+    read = pypdf.PdfReader(io.BytesIO(made))
+    assert read.metadata is not None
+    assert read.metadata.title == "Calibration certificate C-2026-17"
+    text = " ".join(" ".join(page.extract_text() for page in read.pages).split())
+    for section in sections(certificate()):
+        assert section.title in text
+        for table in section.tables:
+            assert table.title in text
+    for expected in ("Lab <&> Co", "2020-01-01, expired", f"page 1 of {len(read.pages)}", "K1 (sensitivity), y"):
+        assert expected in text
+
+
+def test_sections_are_those_of_a_certificate() -> None:
+    assert [s.title for s in sections(certificate())] == [
+        "Identification", "Procedure", "Environment", "Results", "As found and as left", "Uncertainty", "Traceability",
+    ]  # fmt: skip
+    (results,) = next(s for s in sections(certificate()) if s.title == "Results").tables
+    assert results.rows[0][1].startswith("2.50")
+    check = next(s for s in sections(certificate()) if s.title == "Uncertainty").tables[0]
+    assert check.rows[0][-1] in ("confirmed", "widened to the simulation")

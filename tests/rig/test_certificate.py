@@ -1,0 +1,107 @@
+"""rig certificate: from a run with its bench, from a file, and what it refuses."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from calibrations.model_file import dump_model
+from rig.bench import Bench
+from rig.record import Record
+from tests.calibrations.certified import before
+
+Rig = Callable[..., Any]
+BENCH = {
+    "sensor": {"name": "ADXL203", "serial": "17", "manufacturer": "Analog Devices", "filter_corner_hz": 15.07},
+    "laboratory": {"name": "The Lab", "person": "A. Person", "city": "Town", "country": "DE", "customer": "Somebody"},
+    "limits": {"results": {"bias-x": [1.0, 4.0], "scale-factor-x": [0.1, 0.2]}},
+    "uncertainty": {"gain_std": 1e-4},
+    "certificates": {"hand level": {"number": "L-1", "due": "2001-01-01"}},
+}
+SWEEP = (
+    "run",
+    "sweep",
+    "--inclinations-deg",
+    "90,30",
+    "--step-deg",
+    "45",
+    "--dwell-s",
+    "0.2",
+    "--unattended",
+    "--json",
+)
+
+
+@pytest.mark.sockets
+def test_a_run_gives_all_three_forms(rig: Rig, bench_file: Callable[..., Path], tmp_path: Path) -> None:
+    file = str(bench_file(BENCH))
+    run = json.loads(rig(*SWEEP, "--bench", file).out)["run"]
+    ended = rig("certificate", run, "--model", "linear", "--out", str(tmp_path / "c"))
+    assert ended.status == 1, ended.err  # the scale factor is beyond its limit
+    assert "pass (over 99.9 %)" in ended.out
+    assert "hand level's certificate L-1 expired" in ended.out
+    for form, text in ((".html", "The Lab"), (".xml", "<dcc:city>Town</dcc:city>"), (".pdf", "")):
+        path = tmp_path / f"c{form}"
+        assert f"written: {path}" in ended.out
+        assert form == ".pdf" or text in path.read_text(encoding="utf-8")
+    document = json.loads(rig("certificate", run, "--model", "linear", "--out", str(tmp_path / "d.xml"), "--json").out)
+    assert document["schema"] == "rig.certificate/1"
+    assert (document["serial"], document["customer"], document["laboratory"]["country"]) == ("17", "Somebody", "DE")
+    assert {i["role"] for i in document["instruments"]} >= {"alpha", "adc", "hand level"}
+    _check_that_samples_can_be_found(run, document)
+
+
+def _check_that_samples_can_be_found(run: str, document: dict[str, Any]) -> None:
+    """By run, pose and digest, with nothing of the program but its record."""
+    with Record() as record:
+        kept = list(record.kept(run))
+    assert [s["number"] for s in document["samples"]] == [k.number for k in kept]
+    for said, k in zip(document["samples"], kept, strict=True):
+        block = ",".join(k.samples.channels).encode() + np.ascontiguousarray(k.samples.volts, "<f8").tobytes()
+        assert said["sha256"] == hashlib.sha256(block).hexdigest()
+        assert said["means"][0] == pytest.approx(k.dwell.means["vx"])
+
+
+def test_a_file_is_certified_without_a_rig(rig: Rig, work: Path) -> None:
+    (work / "last-year.yaml").write_text(dump_model(before()))
+    ended = rig(
+        "certificate", "good.csv", "--model", "last-year.yaml", "--out", "good", "--number", "C-1", "--customer", "Me"
+    )
+    assert ended.status == 0, ended.err
+    page = (work / "good.html").read_text()
+    for text in (
+        "C-1",
+        "Me",
+        "measured elsewhere",
+        "As found: by the model last-year.yaml",
+        "does not say which laboratory",
+    ):
+        assert text in page
+    assert "As found is not known" in _page(rig, "linear", work)
+
+
+def _page(rig: Rig, model: str, work: Path) -> str:
+    assert rig("certificate", "good.csv", "--model", model, "--out", "only.html").status == 0
+    assert not (work / "only.pdf").exists()
+    return (work / "only.html").read_text()
+
+
+def test_what_is_asked_wrongly_is_refused(refused: Callable[..., str]) -> None:
+    words = ("--model", "linear", "--out")
+    assert 'certificates end in .html, .pdf or .xml, not in ".doc"' in refused(
+        "certificate", "good.csv", *words, "c.doc"
+    )
+    assert "there is no folder" in refused("certificate", "good.csv", *words, "nowhere/c")
+    assert "no such file" in refused("certificate", "nothing", *words, "c")
+
+
+def test_the_laboratory_is_no_part_of_what_a_run_depends_on() -> None:
+    bench: dict[str, Any] = {"instruments": {}}
+    one, other = (Bench.model_validate(bench | {"laboratory": {"name": name}}) for name in ("A", "B"))
+    assert one.configuration("sweep", {}) == other.configuration("sweep", {})
