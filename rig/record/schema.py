@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sqlalchemy import JSON, Column, Float, ForeignKey, Index, Integer, LargeBinary, MetaData, String, Table
 
-SCHEMA = 5
+SCHEMA = 6
 metadata = MetaData()
 
 runs = Table(
@@ -69,6 +69,16 @@ blocks = Table(
     Column("samples", LargeBinary, nullable=False),
 )
 
+dwells = Table(  # what a page draws of a night without reading its samples
+    "dwells",
+    metadata,
+    Column("run", ForeignKey("runs.run"), primary_key=True),
+    Column("number", Integer, primary_key=True),  # of the pose
+    Column("n", Integer, nullable=False),  # samples
+    Column("means", JSON, nullable=False),  # V, by channel
+    Column("stds", JSON, nullable=False),
+)
+
 columns = Table(  # of imported tables
     "columns",
     metadata,
@@ -119,4 +129,5 @@ MIGRATIONS = {
         "ALTER TABLE poses ADD COLUMN rate_deg_s FLOAT NOT NULL DEFAULT 0",
     ),
     4: (),  # a new table
+    5: (),  # a new table
 }

@@ -21,14 +21,14 @@ from sqlalchemy import Table as SqlTable
 from sqlalchemy.dialects.sqlite import insert as insert_or
 
 from calibrations.table import Table
-from procedures.session import Pose, Reading
+from procedures.session import Dwell, Pose, Reading
 from rig.errors import RecordError, UnknownRun
 from rig.home import home
 from rig.lease import is_held
 from rig.nearest import did_you_mean
 from rig.record import codec
 from rig.record.file import open_file
-from rig.record.schema import blocks, columns, events, log, poses, readings, runs, states
+from rig.record.schema import blocks, columns, dwells, events, log, poses, readings, runs, states
 from rig.record.values import Block, Event, Kept, Line, Run
 
 FILE = "record.db"
@@ -94,9 +94,12 @@ class Record:
         samples = {name: getattr(kept.samples, name) for name in ("rate_hz", "start_s")}
         samples |= {"channels": list(kept.samples.channels), "codec": codec.CODEC}
         samples |= {"samples": codec.encode(kept.samples.volts)}
+        measured = kept.dwell
+        dwell = {"n": measured.n, "means": dict(measured.means), "stds": dict(measured.stds)}
         with self._engine.begin() as to:
             to.execute(insert(poses), key | pose | {name: getattr(kept, name) for name in _BESIDE})
             to.execute(insert(blocks), key | samples)
+            to.execute(insert(dwells), key | dwell)
             if state is not None:
                 _put_state(to, run, state)
             self._put_lines(to)
@@ -229,6 +232,19 @@ class Record:
             for row in options.execute(query.order_by(poses.c.number)):
                 yield _kept(row)
 
+    def dwells(self, run: str, after: int = -1) -> list[tuple[int, Dwell]]:
+        """Every pose with a number above `after` that is not excluded, as means and scatter, without its samples.
+
+        Those of runs of an older program are made of the samples, which takes longer.
+        """
+        same = (poses.c.run == dwells.c.run) & (poses.c.number == dwells.c.number)
+        query = select(poses, dwells.c.n, dwells.c.means, dwells.c.stds).join_from(poses, dwells, same, isouter=True)
+        chosen = (poses.c.run == run) & (poses.c.number > after) & poses.c.excluded.is_(None)
+        with self._engine.connect() as at:
+            rows = at.execute(query.where(chosen).order_by(poses.c.number)).all()
+        older = {kept.number: kept.dwell for kept in self.kept(run)} if any(row.n is None for row in rows) else {}
+        return [(row.number, older.get(row.number) or _dwell(row)) for row in rows]
+
     def state(self, run: str) -> dict[str, Any] | None:
         """The simulated bench's state after the last kept pose; None on a real bench."""
         with self._engine.connect() as at:
@@ -293,6 +309,11 @@ def _select_runs() -> Select[Any]:
     kept = select(func.count()).where(poses.c.run == runs.c.run).scalar_subquery()
     imported = select(func.max(func.length(columns.c.numbers, type_=Integer) // 8)).where(columns.c.run == runs.c.run)
     return select(runs, func.coalesce(imported.scalar_subquery(), kept).label("rows"))
+
+
+def _dwell(row: Row[Any]) -> Dwell:
+    pose = Pose(**{name: row._mapping[name] for name in _POSE})
+    return Dwell(pose, row.t_s, row.means, row.stds, row.n, row.temperature_c)
 
 
 def _kept(row: Row[Any]) -> Kept:

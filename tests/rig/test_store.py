@@ -214,6 +214,22 @@ def test_an_excluded_pose_stays_with_its_reason_and_is_left_out() -> None:
             record.exclude(run, 7, "nothing")
 
 
+def test_means_and_scatter_come_without_the_samples() -> None:
+    with Record() as record:
+        run = begin(record)
+        for number in range(3):
+            record.keep(run, number, Kept(Pose(90, number), block([[2.0, 1.0], [4.0, number]]), 3.5, 21.5), None)
+        record.exclude(run, 1, "touched")
+        first, last = record.dwells(run)
+        assert first == (0, next(record.kept(run)).dwell)
+        assert last[0] == 2
+        assert last[1].means == {"vx": 3.0, "vy": 1.5}
+        assert record.dwells(run, after=0) == [last]
+        with record._engine.begin() as connection:  # as a run of an older program
+            connection.exec_driver_sql("DELETE FROM dwells WHERE number = 0")
+        assert record.dwells(run) == [first, last]
+
+
 def test_two_runs_of_one_second_do_not_share_a_name(monkeypatch: pytest.MonkeyPatch) -> None:
     drawn = iter(["aaa0", "aaa1", "bbb0"])
     monkeypatch.setattr("rig.record.store.secrets.token_hex", lambda _: next(drawn))
