@@ -13,12 +13,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from calibrations.evaluations.forecast import Forecast
 from procedures.level_check import reversal
 from procedures.session import Limits, Reading
 from rig.bench import Bench
 from rig.numerals import duration
 from rig.plan import Plan
 from rig.record import Kept
+from rig.soak_forecast import outlook, present, soak_watch
 from rig.way import Way
 
 UNUSUAL = 2.0  # times the usual scatter, or less than a half of it
@@ -31,6 +33,7 @@ class Seen:
     """What is known of a run at one moment.
 
     `usual_v`: by channel the usual scatter of dwells of this kind. `tilt`: the level's readings by name, deg.
+    `foreseen`: of a soak, what bias and scale factor come to.
     `range_v`: what the converter can take. `simulated`: the rig's time is faster than the wall's.
     """
 
@@ -43,6 +46,7 @@ class Seen:
     kept: Kept | None = None
     usual_v: Mapping[str, float] = field(default_factory=dict)
     tilt: Mapping[str, float] = field(default_factory=dict)
+    foreseen: Mapping[str, Forecast] = field(default_factory=dict)
 
     @property
     def count(self) -> str:
@@ -82,6 +86,7 @@ class Sight:
         adc = bench.instruments.get("adc")
         range_v = getattr(adc.typed_settings(), "range_v", None) if adc else None
         self.seen = Seen(title, bench.limits, range_v, bench.simulated)
+        self._soak = soak_watch(title)
         self._scatter: dict[tuple[str, str], deque[float]] = defaultdict(lambda: deque(maxlen=REMEMBERED))
 
     def planned(self, plan: Plan) -> None:
@@ -89,8 +94,10 @@ class Sight:
         way = replace(self.seen.way, at_s=tuple(held.start_s for held in plan.held), end_s=plan.duration_s)
         self.seen = replace(self.seen, way=way)
 
-    def begun(self, title: str) -> None:
-        """The run begins, or goes on."""
+    def begun(self, title: str, run: str = "") -> None:
+        """The run begins, or goes on; the title may be its name."""
+        if self._soak:
+            self._soak.begun(run or title)
         self.seen = replace(self.seen, title=title, way=self.seen.way.begin(time.monotonic()))
 
     def doing(self, text: str) -> None:
@@ -108,7 +115,9 @@ class Sight:
             if before_it:
                 usual[name] = statistics.median(before_it)
             before_it.append(std)
-        self.seen = replace(self.seen, kept=kept, usual_v=usual, way=self.seen.way.step(time.monotonic()))
+        foreseen = (self._soak.kept(kept) if self._soak else {}) or self.seen.foreseen
+        way = self.seen.way.step(time.monotonic())
+        self.seen = replace(self.seen, kept=kept, usual_v=usual, foreseen=foreseen, way=way)
 
     def read(self, reading: Reading) -> None:
         self.seen = replace(self.seen, tilt={**self.seen.tilt, reading.name: reading.value})
@@ -136,6 +145,8 @@ def values(seen: Seen) -> Iterator[Value]:
         for name, column in zip(kept.samples.channels, volts.T, strict=True):
             farthest = float(column[np.argmax(np.abs(column))])
             yield _channel(name, dwell.means[name], dwell.stds[name], farthest, seen)
+    for name, each in seen.foreseen.items():
+        yield Value(name, present(name, each), outlook(name, each))
 
 
 def _channel(name: str, mean: float, std: float, farthest: float, seen: Seen) -> Value:

@@ -105,14 +105,14 @@ class Bank:
         return weighed._pruned(self.nis + float(weighed.weight @ done.nis))
 
     def drawn(self, n: int, seed: int = 0) -> Array:
-        """States that may be the true one, (n, SIZE): the same bank gives the same."""
+        """States that may be the true one, up to SLOW: shape (n, SLOW). The same bank gives the same."""
         random = np.random.default_rng(seed)
         chosen = np.sort(random.choice(len(self.weight), n, p=self.weight))
         members, which = np.unique(chosen, return_inverse=True)
-        sizes, ways = np.linalg.eigh(self.belief.covariance[members])
+        sizes, ways = np.linalg.eigh(self.belief.covariance[members, :SLOW, :SLOW])
         roots = ways * np.sqrt(np.maximum(sizes, 0.0))[:, None, :]
-        away = roots[which] @ random.standard_normal((n, SIZE, 1))
-        return np.asarray(self.belief.mean[chosen] + away[:, :, 0])
+        away = roots[which] @ random.standard_normal((n, SLOW, 1))
+        return np.asarray(self.belief.mean[chosen, :SLOW] + away[:, :, 0])
 
     def _pruned(self, nis: float) -> Bank:
         likely = self.weight > UNLIKELY

@@ -30,9 +30,10 @@ STRETCH_S, STRETCHES = 300.0, 3  # of the still record: a value is the mean of s
 MOST = 5e-3  # of a drift beforehand, over the scale factor: in g, and as a fraction
 QUIET = 2e-5  # white standard error over the scale factor, where it is not known
 DRAWS = 2000
+LOOKS = 40
 NARROW = 0.25  # of the whole change: half the width of the bounds of what is known
 SURE = 1e-3  # probability of the innovations below which no filter's model holds
-AHEAD_S = np.concatenate([[0.0], np.geomspace(60.0, 100 * HOUR_S, 120)])
+AHEAD_S = np.concatenate([[0.0], np.geomspace(60.0, 100 * HOUR_S, 100)])
 
 
 class Bounds(NamedTuple):
@@ -164,8 +165,43 @@ class SoakForecast:
         }
 
 
-def forecast(table: Table, oven_c: float = 0.0) -> Iterator[SoakForecast]:
-    """After each part of a soak's table, as it was while it lasted."""
+@dataclass(frozen=True)
+class Foreseen:
+    """What was known of one quantity in the course of a soak, in order of time."""
+
+    forecasts: tuple[Forecast, ...]
+
+    @property
+    def last(self) -> Forecast:
+        """What is known at the end."""
+        return self.forecasts[-1]
+
+    @property
+    def known_s(self) -> float | None:
+        """From when on the final value was known, since power-on; None where it is not at the end."""
+        since = None
+        for each in reversed(self.forecasts):
+            if not each.known:
+                break
+            since = each.t_s
+        return since
+
+
+def foreseen(table: Table, oven_c: float = 0.0) -> dict[str, Foreseen]:
+    """Every quantity of a soak's table by name, as known after LOOKS parts of it, closer together at the beginning."""
+    whole = list(parts(table))
+    looks = set(np.rint(np.geomspace(1, len(whole), LOOKS)).astype(int).tolist()) if whole else set()
+    seen: dict[str, list[Forecast]] = {}
+    for number, told in enumerate(followed(table, oven_c), 1):
+        for name, each in told.forecasts().items() if number in looks else ():
+            before = seen.setdefault(name, [])
+            if not before or before[-1].t_s < each.t_s:
+                before.append(each)
+    return {name: Foreseen(tuple(forecasts)) for name, forecasts in seen.items()}
+
+
+def followed(table: Table, oven_c: float = 0.0) -> Iterator[SoakForecast]:
+    """After each part of a soak's table: what was known while it lasted."""
     told = SoakForecast({}, oven_c)
     for part in parts(table):
         told = told.after(part)

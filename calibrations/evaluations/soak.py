@@ -9,7 +9,7 @@ Source  Ang III.B, Fig. 10.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -18,10 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrations.errors import TooFewRows
-from calibrations.evaluations.allan import allan_deviation
 from calibrations.evaluations.steady_state import FEWEST, Quantity, SteadyState, steady_state
 from calibrations.evaluations.tumble import Tumble, tumbles
 from calibrations.noise import rms
+from calibrations.noise_analysis.exact import deviations
 from calibrations.table import Array, Table
 
 REVERSAL, HOLD = "reversal", "hold"
@@ -128,7 +128,7 @@ class Soak:
         starts = self.holds.time_s - step / 2
         new = (paths[1:] != paths[:-1]) | (np.abs(np.diff(starts) - step[:-1]) > GAP_SAMPLES / _rate_hz(self.table))
         means = np.split(self.holds.column(f"v{axis}_v"), np.flatnonzero(new) + 1)
-        return allan_deviation(means, float(np.median(step)))
+        return _pooled(means, float(np.median(step)))
 
 
 def soak(table: Table, oven_c: float = 0.0) -> Soak:
@@ -153,6 +153,17 @@ def soak(table: Table, oven_c: float = 0.0) -> Soak:
         done = tumbles(reversals, axis)
         courses |= {f"{quantity}-{axis}": _course(quantity, axis, done) for quantity in ("bias", "scale")}
     return Soak(table, gaps, courses)
+
+
+def _pooled(stretches: Sequence[Array], step_s: float) -> tuple[Array, Array]:
+    """(times, s; Allan deviations) at 1, 2, 4 ... steps of stretches without gaps; empty where all are too short."""
+    longest = max((len(each) for each in stretches), default=0)
+    steps = np.array([2**k for k in range(longest.bit_length()) if 2 * 2**k <= longest], dtype=int)
+    if not len(steps):
+        return np.zeros(0), np.zeros(0)
+    squares = np.array([np.nan_to_num(deviations(each, steps) ** 2) for each in stretches])
+    counts = np.maximum(np.array([len(each) + 1 for each in stretches])[:, None] - 2 * steps, 0)
+    return step_s * steps, np.sqrt(np.sum(counts * squares, axis=0) / np.sum(counts, axis=0))
 
 
 def _complete(table: Table, whole: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -66,7 +66,7 @@ class Guide:
 
     def begun(self, run: str) -> None:
         """The run begins, or goes on."""
-        self._sight.begun(f"{self._procedure.name}  {run}")
+        self._sight.begun(f"{self._procedure.name}  {run}", run)
         self._live.start()
 
     def doing(self, text: str) -> None:

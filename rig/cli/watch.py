@@ -23,6 +23,8 @@ from rig.cli.verdicts import next_steps
 from rig.plan import Plan
 from rig.record import Kept, Record
 from rig.runner import Outcome, Watch, Wish
+from rig.soak_forecast import SoakWatch, soak_watch
+from rig.soak_forecast import lines as told_lines
 
 
 def watch_options(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -33,16 +35,21 @@ def watch_options(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 class Quiet:
-    """Nobody looks on. A question takes its answer from the file, or from the technician of a simulated bench."""
+    """Nobody looks on. A question takes its answer from the file, or from the technician of a simulated bench.
 
-    def __init__(self, answers: Mapping[str, str]) -> None:
-        self._answers = answers
+    What a soak will come to is told on standard error, after every reversal.
+    """
+
+    def __init__(self, answers: Mapping[str, str], soak: SoakWatch | None = None) -> None:
+        self._answers, self._soak = answers, soak
 
     def planned(self, plan: Plan) -> None:
         """It is done as it is planned."""
 
     def begun(self, run: str) -> None:
         note(f"run {run}")
+        if self._soak:
+            self._soak.begun(run)
 
     def doing(self, text: str) -> None:
         """Nobody reads it."""
@@ -52,6 +59,8 @@ class Quiet:
 
     def kept(self, kept: Kept) -> None:
         """The record has it."""
+        if self._soak and (told := self._soak.kept(kept)):
+            note(told_lines(told))
 
     def read(self, reading: Reading) -> None:
         """The record has it."""
@@ -75,7 +84,7 @@ def watching(procedure: Procedure, bench: Bench, unattended: bool, answers: Path
     """Who looks on: a person in a terminal, unless the run is unattended or nobody is there."""
     given = _answers(answers)
     if unattended or not (sys.stdin.isatty() and sys.stderr.isatty()):
-        yield Quiet(given)
+        yield Quiet(given, soak_watch(procedure.name))
         return
     from rig.cli.guide import Guide  # rich is only imported where somebody sees it
 

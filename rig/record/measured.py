@@ -75,11 +75,11 @@ class Measured:
     def part(self, kind: str, path: str = "") -> Table:
         """A table of another kind out of the run: of `poses` whose path begins with `path`. Raises RecordError."""
         run = replace(self.run, run=self.name, constants=self.constants, kind=kind)
-        on_s = self._power_on_s()
+        on_s = self.power_on_s()
         poses = (replace(kept, t_s=kept.t_s - on_s) for kept in self.kept() if kept.pose.path.startswith(path))
         return MADE.get(kind, samples_table)(run, poses)
 
-    def _power_on_s(self) -> float:
+    def power_on_s(self) -> float:
         """When the run itself switched the sensor on, on its clock: 0 where it did not.
 
         The reading is the bench's, and was taken before the first pose by the same process.

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import groupby
 
 import numpy as np
 
+from calibrations.evaluations.forecast import Foreseen, foreseen
 from calibrations.evaluations.soak import AXES, HOUR_S, Course, Soak
 from calibrations.evaluations.soak import soak as soak_of
 from calibrations.evaluations.steady_state import COVERAGE, FEWEST, SteadyState
@@ -21,6 +22,7 @@ NAMES = (
     *("steady-state", "steady-state-time", "steady-state-{axis}", "steady-state-time-{axis}"),
     *("bias-drift-{axis}", "scale-drift-{axis}", "bias-tolerance-{axis}", "scale-tolerance-{axis}"),
     *("time-constant-{axis}", "scale-time-constant-{axis}", "temperature-wander", "gap"),
+    *("bias-final-{axis}", "scale-final-{axis}", "bias-foreseen-{axis}", "scale-foreseen-{axis}"),
 )
 
 
@@ -36,6 +38,9 @@ def evaluate(measured: Measured) -> dict[str, Result]:
     bias-tolerance         V, within which a bias is called steady; so for the scale factor, over its final value
     temperature-wander     K, peak to peak, of the temperature about the sensor's own warming
     gap                    s, of which nothing was kept
+    bias-final             V, what the bias comes to, as followed by the filter: where that is known
+    scale-final            V/g, the same of the scale factor
+    bias-foreseen          h since power-on, from which on the filter knew it; so for the scale factor
 
     A soak with too few reversals to tell drift from noise has its gaps only.
     """
@@ -48,12 +53,18 @@ def evaluate(measured: Measured) -> dict[str, Result]:
             results |= _drift(course, course.state)
     if (wander_k := found.temperature_wander_k) is not None:
         results["temperature-wander"] = Result(wander_k, "K")
+    results |= _foreseen(foreseen_of(measured))
     return results | {"gap": Result(sum(gap.length_s for gap in found.gaps), "s")}
 
 
 def night(measured: Measured) -> Soak:
     """The run as a soak; its times are counted from power-on, or from its beginning where that is not known."""
     return soak_of(measured.table(), measured.run.settings["oven_c"])
+
+
+def foreseen_of(measured: Measured) -> dict[str, Foreseen]:
+    """What was known of each quantity in the course of the run."""
+    return foreseen(measured.table(), measured.run.settings["oven_c"])
 
 
 def steady(dwells: Sequence[Dwell], oven_c: float) -> bool:
@@ -65,7 +76,7 @@ def steady(dwells: Sequence[Dwell], oven_c: float) -> bool:
     if len(list(groupby(reversals, lambda dwell: dwell.pose.path))) < FEWEST:
         return False
     sensors = dict.fromkeys(name.rpartition(".")[0] for name in dwells[0].means if name[-2:] in ("vx", "vy"))
-    return all(_at_rest(soak_of(_table(reversals, f"{sensor}." if sensor else ""), oven_c)) for sensor in sensors)
+    return all(_at_rest(soak_of(table_of(reversals, sensor), oven_c)) for sensor in sensors)
 
 
 def _at_rest(found: Soak) -> bool:
@@ -82,12 +93,16 @@ def _at_rest(found: Soak) -> bool:
     return True
 
 
-def _table(dwells: Sequence[Dwell], prefix: str) -> Table:
-    """The dwells of one sensor as a table."""
+def table_of(
+    dwells: Sequence[Dwell], sensor: str = "", constants: Mapping[str, str | float] | None = None, on_s: float = 0.0
+) -> Table:
+    """The dwells of one sensor, "" where there is only one, as a table with what is known of it; on since `on_s`."""
+    prefix = f"{sensor}." if sensor else ""
     columns: dict[str, list[float]] = {
         "alpha_deg": [dwell.pose.alpha_deg for dwell in dwells],
         "beta_deg": [dwell.pose.beta_deg for dwell in dwells],
-        "t_s": [dwell.t_s for dwell in dwells],
+        "direction": [dwell.pose.direction for dwell in dwells],
+        "t_s": [dwell.t_s - on_s for dwell in dwells],
         "n": [dwell.n for dwell in dwells],
     }
     temperatures_c = [dwell.temperature_c for dwell in dwells if dwell.temperature_c is not None]
@@ -97,7 +112,8 @@ def _table(dwells: Sequence[Dwell], prefix: str) -> Table:
         if (channel := f"{prefix}v{axis}") in dwells[0].means:
             columns[f"v{axis}_v"] = [dwell.means[channel] for dwell in dwells]
             columns[f"v{axis}_std_v"] = [dwell.stds[channel] for dwell in dwells]
-    return Table.from_columns("poses", columns, labels={"path": tuple(dwell.pose.path for dwell in dwells)})
+    labels = {"path": tuple(dwell.pose.path for dwell in dwells)}
+    return Table.from_columns("poses", columns, constants or {}, "the run", labels)
 
 
 def _steady(found: Soak, axis: str) -> dict[str, Result]:
@@ -105,6 +121,19 @@ def _steady(found: Soak, axis: str) -> dict[str, Result]:
     results = {f"steady-state{end}": Result(float(time is not None), "")}
     if time is not None:
         results[f"steady-state-time{end}"] = Result(time[0] / HOUR_S, "h", time[1] / HOUR_S)
+    return results
+
+
+def _foreseen(found: Mapping[str, Foreseen]) -> dict[str, Result]:
+    """What was known at the end, and since when."""
+    results: dict[str, Result] = {}
+    for name, course in found.items():
+        quantity, _, axis = name.partition("-")
+        if course.known_s is not None:
+            final = course.last.final
+            unit = "V" if quantity == "bias" else "V/g"
+            results[f"{quantity}-final-{axis}"] = Result(final.value, unit, final.half / COVERAGE)
+            results[f"{quantity}-foreseen-{axis}"] = Result(course.known_s / HOUR_S, "h")
     return results
 
 

@@ -104,6 +104,24 @@ def test_noise_of_hours_and_allan_deviation_are_those_of_the_still_record() -> N
     times_s, deviations = found.allan("x")
     assert times_s.tolist() == [BLOCK_S, 2 * BLOCK_S, 4 * BLOCK_S]
     assert deviations[0] == pytest.approx(0.8e-3 * np.sqrt(20 / 60_000), rel=0.2)
+    drift_v = 2e-3 * np.exp(-found.holds.time_s / 5400)
+    straight = BLOCK_S * np.abs(np.gradient(drift_v, found.holds.time_s)).mean() / np.sqrt(2)
+    assert deviations[2] < 0.8e-3 * np.sqrt(20 / 240_000) + 4 * straight
+
+
+def test_a_still_record_in_pieces_has_the_deviation_of_each() -> None:
+    """A straight drift within every hold: the deviation rises with time, and no piece is compared with the next."""
+    table = soak_table(drift_v=0.0)
+    paths = np.array(table.labels["path"])
+    jumps = np.cumsum(np.append(False, paths[1:] != paths[:-1]))
+    columns = {**table.columns, "vx_v": 1e-6 * table.time_s + 0.1 * jumps}
+    times_s, deviations = soak(type(table).from_columns("poses", columns, table.constants, "", table.labels)).allan("x")
+    assert deviations == pytest.approx(1e-6 * times_s / np.sqrt(2))
+
+
+def test_holds_of_one_block_have_no_deviation() -> None:
+    times_s, deviations = soak(soak_table(60.0)).allan("x")
+    assert len(times_s) == len(deviations) == 0
 
 
 def test_the_page_tells_the_night_without_a_network() -> None:
