@@ -18,7 +18,7 @@ from calibrations.fit import Fit, evaluate, fit
 from calibrations.model import Model
 from calibrations.noise import rms
 from calibrations.search.candidates import SIGNIFICANT
-from calibrations.search.path import MATERIAL
+from calibrations.search.share import MATERIAL
 from calibrations.table import MILLI, Array, Table
 
 MOST_PLACES = 8

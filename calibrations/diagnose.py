@@ -19,14 +19,13 @@ from calibrations.search.candidates import Candidate
 from calibrations.search.determined import undetermined
 from calibrations.search.held_out import held_out_excess
 from calibrations.search.outliers import caution, told
-from calibrations.search.path import MATERIAL, Path, find_path, share_left
+from calibrations.search.path import Path, find_path
 from calibrations.search.patterns import Pattern
 from calibrations.search.plainer import plainer
 from calibrations.search.settle import settled
+from calibrations.search.share import MATERIAL, MOST_LEFT, share_left
 from calibrations.search.structure import structure_of
 from calibrations.table import Table
-
-MOST_LEFT = 1 / 5  # of the excess variance: more left than this, and the catalogue has not explained it
 
 
 @dataclass(frozen=True)
@@ -85,4 +84,4 @@ def _verdict_of(path: Path, end: Fit, structure: Pattern | None, plainer_wins: b
         return "unexplained"
     if not path.steps:
         return "adequate"
-    return "ambiguous" if path.steps[0].taken.indistinguishable_from else "effect-missing"
+    return "ambiguous" if path.first[0].indistinguishable_from else "effect-missing"

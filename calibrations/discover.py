@@ -11,7 +11,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from calibrations.diagnose import MOST_LEFT
 from calibrations.effect import Effect, catalogue
 from calibrations.experiment import Experiment, separating
 from calibrations.fit import Fit, refit
@@ -20,14 +19,15 @@ from calibrations.search.candidates import candidates
 from calibrations.search.determined import undetermined
 from calibrations.search.held_out import held_out_excess
 from calibrations.search.outliers import caution, fit_without, told
-from calibrations.search.path import MATERIAL, Path, find_path, share_left
+from calibrations.search.path import Path, find_path
 from calibrations.search.patterns import Pattern
 from calibrations.search.plainer import plainer
+from calibrations.search.rivals import with_rivals
 from calibrations.search.settle import Settled, cost, first_order, settled
+from calibrations.search.share import MATERIAL, MOST_LEFT, OF_FORM, share_left
 from calibrations.search.structure import structure_of
 from calibrations.table import Table
 
-OF_FORM = 1 / 16  # of the excess variance: so little may be the form of the causes, known only approximately
 REFINEMENT = 0.02  # of the greatest cost: an effect that costs less to lose refines the form of another
 
 
@@ -88,7 +88,7 @@ def add(effect: Effect, model: Model, table: Table, effects: Mapping[str, Effect
     """
     before, outliers = fit_without(model, table)
     found = candidates(before, catalogue() if effects is None else effects)
-    rivals = next((c.indistinguishable_from for c in found if c.name == effect.name), ())
+    rivals = next((with_rivals(c, found, before).indistinguishable_from for c in found if c.name == effect.name), ())
     step = Added(effect.name, before, refit(before, before.model.with_effect(effect)))
     structure = structure_of(step.after)
     left = step.after.pooled_excess > MATERIAL and structure is not None

@@ -31,10 +31,10 @@ NEEDS (columns), KINDS (of tables), AFTER (effects without which in a model it m
 function of the table, for reference values that are kept with the model and not fitted; STARTS: name -> function of
 the table, for starts from the data, (axes,) or (starts, axes); SEARCHED, a function of the table: how many starts
 that look different STARTS is the best of; CONTAINS, effects that it becomes where its shape vanishes; EXACT, where the
-form follows from geometry alone and needs no other effect to refine it; LACKS, a function of the table: why its
-rows cannot show the effect whatever their number, or None; and LEFT_OUT: why a compensation in the sensor's product
-cannot follow it (every other effect on force, transduction or output is inverted there). KINDS are kinds of tables, and "fields" for positions of a
-magnetometer.
+form follows from geometry alone and needs no other effect to refine it; ROUNDS, where the output becomes a staircase,
+whose slope says nothing; LACKS, a function of the table: why its rows cannot show the effect whatever their number, or
+None; and LEFT_OUT: why a compensation in the sensor's product cannot follow it (every other effect on force,
+transduction or output is inverted there). KINDS are kinds of tables, and "fields" for positions of a magnetometer.
 """
 
 from __future__ import annotations
@@ -131,6 +131,7 @@ class Effect:
     searched: Callable[[Table], float] = _one
     contains: tuple[str, ...] = ()
     exact: bool = False
+    rounds: bool = False
     lacks: Callable[[Table], str | None] = _nothing
     pose: Callable[..., Any] | None = None
     force: Callable[..., Array] | None = None
@@ -234,6 +235,7 @@ def _from_module(module: ModuleType, path: Path) -> Effect:
         searched=getattr(module, "SEARCHED", _one),
         contains=_words(module, "CONTAINS", (), path),
         exact=bool(getattr(module, "EXACT", False)),
+        rounds=bool(getattr(module, "ROUNDS", False)),
         lacks=getattr(module, "LACKS", _nothing),
         left_out=str(getattr(module, "LEFT_OUT", "")),
         pose=hooks.get("pose"),

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy.optimize import OptimizeResult, least_squares
 
 from calibrations.model import Model
 from calibrations.noise import Noise, rms, white_only
@@ -121,20 +121,25 @@ def _minimise(problem: Problem, noise: Noise, start: Array) -> tuple[Array, floa
     def residual(theta: Array) -> Array:
         return noise.whiten(problem.residual(theta)[:, :, None])[:, 0]
 
-    def jacobian(theta: Array) -> Array:
-        return noise.whiten(problem.jacobian(theta))
+    def descended(start: Array, stairs: bool) -> OptimizeResult:
+        def jacobian(theta: Array) -> Array:
+            return noise.whiten(problem.jacobian(theta, stairs=stairs))
 
-    answer = least_squares(
-        residual,
-        start,
-        jac=jacobian,
-        bounds=problem.layout.bounds,
-        x_scale=problem.layout.typical,
-        ftol=1e-9,
-        xtol=1e-9,
-        gtol=1e-12,
-        max_nfev=60,
-    )
+        return least_squares(
+            residual,
+            start,
+            jac=jacobian,
+            bounds=problem.layout.bounds,
+            x_scale=problem.layout.typical,
+            ftol=1e-9,
+            xtol=1e-9,
+            gtol=1e-12,
+            max_nfev=60,
+        )
+
+    answer = descended(start, stairs=False)
+    if problem.rounds:
+        answer = descended(answer.x, stairs=True)
     return answer.x, float(answer.cost)
 
 

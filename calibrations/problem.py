@@ -95,12 +95,21 @@ class Problem:
         strengths = [float(p["total"]) for effect, p in steps if effect.name == STRENGTH]
         return strengths[0] / self.layout.nominal if strengths else 1.0
 
-    def jacobian(self, theta: Array, of: NDArray[np.bool_] | None = None) -> Array:
-        """d residual / d theta by central differences, shape (channels, n, p); only the entries `of` where given."""
+    @property
+    def rounds(self) -> bool:
+        """Whether an effect makes a staircase of the output."""
+        return any(term.effect.rounds for term in self.layout.model.terms)
+
+    def jacobian(self, theta: Array, of: NDArray[np.bool_] | None = None, stairs: bool = False) -> Array:
+        """d residual / d theta by central differences, shape (channels, n, p); only the entries `of` where given.
+
+        A staircase that an effect makes of the output is taken for the slope of one that it has in the mean, unless
+        `stairs` are to be climbed: beside what else is missing, where edges lie tells nothing of what comes before.
+        """
         low, high = self.layout.bounds
         steps = 1e-3 * self.layout.typical
         chosen = np.flatnonzero(np.ones(len(theta), dtype=bool) if of is None else of)
-        error = self._errors_near(theta)
+        error = self._errors_near(theta, stairs)
         columns = []
         for k in map(int, chosen):
             ahead, behind = theta.copy(), theta.copy()
@@ -108,12 +117,14 @@ class Problem:
             columns.append((error(k, ahead) - error(k, behind)) / (ahead[k] - behind[k]))
         return np.stack(columns, axis=2) if columns else np.zeros((len(self.channels), self.table.n, 0))
 
-    def _errors_near(self, theta: Array) -> Callable[[int, Array], Array]:
+    def _errors_near(self, theta: Array, stairs: bool) -> Callable[[int, Array], Array]:
         """The residual, up to a constant, as a function of (entry changed, vector).
 
         An entry of an effect that only adds to the output changes that effect's contribution and nothing else.
         """
         terms = self.layout.model.terms
+        if self.rounds and not stairs:
+            return self._errors_beside_stairs
         if self.table.kind not in KNOWN or any(term.effect.output for term in terms):
             return lambda _, vector: self.residual(vector)
         a = force(self.table, self.layout.steps(theta))
@@ -128,6 +139,12 @@ class Problem:
             return -added[:, : len(self.channels)].T
 
         return error
+
+    def _errors_beside_stairs(self, k: int, vector: Array) -> Array:
+        steps = self.layout.steps(vector)
+        if self.layout.model.terms[self.layout.slots[k].term].effect.rounds:
+            return self.residual_by(steps)
+        return self.residual_by([step for step in steps if not step[0].rounds])
 
     @cached_property
     def white(self) -> Array | None:

@@ -24,6 +24,7 @@ from calibrations.table import Array, Table
 KINDS = ("poses",)
 LEFT_OUT = "what was rounded off is lost"
 AFTER = ("bias", "scale-factor")
+ROUNDS = True
 PARAMETERS = (
     Parameter("step", "{out}", typical=1e-6, per_axis=False, starts=(1e-3,), low=1e-9, doc="from one code to the next"),
     Parameter("offset", "{out}", typical=1e-4, per_axis=False, doc="where a code stands"),

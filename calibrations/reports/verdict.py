@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from calibrations.diagnose import Diagnosis
-from calibrations.search.path import MATERIAL
+from calibrations.search.share import MATERIAL
 
 
 def headline(result: Diagnosis) -> str:
@@ -16,7 +16,7 @@ def headline(result: Diagnosis) -> str:
         return f"nothing in the catalogue explains this. Left over: {result.residual_structure}."
     if not result.path.steps:
         return f"nothing shows that an effect is missing, but {result.caution}."
-    best = result.path.steps[0].taken
+    best = result.candidates[0]
     if result.verdict == "ambiguous":
         rivals = " or ".join((best.name, *best.indistinguishable_from))
         return f"an effect is missing: {rivals}; this data cannot tell which."

@@ -18,7 +18,6 @@ from calibrations.coverage import uncovered
 from calibrations.effect import Effect
 from calibrations.fit import Fit, refit
 from calibrations.noise import rms
-from calibrations.noise_estimation.likelihood import twice_log_likelihood
 from calibrations.noise_estimation.noise_fit import gains
 from calibrations.parameters import Layout
 from calibrations.problem import Problem
@@ -27,7 +26,6 @@ from calibrations.search.screen import Screen, Search, of_search
 from calibrations.table import Array
 
 SIGNIFICANT = 0.003  # chance of naming anything at all where nothing is missing, over the whole search
-HALF = 0.5  # of the best one's gain: rivals with less of it have another shape altogether
 NOT_TOLD_APART = 6.0  # a loss of twice the log-likelihood below this: odds of less than 20 to 1
 
 
@@ -75,7 +73,6 @@ def candidates(before: Fit, effects: Mapping[str, Effect]) -> list[Candidate]:
     found = _with_probabilities(found, before.residual.size, unseen)
     found.sort(key=lambda c: (c.held_out_after < unseen, schwarz(c, before.residual.size)), reverse=True)
     like = [_like(c, found, screen) for c in found]
-    like[:1] = [(*names, *_bent(found, names, before)) for names in like[:1]]
     return [
         replace(c, indistinguishable_from=(*names, *_unlogged(c.effect, before, effects)))
         for c, names in zip(found, like, strict=True)
@@ -224,22 +221,6 @@ def _with_probabilities(found: list[Candidate], rows: int, unseen: float) -> lis
     half = np.array([schwarz(c, rows) / 2 if c.held_out_after < unseen else -np.inf for c in found] + [0.0])
     weight = np.exp(half - half.max())
     return [replace(c, probability=float(w / weight.sum())) for c, w in zip(found, weight[:-1], strict=True)]
-
-
-def _bent(found: list[Candidate], known: tuple[str, ...], before: Fit) -> tuple[str, ...]:
-    """Rivals of the first candidate, beside the known, that take up as much once their shape has been fitted."""
-    best = found[0]
-    rivals = [c for c in found[1:] if c.name not in known and c.rank <= best.rank + 1 and _has_shape(c.effect)]
-    rivals = [c for c in rivals if c.gain > HALF * best.gain and best.name not in c.effect.contains]
-    if best.p_value >= SIGNIFICANT or not rivals:
-        return ()
-    own = twice_log_likelihood(added(before, best))
-    return tuple(c.name for c in rivals if own - twice_log_likelihood(added(before, c)) < NOT_TOLD_APART)
-
-
-def _has_shape(effect: Effect) -> bool:
-    """Whether it has parameters, such as a time constant, that change the form of what it does."""
-    return bool(effect.starts) or any(len(p.starts) > 1 for p in effect.parameters)
 
 
 def _unlogged(effect: Effect, before: Fit, effects: Mapping[str, Effect]) -> tuple[str, ...]:

@@ -12,11 +12,12 @@ from calibrations.model import Model
 from calibrations.search.candidates import SIGNIFICANT, Candidate, added, best_pair, candidates
 from calibrations.search.held_out import held_out_excess
 from calibrations.search.outliers import fit_without
+from calibrations.search.rivals import with_rivals
+from calibrations.search.share import MATERIAL, share_left
 from calibrations.table import Table
 
 MOST_EFFECTS = 14
 LEAST_SHARE = 0.05  # of what is left beyond noise: a smaller gain may be the wrong form of something strong
-MATERIAL = 1.15  # times the noise floor: a residual below is as good as noise
 
 
 @dataclass(frozen=True)
@@ -53,10 +54,14 @@ class Path:
         """The last fit."""
         return self.steps[-1].after if self.steps else self.start
 
-    @property
+    @cached_property
     def first(self) -> tuple[Candidate, ...]:
-        """Candidates on top of the model that was given."""
-        return self.steps[0].candidates if self.steps else self.left
+        """Candidates on top of the model that was given; before them the one that was taken, with all its rivals."""
+        if not self.steps:
+            return self.left
+        step = self.steps[0]
+        best = with_rivals(step.taken, step.candidates, step.before)
+        return best, *(c for c in step.candidates if c is not step.taken)
 
 
 def find_path(model: Model, table: Table, effects: Mapping[str, Effect], enough: float = 0.0) -> Path:
@@ -82,11 +87,6 @@ def grown(path: Path, effects: Mapping[str, Effect], enough: float = 0.0) -> Pat
             break
         found = candidates(present, effects)
     return Path(path.start, tuple(steps), tuple(found), path.outliers)
-
-
-def share_left(start: Fit, present: Fit) -> float:
-    """Part of the excess variance at the start that the present fit has not explained."""
-    return max(present.pooled_excess**2 - 1, 0.0) / max(start.pooled_excess**2 - 1, 1e-9)
 
 
 def _next(present: Fit, found: list[Candidate]) -> Step | None:

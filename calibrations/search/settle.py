@@ -19,6 +19,7 @@ from calibrations.noise_estimation.likelihood import likelihood
 from calibrations.search.candidates import SIGNIFICANT, Candidate, added, candidates
 from calibrations.search.held_out import held_out_excess
 from calibrations.search.path import Path, grown
+from calibrations.search.rivals import with_rivals
 from calibrations.search.screen import chance
 
 MOST_ROUNDS = 6
@@ -41,19 +42,24 @@ def settled(path: Path, effects: Mapping[str, Effect]) -> Settled:
     """What stands of the effects of `path`, and what comes in their place."""
     freed = {term.name for term in path.start.model.terms}
     end, names = path.end, tuple(step.taken.name for step in path.steps)
-    beside: dict[str, Candidate] = {}
+    found: Mapping[str, tuple[Candidate, ...]] = {}
     for _ in range(MOST_ROUNDS):
         end, names = _needed(end, names, freed)
         if len(names) > MOST_EXCHANGED:
             return Settled(end, names, {})
         found = _beside(path, end, tuple(name for name in names if name not in freed), effects)
-        beside = {name: c for name, others in found.items() for c in others if c.name == name}
         after = _exchanged(end, names, found, freed)
         if after is None:
             break
         further = grown(Path(after[0], (), ()), effects)
         end, names = further.end, (*after[1], *(step.taken.name for step in further.steps))
-    return Settled(end, names, beside)
+    return Settled(end, names, _told_apart(end, found))
+
+
+def _told_apart(end: Fit, found: Mapping[str, tuple[Candidate, ...]]) -> Mapping[str, Candidate]:
+    """Each effect of the model as a candidate, with its rivals."""
+    own = {name: c for name, others in found.items() for c in others if c.name == name}
+    return {name: with_rivals(c, found[name], _without(end, name)) for name, c in own.items()}
 
 
 def _needed(present: Fit, names: tuple[str, ...], freed: set[str]) -> tuple[Fit, tuple[str, ...]]:

@@ -13,10 +13,10 @@ from functools import cached_property
 
 import numpy as np
 
-from calibrations.diagnose import MOST_LEFT
 from calibrations.effect import Effect, catalogue
 from calibrations.experiment import Experiment
 from calibrations.model import Model
+from calibrations.search.share import MOST_LEFT
 from calibrations.still.chance import chance, tube
 from calibrations.still.experiment import separating
 from calibrations.still.fit import NoiseFit, fit

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from calibrations.diagnose import MOST_LEFT
 from calibrations.effect import Effect, catalogue
 from calibrations.experiment import Experiment
 from calibrations.model import Model
+from calibrations.search.share import MOST_LEFT
 from calibrations.still.diagnose import share_left, structure_of
 from calibrations.still.experiment import separating
 from calibrations.still.fit import NoiseFit, fit

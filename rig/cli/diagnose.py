@@ -80,7 +80,7 @@ def _told(result: Diagnosis, data: str, model: str, bench: str) -> str:
         head = ("candidate", "error on unseen poses / floor", "p-value", "probability", "not told apart from")
         lines += [columns(head, rows), ""]
     if result.verdict in ("effect-missing", "ambiguous") and result.path.steps:
-        best = result.path.steps[0].taken
+        best = result.candidates[0]
         lines += [f"{best.name}: {why(best, result)}", "", f"    {best.effect.formula.splitlines()[0]}", ""]
         lines.append(f"Add it: rig add {best.name} --model {model} --data {data} --out model.yaml{bench}")
     if result.next_experiment:

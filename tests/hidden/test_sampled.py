@@ -41,7 +41,7 @@ def test_the_cause_is_named(name: str, k: int) -> None:
         found = diagnose(sampled.measured(seed, **CAUSES[name][k]), read_model("linear"))
         told = f"{name} {k}, seed {seed}: {found.verdict}, {[s.taken.name for s in found.path.steps]}"
         assert found.verdict in ("effect-missing", "ambiguous"), told
-        named = found.path.steps[0].taken
+        named = found.candidates[0]
         assert name in (named.name, *named.indistinguishable_from), told
 
 

@@ -81,3 +81,35 @@ def test_a_cycle_of_temperature_tells_whether_there_is_play(lag_k: float, cause:
     """Play of no width is no rival: no data could rule it out."""
     found = discover(cycled(lag_k), read_model("linear"))
     assert (found.verdict, found.causes, dict(found.alternatives)) == ("adequate", (cause,), {})
+
+
+@pytest.mark.parametrize(
+    ("name", "seed", "rivals", "experiment"),
+    [
+        # a room that only becomes warmer, by a noisy thermometer: time is the better thermometer, and no proof
+        ("rising room", 5020, {"temperature-bias", "warm-up-bias"}, "soak"),
+        ("one way round", 5035, {"axis-misalignment", "stage-backlash"}, "sweep"),  # play that turns with the gear
+        ("one inclination", 5030, {"cross-axis-bias"}, "sweep"),
+    ],
+)
+def test_what_leaves_only_noise_is_a_rival_however_likely_another_is(
+    name: str, seed: int, rivals: set[str], experiment: str
+) -> None:
+    found = diagnose(case(f"inseparable/{name}", 10, seed)[0], read_model("linear"))
+    assert found.verdict == "ambiguous"
+    assert rivals <= set(found.candidates[0].indistinguishable_from)
+    assert found.next_experiment is not None
+    assert found.next_experiment.procedure == experiment
+
+
+def test_what_took_anothers_place_has_it_as_its_rival() -> None:
+    """Warming up describes the room better than its thermometer does."""
+    found = found_on("inseparable/settling room, bias", 10, 5010)
+    assert (found.verdict, found.causes) == ("ambiguous", ("warm-up-bias",))
+    assert "temperature-bias" in found.alternatives["warm-up-bias"]
+
+
+def test_what_comes_before_a_coarse_converter_is_seen_through_its_stairs() -> None:
+    """Edges that lie where another effect puts them tell nothing of it by their slope."""
+    steps = diagnose(case("triple", 10, 4010)[0], read_model("linear")).path.steps
+    assert [s.taken.name for s in steps] == ["odd-quadratic-nonlinearity", "quantisation", "temperature-bias"]

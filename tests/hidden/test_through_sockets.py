@@ -47,7 +47,7 @@ def swept(config: WorldConfig, seed: int, folder: Path, **settings: str) -> Tabl
 def test_the_missing_effect_is_named(defect: str, effect: str, tmp_path: Path) -> None:
     config = rigs.scaled(DEFECTS[defect], rigs.IDEAL, 11, 10 * rigs.noise_floor_v())
     found = diagnose(swept(config, 11, tmp_path, step_deg="20"), read_model("linear"))
-    named = found.path.steps[0].taken
+    named = found.candidates[0]
     assert found.verdict == ("ambiguous" if named.indistinguishable_from else "effect-missing")
     assert effect in (named.name, *named.indistinguishable_from)
     assert named.held_out_after <= 1.15
