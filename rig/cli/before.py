@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
 from collections import Counter
 from collections.abc import Iterator
 from datetime import date
@@ -100,9 +99,3 @@ def drawn(attitude: Attitude, file: Path) -> RenderableType:
     legend = f"\n{attitude.words}\n\nThe table from above at alpha 0:\nx, y  axes of the sensor\no     pin 1\n\n{file}"
     beside.add_row(Text("\n".join(sketch(attitude))), Text(legend, overflow="fold"))
     return beside
-
-
-def free_bytes(folder: Path) -> int:
-    """The room on the disk on which `folder` is, or will be."""
-    there = next(place for place in (folder, *folder.resolve().parents) if place.exists())
-    return shutil.disk_usage(there).free

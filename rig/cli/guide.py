@@ -19,13 +19,14 @@ from procedures.errors import BadAnswer, Declined, NoAnswer
 from procedures.questions import Choice, Question
 from procedures.session import Reading
 from rig.bench import Bench
-from rig.cli.before import before, drawn, free_bytes, mounting
+from rig.cli.before import before, drawn, mounting
 from rig.cli.screen import screen
 from rig.drawings import Attitude, drawing_of, page
 from rig.files import write_whole
 from rig.home import home
 from rig.plan import Plan
 from rig.record import Kept
+from rig.room import free_bytes
 from rig.runner import Outcome, Wish
 from rig.seen import Sight
 

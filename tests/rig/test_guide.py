@@ -18,7 +18,7 @@ from procedures.errors import Declined, NoAnswer
 from procedures.questions import Choice, Confirm, Mounting, Number
 from procedures.session import Limits, Pose, Reading
 from rig.bench import Bench, read_bench
-from rig.cli.before import before, checks, free_bytes, mounting
+from rig.cli.before import before, checks, mounting
 from rig.cli.gauge import WIDTH, gauge
 from rig.cli.guide import Guide
 from rig.cli.output import columns
@@ -29,6 +29,7 @@ from rig.errors import Stopped
 from rig.numerals import duration, size
 from rig.plan import Plan, plan
 from rig.record import Block, Kept
+from rig.room import free_bytes
 from rig.runner import Outcome
 from rig.seen import Seen, nearness
 from rig.way import Way
