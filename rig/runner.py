@@ -85,7 +85,7 @@ def _begun(
             kind=procedure.kind,
         )
         if trace is not None:
-            trace.begin(run, rig.clock)
+            trace.begin(run)
         for fault in faults:
             record.note(run, EXPIRED, fault)
         if after is not None:
@@ -114,7 +114,7 @@ def _resumed(record: Record, run_id: str, watch: Watch, bench: Bench | None = No
     trail = Trace(record) if trace else None
     with stoppable(), _held(record, run_id), connected(own, trail) as rig:
         if trail is not None:
-            trail.begin(run_id, rig.clock)
+            trail.begin(run_id)
         _same_instruments(run, rig)
         return _carry_out(record, rig, run, procedure, watch)
 

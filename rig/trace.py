@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Literal
 
-from drivers.clock import Clock
 from rig.record import Record
 
 SHOWN_BYTES = 64  # of one message: of a stream's, the header and the first samples
@@ -15,21 +14,21 @@ class Trace:
 
     def __init__(self, record: Record) -> None:
         self._record = record
-        self._run, self._clock = "", None  # type: str, Clock | None
-        self._early: list[tuple[str, str, str]] = []
+        self._run = ""
+        self._early: list[tuple[float, str, str, str]] = []
 
-    def __call__(self, wire: str, way: Literal["sent", "heard"], data: bytes) -> None:
-        line = (wire, way, shown(data))
-        if self._clock is None:
-            self._early.append(line)
+    def __call__(self, clock_s: float, wire: str, way: Literal["sent", "heard"], data: bytes) -> None:
+        line = (clock_s, wire, way, shown(data))
+        if self._run:
+            self._record.log(self._run, *line)
         else:
-            self._record.log(self._run, self._clock.now(), *line)
+            self._early.append(line)
 
-    def begin(self, run: str, clock: Clock) -> None:
+    def begin(self, run: str) -> None:
         """From now on it is the log of `run`."""
-        self._run, self._clock = run, clock
+        self._run = run
         for line in self._early:
-            self._record.log(run, clock.now(), *line)
+            self._record.log(run, *line)
         self._early.clear()
 
 

@@ -22,7 +22,7 @@ from drivers.links.url import Url
 
 CONNECT_TIMEOUT_S = 5.0
 DISCARD_S = 1.0
-Tap = Callable[[str, Literal["sent", "heard"], bytes], None]  # told of every message: on which wire, which way, what
+Tap = Callable[[float, str, Literal["sent", "heard"], bytes], None]  # told of every message: when, on which wire, what
 LOST = (OSError, termios.error, serial.SerialException)  # what a dead connection raises
 
 
@@ -82,7 +82,7 @@ class Link:
             raise self._lost(error) from error
         line.sent += len(data)
         if self._tap:
-            self._tap(self._name, "sent", data)
+            self._tap(self.clock.now(), self._name, "sent", data)
 
     def read(self, timeout_s: float) -> bytes:
         """What arrives first, or nothing when `timeout_s` is over. Raises LinkRefused at the end."""
@@ -97,7 +97,7 @@ class Link:
             raise self._lost("the other side closed it")
         line.received += len(data)
         if self._tap:
-            self._tap(self._name, "heard", data)
+            self._tap(self.clock.now(), self._name, "heard", data)
         return data
 
     def discard(self, quiet_s: float = 0.0) -> int:

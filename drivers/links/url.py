@@ -14,7 +14,10 @@ REMEDY = "Write tcp://host:port, rtu+tcp://host:port or serial:/dev/ttyUSB0?baud
 
 @dataclass(frozen=True)
 class Url:
-    """A wire's address, taken apart. `pty:` asks a server for a new pseudo-terminal."""
+    """A wire's address, taken apart. `pty:` asks a server for a new pseudo-terminal.
+
+    It has no user and no password, so that none comes into a record.
+    """
 
     text: str
     scheme: str
@@ -45,7 +48,7 @@ class Url:
             )
         except ValueError as error:
             raise LinkRefused(f"{text!r} is not the address of a wire ({error})", REMEDY) from error
-        if options or not url._complete():
+        if options or "@" in parts.netloc or not url._complete():
             raise LinkRefused(f"{text!r} is not the address of a wire", REMEDY)
         return url
 

@@ -19,7 +19,9 @@ from rig.runner import Outcome, resume
 @watch_options
 @bench_option
 @json_option
-def command(run: str, unattended: bool, answers: Path | None, bench_file: Path | None, as_json: bool) -> int:
+def command(
+    run: str, unattended: bool, answers: Path | None, trace: bool, bench_file: Path | None, as_json: bool
+) -> int:
     """Go on with RUN at its first missing pose, on the bench that it was begun with.
 
     With --bench the run goes on only if that file is still the same.
@@ -31,5 +33,5 @@ def command(run: str, unattended: bool, answers: Path | None, bench_file: Path |
             return tell(record, Outcome(found), as_json)
         own = Bench.model_validate(found.bench)
         with watching(find(found.procedure, own.folders.procedures), own, unattended, answers) as watch:
-            outcome = resume(record, run, watch, bench)
+            outcome = resume(record, run, watch, bench, trace)
         return tell(record, outcome, as_json)

@@ -28,6 +28,7 @@ def command(
     pairs: tuple[str, ...],
     unattended: bool,
     answers: Path | None,
+    trace: bool,
     bench_file: Path | None,
     as_json: bool,
 ) -> int:
@@ -41,5 +42,5 @@ def command(
     settings = parse(found, read_settings(given, pairs, found.defaults))
     with Record() as record:
         with watching(found, bench, unattended, answers) as watch:
-            outcome = start(record, bench, found, settings, watch)
+            outcome = start(record, bench, found, settings, watch, trace=trace)
         return tell(record, outcome, as_json)

@@ -14,7 +14,7 @@ from rig.cli.verdicts import lines as results
 from rig.cli.verdicts import next_steps
 from rig.errors import RecordError
 from rig.numerals import duration
-from rig.record import Event, Kept, Record, Run
+from rig.record import Event, Kept, Line, Record, Run
 from rig.record.measured import Measured, sensors_of
 
 Ranges = Mapping[str, tuple[float, float]]
@@ -23,19 +23,22 @@ Ranges = Mapping[str, tuple[float, float]]
 @click.command("show")
 @click.argument("run")
 @click.option("--poses", is_flag=True, help="List every pose with its number, and why it is left out where it is.")
+@click.option("--log", "wants_log", is_flag=True, help="List what happened step by step, and when.")
 @json_option
-def command(run: str, poses: bool, as_json: bool) -> None:
+def command(run: str, poses: bool, wants_log: bool, as_json: bool) -> None:
     """Show how RUN was made, how it ended, its results, and the range of each of its columns."""
     with Record.to_find(run) as record:
         found, events, left_out = record.run(run), record.events(run), record.excluded(run)
         ranges = _ranges(record, found)
         listed = [_pose(number, kept) for number, kept in enumerate(record.kept(run))] if poses else None
+        lines = record.lines(run) if wants_log else []
     if as_json:
-        emit(_document(found, events, ranges) | ({"kept": listed} if poses else {}))
+        more = ({"kept": listed} if poses else {}) | ({"log": [vars(line) for line in lines]} if wants_log else {})
+        emit(_document(found, events, ranges) | more)
     else:
         after = [*results(found.results), *next_steps(found, left_out)]
         told = [_event(event) for event in events]
-        parts = (_head(found), after, _columns(ranges), told, _listed(listed or []))
+        parts = (_head(found), after, _columns(ranges), told, _listed(listed or []), _logged(lines))
         click.echo("\n\n".join("\n".join(part) for part in parts if part))
 
 
@@ -88,6 +91,12 @@ def _columns(ranges: Ranges) -> list[str]:
 
 def _event(event: Event) -> str:
     return f"  {event.at[:19].replace('T', ' ')}  {event.what}: {event.text}"
+
+
+def _logged(lines: Sequence[Line]) -> Iterator[str]:
+    """Each line with its time of day (UTC) and the rig's clock."""
+    for line in lines:
+        yield f"  {line.at[11:23]}  {line.clock_s:10.3f} s  {line.who}  {line.what}: {line.text}"
 
 
 def _listed(poses: Sequence[Mapping[str, Any]]) -> list[str]:

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 CODEC = "palette-zlib/1"
+MOST_BYTES = 1 << 30  # of a block before compression: a hundred times the longest that is kept
 _HEAD = struct.Struct("<II")
 _COUNT = struct.Struct("<I")
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)  # 2^64 / golden ratio: spreads neighbours over the table
@@ -32,12 +33,28 @@ def encode(samples: NDArray[np.float64]) -> bytes:
 
 
 def decode(data: bytes) -> NDArray[np.float64]:
-    """The samples that `encode` was given, bit for bit, shape (n, channels). Raises ValueError on damage."""
+    """The samples that `encode` was given, bit for bit, shape (n, channels).
+
+    Raises ValueError on damage, which costs no more memory than MOST_BYTES.
+    """
     try:
-        raw = zlib.decompress(data)
-    except zlib.error as error:
+        return _decode(_inflated(data))
+    except (zlib.error, struct.error, IndexError, ValueError) as error:
         raise ValueError(f"damaged sample block: {error}") from None
+
+
+def _inflated(data: bytes) -> bytes:
+    inflater = zlib.decompressobj()
+    raw = inflater.decompress(data, MOST_BYTES)
+    if not inflater.eof:
+        raise ValueError(f"its end is missing, or it is longer than {MOST_BYTES} bytes")
+    return raw
+
+
+def _decode(raw: bytes) -> NDArray[np.float64]:
     n, channels = _HEAD.unpack_from(raw)
+    if n * channels > len(raw):
+        raise ValueError(f"{len(raw)} bytes cannot hold {n} samples of {channels} channels")
     samples = np.empty((channels, n))
     offset = _HEAD.size
     for k in range(channels):

@@ -40,9 +40,11 @@ class Run:
         """How much it holds, for people; a record without gaps is kept as many blocks."""
         if not self.bench:
             return f"{self.rows} rows"
-        return {"poses": f"{self.rows} poses", "positions": f"{self.rows} positions", "rates": f"{self.rows} turns"}.get(
-            self.kind, f"{self.rows} poses and blocks"
-        )
+        return {
+            "poses": f"{self.rows} poses",
+            "positions": f"{self.rows} positions",
+            "rates": f"{self.rows} turns",
+        }.get(self.kind, f"{self.rows} poses and blocks")
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,16 @@ from rig.bench import Bench
 from rig.cli.failure import status_of
 from rig.record import Kept, Record
 from rig.runner import Outcome, resume
-from tests.rig.misbehaving import STRETCHES, Aftermath, afflicted, digest, guarded_bench, looking_on, short, watched_bench
+from tests.rig.misbehaving import (
+    STRETCHES,
+    Aftermath,
+    afflicted,
+    digest,
+    guarded_bench,
+    looking_on,
+    short,
+    watched_bench,
+)
 from tests.rig.rigging import Onlooker
 
 End = Literal["complete", "stopped", "not begun"]

@@ -1,0 +1,96 @@
+BEGIN TRANSACTION;
+CREATE TABLE blocks (
+	run VARCHAR NOT NULL, 
+	number INTEGER NOT NULL, 
+	rate_hz FLOAT NOT NULL, 
+	start_s FLOAT NOT NULL, 
+	channels JSON NOT NULL, 
+	codec VARCHAR NOT NULL, 
+	samples BLOB NOT NULL, 
+	PRIMARY KEY (run, number), 
+	FOREIGN KEY(run) REFERENCES runs (run)
+);
+INSERT INTO "blocks" VALUES('20261121-220310-sweep-de5',0,1000.0,2.57298051303007682113e+01,'["vx", "vy", "supply"]','palette-zlib/1',X'780185C13D2F83611406E0FB7DDEF3F1B69E1CD5D62054B516434562F0B19DC4EE0F1889C4266230B06A6C82C9C00FB0180C16913018246D223190182C06B1182462504DD85DD72480144044973DBCBE0D46876D6EEF0D458755EB3395E8B0AB8BA74A7458F631568D0E3BD96D55A3C3E61BEB23D161EF3703B5E8B083C5CB5A74D87467A91E1DF678981F8D0EDB9A3A1D8D9EA66940084908442C222CAA4424222C2A2AAA9A692EDF935365C95498F3E8B2B9CF672387BDEC377BC9613B13E3057258E3F6AE400E6B2F6FF491C3D6C270911CD67F745D24879DCFAE94C8610BF75626877DAF9E95C945336661912C535521620E21A44C44CC4C14421212044A5362919CE6B2802E6D35DA9D92A379FC5543D9933F48FE83E4D70FA03A3436');
+INSERT INTO "blocks" VALUES('20261121-220310-sweep-de5',1,1000.0,32.886724227523,'["vx", "vy", "supply"]','palette-zlib/1',X'780195C1BD2E85411006E077667666C74FD62944B5091A17200ADD6EE10A14E70E542242A917A150A84FB8088928B4A7A092502969347E8E93C81211DF2D789E65000220A293779F1FBC15E4CBF9A5C956907FFB3B53AD20AF1D5F4DB7827C348CA915E4DB9FF5995690E7564E7BAD8460AAC14C83323301605655530BAC4158844998889988899969029D74F3F9F4221569EBE4F0552AD2F9F5FD9B54A4FEC6DEBB54A42F2C8CA4220D06C39154A4B2BAF92115E9F1AE37968AB4BF7D3196EAD1A35BD0A0E66ED1A37B348B1ECD4DD52C465356112680883908A17370F6BD88D98A7FFB037C673359');
+INSERT INTO "blocks" VALUES('20261121-220310-sweep-de5',2,1000.0,4.00436433247452328032e+01,'["vx", "vy", "supply"]','palette-zlib/1',X'780185C12F3344711805E0F33BE7DCBBC26FDE31668B625D891989A0BEBA9119C50C8A6666BF81A0194190688ABC5932249FC21710147F76DD2A799E0D000230402F4EF6CF976A22E63E564735110F57AFA39A88DDF5F1724DC4FBF3625713717DF4D8D5446CCD8E576A16D9244B015058284B96649BA2085A92DDB4AD1B8B0503F462E1F2F4478998ACCD4F9588BDA7C95489F83A3C982911B7DF8013B17D730F27E26D73A738D92B05A448CA9669931229ABB0C86EDC58A6DBC6A288DEC5DD6787616270F632C630F147C1FF7E01604723FE');
+INSERT INTO "blocks" VALUES('20261121-220310-sweep-de5',3,1000.0,4.19007646964578341899e+01,'["vx", "vy", "supply"]','palette-zlib/1',X'780195C1A14A84511005E03373CE5C0D9741D0E8FAB39B44B0982CCABCC63E80C9B2C520D804DD285B8C82D56EB3D8B5980C16DFC122067FF009FCBE030004D030CA8BABD5762FE4303B9CF4423E3F7D4C7A214FE6973BBD90EB5FBB432FE4C3CDEBD0CB28054949EE4E458444894E9AB9D14774378799B94B6B18E5DEE9ADAB902FED882AE4E2FE932AE4E6F1522AE4E3FB7EA890F3B3B750217F36CE9BCA29855A934784E8A242218AA29CA1F8E36E703773338CAEEFBEA7D82AFCDB2F527C1BFE');
+CREATE TABLE columns (
+	run VARCHAR NOT NULL, 
+	name VARCHAR NOT NULL, 
+	position INTEGER NOT NULL, 
+	numbers BLOB, 
+	texts JSON, 
+	PRIMARY KEY (run, name), 
+	FOREIGN KEY(run) REFERENCES runs (run)
+);
+CREATE TABLE events (
+	event INTEGER NOT NULL, 
+	run VARCHAR NOT NULL, 
+	at VARCHAR NOT NULL, 
+	what VARCHAR NOT NULL, 
+	text VARCHAR NOT NULL, 
+	PRIMARY KEY (event), 
+	FOREIGN KEY(run) REFERENCES runs (run)
+);
+INSERT INTO "events" VALUES(1,'20261121-220310-sweep-de5','2026-11-21T22:03:10.934+00:00','answer mounting','yes');
+CREATE TABLE poses (
+	run VARCHAR NOT NULL, 
+	number INTEGER NOT NULL, 
+	alpha_deg FLOAT NOT NULL, 
+	beta_deg FLOAT NOT NULL, 
+	direction INTEGER NOT NULL, 
+	path VARCHAR NOT NULL, 
+	mount_deg FLOAT NOT NULL, 
+	flip INTEGER NOT NULL, 
+	t_s FLOAT NOT NULL, 
+	temperature_c FLOAT, 
+	excluded VARCHAR, 
+	PRIMARY KEY (run, number), 
+	FOREIGN KEY(run) REFERENCES runs (run)
+);
+INSERT INTO "poses" VALUES('20261121-220310-sweep-de5',0,90.0,0.0,1,'A+ to B-',0.0,0,4.32253898884633090335e+04,28.3,NULL);
+INSERT INTO "poses" VALUES('20261121-220310-sweep-de5',1,90.0,180.0,1,'A+ to B-',0.0,0,4.32325468075605313066e+04,28.3,NULL);
+INSERT INTO "poses" VALUES('20261121-220310-sweep-de5',2,90.0,360.0,1,'A+ to B-',0.0,0,4.32397037266577535753e+04,28.3,NULL);
+INSERT INTO "poses" VALUES('20261121-220310-sweep-de5',3,90.0,360.0,-1,'B+ to A-',0.0,0,4.32415608480294613421e+04,28.3,NULL);
+CREATE TABLE readings (
+	run VARCHAR NOT NULL, 
+	name VARCHAR NOT NULL, 
+	at VARCHAR NOT NULL, 
+	value FLOAT NOT NULL, 
+	std FLOAT, 
+	unit VARCHAR NOT NULL, 
+	PRIMARY KEY (run, name), 
+	FOREIGN KEY(run) REFERENCES runs (run)
+);
+INSERT INTO "readings" VALUES('20261121-220310-sweep-de5','level-front-x','2026-11-21T22:03:10.965+00:00',0.036,8.59263250310016071104e-04,'deg');
+INSERT INTO "readings" VALUES('20261121-220310-sweep-de5','level-front-y','2026-11-21T22:03:10.967+00:00',-4.58999999999999894195e-02,8.59263250310016071104e-04,'deg');
+INSERT INTO "readings" VALUES('20261121-220310-sweep-de5','level-back-x','2026-11-21T22:03:10.996+00:00',-0.0106,1.17118173938405775724e-03,'deg');
+INSERT INTO "readings" VALUES('20261121-220310-sweep-de5','level-back-y','2026-11-21T22:03:10.997+00:00',3.15000000000000071609e-02,1.17118173938405775724e-03,'deg');
+CREATE TABLE runs (
+	run VARCHAR NOT NULL, 
+	kind VARCHAR NOT NULL, 
+	procedure VARCHAR NOT NULL, 
+	state VARCHAR NOT NULL, 
+	settings JSON NOT NULL, 
+	bench JSON NOT NULL, 
+	identities JSON NOT NULL, 
+	configuration VARCHAR NOT NULL, 
+	constants JSON NOT NULL, 
+	source VARCHAR NOT NULL, 
+	created VARCHAR NOT NULL, 
+	ended VARCHAR, 
+	message VARCHAR, 
+	results JSON NOT NULL, 
+	PRIMARY KEY (run)
+);
+INSERT INTO "runs" VALUES('20261121-220310-sweep-de5','poses','sweep','stopped','{"inclinations_deg": [90.0], "step_deg": 180.0, "dwell_s": 0.05, "settle_s": 0.5, "paths": "grid", "reference_every": 0}','{"name": "simulated rig", "seed": 1, "instruments": {"alpha": {"driver": "oriental_az", "url": "simulated", "unit": 1, "stream_url": null, "settings": {"steps_per_turn": 18000, "limits_deg": [-400, 400], "speed_deg_s": 30, "acceleration_deg_s2": 60}, "faults": [], "certificate": null, "error_table": null}, "beta": {"driver": "oriental_az", "url": "simulated", "unit": 2, "stream_url": null, "settings": {"steps_per_turn": 18000, "limits_deg": [-400, 400], "speed_deg_s": 30, "acceleration_deg_s2": 60}, "faults": [], "certificate": null, "error_table": null}, "adc": {"driver": "labjack_t7", "url": "simulated", "unit": 1, "stream_url": null, "settings": {"channels": {"vx": 0, "vy": 1, "supply": 2}, "rate_hz": 1000, "range_v": 10}, "faults": [], "certificate": null, "error_table": null}, "oven": {"driver": "omega_cn7500", "url": "simulated", "unit": 1, "stream_url": null, "settings": {}, "faults": [], "certificate": null, "error_table": null}, "level": {"driver": "dpg2", "url": "simulated", "unit": 1, "stream_url": null, "settings": {}, "faults": [], "certificate": null, "error_table": null}}, "sensor": {"name": "ADXL203", "serial": "simulated", "gravity_m_s2": 9.80131, "filter_corner_hz": 15.07, "world": {}}, "sensors": {}, "limits": {"temperature_c": [-20.0, 85.0], "overrun_deg": 5.0, "level_deg": 0.3, "results": {}}, "certificates": {}, "world": {"preset": "adxl203"}, "folders": {"effects": null, "procedures": null}}','{"alpha": {"model": "Oriental Motor AZ", "serial": "", "firmware": ""}, "beta": {"model": "Oriental Motor AZ", "serial": "", "firmware": ""}, "adc": {"model": "LabJack T7", "serial": "470012345", "firmware": "1.0312"}, "oven": {"model": "Omega CN7500", "serial": "", "firmware": ""}, "level": {"model": "MEAS DPG2", "serial": "123456789", "firmware": "DPL2 V1.8.0"}}','e037d563a8295883d1675ef0540906530de660928e0984bf81e85b7f5336704b','{"sensor": "ADXL203", "serial": "simulated", "gravity_m_s2": 9.80131, "filter_corner_hz": 15.07, "approach_deg": 5.0}','simulated rig','2026-11-21T22:03:10.899+00:00','2026-11-21T22:03:17.962+00:00','stopped by SIGTERM','{}');
+CREATE TABLE states (
+	run VARCHAR NOT NULL, 
+	state JSON NOT NULL, 
+	PRIMARY KEY (run), 
+	FOREIGN KEY(run) REFERENCES runs (run)
+);
+INSERT INTO "states" VALUES('20261121-220310-sweep-de5','{"rig": {"clock_s": 56.29506955756897, "world": {"world": {"now_ns": 56293602891, "ticks": 562, "mechanics_ns": 56200000000, "pieces": [[[14.35758229166668, 0.0, 0.0, 60.0], [14.85758229166668, 7.5, 30.0, 0.0], [17.35758229166668, 82.5, 30.0, -60.0], [17.85758229166668, 90.0, 0.0, 0.0], [17.85758229166668, 90.0, 0.0, 0.0]], [[49.187126154791194, 180.0, 0.0, -60.0], [49.687126154791194, 172.5, -30.0, 0.0], [55.187126154791194, 7.5, -30.0, 60.0], [55.687126154791194, 0.0, 0.0, 0.0], [55.687126154791194, 0.0, 0.0, 0.0]]], "rest_ns": [17857582292, 55687126155], "table_deg": [89.98954351301187, 0.010028462670800011], "up": [-0.0005559120198596508, -0.0006652718559270422, 0.9999996241875213], "mount": [[0.9997430502521967, -0.005615464783952824, -0.02196133028060697], [0.005325077776014574, 0.9998979179730849, -0.013258852882866715], [0.02203354304493752, 0.013138500232153327, 0.9996708972419557]], "carriage": [[[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]], [[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]], [[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]]], "carriage_rest_ns": [0, 0, 0], "seats_nm": [[7.382722191381169, 6.539561059392369, 5.696399927403569, 4.853238795414769], [1.0836208131468879, 2.0990764706415423, 3.1145321281361973, 4.129987785630852]], "volts": [3.51552191732076, 2.510393183672824], "powered": 1, "powered_ns": -43200000000000, "charged": 1.0, "wander_k": -0.018319190398142515, "chamber_c": 21.98744723666562, "body_c": 21.98750160674296, "board_k": 5.9980080633811514, "package_k": 2.0, "glue_c": 29.98550967012411, "thermocouple_c": 28.28550710328715, "oven_set_c": 21.98748564195868, "oven_running": 0, "oven_integral": 0.0, "supply_v": 5.000227339113752, "supply_wander_v": 0.00022733911375156217, "flicker_v": [[3.247586046150353e-07, 5.24436924582082e-07, 1.077649875802206e-05, 2.925160408451791e-06, -5.526981859954176e-06], [5.2570095361091475e-06, 4.148967081862638e-06, 6.237298164756779e-06, 1.8845628618598661e-06, 3.4855010541774485e-06]], "walk_v": [0.0, 0.0], "slow_v": [9.023872835716794e-06, 2.101333869876588e-05], "filtered_v": [3.515530940394899, 2.5104141957945956], "filtered_ns": [56293602891, 56293617891], "white": [0.4462227055386888, 0.23849041323465586], "white_ns": [56293602891, 56293617891], "kept_ns": 1000000, "kept": 0.9096485437810087, "fresh": 0.4153787750921927, "seat": 0.5, "lid_in": 0.0}, "generators": [{"bit_generator": "PCG64", "state": {"state": 209186726592109762006005850859910521361, "inc": 37820244784906158083616761211378334797}, "has_uint32": 0, "uinteger": 0}, {"bit_generator": "PCG64", "state": {"state": 123057241274631230594184937289721704687, "inc": 231986847983001667667541278771414391591}, "has_uint32": 0, "uinteger": 0}]}, "servers": [{"alpha": {"plan": {"start_s": 14.35758229166668, "start_deg": 0.0, "target_deg": 90.0, "speed_deg_s": 30.0, "acceleration_deg_s2": 60.0, "stop_s": null}, "alarm": 0, "referenced": true, "homing": false}, "beta": {"plan": {"start_s": 49.187126154791194, "start_deg": 180.0, "target_deg": 0.0, "speed_deg_s": 30.0, "acceleration_deg_s2": 60.0, "stop_s": null}, "alarm": 0, "referenced": true, "homing": false}}, {"adc": {}}, {"oven": {"set_point_c": 25.0, "running": false}}, {"level": {"running": false, "next_s": 0.1}}]}, "zero_s": -43199.63508333301}');
+CREATE INDEX events_of_run ON events (run);
+COMMIT;
+PRAGMA user_version = 2;

@@ -1,0 +1,118 @@
+"""`rig doctor`: what is wrong with an installation, what goes to a maintainer, and what can be saved of a record."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from procedures.session import Pose, Reading
+from rig.errors import RecordError
+from rig.health import without_secrets
+from rig.record import Kept, Record
+from rig.record.recover import recover
+from tests.rig.test_store import begin, block
+
+PAGE = 4096
+
+
+def test_it_collects_versions_checks_runs_and_the_last_runs_log(rig: Callable[..., Any], tmp_path: Path) -> None:
+    with Record() as record:
+        run = begin(record)
+        record.log(run, 1.5, "run", "doing", "measuring")
+        record.set_state(run, "failed", "alpha: stands still")
+    archive = tmp_path / "doctor.zip"
+    ended = rig("doctor", "--out", str(archive), "--json")
+    document = json.loads(ended.out)
+    assert (ended.status, document["schema"]) == (0, "rig.doctor/1")
+    assert all(check["ok"] for check in document["checks"].values())
+    with zipfile.ZipFile(archive) as file:
+        assert sorted(file.namelist()) == document["files"] == ["checks.json", "run.json", "runs.json", "versions.json"]
+        parts = {name: json.loads(file.read(name)) for name in file.namelist()}
+    assert parts["versions.json"]["packages"]["numpy"]
+    assert parts["runs.json"][0]["message"] == "alpha: stands still"
+    assert parts["run.json"]["log"][0]["text"] == "measuring"
+    assert b"samples" not in archive.read_bytes()
+
+
+def test_without_any_run_there_is_nothing_to_complain_about(rig: Callable[..., Any], tmp_path: Path) -> None:
+    ended = rig("doctor", "--out", str(tmp_path / "doctor.zip"))
+    assert (ended.status, "nothing is recorded yet" in ended.out) == (0, True)
+
+
+def test_a_bench_goes_with_it_and_no_secret(rig: Callable[..., Any], tmp_path: Path, bench_file: Any) -> None:
+    archive = tmp_path / "doctor.zip"
+    assert rig("doctor", "--bench", str(bench_file({})), "--out", str(archive)).status == 0
+    with zipfile.ZipFile(archive) as file:
+        assert "alpha" in json.loads(file.read("bench.json"))["instruments"]
+    assert without_secrets({"a": [{"api_key": "x", "Password": "y", "token": 1, "keys": 2}]}) == {
+        "a": [{"api_key": "***", "Password": "***", "token": "***", "keys": 2}]
+    }
+
+
+def test_an_archive_that_cannot_be_written_is_said(rig: Callable[..., Any], tmp_path: Path) -> None:
+    ended = rig("doctor", "--out", str(tmp_path / "nowhere" / "doctor.zip"))
+    assert (ended.status, "name another with --out" in ended.err) == (2, True)
+
+
+def recorded(folder: Path, poses: int = 60) -> str:
+    """A run with poses that take a page each, and readings."""
+    with Record(folder) as record:
+        run = begin(record)
+        for number in range(poses):
+            volts = [[0.001 * k * k + number, 1.0] for k in range(400)]
+            record.keep(run, number, Kept(Pose(90, number), block(volts), number, 21.5), None)
+        record.keep_readings(run, [Reading("level-x", 0.02, "deg", 0.001)], None)
+    return run
+
+
+def test_a_sound_record_is_copied_whole(tmp_path: Path) -> None:
+    run = recorded(tmp_path / "old")
+    done = recover(tmp_path / "old" / "record.db", tmp_path / "new")
+    assert (done.damaged, done.spoilt) == ((), ())
+    with Record(tmp_path / "old") as old, Record(tmp_path / "new") as new:
+        assert new.run(run) == old.run(run)
+        assert new.readings(run) == old.readings(run)
+        for a, b in zip(old.kept(run), new.kept(run), strict=True):
+            assert (a.pose, a.samples.volts.tobytes()) == (b.pose, b.samples.volts.tobytes())
+
+
+@pytest.mark.parametrize("page", [20, 45, 70])
+def test_of_a_damaged_record_is_read_what_can_be_and_what_is_lost_is_said(
+    rig: Callable[..., Any], rig_home: Path, tmp_path: Path, page: int
+) -> None:
+    run = recorded(rig_home)
+    sound = {number: kept.samples.volts.tobytes() for number, kept in _kept(rig_home, run).items()}
+    path = rig_home / "record.db"
+    data = bytearray(path.read_bytes())
+    assert len(data) > (page + 4) * PAGE
+    data[page * PAGE : (page + 4) * PAGE] = b"\xa5" * (4 * PAGE)
+    path.write_bytes(data)
+    checked = rig("doctor", "--out", str(tmp_path / "doctor.zip"))
+    assert (checked.status, "WRONG  damaged: " in checked.out) == (1, True)
+    ended = rig("doctor", "--recover", str(tmp_path / "new"), "--json")
+    told = json.loads(ended.out)
+    assert ended.status == 1
+    assert told["lost"]
+    found = _kept(tmp_path / "new", run)
+    assert 10 < len(found) < len(sound)
+    for number, kept in found.items():
+        assert kept.samples.volts.tobytes() == sound[number], "what was read is what was kept"
+
+
+def _kept(folder: Path, run: str) -> dict[int, Kept]:
+    with Record(folder) as record:
+        return {kept.number: kept for kept in record.kept(run) if kept.number is not None}
+
+
+def test_a_record_is_not_recovered_over_another_and_nothing_out_of_nothing(tmp_path: Path) -> None:
+    recorded(tmp_path / "old", 1)
+    with pytest.raises(RecordError, match="is there already; name a folder without a record"):
+        recover(tmp_path / "old" / "record.db", tmp_path / "old")
+    (tmp_path / "letters").write_text("no database" * 1000)
+    with pytest.raises(RecordError, match="nothing of it can be read"):
+        recover(tmp_path / "letters", tmp_path / "new")

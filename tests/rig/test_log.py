@@ -1,0 +1,74 @@
+"""What happened in a run, step by step and when; on request every message to and from instruments."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from drivers.links.faults import Fault
+from rig.bench import read_bench
+from rig.record import Record
+from rig.runner import resume, start
+from rig.trace import SHOWN_BYTES, shown
+from tests.rig.misbehaving import afflicted
+from tests.rig.rigging import POSES, Onlooker, small_sweep
+
+
+@pytest.mark.parametrize(
+    ("data", "text"),
+    [
+        (b"ERR?\n", r"'ERR?\n'"),
+        (bytes.fromhex("0103007f"), "01 03 00 7f"),
+        (b"X=+00.035\r\n", r"'X=+00.035\r\n'"),
+        (b"\xff\xfe", "ff fe"),
+        (bytes(100), " ".join(["00"] * SHOWN_BYTES) + " ... 100 bytes"),
+    ],
+)
+def test_a_message_is_shown_as_text_where_it_is_some(data: bytes, text: str) -> None:
+    assert shown(data) == text
+
+
+@pytest.mark.sockets
+def test_a_run_tells_what_it_did_what_stopped_it_and_that_it_went_on() -> None:
+    bench = read_bench()
+    with Record() as record:
+        broken = afflicted(bench, "alpha", Fault("alarm", at_s=30.0))
+        run = start(record, broken, *small_sweep(), Onlooker()).run
+        kept = run.rows
+        resume(record, run.run, Onlooker(), bench)
+        lines = record.lines(run.run)
+    told = [line.what for line in lines]
+    assert told[0] == "begun"
+    assert told.count("kept") == POSES
+    error = told.index("error")
+    assert lines[error].text.startswith("StageAlarm: alpha: stands still with alarm 30")
+    assert [(line.what, line.text) for line in lines[error + 1 : error + 3]] == [
+        ("stopped", "all stands still"),
+        ("begun", f"sweep at pose {kept}"),
+    ]
+    assert 30.0 <= lines[error].clock_s < 40.0
+    assert lines[-1].what == "complete"
+    assert {line.who for line in lines} == {"run"}, "messages are logged on request"
+
+
+@pytest.mark.sockets
+def test_every_message_is_logged_on_request_and_shown(rig: Callable[..., Any], bench_file: Callable[..., Path]) -> None:
+    small = ("--step-deg", "180", "--dwell-s", "0.1", "--inclinations-deg", "90")
+    ended = rig("run", "sweep", *small, "--unattended", "--json", "--trace")
+    run = json.loads(ended.out)["run"]
+    log = json.loads(rig("show", run, "--log", "--json").out)["log"]
+    sent, heard = ([line for line in log if line["what"] == way] for way in ("sent", "heard"))
+    assert len(sent) > 100
+    assert len(heard) > 100
+    assert any(line["text"].startswith("01 10 00 58 00 10 20") for line in sent), "a move, as the manual writes it"
+    assert {line["who"] for line in sent} >= {"level", "positioner"}
+    assert log[0]["clock_s"] < log[-1]["clock_s"]
+    shown_log = rig("show", run, "--log").out
+    assert "positioner  sent: '*IDN?" in shown_log
+    assert "run  kept: pose 5: 100 samples" in shown_log
+    assert "  run  doing: holding alpha 90, beta 0 deg" in shown_log
+    assert "sent:" not in rig("show", run).out

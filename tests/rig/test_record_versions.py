@@ -1,0 +1,59 @@
+"""Records of every version of the program are opened by this one: read, written to, and gone on with.
+
+`tests/data/records` has, of each version, a sweep of six poses that was stopped after four.
+"""
+
+from __future__ import annotations
+
+import sqlite3
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from rig.record import Record
+from rig.record.measured import table_of
+from rig.record.schema import MIGRATIONS, SCHEMA, metadata
+from tests.docs.markdown import ROOT
+
+FILES = sorted((ROOT / "tests" / "data" / "records").glob("schema-*.sql"))
+
+
+def restored(file: Path, folder: Path) -> Path:
+    """The record that a dump is of."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with closing(sqlite3.connect(folder / "record.db")) as connection:
+        connection.executescript(file.read_text())
+    return folder
+
+
+def shape(path: Path) -> dict[str, set[tuple[str, str]]]:
+    """The columns of every table with their types."""
+    with closing(sqlite3.connect(path)) as connection:
+        tables = metadata.tables
+        return {name: {(row[1], row[2]) for row in connection.execute(f"PRAGMA table_info({name})")} for name in tables}
+
+
+def test_there_is_a_way_from_every_version() -> None:
+    assert sorted(MIGRATIONS) == list(range(1, SCHEMA))
+    assert [int(file.stem.rpartition("-")[2]) for file in FILES] == [1, 2, 3]
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
+def test_an_older_record_becomes_one_of_this_version(file: Path, tmp_path: Path) -> None:
+    old = restored(file, tmp_path / "old")
+    with Record(old) as record:
+        (run,) = record.runs()
+        assert (run.state, run.rows, run.procedure) == ("stopped", 4, "sweep")
+        table = table_of(record, run.run)
+        assert table.n == 4
+        assert list(table.column("alpha_deg")) == [90.0] * 4
+        record.exclude(run.run, 0, "touched")
+        record.log(run.run, 0.0, "run", "doing", "nothing")
+        record.set_state(run.run, "stopped")
+        assert [line.text for line in record.lines(run.run)] == ["nothing"]
+    with Record(tmp_path / "new") as fresh:
+        assert shape(old / "record.db") == shape(fresh.path)
+    with closing(sqlite3.connect(old / "record.db")) as connection:
+        assert connection.execute("PRAGMA user_version").fetchone() == (SCHEMA,)
+        assert connection.execute("PRAGMA foreign_key_check").fetchall() == []
