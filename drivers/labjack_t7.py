@@ -106,8 +106,7 @@ class T7:
         self.name = unit.name
         self.settings = settings
         self._unit, self._stream, self._clock = unit, stream, stream.clock
-        self._stop()  # a stream that a dead program left behind
-        self._prepare_inputs(settings.channels)
+        self._prepare_inputs()
         self._calibration = self._read_calibration()
         self._volts = self._calibration.table()
 
@@ -159,7 +158,6 @@ class T7:
         """The same device with these channels and no others. Raises LimitError for one that is not wired."""
         chosen = copy(self)
         chosen.settings = self.settings.only(self.name, outputs)
-        chosen._prepare_inputs(chosen.settings.channels)
         return chosen
 
     def acquire(self, duration_s: float) -> Samples:
@@ -258,9 +256,10 @@ class T7:
             why = t7.ERRORS.get(detail, "see the list of error codes in its datasheet")
             raise Refused(f"{refused.what}; device error {detail}: {why}", refused.remedy, refused.code) from refused
 
-    def _prepare_inputs(self, channels: Mapping[str, int]) -> None:
-        """Ranges and ground."""
-        for number in channels.values():
+    def _prepare_inputs(self) -> None:
+        """End a stream that a dead program left behind; ranges and ground of all that is wired."""
+        self._stop()
+        for number in self.settings.wired.values():
             self._unit.write(t7.ain_range(number), self.settings.range_v)
             self._unit.write(t7.ain_negative(number), t7.SINGLE_ENDED)
 

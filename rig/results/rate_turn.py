@@ -5,6 +5,7 @@ from __future__ import annotations
 from itertools import permutations
 
 from calibrations.noise import rms
+from procedures.questions import EDGES
 from rig.record.measured import Measured
 from rig.results.result import Missing, Result
 from rig.results.turned import estimates, fitted, result
@@ -27,8 +28,8 @@ def evaluate(measured: Measured) -> dict[str, Result | Missing]:
     gyro-g-sensitivity-xy    (deg/s)/g, what x shows of a specific force along y
     rate-residual            deg/s, rms of what the four leave over all turns and rests
 
-    The earth's rotation is taken off where the bench knows its latitude. An axis that was not turned about has no scale
-    factor, and no misalignment of the others is seen by it: they are missing, and say so.
+    The earth's rotation is taken off where the bench knows its latitude. Of an axis that was not asked to be turned
+    about there is no scale factor, and no misalignment of the others towards it.
     """
     table = measured.table()
     found = fitted(table, "gyroscope", "gyro-misalignment", "gyro-g-sensitivity")
@@ -42,4 +43,5 @@ def evaluate(measured: Measured) -> dict[str, Result | Missing]:
             for e in (e for e in estimates(found, "gyro-g-sensitivity") if e.axis == axis):
                 results[f"gyro-g-sensitivity-{axis}{e.name}"] = result(e, "(deg/s)/g", scale.value)
             results[f"rate-residual-{axis}"] = Result(abs(float(left[axis]) / scale.value), "deg/s")
-    return results
+    whole = measured.run.settings["mounts"] == len(EDGES)
+    return {name: each for name, each in results.items() if whole or isinstance(each, Result)}

@@ -1,0 +1,163 @@
+"""rate-turn and magnetometer-turn on the simulated bench, every byte on a socket: from the run to the effect."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from calibrations.reading.read_csv import read_csv
+from rig.record import Record
+from rig.record.measured import table_of
+from tests.rig.rigging import in_own_process, signal_at
+
+Rig = Callable[..., Any]
+FIELD = ("magnetometer-turn", "--step-deg", "45", "--dwell-s", "0.1", "--settle-s", "0.1", "--unattended", "--json")
+RATES = ("rate-turn", "--rates-deg-s", "80", "--rest-s", "0.5", "--unattended", "--json")
+ONE = ("--mounts", "1")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A record that this file's runs share."""
+    return tmp_path_factory.mktemp("turned")
+
+
+@pytest.fixture(autouse=True)
+def shared(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("RIG_HOME", str(folder))
+
+
+def run(rig: Rig, folder: Path, arguments: tuple[str, ...]) -> dict[str, Any]:
+    """What a run gave; one of the same arguments is not done again."""
+    kept = folder / f"{'_'.join(arguments)}.json"
+    if not kept.exists():
+        ended = rig("run", *arguments)
+        assert ended.status == (1 if "no hard-iron" in ended.err else 0), ended.err
+        kept.write_text(ended.out)
+    return dict(json.loads(kept.read_text()))
+
+
+@pytest.mark.sockets
+def test_a_magnetometer_is_calibrated_by_the_ellipsoid_and_by_hand(rig: Rig, folder: Path) -> None:
+    """The field of the simulated laboratory is 52.4 uT, dips by 66.8 deg, and stands 34.3 deg before the base's x."""
+    found = run(rig, folder, FIELD)["results"]
+    assert found["field-inclination"]["value"] == pytest.approx(66.8, abs=0.2)
+    assert found["field-declination"]["value"] == pytest.approx(-34.3, abs=0.4)
+    assert found["field-total"]["value"] == pytest.approx(52.4 * 0.02, rel=0.01)
+    horizontal = found["field-total"]["value"] * np.cos(np.radians(found["field-inclination"]["value"]))
+    assert found["field-horizontal"]["value"] == pytest.approx(horizontal, rel=1e-6)
+    for axis in "xyz":
+        ellipsoid, by_hand = found[f"hard-iron-{axis}"], found[f"hard-iron-by-hand-{axis}"]
+        assert 0 < ellipsoid["std"] < 1e-4
+        assert by_hand["value"] == pytest.approx(ellipsoid["value"], abs=0.005)
+    assert found["left-by-ellipsoid"]["value"] < 0.5 < 5 < found["left-by-hand"]["value"]
+    assert all(each["verdict"] is None for each in found.values())
+
+
+@pytest.mark.sockets
+def test_one_horizontal_turn_says_what_it_cannot_show(rig: Rig, folder: Path) -> None:
+    arguments = (*FIELD, *ONE, "--over", "no")
+    document = run(rig, folder, arguments)
+    assert set(document["results"]) == {
+        *("hard-iron-by-hand-x", "hard-iron-by-hand-y", "soft-iron-by-hand", "soft-iron-angle-by-hand", "left-by-hand")
+    }
+    told = rig("show", document["run"]).out  # and its exit status is 1
+    assert "no hard-iron-x: hard-iron and soft-iron cannot be asked: the orientations cover too little" in told
+    assert "no hard-iron-by-hand-z: z was upright throughout; use more mounts" in told
+
+
+@pytest.mark.sockets
+def test_a_gyroscope_is_calibrated_about_three_edges(rig: Rig, folder: Path) -> None:
+    found = run(rig, folder, RATES)["results"]
+    for axis in "xyz":
+        assert found[f"gyro-scale-{axis}"]["value"] == pytest.approx(6.04e-3, rel=0.01)
+        assert found[f"gyro-scale-{axis}"]["unit"] == "V/(deg/s)"
+        assert found[f"rate-residual-{axis}"]["value"] < 0.03
+    lean = {pair: found[f"gyro-misalignment-{pair}"] for pair in ("xy", "yx", "xz", "zx", "yz", "zy")}
+    expected = {"xy": -0.4, "yx": 0.4, "xz": -0.9, "zx": 0.9, "yz": -0.6, "zy": 0.6}
+    assert {pair: each["value"] for pair, each in lean.items()} == pytest.approx(expected, abs=0.05)
+    assert abs(found["gyro-g-sensitivity-yz"]["value"]) > 20 * found["gyro-g-sensitivity-yz"]["std"]
+
+
+@pytest.mark.sockets
+def test_a_gyroscope_that_was_turned_about_one_edge_has_one_scale_factor(rig: Rig, folder: Path) -> None:
+    document = run(rig, folder, (*RATES, *ONE))
+    scales = {name for name in document["results"] if name.startswith("gyro-scale")}
+    assert scales == {"gyro-scale-z"}
+    assert "gyro-bias-x" in document["results"]
+
+
+@pytest.mark.sockets
+def test_the_table_of_a_run_is_a_table_of_rates_that_a_file_gives_back(rig: Rig, folder: Path, tmp_path: Path) -> None:
+    name = run(rig, folder, (*RATES, *ONE))["run"]
+    with Record() as record:
+        table = table_of(record, name)
+        turns = [kept.pose for kept in record.kept(name)]
+    assert (table.kind, table.unit, table.constants["latitude_deg"]) == ("rates", "V", 40.443)
+    assert table.column("rate_deg_s").tolist() == [-pose.rate_deg_s + 0.0 for pose in turns]
+    assert table.column("axis_z").tolist() == [1.0] * table.n
+    assert table.column("az").tolist() == [np.cos(np.radians(pose.alpha_deg)) for pose in turns]
+    assert "filter_corner_hz" not in table.constants
+    assert {"gx_std", "n", "temperature_c", "t_s"} <= set(table.columns)
+    out = tmp_path / "rates.csv"
+    assert rig("export", name, "--out", str(out)).status == 0
+    again = read_csv(out)
+    assert {each: again.column(each).tolist() for each in table.columns} == {
+        each: pytest.approx(table.column(each).tolist()) for each in table.columns
+    }
+
+
+@pytest.mark.sockets
+def test_every_command_takes_a_run(rig: Rig, folder: Path, tmp_path: Path) -> None:
+    field, rates = run(rig, folder, FIELD)["run"], run(rig, folder, (*RATES, *ONE))["run"]
+    model, page = str(tmp_path / "hard.yaml"), tmp_path / "page.html"
+    assert json.loads(rig("diagnose", field, "--json").out)["candidates"][0]["effect"] == "hard-iron"
+    assert rig("add", "hard-iron", "--model", "field", "--data", field, "--out", model).status == 0
+    assert json.loads(rig("diagnose", field, "--model", model, "--json").out)["candidates"][0]["effect"] == "soft-iron"
+    assert "fails" in json.loads(rig("compare", field, "--model", model, "--json").out)
+    assert rig("report", field, "--model", "magnetometer", "--out", str(page)).status == 0
+    assert "<h2>General calibration</h2>" in page.read_text(encoding="utf-8")
+    assert json.loads(rig("diagnose", rates, "--json").out)["verdict"] == "effect-missing"
+
+
+@pytest.mark.sockets
+def test_a_run_that_is_stopped_in_a_turn_stands_and_goes_on_sample_for_sample(rig: Rig, folder: Path) -> None:
+    """The signal comes with the second turn's kept block; resumed, the third is as in a run that was never stopped."""
+    whole = run(rig, folder, (*RATES, *ONE))["run"]
+    in_own_process("run", *RATES, *ONE, harm=signal_at("poses", 4, "SIGTERM"))
+    with Record() as record:
+        stopped = record.runs()[0]
+    assert (stopped.state, stopped.rows) == ("stopped", 3)
+    assert rig("resume", stopped.run, "--unattended", "--json").status == 0
+    with Record() as record:
+        for a, b in zip(record.kept(whole), record.kept(stopped.run), strict=True):
+            assert a.pose == b.pose
+            np.testing.assert_array_equal(a.samples.volts, b.samples.volts)
+        assert record.run(whole).results == record.run(stopped.run).results != {}
+
+
+def test_a_plan_knows_ways_limits_and_mounts(rig: Rig) -> None:
+    told = rig("plan", "rate-turn", "--rates-deg-s", "20,80").out
+    assert "alpha 180, beta -180 to 180 deg: 4 poses  y turning  at 20, 80 deg/s both ways" in told
+    assert "mount-0-x-up: Does the sensor stand on edge, its x axis up and its y axis along the table's x?" in told
+    assert "beta from -273.333 to 273.333 deg, within its limits -400 to 400 deg" in told
+    refused = rig("plan", "rate-turn", "--rates-deg-s", "200")
+    assert refused.status == 2
+    assert "outside its limits -400 .. 400 deg; nothing was sent. Ask for a slower or shorter turn" in refused.err
+
+
+def test_a_bench_without_the_channels_says_so(rig: Rig, bench_file: Callable[..., Path]) -> None:
+    adc = {"driver": "labjack_t7", "url": "simulated", "settings": {"channels": {"vx": 0, "vy": 1}}}
+    path = bench_file({"instruments": {"alpha": _stage(1), "beta": _stage(2), "adc": adc}, "d63": None})
+    refused = rig("plan", "magnetometer-turn", "--bench", str(path))
+    assert refused.status == 2
+    assert "adc: no input is wired to mx, my, mz; there are vx, vy. Name the inputs in the bench file" in refused.err
+
+
+def _stage(unit: int) -> dict[str, Any]:
+    return {"driver": "oriental_az", "url": "simulated", "unit": unit}
