@@ -175,3 +175,70 @@ def test_the_drives_own_limits_are_written_and_read_back_before_the_first_move(
 def test_limits_that_are_not_kept_let_nothing_move(script: Callable[..., Address], links: Links) -> None:
     with pytest.raises(Interlocked, match="it shows 3 in register 0x0386"):
         limited(script, links, NOT_KEPT).start(85.0)
+
+
+TURN_TO_8500 = (
+    "01 10 00 58 00 10 20 "  # 16 registers from 0058
+    "00 00 00 00 "  # data number 0
+    "00 00 00 01 "  # absolute positioning
+    "00 00 21 34 "  # 8500 steps
+    "00 00 03 E8 "  # 1000 Hz
+    "00 00 05 DC 00 00 05 DC "  # 1.5 kHz/s
+    "00 00 03 E8 "  # 100.0 %
+    "00 00 00 01 "  # trigger: all
+    "31 BF"
+)
+TURN_ON_AND_ON = (
+    "01 10 00 58 00 10 20 "  # 16 registers from 0058
+    "00 00 00 00 "  # data number 0
+    "00 00 00 07 "  # continuous, by position
+    "00 00 00 00 "  # no target
+    "FF FF F8 30 "  # -2000 Hz: backwards
+    "00 00 05 DC 00 00 05 DC "  # 1.5 kHz/s
+    "00 00 03 E8 "  # 100.0 %
+    "00 00 00 01 "  # trigger: all
+    "F2 BC"
+)
+ASK_SPEED = "01 03 00 D0 00 02 C5 F2"
+GOING = "01 03 06 20 10 00 00 00 00 E7 D6"  # MOVE, HOME-END
+
+
+def test_a_turn_at_a_constant_rate_is_a_move_at_that_speed_whose_end_lies_beyond(
+    stage: Stages, clock: SimulatedClock
+) -> None:
+    """Run-up to 10 deg/s takes 3 1/3 deg, and 0.2 s more; after the turn come 0.5 s, and as much to brake."""
+    there = [(ASK_STATUS, HOMED), (ASK_POSITION, AT_MINUS_4500)]
+    turn = [(ASK_STATUS, GOING), (ASK_SPEED, "01 03 04 00 00 03 E8 FA 8D")]
+    ended = [(ASK_STATUS, HOMED), (ASK_POSITION, AT_8500)]
+    drive = stage([*there, *there, (TURN_TO_8500, TAKEN), *turn, *ended])
+    with drive.turning(10.0, -45 + 16 / 3, 85 - 25 / 3) as turning:
+        assert clock.now() == pytest.approx(10 / 15 + 0.2, abs=0.01)
+        turning.require()
+    assert clock.now() == pytest.approx(130 / 10 + 10 / 15, abs=0.01)
+
+
+def test_a_turn_that_is_too_slow_is_found(stage: Stages) -> None:
+    there = [(ASK_STATUS, HOMED), (ASK_POSITION, AT_MINUS_4500)]
+    slow = [(ASK_STATUS, GOING), (ASK_SPEED, "01 03 04 00 00 03 D4 FA 9C")]
+    on, off = "01 06 00 7D 00 20 18 0A", "01 06 00 7D 00 00 19 D2"
+    stopped = [(on, on), ("01 03 00 7F 00 01 B5 D2", "01 03 02 40 30 89 90"), (off, off)]
+    drive = stage([*there, *there, (TURN_TO_8500, TAKEN), *slow, *stopped])
+    with pytest.raises(NotSettled, match=r"alpha: turns at 9.800 deg/s instead of 10.000 deg/s"):  # noqa: SIM117
+        with drive.turning(10.0, -45 + 16 / 3, 85 - 25 / 3) as turning:
+            turning.require()
+
+
+def test_without_limits_it_turns_on_and_on_watched_until_it_is_stopped(
+    script: Callable[..., Address], links: Links, clock: SimulatedClock
+) -> None:
+    told = "01 10 13 8A 00 02 64 A6"
+    watch, leave = "01 10 13 8A 00 02 04 00 00 03 E8 A2 3E", "01 10 13 8A 00 02 04 00 00 00 00 A2 80"
+    begun = [(ASK_STATUS, HOMED), (ASK_POSITION, AT_MINUS_4500), (ASK_STATUS, HOMED), (watch, told)]
+    beats = [(ASK_STATUS, GOING)] * 6  # four a second, for 1.33 s of run-up and 0.2 s more
+    on, off = "01 06 00 7D 00 20 18 0A", "01 06 00 7D 00 00 19 D2"
+    stopped = [(on, on), ("01 03 00 7F 00 01 B5 D2", "01 03 02 40 30 89 90"), (off, off), (leave, told)]
+    endless = dataclasses.replace(SETTINGS, limits_deg=(-math.inf, math.inf), communication_timeout_s=1.0)
+    address = script([*begun, (TURN_ON_AND_ON, TAKEN), *beats, *stopped])
+    with oriental_az.connect(address, links, endless, "alpha").turning(20.0, -45 - 52 / 3, -90.0) as turn:
+        assert (turn.rate_deg_s, turn.beat_s) == (-20.0, 0.25)
+        assert clock.now() == pytest.approx(20 / 15 + 0.2, abs=0.05)
