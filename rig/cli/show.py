@@ -11,8 +11,8 @@ from calibrations.errors import CalibrationError
 from rig.certificates import EXPIRED
 from rig.cli.output import columns, emit, json_option
 from rig.cli.verdicts import lines as results
-from rig.cli.verdicts import next_steps
 from rig.errors import RecordError
+from rig.next_steps import next_steps
 from rig.numerals import duration
 from rig.record import Event, Kept, Line, Record, Run
 from rig.record.measured import Measured, sensors_of

@@ -1,36 +1,17 @@
-"""Results of a run in words: value, uncertainty, limit, verdict, and what to do next."""
+"""Results of a run in words: value, uncertainty, limit, verdict."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from calibrations.model import Estimate
 from calibrations.numerals import bound
-from calibrations.reports.words import joined
 from rig.cli.output import columns
 from rig.cli.words import with_uncertainty
-from rig.record import Run
 
-# By the name of a result that is beyond its limit: what to look at. The first that fits counts.
-REMEDIES = {
-    r"level-offset": "the half turn takes the level's own offset out of the tilt; have the level adjusted",
-    r"level-": "level the base, set the zero of alpha, then: rig run level-check",
-    r"noise-(rms|pp)|inclination": "look for vibration, loose cables and a noisy supply, then measure again",
-    r"theta-|alpha-|beta-|non-orthogonality|correction": "seat the sensor anew and search again; what stays is its "
-    "own, and the results named correction take it out",
-    r"(bias|scale)-temperature": "correct for temperature: rig discover {run} finds the effect and its size",
-    r"(bias|scale)-(as-is|power|mount)": "look at screws, connector and supply, and let it warm up: rig run soak",
-    r"rmse|improvement|amplitude|noise-limit": "see where the model fails: rig compare {run}; "
-    "then how sensor and displacement sensor sit on the carriage",
-    r"drift|steady|time-constant|wander": "let it warm up longer, away from drafts, before it is used or calibrated",
-    r"gap": "the run was interrupted: rig show {run} says when",
-    r"": "look for poses unlike the others: rig show {run} --poses; rig exclude leaves one out, with a reason",
-}
 SPREADS = re.compile("tolerance|wander")  # uncertainties themselves: two digits
-LENGTHS = ("duration_s", "times", "cycles", "most_rounds", "dwell_s")  # settings by which a procedure measures longer
-LONGER = 4  # times as long halves a statistical uncertainty
 
 
 def lines(results: Mapping[str, Any]) -> list[str]:
@@ -51,60 +32,3 @@ def _limit(value: float, limit: Any) -> str:
     if limit is None:
         return "-"
     return bound(value, limit).replace("−", "-")
-
-
-def next_steps(run: Run, excluded: Mapping[int, str]) -> list[str]:
-    """What to do after a run: for each verdict that is no pass, and with what was measured."""
-    return [*_left_out(excluded), *_failed(run), *_marginal(run), *_unjudged(run.results), *_commands(run)]
-
-
-def _left_out(excluded: Mapping[int, str]) -> Iterator[str]:
-    if excluded:
-        yield f"Left out: {'; '.join(f'pose {number} ({reason})' for number, reason in excluded.items())}"
-
-
-def _failed(run: Run) -> Iterator[str]:
-    """Results beyond their limits, those of one remedy together."""
-    by_remedy: dict[str, list[str]] = {}
-    for name in _with_verdict(run.results, "fail"):
-        remedy = next(text for pattern, text in REMEDIES.items() if re.match(pattern, name.rpartition("/")[2]))
-        by_remedy.setdefault(remedy, []).append(name)
-    for remedy, names in by_remedy.items():
-        yield f"Fail: {joined(names)}: {remedy.format(run=run.run)}"
-
-
-def _marginal(run: Run) -> Iterator[str]:
-    """Neither inside nor outside beyond doubt: a longer measurement tells."""
-    if names := _with_verdict(run.results, "marginal"):
-        setting = next((name for name in LENGTHS if name in run.settings), None)
-        longer = f" (--{setting.replace('_', '-')} {LONGER * run.settings[setting]:g})" if setting else ""
-        verb = "reach" if len(names) > 1 else "reaches"
-        yield (
-            f"Marginal: {joined(names)} {verb} across the limit with its uncertainty: measuring {LONGER} times as long"
-            f"{longer} halves that"
-        )
-
-
-def _with_verdict(results: Mapping[str, Any], verdict: str) -> list[str]:
-    return [name for name, result in results.items() if result["verdict"] == verdict]
-
-
-def _unjudged(results: Mapping[str, Any]) -> Iterator[str]:
-    """That a result without a limit has no verdict, and how it gets one."""
-    free = [name.rpartition("/")[2] for name, result in results.items() if result["limit"] is None]
-    if free:
-        yield f"No verdict without a limit: limits.results of the bench file takes them, such as `{free[0]}: ...`"
-
-
-def _commands(run: Run) -> Iterator[str]:
-    """What is usually called next."""
-    if run.state != "complete":
-        yield f"Next: rig resume {run.run}"
-    elif run.procedure == "check-standard":
-        yield "Next: rig control"
-    elif run.rows and run.kind in ("poses", "motion"):
-        data = f"{run.run}/{next(iter(sensors))}" if (sensors := run.bench.get("sensors")) else run.run
-        if run.procedure == "soak":
-            yield f"Next: rig report {data} --out night.html"
-            return
-        yield f"Next: rig compare {data}, rig discover {data}, rig report {data} --out report.html"

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import click
-import yaml
 
+from calibrations.reading.yaml_file import load_yaml
 from procedures.catalogue import Procedure
 from procedures.errors import BadAnswer, NoAnswer
 from procedures.questions import Question
@@ -19,7 +19,7 @@ from rig.bench import Bench
 from rig.certificates import EXPIRED
 from rig.cli.output import emit, note, notes
 from rig.cli.verdicts import lines as results
-from rig.cli.verdicts import next_steps
+from rig.next_steps import next_steps
 from rig.plan import Plan
 from rig.record import Kept, Record
 from rig.runner import Outcome, Watch, Wish
@@ -97,10 +97,10 @@ def _answers(path: Path | None) -> dict[str, str]:
     if path is None:
         return {}
     try:
-        document = yaml.safe_load(path.read_text(encoding="utf-8"))
+        document = load_yaml(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise BadAnswer(f"{path}: the file of answers cannot be read: {error.strerror}") from None
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
+    except ValueError as error:
         raise BadAnswer(f"{path}: is not a YAML file: {error}") from None
     if not isinstance(document, dict):
         raise BadAnswer(f"{path}: a file of answers is a mapping, such as `mounting: yes`")
