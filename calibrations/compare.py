@@ -111,7 +111,7 @@ def _fails(found: Fit) -> list[Place]:
     scale = scales(found)
     unit, milli = found.problem.unit, MILLI[found.table.input_unit]
     floor = found.noise.floor
-    own = np.hypot(found.noise.floor, found.noise.slow) if found.noise.known else found.noise.floor
+    by_noise = _by_noise(found)
     for where, low, high, rows in (*_parts(found.table), *_sides(found)):
         for c, channel in enumerate(found.channels):
             axis = axis_of(channel)
@@ -119,7 +119,7 @@ def _fails(found: Fit) -> list[Place]:
             excess = float(rms(r) / floor[c])
             part = channel[len(axis) :]
             places.append(Place(where, low, high, axis, excess, float(r.mean()), unit, float(scale[c]), milli, part))
-            chances.append(float(chdtrc(len(r), np.sum((r / own[c]) ** 2))))
+            chances.append(float(chdtrc(len(r), np.sum(by_noise[c, rows] ** 2))))
             each.append((where, channel))
     if not places:
         return []
@@ -130,6 +130,14 @@ def _fails(found: Fit) -> list[Place]:
     bad.sort(key=lambda k: places[k].excess, reverse=True)
     first = {each[k]: k for k in reversed(bad)}
     return [places[k] for k in bad if first[each[k]] == k]
+
+
+def _by_noise(found: Fit) -> Array:
+    """The residual over its noise, (channels, n): rows made independent where the slow noise is known beforehand."""
+    if found.noise.given:
+        return found.whitened[:, 0].reshape(found.residual.shape)
+    own = np.hypot(found.noise.floor, found.noise.slow) if found.noise.known else found.noise.floor
+    return np.asarray(found.residual / own[:, None])
 
 
 def _stands_out(place: Place, excess: float, floor: float) -> bool:

@@ -77,7 +77,9 @@ class Fit:
 def fit(model: Model, table: Table) -> Fit:
     """The model with parameters estimated from `table`. Raises TooFewRows, ModelError, DataError."""
     problem = Problem.of(model, table)
-    return _alternate(problem, white_only(problem.white, problem.gap_s, len(problem.channels)), problem.layout.starts())
+    return _alternate(
+        problem, white_only(problem.white, problem.gap_s, len(problem.channels), problem.given), problem.layout.starts()
+    )
 
 
 def refit(before: Fit, model: Model, start: Array | None = None) -> Fit:
@@ -106,7 +108,7 @@ def evaluate(model: Model, table: Table) -> Fit | None:
     if theta is None:
         return None
     residual, jacobian = problem.residual(theta), problem.jacobian(theta)
-    noise = white_only(problem.white, problem.gap_s, len(problem.channels))
+    noise = white_only(problem.white, problem.gap_s, len(problem.channels), problem.given)
     noise = estimate(noise, residual, jacobian, problem.smooth)
     return Fit(replace(model, unit=table.unit), problem, theta, noise, residual, jacobian)
 

@@ -1,11 +1,12 @@
 """Noise of a table's means, as a value: white, whose level is known from the samples, scatter, and slow noise.
 
-    Sigma = W + k^2 I + (rho w)^2 G
+    Sigma = W + k^2 I + (rho w)^2 G + sum s_j^2 G_j
 
 per channel. W: the white variances of the means. k: scatter from row to row beyond the white noise. G: a Gauss-Markov
 process, or flicker noise as a sum of them with time constants evenly spaced on a logarithmic scale; w the rms of white
 noise and scatter. Where the white noise is not known, W is zero and k
-takes its place. `noise_fit` estimates it.
+takes its place. `noise_fit` estimates these. s_j, G_j: Gauss-Markov processes that are known from elsewhere, as from a
+still record of the same sensor (`known_noise`); then no G is guessed.
 """
 
 from __future__ import annotations
@@ -17,6 +18,8 @@ import numpy as np
 
 from calibrations.kernels import whiten
 from calibrations.table import Array
+
+Processes = tuple[tuple[float, float], ...]  # (standard deviation, time constant in s) of Gauss-Markov processes
 
 BEYOND = 10.0  # lengths of a record: the longest times at which it is said to flicker
 SLOW_FREEDOM = 60.0  # as a process has whose time constant is a hundredth of the record
@@ -31,6 +34,7 @@ class Noise:
     scatter: Array
     ratio: Array
     taus_s: tuple[tuple[float, ...], ...]  # time constants, per channel: one, or several for flicker noise
+    given: tuple[Processes, ...] = ()  # per channel, known beforehand; none where nothing is
 
     @property
     def known(self) -> bool:
@@ -54,8 +58,20 @@ class Noise:
 
     @property
     def slow(self) -> Array:
-        """Standard deviation of the slow noise."""
+        """Standard deviation of the slow noise that was estimated."""
         return self.ratio * rms(self.fast)
+
+    @property
+    def known_slow(self) -> Array:
+        """That of the slow noise known beforehand, about its mean over these rows."""
+        return np.array(
+            [_about_mean(each, float(np.sum(self.gap_s))) for each in self.given] or [0.0] * len(self.ratio)
+        )
+
+    @property
+    def wander(self) -> Array:
+        """Standard deviation of all slow noise, estimated and known."""
+        return np.asarray(np.hypot(self.slow, self.known_slow))
 
     @property
     def freedom(self) -> float:
@@ -86,7 +102,8 @@ class Noise:
         return np.concatenate([self._whiten_channel(c, columns[c])[0] for c in range(len(columns))])
 
     def _whiten_channel(self, c: int, columns: Array) -> tuple[Array, float]:
-        return correlated(columns, self.gap_s, self.fast[c], float(self.slow[c]), self.taus_s[c])
+        given = self.given[c] if self.given else ()
+        return correlated(columns, self.gap_s, self.fast[c], float(self.slow[c]), self.taus_s[c], given)
 
     @cached_property
     def logdet(self) -> float:
@@ -96,12 +113,21 @@ class Noise:
 
 
 def correlated(
-    columns: Array, gap_s: Array, fast: Array, slow: float, taus_s: tuple[float, ...]
+    columns: Array, gap_s: Array, fast: Array, slow: float, taus_s: tuple[float, ...], given: Processes = ()
 ) -> tuple[Array, float]:
     """Columns (n, k) of one channel made white, and log det Sigma."""
-    each = np.full(len(taus_s), slow / np.sqrt(len(taus_s)))
-    out, logdet = whiten(np.ascontiguousarray(columns), gap_s, fast, each, np.array(taus_s))
+    each = [(slow / np.sqrt(len(taus_s)), tau_s) for tau_s in taus_s if slow or not given]
+    stds, times_s = (np.array(values) for values in zip(*each, *given, strict=True))
+    out, logdet = whiten(np.ascontiguousarray(columns), gap_s, fast, stds, times_s)
     return out, float(logdet)
+
+
+def _about_mean(processes: Processes, span_s: float) -> float:
+    """Standard deviation of processes about their mean over a time."""
+    if not span_s:
+        return 0.0
+    shares = [(std**2, tau_s / span_s) for std, tau_s in processes]
+    return float(np.sqrt(sum(v * (1 - 2 * x + 2 * x * x * -np.expm1(-1 / x)) for v, x in shares)))
 
 
 def rms(x: Array) -> Array:
@@ -109,9 +135,9 @@ def rms(x: Array) -> Array:
     return np.asarray(np.sqrt(np.mean(x * x, axis=-1)))
 
 
-def white_only(white: Array | None, gap_s: Array, channels: int) -> Noise:
+def white_only(white: Array | None, gap_s: Array, channels: int, given: tuple[Processes, ...] = ()) -> Noise:
     """The noise before anything is fitted."""
     ones = np.ones(channels)
     if white is None:
-        return Noise(np.zeros((channels, len(gap_s))), gap_s, ones, 0 * ones, ((1.0,),) * channels)
-    return Noise(white, gap_s, 0 * ones, 0 * ones, ((1.0,),) * channels)
+        return Noise(np.zeros((channels, len(gap_s))), gap_s, ones, 0 * ones, ((1.0,),) * channels, given)
+    return Noise(white, gap_s, 0 * ones, 0 * ones, ((1.0,),) * channels, given)

@@ -19,6 +19,7 @@ from calibrations.chain import Step, backward, force, forward
 from calibrations.errors import DataError, ModelError, TooFewRows
 from calibrations.model import Model
 from calibrations.motion.stretches import Stretches, stretches
+from calibrations.noise import Processes
 from calibrations.noise_estimation.mean_noise import norm_std, white_std
 from calibrations.noise_estimation.scatter import scatter
 from calibrations.parameters import Layout
@@ -157,6 +158,11 @@ class Problem:
         if self.table.kind in KNOWN or std is None:
             return None if std is None else std.T
         return norm_std(self.table, std).T / self.layout.nominal
+
+    @property
+    def given(self) -> tuple[Processes, ...]:
+        """Slow noise of each channel that is known from a still record; none where nothing is."""
+        return tuple(self.table.noise[channel] for channel in self.channels) if self.table.noise else ()
 
     @cached_property
     def gap_s(self) -> Array:

@@ -65,6 +65,7 @@ class Table:
     source: str = ""
     labels: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     numbers: NDArray[np.intp] | None = None  # of the rows in what they were taken from; None: 0, 1, 2 ...
+    noise: Mapping[str, tuple[tuple[float, float], ...]] = field(default_factory=dict)  # by axis: `known_noise`
 
     @staticmethod
     def from_columns(

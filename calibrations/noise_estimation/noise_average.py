@@ -26,7 +26,7 @@ LEAST_STEP = 1e-9
 
 def widening(noise: Noise, residual: Array, jacobian: Array, typical: Array) -> Array:
     """Factor on each standard uncertainty under `noise`, shape (p,), from residual (channels, n), jacobian (.., p)."""
-    points = allowed(noise.gap_s)
+    points = [NO_SLOW] if noise.given else allowed(noise.gap_s)
     if len(points) == 1 or not jacobian.shape[2]:
         return np.ones(jacobian.shape[2])
     search = Search(noise, residual, (jacobian,), np.zeros((residual.shape[1], 0)), points)

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrations.noise import Noise, correlated, rms
+from calibrations.noise import Noise, Processes, correlated, rms
 from calibrations.table import Array
 
 Point = tuple[float, tuple[float, ...]]  # slow noise over white and scatter, and its time constants
@@ -41,7 +41,7 @@ def estimate(start: Noise, residual: Array, jacobian: Array, smooth: Array) -> N
     noise = start
     rounding = 0.0 if start.known or not jacobian.size else EXACT * rms(jacobian.swapaxes(1, 2)).max(axis=1)
     for _ in range(ROUNDS):
-        best = Search(noise, residual, (jacobian,), smooth, grid(noise.gap_s)).best()
+        best = Search(noise, residual, (jacobian,), smooth, tried(noise)).best()
         variance = best.scale**2 * np.mean(noise.fast**2, axis=1) - np.mean(noise.white**2, axis=1)
         scatter = np.maximum(np.sqrt(np.maximum(variance, 0.0)), rounding)
         noise = replace(noise, scatter=scatter, ratio=best.ratio, taus_s=best.taus_s)
@@ -55,11 +55,16 @@ def gains(noise: Noise, residual: Array, jacobian: Array, extras: Sequence[Array
 
     Smooth columns are set aside: this is what each explains beside them. Gram matrices are made once for all.
     """
-    search = Search(noise, residual, (jacobian, *extras), smooth, grid(noise.gap_s))
+    search = Search(noise, residual, (jacobian, *extras), smooth, tried(noise))
     without = search.best().deviance
     return [
         max(0.0, without - search.best(k).deviance) if k in search.beside[1] else 0.0 for k in range(1, len(extras) + 1)
     ]
+
+
+def tried(noise: Noise) -> list[Point]:
+    """Slow noise to try beside what is known: none where a still record has told it."""
+    return [NO_SLOW] if noise.given else grid(noise.gap_s)
 
 
 def grid(gap_s: Array) -> list[Point]:
@@ -84,7 +89,7 @@ def long_enough(gap_s: Array) -> bool:
 
 def deviance(noise: Noise, residual: Array, jacobian: Array, smooth: Array) -> float:
     """-2 log restricted likelihood up to a constant of the data, under the noise of greatest likelihood."""
-    return Search(noise, residual, (jacobian,), smooth, grid(noise.gap_s)).best().deviance
+    return Search(noise, residual, (jacobian,), smooth, tried(noise)).best().deviance
 
 
 @dataclass(frozen=True)
@@ -143,7 +148,8 @@ class Search:
         smooth = np.broadcast_to(self.smooth, (len(basis), *self.smooth.shape))
         columns = np.concatenate([smooth, basis, self.residual[:, :, None]], axis=2)
         fast, gap_s, k = self.noise.fast, self.noise.gap_s, self.smooth.shape[1]
-        return [_grams(gap_s, fast[c], columns[c], self.grid, k) for c in range(len(basis))]
+        given = self.noise.given or ((),) * len(basis)
+        return [_grams(gap_s, fast[c], columns[c], self.grid, k, given[c]) for c in range(len(basis))]
 
     def _choose(self, score: Array) -> int:
         """The best point; flicker noise where the data cannot tell it from the best.
@@ -196,10 +202,10 @@ class Grams:
         return replace(self, gram=self.gram[:, keep[:, None], keep])
 
 
-def _grams(gap_s: Array, fast: Array, columns: Array, grid: list[Point], k: int) -> Grams:
+def _grams(gap_s: Array, fast: Array, columns: Array, grid: list[Point], k: int, given: Processes) -> Grams:
     """Gram matrices over the grid; the first `k` columns are set aside (Schur complement)."""
     w = float(rms(fast))
-    made = [correlated(columns, gap_s, fast, ratio * w, taus) for ratio, taus in grid]
+    made = [correlated(columns, gap_s, fast, ratio * w, taus, given) for ratio, taus in grid]
     gram = np.stack([out.T @ out for out, _ in made])
     logdet = np.array([logdet for _, logdet in made])
     if not k:

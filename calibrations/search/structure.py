@@ -89,7 +89,7 @@ def sharpened(pattern: Pattern, screen: Screen) -> Pattern:
 
 def _out(fit: Fit) -> list[Pattern]:
     """The poses that stand out; none where there are none, or too many."""
-    rows, n = standing_out(fit.residual, np.hypot(fit.noise.floor, fit.noise.slow)), fit.table.n
+    rows, n = standing_out(fit.residual, np.hypot(fit.noise.floor, fit.noise.wander)), fit.table.n
     if fit.table.kind == "motion" or not 0 < len(rows) <= max(1, MOST_OUT * n):
         return []
     columns = per_channel(Pattern("", np.eye(n)[:, rows]), len(fit.channels)).columns
@@ -112,7 +112,8 @@ def standing_out(residual: Array, noise: Array) -> NDArray[np.intp]:
 
 def _patternless(fit: Fit) -> Pattern | None:
     """More noise than a sensor makes by itself. On positions it is how well a hand repeats them, and no effect."""
-    if fit.table.kind == "positions" or not fit.noise.known or fit.pooled_excess <= MOST_NOISE:
+    excess = rms(fit.rmse / np.hypot(fit.noise.floor, fit.noise.known_slow))
+    if fit.table.kind == "positions" or not fit.noise.known or excess <= MOST_NOISE:
         return None
     slow, scatter = (float(np.max(noise / fit.noise.floor)) for noise in (fit.noise.slow, fit.noise.scatter))
     if scatter > slow and not correlation_known(fit.table):
