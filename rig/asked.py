@@ -13,6 +13,7 @@ from calibrations.fit import Fit
 from calibrations.model import Model
 from calibrations.model_file import read_model
 from calibrations.noise_estimation import scatter
+from calibrations.noise_estimation.known_noise import with_noise
 from calibrations.noise_estimation.mean_noise import correlation_known
 from calibrations.reading.units import UNITS, unit_of
 from calibrations.search.blind import blind_to
@@ -40,15 +41,17 @@ def effects_of(bench_file: Path | None) -> Mapping[str, Effect]:
 
 
 def asked(
-    data: str, model: str | None, bench_file: Path | None, tell: Callable[[str], None]
+    data: str, model: str | None, bench_file: Path | None, tell: Callable[[str], None], noise: str | None = None
 ) -> tuple[Table, Model, Mapping[str, Effect]]:
     """The table, the model (by default that of its kind) and the effects; `tell` hears what a person should know.
+
+    `noise` names a model of the sensor's noise, which then is not guessed.
 
     Raises DataError, UnknownRun, ModelError, UnknownName.
     """
     effects = effects_of(bench_file)
     chosen = read_model(model, effects) if model is not None else None
-    table = load(data, tell=tell)
+    table = with_known_noise(load(data, tell=tell), noise, effects)
     if chosen is not None:
         check_unit(chosen, table.unit, table.source)
     if table.kind == "poses" and not correlation_known(table):
@@ -59,6 +62,11 @@ def asked(
     for why in filter(None, (earth_unknown(table), scatter.told(table))):
         tell(f"{table.source}: {why}.")
     return table, chosen or read_model(DEFAULTS.get(table.content, "linear"), effects), effects
+
+
+def with_known_noise(table: Table, noise: str | None, effects: Mapping[str, Effect]) -> Table:
+    """The table with the slow noise that a noise model gives its outputs, where one is named."""
+    return table if noise is None else with_noise(table, read_model(noise, effects))
 
 
 def blind(found: Fit, effects: Mapping[str, Effect]) -> str | None:

@@ -1,8 +1,8 @@
 """The slow noise of a sensor, as a noise model knows it from a still record, on the rows of a table.
 
-A sum of Gauss-Markov processes: flicker noise has some to each decade of time constants, a random walk is one far slower
-than the record. What is faster than a row, and white and quantisation noise, are in the scatter of its samples; a
-sinusoid averages out in a dwell.
+A sum of Gauss-Markov processes: flicker noise has some to each decade of time constants, a random walk is one far
+slower than the record. What is faster than a row, and white and quantisation noise, are in the scatter of its samples;
+a sinusoid averages out in a dwell.
 
 Source  Machlup, J. Appl. Phys. 25 (1954); McWhorter: 1/f noise as a sum of relaxations evenly spaced in log time.
 """

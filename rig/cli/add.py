@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from rig.cli.output import Sampled, bench_option, emit, json_option, note, notes, sampled_options
+from rig.cli.output import Sampled, bench_option, emit, json_option, noise_option, note, notes, sampled_options
 
 if TYPE_CHECKING:
     from calibrations.effect import Effect
@@ -25,6 +25,7 @@ PLAIN = re.compile(r"[A-Za-z0-9_-]+")  # what no expression that means anything 
 @click.option("--data", required=True, help="A file or a run.")
 @click.option("--out", required=True, type=click.Path(dir_okay=False, path_type=Path), help="The new model file.")
 @bench_option
+@noise_option
 @sampled_options
 @json_option
 def command(
@@ -35,6 +36,7 @@ def command(
     out: Path,
     bench_file: Path | None,
     as_json: bool,
+    noise: str | None,
     sampled: Sampled,
 ) -> None:
     """Add EFFECT to a model, fit both to the data, and write the new model; the old one stays.
@@ -52,10 +54,10 @@ def command(
     from rig.cli.words import addition, parameters, warning
     from rig.trail import require_new
 
-    if (still := of_still(data, model, bench_file, sampled, out)) is not None:
+    if (still := of_still(data, model, bench_file, sampled, out, noise=noise)) is not None:
         told_add(still, effect, out, as_json, data)
         return
-    table, start, effects = asked(data, model, bench_file, out)
+    table, start, effects = asked(data, model, bench_file, out, noise)
     chosen = _chosen(effect, name, table, effects)
     if start.holds(chosen.name):
         raise ModelError(f"{model}: {chosen.name} is in the model already; its effects: {', '.join(start.effects)}")

@@ -19,7 +19,7 @@ from rig.provenance import with_provenance
 
 
 def asked(
-    data: str, model: str | None, bench_file: Path | None, out: Path | None = None
+    data: str, model: str | None, bench_file: Path | None, out: Path | None = None, noise: str | None = None
 ) -> tuple[Table, Model, Mapping[str, Effect]]:
     """The table, the model and the effects that a command was asked for.
 
@@ -27,7 +27,7 @@ def asked(
     """
     if out is not None:
         require_out(out, data, model, bench_file)
-    return read_asked(data, model, bench_file, note)
+    return read_asked(data, model, bench_file, note, noise)
 
 
 def tell_blind(found: Fit, effects: Mapping[str, Effect]) -> None:

@@ -6,7 +6,17 @@ from pathlib import Path
 
 import click
 
-from rig.cli.output import Sampled, bench_option, check_option, emit, json_option, model_option, notes, sampled_options
+from rig.cli.output import (
+    Sampled,
+    bench_option,
+    check_option,
+    emit,
+    json_option,
+    model_option,
+    noise_option,
+    notes,
+    sampled_options,
+)
 
 
 @click.command("compare")
@@ -14,9 +24,18 @@ from rig.cli.output import Sampled, bench_option, check_option, emit, json_optio
 @model_option
 @check_option
 @bench_option
+@noise_option
 @sampled_options
 @json_option
-def command(data: str, model: str | None, check: bool, bench_file: Path | None, as_json: bool, sampled: Sampled) -> int:
+def command(
+    data: str,
+    model: str | None,
+    check: bool,
+    bench_file: Path | None,
+    as_json: bool,
+    noise: str | None,
+    sampled: Sampled,
+) -> int:
     """Set a model beside DATA (a file or a run) and say where it fails. A model without values is fitted first."""
     from calibrations.compare import compare
     from calibrations.documents import comparison_document
@@ -25,9 +44,9 @@ def command(data: str, model: str | None, check: bool, bench_file: Path | None, 
     from rig.cli.still import of_still, told_compare
     from rig.cli.words import errors, warning
 
-    if (still := of_still(data, model, bench_file, sampled)) is not None:
+    if (still := of_still(data, model, bench_file, sampled, noise=noise)) is not None:
         return told_compare(still, model, check, as_json, data)
-    table, start, _ = asked(data, model, bench_file)
+    table, start, _ = asked(data, model, bench_file, noise=noise)
     result = compare(table, start)
     caution = undetermined(result.fit)
     if as_json:

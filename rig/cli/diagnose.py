@@ -15,6 +15,7 @@ from rig.cli.output import (
     emit,
     json_option,
     model_option,
+    noise_option,
     note,
     notes,
     sampled_options,
@@ -31,9 +32,18 @@ SHOWN = 6
 @model_option
 @check_option
 @bench_option
+@noise_option
 @sampled_options
 @json_option
-def command(data: str, model: str | None, check: bool, bench_file: Path | None, as_json: bool, sampled: Sampled) -> int:
+def command(
+    data: str,
+    model: str | None,
+    check: bool,
+    bench_file: Path | None,
+    as_json: bool,
+    noise: str | None,
+    sampled: Sampled,
+) -> int:
     """Find the physical effect that a model misses on DATA (a file or a run)."""
     from calibrations.diagnose import diagnose
     from calibrations.documents import diagnosis_document
@@ -43,9 +53,9 @@ def command(data: str, model: str | None, check: bool, bench_file: Path | None, 
     from rig.cli.words import warning
     from rig.foresight import with_next
 
-    if (still := of_still(data, model, bench_file, sampled)) is not None:
+    if (still := of_still(data, model, bench_file, sampled, noise=noise)) is not None:
         return told_diagnose(still, model, bench_file, check, as_json, data)
-    table, start, effects = asked(data, model, bench_file)
+    table, start, effects = asked(data, model, bench_file, noise=noise)
     result = diagnose(table, start, effects)
     result = with_next(result, data, effects, bench_file, note)
     tell_blind(result.fit, effects)

@@ -13,6 +13,7 @@ from rig.cli.output import (
     emit,
     json_option,
     model_option,
+    noise_option,
     note,
     notes,
     sampled_options,
@@ -29,6 +30,7 @@ from rig.cli.watch import watch_options
 @watch_options
 @check_option
 @bench_option
+@noise_option
 @sampled_options
 @json_option
 def command(
@@ -42,6 +44,7 @@ def command(
     check: bool,
     bench_file: Path | None,
     as_json: bool,
+    noise: str | None,
     sampled: Sampled,
 ) -> int:
     """Diagnose and add until nothing is missing on DATA (a file or a run; several are judged together).
@@ -59,26 +62,33 @@ def command(
         raise click.UsageError("name DATA (a file or a run), or --live to measure it")
     from rig.cli.still import of_still, told_discover
 
-    if (still := of_still(data[0], model, bench_file, sampled, out)) is not None:
+    if (still := of_still(data[0], model, bench_file, sampled, out, noise=noise)) is not None:
         if len(data) > 1:
             raise click.UsageError("still records are judged one at a time; name one")
         return told_discover(still, out, bench_file, check, as_json, data[0])
-    return _discover(data, model, out, check, bench_file, as_json)
+    return _discover(data, model, out, check, bench_file, as_json, noise)
 
 
 def _discover(
-    data: tuple[str, ...], model: str | None, out: Path | None, check: bool, bench_file: Path | None, as_json: bool
+    data: tuple[str, ...],
+    model: str | None,
+    out: Path | None,
+    check: bool,
+    bench_file: Path | None,
+    as_json: bool,
+    noise: str | None,
 ) -> int:
     from calibrations.discover import discover
     from calibrations.documents import discovery_document
+    from rig.asked import with_known_noise
     from rig.cli.asked import asked, write_model
     from rig.cli.own_effect import own_effect, told
     from rig.cli.words import discovery, parameters, warning
     from rig.foresight import with_next
     from rig.several import load_all
 
-    table, start, effects = asked(data[0], model, bench_file, out)
-    table = load_all(data, note) if len(data) > 1 else table
+    table, start, effects = asked(data[0], model, bench_file, out, noise)
+    table = with_known_noise(load_all(data, note), noise, effects) if len(data) > 1 else table
     result = discover(table, start, effects)
     result = with_next(result, data[0], effects, bench_file, note)
     if out is not None:

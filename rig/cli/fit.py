@@ -6,7 +6,17 @@ from pathlib import Path
 
 import click
 
-from rig.cli.output import Sampled, bench_option, check_option, emit, json_option, model_option, notes, sampled_options
+from rig.cli.output import (
+    Sampled,
+    bench_option,
+    check_option,
+    emit,
+    json_option,
+    model_option,
+    noise_option,
+    notes,
+    sampled_options,
+)
 
 
 @click.command("fit")
@@ -15,6 +25,7 @@ from rig.cli.output import Sampled, bench_option, check_option, emit, json_optio
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="Write the fitted model to this file.")
 @check_option
 @bench_option
+@noise_option
 @sampled_options
 @json_option
 def command(
@@ -24,6 +35,7 @@ def command(
     check: bool,
     bench_file: Path | None,
     as_json: bool,
+    noise: str | None,
     sampled: Sampled,
 ) -> int:
     """Estimate the parameters of a model from DATA (a file or a run), with standard uncertainties."""
@@ -39,9 +51,9 @@ def command(
     from rig.cli.still import of_still, told_fit
     from rig.cli.words import errors, paper, parameters, warning
 
-    if (still := of_still(data, model, bench_file, sampled, out)) is not None:
+    if (still := of_still(data, model, bench_file, sampled, out, noise=noise)) is not None:
         return told_fit(still, out, check, as_json)
-    table, start, effects = asked(data, model, bench_file, out)
+    table, start, effects = asked(data, model, bench_file, out, noise)
     found = fit(start, table)
     if out is not None:
         write_model(found, start, out)

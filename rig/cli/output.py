@@ -16,6 +16,9 @@ check_option = click.option("--check", is_flag=True, help="Exit with 1 unless th
 model_option = click.option(
     "--model", default=None, help="A shipped model by name, or a model file. Default: by kind of data."
 )
+noise_option = click.option(
+    "--noise", help="A noise model of this sensor, fitted to a still record: slow noise is then known, and not guessed."
+)
 bench_option = click.option(
     "--bench",
     "bench_file",

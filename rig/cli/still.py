@@ -32,6 +32,7 @@ def of_still(
     bench_file: Path | None,
     sampled: Sampled,
     out: Path | None = None,
+    noise: str | None = None,
 ) -> AskedStill | None:
     """What a command was asked of a still record; None where the data are none. `sampled`: --channel and --rate.
 
@@ -42,6 +43,8 @@ def of_still(
     found = asked_still(data, model, bench_file, *sampled, note)
     if found is None and any(sampled):
         raise click.UsageError("--channel and --rate are for still records, and DATA is none (or name --model still)")
+    if found is not None and noise is not None:
+        raise click.UsageError("--noise is for poses and rates; the model of a still record is named with --model")
     return found
 
 
