@@ -9,7 +9,7 @@ import click
 from procedures.catalogue import find
 from rig.bench import Bench, read_bench
 from rig.cli.output import bench_option, json_option
-from rig.cli.watch import tell, watch_options, watching
+from rig.cli.watch import tell, trace_option, watch_options, watching
 from rig.record import Record
 from rig.runner import Outcome, resume
 
@@ -17,6 +17,7 @@ from rig.runner import Outcome, resume
 @click.command("resume")
 @click.argument("run")
 @watch_options
+@trace_option
 @bench_option
 @json_option
 def command(

@@ -11,7 +11,7 @@ from procedures.settings import parse
 from rig.bench import read_bench
 from rig.cli.output import bench_option, json_option
 from rig.cli.settings import PASS_ON, read_settings, settings_arguments
-from rig.cli.watch import tell, watch_options, watching
+from rig.cli.watch import tell, trace_option, watch_options, watching
 from rig.record import Record
 from rig.runner import start
 
@@ -20,6 +20,7 @@ from rig.runner import start
 @click.argument("procedure")
 @settings_arguments
 @watch_options
+@trace_option
 @bench_option
 @json_option
 def command(

@@ -27,9 +27,11 @@ from rig.soak_forecast import SoakWatch, soak_watch
 from rig.soak_forecast import lines as told_lines
 
 
+trace_option = click.option("--trace", is_flag=True, help="Log every message to and from instruments.")
+
+
 def watch_options(function: Callable[..., Any]) -> Callable[..., Any]:
-    """--unattended, --answers and --trace."""
-    function = click.option("--trace", is_flag=True, help="Log every message to and from instruments.")(function)
+    """--unattended and --answers."""
     function = click.option("--unattended", is_flag=True, help="Ask nobody, show only the end.")(function)
     path = click.Path(dir_okay=False, path_type=Path)
     return click.option("--answers", type=path, help="A YAML file that answers the questions to a person.")(function)
