@@ -22,6 +22,11 @@ def measured(value: float, std: float | None) -> str:
     return minus(f"({value / 10.0**power:.{shown}f} ± {std / 10.0**power:.{shown}f})") + times_ten_to(power)
 
 
+def as_written(value: str | float) -> str:
+    """A constant as a person wrote it: `17` for 17.0, such as a serial number that a file's header holds."""
+    return f"{value:.15g}" if isinstance(value, float) else str(value)
+
+
 def bound(value: float, limit: float | Sequence[float]) -> str:
     """A limit as `value` meets it: `0 to 12`; of a magnitude the side that it is on, `at most 3` or `at least −3`."""
     if isinstance(limit, Sequence):

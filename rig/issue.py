@@ -24,6 +24,7 @@ from calibrations.certificates.content import (
 )
 from calibrations.fit import Fit
 from calibrations.model_file import dump_model
+from calibrations.numerals import as_written
 from calibrations.table import Table
 from procedures.session import Samples
 from rig.bench import Bench
@@ -75,7 +76,7 @@ def _issued(
     bench = given or (_bench(run) if run is not None and run.bench else None)
     lab = bench.laboratory if bench is not None else None
     text = dump_model(found.model)
-    constant = {name: str(value) for name, value in table.constants.items()}
+    constant = {name: as_written(value) for name, value in table.constants.items()}
     ended = (run.ended or run.created) if run is not None else datetime.now(UTC).isoformat(timespec="seconds")
     digest = hashlib.sha256(f"{table.digest}{hashlib.sha256(text.encode()).hexdigest()}".encode()).hexdigest()
     customer = asked.customer or (lab.customer if lab is not None else "")

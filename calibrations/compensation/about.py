@@ -11,6 +11,7 @@ from calibrations.compensation.cost import Size
 from calibrations.compensation.forward import INVERTED, LEFT_OUT
 from calibrations.compensation.inverse import Compensation
 from calibrations.model import Estimate
+from calibrations.numerals import as_written
 
 WIDTH = 112
 UPWARD = Context(prec=3, rounding=ROUND_CEILING)  # bounds are not rounded down
@@ -80,7 +81,7 @@ def _what(made: Compensation, origin: Origin) -> Iterator[str]:
     yield f"  model file  {origin.model_file}, SHA-256 {origin.sha256}"
     for key, title in SAID.items():
         if key in model.provenance:
-            yield f"  {title}  {model.provenance[key]}"
+            yield f"  {title}  {as_written(model.provenance[key])}"
     yield f"  written by {origin.program} on {origin.date}"
 
 

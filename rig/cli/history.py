@@ -1,0 +1,142 @@
+"""history: a sensor's calibrations over its life, their stability, and when the next one is due."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+
+from calibrations.evaluations.control_chart import BASELINE, FEWEST
+from rig.cli.history_words import Compared, compared_lines, document, lines, near_lines
+from rig.cli.output import bench_option, emit, json_option
+from rig.history import History, Limit, closest, compare, compare_rigs, history, stale
+from rig.record import Record
+
+DAY = click.DateTime(["%Y-%m-%d"])
+
+
+@click.command("history")
+@click.argument("sensor")
+@click.option("--model", default="linear", show_default=True, help="By which every run is calibrated.")
+@click.option("--quantity", "chosen", multiple=True, metavar="NAME", help="Only this one; again for more.")
+@click.option("--limit", "given", multiple=True, metavar="NAME=CHANGE", help="Greatest change from the last one.")
+@click.option(
+    "--baseline",
+    type=click.IntRange(min=FEWEST),
+    default=BASELINE,
+    show_default=True,
+    help="Calibrations that set the charts.",
+)
+@click.option("--at", "on", type=DAY, help="The calibration closest to this day, and whether it is stale.")
+@click.option("--between", nargs=2, type=DAY, help="Compare the calibrations closest to two days.")
+@click.option("--beside", help="Compare with another sensor's last calibration.")
+@click.option("--rigs", nargs=2, help="Compare two rigs, by their names, by all calibrations of this sensor on them.")
+@click.option("--pictures", "folder", type=click.Path(file_okay=False, path_type=Path), help="Draw it here.")
+@click.option("--format", "form", type=click.Choice(["png", "svg"]), default="png", show_default=True)
+@bench_option
+@json_option
+def command(
+    sensor: str,
+    model: str,
+    chosen: Sequence[str],
+    given: Sequence[str],
+    baseline: int,
+    on: Any,
+    between: tuple[Any, Any] | None,
+    beside: str | None,
+    rigs: tuple[str, str] | None,
+    folder: Path | None,
+    form: str,
+    bench_file: Path | None,
+    as_json: bool,
+) -> int:
+    """Show the life of SENSOR (its serial number): every calibration in the record, drift, control charts, due dates.
+
+    The next calibration is due when what the drift may come to leaves its limit: of the bench file (limits.results), or
+    --limit. Exit status 1: stale at --at, or a comparison that does not agree.
+    """
+    from calibrations.model_file import read_model
+    from rig.asked import effects_of
+
+    read = read_model(model, effects_of(bench_file))
+    limits = _limits(bench_file, given)
+    with Record() as record:
+        found = _only(history(record, sensor, read, limits, baseline), chosen)
+        other = history(record, beside, read, limits, baseline) if beside is not None else None
+    compared = _compared(found, other, between, rigs)
+    near = closest(found.calibrations, on.date()) if on is not None else None
+    why = stale(found, *near) if near is not None else None
+    written = _draw(found, folder, form) if folder is not None else []
+    if as_json:
+        emit(document(found, near, why, compared))
+    else:
+        told = [*lines(found), *near_lines(near, on, why), *compared_lines(compared)]
+        click.echo("\n".join([*told, *(f"written: {path}" for path in written)]))
+    return int(why is not None or any(not each.agrees for _, _, rows in compared for _, each in rows.values()))
+
+
+def _limits(bench_file: Path | None, given: Sequence[str]) -> dict[str, Limit]:
+    limits: dict[str, Limit] = {}
+    if bench_file is not None:
+        from rig.bench import read_bench
+
+        limits |= {k: v for k, v in read_bench(bench_file).result_limits.items() if isinstance(v, tuple)}
+    for text in given:
+        name, _, number = text.partition("=")
+        try:
+            limits[name] = abs(float(number))
+        except ValueError:
+            raise click.UsageError(f"--limit {text!r}: write NAME=CHANGE, as in bias-x=0.005") from None
+    return limits
+
+
+def _only(found: History, chosen: Sequence[str]) -> History:
+    """With the chosen quantities alone."""
+    from dataclasses import replace
+
+    from rig.nearest import did_you_mean
+
+    known = [q.name for q in found.quantities]
+    for name in chosen:
+        if name not in known:
+            raise click.UsageError(f"no quantity {name!r} by the model {found.model}.{did_you_mean(name, known)}")
+    kept = tuple(q for q in found.quantities if not chosen or q.name in chosen)
+    return replace(found, quantities=kept)
+
+
+def _compared(
+    found: History, other: History | None, between: tuple[Any, Any] | None, rigs: tuple[str, str] | None
+) -> Compared:
+    made: Compared = []
+    if other is not None:
+        a, b = found.calibrations[-1], other.calibrations[-1]
+        made.append((f"{found.sensor}, {a.day}", f"{other.sensor}, {b.day}", compare(a, b)))
+    if between:
+        a, b = (closest(found.calibrations, day.date())[0] for day in between)
+        made.append((a.day, b.day, compare(a, b)))
+    if rigs:
+        made.append((*rigs, compare_rigs(found.calibrations, *rigs)))
+    names = {q.name for q in found.quantities}
+    return [(a, b, {name: row for name, row in rows.items() if name in names}) for a, b, rows in made]
+
+
+def _draw(found: History, folder: Path, form: str) -> list[Path]:
+    """Its life, and a control chart of each quantity."""
+    from calibrations.pictures.control_chart import control_charts
+    from calibrations.pictures.history import Shown, life
+    from calibrations.pictures.save import save_all
+
+    shown = {}
+    for q in found.quantities:
+        values = [each.values[q.name] for each in q.of]
+        days = [each.at.timestamp() / 86400 for each in q.of]
+        due = None if q.due is None or q.line is None or q.allowed is None else q.line.due_days(*q.allowed)
+        numbers, expanded = [v.value for v in values], [2 * v.std for v in values]
+        shown[q.name] = Shown(days, numbers, expanded, q.unit, q.line, q.allowed, due)
+    figures = {"life": life(shown)}
+    charts = {q.name: q.chart for q in found.quantities if q.chart is not None}
+    if charts:
+        figures["charts"] = control_charts(charts, {q.name: q.unit for q in found.quantities})
+    return save_all(figures, folder, form)

@@ -1,0 +1,236 @@
+"""A sensor's calibrations over its life: each complete run of it that determines a model, in the order of time.
+
+A calibration is derived from its samples anew, by one model for all, and so comparable. Its date is that of the run;
+of an imported table the constant `date` that the file carries (`# date: 2025-03-01`), else the day of the import. A
+sensor goes by its serial number, and by its name where it has none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import date, datetime, timedelta
+
+import numpy as np
+
+from calibrations.certificates.terms import name as result_name
+from calibrations.errors import CalibrationError, DataError
+from calibrations.evaluations.agreement import Agreement, agreement
+from calibrations.evaluations.control_chart import BASELINE, Chart, control_chart
+from calibrations.evaluations.control_chart import FEWEST as FEWEST_CHARTED
+from calibrations.evaluations.stability import FEWEST, Stability, stability
+from calibrations.fit import fit
+from calibrations.model import Model
+from calibrations.noise import rms
+from calibrations.numerals import as_written
+from rig.certificates import EXPIRED
+from rig.errors import RecordError
+from rig.nearest import did_you_mean
+from rig.record import Record, Run
+from rig.record.measured import Measured, sensors_of
+
+STALE_DAYS = 365.0  # where no limit says when a calibration is due
+Limit = float | tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Value:
+    """One parameter of one calibration."""
+
+    value: float
+    std: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """One run's parameters by the names of certificates. `at` is its date and time."""
+
+    data: str
+    at: datetime
+    rig: str
+    values: Mapping[str, Value]
+    expired: str | None
+
+    @property
+    def day(self) -> str:
+        return self.at.date().isoformat()
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One parameter over all calibrations that have it; `chart` and `line` None where they are too few."""
+
+    name: str
+    unit: str
+    of: tuple[Calibration, ...]
+    chart: Chart | None
+    line: Stability | None
+    allowed: tuple[float, float] | None
+    due: date | None
+
+    @property
+    def last(self) -> Value:
+        return self.of[-1].values[self.name]
+
+
+@dataclass(frozen=True)
+class History:
+    """A sensor's life. `passed_over` are runs of it that are no calibration by this model, and why."""
+
+    sensor: str
+    model: str
+    calibrations: tuple[Calibration, ...]
+    quantities: tuple[Quantity, ...]
+    passed_over: Mapping[str, str]
+
+    @property
+    def due(self) -> date | None:
+        """The first day on which one of the quantities is due."""
+        return min((q.due for q in self.quantities if q.due is not None), default=None)
+
+
+def history(
+    record: Record,
+    sensor: str,
+    model: Model,
+    limits: Mapping[str, Limit],
+    baseline: int = BASELINE,
+) -> History:
+    """The history of `sensor` by `model`. `limits` by result's name: a number is the greatest change since the last
+    calibration, a pair the lowest and highest value.
+
+    Raises RecordError where the record has no calibration of it, naming the nearest sensor.
+    """
+    found, passed_over = _calibrations(record, sensor, model)
+    if not found:
+        reasons = f" Its runs are none by this model: {next(iter(passed_over.values()))}" if passed_over else ""
+        known = sensors(record.runs())
+        nearest = "" if sensor in known else did_you_mean(sensor, known)
+        raise RecordError(f"no calibration of the sensor {sensor!r} in the record.{reasons}{nearest}")
+    names = dict.fromkeys(name for calibration in found for name in calibration.values)
+    quantities = tuple(_quantity(name, found, limits.get(name), baseline) for name in names)
+    return History(sensor, model.name, tuple(found), quantities, passed_over)
+
+
+def sensors(runs: Iterable[Run]) -> list[str]:
+    """Every sensor of the record, by serial number or name."""
+    return list(dict.fromkeys(each for run in runs for each in _members(run)))
+
+
+def closest(of: Sequence[Calibration], on: date) -> tuple[Calibration, float]:
+    """The calibration closest to a day, and by how many days it is older than that day; below 0: later."""
+    noon = datetime(on.year, on.month, on.day, 12, tzinfo=of[0].at.tzinfo)
+    days = [(noon - each.at) / timedelta(days=1) for each in of]
+    best = int(np.argmin(np.abs(days)))
+    return of[best], days[best]
+
+
+def stale(found: History, calibration: Calibration, age_days: float) -> str | None:
+    """Why a calibration does not hold for a day so much later (or earlier), or None."""
+    day = calibration.at + timedelta(days=age_days)
+    last = calibration is found.calibrations[-1]
+    if last and found.due is not None and day.date() > found.due:
+        return f"it was due on {found.due}"
+    if abs(age_days) > STALE_DAYS:
+        return f"it is {abs(age_days):.0f} days {'older' if age_days > 0 else 'younger'} than that day"
+    return None
+
+
+def compare(a: Calibration, b: Calibration) -> dict[str, tuple[str, Agreement]]:
+    """Two calibrations, by the names that both have: unit and agreement. Raises DataError where there is none."""
+    return _compared(a.values, b.values, a.data, b.data)
+
+
+def compare_rigs(of: Sequence[Calibration], one: str, other: str) -> dict[str, tuple[str, Agreement]]:
+    """The means of all calibrations on two rigs. Raises RecordError for a rig that has none."""
+    return _compared(_means_on(one, of), _means_on(other, of), one, other)
+
+
+def _means_on(rig: str, of: Sequence[Calibration]) -> dict[str, Value]:
+    mine = [each for each in of if each.rig == rig]
+    if not mine:
+        raise RecordError(f"no calibration on the rig {rig!r}.{did_you_mean(rig, {each.rig for each in of})}")
+    return {name: _mean([each.values[name] for each in mine if name in each.values]) for name in mine[-1].values}
+
+
+def _compared(a: Mapping[str, Value], b: Mapping[str, Value], one: str, other: str) -> dict[str, tuple[str, Agreement]]:
+    shared = [name for name in a if name in b and a[name].unit == b[name].unit]
+    if not shared:
+        raise DataError(f"{one} and {other} have no quantity in common; take a model that both determine")
+    return {n: (a[n].unit, agreement((a[n].value, a[n].std), (b[n].value, b[n].std))) for n in shared}
+
+
+def _mean(values: Sequence[Value]) -> Value:
+    """The mean; uncertain by the calibrations' own uncertainty, which they may share, and by what they scatter."""
+    x = np.array([each.value for each in values])
+    own = float(rms(np.array([each.std for each in values])))
+    scatter = float(x.std(ddof=1) / np.sqrt(len(x))) if len(x) > 1 else 0.0
+    return Value(float(x.mean()), max(own, scatter), values[0].unit)
+
+
+def _calibrations(record: Record, sensor: str, model: Model) -> tuple[list[Calibration], dict[str, str]]:
+    """In the order of time; and the sensor's runs that are none, with the reason."""
+    found, passed_over = [], {}
+    for run in record.runs():
+        members = _members(run)
+        if sensor not in members or run.state != "complete":
+            continue
+        member = members[sensor]
+        data = f"{run.run}/{member}" if member else run.run
+        try:
+            found.append(_calibration(Measured.named(record, data), model))
+        except (CalibrationError, RecordError) as error:
+            passed_over[data] = str(error)
+    return sorted(found, key=lambda each: each.at), passed_over
+
+
+def _members(run: Run) -> dict[str, str]:
+    """The sensors of a run: serial number (or name) -> its name in the batch, "" where there is one sensor."""
+    if batch := sensors_of(run):
+        said = {member: run.bench["sensors"][member] for member in batch}
+        return {each.get("serial") or each["name"]: member for member, each in said.items()}
+    name = run.constants.get("serial") or run.constants.get("sensor")
+    return {as_written(name): ""} if name else {}
+
+
+def _calibration(measured: Measured, model: Model) -> Calibration:
+    """Raises CalibrationError where the run does not determine the model."""
+    table = measured.table()
+    found = fit(model, table)
+    values = {
+        result_name(term.effect, e.name, e.axis): Value(e.value, e.std, e.unit)
+        for term in found.model.terms
+        for e in term.estimates
+        if e.identified and e.std
+    }
+    if len(values) < len(found.theta):
+        raise DataError(f"{table.source}: does not determine every parameter of {model.name}")
+    run = measured.run
+    expired = str(run.constants[EXPIRED]) if EXPIRED in run.constants else None
+    return Calibration(measured.name, _date(run), str(run.bench.get("name", "")) or "elsewhere", values, expired)
+
+
+def _date(run: Run) -> datetime:
+    """Raises DataError for a constant `date` that is none."""
+    said = run.constants.get("date")
+    try:
+        at = datetime.fromisoformat(str(said)) if said is not None else datetime.fromisoformat(run.created)
+    except ValueError:
+        raise DataError(f"run {run.run}: its constant date is {said!r}; write it as 2025-03-01") from None
+    return at if at.tzinfo else at.replace(hour=at.hour or 12, tzinfo=datetime.fromisoformat(run.created).tzinfo)
+
+
+def _quantity(name: str, of: Sequence[Calibration], limit: Limit | None, baseline: int) -> Quantity:
+    mine = tuple(each for each in of if name in each.values)
+    values = [each.values[name] for each in mine]
+    numbers, stds = [each.value for each in values], [each.std for each in values]
+    days = [each.at.timestamp() / 86400 for each in mine]
+    chart = control_chart(numbers, baseline, float(rms(np.array(stds)))) if len(mine) >= FEWEST_CHARTED else None
+    line = stability(days, numbers, stds) if len(mine) >= FEWEST and np.ptp(days) > 0 else None
+    allowed = None
+    if limit is not None:
+        allowed = limit if isinstance(limit, tuple) else (numbers[-1] - limit, numbers[-1] + limit)
+    due = line.due_days(*allowed) if line is not None and allowed is not None else None
+    when = None if due is None else datetime.fromtimestamp(due * 86400, tz=mine[-1].at.tzinfo).date()
+    return Quantity(name, values[0].unit, mine, chart, line, allowed, when)
