@@ -30,6 +30,9 @@ from rig.soak_forecast import lines as told_lines
 trace_option = click.option("--trace", is_flag=True, help="Log every message to and from instruments.")
 
 
+trace_option = click.option("--trace", is_flag=True, help="Log every message to and from instruments.")
+
+
 def watch_options(function: Callable[..., Any]) -> Callable[..., Any]:
     """--unattended and --answers."""
     function = click.option("--unattended", is_flag=True, help="Ask nobody, show only the end.")(function)
