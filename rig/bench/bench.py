@@ -48,6 +48,12 @@ class Bench(Strict):
         return adc.typed_settings().channels if adc else {}
 
     @property
+    def wired(self) -> Mapping[str, int]:
+        """All inputs of the converter by name, those on request too."""
+        adc = self.instruments.get("adc")
+        return adc.typed_settings().wired if adc else {}
+
+    @property
     def constants(self) -> dict[str, str | float]:
         """What every table says of the sensor (those of a batch are named apart), of the way and of the inputs."""
         sensor = {} if self.sensors else self.sensor.constants

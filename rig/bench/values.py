@@ -45,7 +45,7 @@ def _of_sensor(key: str, sensor: Sensor) -> Iterator[Fault]:
 
 def _of_channels(bench: Bench) -> Iterator[Fault]:
     seen: dict[int, str] = {}
-    for name, number in bench.channels.items():
+    for name, number in bench.wired.items():
         if (other := seen.setdefault(number, name)) != name:
             fault = f"{other} and {name} are both input {number}; give each its own"
             yield "instruments.adc.settings.channels", fault

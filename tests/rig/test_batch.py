@@ -34,9 +34,9 @@ def document() -> dict[str, Any]:
         for k, name in enumerate(NAMES)
     }
     outputs = [f"{name}.{output}" for name in NAMES for output in ("vx", "vy")]
-    found["instruments"]["adc"]["settings"]["channels"] = {
-        name: k for k, name in enumerate([*outputs, "supply", "d63"])
-    }
+    settings = found["instruments"]["adc"]["settings"]
+    del settings["on_request"]  # their inputs are taken
+    settings["channels"] = {name: k for k, name in enumerate([*outputs, "supply", "d63"])}
     found["world"] = {"preset": "ideal", "spread": {"imperfection_fraction": 0}}
     return found
 
