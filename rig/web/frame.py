@@ -13,6 +13,7 @@ from nicegui import app, ui
 from nicegui.events import KeyEventArguments
 
 from rig.web.desk import Desk
+from rig.web.strip import Strip
 
 STATIC = Path(__file__).parent / "static"
 WAYS = {"/": "Model", "/run": "Run", "/record": "Record"}
@@ -39,16 +40,17 @@ def frame(desk: Desk, here: str) -> Iterator[dict[str, Key]]:
     """A page's head; inside, its content, and the keys that the page may add its own to."""
     keys = {str(k): Key(f"go to {title}", partial(ui.navigate.to, to)) for k, (to, title) in enumerate(WAYS.items(), 1)}
     ui.add_head_html('<link rel="stylesheet" href="/static/workbench.css">')
-    ui.colors(primary="#0067a3")
+    ui.colors(primary="#0067a3", negative="#b3261e")
     with ui.element("header").classes("bar"):
         ui.label("rig workbench").classes("name")
         with ui.element("nav").classes("ways"):
             for to, title in WAYS.items():
                 ui.link(title, to).classes("here" if to == here else "")
         ui.element("div").classes("space")
+        Strip()
         _keys(keys)
         _theme(desk)
-    with ui.element("div").classes("column sheet"):
+    with ui.element("div").classes("stack sheet"):
         yield keys
 
 

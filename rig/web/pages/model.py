@@ -44,12 +44,12 @@ class Workbench:
         self.data = self.data or _newest()
         with frame(self.desk, "/") as keys:
             self.chosen = Choice(self)
-            self.body = div("column")
+            self.body = div("stack")
         with self.body:
             if not self.data:
                 _nothing()
                 return
-            self.notes = div("column")
+            self.notes = div("stack")
             self.verdict = Verdict()
             with div("analysis"):
                 self.pictures = Pictures()

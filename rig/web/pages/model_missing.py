@@ -34,7 +34,7 @@ class Missing:
         self.tried: dict[str, Added] = {}
         with div("side"):
             words("What is missing", "title")
-            self.cards = div("column")
+            self.cards = div("stack")
             self.own = Own(page)
 
     def wait(self, counted: Counted) -> None:

@@ -1,0 +1,87 @@
+"""Record: all runs, searched; two of them, or two sensors, compared."""
+
+from __future__ import annotations
+
+from urllib.parse import urlencode
+
+from nicegui import events, ui
+
+from rig.record import Run
+from rig.web.desk import Desk, runs
+from rig.web.frame import frame
+from rig.web.parts import box, div, failed, state, words
+from rig.web.told import message
+
+COLUMNS: list[dict[str, object]] = [
+    {"name": "name", "label": "run", "field": "name", "align": "left", "sortable": True},
+    {"name": "procedure", "label": "procedure", "field": "procedure", "align": "left", "sortable": True},
+    {"name": "state", "label": "state", "field": "state", "align": "left", "sortable": True},
+    {"name": "extent", "label": "holds", "field": "extent", "align": "left"},
+    {"name": "created", "label": "begun (UTC)", "field": "created", "align": "left", "sortable": True},
+    {"name": "sensor", "label": "sensor", "field": "sensor", "align": "left", "sortable": True},
+    {"name": "source", "label": "bench or file", "field": "source", "align": "left", "sortable": True},
+]
+PAGE = 25
+
+
+def register(desk: Desk) -> None:
+    """The page at /record."""
+
+    @ui.page("/record")
+    def page() -> None:
+        with frame(desk, "/record"):
+            try:
+                found = runs()
+            except Exception as error:
+                failed("The record cannot be read", message(error))
+                return
+            if found:
+                Runs(found)
+            else:
+                with state("The record is empty", "A run of the rig is kept here, with every sample, as is a file that "
+                           "`rig import` takes in."):  # fmt: skip
+                    ui.button("Measure", icon="play_arrow", on_click=lambda: ui.navigate.to("/run"))
+
+
+class Runs:
+    """The list: a click opens a run, two marked ones are compared."""
+
+    def __init__(self, found: list[Run]) -> None:
+        with box("stack"):
+            with div("row-of"):
+                search = ui.input("Search: run, procedure, sensor, file").props("dense clearable").classes("grow")
+                self.hint = words("Mark two to compare them.", "quiet small")
+                self.compare = ui.button("Compare", icon="compare_arrows", on_click=self._compare)
+            rows = [row for run in found for row in _rows(run)]
+            self.table = ui.table(
+                rows=rows, columns=COLUMNS, row_key="name", selection="multiple", pagination=PAGE,
+                on_select=self._marked,
+            ).props("flat dense").on("rowClick", self._open)  # fmt: skip
+            self.table.bind_filter_from(search, "value")
+        self.compare.disable()
+
+    def _marked(self) -> None:
+        self.compare.set_enabled(len(self.table.selected) == 2)
+
+    def _compare(self) -> None:
+        second, first = (row["name"] for row in self.table.selected)
+        ui.navigate.to(f"/compare?{urlencode({'first': first, 'second': second})}")
+
+    def _open(self, event: events.GenericEventArguments) -> None:
+        ui.navigate.to(f"/record/{event.args[1]['name'].partition('/')[0]}")
+
+
+def _rows(run: Run) -> list[dict[str, str]]:
+    """A row for a run; of a batch, one for each sensor."""
+    about = {"procedure": run.procedure, "state": run.state, "extent": run.extent, "source": run.source}
+    about["created"] = run.created[:19].replace("T", " ")
+    batch = run.bench.get("sensors", {})
+    if not batch:
+        return [{"name": run.run, "sensor": _named(run.constants), **about}]
+    return [{"name": f"{run.run}/{name}", "sensor": _named(batch[name]), **about} for name in batch]
+
+
+def _named(of: object) -> str:
+    """Name and serial number of a sensor, as far as they are known."""
+    known = dict(of) if isinstance(of, dict) else {}
+    return " ".join(str(known[key]) for key in ("sensor", "name", "serial") if known.get(key))

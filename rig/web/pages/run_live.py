@@ -1,0 +1,243 @@
+"""The run that is under way: where it is, what it measures, what it asks; pause, go on, stop.
+
+All of it is read anew from the process's status and the record, so a page that is opened later shows the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from typing import Any
+from urllib.parse import urlencode
+
+from nicegui import ui
+
+from rig.apart import steering
+from rig.apart.status import Asked, Status
+from rig.bench import Bench
+from rig.course import Course, kind_of
+from rig.drawings import Attitude, page
+from rig.record import Record
+from rig.web.figures.series import series
+from rig.web.parts import box, div, failed, off_loop, words
+from rig.web.strip import steer
+
+LOOK_S = 0.4
+PHASES = {
+    "starting": ("starting", "plain"),
+    "running": ("running", "good"),
+    "asking": ("asks you", "doubt"),
+    "paused": ("paused", "doubt"),
+}
+ENDS = {"complete": "good", "stopped": "doubt", "failed": "bad"}
+
+
+class Live:
+    """Looks at the status as long as the page is open."""
+
+    def __init__(self, bench: Bench) -> None:
+        self.bench = bench
+        self.status: Status | None = None
+        with box("stack") as self.box:
+            with div("row-of"):
+                self.title = words("", "title")
+                self.phase = words("", "chip")
+                self.to_record = ui.link("", "/record").classes("small grow")
+                self.buttons()
+            self.now = words("", "quiet")
+            self.bar = ui.linear_progress(0.0, show_value=False).props("aria-label=progress")
+            self.count = words("", "small number")
+            self.alarm = div("")
+            self.question = div("")
+            with div("values"):
+                self.values = div("")
+                self.attitude = div("attitude")
+            self.pictures = Pictures()
+        ui.timer(LOOK_S, self.look)
+
+    def buttons(self) -> None:
+        """What can be done to it; what makes no sense now is not shown."""
+        self.pause = ui.button("Pause", icon="pause", on_click=lambda: steer(steering.pause)).props("outline dense")
+        self.resume = ui.button("Go on", icon="play_arrow", on_click=lambda: self.wish("resume")).props("dense")
+        self.repeat = ui.button("Repeat the last pose", icon="replay", on_click=lambda: self.wish("repeat"))
+        self.repeat.props("outline dense")
+        self.stop = ui.button("Stop", icon="stop", color="negative", on_click=lambda: steer(steering.stop))
+        self.stop.props("unelevated dense")
+        self.again = ui.button("Resume", icon="play_arrow", on_click=self.go_on).props("outline dense")
+        self.see = ui.button("See the model", icon="insights", on_click=self._see).props("dense")
+
+    def wish(self, what: str) -> None:
+        """How a paused run goes on."""
+        steer(lambda status: steering.answer(status, what))
+
+    def pause_or_go_on(self) -> None:
+        """One key for both."""
+        if self.status is not None and self.status.phase == "paused":
+            self.wish("resume")
+        elif self.status is not None and self.status.phase == "running":
+            steer(steering.pause)
+
+    def _see(self) -> None:
+        """What the run measured, beside a model."""
+        if self.status is not None:
+            ui.navigate.to(f"/?{urlencode({'data': self.status.run})}")
+
+    async def go_on(self) -> None:
+        """Resume a run that has ended before its time."""
+        if (status := self.status) is not None and status.run:
+            await off_loop(steering.go_on, status.run, status.procedure, None, False)
+
+    async def look(self) -> None:
+        """Show how it stands; only what has changed is sent."""
+        status = steering.latest()
+        self.box.set_visibility(status is not None)
+        if status is None:
+            return
+        if status != self.status:
+            before, self.status = self.status, status
+            self._show(status, before)
+        await self.pictures.follow(status.run)
+
+    def _show(self, status: Status, before: Status | None) -> None:
+        word, look = PHASES.get(status.phase, (status.state or "ended", ENDS.get(status.state, "plain")))
+        going = status.phase != "ended"
+        self.title.set_text(f"{status.procedure} on {status.bench}")
+        self.phase.set_text(word)
+        self.phase.classes(remove="good bad doubt plain", add=look)
+        self.now.set_text(status.now if going else "")
+        self.bar.set_value(status.done / status.total if status.total else 0.0)
+        poses = f"{status.done} of {status.total} poses" if status.total else ""
+        self.count.set_text("; ".join(filter(None, (poses, status.left if going else ""))))
+        self._links(status)
+        self.pause.set_visibility(status.phase == "running")
+        self.resume.set_visibility(status.phase == "paused")
+        self.repeat.set_visibility(status.phase == "paused")
+        self.stop.set_visibility(going)
+        self.see.set_visibility(status.state == "complete")
+        self.again.set_visibility(not going and status.state == "stopped" and bool(status.run))
+        if before is None or (before.error, before.moving) != (status.error, status.moving):
+            self._alarm(status)
+        if before is None or before.asked != status.asked:
+            self._ask(status.asked if status.phase == "asking" else None)
+        if before is None or before.values != status.values:
+            self._values(status)
+
+    def _links(self, status: Status) -> None:
+        self.to_record.set_text(status.run)
+        self.to_record.props(f'href="/record/{status.run}"' if status.run else 'href="/record"')
+
+    def _alarm(self, status: Status) -> None:
+        self.alarm.clear()
+        with self.alarm:
+            if status.moving:
+                failed("Not at rest", "\n".join(status.moving))
+            if status.error:
+                failed("Why it stands still" if status.phase == "paused" else "How it ended", status.error)
+
+    def _ask(self, asked: Asked | None) -> None:
+        self.question.clear()
+        if asked is None:
+            return
+        with self.question, box("question"):
+            words(asked.text, "title")
+            if asked.attitude is not None:
+                with div("attitude"):
+                    ui.html(_drawn(asked.attitude), sanitize=False)
+            if asked.refused:
+                words(asked.refused, "fault")
+            with div("row-of"):
+                if asked.choices:
+                    for choice in asked.choices:
+                        ui.button(choice, on_click=partial(self._answer, choice)).props("dense")
+                else:
+                    typed = ui.input(asked.accepts, value=asked.proposed).props("dense autofocus")
+                    typed.on("keydown.enter", lambda: self._answer(str(typed.value)))
+                    ui.button("Answer", on_click=lambda: self._answer(str(typed.value))).props("dense")
+
+    def _answer(self, text: str) -> None:
+        steer(lambda status: steering.answer(status, text))
+
+    def _values(self, status: Status) -> None:
+        """The last values, each between its limits."""
+        self.values.clear()
+        with self.values, ui.element("table").classes("plain-table"):
+            for value in status.values:
+                with ui.element("tr"):
+                    for cell in (value["name"], value["shown"], _limits(value), value["remark"]):
+                        with ui.element("td"):
+                            words(cell)
+                    with ui.element("td"):
+                        if value["near"]:
+                            words(value["near"], "chip bad")
+        self.attitude.clear()
+        if status.attitude:
+            with self.attitude:
+                ui.html(_drawn(status.attitude), sanitize=False)
+
+
+class Pictures:
+    """What a run has measured so far, over time; thinned, so that a night is no larger than an hour."""
+
+    def __init__(self) -> None:
+        self.run, self.last = "", -1
+        self.courses: dict[str, Course] = {}
+        with div("row-of"):
+            self.kind = ui.select([], label="of", on_change=self.draw).props("dense options-dense")
+            self.name = ui.select([], label="over time", on_change=self.draw).props("dense options-dense")
+        for select in (self.kind, self.name):
+            select.style("min-width: 150px").set_visibility(False)
+        self.place = div("")
+        self.plot: ui.plotly | None = None
+
+    async def follow(self, run: str) -> None:
+        """Take in what is new of `run`."""
+        if run != self.run:
+            self.run, self.last, self.courses = run, -1, {}
+        if not run:
+            return
+        new = await off_loop(_new, run, self.last)
+        if not new or run != self.run:
+            return
+        for number, dwell in new:
+            self.courses.setdefault(kind_of(dwell), Course()).add(dwell)
+            self.last = number
+        self._offer()
+        self.draw()
+
+    def _offer(self) -> None:
+        """The kinds of poses and the quantities that there are; first those with most."""
+        kinds = {kind: kind or "poses" for kind in self.courses}
+        if list(kinds) != list(self.kind.options):
+            most = max(self.courses, key=lambda kind: len(self.courses[kind].parts))
+            value = self.kind.value if self.kind.value in kinds else most
+            self.kind.set_options(kinds, value=value)
+            self.kind.set_visibility(len(kinds) > 1)
+        names = self.courses[str(self.kind.value or "")].names
+        if names != list(self.name.options):
+            self.name.set_options(names, value=self.name.value if self.name.value in names else names[0])
+            self.name.set_visibility(True)
+
+    def draw(self) -> None:
+        """The picture anew."""
+        course = self.courses.get(str(self.kind.value or ""))
+        if course is None or self.name.value not in course.names:
+            return
+        figure = series(course, str(self.name.value))
+        if self.plot is None:
+            with self.place:
+                self.plot = ui.plotly(figure).classes("live-plot").props('aria-label="the run over time"')
+        else:
+            self.plot.update_figure(figure)
+
+
+def _new(run: str, after: int) -> list[tuple[int, Any]]:
+    with Record() as record:
+        return record.dwells(run, after)
+
+
+def _limits(value: Mapping[str, Any]) -> str:
+    return "" if value["limits"] is None else f"{value['limits'][0]:g} .. {value['limits'][1]:g}"
+
+
+def _drawn(attitude: Mapping[str, Any]) -> str:
+    return page(Attitude(**attitude))

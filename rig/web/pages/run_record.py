@@ -1,0 +1,153 @@
+"""One run of the record: how it was made, what it measured, what people noted; export and report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from urllib.parse import urlencode
+
+from nicegui import ui
+
+from calibrations.numerals import bound, measured, unit
+from rig.export import export
+from rig.next_steps import next_steps
+from rig.record import Event, Record, Run
+from rig.reported import reported
+from rig.web.desk import Desk
+from rig.web.frame import frame
+from rig.web.pages.run_live import Pictures
+from rig.web.parts import box, div, facts, failed, off_loop, table, words
+from rig.web.told import message
+
+LOOKS = {"pass": "good", "fail": "bad", "marginal": "doubt"}
+FORMATS = {"csv": "csv", "event-model": "jsonl"}
+SHOWN = 200  # characters of a setting
+
+
+def register(desk: Desk) -> None:
+    """The page at /record/RUN."""
+
+    @ui.page("/record/{run}")
+    def page(run: str) -> None:
+        with frame(desk, "/record"):
+            try:
+                with Record.to_find(run) as record:
+                    found, left_out = record.run(run), record.excluded(run)
+            except Exception as error:
+                failed("No such run", message(error))
+                return
+            OneRun(desk, found, left_out)
+
+
+class OneRun:
+    """All that is known of it."""
+
+    def __init__(self, desk: Desk, run: Run, left_out: dict[int, str]) -> None:
+        self.desk, self.run = desk, run
+        self._head()
+        with div("two"):
+            with box("stack"):
+                words("Results", "title")
+                _results(run)
+                for line in next_steps(run, left_out):
+                    words(line, "quiet small")
+            with box("stack"):
+                words("Over time", "title")
+                self.pictures = Pictures()
+            with box("stack"):
+                words("How it was made", "title")
+                facts({name: str(value)[:SHOWN] for name, value in _made(run).items()})
+            with box("stack"):
+                self._notes()
+        ui.timer(0.0, lambda: self.pictures.follow(run.run), once=True)
+
+    def _head(self) -> None:
+        run = self.run
+        with box("row-of"):
+            words(run.run, "title")
+            words(run.state, f"chip {'good' if run.state == 'complete' else 'doubt'}")
+            words(f"{run.extent}, {run.created[:19].replace('T', ' ')} UTC", "quiet grow")
+            for data in [f"{run.run}/{sensor}" for sensor in run.bench.get("sensors", {})] or [run.run]:
+                to = f"/?{urlencode({'data': data})}"
+                ui.button(f"Model of {data.rpartition('/')[2]}" if "/" in data else "Model", icon="insights",
+                          on_click=lambda to=to: ui.navigate.to(to)).props("dense")  # fmt: skip
+                ui.button("Report", icon="description", on_click=lambda data=data: self._report(data)).props(
+                    "dense outline"
+                )
+            for kind in FORMATS:
+                ui.button(kind, icon="download", on_click=lambda kind=kind: self._export(kind)).props("dense outline")
+
+    def _notes(self) -> None:
+        words("What happened, and notes", "title")
+        self.events = div("stack")
+        with div("row-of"):
+            note = ui.input("A note").props("dense").classes("grow")
+
+            def keep() -> None:
+                if text := str(note.value or "").strip():
+                    with Record() as record:
+                        record.note(self.run.run, "note", text)
+                    note.set_value("")
+                    self._show_events()
+
+            note.on("keydown.enter", keep)
+            ui.button("Keep", on_click=keep).props("dense outline")
+        self._show_events()
+
+    def _show_events(self) -> None:
+        with Record() as record:
+            found = record.events(self.run.run)
+        self.events.clear()
+        with self.events:
+            if found:
+                table(("when (UTC)", "what", ""), [_event(event) for event in found])
+            else:
+                words("Nothing was noted.", "quiet small")
+
+    async def _export(self, kind: str) -> None:
+        """A file of the browser's."""
+        try:
+            with TemporaryDirectory() as folder:
+                path = Path(folder) / f"{self.run.run}.{FORMATS[kind]}"
+                await off_loop(export, self.run.run, kind, path)
+                ui.download.content(path.read_bytes(), path.name)
+        except Exception as error:
+            ui.notify(message(error), type="negative", multi_line=True)
+
+    async def _report(self, data: str) -> None:
+        hint = ui.notification("Making the report", spinner=True, timeout=None)
+        try:
+            notes: list[str] = []
+            _, make = await off_loop(reported, data, None, self.desk.bench_file, notes.append)
+            ui.download.content(await off_loop(make), f"{data.replace('/', '-')}.html")
+        except Exception as error:
+            ui.notify(message(error), type="negative", multi_line=True, timeout=0, close_button="Close")
+        finally:
+            hint.dismiss()
+
+
+def _results(run: Run) -> None:
+    if not run.results:
+        words("It gave none." if run.state == "complete" else "It is not complete.", "quiet")
+        return
+    with ui.element("table").classes("plain-table"):
+        for name, result in run.results.items():
+            limit = "" if result["limit"] is None else bound(result["value"], result["limit"])
+            value = f"{measured(result['value'], result['std'])} {unit(result['unit'])}"
+            with ui.element("tr"):
+                for cell in (name, value, limit):
+                    with ui.element("td"):
+                        words(cell)
+                with ui.element("td"):
+                    if result["verdict"]:
+                        words(result["verdict"], f"chip {LOOKS[result['verdict']]}")
+
+
+def _made(run: Run) -> dict[str, object]:
+    said = {role: " ".join(str(part) for part in each.values() if part) for role, each in run.identities.items()}
+    why = {"message": run.message} if run.message else {}
+    return {"procedure": run.procedure, "bench or file": run.source, **why, **run.settings, **said, **run.constants}
+
+
+def _event(event: Event) -> tuple[str, str, str]:
+    return event.at[:19].replace("T", " "), event.what, event.text
