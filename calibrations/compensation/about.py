@@ -115,10 +115,11 @@ def _of_axis(name: str, made: Compensation) -> str:
 
 def _how(made: Compensation) -> Iterator[str]:
     bound = made.bound
+    left = f"q^{bound.steps} x {made.range.reach:g} {made.unit} = {upward(bound.within)} {made.unit}"
     yield (
         f"Method: a <- a + C (v - G(a)), {bound.steps} steps from a = 0. Each step comes nearer by the factor "
-        f"q <= {upward(bound.q)}, proved over the whole range by interval arithmetic; what is left after the last is below "
-        f"q^{bound.steps} x {made.range.reach:g} {made.unit} = {upward(bound.within)} {made.unit}, rounding aside."
+        f"q <= {upward(bound.q)}, proved over the whole range by interval arithmetic; what is left after the last is "
+        f"below {left}, rounding aside."
     )
     yield f"Operations: {operations(made)}."
 

@@ -38,6 +38,9 @@ def life(quantities: Mapping[str, Shown]) -> Figure:
         ax.set_title(name)
         ax.set_ylabel(shown.unit or "1")
     axes[-1, 0].xaxis_date()
+    for ax in axes[:, 0]:
+        if ax.get_legend_handles_labels()[1]:
+            ax.legend(loc="upper left", ncols=2)
     return figure
 
 
@@ -48,12 +51,10 @@ def _quantity(ax: Axes, shown: Shown) -> None:
         days = np.linspace(first, end, POINTS)
         value, std = shown.line.predict(days)
         reach = shown.line.coverage * std
-        ax.fill_between(days, value - reach, value + reach, color=BAND, lw=0, label="95 % of a later calibration")
+        ax.fill_between(days, value - reach, value + reach, color=BAND, lw=0, label="95 % of the value then")
         ax.plot(days, value, color=QUIET, lw=0.9)
     for limit in shown.allowed or ():
         ax.axhline(limit, color=VERMILION, lw=0.9, ls="--")
     if shown.due_days is not None:
         ax.axvline(shown.due_days, color=VERMILION, lw=0.9, label="due")
     ax.errorbar(shown.t_days, shown.values, yerr=shown.expanded, fmt="o", ms=MARKER, color=BLUE, lw=1.0, capsize=2)
-    if ax.get_legend_handles_labels()[1]:
-        ax.legend(loc="upper left", ncols=2)

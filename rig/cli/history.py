@@ -22,13 +22,7 @@ DAY = click.DateTime(["%Y-%m-%d"])
 @click.option("--model", default="linear", show_default=True, help="By which every run is calibrated.")
 @click.option("--quantity", "chosen", multiple=True, metavar="NAME", help="Only this one; again for more.")
 @click.option("--limit", "given", multiple=True, metavar="NAME=CHANGE", help="Greatest change from the last one.")
-@click.option(
-    "--baseline",
-    type=click.IntRange(min=FEWEST),
-    default=BASELINE,
-    show_default=True,
-    help="Calibrations that set the charts.",
-)
+@click.option("--baseline", type=click.IntRange(min=FEWEST), default=BASELINE, help="Calibrations that set the charts.")
 @click.option("--at", "on", type=DAY, help="The calibration closest to this day, and whether it is stale.")
 @click.option("--between", nargs=2, type=DAY, help="Compare the calibrations closest to two days.")
 @click.option("--beside", help="Compare with another sensor's last calibration.")

@@ -1,0 +1,141 @@
+"""rig history, over tables of several years and of two sensors."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from datetime import UTC, date, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from calibrations.model_file import read_model
+from calibrations.table import Table
+from rig.errors import RecordError
+from rig.history import Calibration, Value, compare_rigs, history
+from rig.record import Record
+from tests.calibrations.synthetic import components, poses, turns
+
+Rig = Callable[..., Any]
+COLUMNS = turns((90, 30), step_deg=45.0)
+
+
+def calibrated(serial: str, day: str, bias: float, seed: int = 0) -> None:
+    """A run of one sensor, imported, with a date of its own."""
+    x, y, _ = components(COLUMNS)
+    made = poses(COLUMNS, bias + 1.001 * x, 2.45 + 0.98 * y, seed=seed)
+    constants = {"sensor": "ADXL203", "serial": serial, **({"date": day} if day else {})}
+    with Record() as record:
+        record.add_table(Table.from_columns("poses", made.columns, constants, "made"))
+
+
+@pytest.fixture
+def years() -> None:
+    """Sensor 17 over five years, in another order than that of time: 1 mV a year; and another sensor."""
+    for k in (3, 0, 4, 1, 2):
+        calibrated("17", f"{2020 + k}-03-01", 2.5 + 0.001 * k, seed=k)
+    calibrated("18", "2024-03-02", 2.52, seed=9)
+
+
+def test_a_life_in_words(rig: Rig, years: None, tmp_path: Path) -> None:
+    ended = rig("history", "17", "--limit", "bias-x=0.005", "--pictures", str(tmp_path / "life"))
+    assert ended.status == 0, ended.err
+    assert ended.out.startswith("17: 5 calibrations from 2020-03-01 to 2024-03-01, by the model linear\n")
+    assert ended.out.index("2021-03-01") < ended.out.index("2022-03-01")
+    assert "Next calibration due on 202" in ended.out
+    assert ": bias-x may then be beyond what is allowed." in ended.out
+    assert {path.name for path in (tmp_path / "life").iterdir()} == {"life.png", "charts.png"}
+
+
+def test_a_life_as_json(rig: Rig, years: None) -> None:
+    said = json.loads(rig("history", "17", "--limit", "bias-x=0.005", "--baseline", "3", "--json").out)
+    assert said["schema"] == "rig.history/1"
+    bias = next(q for q in said["quantities"] if q["name"] == "bias-x")
+    assert bias["drift_per_year"] == pytest.approx(0.001, rel=0.03)
+    assert bias["chart"] == "out of control"
+    due = date.fromisoformat(said["due"])
+    assert date(2028, 1, 1) < due < date(2029, 3, 2)  # 5 mV at 1 mV a year, sooner by the uncertainty
+    still = next(q for q in said["quantities"] if q["name"] == "scale-factor-x")
+    assert (still["allowed"], still["due"]) == (None, None)
+
+
+def test_the_closest_to_a_day_and_whether_it_is_stale(rig: Rig, years: None) -> None:
+    fresh = rig("history", "17", "--at", "2022-05-01")
+    assert (fresh.status, "Closest to 2022-05-01" in fresh.out, "61 days before" in fresh.out) == (0, True, True)
+    old = rig("history", "17", "--at", "2026-01-01")
+    assert old.status == 1
+    assert "But it is stale: it is 671 days older than that day." in old.out
+    due = rig("history", "17", "--at", "2024-12-01", "--limit", "bias-x=0.0003")
+    assert "But it is stale: it was due on 2024" in due.out
+
+
+def test_sensors_and_dates_are_compared(rig: Rig, years: None) -> None:
+    ended = rig("history", "17", "--beside", "18", "--between", "2020-01-01", "2024-01-01")
+    assert ended.status == 1
+    assert "17, 2024-03-01 beside 18, 2024-03-02" in ended.out
+    lines = [line.split() for line in ended.out.splitlines() if "agree" in line]
+    verdicts = {(line[0], "not" in line) for line in lines}
+    assert verdicts == {("bias-x", True), ("bias-y", False), ("scale-factor-x", False), ("scale-factor-y", False)}
+    assert rig("history", "17", "--beside", "18", "--quantity", "bias-y").status == 0
+
+
+def test_rigs_are_compared_by_all_calibrations_on_them() -> None:
+    start = datetime(2025, 1, 1, tzinfo=UTC)
+    of = [
+        Calibration(
+            f"r{k}", start + timedelta(days=k), "AB"[k % 2], {"bias-x": Value(2.5 + 0.001 * (k % 2), 1e-4, "V")}, None
+        )
+        for k in range(6)
+    ]
+    ((unit, found),) = compare_rigs(of, "A", "B").values()
+    assert (unit, found.difference, found.agrees) == ("V", pytest.approx(-0.001), False)
+    assert found.expanded == pytest.approx(2 * 2**0.5 * 1e-4)  # each rig's own error may be the same every time
+    with pytest.raises(RecordError, match="no calibration on the rig 'C'"):
+        compare_rigs(of, "A", "C")
+
+
+@pytest.mark.sockets
+def test_a_run_of_a_batch_is_a_calibration_of_each_sensor(rig: Rig, bench_file: Callable[..., Path]) -> None:
+    channels = {"a1.vx": 0, "a1.vy": 1, "a2.vx": 2, "a2.vy": 3}
+    bench = {
+        "sensors": {name: {"name": "ADXL203", "serial": serial} for name, serial in (("a1", "17"), ("a2", "18"))},
+        "name": "the rig in the cellar",
+    }
+    import yaml
+
+    from rig.bench import DEFAULT
+
+    whole = yaml.safe_load(DEFAULT.read_text())
+    whole["instruments"]["adc"]["settings"]["channels"] = channels
+    whole.pop("sensor")
+    whole.pop("d63")
+    file = bench_file(yaml.safe_dump(whole | bench))
+    sweep = ("--inclinations-deg", "90,30", "--step-deg", "90", "--dwell-s", "0.2", "--unattended")
+    assert rig("run", "sweep", *sweep, "--bench", str(file)).status == 0
+    for serial, member in (("17", "a1"), ("18", "a2")):
+        (only,) = json.loads(rig("history", serial, "--json").out)["calibrations"]
+        assert only["data"].endswith(f"/{member}")
+        assert only["rig"] == "the rig in the cellar"
+
+
+def test_what_is_no_calibration_is_passed_over_and_said(rig: Rig, years: None) -> None:
+    with Record() as record:
+        columns = {name: values[:2] for name, values in COLUMNS.items()} | {"vx_v": [1.0, 2.0]}
+        short = Table.from_columns("poses", columns, {"serial": "17"}, "short")
+        record.add_table(short)
+        found = history(record, "17", read_model("linear"), {})
+    assert len(found.calibrations) == 5
+    (why,) = found.passed_over.values()
+    assert "2 rows cannot determine" in why
+    assert "Passed over: " in rig("history", "17").err
+
+
+def test_what_is_not_there_is_refused(refused: Callable[..., str], years: None) -> None:
+    assert "no calibration of the sensor '170' in the record. Did you mean '17'?" in refused("history", "170")
+    assert "no quantity 'bias-z' by the model linear. Did you mean 'bias-" in refused(
+        "history", "17", "--quantity", "bias-z"
+    )
+    assert "write NAME=CHANGE, as in bias-x=0.005" in refused("history", "17", "--limit", "bias-x")
+    calibrated("19", "last week", 2.5)
+    assert "its constant date is 'last week'; write it as 2025-03-01" in refused("history", "19")
