@@ -18,7 +18,6 @@ from rig.runner import Outcome, resume
 @click.argument("run")
 @watch_options
 @trace_option
-@trace_option
 @bench_option
 @json_option
 def command(

@@ -21,7 +21,6 @@ from rig.runner import start
 @settings_arguments
 @watch_options
 @trace_option
-@trace_option
 @bench_option
 @json_option
 def command(

@@ -26,10 +26,6 @@ from rig.runner import Outcome, Watch, Wish
 from rig.soak_forecast import SoakWatch, soak_watch
 from rig.soak_forecast import lines as told_lines
 
-
-trace_option = click.option("--trace", is_flag=True, help="Log every message to and from instruments.")
-
-
 trace_option = click.option("--trace", is_flag=True, help="Log every message to and from instruments.")
 
 
