@@ -66,6 +66,7 @@ def _figures(folder: Path) -> Iterator[tuple[str, Figure]]:
     yield "live discovery", _live(folder)
     yield "Allan deviation", _allan(folder)
     yield "noise coefficients", _noise(folder)
+    yield "compensation in C", json.loads(subject(folder, "compensation").out)
     yield "100 kills", _inside("", subject(folder, "kills", "100"))
 
 
