@@ -17,7 +17,7 @@ import numpy as np
 from scipy.fft import dct
 from scipy.special import sici
 
-from calibrations.noise_analysis.processes import LINEAR, Sampling, gauss_markov
+from calibrations.noise_analysis.processes import LINEAR, Sampling, flicker, gauss_markov
 from calibrations.table import Array
 
 SINGLE = 16  # lowest coefficients, that stand for themselves
@@ -36,17 +36,23 @@ class Bands:
     corner_hz: float
 
     def column(self, process: str, time_constant_s: float = 0.0) -> Array:
-        """What is expected of a process, for a coefficient of 1, shape (b,)."""
+        """What is expected of a process, for a coefficient of 1, shape (b,).
+
+        What a filter lets through of white noise is a Gauss-Markov process, and none of it folds back as white noise
+        would; what is slow is so far below the corner that the filter's gain is enough.
+        """
         f = self.frequency_hz
-        kept = 1.0 if process == "quantisation-noise" else 1 / (1 + (f / self.corner_hz) ** 2)
+        if process == "quantisation-noise":
+            return np.asarray(LINEAR[process].spectrum(f, self.sampling) + self._of_the_ends())
+        if process == "flicker-noise":
+            return np.asarray(flicker(f, self.sampling, self.corner_hz) * flickering(self.number))
+        if process == "white-noise" and np.isfinite(self.corner_hz):
+            filter_s = 1 / (2 * np.pi * self.corner_hz)
+            return gauss_markov(f, self.sampling, filter_s) / (2 * filter_s)
+        kept = 1 / (1 + (f / self.corner_hz) ** 2)
         if process not in LINEAR:
             return np.asarray(kept * gauss_markov(f, self.sampling, time_constant_s))
-        seen = LINEAR[process].spectrum(f, self.sampling)
-        if process == "flicker-noise":
-            seen = seen * flickering(self.number)
-        if process == "quantisation-noise":
-            seen = seen + self._of_the_ends()
-        return np.asarray(kept * seen)
+        return np.asarray(kept * LINEAR[process].spectrum(f, self.sampling))
 
     def _of_the_ends(self) -> Array:
         """What the first and the last error of quantisation add to every cosine coefficient."""

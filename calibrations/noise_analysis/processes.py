@@ -44,14 +44,15 @@ def white(f: Array, _: Sampling) -> Array:
     return np.ones_like(f)
 
 
-def flicker(f: Array, by: Sampling) -> Array:
+def flicker(f: Array, by: Sampling, corner_hz: float = np.inf) -> Array:
     """Fractionally differenced noise of order 1/2 (Kasdin, Proc. IEEE 83, 1995), which is 1 / (2 pi f) but near the
-    sampling frequency; folded."""
+    sampling frequency; behind a first-order low-pass where it has a corner; folded."""
     folds = min(FOLDS, by.size // 2)
     step, total = 1 / by.rate_hz, np.zeros_like(f)
     for fold in range(-folds, folds + 1 - (by.size % 2 == 0 and folds < FOLDS)):
-        sine = np.abs(np.sin(np.pi * (f + fold / by.interval_s) * step))
-        total += _kept(f, sine, by) * step / (2 * sine)
+        at_hz = f + fold / by.interval_s
+        sine = np.abs(np.sin(np.pi * at_hz * step))
+        total += _kept(f, sine, by) * step / (2 * sine) / (1 + (at_hz / corner_hz) ** 2)
     return total
 
 

@@ -124,4 +124,19 @@ def test_above_half_the_corner_of_a_filter_nothing_is_used() -> None:
     means = np.random.default_rng(1).standard_normal(4000)
     bands = slow_bands(means, Sampling(100.0), corner_hz=10.0)
     assert 4.8 < bands.frequency_hz.max() <= 5.1
-    assert bands.column("white-noise")[-1] == pytest.approx(0.8, rel=0.02)
+    assert bands.column("white-noise")[-1] == pytest.approx(0.8, rel=0.05)
+
+
+@pytest.mark.parametrize("size", [1, 16, 32])
+def test_white_noise_behind_a_filter_keeps_its_density_in_means(size: int) -> None:
+    random, corner_hz, rate_hz = np.random.default_rng(3), 15.0, 1000.0
+    filter_samples = rate_hz / (2 * np.pi * corner_hz)
+    samples = noises.gauss_markov(random, 400_000, filter_samples) * np.sqrt(rate_hz / (2 * filter_samples))
+    means = samples.reshape(-1, size).mean(axis=1)
+    bands = slow_bands(means - means.mean(), Sampling(rate_hz, size), corner_hz)
+    ratio = bands.density / bands.column("white-noise")
+    fast = bands.frequency_hz > 3
+    off = (np.average(ratio[fast], weights=bands.freedom[fast]) - 1) * np.sqrt(bands.freedom[fast].sum() / 2)
+    assert abs(off) < 3
+    slow = bands.frequency_hz < 1
+    assert (2 * np.pi * bands.frequency_hz * bands.column("flicker-noise"))[slow][-1] == pytest.approx(1, rel=0.02)
