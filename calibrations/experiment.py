@@ -18,6 +18,8 @@ WARM_C = 45.0  # above what a powered sensor comes to in a room
 LEVELS = {"stage-zero-offset", "base-tilt"}
 DELAYS = {"output-filter", "sampling-delay"}
 TWO_HZ = [10.0, 4.0]  # the usual one, and one well below that is at the same stroke still above the noise
+IRON = {"field-strength", "hard-iron", "soft-iron"}
+GYROSCOPE = {"gyro-bias", "gyro-scale-factor", "gyro-misalignment", "gyro-g-sensitivity"}
 SQUARES = {"quadratic-nonlinearity", "cross-axis-bias", "z-axis-bias"}
 FEW, MANY = [90.0, 30.0, 150.0], [90.0, 30.0, 150.0, 60.0, 120.0, 45.0, 135.0, 75.0, 105.0]  # out of order, deg
 AS_IT_IS = 0.0  # s without power: the sensor stays on, and its warm-up goes on
@@ -54,6 +56,8 @@ CYCLED = "the oven goes up and down again: what lags behind the temperature come
 TURNED_ROUND = "a level laid on the base shows the tilt of the base alone; an offset of alpha moves the table only"
 SHAKEN = "in a field of 1 g the squares of the three axes add up to a constant; motion along one axis does not"
 TWO_TONES = "a corner changes the size of an oscillation with its frequency, a delay only its phase"
+ALL_ROUND = "full turns on each edge, upward and downward, show every side of the sphere of directions"
+SIX_FACES = "turned about each edge both ways, and at rest on six faces, rate, specific force and time go separate ways"
 
 MENU = (
     _of("sweep", COARSE, step_deg=30.0, inclinations_deg=FEW),
@@ -88,6 +92,10 @@ def by_physics(names: Set[str]) -> tuple[str, dict[str, object], str]:
     """Procedure, settings, and why they tell effects of these names apart."""
     if names >= SQUARES:
         return "motion", {}, SHAKEN
+    if names & IRON:
+        return "magnetometer-turn", {}, ALL_ROUND
+    if names & GYROSCOPE:
+        return "rate-turn", {}, SIX_FACES
     if names <= DELAYS:
         return "motion", {"frequency_hz": TWO_HZ}, TWO_TONES
     if names <= TEMPERATURE:

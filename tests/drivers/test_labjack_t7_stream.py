@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import struct
 from collections.abc import Callable, Iterator
 from contextlib import closing
@@ -15,7 +16,7 @@ from hypothesis import strategies as st
 
 from drivers import labjack_t7, labjack_t7_reception, labjack_t7_twin
 from drivers.clock import SimulatedClock
-from drivers.errors import LinkTimeout, StreamError
+from drivers.errors import LimitError, LinkTimeout, StreamError
 from drivers.labjack_t7_reception import Reception
 from drivers.labjack_t7_stream import Packets
 from drivers.links import Links
@@ -28,16 +29,16 @@ FOUR = labjack_t7.Settings(channels={"vx": 0, "vy": 1, "supply": 2, "thermistor"
 
 
 @pytest.fixture
-def converter() -> Iterator[Callable[[], tuple[World, labjack_t7.T7]]]:
+def converter() -> Iterator[Callable[..., tuple[World, labjack_t7.T7]]]:
     """Makes a converter in front of a whole simulated rig, always of the same seed."""
     opened: list[Any] = []
 
-    def make() -> tuple[World, labjack_t7.T7]:
+    def make(settings: labjack_t7.Settings = FOUR) -> tuple[World, labjack_t7.T7]:
         clock, world = SimulatedClock(), World(WorldConfig.adxl203(), seed=4)
-        server, links = labjack_t7_twin.serve(world, {"adc": (1, FOUR)}), Links(clock)
+        server, links = labjack_t7_twin.serve(world, {"adc": (1, settings)}), Links(clock)
         clock.attach(server)
         opened.extend([links, server])
-        return world, labjack_t7.connect(server.addresses["adc"], links, FOUR, "adc")
+        return world, labjack_t7.connect(server.addresses["adc"], links, settings, "adc")
 
     yield make
     for one in opened:
@@ -180,3 +181,40 @@ def test_packets_may_be_fed_in_any_pieces(cuts: list[int], count: int) -> None:
     edges = [0, *sorted(min(cut * 4, len(data)) for cut in cuts), len(data)]
     codes = [packets.codes(data[a:b]) for a, b in pairwise(edges)]
     assert np.concatenate(codes).tolist() == [0, 1, 2, 3] * count
+
+
+ASKED = dataclasses.replace(FOUR, on_request={"gx": 7, "gz": 9})
+
+
+def test_what_is_on_request_is_sampled_for_who_asks_for_it_alone(converter: Any) -> None:
+    adc = converter(ASKED)[1]
+    assert adc.acquire(0.1).channels == ("vx", "vy", "supply", "thermistor")
+    asked = adc.only("gz", "vx").acquire(0.1)
+    assert asked.channels == ("vx", "gz")
+    assert asked.volts[:, 1].mean() == pytest.approx(2.5, abs=0.01)
+    assert adc.acquire(0.1).channels == ("vx", "vy", "supply", "thermistor")
+
+
+def test_of_a_batch_the_outputs_of_every_sensor_are_meant() -> None:
+    batch = dataclasses.replace(FOUR, channels={"a1.vx": 0, "a2.vx": 1}, on_request={"a1.mx": 2, "a2.mx": 3, "mxy": 4})
+    assert batch.only("adc", ("mx",)).channels == {"a1.mx": 2, "a2.mx": 3}
+    with pytest.raises(LimitError, match=r"adc: no input is wired to my, mz; there are a1.vx, .*\. Name the inputs"):
+        batch.only("adc", ("mx", "my", "mz"))
+
+
+def test_a_record_can_be_watched_and_is_the_same(converter: Any) -> None:
+    whole, seen = converter()[1].acquire(2.0), []
+    watched = converter()[1].acquire_watched(2.0, lambda: seen.append(1), 0.3)
+    assert np.array_equal(watched.volts, whole.volts)
+    assert len(seen) == 7
+
+
+def test_what_a_watch_finds_ends_the_record_and_the_stream(converter: Any) -> None:
+    adc = converter()[1]
+
+    def look() -> None:
+        raise LimitError("seen", "Look")
+
+    with pytest.raises(LimitError):
+        adc.acquire_watched(60.0, look, 1.0)
+    assert len(adc.acquire(0.5).volts) == 500
