@@ -1,8 +1,9 @@
 # make demo: the whole story on the simulated rig.   make test: everything CI checks.
+# make audit: known weaknesses of the pinned dependencies; needs the network, so it is no part of make test.
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test setup bench lint clean
+.PHONY: demo test setup bench lint audit clean
 
 demo: setup
 	$(BIN)/rig demo --folder out/demo
@@ -19,6 +20,10 @@ bench: setup
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[bench]'
 	$(BIN)/python -m tests.benchmark
 	$(BIN)/python -m tests.benchmark.discovery --sets 24
+
+audit: setup
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check 'pip-audit>=2.7,<3'
+	$(BIN)/pip-audit --no-deps --disable-pip -r constraints.txt
 
 setup: .venv/ready
 

@@ -42,6 +42,7 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import inspect
+import logging
 import re
 import sys
 from collections.abc import Callable, Iterable, Mapping
@@ -57,6 +58,7 @@ from calibrations.errors import ModelError, UnknownName, nearest
 from calibrations.expressions.guarded import fault, guarded
 from calibrations.table import Array, Table
 
+LOG = logging.getLogger(__name__)  # what is not called off is printed to standard error
 HOOKS = ("pose", "force", "transduction", "output", "spectrum", "lines")
 KINDS = ("poses", "positions", "motion")  # of tables, where an effect does not say
 Values = Mapping[str, Array]  # parameter name -> shape (3,) if per axis, else a scalar
@@ -166,6 +168,8 @@ def catalogue(folder: Path | None = None) -> Mapping[str, Effect]:
     if folder is not None:
         if not folder.is_dir():
             raise ModelError(f"{folder}: the folder of your own effects does not exist")
+        if any(folder.glob("[!_]*.py")):
+            LOG.warning("the Python files in %s are run: the bench file names this folder for effects", folder)
         own = {e.name: e for e in _read_folder(folder, None)}
         if taken := sorted(effects.keys() & own.keys()):
             raise ModelError(f"{folder}: {', '.join(taken)} is in the catalogue already; give your effect another name")

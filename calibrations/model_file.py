@@ -13,6 +13,7 @@ from calibrations.effect import Effect, catalogue, find
 from calibrations.errors import ModelError, UnknownName, nearest
 from calibrations.expressions.effect import own_effect
 from calibrations.model import Estimate, Model, Term
+from calibrations.reading.yaml_file import load_yaml
 from calibrations.table import NUMBERS
 
 SHIPPED = Path(__file__).parent / "models"
@@ -76,9 +77,9 @@ def read_model(name_or_path: str | Path, effects: Mapping[str, Effect] | None = 
 def parse_model(text: str, source: str, effects: Mapping[str, Effect] | None = None) -> Model:
     """The model in YAML `text`. Raises ModelError or UnknownName."""
     try:
-        document = yaml.safe_load(text)
-    except (yaml.YAMLError, ValueError, RecursionError) as error:  # ValueError: a date that is none
-        raise ModelError(f"{source}: is not YAML: {' '.join(str(error).split())}") from None
+        document = load_yaml(text)
+    except ValueError as error:
+        raise ModelError(f"{source}: is not YAML: {error}") from None
     if not isinstance(document, dict):
         raise ModelError(f"{source}: is not a model: a model file is a mapping that begins with `schema: {SCHEMA}`")
     try:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import ast
 import importlib.util
 import inspect
+import logging
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +19,7 @@ from typing import Any
 from procedures.errors import ProcedureError, UnknownProcedure, nearest
 
 SHIPPED = Path(__file__).parent
+LOG = logging.getLogger(__name__)  # what is not called off is printed to standard error
 
 
 @dataclass(frozen=True)
@@ -94,6 +96,7 @@ def _load(path: Path) -> ModuleType:
     spec = importlib.util.spec_from_file_location(f"user_procedures.{path.stem}", path)
     if spec is None or spec.loader is None:
         raise ProcedureError(f"{path}: is not a Python file")
+    LOG.warning("%s is run: the bench file names its folder for procedures", path)
     module = importlib.util.module_from_spec(spec)
     try:
         spec.loader.exec_module(module)

@@ -68,7 +68,23 @@ def text(content: str, name: str) -> Source:
 
 
 def _bytes(path: Path) -> BinaryIO:
-    return cast(BinaryIO, gzip.open(path, "rb") if path.suffix == ".gz" else path.open("rb"))
+    return cast(BinaryIO, _Unpacked(path) if path.suffix == ".gz" else path.open("rb"))
+
+
+class _Unpacked(gzip.GzipFile):
+    """A compressed file, of which no more comes than of a file that is not."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path, "rb")
+        self._taken = 0
+
+    def read1(self, size: int = -1) -> bytes:
+        """As a text reader takes it. Raises DataError for more than LARGEST_BYTES in all."""
+        data = super().read1(size)
+        self._taken += len(data)
+        if self._taken > LARGEST_BYTES:
+            raise DataError(f"{self.name}: holds more than {LARGEST_BYTES >> 30} GiB; unpack it, and take a part of it")
+        return data
 
 
 def _encoding(head: bytes, path: Path) -> str:

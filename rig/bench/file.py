@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 from pathlib import Path
 from typing import Any
 
-import yaml
 from pydantic import ValidationError
 
 from calibrations.error_table import ErrorTable, Point, read_error_table
 from calibrations.errors import DataError
+from calibrations.reading.yaml_file import load_yaml
 from drivers.philtec_d63 import Curve
 from rig.bench.bench import Bench
 from rig.bench.check import check
@@ -29,10 +30,10 @@ def read_bench(path: Path | None = None) -> Bench:
     """
     path = path or DEFAULT
     try:
-        document = yaml.safe_load(path.read_text(encoding="utf-8"))
+        document = load_yaml(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise BenchError(f"{path}: the bench file cannot be read: {error.strerror}") from None
-    except (yaml.YAMLError, ValueError, RecursionError) as error:  # ValueError: no text, no date
+    except ValueError as error:
         raise BenchError(f"{path}: is not a YAML file: {error}") from None
     if not isinstance(document, dict):
         raise BenchError(f"{path}: a bench file is a mapping that begins with `instruments:`")
@@ -62,7 +63,7 @@ def _error_table(role: str, given: tuple[Point, ...] | Path | None, path: Path) 
     if role not in TURNING:
         raise BenchError(f"{key}: only {' and '.join(TURNING)} have errors of angle; remove it")
     try:
-        points = read_error_table(path.parent / given.expanduser()) if isinstance(given, Path) else given
+        points = read_error_table(beside(path, given, key)) if isinstance(given, Path) else given
         return ErrorTable(points).points
     except DataError as error:
         raise BenchError(f"{key}: {error}") from None
@@ -72,17 +73,33 @@ def _with_curve(given: Any, path: Path) -> dict[str, Any]:
     """The key d63 with the points of the curve that it names. Raises BenchError."""
     if not isinstance(given, dict) or not isinstance(name := given.get("curve"), str) or name == SIMULATED:
         return {}
+    file = beside(path, Path(name), f"{path}, key d63.curve")
     try:
-        curve = Curve.from_file(path.parent / Path(name).expanduser())
-    except ValueError as error:
-        raise BenchError(f"{path}, key d63.curve: {error}") from None
+        document = load_yaml(file.read_text(encoding="utf-8"))
+        if not isinstance(document, dict):
+            raise ValueError("must be a mapping")
+        curve = Curve.from_mapping(document)
+    except (OSError, ValueError) as error:
+        raise BenchError(f"{path}, key d63.curve: {file}: {error}") from None
     return {"d63": {**given, "curve": dataclasses.asdict(curve)}}
+
+
+def beside(path: Path, given: Path, key: str) -> Path:
+    """What a bench file, which may be a stranger's, names in its own folder. Raises BenchError for a way out of it.
+
+    A link in that folder may lead out: a person has put it there.
+    """
+    folder = Path(os.path.abspath(path.parent))  # noqa: PTH100 - resolve() would follow links
+    named = Path(os.path.abspath(folder / given))  # noqa: PTH100
+    if not named.is_relative_to(folder) or "\0" in str(given):
+        raise BenchError(f"{key}: {given} is outside the folder of the bench file; move or link it into {folder}")
+    return path.parent / given
 
 
 def _beside(folders: Folders, path: Path) -> Folders:
     """Folders as the file means them: relative to itself. Raises BenchError where there is none."""
     given = {name: place for name, place in folders if place is not None}
-    found = {name: (path.parent / place.expanduser()).resolve() for name, place in given.items()}
+    found = {name: beside(path, place, f"{path}, key folders.{name}").resolve() for name, place in given.items()}
     for name, place in found.items():
         if not place.is_dir():
             raise BenchError(f"{path}, key folders.{name}: there is no folder {place}")

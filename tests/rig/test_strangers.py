@@ -1,0 +1,146 @@
+"""Files of strangers: they are data, they stay in their folder, and no program of theirs is run."""
+
+from __future__ import annotations
+
+import gzip
+import logging
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from calibrations.errors import DataError, ModelError
+from calibrations.model_file import parse_model
+from calibrations.reading import text_file
+from calibrations.reading.yaml_file import LONGEST, load_yaml
+from drivers.errors import LinkRefused
+from drivers.links.url import Url
+from procedures.catalogue import find
+from rig.bench import read_bench
+from rig.errors import BenchError
+
+BOMB = "a0: &a0 [x, x, x, x, x, x, x, x, x]\n" + "".join(
+    f"a{k}: &a{k} [{', '.join([f'*a{k - 1}'] * 9)}]\n" for k in range(1, 10)
+)
+PAGE = "schema: rig.model/1\nname: mine\neffects:\n- effect: bias\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("!!python/object/apply:os.system ['touch ran']", "could not determine a constructor"),
+        ("!!python/name:os.system", "could not determine a constructor"),
+        (BOMB, "more than 100000 parts; write it without aliases"),
+        ("a: &a [*a]", "contains itself"),
+        ("[" * 10_000, "nested too deeply"),
+        ("x: " + "y" * LONGEST, f"more than the {LONGEST} that are read"),
+        ("2024-13-45", "month must be in 1..12"),
+    ],
+    ids=["object", "name", "bomb", "itself", "deep", "long", "date"],
+)
+def test_yaml_is_data_of_bounded_size(text: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ValueError, match=said):
+        load_yaml(text)
+    with pytest.raises(ModelError, match="is not YAML"):
+        parse_model(text, "theirs.yaml")
+    path = tmp_path / "bench.yaml"
+    path.write_text(text)
+    with pytest.raises(BenchError, match="is not a YAML file"):
+        read_bench(path)
+    assert not (tmp_path / "ran").exists()
+
+
+def test_a_part_may_be_repeated_by_name() -> None:
+    assert load_yaml("a: &stage {driver: oriental_az}\nb: *stage\n") == {
+        "a": {"driver": "oriental_az"},
+        "b": {"driver": "oriental_az"},
+    }
+
+
+STEPS = [
+    "__import__('os').system('touch ran')",
+    "(lambda: a)()",
+    "a.__class__",
+    "a*[b for b in (1,)][0]",
+    "a*open('ran', 'w')",
+    "a*'x'",
+    "a*f'{b}'",
+    "exec('1')*a",
+    "a*sin.__globals__",
+    "a if 1 else b",
+    "(a := 1)",
+    "a*9**9**9**9**9",
+]
+
+
+@pytest.mark.parametrize("expression", STEPS)
+def test_an_expression_does_not_reach_python(expression: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = PAGE + f'- effect: mine\n  expression: "v += {expression}"\n'
+    try:
+        parse_model(text, "theirs.yaml")
+    except ModelError as refused:
+        assert "theirs.yaml" in str(refused) or "v +=" in str(refused)  # noqa: PT017
+    else:
+        assert expression == STEPS[-1], "only arithmetic is taken"
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("way", ["../secret.csv", "/etc/passwd", "in/../../secret.csv", "~/secret.csv"])
+@pytest.mark.parametrize("what", ["curve", "error_table", "folder"])
+def test_a_bench_file_names_nothing_outside_its_folder(bench_file: Callable[..., Path], what: str, way: str) -> None:
+    changes: dict[str, Any] = {
+        "curve": {"d63": {"curve": way}},
+        "error_table": {"instruments": {"alpha": {"driver": "manual_stage", "url": "person", "error_table": way}}},
+        "folder": {"folders": {"effects": way}},
+    }[what]
+    with pytest.raises(
+        BenchError, match=r"is outside the folder of the bench file|No such file|there is no folder"
+    ) as no:
+        read_bench(bench_file(changes))
+    assert "root:" not in str(no.value)
+    if not way.startswith("~"):  # which is a name like another
+        assert "outside the folder of the bench file; move or link it into" in str(no.value)
+
+
+def test_a_link_that_a_person_has_put_there_may_lead_out(bench_file: Callable[..., Path], tmp_path: Path) -> None:
+    elsewhere = tmp_path.parent / f"{tmp_path.name}-elsewhere"
+    elsewhere.mkdir()
+    (tmp_path / "mine").symlink_to(elsewhere)
+    assert read_bench(bench_file({"folders": {"effects": "mine"}})).folders.effects == elsewhere
+
+
+def test_a_model_file_loads_no_effect_from_beside_it(
+    tmp_path: Path, rig: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "evil.py").write_text("open('ran', 'w')")
+    (tmp_path / "theirs.yaml").write_text(PAGE + "- effect: evil\n")
+    (tmp_path / "data.csv").write_text("alpha_deg,beta_deg,vx_v\n" + "".join(f"90,{10 * k},2.5\n" for k in range(36)))
+    monkeypatch.chdir(tmp_path)
+    ended = rig("fit", "data.csv", "--model", "theirs.yaml", "--out", "out.yaml")
+    assert (ended.status, 'unknown effect "evil"' in ended.err) == (2, True)
+    assert not (tmp_path / "ran").exists()
+
+
+def test_that_a_persons_own_program_is_run_is_said(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    path = tmp_path / "mine.py"
+    path.write_text('"""mine: nothing.\n"""\ndef mine(rig):\n    pass\n')
+    with caplog.at_level(logging.WARNING):
+        find("mine", tmp_path)
+    assert f"{path} is run: the bench file names its folder for procedures" in caplog.text
+
+
+def test_a_compressed_file_is_no_bomb(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(text_file, "LARGEST_BYTES", 1 << 20)
+    path = tmp_path / "bomb.csv.gz"
+    path.write_bytes(gzip.compress(b"1,2,3\n" * (1 << 19)))
+    assert path.stat().st_size < 1 << 14
+    with pytest.raises(DataError, match="holds more than"), text_file.text_file(path).lines() as lines:
+        assert sum(1 for _ in lines) < 0
+
+
+def test_an_address_has_no_password() -> None:
+    with pytest.raises(LinkRefused, match="is not the address of a wire"):
+        Url.parse("tcp://me:hush@192.168.1.40:502")
