@@ -20,8 +20,8 @@ REMEDIES = {
     r"(bias|scale)-(as-is|power|mount)": "look at screws, connector and supply, and let it warm up: rig run soak",
     r"rmse|improvement|amplitude|noise-limit": "see where the model fails: rig compare {run}; "
     "then how sensor and displacement sensor sit on the carriage",
-    r"(hard|soft)-iron|left-by|field-": "move iron and magnets away from the sensor; what turns with it is in the model "
-    "of rig fit {run} --model magnetometer",
+    r"(hard|soft)-iron|left-by|field-": "move iron and magnets away from the sensor; what turns with it is in "
+    "the model of rig fit {run} --model magnetometer",
     r"gyro-|rate-": "seat the sensor anew; what stays is its own, and rig discover {run} makes the model of it",
     r"drift|steady|time-constant|wander": "let it warm up longer, away from drafts, before it is used or calibrated",
     r"gap": "the run was interrupted: rig show {run} says when",

@@ -37,9 +37,9 @@ def run(kind: str, **constants: float) -> Run:
 
 
 def turned(seed: int = 2, latitude_deg: float | None = 40.443, world: Any = None, **gyroscope: Any) -> Table:
-    """The table of a gyroscope with these faults, each edge up and down, three rates both ways."""
+    """The table of a gyroscope with these faults, each edge up and down, two rates both ways."""
     rig, book = session(World(WorldConfig.ideal().changed({"gyroscope": gyroscope, **(world or {})}), seed))
-    rate_turn(rig, rates_deg_s=(40.0, 60.0, 80.0), rest_s=5.0)
+    rate_turn(rig, rates_deg_s=(60.0, 80.0), rest_s=3.0)
     known = {} if latitude_deg is None else {"latitude_deg": latitude_deg}
     return rates_table(run("rates", **known), book.blocks)
 
@@ -77,7 +77,7 @@ def test_two_faults_of_a_gyroscope_are_found_one_after_the_other_and_nothing_els
     assert (found.verdict, set(found.causes)) == ("adequate", {"gyro-misalignment", "gyro-g-sensitivity"})
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_of_a_gyroscope_without_fault_nothing_is_missing(seed: int) -> None:
     assert diagnose(turned(seed), read_model("gyroscope")).verdict == "adequate"
 
@@ -125,7 +125,7 @@ def test_what_lies_beside_a_magnetometer_is_named(magnet: bool, iron: bool, mode
     assert ("soft-iron" in answer.causes) == iron
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_of_a_magnetometer_alone_nothing_is_missing(seed: int) -> None:
     assert diagnose(field(seed), read_model("field")).verdict == "adequate"
 

@@ -11,9 +11,15 @@ import numpy as np
 import pytest
 
 from calibrations.reading.read_csv import read_csv
+from drivers.errors import StageAlarm
+from procedures.catalogue import find
+from procedures.settings import parse
+from rig.bench import read_bench
 from rig.record import Record
 from rig.record.measured import table_of
-from tests.rig.rigging import in_own_process, signal_at
+from rig.record.turned import RATE
+from rig.runner import start
+from tests.rig.rigging import Onlooker, in_own_process, signal_at
 
 Rig = Callable[..., Any]
 FIELD = ("magnetometer-turn", "--step-deg", "45", "--dwell-s", "0.1", "--settle-s", "0.1", "--unattended", "--json")
@@ -161,3 +167,25 @@ def test_a_bench_without_the_channels_says_so(rig: Rig, bench_file: Callable[...
 
 def _stage(unit: int) -> dict[str, Any]:
     return {"driver": "oriental_az", "url": "simulated", "unit": unit}
+
+
+def test_an_alarm_in_the_middle_of_a_turn_ends_the_run_and_the_turn(bench_file: Callable[..., Path]) -> None:
+    """The first turn, at 20 deg/s, is under way from about 42 s to 60 s; the drive stops with alarm 30 at 50 s."""
+    beta = _stage(2) | {"faults": [{"what": "alarm", "at_s": 50.0}]}
+    adc = {
+        "driver": "labjack_t7",
+        "url": "simulated",
+        "settings": {"channels": dict(zip(RATE, (0, 1, 2), strict=True))},
+    }
+    bench = read_bench(bench_file({"instruments": {"alpha": _stage(1), "beta": beta, "adc": adc}, "d63": None}))
+    procedure, looker = find("rate-turn"), Onlooker()
+    chosen = parse(procedure, {"rates_deg_s": "20", "rest_s": "0.5", "mounts": "1"})
+    with Record() as record:
+        outcome = start(record, bench, procedure, chosen, looker)
+        assert isinstance(outcome.error, StageAlarm)
+        assert "alarm 30, overload" in str(outcome.error)
+        assert (outcome.run.state, outcome.moving) == ("failed", ())
+        assert [kept.pose.rate_deg_s for kept in record.kept(outcome.run.run)] == [0.0, 0.0]
+        plan = (record.state(outcome.run.run) or {})["rig"]
+    assert looker.said[-1].startswith("turning beta at 20 deg/s")
+    assert plan["clock_s"] < 40.0  # the state is that of the last rest, from which the run goes on
