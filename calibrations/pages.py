@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from calibrations.compensation.forward import at_run_time
 from calibrations.effect import Effect, Parameter, catalogue
 from calibrations.pictures import signature, signature_noise
 from calibrations.pictures.compact import sparing
@@ -41,6 +42,7 @@ def page(effect: Effect) -> str:
         ("Confused with", effect.confused_with or "nothing in the catalogue"),
         ("Acts on", ACTS_ON[effect.acts_on] + "."),
         ("Needs", _needs(effect)),
+        ("At run time", f"{at_run_time(effect)}."),
         ("Source", effect.source),
     ]
     rows = "\n".join(_row(parameter) for parameter in effect.parameters)

@@ -8,7 +8,7 @@ from decimal import ROUND_CEILING, Context
 from textwrap import wrap
 
 from calibrations.compensation.cost import Size
-from calibrations.compensation.forward import INVERTED, LEFT_OUT
+from calibrations.compensation.forward import INVERTED, LEFT_OUT, NOISE, OF_THE_RIG
 from calibrations.compensation.inverse import Compensation
 from calibrations.model import Estimate
 from calibrations.numerals import as_written
@@ -129,8 +129,10 @@ def _effects(made: Compensation) -> Iterator[str]:
     for fate in made.forward.fates:
         by_how.setdefault(fate.how, []).append(fate.effect)
     yield f"Inverted: {', '.join(by_how.get(INVERTED, ['nothing']))}."
-    if rigs := by_how.get("of the rig"):
+    if rigs := by_how.get(OF_THE_RIG):
         yield f"Of the rig, not of the sensor, and dropped: {', '.join(rigs)}."
+    if noise := by_how.get(NOISE):
+        yield f"Noise, which no inverse takes off: {', '.join(noise)}."
     for fate in made.forward.fates:
         if fate.how == LEFT_OUT:
             size = made.costs.left_out[fate.effect]

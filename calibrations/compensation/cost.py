@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calibrations.chain import Step, nominal_pose, respond, sensed, specific_force
-from calibrations.compensation.forward import FORCES, LEFT_OUT, Forward, steps_of
+from calibrations.compensation.forward import FORCES, INVERTED, Forward, steps_of
 from calibrations.compensation.program import Program
 from calibrations.errors import CalibrationError
 from calibrations.model import Estimate, Model, Term
@@ -50,7 +50,7 @@ def costs(model: Model, forward: Forward, program: Program, reach: float, unit: 
     table = _sweep(model, program)
     a = specific_force(nominal_pose(table)) * (1.0 if unit != "deg/s" else reach)
     fates = {fate.effect: fate.how for fate in forward.fates}
-    followed = [step for step in steps_of(model) if fates[step[0].name] not in (LEFT_OUT, "of the rig")]
+    followed = [step for step in steps_of(model) if fates[step[0].name] == INVERTED]
     left = {name: _of_left_out(name, model, followed, table, a, forward, program) for name in forward.left_out}
     hidden = unit == "g" and len(forward.axes) == 2 and "az" in program.inputs
     return Cost(

@@ -2,6 +2,7 @@
 
 inverted    the effect acts on force, transduction or output, and its function can be written down
 of the rig  it acts on the pose alone: the stages' errors are not the sensor's, and drop out
+noise       it has no value that could be taken off
 left out    it says itself why a product cannot follow it, its function cannot be written down, or it was asked for
 """
 
@@ -17,18 +18,19 @@ from calibrations.chain import Step
 from calibrations.compensation.graph import Node, given
 from calibrations.compensation.traced import NotTraced, RunTime, Traced, nodes_traced
 from calibrations.compensation.written import added
+from calibrations.effect import Effect
 from calibrations.errors import ModelError
 from calibrations.model import Model, Term
 from calibrations.table import AXES, NUMBERS
 
-INVERTED, OF_THE_RIG, LEFT_OUT = "inverted", "of the rig", "left out"
+INVERTED, OF_THE_RIG, NOISE, LEFT_OUT = "inverted", "of the rig", "noise", "left out"
 KNOWN = ("temperature_c", "supply_v", "t_s")  # what a product may know beside the outputs
 FORCES = ("ax", "ay", "az")
 
 
 @dataclass(frozen=True)
 class Fate:
-    """What becomes of an effect: one of the three, and why where it is left out."""
+    """What becomes of an effect: one of the four, and why where it is left out."""
 
     effect: str
     how: str
@@ -78,6 +80,15 @@ def input_unit(model: Model) -> str:
     return {"fields": "field", "rates": "deg/s"}.get(next(iter(kinds), ""), "g") if len(kinds) == 1 else "g"
 
 
+def at_run_time(effect: Effect) -> str:
+    """What a compensation does about an effect, as far as its file tells."""
+    if effect.left_out:
+        return f"left out: {effect.left_out}"
+    if effect.force or effect.transduction or effect.output:
+        return "inverted"
+    return "dropped: it is the rig's" if effect.pose else "nothing: noise cannot be taken off"
+
+
 def forward_of(model: Model, without: Collection[str] = ()) -> Forward:
     """The graphs of a fitted model; the effects in `without` are left out."""
     axes, steps = measured_axes(model), steps_of(model)
@@ -109,8 +120,8 @@ def _fate(step: Step, table: RunTime, without: Collection[str]) -> Fate:
         return Fate(effect.name, LEFT_OUT, "as was asked")
     if effect.left_out:
         return Fate(effect.name, LEFT_OUT, effect.left_out)
-    if effect.acts_on == "pose" and not (effect.force or effect.transduction or effect.output):
-        return Fate(effect.name, OF_THE_RIG)
+    if not (effect.force or effect.transduction or effect.output):
+        return Fate(effect.name, OF_THE_RIG if effect.pose else NOISE)
     try:
         _outputs([step], table)
     except NotTraced as error:

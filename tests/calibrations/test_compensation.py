@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from calibrations.chain import respond, sensed
-from calibrations.compensation.forward import INVERTED, LEFT_OUT, OF_THE_RIG, steps_of
+from calibrations.compensation.forward import INVERTED, LEFT_OUT, NOISE, OF_THE_RIG, forward_of, steps_of
 from calibrations.compensation.inverse import Compensation, Range, invert
 from calibrations.effect import Effect, catalogue, read_effect
 from calibrations.errors import ModelError
@@ -125,19 +125,17 @@ def test_magnetometers_and_gyroscopes() -> None:
 def test_every_effect_is_inverted_or_says_why_not(name: str) -> None:
     effect = catalogue()[name]
     values = {p.name: (0.01, 0.02) if p.per_axis else 0.01 for p in effect.parameters}
-    (*_, fate) = invert_or_tell(model({**LINEAR, name: values} if name not in LINEAR else LINEAR))
-    if effect.acts_on == "pose":
-        assert fate.how == OF_THE_RIG
-    elif effect.left_out:
+    (*_, fate) = fates(model({**LINEAR, name: values} if name not in LINEAR else LINEAR))
+    if effect.left_out:
         assert (fate.how, fate.why) == (LEFT_OUT, effect.left_out)
-    else:
+    elif effect.force or effect.transduction or effect.output:
         assert fate.how == INVERTED, fate.why
+    else:
+        assert fate.how == (OF_THE_RIG if effect.pose else NOISE)
 
 
-def invert_or_tell(fitted: Model) -> Any:
+def fates(fitted: Model) -> Any:
     """What becomes of the effects, whether or not there is an inverse."""
-    from calibrations.compensation.forward import forward_of
-
     return forward_of(fitted).fates
 
 

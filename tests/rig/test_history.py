@@ -39,7 +39,8 @@ def years() -> None:
 
 
 def test_a_life_in_words(rig: Rig, years: None, tmp_path: Path) -> None:
-    ended = rig("history", "17", "--limit", "bias-x=0.005", "--quantity", "bias-x", "--pictures", str(tmp_path / "life"))
+    words = ("--limit", "bias-x=0.005", "--quantity", "bias-x", "--pictures", str(tmp_path / "life"))
+    ended = rig("history", "17", *words)
     assert ended.status == 0, ended.err
     assert ended.out.startswith("17: 5 calibrations from 2020-03-01 to 2024-03-01, by the model linear\n")
     assert ended.out.index("2021-03-01") < ended.out.index("2022-03-01")
