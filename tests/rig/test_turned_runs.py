@@ -9,17 +9,19 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 
 from calibrations.reading.read_csv import read_csv
 from drivers.errors import StageAlarm
+from drivers.oriental_az import RotaryStage
 from procedures.catalogue import find
 from procedures.settings import parse
-from rig.bench import read_bench
+from rig.bench import DEFAULT, read_bench
 from rig.record import Record
 from rig.record.measured import table_of
 from rig.record.turned import RATE
 from rig.runner import start
-from tests.rig.rigging import Onlooker, in_own_process, signal_at
+from tests.rig.rigging import Onlooker
 
 Rig = Callable[..., Any]
 FIELD = ("magnetometer-turn", "--step-deg", "45", "--dwell-s", "0.1", "--settle-s", "0.1", "--unattended", "--json")
@@ -29,8 +31,14 @@ ONE = ("--mounts", "1")
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A record that this file's runs share."""
-    return tmp_path_factory.mktemp("turned")
+    """A record that this file's runs share, and the simulated rig with quick stages: simulated time is not free."""
+    folder = tmp_path_factory.mktemp("turned")
+    bench = yaml.safe_load(DEFAULT.read_text(encoding="utf-8"))
+    for role in ("alpha", "beta"):
+        bench["instruments"][role]["settings"] |= {"speed_deg_s": 180, "acceleration_deg_s2": 600}
+    del bench["limits"]["level_deg"]
+    (folder / "quick.yaml").write_text(yaml.safe_dump(bench), encoding="utf-8")
+    return folder
 
 
 @pytest.fixture(autouse=True)
@@ -42,7 +50,7 @@ def run(rig: Rig, folder: Path, arguments: tuple[str, ...]) -> dict[str, Any]:
     """What a run gave; one of the same arguments is not done again."""
     kept = folder / f"{'_'.join(arguments)}.json"
     if not kept.exists():
-        ended = rig("run", *arguments)
+        ended = rig("run", *arguments, "--bench", str(folder / "quick.yaml"))
         assert ended.status == (1 if "no hard-iron" in ended.err else 0), ended.err
         kept.write_text(ended.out)
     return dict(json.loads(kept.read_text()))
@@ -132,19 +140,33 @@ def test_every_command_takes_a_run(rig: Rig, folder: Path, tmp_path: Path) -> No
 
 
 @pytest.mark.sockets
-def test_a_run_that_is_stopped_in_a_turn_stands_and_goes_on_sample_for_sample(rig: Rig, folder: Path) -> None:
-    """The signal comes with the second turn's kept block; resumed, the third is as in a run that was never stopped."""
+def test_a_run_that_is_stopped_in_a_turn_stands_and_goes_on_sample_for_sample(
+    rig: Rig, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ctrl-C comes while beta turns for the second time."""
     whole = run(rig, folder, (*RATES, *ONE))["run"]
-    in_own_process("run", *RATES, *ONE, harm=signal_at("poses", 4, "SIGTERM"))
+    looks = iter(range(100))
+    looked = RotaryStage._require_turning
+
+    def interrupted(stage: RotaryStage, rate_deg_s: float) -> None:
+        looked(stage, rate_deg_s)
+        if next(looks) == 7:
+            raise KeyboardInterrupt("SIGINT")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(RotaryStage, "_require_turning", interrupted)
+        stopped = rig("run", *RATES, *ONE, "--bench", str(folder / "quick.yaml"))
+    assert stopped.status == 4
+    name = json.loads(stopped.out)["run"]
     with Record() as record:
-        stopped = record.runs()[0]
-    assert (stopped.state, stopped.rows) == ("stopped", 3)
-    assert rig("resume", stopped.run, "--unattended", "--json").status == 0
+        assert (record.run(name).state, record.run(name).rows) == ("stopped", 3)
+        assert not any(event.what == "not stopped" for event in record.events(name))
+    assert rig("resume", name, "--unattended", "--json").status == 0
     with Record() as record:
-        for a, b in zip(record.kept(whole), record.kept(stopped.run), strict=True):
+        for a, b in zip(record.kept(whole), record.kept(name), strict=True):
             assert a.pose == b.pose
             np.testing.assert_array_equal(a.samples.volts, b.samples.volts)
-        assert record.run(whole).results == record.run(stopped.run).results != {}
+        assert record.run(whole).results == record.run(name).results != {}
 
 
 def test_a_plan_knows_ways_limits_and_mounts(rig: Rig) -> None:
@@ -170,14 +192,15 @@ def _stage(unit: int) -> dict[str, Any]:
 
 
 def test_an_alarm_in_the_middle_of_a_turn_ends_the_run_and_the_turn(bench_file: Callable[..., Path]) -> None:
-    """The first turn, at 20 deg/s, is under way from about 42 s to 60 s; the drive stops with alarm 30 at 50 s."""
-    beta = _stage(2) | {"faults": [{"what": "alarm", "at_s": 50.0}]}
+    """The first turn, at 20 deg/s, is under way from about 22 s to 40 s; the drive stops with alarm 30 at 30 s."""
+    beta = _stage(2) | {"faults": [{"what": "alarm", "at_s": 30.0}]}
     adc = {
         "driver": "labjack_t7",
         "url": "simulated",
         "settings": {"channels": dict(zip(RATE, (0, 1, 2), strict=True))},
     }
-    bench = read_bench(bench_file({"instruments": {"alpha": _stage(1), "beta": beta, "adc": adc}, "d63": None}))
+    changes = {"instruments": {"alpha": _stage(1), "beta": beta, "adc": adc}, "d63": None, "limits": {}}
+    bench = read_bench(bench_file(changes))
     procedure, looker = find("rate-turn"), Onlooker()
     chosen = parse(procedure, {"rates_deg_s": "20", "rest_s": "0.5", "mounts": "1"})
     with Record() as record:
@@ -188,4 +211,4 @@ def test_an_alarm_in_the_middle_of_a_turn_ends_the_run_and_the_turn(bench_file: 
         assert [kept.pose.rate_deg_s for kept in record.kept(outcome.run.run)] == [0.0, 0.0]
         plan = (record.state(outcome.run.run) or {})["rig"]
     assert looker.said[-1].startswith("turning beta at 20 deg/s")
-    assert plan["clock_s"] < 40.0  # the state is that of the last rest, from which the run goes on
+    assert plan["clock_s"] < 20.0  # the state is that of the last rest, from which the run goes on
