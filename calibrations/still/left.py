@@ -10,10 +10,12 @@ from calibrations.still.fit import NoiseFit
 from calibrations.still.scan import stretches
 from calibrations.still.stationary import levels
 
+KINDS = 3  # of things that are looked for
+
 
 def left(found: NoiseFit) -> str | None:
     """The first that is no chance over all channels; None where what is left is noise."""
-    limit = SIGNIFICANT / len(found.channels)
+    limit = SIGNIFICANT / (KINDS * len(found.channels))
     told = (_line(each) or _level(each, limit) or _stretch(each, limit) for each in found.channels)
     return next((text for text in told if text is not None), None)
 

@@ -21,7 +21,7 @@ from calibrations.still.mixtures import Mixture, Mixtures
 from calibrations.still.patterns import Pattern, pattern_of
 from calibrations.still.record import Still
 
-NEARLY = 0.5  # of the longest time constant
+NEARLY = 0.9  # of the longest time constant
 CERTAIN = 60.0  # what a pattern has to gain beyond its price to be no chance beside whatever was fitted
 
 

@@ -1,0 +1,228 @@
+"""The analysis commands on still records: tables, arrays and runs; documents, words, pictures; and what they refuse."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from calibrations.table import Array
+from tests.calibrations.hidden_noise import RATE_HZ, fractional, traps, white
+from tests.rig.conftest import Ended
+
+Rig = Callable[..., Ended]
+N = 6000
+COMMANDS = ("compare", "fit", "diagnose", "discover", "report", "add")
+
+
+def words_of(command: str, data: str) -> tuple[str, ...]:
+    """A call of a command on data."""
+    if command == "add":
+        return ("add", "flicker-noise", "--model", "still", "--data", data, "--out", "made.yaml")
+    return (command, data, *(("--out", "page.html") if command == "report" else ()))
+
+
+def document(ended: Ended) -> dict[str, Any]:
+    assert ended.status == 0, ended.err
+    return dict(json.loads(ended.out))
+
+
+def write(path: str, t_s: Array, constants: str = "", **columns: Array) -> None:
+    rows = zip(t_s.tolist(), *[c.tolist() for c in columns.values()], strict=True)
+    lines = [constants + ",".join(["t_s", *columns]), *(",".join(map(repr, row)) for row in rows)]
+    Path(path).write_text("\n".join(lines))
+
+
+@pytest.fixture(scope="module")
+def samples() -> tuple[Array, Array]:
+    """White noise of 1 mV, x with flicker beside."""
+    random = np.random.default_rng(4)
+    x = white(random, N) + 0.7 * traps(random, N)
+    return 2.5 + 1e-3 * x, 2.5 + 1e-3 * white(random, N)
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, samples: tuple[Array, Array]) -> Path:
+    monkeypatch.chdir(tmp_path)
+    x, y = samples
+    write("still.csv", np.arange(N) / RATE_HZ, "# sensor: ADXL203\n", vx_v=x, vy_v=y)
+    np.save("x.npy", x)
+    return tmp_path
+
+
+def test_what_is_missing_is_found_added_and_no_longer_missed(rig: Rig, folder: Path) -> None:
+    said = document(rig("diagnose", "still.csv", "--json"))
+    assert said["schema"] == "rig.diagnosis/1"
+    assert (said["verdict"], said["candidates"][0]["effect"]) == ("effect-missing", "flicker-noise")
+    best = said["candidates"][0]
+    assert best["p_value"] < 0.003
+    assert best["held_out_after"] < best["held_out_before"]
+    assert best["axes"] == ["x", "y"]
+
+    added = document(rig(*words_of("add", "still.csv"), "--json"))
+    assert (added["schema"], added["verdict"], added["causes"]) == ("rig.discovery/1", "adequate", ["flicker-noise"])
+    step = added["steps"][0]
+    assert step["log_likelihood_after"] > step["log_likelihood_before"] + 100
+    assert step["allan_mismatch_after"]["x"] < step["allan_mismatch_before"]["x"] / 3
+    assert step["excess_after"] == pytest.approx(1, abs=0.15)
+    assert step["excess_before"] > 2
+
+    again = document(rig("diagnose", "still.csv", "--model", "made.yaml", "--json", "--check"))
+    assert again["verdict"] == "adequate"
+    kept = yaml.safe_load(Path("made.yaml").read_text())
+    assert (kept["unit"], kept["provenance"]["sensor"]) == ("V", "ADXL203")
+    assert {p["axis"] for entry in kept["effects"] for p in entry["parameters"]} == {"x", "y"}
+
+
+def test_compare_sets_both_curves_side_by_side(rig: Rig, folder: Path) -> None:
+    said = document(rig("compare", "still.csv", "--json"))
+    assert said["schema"] == "rig.comparison/1"
+    for axis in "xy":
+        assert said["excess"][axis] == pytest.approx(said["rmse"][axis] / said["noise_floor"][axis])
+    curve = said["allan"]["x"]
+    assert len(curve["tau_s"]) == len(curve["model"]) == len(curve["deviation"]) > 8
+    worst = next(place for place in said["fails"] if place["where"] == "averaging time" and place["excess"] > 3)
+    assert (worst["axis"], worst["from"] > RATE_HZ**-1) == ("x", True)
+    assert all(place["axis"] == "x" for place in said["fails"])
+    assert rig("compare", "still.csv", "--check").status == 1
+    assert rig("discover", "still.csv", "--out", "found.yaml").status == 0
+    shown = rig("compare", "still.csv", "--model", "found.yaml", "--check")
+    assert shown.status == 0, shown.out
+    assert "The model fails nowhere: what is left is chance." in shown.out
+
+
+def test_an_array_and_its_rate(rig: Rig, folder: Path) -> None:
+    said = document(rig("fit", "x.npy", "--rate", "10", "--model", "still", "--json"))
+    assert said["parameters"][0]["unit"] == "count/sqrt(Hz)"
+    ended = rig("discover", "x.npy", "--rate", "10")
+    assert "+ flicker-noise" in ended.out
+    assert "Missing was flicker-noise." in ended.out
+    assert "give --rate HZ" in rig("discover", "x.npy").err
+
+
+def test_one_channel_may_be_asked_for(rig: Rig, folder: Path) -> None:
+    assert document(rig("diagnose", "still.csv", "--channel", "vy", "--json"))["verdict"] == "adequate"
+    only = document(rig("fit", "still.csv", "--channel", "vy", "--out", "y.yaml", "--json"))
+    assert {p["axis"] for p in only["parameters"]} == {"y"}
+    ended = rig("compare", "still.csv", "--model", "y.yaml")
+    assert (ended.status, "has values for the axes y, and none for x" in ended.err) == (2, True)
+    assert 'has no channel "vq"' in rig("compare", "still.csv", "--channel", "vq").err
+
+
+def test_the_report_is_one_page_with_both_pictures(rig: Rig, folder: Path) -> None:
+    ended = rig("report", "still.csv", "--out", "page.html", "--pictures", "pictures", "--format", "svg")
+    assert ended.status == 0, ended.err
+    page = Path("page.html").read_text()
+    assert "The noise model still misses flicker-noise." in page
+    assert "Allan deviation beside the model" in page
+    assert "src=" not in page
+    assert {path.name for path in Path("pictures").iterdir()} == {"allan.svg", "spectrum.svg"}
+
+
+def test_a_run_straight_from_its_record(rig: Rig, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("RIG_HOME", str(folder / "home"))
+    run = document(rig("run", "noise-floor", "--duration-s", "60", "--unattended", "--json"))["run"]
+    said = document(rig("diagnose", run, "--json"))
+    assert (said["data"], said["verdict"]) == (run, "adequate")
+    fit = document(rig("fit", run, "--json"))
+    density = {p["axis"]: p["value"] for p in fit["parameters"]}
+    assert density == pytest.approx(dict.fromkeys("xy", 1.126e-4), rel=0.1)  # 0.775 mV behind 15.07 Hz (Ang V)
+
+
+def test_an_ambiguous_answer_comes_with_a_longer_record(rig: Rig, folder: Path) -> None:
+    random = np.random.default_rng(0)
+    np.save("short.npy", white(random, N) + 0.003 * np.cumsum(random.standard_normal(N)))
+    said = document(rig("diagnose", "short.npy", "--rate", "10", "--json"))
+    assert said["verdict"] == "ambiguous"
+    assert said["candidates"][0]["indistinguishable_from"]
+    following = said["next_experiment"]
+    assert (following["procedure"], following["settings"]["duration_s"] > N / 10) == ("noise-floor", True)
+    assert following["command"].startswith("rig run noise-floor --duration-s ")
+    assert 0 < following["expected"]["probability"] <= 1
+
+
+def bad(folder: Path) -> None:
+    """One file of each kind that cannot be taken."""
+    x, t_s = 2.5 + 1e-3 * white(np.random.default_rng(2), N), np.arange(N) / RATE_HZ
+    torn, late, nan = t_s.copy(), np.cumsum(np.random.default_rng(1).exponential(0.1, N)), x.copy()
+    torn[1000:] += 600
+    nan[4000] = np.nan
+    write("nan.csv", t_s, vx_v=nan)
+    write("gap.csv", torn, vx_v=x)
+    write("late.csv", late, vx_v=x)
+    write("rate.csv", t_s, "# sample_rate_hz: 100\n", vx_v=x)
+    write("constant.csv", t_s, vx_v=np.full(N, 2.5))
+    write("clipped.csv", t_s, vx_v=np.minimum(x, 2.5005))
+    write("short.csv", t_s[:50], vx_v=x[:50])
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_bad_input_is_one_message(rig: Rig, folder: Path, command: str) -> None:
+    bad(folder)
+    before = set(folder.iterdir())
+    for data, says in {
+        "nan.csv": "nan",
+        "gap.csv": "analyse the parts between gaps each by itself",
+        "late.csv": "samples must be evenly spaced: interpolate them onto equal steps first",
+        "rate.csv": "100 samples a second are stated, the column t_s has 10; correct one of them",
+        "constant.csv": "every sample is the same; is the sensor connected",
+        "clipped.csv": "the channel is clipped; choose a wider range",
+        "short.csv": "50 samples; the noise of a record needs 64 or more",
+    }.items():
+        ended = rig(*words_of(command, data))
+        assert (ended.status, ended.out) == (2, ""), data
+        assert says in ended.err, ended.err
+        assert ended.err.startswith("rig: ")
+    assert set(folder.iterdir()) == before
+
+
+def test_a_small_gap_is_closed_and_that_is_said(rig: Rig, folder: Path, samples: tuple[Array, Array]) -> None:
+    t_s = np.arange(N) / RATE_HZ
+    t_s[3000:] += 5
+    write("gap.csv", t_s, vx_v=samples[0])
+    ended = rig("diagnose", "gap.csv")
+    assert ended.status == 0
+    assert "1 gaps, 5 s in all, are closed up" in ended.err
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("diagnose", "still.csv", "--model", "physical"), "none of its effects is noise"),
+        (("diagnose", "still.csv", "--model", "mixed.yaml"), "keep them in models of their own"),
+        (("add", "bias", "--model", "still", "--data", "still.csv", "--out", "o.yaml"), "bias is no noise"),
+        (("add", "white-noise", "--model", "still", "--data", "still.csv", "--out", "o.yaml"), "is in the model"),
+        (("discover", "still.csv", "still.csv"), "judged one at a time"),
+        (("compare", "still.csv", "--noise", "still"), "--noise is for poses and rates"),
+        (("compare", "poses.csv", "--rate", "5"), "--channel and --rate are for still records"),
+        (("compare", "poses.csv", "--noise", "still"), "not fitted"),
+    ],
+)
+def test_what_does_not_fit_together_is_said(rig: Rig, folder: Path, words: tuple[str, ...], says: str) -> None:
+    Path("poses.csv").write_text("alpha_deg,beta_deg,vx_v,t_s\n90,0,3.5,0\n90,180,1.5,6\n90,90,2.5,12\n")
+    Path("mixed.yaml").write_text("schema: rig.model/1\nname: mixed\neffects:\n- effect: bias\n- effect: white-noise\n")
+    ended = rig(*words)
+    assert (ended.status, ended.out) == (2, "")
+    assert says in ended.err
+
+
+def test_known_noise_lets_a_quiet_model_be_adequate(rig: Rig, folder: Path) -> None:
+    """A sweep under flicker five times the white noise of a mean, whose level a still record has told."""
+    from calibrations.reading.read_csv import write_csv
+    from tests.calibrations.synthetic import components, poses, turns
+
+    random, columns = np.random.default_rng(6), turns()
+    x, y, _ = components(columns)
+    slow = [2.5e-4 * fractional(random, len(x)) for _ in range(2)]
+    write_csv(poses(columns, 2.5 + x + slow[0], 2.5 + y + slow[1]), "sweep.csv")
+    still = [2.5 + 1e-3 * white(random, N) + 2.5e-4 * fractional(random, N) for _ in range(2)]
+    write("rest.csv", np.arange(N) / RATE_HZ, vx_v=still[0], vy_v=still[1])
+    assert rig("discover", "rest.csv", "--out", "noise.yaml").status == 0
+    assert document(rig("diagnose", "sweep.csv", "--json"))["verdict"] == "unexplained"
+    assert document(rig("diagnose", "sweep.csv", "--noise", "noise.yaml", "--json"))["verdict"] == "adequate"
+    assert rig("compare", "sweep.csv", "--noise", "noise.yaml", "--check").status == 0
