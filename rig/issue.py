@@ -26,12 +26,12 @@ from calibrations.fit import Fit
 from calibrations.model_file import dump_model
 from calibrations.numerals import as_written
 from calibrations.table import Table
-from procedures.session import Samples
 from rig.bench import Bench
 from rig.certificates import EXPIRED, certificates
 from rig.errors import UnknownRun
 from rig.provenance import program, today
-from rig.record import Kept, Record, Run
+from rig.record import Record, Run
+from rig.record.digest import digest_of
 from rig.record.measured import Measured
 
 # condition's column -> name and unit
@@ -81,7 +81,7 @@ def _issued(
     digest = hashlib.sha256(f"{table.digest}{hashlib.sha256(text.encode()).hexdigest()}".encode()).hexdigest()
     customer = asked.customer or (lab.customer if lab is not None else "")
     return Certificate(
-        number=asked.number or f"{Path(data).stem.replace('/', '-')}-{digest[:8]}",
+        number=asked.number or f"{data.replace('/', '-') if run is not None else Path(data).stem}-{digest[:8]}",
         issued=today(),
         program=program(),
         laboratory=Laboratory(**lab.model_dump(exclude={"customer"})) if lab is not None else Laboratory(),
@@ -178,10 +178,11 @@ def _remarks(run: Run | None, stated: bool) -> Iterator[str]:
 
 def _samples(table: Table, measured: Measured | None) -> Iterator[Sample]:
     """Every row of the table, with the digest of its block of samples, or of its own numbers where there is none."""
-    blocks = {kept.number: kept for kept in measured.kept()} if measured is not None and measured.run.bench else {}
+    digests: dict[int, str] = {}
+    if measured is not None and measured.run.bench:  # of the whole block, also where a batch shares it
+        digests = {kept.number: digest_of(kept.samples) for kept in measured.record.kept(measured.run.run)}
     numbers = table.numbered(np.arange(table.n))
     for i, number in enumerate(numbers.tolist()):
-        kept: Kept | None = blocks.get(number)
         values = np.array([column[i] for column in table.columns.values()])
         yield Sample(
             number=number,
@@ -189,15 +190,8 @@ def _samples(table: Table, measured: Measured | None) -> Iterator[Sample]:
             place=_place(table, i),
             means=tuple(table.outputs[i].tolist()),
             n=int(table.optional("n", 1.0)[i]),
-            sha256=digest_of(kept.samples) if kept is not None else hashlib.sha256(values.tobytes()).hexdigest(),
+            sha256=digests.get(number) or hashlib.sha256(values.tobytes()).hexdigest(),
         )
-
-
-def digest_of(samples: Samples) -> str:
-    """SHA-256 of a block: its channels' names, then its samples as little-endian float64, one sample after another."""
-    h = hashlib.sha256(",".join(samples.channels).encode())
-    h.update(np.ascontiguousarray(samples.volts, "<f8").tobytes())
-    return h.hexdigest()
 
 
 def _place(table: Table, i: int) -> str:

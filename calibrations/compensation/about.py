@@ -47,6 +47,11 @@ def shown(value: float, unit: str) -> str:
     return f"{1e3 * value:.2g} mg" if unit == "g" else f"{value:.2g} {unit}"
 
 
+def steps(made: Compensation) -> str:
+    """`7 steps`."""
+    return f"{made.bound.steps} step{'s' if made.bound.steps > 1 else ''}"
+
+
 def upward(bound: float) -> str:
     """A bound to three digits, never less than it is."""
     return f"{float(UPWARD.create_decimal(bound)):.3g}"
@@ -117,7 +122,7 @@ def _how(made: Compensation) -> Iterator[str]:
     bound = made.bound
     left = f"q^{bound.steps} x {made.range.reach:g} {made.unit} = {upward(bound.within)} {made.unit}"
     yield (
-        f"Method: a <- a + C (v - G(a)), {bound.steps} steps from a = 0. Each step comes nearer by the factor "
+        f"Method: a <- a + C (v - G(a)), {steps(made)} from a = 0. Each step comes nearer by the factor "
         f"q <= {upward(bound.q)}, proved over the whole range by interval arithmetic; what is left after the last is "
         f"below {left}, rounding aside."
     )

@@ -143,11 +143,11 @@ def _folder(out: Path) -> None:
 
 def _told(made: Compensation) -> list[str]:
     """What it does and what it costs, for people."""
-    from calibrations.compensation.about import operations, shown
+    from calibrations.compensation.about import operations, shown, steps
     from calibrations.compensation.forward import LEFT_OUT
 
     bound, costs = made.bound, made.costs
-    method = f"{bound.steps} steps, {operations(made)}; each comes nearer by {bound.q:.2g} at least"
+    method = f"{steps(made)}, {operations(made)}; each comes nearer by {bound.q:.2g} at least"
     lines = [f"{made.model.name}: {method}, proved within +-{made.range.reach:g} {made.unit}."]
     for fate in made.forward.fates:
         if fate.how == LEFT_OUT:

@@ -15,6 +15,7 @@ from rig.errors import RecordError
 from rig.next_steps import next_steps
 from rig.numerals import duration
 from rig.record import Event, Kept, Line, Record, Run
+from rig.record.digest import digest_of
 from rig.record.measured import Measured, sensors_of
 
 Ranges = Mapping[str, tuple[float, float]]
@@ -61,7 +62,8 @@ def _pose(number: int, kept: Kept) -> dict[str, Any]:
     names = ("alpha_deg", "beta_deg", "direction", "mount_deg", "flip", "up", "rate_deg_s")
     angles = {name: getattr(kept.pose, name) for name in names}
     about = {"t_s": kept.t_s, "temperature_c": kept.temperature_c, "excluded": kept.excluded}
-    return {"pose": number, "path": kept.pose.path, **angles, **about, "means_v": dict(kept.dwell.means)}
+    means = {"means_v": dict(kept.dwell.means), "sha256": digest_of(kept.samples)}
+    return {"pose": number, "path": kept.pose.path, **angles, **about, **means}
 
 
 def _head(run: Run) -> list[str]:

@@ -55,6 +55,8 @@ def test_a_run_gives_all_three_forms(rig: Rig, bench_file: Callable[..., Path], 
     assert (document["serial"], document["customer"], document["laboratory"]["country"]) == ("17", "Somebody", "DE")
     assert {i["role"] for i in document["instruments"]} >= {"alpha", "adc", "hand level"}
     _check_that_samples_can_be_found(run, document)
+    listed = json.loads(rig("show", run, "--poses", "--json").out)["kept"]
+    assert [pose["sha256"] for pose in listed] == [s["sha256"] for s in document["samples"]]
 
 
 def _check_that_samples_can_be_found(run: str, document: dict[str, Any]) -> None:
