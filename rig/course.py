@@ -76,6 +76,6 @@ class Course:
 
 
 def kind_of(dwell: Dwell) -> str:
-    """Dwells of numbered paths belong together by name: `hold` of `hold 17`; those of a sweep are all of one kind, ""."""
+    """Dwells of numbered paths belong together by name: `hold` of `hold 17`; those of a sweep are of one kind, ""."""
     head, _, number = dwell.pose.path.rpartition(" ")
     return head if number.isdigit() else ""

@@ -1,0 +1,47 @@
+"""Tables of the simulated sensor with a hidden fault, as files for the workbench."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from calibrations.reading.read_csv import write_csv
+from calibrations.table import Array, Table
+from drivers.simulation.world import World
+from tests.hidden.rigs import IDEAL, rig_with, unexplained_rig
+
+CONSTANTS = {"filter_corner_hz": 15.07, "sample_rate_hz": 1000.0}
+
+
+def hidden(folder: Path, defect: str, times_noise: float = 40.0) -> str:
+    """A sweep of 518 poses on a rig with one defect; the file's name."""
+    return _written(folder, defect, rig_with(defect, times_noise, seed=3))
+
+
+def unexplained(folder: Path, defect: str) -> str:
+    """The same with a defect that the catalogue does not hold."""
+    return _written(folder, defect, unexplained_rig(defect, 40.0, seed=3))
+
+
+def thousand(folder: Path) -> str:
+    """1,000 poses."""
+    alpha, beta = np.repeat(np.linspace(20.0, 160.0, 20), 50), np.tile(np.arange(0.0, 360.0, 7.2), 20)
+    return _written(folder, "thousand", World(IDEAL, 3).dwell_mean(alpha, beta, direction=np.ones(1000, dtype=int)))
+
+
+def hundred_thousand(folder: Path) -> str:
+    """A raw log of 100,000 rows: 1,000 samples at each of 100 poses."""
+    rng = np.random.default_rng(1)
+    alpha, beta = (np.repeat(each, 1000) for each in (np.repeat([90.0, 30.0, 150.0, 60.0], 25),
+                                                      np.tile(np.arange(0.0, 360.0, 14.4), 4)))  # fmt: skip
+    load = np.sin(np.radians(alpha)) * np.array([np.cos(np.radians(beta)), np.sin(np.radians(beta))])
+    vx, vy = 2.5 + load + 0.01 * load**2 + 1e-3 * rng.standard_normal(load.shape)
+    rows = {"t_s": np.arange(1e5) / 1000.0, "alpha_deg": alpha, "beta_deg": beta, "vx_v": vx, "vy_v": vy}
+    return _written(folder, "log", rows)
+
+
+def _written(folder: Path, name: str, columns: dict[str, Array]) -> str:
+    path = folder / f"{name}.csv"
+    write_csv(Table.from_columns("poses", columns, CONSTANTS, name), path)
+    return str(path)

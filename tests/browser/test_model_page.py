@@ -1,0 +1,126 @@
+"""The page Model in a browser: the failing model, the missing effect, the falling error, an effect of one's own."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from urllib.parse import quote
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from calibrations.model_file import read_model
+from tests.browser.conftest import Workbench
+from tests.browser.measured import hidden, hundred_thousand, thousand, unexplained
+
+DOTS = "[aria-label='What the model leaves'] .points path"
+ALIVE_MS = 5000  # on a busy machine; else a tenth of that
+BARS = "[aria-label^='The falling error'] .bars .point"
+
+
+def looked_at(workbench: Workbench, data: str, verdict: str) -> Page:
+    """The page on a file, once it is diagnosed."""
+    page = workbench.visit(f"/?data={quote(data)}")
+    expect(page.locator(".verdict .headline").first).to_contain_text(verdict)
+    return page
+
+
+def brushed(page: Page, picture: str) -> None:
+    """A box drawn around the left half of a picture."""
+    area = page.locator(f"[aria-label='{picture}'] .nsewdrag").bounding_box()
+    assert area is not None
+    page.mouse.move(area["x"] + 2, area["y"] + 2)
+    page.mouse.down()
+    page.mouse.move(area["x"] + area["width"] / 2, area["y"] + area["height"] - 2, steps=4)
+    page.mouse.up()
+
+
+def test_a_hidden_effect_is_found_added_saved_and_undone(workbench: Workbench, tmp_path: Path) -> None:
+    data = hidden(tmp_path, "package turned")
+    page = looked_at(workbench, data, "An effect is missing: axis-misalignment")
+    card = page.locator(".card.first")
+    for told in ("a <- R(theta)^T a", "opposite signs", "above 99.9 %", "Cannot be told from", "× the noise floor"):
+        expect(card).to_contain_text(told)
+    expect(page.get_by_text("axis-misalignment", exact=True)).to_have_count(2)  # the card, and its curve
+    expect(page.locator(BARS)).to_have_count(1)
+    workbench.shot(page, "model")
+    page.get_by_role("button", name="Add axis-misalignment").click()
+    expect(page.locator(BARS)).to_have_count(2)
+    expect(page.locator(".verdict .headline").first).to_contain_text("Nothing is missing")
+    page.get_by_role("button", name="Save model").click()
+    page.get_by_role("dialog").get_by_label("Name").fill("sensor 17")
+    page.get_by_role("button", name="Save", exact=True).click()
+    expect(page.get_by_text("written:")).to_be_visible()
+    model = read_model(workbench.home / "models" / "sensor-17.yaml")
+    assert model.effects == ("bias", "scale-factor", "axis-misalignment")
+    workbench.shot(page, "nothing-missing")
+    page.close()
+    page = looked_at(workbench, data, "Nothing is missing")  # opened again, it is as it was left
+    page.get_by_role("button", name="Undo axis-misalignment").click()
+    expect(page.locator(BARS)).to_have_count(1)
+    expect(page.locator(".verdict .headline").first).to_contain_text("axis-misalignment")
+
+
+def test_an_effect_of_ones_own_with_a_mistake_and_then_right(workbench: Workbench, tmp_path: Path) -> None:
+    page = looked_at(workbench, unexplained(tmp_path, "worm gear"), "Nothing in the catalogue explains this")
+    text, add = page.get_by_label("Expression"), page.get_by_role("button", name="Add it")
+    expect(text).to_have_value(re.compile("sin"))  # what is left proposes itself
+    text.fill("a*sin(5*betta) + b*cos(5*beta)")
+    expect(page.locator(".fault").last).to_contain_text('did you mean "beta"')
+    expect(add).to_be_disabled()
+    workbench.shot(page, "own-effect-mistake")
+    page.get_by_label("Name").fill("my-worm")
+    text.fill("beta_deg += a*sin(5*beta) + b*cos(5*beta)")
+    expect(page.locator(".fall").last).to_contain_text("× the noise floor; unseen rows")
+    expect(add).to_be_enabled()
+    workbench.shot(page, "own-effect")
+    add.click()
+    expect(page.locator(BARS)).to_have_count(2)
+    expect(page.get_by_role("button", name="Undo my-worm")).to_be_enabled()
+
+
+def test_selection_units_axes_and_poses(workbench: Workbench, tmp_path: Path) -> None:
+    page = looked_at(workbench, hidden(tmp_path, "package turned"), "An effect is missing")
+    brushed(page, "Where it fails")
+    expect(page.get_by_text("of 518 selected")).to_be_visible()
+    for picture in ("Measurement beside model", "What the model leaves", "Where it fails"):
+        faded = f"[aria-label='{picture}'] .points path[style*='opacity: 0.2']"
+        expect(page.locator(faded).first).to_be_attached()
+    workbench.shot(page, "brushed")
+    page.get_by_role("button", name="Select nothing").click()
+    expect(page.locator("[aria-label='What the model leaves'] .points path[style*='opacity: 0.2']")).to_have_count(0)
+    label = page.locator("[aria-label='What the model leaves'] .ytitle")
+    expect(label).to_have_text("residual of x (mV)")
+    page.keyboard.press("g")
+    expect(label).to_have_text("residual of x (mg)")
+    page.keyboard.press("x")
+    expect(label).to_have_text("residual of y (mg)")
+    page.get_by_label("against").click()
+    page.get_by_role("option", name="temperature (°C)").click()
+    expect(page.locator("[aria-label='What the model leaves'] .xtitle")).to_have_text("temperature (°C)")
+    page.locator("[aria-label='Where it fails'] .points path").nth(9).hover(force=True)
+    expect(page.locator("[aria-label='Where it fails'] .hovertext")).to_contain_text("α 90°, β 90°")
+
+
+def test_what_cannot_be_looked_at_says_what_to_do(workbench: Workbench) -> None:
+    page = workbench.visit("/?data=no-such-run")
+    expect(page.get_by_role("alert")).to_contain_text("there is no such file, and no run 'no-such-run'")
+    page = workbench.visit("/")
+    expect(page.get_by_text("Nothing is measured yet")).to_be_visible()
+    workbench.shot(page, "empty")
+
+
+@pytest.mark.parametrize(("make", "rows"), [(thousand, "on 1000 poses"), (hundred_thousand, "on 100 poses")])
+def test_large_data_leave_the_page_alive(workbench: Workbench, tmp_path: Path, make: object, rows: str) -> None:
+    assert callable(make)
+    page = workbench.visit(f"/?data={quote(make(tmp_path))}")
+    dark = page.get_by_role("button", name="Light or dark")
+    expect(page.locator(".verdict .detail")).to_contain_text(rows)
+    dark.click()  # while effects are being tried
+    dark.click()
+    expect(page.locator("body.body--dark")).to_be_attached(timeout=ALIVE_MS)
+    expect(page.locator(".verdict.good, .verdict.bad, .verdict.doubt").first).to_be_visible()
+    brushed(page, "What the model leaves")
+    expect(page.get_by_text(re.compile("of [0-9]+ selected"))).to_be_visible(timeout=ALIVE_MS)
+    workbench.shot(page, f"dark-{rows.split()[1]}")
+    dark.click()
