@@ -20,6 +20,7 @@ bench: setup
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[bench]'
 	$(BIN)/python -m tests.benchmark
 	$(BIN)/python -m tests.benchmark.discovery --sets 24
+	$(BIN)/python -m tests.benchmark.noise_discovery 40
 
 audit: setup
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check 'pip-audit>=2.7,<3'
