@@ -45,8 +45,8 @@ def test_the_simulation_agrees_with_the_budget_where_the_model_is_straight() -> 
 def test_the_simulation_scatters_as_repeated_calibrations_do() -> None:
     found = fit(read_model("linear"), table())
     trials = simulate(found, contributions(found.table), 400)
-    again = np.array([fit(read_model("linear"), table(seed=100 + k)).theta for k in range(40)])
-    assert np.allclose(trials.std(axis=0), again.std(axis=0), rtol=0.45)
+    again = np.array([fit(read_model("linear"), table(seed=100 + k)).theta for k in range(24)])
+    assert np.allclose(trials.std(axis=0), again.std(axis=0), rtol=0.55)
     low, high = interval(trials)
     assert np.all((low < found.theta) & (found.theta < high))
 

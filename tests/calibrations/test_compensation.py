@@ -63,7 +63,7 @@ def test_it_gives_back_what_the_model_was_given(values: Any) -> None:
     assert made.bound.q**made.bound.steps * 1.5 == pytest.approx(made.bound.within)
 
 
-@settings(max_examples=15)
+@settings(max_examples=8)
 @given(
     st.lists(st.floats(-0.02, 0.02), min_size=10, max_size=10),
     st.tuples(*[st.floats(-3, 3)] * 3),

@@ -62,9 +62,8 @@ def test_c_agrees_with_python_over_the_whole_range(compiler: str, values: Any, t
 
 
 @pytest.mark.parametrize("compiler", COMPILERS)
-@pytest.mark.parametrize("precision", ["double", "float"])
-def test_the_self_test_passes_and_can_fail(compiler: str, precision: str, tmp_path: Path) -> None:
-    made = invert(model(EVERYTHING), precision=precision)
+def test_the_self_test_passes_and_can_fail(compiler: str, tmp_path: Path) -> None:
+    made = invert(model(EVERYTHING), precision="float" if compiler == "clang" else "double")
     sources = written(made, tmp_path)
     program = build(compiler, sources, tmp_path / "test", "-DSENSOR_MAIN")
     assert subprocess.run([str(program)], capture_output=True, text=True, check=True).stdout.startswith("0 of 16")
