@@ -70,7 +70,7 @@ def diagnose(table: Table, model: Model, effects: Mapping[str, Effect] | None = 
         candidates=path.first,
         held_out_before=held_out_excess(path.start),
         residual_structure=shown,
-        next_experiment=separating(path.first[0]) if verdict == "ambiguous" and path.steps else None,
+        next_experiment=separating(path.first[0], table) if verdict == "ambiguous" and path.steps else None,
         path=path,
         caution="; ".join(filter(None, (caution(path.outliers), why_not))) or None,
         pattern=structure if verdict == "unexplained" else None,

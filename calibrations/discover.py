@@ -130,7 +130,7 @@ def discover(table: Table, model: Model, effects: Mapping[str, Effect] | None = 
         refinements=tuple(s.name for s in steps if s.name not in causes),
         alternatives=alternatives,
         residual_structure=structure.text if structure and left else None,
-        next_experiment=separating(ambiguous) if ambiguous else None,
+        next_experiment=separating(ambiguous, table) if ambiguous else None,
         path=path,
         pattern=structure if left else None,
     )

@@ -73,6 +73,7 @@ def diagnosis_document(result: Diagnosis, model: str) -> Document:
         "verdict": result.verdict,
         "candidates": [_candidate(c, result) for c in result.candidates],
         "residual_structure": result.residual_structure,
+        "outliers": list(result.path.outliers),
         "next_experiment": experiment_document(result.next_experiment),
     }
 
@@ -88,6 +89,7 @@ def discovery_document(result: Discovery, path: str | None) -> Document:
         "refinements": list(result.refinements),
         "alternatives": {name: list(names) for name, names in result.alternatives.items()},
         "residual_structure": result.residual_structure,
+        "outliers": list(result.path.outliers),
         "next_experiment": experiment_document(result.next_experiment),
         "model": path,
     }

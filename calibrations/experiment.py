@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from calibrations.design.expected import Expected
 from calibrations.search.candidates import Candidate
+from calibrations.table import Table
 
 TEMPERATURE = {"temperature-bias", "temperature-scale", "temperature-hysteresis"}
 TIME = {"warm-up-bias", "warm-up-scale", "bias-drift"}
@@ -55,6 +56,7 @@ HELD = "in the oven the temperature is held, and what still changes follows the 
 CYCLED = "the oven goes up and down again: what lags behind the temperature comes back another way, and time does not"
 TURNED_ROUND = "a level laid on the base shows the tilt of the base alone; an offset of alpha moves the table only"
 SHAKEN = "in a field of 1 g the squares of the three axes add up to a constant; motion along one axis does not"
+RECORDED = "these data have no temperature: with a thermometer read at each pose, they tell what follows it from time"
 TWO_TONES = "a corner changes the size of an oscillation with its frequency, a delay only its phase"
 ALL_ROUND = "full turns on each edge, upward and downward, show every side of the sphere of directions"
 SIX_FACES = "turned about each edge both ways, and at rest on six faces, rate, specific force and time go separate ways"
@@ -78,13 +80,17 @@ BESIDE = (  # what tells nothing by itself, but much beside data that were taken
 )
 
 
-def separating(best: Candidate) -> Experiment | None:
+LOGGED: tuple[str, dict[str, object], str] = ("sweep", {"step_deg": 30.0, "inclinations_deg": FEW}, RECORDED)
+
+
+def separating(best: Candidate, table: Table) -> Experiment | None:
     """An experiment for the best candidate and the rivals that this data cannot tell from it."""
     rivals = best.indistinguishable_from
     if not rivals:
         return None
     pairs = tuple((best.name, rival) for rival in rivals)
-    procedure, settings, why = by_physics({best.name, *rivals})
+    unlogged = TEMPERATURE & {best.name, *rivals} and "temperature_c" not in table
+    procedure, settings, why = LOGGED if unlogged else by_physics({best.name, *rivals})
     return Experiment(procedure, settings, pairs, why)
 
 

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibrations.errors import ExpressionError, nearest
-from calibrations.expressions.words import COMPARISONS, FUNCTIONS, OPERATORS, SIGNS, TARGETS, Operation
+from calibrations.expressions.words import COMPARISONS, FUNCTIONS, OF_ANGLES, OPERATORS, SIGNS, TARGETS, Operation
 from calibrations.table import Array
 
 LONGEST = 400  # characters
@@ -147,6 +147,14 @@ def _statement(text: str) -> tuple[str, ast.expr]:
     raise fault(text, 0, "is not an expression; write what is added, as in v += a*sin(5*beta)")
 
 
+def _degrees(node: Node) -> str | None:
+    """The first name of an angle in degrees that nothing makes rad of."""
+    inside = list(nodes(node))
+    if any(isinstance(each, Number) and each.value == np.pi for each in inside):
+        return None
+    return next((each.name for each in inside if isinstance(each, Name) and each.name.endswith("_deg")), None)
+
+
 class _Reader:
     """Python's tree into ours; what has no place there is refused."""
 
@@ -199,7 +207,11 @@ class _Reader:
         if not operation.least <= len(arguments) <= operation.most:
             wanted = f"{operation.least}" if operation.least == operation.most else f"{operation.least} or more"
             raise self._fault(read, f"{name} takes {wanted} in its brackets, not {len(arguments)}")
-        return self._apply(read, operation, arguments, depth)
+        applied = self._apply(read, operation, arguments, depth)
+        if name in OF_ANGLES and (degrees := _degrees(applied)):
+            right = f"write {degrees.removesuffix('_deg')}, the same in rad, or {degrees}*pi/180"
+            raise self._fault(read, f"{name} takes rad, and {degrees} is in degrees: {right}")
+        return applied
 
     def _comparison(self, read: ast.Compare, depth: int) -> Node:
         """A chain such as 0 < t < 100 is the product of its links."""

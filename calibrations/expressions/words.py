@@ -10,6 +10,7 @@ import numpy as np
 
 from calibrations.table import Array
 
+OF_ANGLES = ("sin", "cos", "tan")
 TARGETS = ("v", "vx", "vy", "vz", "alpha_deg", "beta_deg")
 HUGE = 1e100  # beyond what is measured, and its square is still a number
 MANY = 20  # arguments of min and max

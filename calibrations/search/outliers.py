@@ -24,6 +24,11 @@ NEIGHBOURS = 6
 GROSS = 10.0  # times the spread of what is around: noise alone does so in no record
 MOST = 1 / 20  # of the poses: more are no accidents
 SAME_G = 1e-3  # apart: the same pose
+COUNTED = "(counted from 0, excluded ones too)"
+LEAVE_OUT = (
+    "look at them, then leave them out of every analysis (`rig exclude RUN POSE --reason TEXT`; in a file, a column "
+    "`excluded` that is 1)"
+)
 TO_STD = 1.4826  # median of absolute deviations to standard deviation
 
 
@@ -90,11 +95,15 @@ def told(numbers: tuple[int, ...], what: str = "poses", most: int | None = None)
     return f"{len(numbers)} {who} out: {listed}{more}"
 
 
+def kept(found: Fit) -> str | None:
+    """Gross outliers that a fit of all rows still holds, and what a person can do; None where there are none."""
+    rows = gross(found)
+    numbers = tuple(map(int, found.table.numbered(rows)))
+    return f"{told(numbers)} {COUNTED}, still in this fit: {LEAVE_OUT}" if numbers else None
+
+
 def caution(rows: tuple[int, ...]) -> str | None:
     """What was done about them, and what a person can do; None where there are none."""
     if not rows:
         return None
-    return (
-        f"{told(rows)} (counted from 0, excluded ones too); set aside here, as accidents: look at them, then leave "
-        "them out of every analysis (`rig exclude RUN POSE --reason TEXT`; in a file, a column `excluded` that is 1)"
-    )
+    return f"{told(rows)} {COUNTED}; set aside here, as accidents: {LEAVE_OUT}"

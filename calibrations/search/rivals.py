@@ -22,10 +22,23 @@ def with_rivals(best: Candidate, found: Sequence[Candidate], before: Fit) -> Can
     """`best`, one of the candidates `found` on top of `before`, with all that may stand in its place."""
     if best.p_value >= SIGNIFICANT:
         return best
+    by_name = {c.name: c for c in found}
+    like = [name for name in best.indistinguishable_from if name not in by_name or _open(by_name[name], best, before)]
     near = [c for c in found if c.name not in (best.name, *best.indistinguishable_from) and _near(c, best)]
     own = twice_log_likelihood(added(before, best)) if near else 0.0
-    further = tuple(c.name for c in near if _may_be(added(before, c), before, own))
-    return replace(best, indistinguishable_from=(*best.indistinguishable_from, *further))
+    further = [c.name for c in near if _may_be(added(before, c), before, own)]
+    return replace(best, indistinguishable_from=(*like, *further))
+
+
+def _open(c: Candidate, best: Candidate, before: Fit) -> bool:
+    """Whether a rival that has `best` within it may still be more: the data then leave a part of it undetermined.
+
+    A play whose width is known to be none is no rival; one that no reversal has shown may have any width.
+    """
+    if best.name not in c.effect.contains:
+        return True
+    term = next(term for term in added(before, c).model.terms if term.name == c.name)
+    return not all(e.identified for e in term.estimates)
 
 
 def _near(c: Candidate, best: Candidate) -> bool:

@@ -40,6 +40,7 @@ def command(
     from calibrations.compare import compare
     from calibrations.documents import comparison_document
     from calibrations.search.determined import undetermined
+    from calibrations.search.outliers import kept
     from rig.cli.asked import asked
     from rig.cli.still import of_still, told_compare
     from rig.cli.words import errors, warning
@@ -48,10 +49,10 @@ def command(
         return told_compare(still, model, check, as_json, data)
     table, start, _ = asked(data, model, bench_file, noise=noise)
     result = compare(table, start)
-    caution = undetermined(result.fit)
+    caution, outliers = undetermined(result.fit), kept(result.fit)
     if as_json:
         emit(comparison_document(result, model or start.name))
-        notes(warning(caution))
+        notes([*warning(caution), *warning(outliers)])
     else:
         click.echo(f"{start.name} beside {table.n} rows of {table.source}\n\n{errors(result.fit)}\n")
         if result.adequate:
@@ -59,4 +60,6 @@ def command(
         else:
             click.echo("It fails, worst first:\n" + "\n".join(f"  {place.text}" for place in result.fails))
             click.echo(f"\nWhich effect is missing: rig diagnose {data} --model {model or start.name}")
+        for line in warning(outliers):
+            click.echo(f"\n{line}")
     return 1 if check and (not result.adequate or caution) else 0

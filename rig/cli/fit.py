@@ -44,6 +44,7 @@ def command(
     from calibrations.fit import fit
     from calibrations.reports.budget import document as in_parts
     from calibrations.search.determined import undetermined
+    from calibrations.search.outliers import kept
     from calibrations.search.unseen import unseen
     from rig.cli import calibrated
     from rig.cli.asked import asked, tell_blind, write_model
@@ -62,10 +63,10 @@ def command(
     if as_json:
         more = document(checked) | calibrated.document(found) | {"budget": in_parts(found)}
         emit(fit_document(found, str(out) if out else None) | more)
-        notes(warning(caution))
+        notes([*warning(caution), *warning(kept(found))])
     else:
         click.echo(f"{found.model.name} fitted to {table.n} rows of {table.source}\n\n{parameters(found.model)}\n")
-        told = [*calibrated.lines(found), *warning(caution), *lines(checked, data)]
+        told = [*calibrated.lines(found), *warning(caution), *warning(kept(found)), *lines(checked, data)]
         click.echo("\n".join([errors(found), *(f"\n{line}" for line in told)]))
         if "cross-axis-bias" in start.effects and table.kind == "poses":
             click.echo(f"\n{paper(table)}")

@@ -151,12 +151,12 @@ def _verdict(result: Discovery) -> str:
     extra = f"; {joined(result.refinements)} {refines} the form" if result.refinements else ""
     if result.verdict == "unexplained":
         return (
-            f"{what}{extra}: the error falls to 1/{start / end:.0f}. {left} still has a pattern that no effect of the "
-            f"catalogue describes: {result.residual_structure}."
+            f"{what}{extra}: the error falls to 1/{start / end:.0f}. {left} still is more than noise, and no "
+            f"effect of the catalogue describes it: {result.residual_structure}."
         )
     if result.residual_structure is not None:
         return (
-            f"{what}{extra}: the error falls to 1/{start / end:.0f}. {left} still shows a pattern: "
+            f"{what}{extra}: the error falls to 1/{start / end:.0f}. {left} still is more than noise: "
             f"{result.residual_structure}. It may be the form of {joined(result.causes, 'or')}, which the catalogue "
             "has only approximately, or one more cause."
         )

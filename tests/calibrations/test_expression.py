@@ -40,7 +40,7 @@ def test_an_expression_has_its_value(text: str, value: np.ndarray) -> None:
 
 @pytest.mark.parametrize(
     ("text", "target"),
-    [("a*t", "v"), ("v += a*t", "v"), ("vy += a*t", "vy"), ("beta_deg += a*sin(beta)", "beta_deg")],
+    [("a*t", "v"), ("v += a*t", "v"), ("vy += a*t", "vy"), ("beta_deg += a*sin(beta_deg*pi/180)", "beta_deg")],
 )
 def test_what_it_is_added_to_stands_first(text: str, target: str) -> None:
     assert parse(text).target == target
@@ -52,6 +52,7 @@ REFUSED = [
     ("a*sn(5*beta)", r'column 3: there is no function "sn"; did you mean "sin"\?'),
     ("a*sin", r"column 3: sin is a function: write sin\(...\)"),
     ("a*min(t)", "column 3: min takes 2 or more in its brackets, not 1"),
+    ("a*sin(5*beta_deg)", "column 3: sin takes rad, and beta_deg is in degrees: write beta, the same in rad"),
     ("a*sin(t, 2)", "column 3: sin takes 1 in its brackets, not 2"),
     ("a^2", r"a power is \*\*"),
     ("a*t; b", "one expression at a time"),

@@ -142,7 +142,8 @@ def test_positions_have_one_residual(rig: Rig, tmp_path: Path) -> None:
 def test_diagnose(rig: Rig, clean: str, bent: str) -> None:
     kinds = {"schema": str, "data": str, "model": str, "verdict": str, "candidates": [CANDIDATE]}
     kinds |= dict.fromkeys(("next_experiment", "own_effect"), (dict, type(None))) | {
-        "residual_structure": (str, type(None))
+        "residual_structure": (str, type(None)),
+        "outliers": [int],
     }
     for data, verdict in ((bent, "effect-missing"), (clean, "adequate")):
         found = document(rig("diagnose", data, "--model", "linear", "--json"), "rig.diagnosis/1")

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from calibrations.errors import DataError
+from calibrations.reading.read_csv import write_csv
 from rig.data import load
+from tests.calibrations.synthetic import components, poses, turns
+from tests.rig.conftest import Ended
 
 ROWS = ["alpha_deg,beta_deg,vx_v,excluded", "90,0,3.5,0", "90,90,9.9,1", "90,180,1.5,0"]
 
@@ -25,3 +29,16 @@ def test_a_file_cannot_exclude_all(tmp_path: Path) -> None:
     file.write_text("\n".join(row[:-1] + "1" if row[0] == "9" else row for row in ROWS))
     with pytest.raises(DataError, match="every row is left out"):
         load(str(file))
+
+
+@pytest.mark.parametrize("command", ["compare", "fit"])
+def test_a_fit_of_all_rows_names_those_that_stand_out(command: str, tmp_path: Path, rig: Callable[..., Ended]) -> None:
+    columns = turns(step_deg=30.0)
+    x, y, _ = components(columns)
+    volts = 2.5 + x
+    volts[7] += 0.2
+    write_csv(poses(columns, volts, 2.5 + y), tmp_path / "knocked.csv")
+    said = rig(command, str(tmp_path / "knocked.csv"), "--model", "linear")
+    assert said.status == 0
+    assert "1 pose stands out: #7 (counted from 0, excluded ones too), still in this fit" in said.out
+    assert "rig exclude" in said.out
