@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -118,8 +119,9 @@ def _of_array(path: Path, rate_hz: float | None) -> Stream:
     if rate_hz is None:
         raise DataError(f"{path}: an array does not say how fast it was sampled; give --rate HZ")
     try:
-        array = np.load(path, mmap_mode="r", allow_pickle=False)
-    except (ValueError, OSError, EOFError) as error:
+        with warnings.catch_warnings(action="ignore"):  # of a header as Python 2 wrote it
+            array = np.load(path, mmap_mode="r", allow_pickle=False)
+    except Exception as error:  # its header is parsed as Python, which fails in many ways
         raise DataError(f"{path}: is no array that numpy.save wrote: {error}") from None
     if array.ndim == 2 and 1 in array.shape:
         array = array.reshape(-1)

@@ -51,9 +51,16 @@ def _connected(path: Path) -> sqlite3.Connection:
     if path.exists() and not os.access(path.parent, os.W_OK):
         return sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro&immutable=1", uri=True, check_same_thread=False)
     connection = sqlite3.connect(path, check_same_thread=False)
+    try:
+        _prepare(connection)
+    except UnicodeDecodeError:  # SQLite quotes what it cannot read
+        raise RecordError(f"{path}: {FAILURES[sqlite3.SQLITE_CORRUPT]}") from None
+    return connection
+
+
+def _prepare(connection: sqlite3.Connection) -> None:
     for pragma in ("busy_timeout = 10000", "journal_mode = WAL", "synchronous = FULL", "foreign_keys = ON"):
         connection.execute(f"PRAGMA {pragma}")
-    return connection
 
 
 def _require_there(connection: Connection, path: Path) -> None:
@@ -69,6 +76,8 @@ def _require_there(connection: Connection, path: Path) -> None:
 def _tell(context: ExceptionContext, path: Path) -> None:
     """Raises RecordError for what the file or its disk is to blame for."""
     error = context.original_exception
+    if isinstance(error, UnicodeDecodeError):
+        raise RecordError(f"{path}: {FAILURES[sqlite3.SQLITE_CORRUPT]}") from None
     if isinstance(error, sqlite3.DatabaseError):
         code = getattr(error, "sqlite_errorcode", 0) & 0xFF
         if code in FAILURES:

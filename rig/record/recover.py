@@ -18,6 +18,7 @@ from rig.record.file import open_file
 from rig.record.schema import metadata
 
 FILE = "record.db"
+UNREADABLE = (sqlite3.Error, UnicodeDecodeError)  # of its own messages, which quote what it cannot read
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,7 @@ def _opened(source: Path) -> sqlite3.Connection:
     try:
         old = sqlite3.connect(f"{source.resolve().as_uri()}?mode=ro", uri=True)
         old.execute("SELECT count(*) FROM sqlite_master").fetchone()
-    except sqlite3.Error as error:
+    except UNREADABLE as error:
         raise RecordError(f"{source}: nothing of it can be read ({error}); restore a copy") from None
     return old
 
@@ -67,7 +68,7 @@ def _copied(old: sqlite3.Connection, new: sqlite3.Connection, table: str) -> tup
     known = {row[1] for row in new.execute(f"PRAGMA table_info({table})")}
     try:
         names = [row[1] for row in old.execute(f"PRAGMA table_info({table})") if row[1] in known]
-    except sqlite3.Error:
+    except UNREADABLE:
         return 0, False
     if not names:
         return 0, True  # a table that is younger than the record
@@ -90,7 +91,7 @@ def _readable(old: sqlite3.Connection, select: str) -> Iterator[tuple[object, ..
     """Rows up to the first that cannot be read, which is None."""
     try:
         yield from old.execute(select)
-    except sqlite3.Error:
+    except UNREADABLE:
         yield None
 
 

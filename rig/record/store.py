@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import secrets
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 from sqlalchemy import Connection, Integer, Row, Select, func, insert, select, text, update
 from sqlalchemy import Table as SqlTable
 from sqlalchemy.dialects.sqlite import insert as insert_or
+from sqlalchemy.exc import DatabaseError
 
 from calibrations.table import Table
 from procedures.session import Dwell, Pose, Reading
@@ -27,7 +29,7 @@ from rig.home import home
 from rig.lease import is_held
 from rig.nearest import did_you_mean
 from rig.record import codec
-from rig.record.file import open_file
+from rig.record.file import RECOVER, open_file
 from rig.record.schema import blocks, columns, dwells, events, log, poses, readings, runs, states
 from rig.record.values import Block, Event, Kept, Line, Run
 
@@ -177,13 +179,13 @@ class Record:
 
     def runs(self) -> list[Run]:
         """Every run, newest first."""
-        with self._engine.connect() as at:
+        with self._reading() as at:
             rows = at.execute(_select_runs().order_by(text("runs.rowid DESC")))
             return [self._seen(Run(**row._mapping)) for row in rows]
 
     def run(self, run: str) -> Run:
         """One run. Raises UnknownRun with the nearest name."""
-        with self._engine.connect() as at:
+        with self._reading() as at:
             row = at.execute(_select_runs().where(runs.c.run == run)).one_or_none()
             if row is not None:
                 return self._seen(Run(**row._mapping))
@@ -194,25 +196,25 @@ class Record:
         """The kept poses, in their order, without those that were excluded."""
         chosen = (poses.c.run == run) & poses.c.excluded.is_(None)
         query = select(*[poses.c[name] for name in _POSE]).where(chosen).order_by(poses.c.number)
-        with self._engine.connect() as at:
+        with self._reading() as at:
             return [Pose(**row._mapping) for row in at.execute(query)]
 
     def excluded(self, run: str) -> dict[int, str]:
         """Why each pose that is left out of every analysis is, by its number."""
         chosen = (poses.c.run == run) & poses.c.excluded.is_not(None)
         query = select(poses.c.number, poses.c.excluded).where(chosen).order_by(poses.c.number)
-        with self._engine.connect() as at:
+        with self._reading() as at:
             return {row.number: row.excluded for row in at.execute(query)}
 
     def next_number(self, run: str) -> int:
         """The number of the next pose to be kept; excluded ones keep theirs."""
-        with self._engine.connect() as at:
+        with self._reading() as at:
             highest = at.execute(select(func.max(poses.c.number)).where(poses.c.run == run)).scalar_one()
         return 0 if highest is None else int(highest) + 1
 
     def last_t_s(self, run: str) -> float | None:
         """The time of the last kept pose; None before the first."""
-        with self._engine.connect() as at:
+        with self._reading() as at:
             last: float | None = at.execute(select(func.max(poses.c.t_s)).where(poses.c.run == run)).scalar_one()
         return last
 
@@ -220,14 +222,14 @@ class Record:
         """The run's readings, in the order of their names."""
         names = ("name", "value", "unit", "std")
         query = select(*[readings.c[name] for name in names]).where(readings.c.run == run).order_by(readings.c.name)
-        with self._engine.connect() as at:
+        with self._reading() as at:
             return [Reading(*row) for row in at.execute(query)]
 
     def kept(self, run: str) -> Iterator[Kept]:
         """Every pose with its samples, in order, excluded ones too; few in memory at a time."""
         same = (poses.c.run == blocks.c.run) & (poses.c.number == blocks.c.number)
         query = select(poses, blocks).join_from(poses, blocks, same).where(poses.c.run == run)
-        with self._engine.connect() as at:
+        with self._reading() as at:
             options = at.execution_options(yield_per=32)
             for row in options.execute(query.order_by(poses.c.number)):
                 yield _kept(row)
@@ -240,35 +242,45 @@ class Record:
         same = (poses.c.run == dwells.c.run) & (poses.c.number == dwells.c.number)
         query = select(poses, dwells.c.n, dwells.c.means, dwells.c.stds).join_from(poses, dwells, same, isouter=True)
         chosen = (poses.c.run == run) & (poses.c.number > after) & poses.c.excluded.is_(None)
-        with self._engine.connect() as at:
+        with self._reading() as at:
             rows = at.execute(query.where(chosen).order_by(poses.c.number)).all()
         older = {kept.number: kept.dwell for kept in self.kept(run)} if any(row.n is None for row in rows) else {}
         return [(row.number, older.get(row.number) or _dwell(row)) for row in rows]
 
     def state(self, run: str) -> dict[str, Any] | None:
         """The simulated bench's state after the last kept pose; None on a real bench."""
-        with self._engine.connect() as at:
+        with self._reading() as at:
             return at.execute(select(states.c.state).where(states.c.run == run)).scalar_one_or_none()
 
     def events(self, run: str) -> list[Event]:
         """What happened in a run, in order."""
         query = select(events.c.at, events.c.what, events.c.text).where(events.c.run == run)
-        with self._engine.connect() as at:
+        with self._reading() as at:
             return [Event(*row) for row in at.execute(query.order_by(events.c.event))]
 
     def lines(self, run: str) -> list[Line]:
         """A run's log, in order."""
         columns = [log.c[name] for name in ("at", "clock_s", "who", "what", "text")]
-        with self._engine.connect() as at:
+        with self._reading() as at:
             return [Line(*row) for row in at.execute(select(*columns).where(log.c.run == run).order_by(log.c.line))]
 
     def columns(self, run: str) -> tuple[dict[str, NDArray[np.float64]], dict[str, tuple[str, ...]]]:
         """The columns of an imported table: numbers, and texts, by name."""
         query = select(columns).where(columns.c.run == run).order_by(columns.c.position)
-        with self._engine.connect() as at:
+        with self._reading() as at:
             rows = at.execute(query).all()
         numbers = {row.name: np.frombuffer(row.numbers, "<f8") for row in rows if row.numbers is not None}
         return numbers, {row.name: tuple(row.texts) for row in rows if row.numbers is None}
+
+    @contextmanager
+    def _reading(self) -> Iterator[Connection]:
+        """A connection to read by; what cannot be in a sound record is a RecordError."""
+        try:
+            with self._engine.connect() as at:
+                yield at
+        except (ValueError, TypeError, LookupError, OverflowError, DatabaseError) as error:
+            what = f"{type(error).__name__}: {error}".partition("\n")[0]
+            raise RecordError(f"{self.path}: the record is damaged; {RECOVER} ({what})") from None
 
     def _put_lines(self, to: Connection) -> None:
         """Lines of the log that wait are written; where that fails they are not tried again."""

@@ -1,0 +1,9 @@
+"""Every decoder and reader that takes bytes from outside."""
+
+from __future__ import annotations
+
+from tests.fuzz.files import FILES
+from tests.fuzz.target import Target
+from tests.fuzz.wires import WIRES
+
+TARGETS: dict[str, Target] = WIRES | FILES
