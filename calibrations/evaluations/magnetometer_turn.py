@@ -61,6 +61,20 @@ def elements(sensed: Array, sensor_from_base: Array, turns: Sequence[str]) -> El
     return Elements(value, stds)
 
 
+def level_by_hand(outputs: Array, sensor_from_base: Array) -> Elements:
+    """H and D of a horizontal turn alone, (n, 3) at known attitudes (n, 3, 3), corrected by its own extremes.
+
+    Their uncertainties are from the scatter about the turn; H is of the size that the least radius has (17.15).
+    """
+    level = outputs[:, :2] - hard_iron(outputs[:, :2])
+    level = np.column_stack([level @ ellipse(level).correction, np.zeros(len(level))])
+    in_base = np.einsum("nij,ni->nj", sensor_from_base, level)
+    found = _of_field(in_base.mean(axis=0))
+    along = np.radians([found["D"], found["D"] + 90])
+    std = [float((in_base[:, :2] @ [np.cos(a), -np.sin(a)]).std(ddof=1) / np.sqrt(len(level))) for a in along]
+    return Elements({k: found[k] for k in "HD"}, {"H": std[0], "D": float(np.degrees(std[1] / found["H"]))})
+
+
 def by_hand(outputs: Array, edges: Sequence[str], turns: Sequence[str], std: float) -> ByHand:
     """From raw outputs (n, 3) of turns about the edge of each row, `std` that of one of them; z first."""
     edge, turn = np.array(edges), np.array(turns)

@@ -7,7 +7,8 @@ from math import hypot
 import numpy as np
 
 from calibrations.coverage import uncovered
-from calibrations.evaluations.magnetometer_turn import ByHand, by_hand, elements
+from calibrations.errors import DataError
+from calibrations.evaluations.magnetometer_turn import ByHand, Elements, by_hand, elements, level_by_hand
 from calibrations.fit import Fit
 from calibrations.general import general
 from calibrations.noise import rms
@@ -26,6 +27,7 @@ NAMES = (
     *("hard-iron-{axis}", "hard-iron-by-hand-{axis}", "soft-iron-by-hand", "soft-iron-angle-by-hand"),
     *(f"soft-iron-{pair}" for pair in SOFT),
     *ELEMENTS.values(),
+    *(f"{ELEMENTS[name]}-by-hand" for name in "HD"),
     *("left-by-ellipsoid", "left-by-hand"),
 )
 
@@ -44,16 +46,24 @@ def evaluate(measured: Measured) -> dict[str, Result | Missing]:
 
     hard-iron-by-hand        V
     soft-iron-by-hand        least over greatest radius of the turn about z
-    soft-iron-angle-by-hand  deg from x to its major axis
+    soft-iron-angle-by-hand  deg from x to its major axis, from -90 to 90
     left-by-hand             what the magnitude then varies by, per mille
+    field-horizontal-by-hand, field-declination-by-hand    H and D of the turn about z alone
 
-    Where the directions cover too little of the sphere, what the ellipsoid gives is missing and says so.
+    Where the directions cover too little of the sphere, what the ellipsoid gives is missing and says so. Raises
+    DataError where the turn about z was left out.
     """
     table, poses = measured.table(), [kept.pose for kept in measured.kept()]
+    if poses[0].up != "z":
+        raise DataError(
+            f"run {measured.name} holds nothing of the turn about z any more; take it in again: rig exclude"
+        )
     extremes = by_hand(table.outputs, [p.up for p in poses], [p.path for p in poses], _std_v(table))
     why = uncovered(table)
     ellipsoid = _all_missing(why) if why else _by_ellipsoid(table, poses)
-    return ellipsoid | _by_extremes(extremes)
+    level = [k for k, pose in enumerate(poses) if pose.path == poses[0].path]  # the turn about z, upward, is first
+    attitudes = np.array([sensor_from_base(poses[k]) for k in level])
+    return ellipsoid | _by_extremes(extremes, level_by_hand(table.outputs[level], attitudes))
 
 
 def _std_v(table: Table) -> float:
@@ -64,6 +74,7 @@ def _std_v(table: Table) -> float:
 
 def _all_missing(why: str) -> dict[str, Result | Missing]:
     names = (*(f"hard-iron-{axis}" for axis in AXES), *(f"soft-iron-{pair}" for pair in SOFT), *ELEMENTS.values())
+    names = (*names, "left-by-ellipsoid")
     return {name: Missing(why) for name in names}
 
 
@@ -93,8 +104,10 @@ def _elements(found: Fit, table: Table, poses: list[Pose]) -> dict[str, Result |
     return results
 
 
-def _by_extremes(found: ByHand) -> dict[str, Result | Missing]:
+def _by_extremes(found: ByHand, level: Elements) -> dict[str, Result | Missing]:
     results: dict[str, Result | Missing] = {}
+    for name, unit in (("H", "V"), ("D", "deg")):
+        results[f"{ELEMENTS[name]}-by-hand"] = Result(level.value[name], unit, level.std[name])
     for k, axis in enumerate(AXES):
         value, std = float(found.hard_iron[k]), float(found.hard_iron_std[k])
         results[f"hard-iron-by-hand-{axis}"] = (
@@ -104,5 +117,6 @@ def _by_extremes(found: ByHand) -> dict[str, Result | Missing]:
         )
     ratio = found.soft_iron.least / found.soft_iron.greatest
     results["soft-iron-by-hand"] = Result(ratio, "")
-    results["soft-iron-angle-by-hand"] = Result(float(np.degrees(found.soft_iron.angle_rad)), "deg")
+    angle_deg = (np.degrees(found.soft_iron.angle_rad) + 90) % 180 - 90  # an axis has no direction
+    results["soft-iron-angle-by-hand"] = Result(float(angle_deg), "deg")
     return results | {"left-by-hand": Result(found.left_per_mille, "per mille")}

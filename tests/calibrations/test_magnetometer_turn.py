@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from calibrations.evaluations.magnetometer_turn import by_hand, elements
+from calibrations.evaluations.magnetometer_turn import by_hand, elements, level_by_hand
 from calibrations.experiment import by_physics
 from calibrations.table import Array
 
@@ -71,6 +71,10 @@ def test_by_one_horizontal_turn_the_third_component_is_not_known() -> None:
     found = by_hand(attitudes @ EARTH + [7.0, -3.0, 11.0], edges, names, std=0.0)
     assert found.hard_iron[:2] == pytest.approx([7.0, -3.0], abs=0.2)
     assert np.isnan(found.hard_iron[2])
+    level = level_by_hand(attitudes @ EARTH + [7.0, -3.0, 11.0], attitudes)
+    assert level.value["H"] == pytest.approx(np.hypot(18.0, 10.0), rel=0.02)
+    assert level.value["D"] == pytest.approx(np.degrees(np.arctan2(10.0, 18.0)), abs=1.0)
+    assert 0 < (level.std["D"] or 0.0) < 0.3
     assert found.left_per_mille < 5.0
 
 

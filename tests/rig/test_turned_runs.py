@@ -69,6 +69,7 @@ def test_a_magnetometer_is_calibrated_by_the_ellipsoid_and_by_hand(rig: Rig, fol
         ellipsoid, by_hand = found[f"hard-iron-{axis}"], found[f"hard-iron-by-hand-{axis}"]
         assert 0 < ellipsoid["std"] < 1e-4
         assert by_hand["value"] == pytest.approx(ellipsoid["value"], abs=0.005)
+    assert -90 <= found["soft-iron-angle-by-hand"]["value"] <= 90
     assert found["left-by-ellipsoid"]["value"] < 0.5 < 5 < found["left-by-hand"]["value"]
     assert all(each["verdict"] is None for each in found.values())
 
@@ -78,8 +79,10 @@ def test_one_horizontal_turn_says_what_it_cannot_show(rig: Rig, folder: Path) ->
     arguments = (*FIELD, *ONE, "--over", "no")
     document = run(rig, folder, arguments)
     assert set(document["results"]) == {
-        *("hard-iron-by-hand-x", "hard-iron-by-hand-y", "soft-iron-by-hand", "soft-iron-angle-by-hand", "left-by-hand")
+        *("hard-iron-by-hand-x", "hard-iron-by-hand-y", "soft-iron-by-hand", "soft-iron-angle-by-hand", "left-by-hand"),
+        *("field-horizontal-by-hand", "field-declination-by-hand"),
     }
+    assert document["results"]["field-declination-by-hand"]["value"] == pytest.approx(-34.3, abs=5.0)
     told = rig("show", document["run"]).out  # and its exit status is 1
     assert "no hard-iron-x: hard-iron and soft-iron cannot be asked: the orientations cover too little" in told
     assert "no hard-iron-by-hand-z: z was upright throughout; use more mounts" in told
