@@ -1,13 +1,12 @@
 """A sensor's calibrations over its life: each complete run of it that determines a model, in the order of time.
 
 A calibration is derived from its samples anew, by one model for all, and so comparable. Its date is that of the run;
-of an imported table the constant `date` that the file carries (`# date: 2025-03-01`), else the day of the import. A
-sensor goes by its serial number, and by its name where it has none.
+of an imported table the constant `date` that the file carries (`# date: 2025-03-01`), else the day of the import.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date, datetime, timedelta
 
@@ -22,12 +21,12 @@ from calibrations.evaluations.stability import FEWEST, Stability, stability
 from calibrations.fit import fit
 from calibrations.model import Model
 from calibrations.noise import rms
-from calibrations.numerals import as_written
 from rig.certificates import EXPIRED
 from rig.errors import RecordError
 from rig.nearest import did_you_mean
 from rig.record import Record, Run
-from rig.record.measured import Measured, sensors_of
+from rig.record.measured import Measured
+from rig.sensors import members, sensors
 
 STALE_DAYS = 365.0  # where no limit says when a calibration is due
 Limit = float | tuple[float, float]
@@ -113,11 +112,6 @@ def history(
     return History(sensor, model.name, tuple(found), quantities, passed_over)
 
 
-def sensors(runs: Iterable[Run]) -> list[str]:
-    """Every sensor of the record, by serial number or name."""
-    return list(dict.fromkeys(each for run in runs for each in _members(run)))
-
-
 def closest(of: Sequence[Calibration], on: date) -> tuple[Calibration, float]:
     """The calibration closest to a day, and by how many days it is older than that day; below 0: later."""
     noon = datetime(on.year, on.month, on.day, 12, tzinfo=of[0].at.tzinfo)
@@ -173,25 +167,16 @@ def _calibrations(record: Record, sensor: str, model: Model) -> tuple[list[Calib
     """In the order of time; and the sensor's runs that are none, with the reason."""
     found, passed_over = [], {}
     for run in record.runs():
-        members = _members(run)
-        if sensor not in members or run.state != "complete":
+        batch = members(run)
+        if sensor not in batch or run.state != "complete":
             continue
-        member = members[sensor]
+        member = batch[sensor]
         data = f"{run.run}/{member}" if member else run.run
         try:
             found.append(_calibration(Measured.named(record, data), model))
         except (CalibrationError, RecordError) as error:
             passed_over[data] = str(error)
     return sorted(found, key=lambda each: each.at), passed_over
-
-
-def _members(run: Run) -> dict[str, str]:
-    """The sensors of a run: serial number (or name) -> its name in the batch, "" where there is one sensor."""
-    if batch := sensors_of(run):
-        said = {member: run.bench["sensors"][member] for member in batch}
-        return {each.get("serial") or each["name"]: member for member, each in said.items()}
-    name = run.constants.get("serial") or run.constants.get("sensor")
-    return {as_written(name): ""} if name else {}
 
 
 def _calibration(measured: Measured, model: Model) -> Calibration:

@@ -17,6 +17,7 @@ from rig.numerals import duration
 from rig.record import Event, Kept, Line, Record, Run
 from rig.record.digest import digest_of
 from rig.record.measured import Measured, sensors_of
+from rig.sensors import lives
 
 Ranges = Mapping[str, tuple[float, float]]
 
@@ -33,11 +34,15 @@ def command(run: str, poses: bool, wants_log: bool, as_json: bool) -> None:
         ranges = _ranges(record, found)
         listed = [_pose(number, kept) for number, kept in enumerate(record.kept(run))] if poses else None
         lines = record.lines(run) if wants_log else []
+        known = lives(found, record.runs())
     if as_json:
         more = ({"kept": listed} if poses else {}) | ({"log": [vars(line) for line in lines]} if wants_log else {})
         emit(_document(found, events, ranges) | more)
     else:
         after = [*results(found.results), *next_steps(found, left_out)]
+        after += [
+            f"{count} runs of the sensor {name} are in the record: rig history {name}" for name, count in known.items()
+        ]
         told = [_event(event) for event in events]
         parts = (_head(found), after, _columns(ranges), told, _listed(listed or []), _logged(lines))
         click.echo("\n\n".join("\n".join(part) for part in parts if part))

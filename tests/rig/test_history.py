@@ -120,6 +120,12 @@ def test_a_run_of_a_batch_is_a_calibration_of_each_sensor(rig: Rig, bench_file: 
         assert only["rig"] == "the rig in the cellar"
 
 
+def test_a_run_leads_to_the_life_of_its_sensor(rig: Rig, years: None) -> None:
+    shown = {run["run"]: rig("show", run["run"]).out for run in json.loads(rig("runs", "--json").out)["runs"]}
+    assert sum("5 runs of the sensor 17 are in the record: rig history 17" in text for text in shown.values()) == 5
+    assert sum("rig history 18" in text for text in shown.values()) == 0  # one run makes no life
+
+
 def test_what_is_no_calibration_is_passed_over_and_said(rig: Rig, years: None) -> None:
     with Record() as record:
         columns = {name: values[:2] for name, values in COLUMNS.items()} | {"vx_v": [1.0, 2.0]}

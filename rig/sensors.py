@@ -1,0 +1,32 @@
+"""Which sensors a run measured. A sensor goes by its serial number, and by its name where it has none."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from calibrations.numerals import as_written
+from rig.record import Run
+from rig.record.measured import sensors_of
+
+CALIBRATING = ("poses", "positions", "rates")  # kinds of tables that models are fitted to
+
+
+def members(run: Run) -> dict[str, str]:
+    """Serial number (or name) -> the sensor's name in the run's batch, "" where there is one sensor."""
+    if batch := sensors_of(run):
+        said: dict[str, Mapping[str, str]] = {member: run.bench["sensors"][member] for member in batch}
+        return {each.get("serial") or each["name"]: member for member, each in said.items()}
+    name = run.constants.get("serial") or run.constants.get("sensor")
+    return {as_written(name): ""} if name else {}
+
+
+def sensors(runs: Iterable[Run]) -> list[str]:
+    """Every sensor of the runs."""
+    return list(dict.fromkeys(each for run in runs for each in members(run)))
+
+
+def lives(run: Run, runs: Iterable[Run]) -> dict[str, int]:
+    """How many complete runs that may be calibrations there are of each sensor of `run`, where more than one."""
+    of = [set(members(r)) for r in runs if r.state == "complete" and r.kind in CALIBRATING]
+    counts = {sensor: sum(sensor in each for each in of) for sensor in members(run)}
+    return {sensor: count for sensor, count in counts.items() if count > 1}
