@@ -147,7 +147,7 @@ class Choice:
 
 def _data(chosen: str) -> dict[str, str]:
     """Runs by id, each with what it is; what is chosen is among them."""
-    found = {chosen: chosen} if chosen else {}
+    found = {chosen: Path(chosen).name} if chosen else {}
     try:
         listed = runs()
     except RigError:

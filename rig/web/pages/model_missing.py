@@ -76,7 +76,7 @@ class Missing:
             if good:
                 words("Nothing is missing: save the model, or see below what was tried.")
             elif result.residual_structure:
-                words(f"Unexplained: {result.residual_structure}. What it may be, you can write below; what was tried:")
+                words(f"Unexplained: {result.residual_structure}. What it may be, you can write above; what was tried:")
             else:
                 words("Nothing shows that an effect is missing; what was tried:")
 

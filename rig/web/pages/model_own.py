@@ -29,7 +29,7 @@ class Own:
     def __init__(self, page: Workbench) -> None:
         self.page, self.asked = page, 0
         self.step: Added | None = None
-        with box():
+        with box("own") as self.box:
             words("An effect of your own", "title")
             self.hint = words("", "quiet small")
             self.text = ui.input("Expression, such as a*sin(5*beta) + b*cos(5*beta)").props("dense debounce=350")
@@ -50,6 +50,7 @@ class Own:
         self.said.set_text("")
         self.fall.set_text("")
         proposed = pattern is not None and bool(pattern.expression)
+        self.box.classes(add="proposed" if proposed else "", remove="" if proposed else "proposed")
         self.hint.set_text("What is left looks like this; try it, or write something better." if proposed else "")
         self.text.set_value(pattern.expression if pattern is not None and proposed else "")
         if pattern is not None and proposed:

@@ -56,7 +56,7 @@ class Pictures:
             self.unit = ui.toggle({False: "V", True: "g"}, value=False, on_change=self.draw).props("dense no-caps")
             self.x = self._column("against")
             self.colour = self._column("coloured by")
-            self.told = words("", "quiet small grow")
+            self.told = words("", "told quiet small")
             self.clear = ui.button("Select nothing", on_click=lambda: self.select([])).props("flat dense")
             self.clear.set_visibility(False)
 

@@ -1,0 +1,87 @@
+"""The page Run in a browser: from the empty record to the falling error; paused, closed, opened again, stopped."""
+
+from __future__ import annotations
+
+from playwright.sync_api import Page, expect
+
+from rig.record import Record
+from tests.browser.conftest import Workbench
+from tests.browser.test_model_page import BARS
+
+NIGHT = "/run?procedure=soak&duration_s=43200"
+
+
+def phase(page: Page, word: str) -> None:
+    """Waits until the run is at that."""
+    expect(page.locator(".chip").first).to_have_text(word)
+
+
+def started(workbench: Workbench, path: str) -> Page:
+    page = workbench.visit(path)
+    expect(page.get_by_text("Takes", exact=True)).to_be_visible()
+    page.get_by_role("button", name="Start").click()
+    return page
+
+
+def test_a_newcomer_gets_from_the_empty_record_to_the_falling_error(workbench: Workbench) -> None:
+    page = workbench.visit("/")
+    page.get_by_role("button", name="Measure").click()
+    page.get_by_label("step (deg)").fill("45")
+    page.get_by_label("inclinations (deg)").fill("90,30,150")
+    expect(page.get_by_text("54 poses")).to_be_visible()
+    workbench.shot(page, "plan")
+    page.get_by_role("button", name="Start").click()
+    phase(page, "running")
+    expect(page.locator(".values").get_by_text("as usual").first).to_be_visible()
+    expect(page.get_by_role("button", name="Stop").first).to_be_visible()
+    workbench.shot(page, "running")
+    phase(page, "complete")
+    page.get_by_role("button", name="See the model").click()
+    page.get_by_role("button", name="Add axis-misalignment").click()
+    expect(page.locator(BARS)).to_have_count(2)
+
+
+def test_a_run_is_paused_left_alone_opened_again_and_stopped(workbench: Workbench) -> None:
+    page = started(workbench, NIGHT)
+    phase(page, "running")
+    page.get_by_role("button", name="Pause").first.click()
+    phase(page, "paused")
+    expect(page.get_by_role("alert")).to_contain_text("stopped by SIGINT")
+    page.close()
+    page = workbench.visit("/record")  # the run is in the head of every page
+    page.get_by_role("link", name="soak").first.click()
+    phase(page, "paused")
+    workbench.shot(page, "paused")
+    page.get_by_role("button", name="Go on").click()
+    phase(page, "running")
+    page.get_by_role("button", name="Stop").first.click()
+    phase(page, "stopped")
+    expect(page.get_by_role("button", name="Resume")).to_be_visible()
+    expect(page.get_by_role("button", name="Stop")).to_have_count(0)
+    with Record() as record:
+        run = record.runs()[0]
+    assert (run.procedure, run.state) == ("soak", "stopped")
+
+
+def test_questions_are_asked_and_a_wrong_answer_is_refused(workbench: Workbench) -> None:
+    page = workbench.visit("/run?procedure=sweep&step_deg=180&inclinations_deg=90")
+    expect(page.get_by_text("Takes", exact=True)).to_be_visible()
+    page.get_by_text("Ask me").click()
+    page.get_by_role("button", name="Start").click()
+    phase(page, "asks you")
+    expect(page.locator(".question")).to_be_visible()
+    workbench.shot(page, "question")
+    page.locator(".question").get_by_role("button", name="yes").click()
+    phase(page, "complete")
+
+
+def test_a_plan_that_cannot_be_says_why_and_does_not_start(workbench: Workbench) -> None:
+    page = workbench.visit("/run?procedure=sweep&step_deg=ten")
+    expect(page.get_by_role("alert")).to_contain_text("step_deg is 'ten'; it takes a number")
+    expect(page.get_by_role("button", name="Start")).to_be_disabled()
+
+
+def test_the_bench_is_checked(workbench: Workbench) -> None:
+    page = workbench.visit("/run")
+    page.get_by_role("button", name="Check the instruments").click()
+    expect(page.get_by_text("✓ alarm").first).to_be_visible()
