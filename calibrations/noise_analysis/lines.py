@@ -23,16 +23,18 @@ LOWEST = 6  # periods in the record: slower ones cannot be told from drift
 MOST = 8
 LOBE = 3  # ordinates on each side that a line reaches under the window
 AROUND = 65  # ordinates that tell the noise around a line
+CENTROID = 0.02  # ordinates by which the middle of a line may be off
 WINDOW_LOSS = 1.5  # of variance, by the window
 
 
 @dataclass(frozen=True)
 class Line:
-    """A sinusoid: Hz, and the values' unit."""
+    """A sinusoid: Hz, and the values' unit; `std` and `std_hz` are standard uncertainties."""
 
     frequency_hz: float
     amplitude: float
     std: float
+    std_hz: float = 0.0
 
 
 def without_line(
@@ -56,7 +58,9 @@ def without_line(
     tone = 2 * np.sum(means * window * wave) / window.sum()
     kept = abs(np.sin(np.pi * turns / n) / (sampling.size * np.sin(np.pi * turns / n / sampling.size)))
     std = np.sqrt(2 * WINDOW_LOSS * noise[best] / (n * dt)) / kept
-    return means - (tone * wave.conj()).real, Line(turns / (n * dt), float(abs(tone)) / kept, float(std))
+    std_hz = np.sqrt(12) / (2 * np.pi * n * dt) * std * kept / abs(tone)
+    line = Line(turns / (n * dt), float(abs(tone)) / kept, float(std), float(std_hz))
+    return means - (tone * wave.conj()).real, line
 
 
 def _turns(windowed: Array, near: int) -> float:
@@ -82,6 +86,8 @@ def fast_lines(f: Array, density: Array, freedom: float, above_hz: float, length
         excess = np.maximum(left[lobe] - around[lobe], 0.0)
         amplitude = float(np.sqrt(4 * (f[1] - f[0]) * excess.sum()))
         std = float(np.sqrt(2 * WINDOW_LOSS * around[best] / length_s))
-        found.append(Line(float(np.sum(f[lobe] * excess) / excess.sum()), amplitude, std))
+        found.append(
+            Line(float(np.sum(f[lobe] * excess) / excess.sum()), amplitude, std, CENTROID * float(f[1] - f[0]))
+        )
         left[lobe] = around[lobe]
     return left, sorted(found, key=lambda line: -line.amplitude)

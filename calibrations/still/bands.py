@@ -95,9 +95,10 @@ def strongest(channel: Channel, beside: Lines, level: Callable[[Array], Array]) 
     fast = fast_lines(f, density, channel.segments.freedom, 0.0, channel.length_s)[1] if len(f) else []
     if isinstance(slow, float):
         return fast[0] if fast else slow
-    folded = [(line, _unfolded(slow[1].frequency_hz, line, channel)) for line in fast]
-    true = next((replace(line, frequency_hz=f_hz) for line, f_hz in folded if f_hz is not None), slow[1])
-    return max([true, *fast[:1]], key=lambda line: line.amplitude)
+    for line in fast:  # what the means show may be the folded image of a fast line, and tells its frequency best
+        if (true_hz := _unfolded(slow[1].frequency_hz, line, channel)) is not None:
+            return replace(line, frequency_hz=true_hz, std_hz=slow[1].std_hz)
+    return max([slow[1], *fast[:1]], key=lambda line: line.amplitude)
 
 
 def _around(means: Array, sampling: Sampling) -> Callable[[Array], Array]:

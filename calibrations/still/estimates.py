@@ -64,9 +64,8 @@ def _deviations(found: ChannelFit) -> dict[tuple[str, str], float]:
 def _of_lines(found: ChannelFit, unit: str) -> Iterator[Estimate]:
     axis = found.channel.axis
     for k, line in enumerate(found.lines, 1):
-        std_hz = np.sqrt(12) / (2 * np.pi * found.channel.length_s) * line.std / line.amplitude
         yield Estimate(f"amplitude_{k}", axis, float(line.amplitude), float(line.std), unit)
-        yield Estimate(f"frequency_{k}", axis, float(line.frequency_hz), float(std_hz), "Hz")
+        yield Estimate(f"frequency_{k}", axis, float(line.frequency_hz), float(line.std_hz), "Hz")
     if not found.lines:
         why = f"no line stands out; one of less than {found.line_bound:.2g} {unit} would not"
         yield Estimate("amplitude_1", axis, 0.0, float(found.line_bound / SHOWN), unit, False, why)

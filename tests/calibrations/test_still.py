@@ -158,6 +158,20 @@ def test_a_given_line_is_taken_off_with_the_phase_that_it_has() -> None:
     assert (heights[2] - heights[1]) / (heights[0] - heights[1]) == pytest.approx(0.25, abs=0.05)
 
 
+def test_hum_beyond_the_means_is_found_at_its_own_frequency() -> None:
+    """A fast line folds into the means of a long record, far from where it is."""
+    n, f_hz = 600_000, 50.0137
+    x = white(np.random.default_rng(1), n) + 0.1 * noises.sinusoid(n, f_hz / 1000)
+    found = discover(reduced([Samples("x", [x], 1000.0, "V")], "made"), model())
+    assert found.causes == ("sinusoidal-noise",)
+    known = values(found.end.model)
+    value, std = known["sinusoidal-noise", "frequency_1"]
+    assert value == pytest.approx(f_hz, abs=4 * float(std or 0))
+    assert float(std or 0) < 1e-3
+    assert known["sinusoidal-noise", "amplitude_1"][0] == pytest.approx(0.1, rel=0.05)
+    assert ("sinusoidal-noise", "frequency_2") not in known
+
+
 def test_adding_what_is_not_enough_says_so() -> None:
     random = np.random.default_rng(7)
     record = still(x=white(random) + 0.5 * traps(random) + 0.4 * noises.sinusoid(SAMPLES, 0.05))
