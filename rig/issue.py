@@ -104,6 +104,7 @@ def _issued(
         data_sha256=table.digest,
         model_sha256=hashlib.sha256(text.encode()).hexdigest(),
         remarks=tuple(_remarks(run, lab is not None and lab.name != UNSTATED)),
+        simulated=bool(_simulated(run)),
     )
 
 
@@ -167,7 +168,16 @@ def _conditions(table: Table) -> Iterator[Condition]:
             yield Condition(name, unit, float(values.min()), float(values.mean()), float(values.max()))
 
 
+def _simulated(run: Run | None) -> list[str]:
+    """The roles of the run's instruments that were simulated."""
+    if run is None or not run.bench:
+        return []
+    return [role for role, part in _bench(run).instruments.items() if part.simulated]
+
+
 def _remarks(run: Run | None, stated: bool) -> Iterator[str]:
+    if roles := _simulated(run):
+        yield f"Simulated were: {', '.join(roles)}. This certifies nothing of any sensor."
     if run is not None and EXPIRED in run.constants:
         yield f"{run.constants[EXPIRED]}: what was measured with it is not traceable by it."
     if run is not None and run.state != "complete":

@@ -163,3 +163,10 @@ class Certificate:
     data_sha256: str
     model_sha256: str
     remarks: tuple[str, ...]
+    simulated: bool = False
+
+    @property
+    def headline(self) -> str:
+        """What it is, and of what; a simulation is not passed off as a measurement."""
+        kind = "Simulated calibration, no certificate" if self.simulated else "Calibration certificate"
+        return f"{kind}: {self.sensor}, {self.serial}"

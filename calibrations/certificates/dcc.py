@@ -70,6 +70,10 @@ def _administration(c: Certificate) -> ET.Element:
     customer = _in(data, "customer")
     _text(customer, "name", c.customer)
     _in(_in(customer, "location"), "countryCode", c.laboratory.country if c.customer == c.laboratory.name else "ZZ")
+    if said := (*c.figures.remarks, *c.remarks):
+        statements = _in(data, "statements")
+        for text in said:
+            _rich(_in(statements, "statement"), "declaration", [text])
     return data
 
 

@@ -14,10 +14,10 @@ def html(c: Certificate) -> str:
     told = verdict(c)
     return page(
         "certificate.html",
-        headline=f"Calibration certificate {c.number}",
-        verdict=told or "calibrated",
-        state=STATES.get(told, "unexplained"),
-        what=f"issued {c.issued}",
+        headline=c.headline,
+        verdict="simulated" if c.simulated else told or "calibrated",
+        state="ambiguous" if c.simulated else STATES.get(told, "unexplained"),
+        what=f"No. {c.number}, issued {c.issued}",
         summary=f"{c.sensor}, serial number {c.serial}, calibrated on {c.ended[:10]} by {c.laboratory.name}.",
         figures=[],
         sections=sections(c),

@@ -45,7 +45,7 @@ def pdf(c: Certificate) -> bytes:
     for style, file in FILES.items():
         page.add_font(FONT, style, folder / file)
     page.set_creation_date(datetime.fromisoformat(f"{c.issued}T00:00:00").replace(tzinfo=UTC))
-    page.set_title(f"Calibration certificate {c.number}")
+    page.set_title(f"{c.headline}, No. {c.number}")
     page.set_creator(c.program)
     page.set_margins(15, 15)
     page.set_auto_page_break(True, margin=16)
@@ -58,7 +58,7 @@ def pdf(c: Certificate) -> bytes:
 
 def _head(page: FPDF, c: Certificate) -> None:
     _write(page, c.laboratory.name, SMALL, QUIET)
-    _write(page, "Calibration certificate", 18, INK, "B")
+    _write(page, c.headline, 16, INK, "B")
     _write(page, f"No. {c.number}, issued {c.issued}", SIZE, INK)
     told = verdict(c)
     conformity = f" Conformity with its limits: {told}." if told else ""

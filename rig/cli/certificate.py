@@ -107,5 +107,5 @@ def _told(made: Certificate) -> list[str]:
     table = results_table(made)
     told = verdict(made)
     conformity = f"; conformity: {told}" if told else ""
-    head = f"Certificate {made.number}: {made.sensor}, serial number {made.serial}{conformity}"
+    head = f"{made.headline}, No. {made.number}{conformity}"
     return [head, "", columns(table.head, table.rows), "", *made.figures.remarks, *made.remarks]

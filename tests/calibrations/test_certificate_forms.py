@@ -11,6 +11,7 @@ import sys
 import types
 import warnings
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -87,6 +88,8 @@ def test_the_xml_holds_budget_conformity_and_every_row() -> None:
     assert "effective degrees of freedom" in said
     valid = [e.text for e in root.iterfind(".//d:measuringEquipment/d:certificate/d:inValidityRange", space)]
     assert valid == ["true", "false"]
+    declared = [e.text for e in root.iterfind(".//d:statement/d:declaration/d:content", space)]
+    assert declared[-1] == "The level's certificate expired."
     whole = json.loads(base64.b64decode(root.findtext("d:document/d:dataBase64", "", space)))
     assert whole["schema"] == "rig.certificate/1"
     assert whole["samples"][5]["sha256"] == f"{5:064x}"
@@ -109,6 +112,7 @@ def test_html_says_everything_and_takes_nothing_literally() -> None:
     assert not re.search(r'(src|href)="http', page)
     assert verdict(certificate()) == "fail"
     assert page == html(certificate())
+    assert "<h1>Simulated calibration, no certificate: ADXL203, 17</h1>" in html(replace(certificate(), simulated=True))
 
 
 def test_the_pdf_holds_the_same_text() -> None:
@@ -116,7 +120,7 @@ def test_the_pdf_holds_the_same_text() -> None:
     assert made == pdf(certificate())
     read = pypdf.PdfReader(io.BytesIO(made))
     assert read.metadata is not None
-    assert read.metadata.title == "Calibration certificate C-2026-17"
+    assert read.metadata.title == "Calibration certificate: ADXL203, 17, No. C-2026-17"
     text = " ".join(" ".join(page.extract_text() for page in read.pages).split())
     for section in sections(certificate()):
         assert section.title in text
