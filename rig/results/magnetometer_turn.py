@@ -56,7 +56,7 @@ def evaluate(measured: Measured) -> dict[str, Result | Missing]:
     table, poses = measured.table(), [kept.pose for kept in measured.kept()]
     if poses[0].up != "z":
         raise DataError(
-            f"run {measured.name} holds nothing of the turn about z any more; take it in again: rig exclude"
+            f"run {measured.name} holds nothing of the turn about z any more; rig exclude --include takes it in again"
         )
     extremes = by_hand(table.outputs, [p.up for p in poses], [p.path for p in poses], _std_v(table))
     why = uncovered(table)
