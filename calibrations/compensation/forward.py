@@ -16,6 +16,7 @@ import numpy as np
 
 from calibrations.chain import Step
 from calibrations.compensation.graph import Node, given
+from calibrations.compensation.inputs import can_be_written
 from calibrations.compensation.traced import NotTraced, RunTime, Traced, nodes_traced
 from calibrations.compensation.written import added
 from calibrations.effect import Effect
@@ -92,7 +93,7 @@ def at_run_time(effect: Effect) -> str:
 def forward_of(model: Model, without: Collection[str] = ()) -> Forward:
     """The graphs of a fitted model; the effects in `without` are left out."""
     axes, steps = measured_axes(model), steps_of(model)
-    own = {name for effect, _ in steps for name in effect.needs if name not in NUMBERS}
+    own = {name for effect, _ in steps for name in effect.needs if name not in NUMBERS and can_be_written(name)}
     table = RunTime(axes, {name: name for name in (*KNOWN, *sorted(own))})
     fates = [_fate(step, table, without) for step in steps]
     taken = [step for step, fate in zip(steps, fates, strict=True) if fate.how == INVERTED]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -199,6 +200,15 @@ def test_own_expressions_are_inverted_where_a_product_knows_their_variables() ->
     assert how["own-angle"] == (LEFT_OUT, "it needs alpha_deg, which is not known at run time")
     assert how["own-bend"] == how["own-wet"] == (INVERTED, "")
     assert error(made, model({**LINEAR, **values}, own)) < 1e-9
+
+
+def test_a_column_whose_name_no_source_can_have_is_left_out() -> None:
+    for column in ("double", "t7", "lambda"):
+        text = f"v += k*{column}" if column != "lambda" else "v += k*humidity_pct"
+        own = {"own-wet": replace(own_effect("own-wet", text, (text[7:],)), needs=(column,))}
+        ((*_, fate),) = (forward_of(model({**LINEAR, "own-wet": {"k": (0.1, 0.2)}}, own)).fates,)
+        assert fate.how == LEFT_OUT
+        assert "which is not known at run time" in fate.why
 
 
 def test_an_effect_of_the_users_own_file(tmp_path: Path) -> None:
