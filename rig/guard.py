@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from drivers.clock import Clock, Wire
 
-AT_ONCE_S = 0.05  # from one look at interlocks and alarms to the next: half of what a stop may take
+AT_ONCE_S = 0.04  # from one look at interlocks and alarms to the next: less than half of what a stop may take
 NOW_AND_THEN_S = 10.0  # for what is as slow as heat
 SHORTEST_S = 0.01  # a sleep that is shorter may be a part of an exchange
 

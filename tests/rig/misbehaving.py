@@ -27,6 +27,8 @@ SHORT: dict[str, dict[str, str]] = {  # settings with which a procedure is short
     "temperature-cycle": {"dwell_s": "0.2", "temperatures_c": "40,50", "soak_s": "600"},
     "soak": {"duration_s": "400", "interval_s": "200", "block_s": "20", "dwell_s": "0.2", "settle_s": "0.1"},
     "motion": {"duration_s": "4", "still_s": "4", "block_s": "2", "dwell_s": "0.1", "settle_s": "0"},
+    "magnetometer-turn": {"step_deg": "120", "mounts": "1", "over": "false", "dwell_s": "0.2", "settle_s": "0.1"},
+    "rate-turn": {"rates_deg_s": "40", "mounts": "1", "turn_deg": "90", "rest_s": "1"},
     "repeat": {"times": "2", "dwell_s": "0.2", "power": "false", "mount": "false"},
 }
 
@@ -43,9 +45,9 @@ def watched_bench() -> Bench:
     return bench.model_copy(update={"instruments": {**bench.instruments, **watched}})
 
 
-def guarded_bench() -> Bench:
-    """The same with an emergency stop and a door at lines of the converter."""
-    bench = watched_bench()
+def guarded_bench(bench: Bench | None = None) -> Bench:
+    """The same, or `bench`, with an emergency stop and a door at lines of the converter."""
+    bench = bench or watched_bench()
     adc = bench.instruments["adc"]
     guarded = adc.model_copy(update={"settings": adc.settings | {"interlocks": {"e-stop": 4, "door": 5}}})
     return bench.model_copy(update={"instruments": {**bench.instruments, "adc": guarded}})

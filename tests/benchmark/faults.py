@@ -1,0 +1,136 @@
+"""Every fault of every instrument in every procedure, at random moments: `python -m tests.benchmark.faults [MOMENTS]`.
+
+Each run must end complete and right, or stopped safely with a run that goes on (tests/rig/enduring.py); the first that
+does not is named, and makes the exit status 1. With `--page`, the table in docs/faults.md is written anew.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import time
+from collections import Counter
+from collections.abc import Mapping
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from drivers.links.faults import Fault, Kind
+from drivers.links.wire_faults import EFFECTS, kinds_of
+from tests.rig.enduring import BENCH, FAULTS, PROCEDURES, endured, moment
+
+PAGE = Path(__file__).parents[2] / "docs" / "faults.md"
+KINDS = ("<!-- kinds -->\n", "<!-- end of kinds -->\n")
+TABLE = ("<!-- made by tests.benchmark.faults -->\n", "<!-- end -->\n")
+SHORT = {"complete": "c", "stopped": "s", "not begun": "n"}
+BROKEN = "BROKEN"
+DRIVERS = {role: part.driver for role, part in BENCH.instruments.items()}
+
+
+@dataclass(frozen=True)
+class Case:
+    """One run: what was to be endured, how it ended, and what did not hold."""
+
+    procedure: str
+    role: str
+    what: str
+    seed: int
+    end: str = ""
+    why: str = ""
+
+
+def tried(case: Case) -> Case:
+    """Run it."""
+    try:
+        fault = Fault(case.what, at_s=moment(case.procedure, case.role, case.what, case.seed))
+        end, why = endured(case.procedure, case.role, fault), ""
+    except BaseException as error:  # whatever it is, the others are tried
+        end, why = BROKEN, f"{type(error).__name__}: {error}".partition("\n")[0]
+    return Case(case.procedure, case.role, case.what, case.seed, end, why)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("moments", nargs="?", type=int, default=1)
+    parser.add_argument("--procedures", default=",".join(PROCEDURES))
+    parser.add_argument("--processes", type=int, default=os.cpu_count())
+    parser.add_argument("--out", type=Path, help="Add the cases to this file, a line of JSON each.")
+    parser.add_argument("--page", action="store_true")
+    asked = parser.parse_args()
+    wanted = [
+        Case(p, r, w, seed) for p in asked.procedures.split(",") for r, w in FAULTS for seed in range(asked.moments)
+    ]
+    began = time.perf_counter()
+    with TemporaryDirectory() as home:
+        os.environ["RIG_HOME"] = home
+        with ProcessPoolExecutor(asked.processes) as pool:
+            done = list(pool.map(tried, wanted, chunksize=8))
+    if asked.out:
+        with asked.out.open("a") as file:
+            file.writelines(json.dumps(vars(case)) + "\n" for case in done)
+            done = [Case(**json.loads(line)) for line in asked.out.read_text().splitlines()]
+    if asked.page:
+        write(done)
+    broken = [case for case in done if case.end == BROKEN]
+    print(json.dumps({"runs": len(done), "seconds": time.perf_counter() - began, "ends": Counter(c.end for c in done)}))
+    for case in broken:
+        print(f"{case.procedure}, {case.role}, {case.what}, seed {case.seed}: {case.why}", file=sys.stderr)
+    return int(bool(broken))
+
+
+def write(done: list[Case]) -> None:
+    """Both tables in the page, made anew."""
+    text = PAGE.read_text(encoding="utf-8")
+    text = _between(text, KINDS, kinds())
+    PAGE.write_text(_between(text, TABLE, table(done)) if done else text, encoding="utf-8")
+
+
+def _between(text: str, marks: tuple[str, str], new: str) -> str:
+    head, _, rest = text.partition(marks[0])
+    _, _, tail = rest.partition(marks[1])
+    return f"{head}{marks[0]}{new}{marks[1]}{tail}"
+
+
+def table(done: list[Case]) -> str:
+    """Faults by driver, in rows, against procedures: the letters of how each run ended, the most frequent first."""
+    procedures = sorted({case.procedure for case in done})
+    rows: dict[tuple[str, str], dict[str, Counter[str]]] = {}
+    for case in done:
+        row = rows.setdefault((DRIVERS[case.role], case.what), {})
+        row.setdefault(case.procedure, Counter())[SHORT.get(case.end, BROKEN)] += 1
+    lines = [f"{len(done)} runs: {_summary(done)}.\n", f"| driver | fault | {' | '.join(procedures)} |",
+             f"| --- | --- | {' | '.join('---' for _ in procedures)} |"]  # fmt: skip
+    lines += [f"| {driver} | {what} | {_cells(row, procedures)} |" for (driver, what), row in sorted(rows.items())]
+    return "\n".join(lines) + "\n"
+
+
+def _cells(row: Mapping[str, Counter[str]], procedures: list[str]) -> str:
+    return " | ".join(" ".join(letter for letter, _ in row.get(p, Counter()).most_common()) for p in procedures)
+
+
+def _summary(done: list[Case]) -> str:
+    ends = Counter(case.end for case in done)
+    return ", ".join(f"{ends[end]} {end}" for end in (*SHORT, BROKEN) if ends[end] or end == BROKEN)
+
+
+def kinds() -> str:
+    """All faults, for the page: those of every wire, then those of each twin."""
+    lines = ["| of | fault | usual size | what it does |", "| --- | --- | --- | --- |"]
+    common = {what: kind for what, (kind, _) in EFFECTS.items()}
+    lines += [_kind("every wire", what, kind) for what, kind in common.items()]
+    for driver in sorted(set(DRIVERS.values())):
+        own = {what: kind for what, kind in kinds_of(driver).items() if what not in common}
+        lines += [_kind(driver, what, kind) for what, kind in own.items()]
+    return "\n".join(lines) + "\n"
+
+
+def _kind(of: str, what: str, kind: Kind) -> str:
+    size = f"{kind.size:g} {kind.unit}".strip() if kind.size else ""
+    return f"| {of} | `{what}` | {size} | {kind.doc} |"
+
+
+if __name__ == "__main__":
+    sys.exit(main())
