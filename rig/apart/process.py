@@ -19,6 +19,7 @@ from rig.apart.order import Order, file
 from rig.apart.status import Asked, Status, lock
 from rig.bench import Bench, read_bench
 from rig.drawings import drawing_of
+from rig.errors import Stopped
 from rig.home import home
 from rig.lease import lease
 from rig.plan import Plan
@@ -77,7 +78,8 @@ class Teller:
 
     def interrupted(self, outcome: Outcome) -> Wish:
         """All stands still until a person has said how it goes on."""
-        self.tell(error=str(outcome.error), moving=outcome.moving)
+        by_a_person = isinstance(outcome.error, Stopped)
+        self.tell(error="" if by_a_person else str(outcome.error), moving=outcome.moving)
         return cast(Wish, self._answer(WISHES, "resume", "paused"))
 
     def _answer(self, question: Question, proposed: str, phase: str) -> str:

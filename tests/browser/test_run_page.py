@@ -46,7 +46,6 @@ def test_a_run_is_paused_left_alone_opened_again_and_stopped(workbench: Workbenc
     phase(page, "running")
     page.get_by_role("button", name="Pause").first.click()
     phase(page, "paused")
-    expect(page.get_by_role("alert")).to_contain_text("stopped by SIGINT")
     page.close()
     page = workbench.visit("/record")  # the run is in the head of every page
     page.get_by_role("link", name="soak").first.click()

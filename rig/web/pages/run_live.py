@@ -192,7 +192,8 @@ class Pictures:
     async def follow(self, run: str) -> None:
         """Take in what is new of `run`."""
         if run != self.run:
-            self.run, self.last, self.courses = run, -1, {}
+            self.run, self.last, self.courses, self.plot = run, -1, {}, None
+            self.place.clear()
         if not run:
             return
         new = await off_loop(_new, run, self.last)
