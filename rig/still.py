@@ -66,16 +66,18 @@ def stream(record: Record | None, data: str, channel: str | None, rate_hz: float
 
 
 def axes(record: Record | None, data: str, channel: str | None, rate_hz: float | None) -> dict[str, Stream]:
-    """The samples of one sensor's axes by their names: the one asked for, or the first and those that go with it.
+    """The samples of one sensor's axes by their names: the one asked for, or the first axis and those that go with it.
 
     A channel whose name has no axis in it is called x. Raises what `stream` raises.
     """
     source = _source(record, data, rate_hz)
     first = source(channel)
-    if channel is not None or (named := AXIS.fullmatch(first.channel)) is None:
+    names = (first.channel, *first.others)
+    named = next(filter(None, map(AXIS.fullmatch, names)), None)
+    if channel is not None or named is None:
         return {_axis(first.channel): first}
     alike = [f"{named[1]}{axis}{named[3]}" for axis in AXES]
-    return {_axis(name): source(name) for name in alike if name in (first.channel, *first.others)}
+    return {_axis(name): source(name) for name in alike if name in names}
 
 
 def repairs(samples: Stream, n: int) -> Iterable[str]:

@@ -134,6 +134,25 @@ def test_a_run_straight_from_its_record(rig: Rig, folder: Path, monkeypatch: pyt
     assert density == pytest.approx(dict.fromkeys("xy", 1.126e-4), rel=0.1)  # 0.775 mV behind 15.07 Hz (Ang V)
 
 
+def test_flicker_and_hum_of_the_simulated_world_are_found_through_its_sockets(
+    rig: Rig, folder: Path, monkeypatch: pytest.MonkeyPatch, bench_file: Callable[..., Path]
+) -> None:
+    """Traps in x and mains in the leads of y; the world knows no spectrum."""
+    monkeypatch.setenv("RIG_HOME", str(folder / "home"))
+    noise = {"x": {"flicker_v": 100e-6}, "y": {"hum_v": 200e-6}}
+    bench = str(bench_file({"world": {"preset": "ideal", "noise": noise}}))
+    run = document(rig("run", "noise-floor", "--duration-s", "300", "--bench", bench, "--unattended", "--json"))["run"]
+    said = document(rig("discover", run, "--out", "found.yaml", "--json"))
+    assert set(said["causes"]) == {"flicker-noise", "sinusoidal-noise"}
+    entries = yaml.safe_load(Path("found.yaml").read_text())["effects"]
+    known = {(e["effect"], p["name"], p["axis"]): p for e in entries for p in e["parameters"]}
+    flicker, hum = known["flicker-noise", "coefficient", "x"], known["sinusoidal-noise", "amplitude_1", "y"]
+    assert flicker["value"] == pytest.approx(100e-6 * np.sqrt(np.pi / np.log(10)), abs=4 * flicker["std"])
+    assert hum["value"] == pytest.approx(200e-6, rel=0.05)
+    assert known["sinusoidal-noise", "frequency_1", "y"]["value"] == pytest.approx(50, abs=0.02)
+    assert known["flicker-noise", "coefficient", "y"]["identified"] is False
+
+
 def test_an_ambiguous_answer_comes_with_a_longer_record(rig: Rig, folder: Path) -> None:
     random = np.random.default_rng(0)
     np.save("short.npy", white(random, N) + 0.003 * np.cumsum(random.standard_normal(N)))
