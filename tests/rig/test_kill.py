@@ -18,7 +18,7 @@ from pathlib import Path
 import pytest
 
 from rig.record import Record
-from tests.rig.killing import RUN, Story, Undisturbed, finished, inspected, many, measured, undisturbed
+from tests.rig.killing import MOTION, RUN, SOAK, Story, Undisturbed, finished, inspected, many, measured, undisturbed
 from tests.rig.nursery import Harm, Nursery
 from tests.rig.rigging import in_own_process, signal_at
 
@@ -43,6 +43,12 @@ def test_kills_at_random_moments(nursery: Nursery, whole: Undisturbed, tmp_path:
     assert survived.total() >= KILLS
 
 
+@pytest.mark.parametrize("words", [SOAK, MOTION], ids=lambda words: words[1])
+def test_kills_of_records_without_gaps(nursery: Nursery, tmp_path: Path, words: tuple[str, ...]) -> None:
+    survived = many(nursery, tmp_path, undisturbed(nursery, tmp_path / "undisturbed", words), 7, 3)
+    assert survived.total() >= 3
+
+
 @pytest.mark.parametrize(
     ("table", "number", "poses"),
     [("blocks", 1, 0), ("blocks", 9, 8), ("states", 1, 0), ("events", 1, 0), ("readings", 2, 0), ("readings", 4, 0)],
@@ -52,7 +58,7 @@ def test_a_kill_inside_a_transaction(
 ) -> None:
     killed = nursery.run(rig_home, *RUN, harm=Harm(f"INSERT INTO {table}", number))
     assert killed.status == -signal.SIGKILL
-    seen = inspected(rig_home, whole.measured)
+    seen = inspected(rig_home, whole)
     assert (seen.state, seen.poses) == ("stopped", poses)
     finished(nursery, rig_home, whole, Story(seen=[seen]))
 
@@ -70,7 +76,7 @@ def test_whole_processes_killed_while_they_start(nursery: Nursery, whole: Undist
         with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)
         process.wait()
-        seen = inspected(rig_home, whole.measured)
+        seen = inspected(rig_home, whole)
     finished(nursery, rig_home, whole, Story(seen=[seen]))
 
 

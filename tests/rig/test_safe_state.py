@@ -25,7 +25,7 @@ from tests.rig.enduring import BENCH, FAULTS, PROCEDURES, endured, moment, undis
 from tests.rig.misbehaving import Aftermath, afflicted, looking_on, short
 
 pytestmark = pytest.mark.sockets
-SAMPLE = 45  # of all that the benchmark tries
+SAMPLE = 36  # of all that the benchmark tries
 
 
 @pytest.fixture
