@@ -73,10 +73,8 @@ class GuardedClock:
         return first_s, [look for due_s, look in fitting if due_s == first_s]
 
     def _take(self, due: Sequence[Look]) -> None:
-        """A look that waits does not look about itself."""
+        """A look that waits does not look about itself; nor does anybody once something was found: it is put right."""
         looks, self._looks = self._looks, ()
-        try:
-            for each in due:
-                each.look()
-        finally:
-            self._looks = looks
+        for each in due:
+            each.look()
+        self._looks = looks
