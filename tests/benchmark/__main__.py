@@ -68,6 +68,9 @@ def _figures(folder: Path) -> Iterator[tuple[str, Figure]]:
     yield "noise coefficients", _noise(folder)
     yield "compensation in C", json.loads(subject(folder, "compensation").out)
     yield "100 kills", _inside("", subject(folder, "kills", "100"))
+    yield "stops in real time", json.loads(subject(folder, "stops").out)
+    yield "10 million inputs", json.loads(subject(folder, "fuzz").out)
+    yield "every fault in every procedure", json.loads(subject(folder, "faults").out)
 
 
 def _generation(folder: Path) -> Figure:
