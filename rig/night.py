@@ -28,12 +28,12 @@ def night_of(data: str, date: str, program: str) -> Page | None:
             return None
         from calibrations.pictures.soak import soak_album
         from calibrations.reports.soak import soak_report
-        from rig.results.soak import night
+        from rig.results.soak import foreseen_of, night
 
         measured = Measured.named(record, data)
-        found = night(measured)
-    pictures, facts = soak_album(found), _facts(measured, date, program)
-    return pictures, lambda: soak_report(found, measured.run.results, facts, pictures)
+        found, foreseen = night(measured), foreseen_of(measured)
+    pictures, facts = soak_album(found, foreseen), _facts(measured, date, program)
+    return pictures, lambda: soak_report(found, measured.run.results, facts, pictures, foreseen)
 
 
 def _facts(measured: Measured, date: str, program: str) -> Mapping[str, str]:

@@ -5,10 +5,10 @@
                                                                            minutes)
 
 A bank of extended Kalman filters runs side by side. Each has its cell of time constants, within which it estimates
-them, and its own slow noise: Gauss-Markov processes of many time constants, alike (flicker) or the slower the larger,
-or a random walk beside them. How well each foresaw what came is its weight. So what cannot be known yet, the time
-constant of a drift that has hardly bent and the noise of a record that has hardly begun, is in the bounds, which are
-those of the whole bank.
+them, and its own slow noise: Gauss-Markov processes of many time constants, all alike (flicker) or not, with or without
+a random walk. How well each foresaw what came is its weight. So what cannot be known yet, the time constant of a drift
+that has hardly bent and the noise of a record that has hardly begun, is in the bounds, which are those of the whole
+bank.
 
 Values are in units of the white standard error of one of them.
 
@@ -23,25 +23,33 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
-from scipy.stats import chi2
 
 from calibrations.estimators.kalman import Belief, corrected, predicted
 from calibrations.table import Array
 
 LEVEL, OFFSET, REST, LN_TAU, SLOW, WALK = 0, 1, 2, 4, 6, 11  # places in a state: REST and LN_TAU have two each
 SIZE = 12
-CELL = np.array([0.3, 0.6])  # of a logarithm of a time constant, the slower and the faster one
+CELL = np.array([0.3, 0.8])  # of a logarithm of a time constant, the slower and the faster one
 TAUS_S = np.exp(np.arange(np.log(150.0), np.log(100e3), CELL[0]))
 FAST_S = np.exp(np.arange(np.log(60.0), np.log(1300.0), CELL[1]))
 APART = 3.0  # nearer than this factor, two time constants are one to any noise
 USUAL_S, USUALLY = 3600.0, 1.2  # of a slow time constant beforehand: its median, and the std of its logarithm
 COUNTS = (0.3, 0.4, 0.3)  # probability beforehand of no exponential, one, two
 SLOW_S = np.array([20.0, 120.0, 800.0, 5e3, 3e4])  # time constants of slow noise
-FLICKER = (0.0, 0.25, 0.7, 2.0, 6.0)  # rms of its middle process
-SORTS = ((0.0, 0.0, 0.55), (0.4, 0.0, 0.25), (0.0, 1.5, 0.1), (0.0, 6.0, 0.1))
-"""Of slow noise: by which power of its time constant a process is larger, random walk per root of an hour, probability
+RMS = (0.5, 1.7, 6.0)  # of a slow process, in units
+SHAPES = (
+    ((1.0, 1.0, 1.0, 1.0, 1.0), 0.0, 0.35),  # flicker
+    ((0.2, 0.5, 1.0, 2.0, 4.0), 0.0, 0.15),  # the slower the larger
+    ((1.0, 1.0, 0.5, 0.5, 0.7), 0.0, 0.1),  # of seconds to minutes, beside weaker flicker
+    ((0.0, 1.0, 1.0, 0.5, 0.7), 0.0, 0.1),  # of minutes, beside weaker flicker of hours
+    ((0.0, 0.0, 1.0, 1.0, 0.8), 0.0, 0.1),  # of hours, likewise
+    ((1.0, 1.0, 1.0, 1.0, 1.0), 1.5, 0.1),
+    ((1.0, 1.0, 1.0, 1.0, 1.0), 6.0, 0.1),
+)
+"""Of slow noise: how large its processes are beside each other, random walk per root of an hour, probability
 beforehand."""
-UNLIKELY = 1e-7  # a filter of less weight is let go
+NONE = 0.2  # probability beforehand of no slow process
+UNLIKELY = 1e-6  # a filter of less weight is let go
 HOUR_S = 3600.0
 
 
@@ -72,9 +80,9 @@ class Bank:
         return float(np.sqrt(self.weight @ (1 + np.sum(self.slow**2, axis=1))))
 
     @property
-    def consistency(self) -> float:
-        """Probability of innovations as large as these, or larger, where the model holds."""
-        return float(chi2.sf(self.nis, max(self.count, 1)))
+    def surprise(self) -> float:
+        """Mean normalised innovation squared: 1 where some filter's model holds, more where none does."""
+        return self.nis / max(self.count, 1)
 
     def at(self, t_s: float) -> Bank:
         """The bank at a later time, with nothing measured since."""
@@ -126,14 +134,14 @@ def bank(t_s: float, value: float, most: float) -> Bank:
     """Before anything is measured: the first `value`, at `t_s`, is near; a drift is seldom much beyond `most`."""
     members = [(tau, noise, p * q) for (tau, p), (noise, q) in product(_approaches(), _noises())]
     taus_s, noise = np.array([m[0] for m in members]), np.array([m[1] for m in members])
+    slow, walk = noise[:, :-1], noise[:, -1]
     mean, covariance = np.zeros((len(members), SIZE)), np.zeros((len(members), SIZE, SIZE))
     mean[:, LEVEL] = value
     mean[:, LN_TAU:SLOW] = np.log(np.where(taus_s > 0, taus_s, 1.0))
-    slow = noise[:, :1] * (SLOW_S / SLOW_S[2]) ** noise[:, 1:2]
     variances = np.column_stack([np.full((len(members), 2), (3 * most) ** 2), (taus_s > 0) * most**2,
                                  (taus_s > 0) * (CELL / 2) ** 2, slow**2, np.zeros(len(members))])  # fmt: skip
     covariance[:, range(SIZE), range(SIZE)] = variances
-    return Bank(t_s, Belief(mean, covariance), slow, noise[:, 2], np.log([m[2] for m in members]))
+    return Bank(t_s, Belief(mean, covariance), slow, walk, np.log([m[2] for m in members]))
 
 
 def _approaches() -> list[tuple[tuple[float, float], float]]:
@@ -148,6 +156,8 @@ def _approaches() -> list[tuple[tuple[float, float], float]]:
     return found
 
 
-def _noises() -> list[tuple[tuple[float, float, float], float]]:
-    """Rms of slow noise, its power, its walk; and their probability beforehand."""
-    return [((rms, power, walk), p / len(FLICKER)) for rms, (power, walk, p) in product(FLICKER, SORTS)]
+def _noises() -> list[tuple[tuple[float, ...], float]]:
+    """Rms of each slow process, and the random walk; and their probability beforehand."""
+    quiet = [((*np.zeros(len(SLOW_S)), walk), NONE * p) for walk, p in ((0.0, 0.8), (1.5, 0.1), (6.0, 0.1))]
+    share = (1 - NONE) / len(RMS)
+    return quiet + [((*(rms * np.array(shape)), walk), share * p) for rms, (shape, walk, p) in product(RMS, SHAPES)]

@@ -29,11 +29,12 @@ from calibrations.table import Array, Table
 STRETCH_S, STRETCHES = 300.0, 3  # of the still record: a value is the mean of so much, or of a third of a hold
 MOST = 5e-3  # of a drift beforehand, over the scale factor: in g, and as a fraction
 QUIET = 2e-5  # white standard error over the scale factor, where it is not known
-DRAWS = 2000
-LOOKS = 40
+DRAWS = 1000
+LOOKS = 24
 NARROW = 0.25  # of the whole change: half the width of the bounds of what is known
-SURE = 1e-3  # probability of the innovations below which no filter's model holds
-AHEAD_S = np.concatenate([[0.0], np.geomspace(60.0, 100 * HOUR_S, 100)])
+SURPRISED = 3.0  # mean normalised innovation squared beyond which no filter's model holds
+TINY = 1e-12  # of a unit
+AHEAD_S = np.concatenate([[0.0], np.geomspace(60.0, 100 * HOUR_S, 60)])
 
 
 class Bounds(NamedTuple):
@@ -64,12 +65,12 @@ class Forecast:
     steady_s: Bounds
     tolerance: float
     change: float  # of the whole approach, as foreseen
-    consistency: float  # see `Bank.consistency`
+    surprise: float  # see `Bank.surprise`
 
     @property
     def known(self) -> bool:
         """Whether the final value is."""
-        return self.consistency > SURE and self.final.half <= max(self.tolerance, NARROW * abs(self.change))
+        return self.surprise < SURPRISED and self.final.half <= max(self.tolerance, NARROW * abs(self.change))
 
     @property
     def steady(self) -> bool:
@@ -111,7 +112,7 @@ class Followed:
             _bounds(steady_s),
             tolerance * self.unit,
             median * self.unit,
-            self.bank.consistency,
+            self.bank.surprise,
         )
 
     def _bounds(self, draws: Array) -> Bounds:
@@ -224,9 +225,13 @@ def parts(table: Table) -> Iterator[Table]:
 def _left_s(rest: Array, taus_s: Array, tolerance: float) -> Array:
     """How long what is left to come stays beyond the tolerance, of each draw; `rest` and `taus_s` (n, 2)."""
     ahead = np.abs(np.sum(rest[:, None, :] * np.exp(-AHEAD_S[None, :, None] / taus_s[:, None, :]), axis=2))
-    over = ahead > tolerance
-    last = len(AHEAD_S) - 1 - np.argmax(over[:, ::-1], axis=1)
-    return np.where(over.any(axis=1), AHEAD_S[np.minimum(last + 1, len(AHEAD_S) - 1)], 0.0)
+    over = np.log(np.maximum(ahead, TINY) / tolerance)
+    last = len(AHEAD_S) - 1 - np.argmax(over[:, ::-1] > 0, axis=1)  # the last time at which it is beyond
+    last, each = np.minimum(last, len(AHEAD_S) - 2), np.arange(len(over))
+    before, after = over[each, last], over[each, last + 1]
+    share = np.clip(before / np.maximum(before - after, TINY), 0.0, 1.0)
+    crossed = AHEAD_S[last] + share * (AHEAD_S[last + 1] - AHEAD_S[last])
+    return np.where((over > 0).any(axis=1), crossed, 0.0)
 
 
 def _bounds(draws: Array) -> Bounds:

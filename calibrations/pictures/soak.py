@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
+from calibrations.evaluations.forecast import Foreseen
 from calibrations.evaluations.soak import HOUR_S, Course, Soak
-from calibrations.numerals import measured
+from calibrations.numerals import measured, plain
 from calibrations.pictures.album import Picture
 from calibrations.pictures.style import AMBER, BAND, BLUE, GREEN, INK, QUIET, VERMILION, panels, styled
 from calibrations.table import Array
@@ -17,10 +21,16 @@ COLOURS = {"x": BLUE, "y": VERMILION}
 SHOWN = 600  # means of the still record that a line is drawn through, at most
 CURVE = 400  # points of a fitted curve
 COVERAGE = 2.0
+WINDOW = 1.6  # times the whole drift: what is shown of bounds that are far wider in the beginning
+FORESEEN = (
+    "What the Kalman filters said, at each time, that bias and scale factor would come to: a line within its 95 % "
+    "bounds, less the last one. The dotted line is where the drift was then. The broken line is when the final value "
+    "was known: from then on the bounds are narrow beside the whole drift."
+)
 
 
-def soak_album(found: Soak) -> list[Picture]:
-    """All pictures of a soak, with words for a page."""
+def soak_album(found: Soak, foreseen: Mapping[str, Foreseen] = MappingProxyType({})) -> list[Picture]:
+    """All pictures of a soak, and of what was foreseen of it, with words for a page."""
     course = (
         "Dots are reversals, with their standard errors; the line is the exponential approach with its standard error. "
         "Within the grey band, the expanded uncertainty of one reversal about the final value, the rest of the drift "
@@ -38,6 +48,8 @@ def soak_album(found: Soak) -> list[Picture]:
         Picture("drift", "Bias and scale factor since power-on", course, drift(found)),
         Picture("night", "Temperature, supply and noise", around, surroundings(found)),
     ]
+    if foreseen:
+        pictures.insert(1, Picture("foreseen", "What was foreseen, and when", FORESEEN, forecasts(found, foreseen)))
     times_s, _ = found.allan(found.axes[0])
     return [*pictures, Picture("allan", "Allan deviation", noise, allan(found))] if len(times_s) else pictures
 
@@ -53,6 +65,41 @@ def drift(found: Soak) -> Figure:
         axes[0, k].set_title(f"axis {axis}")
         axes[1, k].set_xlabel("time since power-on (h)")
     return figure
+
+
+@styled
+def forecasts(found: Soak, foreseen: Mapping[str, Foreseen]) -> Figure:
+    """A column for each axis: what bias and scale factor were thought to come to, less what the last forecast says."""
+    figure, axes = panels(2, len(found.axes), 2.6, sharex=True)
+    for k, axis in enumerate(found.axes):
+        for row, (quantity, factor, unit) in enumerate((("bias", 1e3, "mV"), ("scale", 1e6, "ppm"))):
+            ax, name = axes[row, k], f"{quantity}-{axis}"
+            if name in foreseen:
+                whole = 1.0 if quantity == "bias" else foreseen[name].last.final.value
+                _forecast(ax, foreseen[name], factor / whole, COLOURS[axis])
+            ax.set_ylabel(f"{'bias' if quantity == 'bias' else 'scale factor'} foreseen ({unit})")
+        axes[0, k].set_title(f"axis {axis}")
+        axes[1, k].set_xlabel("time since power-on (h)")
+    return figure
+
+
+def _forecast(ax: Axes, course: Foreseen, factor: float, colour: str) -> None:
+    """Bounds of the final value, and where the drift was, against the time at which that was said."""
+    hours = np.array([each.t_s for each in course.forecasts]) / HOUR_S
+    low, value, high = (factor * (np.array(column) - course.last.final.value)
+                        for column in zip(*(each.final for each in course.forecasts), strict=True))  # fmt: skip
+    now = factor * (np.array([each.present.value for each in course.forecasts]) - course.last.final.value)
+    ax.fill_between(hours, low, high, color=colour, alpha=0.25, lw=0)
+    ax.plot(hours, value, color=colour, lw=1.4)
+    ax.plot(hours, now, color=INK, lw=0.9, ls=":")
+    reach = WINDOW * max(np.abs(now).max(), (high[-1] - low[-1]) / 2)
+    ax.set(ylim=(-reach, reach), xlim=(0, None))
+    words = "not known at the end"
+    if course.known_s is not None:
+        ax.axvline(course.known_s / HOUR_S, color=INK, ls="--", lw=0.9)
+        words = f"known after {plain(course.known_s / HOUR_S)} h"
+    ax.annotate(words, (1, 1), xycoords="axes fraction", xytext=(-4, -4), textcoords="offset points",
+                ha="right", va="top")  # fmt: skip
 
 
 @styled

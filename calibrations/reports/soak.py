@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
+from calibrations.evaluations.forecast import Foreseen
 from calibrations.evaluations.soak import HOUR_S, Course, Gap, Soak
 from calibrations.numerals import bound, measured, minus, plain
 from calibrations.pictures.album import Picture
@@ -18,12 +20,16 @@ WANDERED_K = 1.0  # peak to peak: more is no constant ambient
 
 
 def soak_report(
-    found: Soak, results: Mapping[str, Any], facts: Mapping[str, str], pictures: Iterable[Picture] | None = None
+    found: Soak,
+    results: Mapping[str, Any],
+    facts: Mapping[str, str],
+    pictures: Iterable[Picture] | None = None,
+    foreseen: Mapping[str, Foreseen] = MappingProxyType({}),
 ) -> str:
     """The page as HTML text. `results` are the run's, by name, each with value, std, unit, limit and verdict; `facts`
-    its provenance. The same arguments give the same page.
+    its provenance; `foreseen` is what was known of each quantity on the way. The same arguments give the same page.
     """
-    shown = soak_album(found) if pictures is None else pictures
+    shown = soak_album(found, foreseen) if pictures is None else pictures
     steady = found.time_s() is not None
     return page(
         "soak.html",
@@ -35,6 +41,7 @@ def soak_report(
         figures=_figures(found),
         pictures=[figure(picture) for picture in shown],
         courses=[_course(course) for course in found.courses.values()],
+        foreseen=[_outlook(name, course) for name, course in foreseen.items()],
         verdicts=[_verdict(name, result) for name, result in results.items() if result["limit"] is not None],
         gaps=[_gap(gap) for gap in found.gaps],
         provenance=facts,
@@ -111,6 +118,21 @@ def _course(course: Course) -> dict[str, Any]:
         "tolerance": plain(1e3 * state.tolerance, 2),
         "tau": joined(taus) if taus else "–",
         "time": _hours(course.time_s) if course.time_s else "not reached",
+    }
+
+
+def _outlook(name: str, course: Foreseen) -> dict[str, str]:
+    """One row of what was foreseen: the final value with its 95 % bounds at the end, and since when it was known."""
+    quantity, _, axis = name.partition("-")
+    final, known_s = course.last.final, course.known_s
+    return {
+        "name": quantity.replace("scale", "scale factor"),
+        "axis": axis,
+        "unit": "mV" if quantity == "bias" else "mV/g",
+        "final": f"{plain(1e3 * final.value, 7)} ± {plain(1e3 * final.half, 2)}"
+        if known_s is not None
+        else "not known",
+        "known": "–" if known_s is None else plain(known_s / HOUR_S),
     }
 
 

@@ -13,12 +13,14 @@ import numpy as np
 import pytest
 import yaml
 
+from calibrations.evaluations.forecast import SoakForecast
 from procedures.soak import schedule
 from rig.bench import DEFAULT
 from rig.record import Record
 from rig.record.measured import Measured
 from rig.results.names import names
 from rig.results.soak import night
+from rig.soak_forecast import SoakWatch, lines
 from tests.rig.nursery import Harm, Nursery
 
 pytestmark = pytest.mark.sockets
@@ -51,10 +53,16 @@ def test_a_night_reaches_its_steady_state_after_hours_and_is_told_on_one_page(
     assert 2.0 < found["steady-state-time"]["value"] < 12.0
     assert found["time-constant-x"]["value"] == pytest.approx(1.5, abs=4 * found["time-constant-x"]["std"])
     assert abs(found["bias-drift-x"]["value"]) > 1e-3
+    assert "not yet known what it comes to" in ended.err
+    assert "bias-x " in ended.err
+    assert "comes to" in ended.err
+    assert 0.5 < found["scale-foreseen-x"]["value"] < 12
+    assert found["scale-final-x"]["std"] < 1e-3
     page = tmp_path / "night.html"
     assert rig("report", document["run"], "--out", str(page)).status == 0
     text = page.read_text(encoding="utf-8")
     assert "are steady" in text
+    assert "What was foreseen, and when" in text
     assert "steady-state-time" in text
     assert str(tmp_path) not in text
 
@@ -63,6 +71,23 @@ def test_in_an_oven_it_is_steady_within_an_hour(rig: Rig, cold: str) -> None:
     ended = rig("run", "soak", "--bench", cold, "--oven-c", "45", "--off-s", "36000", "--duration-s", "21600", *NIGHT)
     found = json.loads(ended.out)["results"]
     assert 0.05 < found["steady-state-time"]["value"] < 1.0
+
+
+def test_a_soak_that_goes_on_is_foreseen_as_one_that_was_not_interrupted(rig: Rig, rig_home: Path) -> None:
+    """The part that was being kept when the first half ended is all that a follower misses."""
+    run = json.loads(rig("run", *SHORT_RUN, "--block-s", "5", "--json").out)["run"]
+    with Record(rig_home) as record:
+        kept = list(record.kept(run))
+    whole, resumed = SoakWatch(), SoakWatch()
+    for watch in (whole, resumed):
+        watch.begun(run)  # the record holds all of it
+    begun = {name: each.forecast() for name, each in whole.followers[0].told.followed.items()}
+    assert set(begun) == {"bias-x", "scale-x", "bias-y", "scale-y"}
+    assert "not yet known" in lines(begun)
+    resumed.followers[0].told = SoakForecast({})
+    told = [forecasts for each in kept if (forecasts := resumed.kept(each))]
+    assert len(told) == len([pose for pose in schedule(**SHORT) if pose.path.startswith("reversal")]) / 8
+    assert told[-1]["scale-x"].final.value == pytest.approx(begun["scale-x"].final.value, rel=1e-6)
 
 
 def test_until_steady_it_ends_early_and_says_when(rig: Rig, cold: str) -> None:
