@@ -28,7 +28,7 @@ def fault_of(fault: Any, keys: list[str]) -> str:
     if fault["type"] in UNKNOWN:
         return f"no such key.{did_you_mean(str(fault['loc'][-1]), keys)}"
     if fault["type"] == "missing":
-        return "is missing"
+        return "is missing; `rig check --example` prints a bench file that has all"
     return f"{fault['msg']}, is {fault['input']!r}"
 
 

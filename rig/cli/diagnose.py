@@ -87,7 +87,8 @@ def _told(result: Diagnosis, data: str, model: str, bench: str) -> str:
         for c in result.candidates[:SHOWN]
     ]
     if rows:
-        head = ("candidate", "error on unseen poses / floor", "p-value", "probability", "not told apart from")
+        probability = "if it is one of these" if result.verdict == "unexplained" else "probability"
+        head = ("candidate", "error on unseen poses / floor", "p-value", probability, "not told apart from")
         lines += [columns(head, rows), ""]
     if result.verdict in ("effect-missing", "ambiguous") and result.path.steps:
         best = result.candidates[0]

@@ -138,7 +138,7 @@ def test_a_result_that_cannot_be_written(
     assert "is a directory" in refused(*command, "--out", ".")
 
     with monkeypatch.context() as patch:
-        patch.setattr(Path, "write_text", denied("model.yaml", "write_text"))
+        patch.setattr(Path, "write_bytes", denied("model.yaml", "write_bytes"))
         said = refused(*command, "--out", "model.yaml")
     assert "model.yaml: cannot be written: Permission denied; name another file" in said
 
