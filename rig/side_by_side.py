@@ -73,4 +73,4 @@ def _own(results: Mapping[str, Any], sensor: str) -> Mapping[str, Any]:
 def _estimates(fit: Fit) -> Iterator[tuple[str, Estimate]]:
     for term in fit.model.terms:
         for each in term.estimates:
-            yield " ".join(filter(None, (term.name, each.name, each.axis))), each
+            yield " ".join(dict.fromkeys(filter(None, (term.name, each.name, each.axis)))), each

@@ -122,6 +122,9 @@ def main(text: str) -> None:
         teller = Teller(order, read_bench(order.bench_path))
         try:
             outcome = _carried_out(order, record, teller)
+        except KeyboardInterrupt as signal:  # before the run began, or between its parts
+            teller.tell(phase="ended", state="stopped", asked=None, error=f"stopped by {signal}")
+            return
         except Exception as error:
             teller.tell(phase="ended", state="failed", asked=None, error=str(error))
             raise

@@ -18,6 +18,7 @@ from rig.apart.order import Order, file
 from rig.apart.status import Status, keys, read
 from rig.errors import RigError
 
+KEPT = 20
 _children: list[subprocess.Popen[bytes]] = []  # so that those that have ended are taken notice of
 
 
@@ -33,12 +34,20 @@ def go_on(run: str, procedure: str, bench_file: Path | None, attended: bool) -> 
 
 def _begin(order: Order) -> str:
     file(order.key, "log").parent.mkdir(parents=True, exist_ok=True)
+    tidy()
     os.mkfifo(file(order.key, "answers"))
     with file(order.key, "log").open("wb") as log:
         words = [sys.executable, "-m", "rig.apart.process", order.text()]
         child = subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True)  # noqa: S603
     _children.append(child)
     return order.key
+
+
+def tidy() -> None:
+    """Remove the files of all processes but the last KEPT; the record keeps their runs."""
+    for key in keys()[:-KEPT]:
+        for ending in ("answers", "log", "json"):
+            file(key, ending).unlink(missing_ok=True)
 
 
 def latest() -> Status | None:

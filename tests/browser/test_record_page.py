@@ -1,0 +1,67 @@
+"""The page Record in a browser: found, noted, compared, exported, reported."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from playwright.sync_api import expect
+
+from calibrations.reading.read_csv import read_csv
+from procedures.session import Pose
+from rig.record import Block, Kept, Record
+from tests.browser.conftest import Workbench
+from tests.browser.measured import hidden
+
+
+@pytest.fixture
+def runs(workbench: Workbench, tmp_path: Path) -> Iterator[list[str]]:
+    """Two imported tables and a soak of one block, oldest first."""
+    tables = [read_csv(Path(hidden(tmp_path, "package turned", times))) for times in (40.0, 20.0)]
+    with Record() as record:
+        made = [record.add_table(table) for table in tables]
+        parts = {"bench": {"seed": 1}, "identities": {}, "configuration": "abc", "source": "a bench"}
+        made.append(record.begin("noise-floor", {}, constants={"sensor": "ADXL203"}, kind="still", **parts))
+        block = Block(np.array([[2.0, 1.0], [4.0, 1.0]]), ("vx", "vy"), 1000.0, 0.0)
+        record.keep(made[-1], 0, Kept(Pose(0, 0, 0, "still 0"), block, 1.0, 22.0), None)
+        yield made
+
+
+def test_runs_are_searched_and_one_is_opened_and_noted(workbench: Workbench, runs: list[str]) -> None:
+    page = workbench.visit("/record")
+    expect(page.get_by_role("row")).to_have_count(1 + len(runs))
+    workbench.shot(page, "record")
+    page.get_by_label("Search").fill("noise-fl")
+    expect(page.get_by_role("row")).to_have_count(2)
+    page.get_by_role("cell", name=runs[2]).click()
+    expect(page.get_by_text("its process was killed").first).to_be_visible()
+    expect(page.locator("[aria-label='the run over time'] .points path")).to_have_count(1)
+    page.get_by_label("A note").fill("the door was open")
+    page.get_by_role("button", name="Keep").click()
+    expect(page.get_by_role("cell", name="the door was open")).to_be_visible()
+    with Record() as record:
+        assert [(event.what, event.text) for event in record.events(runs[2])] == [("note", "the door was open")]
+    workbench.shot(page, "run")
+
+
+def test_two_runs_are_compared(workbench: Workbench, runs: list[str]) -> None:
+    page = workbench.visit("/record")
+    for run in runs[:2]:
+        page.get_by_role("row", name=run).get_by_role("checkbox").click()
+    page.get_by_role("button", name="Compare").click()
+    expect(page.get_by_text("Parameters of linear")).to_be_visible()
+    expect(page.get_by_role("cell", name="scale-factor scale x")).to_be_visible()
+    workbench.shot(page, "compared")
+
+
+def test_a_run_is_exported_and_reported(workbench: Workbench, runs: list[str], tmp_path: Path) -> None:
+    page = workbench.visit(f"/record/{runs[0]}")
+    with page.expect_download() as csv:
+        page.get_by_role("button", name="csv").click()
+    csv.value.save_as(tmp_path / "exported.csv")
+    assert read_csv(tmp_path / "exported.csv").n == 518
+    with page.expect_download() as report:
+        page.get_by_role("button", name="Report").click()
+    assert "misses axis-misalignment" in Path(report.value.path()).read_text(encoding="utf-8")

@@ -1,0 +1,141 @@
+"""A run in a process of its own: it tells how it stands, and is paused, answered and ended by who did not start it."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from procedures.errors import SettingError
+from rig.apart import process, steering
+from rig.apart.order import Order, file
+from rig.apart.status import Asked, Status, keys, lock, read
+from rig.errors import RigError
+from rig.home import home
+from rig.lease import lease
+from rig.record import Record
+from tests.rig.rigging import POSES, SMALL
+
+POLL_S = 0.002
+PATIENCE_S = 60.0
+KEY = "20261121-093012"
+
+
+def carried_out(procedure: str, settings: dict[str, str], steer: Callable[[], None], attended: bool = False) -> Status:
+    """The order, carried out in this very process while `steer` has a thread of its own; how it stands at the end."""
+    order = Order(KEY, procedure, settings, attended=attended)
+    file(KEY, "log").parent.mkdir(parents=True)
+    os.mkfifo(file(KEY, "answers"))
+    person = threading.Thread(target=steer)
+    person.start()
+    process.main(order.text())
+    person.join()
+    status = steering.latest()
+    assert status is not None
+    return status
+
+
+def when(phase: str, also: Callable[[Status], bool] = lambda _: True) -> Status:
+    """The status, as soon as it is at `phase`."""
+    never = threading.Event()
+    for _ in range(round(PATIENCE_S / POLL_S)):
+        status = steering.latest()
+        if status is not None and status.phase == phase and also(status):
+            return status
+        never.wait(POLL_S)
+    raise AssertionError(f"never {phase}: {status}")
+
+
+def test_a_run_tells_how_it_stands_and_how_it_ended() -> None:
+    seen: list[Status] = []
+    status = carried_out("sweep", SMALL, lambda: seen.append(when("running", lambda s: s.done > 2)))
+    assert (status.phase, status.state, status.done, status.total, status.error) == ("ended", "complete", 20, POSES, "")
+    assert seen[0].bench == "simulated rig"
+    assert {value["name"] for value in seen[0].values} >= {"temperature", "vx", "vy"}
+    assert seen[0].attitude["alpha_deg"] == 90
+    with Record() as record:
+        assert record.run(status.run).state == "complete"
+
+
+def test_paused_and_gone_on_and_stopped() -> None:
+    def person() -> None:
+        steering.pause(when("running"))
+        paused = when("paused")
+        assert paused.error == ""
+        steering.answer(paused, "resume")
+        steering.stop(when("running"))
+
+    status = carried_out("soak", {"duration_s": "43200"}, person)
+    assert (status.phase, status.state) == ("ended", "stopped")
+    assert "SIGTERM" in status.error
+
+
+def test_stopped_while_it_is_paused() -> None:
+    def person() -> None:
+        steering.pause(when("running"))
+        steering.stop(when("paused"))
+
+    assert carried_out("soak", {"duration_s": "43200"}, person).state == "stopped"
+
+
+def test_a_question_is_asked_until_its_answer_makes_sense() -> None:
+    refused: list[str] = []
+
+    def person() -> None:
+        asking = when("asking")
+        assert asking.asked is not None
+        assert asking.asked.choices == ["yes", "no"]
+        assert asking.asked.attitude is not None
+        steering.answer(asking, "perhaps")
+        again = when("asking", lambda s: bool(s.asked and s.asked.refused))
+        refused.append(again.asked.refused if again.asked else "")
+        steering.answer(again, "yes")
+
+    status = carried_out("sweep", SMALL, person, attended=True)
+    assert status.state == "complete"
+    assert "takes yes or no" in refused[0]
+
+
+def test_what_cannot_be_run_is_told_as_well() -> None:
+    with pytest.raises(SettingError):
+        carried_out("sweep", {"step_deg": "ten"}, lambda: None)
+    status = steering.latest()
+    assert status is not None
+    assert (status.phase, status.state) == ("ended", "failed")
+    assert "it takes a number" in status.error
+
+
+def test_a_process_that_was_killed_has_ended() -> None:
+    status = Status(KEY, 4711, "sweep", "a bench", phase="running", values=[], moving=[])
+    file(KEY, "json").parent.mkdir(parents=True)
+    status.write()
+    with lease(home(), lock(KEY), "a test"):
+        assert read(KEY) == status
+    found = read(KEY)
+    assert found is not None
+    assert (found.phase, found.state) == ("ended", "stopped")
+    file(KEY, "log").write_text("Traceback ...\nMemoryError\n")
+    assert "MemoryError" in (read(KEY) or status).error
+
+
+def test_only_the_last_ones_are_kept() -> None:
+    file(KEY, "json").parent.mkdir(parents=True)
+    for number in range(25):
+        Status(f"{KEY}-{number:02}", 4711, "sweep", "a bench", phase="ended").write()
+    steering.tidy()
+    assert [key[-2:] for key in keys()] == [f"{number:02}" for number in range(25 - steering.KEPT, 25)]
+
+
+def test_nobody_is_answered_who_does_not_ask() -> None:
+    assert (steering.latest(), keys()) == (None, [])
+    status = Status(KEY, 4711, "sweep", "a bench")
+    status_of_one_who_asked = replace(status, asked=Asked("mounting", "Is it mounted?", "yes or no"))
+    with pytest.raises(RigError, match="nothing is asked"):
+        steering.answer(status, "yes")
+    file(KEY, "answers").parent.mkdir(parents=True)
+    os.mkfifo(file(KEY, "answers"))
+    with pytest.raises(RigError, match="nobody waits for an answer"):
+        steering.answer(status_of_one_who_asked, "yes")

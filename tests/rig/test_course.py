@@ -1,0 +1,40 @@
+"""A night over time in a bounded number of parts: nothing is lost of mean and extremes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from procedures.session import Dwell, Pose
+from rig.course import MOST, Course, kind_of
+
+
+def dwell(number: int, path: str = "hold 1") -> Dwell:
+    return Dwell(Pose(0, 0, 0, path), 10.0 * number, {"vx": float(number % 7)}, {"vx": 1e-3}, 5000, 20.0)
+
+
+@pytest.mark.parametrize("n", [1, MOST, MOST + 1, 5000])
+def test_however_many_dwells_there_are_the_parts_stay_few(n: int) -> None:
+    course = Course()
+    for number in range(n):
+        course.add(dwell(number))
+    t_s, mean, low, high = (np.array(values) for values in course.line("vx"))
+    assert len(course.parts) <= MOST
+    weights = np.array([part.n for part in course.parts])
+    assert weights.sum() == n
+    assert np.average(mean, weights=weights) == pytest.approx(np.mean([number % 7 for number in range(n)]))
+    assert np.average(t_s, weights=weights) == pytest.approx(10.0 * (n - 1) / 2)
+    assert (low.min(), high.max()) == (0, min(n - 1, 6))
+    assert np.all(np.diff(t_s) > 0)
+
+
+def test_what_was_measured_has_names() -> None:
+    course = Course()
+    assert course.names == []
+    course.add(dwell(1))
+    assert course.names == ["vx", "rms vx", "temperature"]
+
+
+@pytest.mark.parametrize(("path", "kind"), [("hold 17", "hold"), ("A+ to B-", ""), ("", ""), ("17", "")])
+def test_dwells_of_numbered_paths_belong_together(path: str, kind: str) -> None:
+    assert kind_of(dwell(1, path)) == kind
