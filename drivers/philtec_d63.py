@@ -46,7 +46,7 @@ class Curve:
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> Curve:
         """A curve as a bench file gives it: keys serial, date, near, far. Raises ValueError."""
-        if unknown := sorted(set(values) - set(KEYS)):
+        if unknown := sorted(map(str, set(values) - set(KEYS))):
             raise ValueError(f"{', '.join(unknown)}: no such key of a D63's curve; known are {', '.join(KEYS)}")
         if missing := sorted({"serial", "date", "near"} - set(values)):
             raise ValueError(f"{', '.join(missing)}: missing in a D63's curve")

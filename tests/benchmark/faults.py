@@ -56,6 +56,7 @@ def main() -> int:
     parser = argparse.ArgumentParser()
     parser.add_argument("moments", nargs="?", type=int, default=1)
     parser.add_argument("--procedures", default=",".join(PROCEDURES))
+    parser.add_argument("--every", type=int, default=1, help="Try one of so many.")
     parser.add_argument("--processes", type=int, default=os.cpu_count())
     parser.add_argument("--out", type=Path, help="Add the cases to this file, a line of JSON each.")
     parser.add_argument("--page", action="store_true")
@@ -63,6 +64,7 @@ def main() -> int:
     wanted = [
         Case(p, r, w, seed) for p in asked.procedures.split(",") for r, w in FAULTS for seed in range(asked.moments)
     ]
+    wanted = wanted[:: asked.every]
     began = time.perf_counter()
     with TemporaryDirectory() as home:
         os.environ["RIG_HOME"] = home
