@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import os
+import select
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import asdict, replace
 from typing import Any, cast
 
@@ -27,6 +29,7 @@ from rig.record import Kept, Record
 from rig.runner import Outcome, Wish, resume, start
 from rig.seen import Sight, values
 
+LONGEST = 4096  # bytes of an answer, which a pipe hands over in one piece
 WISHES = Choice("interrupted", "What now?", choices=("resume", "repeat", "end"))
 
 
@@ -89,30 +92,40 @@ class Teller:
         choices = question.choices if isinstance(question, Choice) else yes_or_no
         attitude = asdict(drawn) if drawn else None
         asked = Asked(question.name, question.text, question.accepts, choices, proposed, attitude=attitude)
-        while True:
-            self.tell(phase=phase, asked=asked)
-            given = _heard(self._order.key)
-            try:
-                checked = question.checked(given["text"]) if given.get("name") == question.name else None
-            except BadAnswer as refused:
-                asked = replace(asked, refused=str(refused))
-                continue
-            if checked is not None:
-                self.tell(phase="running", asked=None)
-                return checked
+        with _pipe(self._order.key) as heard:  # open before it is said that something is asked
+            while True:
+                self.tell(phase=phase, asked=asked)
+                given = heard()
+                try:
+                    checked = question.checked(given["text"]) if given.get("name") == question.name else None
+                except BadAnswer as refused:
+                    asked = replace(asked, refused=str(refused))
+                    continue
+                if checked is not None:
+                    self.tell(phase="running", asked=None)
+                    return checked
 
     def _values(self) -> list[dict[str, Any]]:
         return [{**asdict(value), "near": value.near} for value in values(self._sight.seen)]
 
 
-def _heard(key: str) -> Mapping[str, str]:
-    """The next answer out of the pipe: waits until somebody writes one; a signal interrupts it."""
-    with file(key, "answers").open(encoding="utf-8") as pipe:
+@contextmanager
+def _pipe(key: str) -> Iterator[Callable[[], Mapping[str, str]]]:
+    """What gives the next answer: it waits until somebody writes one, and a signal interrupts it."""
+    pipe = os.open(file(key, "answers"), os.O_RDONLY | os.O_NONBLOCK)
+
+    def heard() -> Mapping[str, str]:
+        select.select([pipe], [], [])
         try:
-            document = json.loads(pipe.read())
+            document = json.loads(os.read(pipe, LONGEST))
         except ValueError:
             return {}
-    return document if isinstance(document, dict) else {}
+        return document if isinstance(document, dict) else {}
+
+    try:
+        yield heard
+    finally:
+        os.close(pipe)
 
 
 def main(text: str) -> None:
