@@ -1,0 +1,138 @@
+"""`python -m tests.benchmark.web`: the figures of the workbench in a real browser, one JSON document with targets.
+
+first page   from the server's address to the page that a newcomer reads; Chromium has been started before
+add          from the click on Add to the second bar of the falling error and the new residual, on 518 poses
+night        from the address of a 12-hour soak (43.2 million samples of one channel) to its curve
+memory       of server and page, while an hour of a soak is measured and watched
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+from urllib.parse import quote
+
+import numpy as np
+from playwright.sync_api import Browser, Page, expect, sync_playwright
+
+from procedures.session import Pose
+from rig.record import Block, Kept, Record
+from tests.browser.measured import hidden
+
+TARGETS = {"first_page_s": 1.0, "add_s": 1.5, "night_s": 1.0, "memory_growth_mb": 16.0}
+BLOCKS, IN_A_BLOCK, RATE_HZ = 4320, 10_000, 1000.0
+STEP_V = 20.0 / 65536
+BARS = "[aria-label^='The falling error'] .bars .point"
+CURVE = "[aria-label='the run over time'] .scatterlayer path"
+REPEATS = 3
+PATIENCE_MS = 120_000
+expect.set_options(timeout=PATIENCE_MS)
+
+
+def main() -> None:
+    with TemporaryDirectory() as folder, sync_playwright() as playwright:
+        os.environ["RIG_HOME"] = str(Path(folder) / "home")
+        browser = playwright.chromium.launch(
+            executable_path=shutil.which("chromium"),
+            args=["--no-sandbox", "--js-flags=--expose-gc", "--enable-precise-memory-info"],
+        )
+        browser.new_page().goto("about:blank")
+        figures = {"first_page_s": min(_first_page(browser) for _ in range(REPEATS))}
+        with _served() as (url, server):
+            page, origin = browser.new_page(), url.partition("/?")[0]
+            page.set_default_timeout(PATIENCE_MS)
+            page.goto(url)
+            figures["add_s"] = _add(page, origin, hidden(Path(folder), "package turned"))
+            night = f"{origin}/record/{_night()}"
+            figures["night_s"] = min(_timed(page, night, CURVE) for _ in range(REPEATS))
+            figures |= _memory(page, origin, server)
+        browser.close()
+    met = {name: figures[name] <= target for name, target in TARGETS.items()}
+    json.dump({"schema": "rig.benchmark/1", "figures": figures, "targets": TARGETS, "met": met}, sys.stdout, indent=1)
+    print()
+
+
+@contextmanager
+def _served() -> Iterator[tuple[str, subprocess.Popen[str]]]:
+    """A server: the address that it printed, and its process."""
+    server = subprocess.Popen([sys.executable, "-m", "rig", "web", "--json"], stdout=subprocess.PIPE, text=True)
+    assert server.stdout is not None
+    yield json.loads(server.stdout.readline())["url"], server
+    server.send_signal(signal.SIGTERM)
+    server.wait()
+
+
+def _first_page(browser: Browser) -> float:
+    with _served() as (url, _):
+        page = browser.new_page()
+        took = _timed(page, url, "text=Nothing is measured yet")
+        page.close()
+    return took
+
+
+def _add(page: Page, origin: str, data: str) -> float:
+    page.goto(f"{origin}/?data={quote(data)}")
+    add = page.get_by_role("button", name="Add axis-misalignment")
+    expect(add).to_be_enabled()
+    page.get_by_text("axis-misalignment", exact=True).nth(1).wait_for()
+    began = time.perf_counter()
+    add.click()
+    expect(page.locator(BARS)).to_have_count(2)
+    return time.perf_counter() - began
+
+
+def _night() -> str:
+    """Twelve hours of blocks in the record, as a soak keeps them; the run."""
+    rng = np.random.default_rng(1)
+    about: dict[str, Any] = {"bench": {"seed": 1}, "identities": {}, "configuration": "", "constants": {}, "source": ""}
+    with Record() as record:
+        run = record.begin("soak", {"oven_c": 0.0}, kind="still", **about)
+        for number in range(BLOCKS):
+            drift = 2.5 + 0.01 * np.exp(-number / 900)
+            volts = np.round((drift + 8e-4 * rng.standard_normal((IN_A_BLOCK, 1))) / STEP_V) * STEP_V
+            block = Block(volts, ("vx",), RATE_HZ, 10.0 * number)
+            record.keep(run, number, Kept(Pose(0, 0, 0, f"hold {number}"), block, 10.0 * number, 22.0), None)
+        record.set_state(run, "complete")
+    return run
+
+
+def _timed(page: Page, url: str, until: str) -> float:
+    began = time.perf_counter()
+    page.goto(url)
+    page.locator(until).first.wait_for()
+    return time.perf_counter() - began
+
+
+def _memory(page: Page, origin: str, server: subprocess.Popen[str]) -> dict[str, float]:
+    """Memory in MB when a tenth of the hour is measured, and at its end."""
+    page.goto(f"{origin}/run?procedure=soak&duration_s=3600&off_s=0")
+    expect(page.get_by_text("Takes", exact=True)).to_be_visible()
+    page.get_by_role("button", name="Start").click()
+    page.locator(CURVE).first.wait_for()
+    before = _used_mb(page, server.pid)
+    expect(page.locator(".chip").first).to_have_text("complete")
+    after = _used_mb(page, server.pid)
+    growth = max(after[name] - before[name] for name in after)
+    return {f"{name}_mb": round(value, 1) for name, value in after.items()} | {"memory_growth_mb": round(growth, 1)}
+
+
+def _used_mb(page: Page, server: int) -> dict[str, float]:
+    page.evaluate("() => { gc(); gc(); }")
+    heap = float(page.evaluate("() => performance.memory.usedJSHeapSize"))
+    status = Path(f"/proc/{server}/status").read_text(encoding="utf-8")
+    resident = next(line for line in status.splitlines() if line.startswith("VmRSS"))
+    return {"page": heap / 1e6, "server": int(resident.split()[1]) / 1e3}
+
+
+if __name__ == "__main__":
+    main()
