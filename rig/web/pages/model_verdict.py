@@ -39,7 +39,7 @@ class Verdict:
         self.floor.set_text(f"{plain(floor, 2)} {unit}")
         places = "; ".join(place.text for place in compared.fails[:MOST_PLACES])
         rows = f"{compared.fit.model.name} on {fit.table.n} {rows_of(fit.table)}"
-        self._tell(f"{rows}. Fails at {places}." if places else f"{rows}. It fails nowhere.")
+        self._tell(f"{rows}. Fails at {places}." if places else f"{rows}. No place stands out.")
 
     def wait(self, what: str) -> None:
         """The verdict is on its way."""

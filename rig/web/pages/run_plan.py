@@ -42,7 +42,8 @@ class Planning:
             self.fields = div("settings")
             self.attended = ui.switch("Ask me, even where the simulated rig could answer", value=not bench.simulated)
             self.attended.set_visibility(bench.simulated)
-            self.button = ui.button("Start", icon="play_arrow", on_click=self.start)
+            with div("row-of"):
+                self.button = ui.button("Start", icon="play_arrow", on_click=self.start)
 
     def lay_out_plan(self) -> None:
         """The plan's place on the page."""
