@@ -69,11 +69,9 @@ def main() -> int:
     with TemporaryDirectory() as home:
         os.environ["RIG_HOME"] = home
         with ProcessPoolExecutor(asked.processes) as pool:
-            done = list(pool.map(tried, wanted, chunksize=8))
+            done = [_kept(case, asked.out) for case in pool.map(tried, wanted)]
     if asked.out:
-        with asked.out.open("a") as file:
-            file.writelines(json.dumps(vars(case)) + "\n" for case in done)
-            done = [Case(**json.loads(line)) for line in asked.out.read_text().splitlines()]
+        done = [Case(**json.loads(line)) for line in asked.out.read_text(encoding="utf-8").splitlines()]
     if asked.page:
         write(done)
     broken = [case for case in done if case.end == BROKEN]
@@ -81,6 +79,14 @@ def main() -> int:
     for case in broken:
         print(f"{case.procedure}, {case.role}, {case.what}, seed {case.seed}: {case.why}", file=sys.stderr)
     return int(bool(broken))
+
+
+def _kept(case: Case, out: Path | None) -> Case:
+    """The case, in the file as soon as it is known: all of them take long."""
+    if out is not None:
+        with out.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(vars(case)) + "\n")
+    return case
 
 
 def write(done: list[Case]) -> None:
