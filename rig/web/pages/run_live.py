@@ -223,12 +223,15 @@ class Pictures:
         course = self.courses.get(str(self.kind.value or ""))
         if course is None or self.name.value not in course.names:
             return
-        figure = series(course, str(self.name.value))
+        self.lay_out().update_figure(series(course, str(self.name.value)))
+
+    def lay_out(self) -> ui.plotly:
+        """The picture's place, where it was not made yet: the browser can fetch what draws it meanwhile."""
         if self.plot is None:
             with self.place:
-                self.plot = ui.plotly(figure).classes("live-plot").props('aria-label="the run over time"')
-        else:
-            self.plot.update_figure(figure)
+                self.plot = ui.plotly({"data": [], "layout": {}}).classes("live-plot")
+                self.plot.props('aria-label="the run over time"')
+        return self.plot
 
 
 def _new(run: str, after: int) -> list[tuple[int, Any]]:

@@ -54,6 +54,8 @@ class OneRun:
             with box("stack"):
                 words("Over time", "title")
                 self.pictures = Pictures()
+                if run.bench:
+                    self.pictures.lay_out()
             with box("stack"):
                 words("How it was made", "title")
                 facts({name: str(value)[:SHOWN] for name, value in _made(run).items()})

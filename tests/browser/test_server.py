@@ -1,0 +1,53 @@
+"""Where the workbench listens, what it says of it, and how it ends."""
+
+from __future__ import annotations
+
+import json
+import socket
+import subprocess
+import sys
+import urllib.error
+import urllib.request
+
+import pytest
+from playwright.sync_api import Browser
+
+from tests.browser.conftest import Workbench
+
+WEB = [sys.executable, "-m", "rig", "web", "--no-open"]
+
+
+def test_a_port_that_is_taken_is_refused() -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        words = [*WEB, "--port", str(port)]
+        ended = subprocess.run(words, check=False, capture_output=True, text=True, timeout=60)
+    assert ended.returncode == 2
+    assert f"cannot listen at 127.0.0.1:{port}: Address already in use; name another --port" in ended.stderr
+
+
+def test_another_host_is_warned_of_and_has_a_token_as_well() -> None:
+    words = [*WEB, "--json", "--host", "127.0.0.2"]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as server:
+        assert server.stdout is not None
+        assert server.stderr is not None
+        said = json.loads(server.stdout.readline())
+        assert said["url"].startswith(f"http://127.0.0.2:{said['port']}/?token=")
+        with pytest.raises(urllib.error.HTTPError) as refused:
+            urllib.request.urlopen(f"http://127.0.0.2:{said['port']}/")
+        assert refused.value.code == 401
+        refused.value.close()
+        server.terminate()
+        assert server.wait(20) == 0
+        assert "Listening at 127.0.0.2: other machines can reach the workbench" in server.stderr.read()
+
+
+def test_a_wrong_token_is_refused_in_the_browser(browser: Browser, workbench: Workbench) -> None:
+    page = browser.new_context().new_page()
+    answer = page.goto(f"{workbench.origin}/?token=wrong")
+    assert answer is not None
+    assert answer.status == 401
+    assert "Open the address that `rig web` printed" in page.inner_text("body")
+    page.context.close()
