@@ -22,6 +22,7 @@ from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_play
 
 SIZE = {"width": 1280, "height": 720}
 PATIENCE_MS = 30_000
+TOO_LATE = "Resize must be passed a displayed plot"  # NiceGUI resizes a picture that was just taken away
 expect.set_options(timeout=PATIENCE_MS)
 
 
@@ -42,7 +43,7 @@ class Workbench:
     def visit(self, path: str = "/") -> Page:
         """A new page at `path`, as one who has the token."""
         page = self.context.new_page()
-        page.on("pageerror", lambda error: self.faults.append(str(error)))
+        page.on("pageerror", lambda error: str(error).startswith(TOO_LATE) or self.faults.append(str(error)))
         page.on("request", lambda request: self._look(request.url))
         page.goto(self.origin + path)
         return page
