@@ -27,7 +27,7 @@ SHORT: dict[str, dict[str, str]] = {  # settings with which a procedure is short
     "temperature-cycle": {"dwell_s": "0.2", "temperatures_c": "40,50", "soak_s": "600"},
     "soak": {"duration_s": "400", "interval_s": "200", "block_s": "20", "dwell_s": "0.2", "settle_s": "0.1"},
     "motion": {"duration_s": "4", "still_s": "4", "block_s": "2", "dwell_s": "0.1", "settle_s": "0"},
-    "magnetometer-turn": {"step_deg": "120", "mounts": "1", "over": "false", "dwell_s": "0.2", "settle_s": "0.1"},
+    "magnetometer-turn": {"step_deg": "45", "mounts": "1", "over": "false", "dwell_s": "0.2", "settle_s": "0.1"},
     "rate-turn": {"rates_deg_s": "40", "mounts": "1", "turn_deg": "90", "rest_s": "1"},
     "repeat": {"times": "2", "dwell_s": "0.2", "power": "false", "mount": "false"},
 }
