@@ -18,7 +18,7 @@ from calibrations.fit import Fit, evaluate, fit
 from calibrations.model import Model
 from calibrations.noise import rms
 from calibrations.search.candidates import SIGNIFICANT
-from calibrations.search.share import MATERIAL
+from calibrations.search.share import MATERIAL, MOST_NOISE
 from calibrations.table import MILLI, Array, Table
 
 MOST_PLACES = 8
@@ -133,10 +133,14 @@ def _fails(found: Fit) -> list[Place]:
 
 
 def _by_noise(found: Fit) -> Array:
-    """The residual over its noise, (channels, n): rows made independent where the slow noise is known beforehand."""
+    """The residual over its noise, (channels, n): rows made independent where the slow noise is known beforehand.
+
+    Slow noise that was only found in the residual counts as far as a sensor may have it: beyond, it is the model's error.
+    """
     if found.noise.given:
         return found.whitened[:, 0].reshape(found.residual.shape)
-    own = np.hypot(found.noise.floor, found.noise.slow) if found.noise.known else found.noise.floor
+    slow = np.minimum(found.noise.slow, MOST_NOISE * found.noise.floor)
+    own = np.hypot(found.noise.floor, slow) if found.noise.known else found.noise.floor
     return np.asarray(found.residual / own[:, None])
 
 

@@ -21,9 +21,9 @@ from calibrations.search.candidates import SIGNIFICANT
 from calibrations.search.outliers import told
 from calibrations.search.patterns import Pattern, one_sided, patterns, per_channel
 from calibrations.search.screen import Screen, Search
+from calibrations.search.share import MOST_NOISE
 from calibrations.table import Array
 
-MOST_NOISE = 2.5  # times the noise floor: more than white and slow noise of a sensor alone
 MOST_OUT = 1 / 10  # of the poses: more do not stand out
 FINALISTS = 6  # patterns that are sharpened
 NAMED = 6  # poses that are told one by one

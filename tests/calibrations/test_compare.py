@@ -65,3 +65,13 @@ def test_a_model_with_values_is_taken_as_it_is() -> None:
     assert not found.adequate
     assert found.fit.rmse[0] == pytest.approx(0.001, rel=0.05)
     assert compare(table(0.001), read_model("linear")).adequate
+
+
+def test_so_few_poses_that_any_misfit_could_be_slow_noise_are_no_excuse() -> None:
+    """No noise of a sensor's own is a hundred times that of its means."""
+    columns = synthetic.turns((90, 45), step_deg=60)
+    x, y, z = synthetic.components(columns)
+    few = synthetic.poses(columns, 2.5 + x + 0.02 * y + 0.01 * z**2, 2.5 + y - 0.03 * x)
+    found = compare(few, read_model("linear"))
+    assert np.all(found.fit.excess > 100)
+    assert not found.adequate
