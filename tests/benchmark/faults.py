@@ -104,7 +104,7 @@ def _between(text: str, marks: tuple[str, str], new: str) -> str:
 
 def table(done: list[Case]) -> str:
     """Faults by driver, in rows, against procedures: the letters of how each run ended, the most frequent first."""
-    procedures = sorted({case.procedure for case in done})
+    procedures = PROCEDURES
     rows: dict[tuple[str, str], dict[str, Counter[str]]] = {}
     for case in done:
         row = rows.setdefault((DRIVERS[case.role], case.what), {})

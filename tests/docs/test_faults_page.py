@@ -1,0 +1,22 @@
+"""docs/faults.md names every fault that can be asked for, and has a table of what became of each."""
+
+from __future__ import annotations
+
+import re
+
+from tests.benchmark.faults import DRIVERS, PAGE, TABLE, kinds
+from tests.rig.enduring import FAULTS, PROCEDURES
+
+TEXT = PAGE.read_text(encoding="utf-8")
+
+
+def test_every_fault_is_named_with_what_it_does() -> None:
+    assert kinds() in TEXT, "make it anew: python -m tests.benchmark.faults --page 0"
+
+
+def test_no_fault_of_any_procedure_was_broken_when_the_table_was_made() -> None:
+    made = TEXT.partition(TABLE[0])[2].partition(TABLE[1])[0]
+    assert re.search(r"^\d+ runs: .*, 0 BROKEN\.$", made, re.MULTILINE)
+    rows = re.findall(r"^\| (\w+) \| ([\w-]+) \| (.*) \|$", made, re.MULTILINE)[1:]
+    assert {(driver, what) for driver, what, _ in rows} == {(DRIVERS[role], what) for role, what in FAULTS}
+    assert all(len(cells.split("|")) == len(PROCEDURES) for *_, cells in rows)
