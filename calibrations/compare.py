@@ -135,7 +135,7 @@ def _fails(found: Fit) -> list[Place]:
 def _by_noise(found: Fit) -> Array:
     """The residual over its noise, (channels, n): rows made independent where the slow noise is known beforehand.
 
-    Slow noise that was only found in the residual counts as far as a sensor may have it: beyond, it is the model's error.
+    Slow noise that was only found in the residual counts as far as a sensor may have it; beyond, it is a misfit.
     """
     if found.noise.given:
         return found.whitened[:, 0].reshape(found.residual.shape)
