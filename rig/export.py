@@ -19,7 +19,7 @@ from uuid import NAMESPACE_URL, uuid5
 
 from calibrations.reading.read_csv import write_csv
 from calibrations.table import Table
-from rig.data import load
+from rig.analysis.data import load
 from rig.errors import ExportError
 from rig.record import Record, Run
 from rig.record.measured import table_of

@@ -24,10 +24,10 @@ from rig.drawings import drawing_of
 from rig.errors import Stopped
 from rig.home import home
 from rig.lease import lease
-from rig.plan import Plan
+from rig.planning.plan import Plan
 from rig.record import Kept, Record
-from rig.runner import Outcome, Wish, resume, start
-from rig.seen import Sight, values
+from rig.running.runner import Outcome, Wish, resume, start
+from rig.running.seen import Sight, values
 
 LONGEST = 4096  # bytes of an answer, which a pipe hands over in one piece
 WISHES = Choice("interrupted", "What now?", choices=("resume", "repeat", "end"))

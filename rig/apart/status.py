@@ -33,7 +33,7 @@ class Asked:
 
 @dataclass(frozen=True)
 class Status:
-    """`values` are keywords of `rig.seen.Value`, with `near`. `state` is the run's once it has ended.
+    """`values` are keywords of `rig.running.seen.Value`, with `near`. `state` is the run's once it has ended.
 
     `error`: why it is paused, or why it did not end as it should. `moving`: what could not be stopped.
     """

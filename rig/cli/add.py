@@ -49,10 +49,10 @@ def command(
     from calibrations.discover import add
     from calibrations.documents import discovery_document
     from calibrations.errors import ModelError
+    from rig.analysis.trail import require_new
     from rig.cli.asked import asked, write_model
     from rig.cli.still import of_still, told_add
     from rig.cli.words import addition, parameters, warning
-    from rig.trail import require_new
 
     if (still := of_still(data, model, bench_file, sampled, out, noise=noise)) is not None:
         told_add(still, effect, out, as_json, data)

@@ -11,11 +11,11 @@ from calibrations.model import Model
 from calibrations.model_file import dump_model
 from calibrations.still.fit import NoiseFit
 from calibrations.table import Table
-from rig.asked import asked as read_asked
-from rig.asked import blind
+from rig.analysis.asked import asked as read_asked
+from rig.analysis.asked import blind
+from rig.analysis.provenance import with_provenance
 from rig.cli.output import note
 from rig.files import require_out, write_whole
-from rig.provenance import with_provenance
 
 
 def asked(

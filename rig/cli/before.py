@@ -15,11 +15,11 @@ from rich.text import Text
 
 from procedures.catalogue import Procedure
 from rig.bench import Bench
-from rig.certificates import expired
+from rig.bench.certificates import expired
 from rig.drawings import Attitude, drawing_of, sketch
 from rig.numerals import duration, size
-from rig.plan import Plan
-from rig.stretches import stretches
+from rig.planning.plan import Plan
+from rig.planning.stretches import stretches
 
 FACTS = re.compile(r"^(Excites|Blind to)\s+(.*(?:\n\s+.*)*)", re.MULTILINE)
 MOST_STRETCHES = 6

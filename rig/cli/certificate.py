@@ -51,9 +51,9 @@ def command(
     from calibrations.certificates.results import figures
     from calibrations.fit import fit
     from calibrations.model_file import read_model
-    from rig.asked import asked
+    from rig.analysis.asked import asked
+    from rig.analysis.issue import Asked, issue, limits
     from rig.bench import read_bench
-    from rig.issue import Asked, issue, limits
 
     paths = _paths(out)
     table, given, effects = asked(data, model, bench_file, note)

@@ -10,9 +10,9 @@ import click
 
 from drivers.instrument import Check, Identity
 from rig.bench import DEFAULT, read_bench
-from rig.certificates import EXPIRED, certificates, expired
+from rig.bench.certificates import EXPIRED, certificates, expired
 from rig.cli.output import bench_option, columns, emit, json_option, notes
-from rig.instruments import checked
+from rig.connected.instruments import checked
 
 NOT_MET, FAILED = 1, 3
 

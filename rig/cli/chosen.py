@@ -13,8 +13,8 @@ from click import wrap_text
 
 from rig.cli.output import columns
 from rig.numerals import duration
-from rig.optimal import AGAIN, CHECK, DESIGN, Optimal, most_relative, relative
-from rig.sweep_range import Judged
+from rig.planning.optimal import AGAIN, CHECK, DESIGN, Optimal, most_relative, relative
+from rig.planning.sweep_range import Judged
 
 HEAD = ("", "standard sweep", "chosen, same dwell", "chosen, same error")
 

@@ -61,9 +61,9 @@ def command(
     from calibrations.compensation.residual import residual
     from calibrations.compensation.vectors import vectors
     from calibrations.model_file import dump_model, read_model
-    from rig.asked import effects_of
+    from rig.analysis.asked import effects_of
+    from rig.analysis.provenance import program, today
     from rig.files import write_whole
-    from rig.provenance import program, today
 
     if picture is not None and data is None:
         raise click.UsageError("--picture draws what --data shows: give --data DATA")
@@ -74,7 +74,7 @@ def command(
     files = _writer(language)(made, origin, vectors(made))
     beside = None
     if data is not None:
-        from rig.data import load
+        from rig.analysis.data import load
 
         beside = residual(made, load(data, tell=note))
     _folder(out)

@@ -9,9 +9,9 @@ import click
 
 from calibrations.evaluations.control_chart import BASELINE, FEWEST
 from calibrations.model import Estimate
+from rig.analysis.control import Controlled, controlled
 from rig.cli.output import columns, emit, json_option
 from rig.cli.words import with_uncertainty
-from rig.control import Controlled, controlled
 from rig.record import Record
 
 OUT = "out of control"

@@ -28,15 +28,15 @@ def command(folder: Path, as_json: bool) -> None:
     from calibrations.reports.report import report
     from procedures.catalogue import find
     from procedures.settings import parse
+    from rig.analysis.data import load
+    from rig.analysis.provenance import program, today
     from rig.bench import read_bench
     from rig.cli.asked import write_model
     from rig.cli.watch import watching
     from rig.cli.words import discovery, errors
-    from rig.data import load
     from rig.files import write_whole
-    from rig.provenance import program, today
     from rig.record import Record
-    from rig.runner import start
+    from rig.running.runner import start
 
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -51,7 +51,7 @@ def command(
     from rig.cli.own_effect import own_effect, told
     from rig.cli.still import of_still, told_diagnose
     from rig.cli.words import warning
-    from rig.foresight import with_next
+    from rig.planning.foresight import with_next
 
     if (still := of_still(data, model, bench_file, sampled, noise=noise)) is not None:
         return told_diagnose(still, model, bench_file, check, as_json, data)

@@ -80,12 +80,12 @@ def _discover(
 ) -> int:
     from calibrations.discover import discover
     from calibrations.documents import discovery_document
-    from rig.asked import with_known_noise
+    from rig.analysis.asked import with_known_noise
+    from rig.analysis.several import load_all
     from rig.cli.asked import asked, write_model
     from rig.cli.own_effect import own_effect, told
     from rig.cli.words import discovery, parameters, warning
-    from rig.foresight import with_next
-    from rig.several import load_all
+    from rig.planning.foresight import with_next
 
     table, start, effects = asked(data[0], model, bench_file, out, noise)
     table = with_known_noise(load_all(data, note), noise, effects) if len(data) > 1 else table

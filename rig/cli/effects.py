@@ -17,7 +17,7 @@ def command(effect: str | None, bench_file: Path | None, as_json: bool) -> None:
     """List the catalogue of physical effects, or show one EFFECT in full."""
     from calibrations.compensation.forward import at_run_time
     from calibrations.effect import Effect, find
-    from rig.asked import effects_of
+    from rig.analysis.asked import effects_of
 
     known = effects_of(bench_file)
 

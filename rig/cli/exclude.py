@@ -21,8 +21,8 @@ def command(run: str, pose: int, reason: str | None, include: bool, as_json: boo
     """
     if include == bool(reason and reason.strip()):
         raise click.UsageError("say why the pose is left out (--reason TEXT), or take it in again (--include)")
+    from rig.analysis.exclusion import RESULTS, exclude
     from rig.cli.verdicts import lines
-    from rig.exclusion import RESULTS, exclude
     from rig.record import Record
 
     with Record.to_find(run) as record:

@@ -24,11 +24,11 @@ from rig.cli.screen import screen
 from rig.drawings import Attitude, drawing_of, page
 from rig.files import write_whole
 from rig.home import home
-from rig.plan import Plan
+from rig.planning.plan import Plan
 from rig.record import Kept
 from rig.room import free_bytes
-from rig.runner import Outcome, Wish
-from rig.seen import Sight
+from rig.running.runner import Outcome, Wish
+from rig.running.seen import Sight
 
 BEGIN = Choice("begin", "Begin?", choices=("go", "cancel"))
 GO_ON = Choice("interrupted", "What now?", choices=("resume", "repeat", "end"))

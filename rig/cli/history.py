@@ -9,9 +9,9 @@ from typing import Any
 import click
 
 from calibrations.evaluations.control_chart import BASELINE, FEWEST
+from rig.analysis.history import History, Limit, closest, compare, compare_rigs, history, stale
 from rig.cli.history_words import Compared, compared_lines, document, lines, near_lines
 from rig.cli.output import bench_option, emit, json_option
-from rig.history import History, Limit, closest, compare, compare_rigs, history, stale
 from rig.record import Record
 
 DAY = click.DateTime(["%Y-%m-%d"])
@@ -52,7 +52,7 @@ def command(
     --limit. Exit status 1: stale at --at, or a comparison that does not agree.
     """
     from calibrations.model_file import read_model
-    from rig.asked import effects_of
+    from rig.analysis.asked import effects_of
 
     read = read_model(model, effects_of(bench_file))
     limits = _limits(bench_file, given)

@@ -8,9 +8,9 @@ from typing import Any
 from calibrations.evaluations.agreement import Agreement
 from calibrations.evaluations.stability import YEAR_DAYS
 from calibrations.model import Estimate
+from rig.analysis.history import Calibration, History, Quantity
 from rig.cli.output import columns, note
 from rig.cli.words import with_uncertainty
-from rig.history import Calibration, History, Quantity
 
 Compared = list[tuple[str, str, dict[str, tuple[str, Agreement]]]]  # one, other, and what they come to
 NO_LIMIT = "When the next calibration is due needs a limit: --limit bias-x=0.005, or limits.results of the bench file."

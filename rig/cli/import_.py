@@ -28,7 +28,7 @@ def command(file: Path, kind: str | None, mapped: tuple[str, ...], given: tuple[
     from calibrations.reading.separated import sheet
     from calibrations.reading.text_file import text_file
     from calibrations.reading.units import Mapped
-    from rig.data import averaged
+    from rig.analysis.data import averaged
     from rig.record import Record
 
     laid, columns, constants = sheet(text_file(file)), [Mapped.parse(m) for m in mapped], _constants(given)

@@ -16,19 +16,19 @@ from calibrations.reports.words import joined
 from calibrations.table import Table
 from procedures.catalogue import find
 from procedures.settings import parse
-from rig.asked import effects_of
+from rig.analysis.asked import effects_of
+from rig.analysis.several import begun, joined_runs
 from rig.bench import Bench, read_bench
 from rig.cli.asked import write_model
 from rig.cli.output import emit, note, notes
 from rig.cli.watch import watching
 from rig.cli.words import discovery, parameters, warning
 from rig.files import require_out
-from rig.live import FIRST, STANDARD, Live, Measurement, stands
 from rig.numerals import duration
 from rig.record import Record
 from rig.record.measured import Measured
-from rig.runner import start
-from rig.several import begun, joined_runs
+from rig.running.live import FIRST, STANDARD, Live, Measurement, stands
+from rig.running.runner import start
 
 
 @dataclass

@@ -44,9 +44,9 @@ def command(
     from calibrations.noise_analysis.analysis import analyse
     from calibrations.noise_analysis.asked_times import KIND, curve_at
     from calibrations.noise_analysis.document import noise_document
+    from rig.analysis.still import stream
     from rig.cli.noise_words import remarks, summary
     from rig.record.store import Record
-    from rig.still import stream
 
     with nullcontext() if Path(data).exists() or data.endswith(".npy") else Record.to_find(data) as record:
         samples = stream(record, data, channel, rate_hz)

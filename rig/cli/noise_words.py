@@ -8,9 +8,9 @@ import numpy as np
 
 from calibrations.noise_analysis.analysis import Coefficient, NoiseAnalysis
 from calibrations.numerals import exponent
+from rig.analysis.still import Stream, repairs
 from rig.cli.output import columns
 from rig.numerals import duration
-from rig.still import Stream, repairs
 
 PREFIXES = ((1.0, ""), (1e3, "m"), (1e6, "u"), (1e9, "n"), (1e12, "p"))
 MEANS = {

@@ -20,8 +20,8 @@ from rig.cli.output import bench_option, emit, json_option, model_option
 from rig.cli.settings import PASS_ON, read_settings, settings_arguments
 from rig.errors import BeyondLimits
 from rig.numerals import duration, size
-from rig.plan import Plan, plan
-from rig.stretches import Stretch, stretches
+from rig.planning.plan import Plan, plan
+from rig.planning.stretches import Stretch, stretches
 
 FEW_STEPS = 120  # that are read through rather than summed up
 HEAD, TAIL = 14, 4  # stretches of a long plan that are shown
@@ -104,7 +104,7 @@ def _optimal(bench: Bench, procedure: Procedure, settings: Mapping[str, Any], as
     from calibrations.effect import catalogue
     from calibrations.model_file import read_model
     from rig.cli.chosen import document, lines
-    from rig.optimal import optimal as chosen
+    from rig.planning.optimal import optimal as chosen
 
     if procedure.name != "sweep" or settings["pose_list"]:
         raise click.UsageError("--optimal chooses the poses of a sweep over a grid")

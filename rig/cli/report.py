@@ -36,8 +36,8 @@ def command(
     if out is None and folder is None:
         raise click.UsageError("nothing to write: give --out FILE.html, --pictures FOLDER, or both")
     from calibrations.pictures.save import save_all
+    from rig.analysis.reported import reported
     from rig.files import require_out, write_whole
-    from rig.reported import reported
 
     if out is not None:
         require_out(out, data, model, bench_file)

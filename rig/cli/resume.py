@@ -11,7 +11,7 @@ from rig.bench import Bench, read_bench
 from rig.cli.output import bench_option, json_option
 from rig.cli.watch import tell, trace_option, watch_options, watching
 from rig.record import Record
-from rig.runner import Outcome, resume
+from rig.running.runner import Outcome, resume
 
 
 @click.command("resume")

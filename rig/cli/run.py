@@ -13,7 +13,7 @@ from rig.cli.output import bench_option, json_option
 from rig.cli.settings import PASS_ON, read_settings, settings_arguments
 from rig.cli.watch import tell, trace_option, watch_options, watching
 from rig.record import Record
-from rig.runner import start
+from rig.running.runner import start
 
 
 @click.command("run", context_settings=PASS_ON)

@@ -12,7 +12,7 @@ from rich.text import Text
 
 from rig.cli.gauge import STYLES, gauge
 from rig.numerals import duration
-from rig.seen import Seen, Value, values
+from rig.running.seen import Seen, Value, values
 
 Row = tuple[RenderableType, ...]
 

@@ -8,16 +8,16 @@ from typing import Any
 import click
 
 from calibrations.errors import CalibrationError
-from rig.certificates import EXPIRED
+from rig.analysis.next_steps import next_steps
+from rig.analysis.sensors import lives
+from rig.bench.certificates import EXPIRED
 from rig.cli.output import columns, emit, json_option
 from rig.cli.verdicts import lines as results
 from rig.errors import RecordError
-from rig.next_steps import next_steps
 from rig.numerals import duration
 from rig.record import Event, Kept, Line, Record, Run
 from rig.record.digest import digest_of
 from rig.record.measured import Measured, sensors_of
-from rig.sensors import lives
 
 Ranges = Mapping[str, tuple[float, float]]
 

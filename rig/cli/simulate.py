@@ -18,8 +18,8 @@ from drivers.links.person import PERSON
 from drivers.links.server import Server
 from rig.bench import Bench, read_bench
 from rig.cli.output import bench_option, columns, json_option, note
+from rig.connected.wiring import serve, world_of
 from rig.errors import BenchError
-from rig.wiring import serve, world_of
 
 
 @click.command("simulate")

@@ -18,12 +18,12 @@ from calibrations.still.documents import (
     fit_document,
 )
 from calibrations.still.fit import fit
-from rig.asked_still import AskedStill, asked_still
+from rig.analysis.asked_still import AskedStill, asked_still
 from rig.cli.asked import write_model
 from rig.cli.output import Sampled, emit, note
 from rig.cli.still_words import added, compared, diagnosed, discovered, fitted
 from rig.files import require_out
-from rig.foresight import with_noise_next
+from rig.planning.foresight import with_noise_next
 
 
 def of_still(

@@ -15,16 +15,16 @@ from procedures.catalogue import Procedure
 from procedures.errors import BadAnswer, NoAnswer
 from procedures.questions import Question
 from procedures.session import Reading
+from rig.analysis.next_steps import next_steps
 from rig.bench import Bench
-from rig.certificates import EXPIRED
+from rig.bench.certificates import EXPIRED
 from rig.cli.output import emit, note, notes
 from rig.cli.verdicts import lines as results
-from rig.next_steps import next_steps
-from rig.plan import Plan
+from rig.planning.plan import Plan
 from rig.record import Kept, Record
-from rig.runner import Outcome, Watch, Wish
-from rig.soak_forecast import SoakWatch, soak_watch
-from rig.soak_forecast import lines as told_lines
+from rig.running.runner import Outcome, Watch, Wish
+from rig.running.soak_forecast import SoakWatch, soak_watch
+from rig.running.soak_forecast import lines as told_lines
 
 trace_option = click.option("--trace", is_flag=True, help="Log every message to and from instruments.")
 

@@ -12,7 +12,7 @@ from rig.record import Record, Run
 from rig.record.store import FILE
 
 if TYPE_CHECKING:
-    from rig.trail import Trail
+    from rig.analysis.trail import Trail
 
 MOST_OPEN = 6  # trails that are kept: each holds its data
 MODELS = "models"  # the folder in the home where the workbench saves models
@@ -29,7 +29,7 @@ class Desk:
 
     def open(self, data: str, model: str) -> Trail:
         """The trail that lies open, or a new one; `model` "" is the one by default. Raises what `trail` raises."""
-        from rig.trail import trail
+        from rig.analysis.trail import trail
 
         found = self.trails.get((data, model)) or trail(data, model or None, self.bench_file)
         self.keep(data, model, found)

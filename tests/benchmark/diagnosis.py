@@ -8,7 +8,7 @@ import sys
 from calibrations.diagnose import diagnose
 from calibrations.model_file import read_model
 from calibrations.table import Table
-from rig.data import load
+from rig.analysis.data import load
 from tests.benchmark.timed import seconds
 
 

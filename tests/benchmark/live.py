@@ -19,7 +19,7 @@ from calibrations.model_file import read_model
 from drivers.simulation.config import WorldConfig
 from drivers.simulation.defects import DEFECTS
 from rig.bench import read_bench
-from rig.live import STANDARD, Live, stands
+from rig.running.live import STANDARD, Live, stands
 from tests.hidden import rigs
 from tests.hidden.quick_rig import QuickRig
 from tests.hidden.test_hidden_defects import NAMES

@@ -26,8 +26,8 @@ from procedures.catalogue import find
 from procedures.session import Pose
 from procedures.settings import parse
 from rig.bench import read_bench
-from rig.optimal import Optimal, optimal
-from rig.sweep_range import Judged
+from rig.planning.optimal import Optimal, optimal
+from rig.planning.sweep_range import Judged
 from tests.hidden import rigs
 
 STAGES = {"speed_deg_s": 30.0, "acceleration_deg_s2": 60.0}  # of the embedded bench

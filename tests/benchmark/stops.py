@@ -23,10 +23,10 @@ from drivers.links.faults import Fault
 from drivers.links.wire_faults import faults_of
 from drivers.oriental_az_twin import Drive
 from rig.bench import read_bench
-from rig.guard import GuardedClock
-from rig.instruments import Rig
-from rig.signals import stoppable
-from rig.wiring import Wiring, serve, world_of
+from rig.connected.guard import GuardedClock
+from rig.connected.instruments import Rig
+from rig.connected.wiring import Wiring, serve, world_of
+from rig.running.signals import stoppable
 from tests.rig.misbehaving import guarded_bench
 
 TARGET_S = 0.1

@@ -23,11 +23,11 @@ from calibrations.reading.text_file import text, text_file
 from calibrations.reading.yaml_file import load_yaml
 from drivers.philtec_d63 import Curve
 from procedures.session import Pose
+from rig.analysis.still import stream
 from rig.bench import DEFAULT, read_bench
 from rig.errors import RigError
 from rig.record import Kept, Record, codec
 from rig.record.recover import recover
-from rig.still import stream
 from tests.fuzz.target import Target
 from tests.rig.test_store import begin, block
 

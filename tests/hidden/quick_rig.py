@@ -16,7 +16,7 @@ from procedures.catalogue import find
 from procedures.session import Pose
 from procedures.settings import parse
 from rig.bench import Bench
-from rig.plan import plan
+from rig.planning.plan import plan
 
 CONSTANTS = {"sample_rate_hz": 1000.0, "filter_corner_hz": 15.07}
 OFF_C = 0.0  # an oven that only heats does nothing

@@ -16,7 +16,7 @@ from calibrations.model_file import read_model
 from drivers.simulation.config import WorldConfig
 from drivers.simulation.defects import DEFECTS
 from rig.bench import read_bench
-from rig.next_experiment import proposed
+from rig.planning.next_experiment import proposed
 from tests.hidden.quick_rig import QuickRig
 
 IDEAL = WorldConfig.ideal()

@@ -20,7 +20,7 @@ from rig.bench import read_bench
 from rig.cli.watch import Quiet
 from rig.record import Record
 from rig.record.measured import table_of
-from rig.runner import start
+from rig.running.runner import start
 from tests.hidden import rigs
 
 

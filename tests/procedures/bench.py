@@ -15,7 +15,7 @@ from drivers.simulation.trajectory import Trajectory
 from drivers.simulation.world import World
 from procedures.questions import Mounting, Question
 from procedures.session import Dwell, Limits, Pose, Reading, Samples, Session
-from rig.planned import PlannedTurn
+from rig.planning.planned import PlannedTurn
 from rig.record.values import Block, Kept
 
 CHANNELS = ("vx", "vy", "supply")

@@ -10,7 +10,7 @@ import pytest
 from procedures.catalogue import find, paths
 from procedures.settings import parse
 from rig.bench import read_bench
-from rig.plan import plan
+from rig.planning.plan import plan
 
 NAMES = list(paths())
 

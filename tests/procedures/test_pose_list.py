@@ -12,7 +12,7 @@ from procedures.pose_list import listed, written
 from procedures.session import Pose
 from procedures.settings import parse
 from rig.bench import read_bench
-from rig.plan import plan
+from rig.planning.plan import plan
 
 POSES = [Pose(90, 45, 1, "design"), Pose(90, 45, 1, "design"), Pose(-37.5, 0, -1, "check"), Pose(0, 350, 0, "", 90, 1)]
 

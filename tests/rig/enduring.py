@@ -20,7 +20,7 @@ from procedures.session import Reading
 from rig.bench import Bench
 from rig.cli.failure import status_of
 from rig.record import Kept, Record
-from rig.runner import Outcome, resume
+from rig.running.runner import Outcome, resume
 from tests.rig.misbehaving import (
     STRETCHES,
     Aftermath,

@@ -12,9 +12,9 @@ from drivers.links.faults import Fault
 from procedures.catalogue import find
 from procedures.settings import parse
 from rig.bench import Bench, read_bench
-from rig.instruments import Rig
+from rig.connected.instruments import Rig
 from rig.record import Record
-from rig.runner import Outcome, start
+from rig.running.runner import Outcome, start
 from tests.rig.rigging import Onlooker
 
 STAGES = ("alpha", "beta")

@@ -12,7 +12,7 @@ import pytest
 import yaml
 
 from rig.bench import DEFAULT, Bench
-from rig.certificates import certificates, expired
+from rig.bench.certificates import certificates, expired
 
 Rig = Callable[..., Any]
 OLD, GOOD = {"number": "CAL-17", "due": "2001-03-01"}, {"number": 42, "due": "2999-12-31"}

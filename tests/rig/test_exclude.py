@@ -9,11 +9,11 @@ from typing import Any
 
 import pytest
 
-from rig.exclusion import RESULTS, exclude
+from rig.analysis.exclusion import RESULTS, exclude
 from rig.lease import lease
 from rig.record import Record
 from rig.record.measured import table_of
-from rig.runner import resume, start
+from rig.running.runner import resume, start
 from tests.rig.rigging import POSES, Onlooker, in_own_process, signal_at, small_sweep
 
 Rig = Callable[..., Any]

@@ -9,7 +9,7 @@ import pytest
 
 from calibrations.errors import DataError
 from calibrations.reading.read_csv import write_csv
-from rig.data import load
+from rig.analysis.data import load
 from tests.calibrations.synthetic import components, poses, turns
 from tests.rig.conftest import Ended
 

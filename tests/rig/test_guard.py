@@ -13,9 +13,9 @@ from drivers.errors import DriverError, OverTemperature
 from drivers.links.faults import Fault
 from drivers.oriental_az_twin import Drive
 from rig.cli.failure import status_of
-from rig.guard import AT_ONCE_S, GuardedClock, Look
+from rig.connected.guard import AT_ONCE_S, GuardedClock, Look
 from rig.record import Record
-from rig.runner import resume
+from rig.running.runner import resume
 from tests.rig.misbehaving import afflicted, digest, guarded_bench, looking_on, short, watched_bench
 from tests.rig.rigging import Onlooker
 

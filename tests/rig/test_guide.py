@@ -27,12 +27,12 @@ from rig.cli.watch import Quiet, watching
 from rig.drawings import Attitude, page
 from rig.errors import Stopped
 from rig.numerals import duration, size
-from rig.plan import Plan, plan
+from rig.planning.plan import Plan, plan
 from rig.record import Block, Kept
 from rig.room import free_bytes
-from rig.runner import Outcome
-from rig.seen import Seen, nearness
-from rig.way import Way
+from rig.running.runner import Outcome
+from rig.running.seen import Seen, nearness
+from rig.running.way import Way
 from tests.rig.rigging import POSES, small_sweep
 
 TODAY = date(2026, 11, 21)

@@ -12,8 +12,8 @@ import pytest
 
 from calibrations.model_file import read_model
 from calibrations.table import Table
+from rig.analysis.history import Calibration, Value, compare_rigs, history
 from rig.errors import RecordError
-from rig.history import Calibration, Value, compare_rigs, history
 from rig.record import Record
 from tests.calibrations.synthetic import components, poses, turns
 

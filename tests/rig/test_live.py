@@ -15,9 +15,9 @@ from calibrations.effect import catalogue
 from calibrations.experiment import Experiment
 from calibrations.model_file import read_model
 from rig.bench import read_bench
-from rig.live import FIRST, Live, Measurement, stands
 from rig.record import Record
 from rig.record.measured import table_of
+from rig.running.live import FIRST, Live, Measurement, stands
 from tests.hidden.quick_rig import QuickRig
 from tests.hidden.rigs import IDEAL
 from tests.rig.conftest import Ended

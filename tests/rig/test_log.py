@@ -12,8 +12,8 @@ import pytest
 from drivers.links.faults import Fault
 from rig.bench import read_bench
 from rig.record import Record
-from rig.runner import resume, start
-from rig.trace import SHOWN_BYTES, shown
+from rig.running.runner import resume, start
+from rig.running.trace import SHOWN_BYTES, shown
 from tests.rig.misbehaving import afflicted
 from tests.rig.rigging import POSES, Onlooker, small_sweep
 

@@ -18,10 +18,10 @@ from procedures.questions import Question
 from procedures.settings import parse
 from rig.bench import DEFAULT, Bench, read_bench
 from rig.errors import BenchError
-from rig.plan import plan
+from rig.planning.plan import plan
 from rig.record import Record
 from rig.record.measured import table_of
-from rig.runner import resume, start
+from rig.running.runner import resume, start
 from tests.rig.rigging import Onlooker
 
 MARK_DEG = 5 / 60

@@ -15,10 +15,10 @@ from calibrations.evaluations.misalignment import along_reference
 from procedures.catalogue import find
 from procedures.settings import parse
 from rig.bench import DEFAULT, Bench, read_bench
-from rig.plan import plan
+from rig.planning.plan import plan
 from rig.record import Record
 from rig.results.names import names
-from rig.runner import start
+from rig.running.runner import start
 from tests.rig.rigging import Onlooker
 
 Rig = Callable[..., Any]

@@ -23,13 +23,13 @@ from procedures.catalogue import find
 from procedures.errors import ProcedureError, SettingError
 from procedures.motion import KIND, STILL, SWEEP
 from procedures.settings import parse
+from rig.analysis.shaken import shaken_of
 from rig.bench import Bench, read_bench
-from rig.plan import plan
+from rig.planning.plan import plan
 from rig.record import Kept, Record
 from rig.record.measured import Measured
 from rig.results.names import names
-from rig.runner import Outcome, resume, start
-from rig.shaken import shaken_of
+from rig.running.runner import Outcome, resume, start
 from tests.rig.rigging import Onlooker
 
 pytestmark = pytest.mark.sockets

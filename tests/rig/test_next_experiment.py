@@ -22,9 +22,9 @@ from procedures.settings import parse
 from rig.bench import read_bench
 from rig.cli import rig as commands
 from rig.cli.settings import read_settings
-from rig.foresight import with_next
-from rig.next_experiment import Dispute, chosen, command_line, planned_experiment, proposed
-from rig.planned_columns import columns
+from rig.planning.foresight import with_next
+from rig.planning.next_experiment import Dispute, chosen, command_line, planned_experiment, proposed
+from rig.planning.planned_columns import columns
 from rig.record import Record
 from tests.hidden.quick_rig import QuickRig
 from tests.hidden.rigs import IDEAL

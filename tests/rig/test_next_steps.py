@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
+from rig.analysis.next_steps import REMEDIES, next_steps
 from rig.cli.verdicts import lines
-from rig.next_steps import REMEDIES, next_steps
 from rig.record import Run
 
 RUN = Run("r1", "poses", "sweep", "complete", {}, {}, {}, "", {}, "", "", None, None, {}, 20)

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from calibrations.noise_analysis.exact import deviations
+from rig.analysis.still import stream
 from rig.record import Record
-from rig.still import stream
 from tests.rig.conftest import Ended
 
 Rig = Callable[..., Ended]

@@ -22,11 +22,11 @@ from procedures.settings import parse
 from rig.bench import read_bench
 from rig.cli.chosen import document, lines
 from rig.errors import PlanError
-from rig.optimal import AGAIN, CHECK, DESIGN, Optimal, most_relative, optimal, relative
-from rig.planned import EXCHANGE_S
+from rig.planning.optimal import AGAIN, CHECK, DESIGN, Optimal, most_relative, optimal, relative
+from rig.planning.planned import EXCHANGE_S
+from rig.planning.travel import from_home_s, moves_s
 from rig.record import Kept, Record
-from rig.runner import resume, start
-from rig.travel import from_home_s, moves_s
+from rig.running.runner import resume, start
 from tests.rig.rigging import Onlooker
 
 COARSE = {"step_deg": "30", "inclinations_deg": "90,45,135"}  # a small sweep, to be quick

@@ -16,7 +16,7 @@ import pytest
 from rig.bench import read_bench
 from rig.errors import RecordError
 from rig.record import Kept, Record, file
-from rig.runner import resume, start
+from rig.running.runner import resume, start
 from tests.rig.misbehaving import looking_on
 from tests.rig.rigging import POSES, SMALL_ARGUMENTS, Onlooker, small_sweep
 

@@ -13,8 +13,8 @@ import yaml
 from procedures.catalogue import find
 from procedures.settings import parse
 from rig.bench import DEFAULT, Bench
-from rig.instruments import connected
-from rig.plan import plan
+from rig.connected.instruments import connected
+from rig.planning.plan import plan
 from rig.record import Record
 from rig.results.names import names
 

@@ -19,7 +19,7 @@ from rig.errors import Busy, InstrumentFailed, RunMismatch
 from rig.lease import lease
 from rig.record import Kept, Record
 from rig.record.measured import table_of
-from rig.runner import Outcome, resume, start
+from rig.running.runner import Outcome, resume, start
 from tests.rig.rigging import POSES, Onlooker, small_sweep
 
 pytestmark = pytest.mark.sockets

@@ -18,8 +18,8 @@ from procedures.errors import ProcedureError
 from procedures.session import Limits
 from rig.bench import read_bench
 from rig.cli.failure import status_of
-from rig.guard import GuardedClock
-from rig.instruments import Rig
+from rig.connected.guard import GuardedClock
+from rig.connected.instruments import Rig
 from rig.record import Record
 from tests.rig.enduring import BENCH, FAULTS, PROCEDURES, endured, moment, undisturbed
 from tests.rig.misbehaving import Aftermath, afflicted, looking_on, short

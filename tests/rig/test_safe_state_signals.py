@@ -13,7 +13,7 @@ from procedures.questions import Question
 from rig.bench import read_bench
 from rig.cli.failure import status_of
 from rig.record import Record
-from rig.runner import resume, start
+from rig.running.runner import resume, start
 from tests.rig.misbehaving import SHORT, STRETCHES, digest, looking_on, short
 from tests.rig.rigging import Onlooker, small_sweep
 

@@ -7,7 +7,7 @@ from types import FunctionType
 
 import pytest
 
-from rig.signals import SIGNALS, stoppable
+from rig.running.signals import SIGNALS, stoppable
 
 
 def twice(number: signal.Signals) -> None:
@@ -63,6 +63,8 @@ def test_a_computing_world_and_a_screen_half_written_are_not_interrupted(module:
     assert signalled_in(module, name) == ["whole"]
 
 
-@pytest.mark.parametrize(("module", "name"), [("rich.console", "input"), ("richer", "print"), ("rig.runner", "run")])
+@pytest.mark.parametrize(
+    ("module", "name"), [("rich.console", "input"), ("richer", "print"), ("rig.running.runner", "run")]
+)
 def test_who_waits_for_a_person_is(module: str, name: str) -> None:
     assert signalled_in(module, name) == []

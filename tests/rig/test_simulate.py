@@ -17,8 +17,8 @@ from drivers import labjack_t7, oriental_az
 from drivers.clock import WallClock
 from drivers.links import Address, Links
 from rig.bench import DEFAULT, read_bench
+from rig.connected.instruments import connected
 from rig.errors import Busy
-from rig.instruments import connected
 
 pytestmark = pytest.mark.sockets
 

@@ -20,7 +20,7 @@ from rig.record import Record
 from rig.record.measured import Measured
 from rig.results.names import names
 from rig.results.soak import night
-from rig.soak_forecast import SoakWatch, lines
+from rig.running.soak_forecast import SoakWatch, lines
 from tests.rig.nursery import Harm, Nursery
 
 pytestmark = pytest.mark.sockets

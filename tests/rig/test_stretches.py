@@ -12,9 +12,9 @@ from procedures.catalogue import find, paths
 from procedures.session import Pose
 from procedures.settings import parse
 from rig.bench import read_bench
-from rig.plan import Plan, plan
-from rig.planned import Held, Step
-from rig.stretches import Stretch, stretches
+from rig.planning.plan import Plan, plan
+from rig.planning.planned import Held, Step
+from rig.planning.stretches import Stretch, stretches
 
 Rig = Callable[..., Any]
 

@@ -10,7 +10,7 @@ import pexpect
 import pytest
 
 from rig.record import Record, Run
-from rig.runner import REPEATED
+from rig.running.runner import REPEATED
 from tests.rig.rigging import POSES, SMALL_ARGUMENTS
 
 pytestmark = pytest.mark.sockets

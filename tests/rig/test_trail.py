@@ -8,7 +8,7 @@ import pytest
 
 from calibrations.errors import ExpressionError, ModelError
 from calibrations.pictures.waterfall import levels
-from rig.trail import Trail, trail
+from rig.analysis.trail import Trail, trail
 from tests.browser.measured import hidden
 
 

@@ -20,7 +20,7 @@ from rig.bench import DEFAULT, read_bench
 from rig.record import Record
 from rig.record.measured import table_of
 from rig.record.turned import RATE
-from rig.runner import start
+from rig.running.runner import start
 from tests.rig.rigging import Onlooker
 
 Rig = Callable[..., Any]

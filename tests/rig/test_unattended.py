@@ -14,10 +14,10 @@ from procedures.settings import parse
 from rig.bench import Bench, read_bench
 from rig.cli.failure import status_of
 from rig.cli.watch import Quiet
-from rig.instruments import Rig
-from rig.plan import plan
+from rig.connected.instruments import Rig
+from rig.planning.plan import plan
 from rig.record import Record
-from rig.runner import Outcome, resume, start
+from rig.running.runner import Outcome, resume, start
 from tests.rig.rigging import Onlooker, small_sweep
 
 pytestmark = pytest.mark.sockets
@@ -35,7 +35,7 @@ def bench_without_level() -> Bench:
 @pytest.fixture
 def deserted(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Nobody stands at the simulated bench; what was stopped there, in order."""
-    monkeypatch.setattr("rig.runner.answer", lambda question, rig: None)
+    monkeypatch.setattr("rig.running.runner.answer", lambda question, rig: None)
     stopped: list[str] = []
     stop = Rig.stop
 
@@ -85,7 +85,7 @@ def test_a_table_that_is_not_level_stops_it_and_is_read_again_when_it_was_levell
     shown = iter([(1.0, 0.0)] * 2 + [(-1.0, 0.0)] * 2)  # before it is levelled: each axis on its own
     real = World.level_deg
     monkeypatch.setattr(World, "level_deg", lambda world: next(shown, None) or real(world))
-    monkeypatch.setattr("rig.runner.answer", typed)
+    monkeypatch.setattr("rig.running.runner.answer", typed)
     watch = Onlooker(wishes=["resume"])
     with Record() as record:
         outcome = start(record, bench_without_level(), *small_sweep(), watch)

@@ -14,11 +14,11 @@ from procedures.errors import Declined
 from procedures.session import Limits
 from procedures.settings import parse
 from rig.bench import read_bench
+from rig.connected.instruments import Rig
 from rig.errors import InstrumentFailed
-from rig.instruments import Rig
-from rig.plan import Plan
+from rig.planning.plan import Plan
 from rig.record import Kept, Record
-from rig.runner import REPEATED, Outcome, Wish, start
+from rig.running.runner import REPEATED, Outcome, Wish, start
 from tests.rig.rigging import POSES, Onlooker, small_sweep
 
 pytestmark = pytest.mark.sockets
@@ -124,7 +124,7 @@ def test_an_instrument_that_does_not_come_back_is_told_and_asked_about_again(mon
     def gone(*arguments: object) -> None:
         raise InstrumentFailed("beta does not answer")
 
-    watch = Disturbed(lambda: (monkeypatch.setattr("rig.runner._same_instruments", gone), alarm()), "resume")
+    watch = Disturbed(lambda: (monkeypatch.setattr("rig.running.runner._same_instruments", gone), alarm()), "resume")
     with Record() as record:
         outcome = start(record, read_bench(), *small_sweep(), watch)
     assert [str(seen.error) for seen in watch.outcomes][1:] == ["beta does not answer"]

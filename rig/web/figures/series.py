@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rig.course import Course
+from rig.analysis.course import Course
 from rig.web.figures.style import MEASURED, UNSEEN, Figure, Trace, figure
 
 LENGTHS = ((10800.0, 3600.0, "h"), (300.0, 60.0, "min"), (-1.0, 1.0, "s"))  # longer than, unit, its name

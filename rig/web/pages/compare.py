@@ -6,9 +6,9 @@ from nicegui import ui
 
 from calibrations.fit import fit
 from calibrations.numerals import measured, plain, unit
-from rig.asked import asked
+from rig.analysis.asked import asked
+from rig.analysis.side_by_side import Pair, parameters_of, results_of
 from rig.record import Record
-from rig.side_by_side import Pair, parameters_of, results_of
 from rig.web.desk import Desk
 from rig.web.frame import frame
 from rig.web.parts import box, div, failed, off_loop, table, waiting, words

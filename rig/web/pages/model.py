@@ -10,7 +10,7 @@ from nicegui import ui
 
 from calibrations.diagnose import Diagnosis
 from calibrations.discover import Added
-from rig.trail import Trail
+from rig.analysis.trail import Trail
 from rig.web.counted import Counted
 from rig.web.desk import Desk, runs
 from rig.web.frame import Key, frame

@@ -15,7 +15,7 @@ from rig.web.parts import box, off_loop, words
 from rig.web.told import message
 
 if TYPE_CHECKING:
-    from rig.trail import Trail
+    from rig.analysis.trail import Trail
     from rig.web.pages.model import Workbench
 
 MOST_BYTES = 200_000_000
@@ -113,7 +113,7 @@ class Choice:
 
     def _text(self) -> str:
         from calibrations.model_file import dump_model
-        from rig.provenance import with_provenance
+        from rig.analysis.provenance import with_provenance
 
         trail = self.page.trail
         assert trail is not None  # noqa: S101 the button is enabled with the trail
@@ -130,7 +130,7 @@ class Choice:
 
     async def _report(self) -> None:
         """The report of `rig report`, as a file of the browser's."""
-        from rig.reported import reported
+        from rig.analysis.reported import reported
 
         page, trail = self.page, self.page.trail
         hint = ui.notification("Making the report: all pictures, all candidates", spinner=True, timeout=None)

@@ -89,7 +89,7 @@ class Missing:
     async def _next(self, result: Diagnosis) -> None:
         """The experiment that would tell, planned on the bench."""
         from rig.bench import read_bench
-        from rig.next_experiment import proposed
+        from rig.planning.next_experiment import proposed
 
         page = self.page
         assert page.trail is not None  # noqa: S101 a diagnosis is of a trail

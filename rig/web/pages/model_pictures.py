@@ -20,7 +20,7 @@ from rig.web.parts import box, div, words
 if TYPE_CHECKING:
     from calibrations.discover import Added
     from calibrations.fit import Fit
-    from rig.trail import Trail
+    from rig.analysis.trail import Trail
 
 LINKED = ("measurement", "residual", "failure")
 TITLES = {

@@ -11,7 +11,7 @@ from calibrations.pictures.view import milli, pooled_mg, rows_of
 from calibrations.reports.verdict import headline
 from calibrations.reports.words import capital
 from calibrations.search.held_out import held_out_excess
-from rig.trail import Trail
+from rig.analysis.trail import Trail
 from rig.web.parts import box, div, words
 
 LOOKS = {"adequate": "good", "effect-missing": "bad", "ambiguous": "doubt", "unexplained": "doubt"}

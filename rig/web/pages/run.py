@@ -8,8 +8,8 @@ from fastapi import Request
 from nicegui import ui
 
 from rig.bench import Bench, read_bench
-from rig.certificates import expired
-from rig.instruments import checked
+from rig.bench.certificates import expired
+from rig.connected.instruments import checked
 from rig.web.desk import Desk
 from rig.web.frame import Key, frame
 from rig.web.pages.run_live import Live

@@ -12,10 +12,10 @@ from urllib.parse import urlencode
 
 from nicegui import ui
 
+from rig.analysis.course import Course, kind_of
 from rig.apart import steering
 from rig.apart.status import Asked, Status
 from rig.bench import Bench
-from rig.course import Course, kind_of
 from rig.drawings import Attitude, page
 from rig.record import Record
 from rig.web.figures.series import series

@@ -13,9 +13,9 @@ from rig.apart import steering
 from rig.bench import Bench
 from rig.home import home
 from rig.numerals import duration, size
-from rig.plan import Plan, plan
+from rig.planning.plan import Plan, plan
+from rig.planning.stretches import stretches
 from rig.room import free_bytes
-from rig.stretches import stretches
 from rig.web.desk import Desk
 from rig.web.parts import box, div, facts, failed, off_loop, table, waiting, words
 from rig.web.told import message

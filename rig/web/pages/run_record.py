@@ -9,10 +9,10 @@ from urllib.parse import urlencode
 from nicegui import ui
 
 from calibrations.numerals import bound, measured, unit
+from rig.analysis.next_steps import next_steps
+from rig.analysis.reported import reported
 from rig.export import export
-from rig.next_steps import next_steps
 from rig.record import Event, Record, Run
-from rig.reported import reported
 from rig.web.desk import Desk
 from rig.web.frame import frame
 from rig.web.pages.run_live import Pictures

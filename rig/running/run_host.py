@@ -8,12 +8,12 @@ from typing import Any
 
 from procedures.questions import Question
 from procedures.session import Dwell, Pose, Reading, Samples
+from rig.connected.instruments import Rig
+from rig.connected.technician import answer
 from rig.errors import RunMismatch
-from rig.instruments import Rig
 from rig.record import Kept, Record, Run
 from rig.record.measured import Measured, of_sensor
-from rig.technician import answer
-from rig.watch import Watch
+from rig.running.watch import Watch
 
 
 class RunHost:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from calibrations.table import Array, Table
-from rig.plan import Plan
+from rig.planning.plan import Plan
 
 PAUSE_S = 60.0  # from the end of the data to the beginning of the next run, at least
 OVEN_S = 1200.0  # in which an oven with what is in it comes near to its set point

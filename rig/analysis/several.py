@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from calibrations.errors import DataError
 from calibrations.joined import clock_began_anew, joined
 from calibrations.table import Table
-from rig.data import load
+from rig.analysis.data import load
 from rig.errors import UnknownRun
 
 if TYPE_CHECKING:

@@ -22,11 +22,11 @@ from drivers.simulation.batch import Batch
 from drivers.simulation.world import World
 from procedures.errors import ProcedureError
 from procedures.session import Dwell, Host, Session
-from rig.attended import AtTheRig
 from rig.bench import ROLES, Bench
+from rig.connected.attended import AtTheRig
+from rig.connected.guard import NOW_AND_THEN_S, GuardedClock, Look
+from rig.connected.wiring import Wiring, wired
 from rig.errors import InstrumentFailed
-from rig.guard import NOW_AND_THEN_S, GuardedClock, Look
-from rig.wiring import Wiring, wired
 
 OVEN_TAKES_S = 0.5  # an answer of the oven, with room to spare
 MOVING = ("alpha", "beta", "positioner")

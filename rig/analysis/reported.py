@@ -14,12 +14,12 @@ from calibrations.reports.still import still_report
 from calibrations.still.compare import compare as compare_noise
 from calibrations.still.diagnose import diagnose as diagnose_noise
 from calibrations.still.discover import discover as discover_noise
-from rig.asked import asked
-from rig.asked_still import AskedStill, asked_still
-from rig.foresight import with_next, with_noise_next
-from rig.night import Page, night_of
-from rig.provenance import program, today
-from rig.shaken import shaken_of
+from rig.analysis.asked import asked
+from rig.analysis.asked_still import AskedStill, asked_still
+from rig.analysis.night import Page, night_of
+from rig.analysis.provenance import program, today
+from rig.analysis.shaken import shaken_of
+from rig.planning.foresight import with_next, with_noise_next
 
 
 def reported(

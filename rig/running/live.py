@@ -1,7 +1,7 @@
 """Measure a little, diagnose, choose what to measure next: until one explanation stands, or the time is used up.
 
 An explanation stands when data that were measured after it was found leave it as it is. Where several cannot be told
-apart, the experiment is run that will tell (`rig/next_experiment.py`); else poses in between those that there are,
+apart, the experiment is run that will tell (`next_experiment.py`); else poses in between those that there are,
 which would show what the first ones are blind to. All data are judged together.
 """
 
@@ -17,7 +17,7 @@ from calibrations.experiment import BESIDE, MENU, Experiment
 from calibrations.model import Model
 from calibrations.table import Table
 from rig.bench import Bench
-from rig.next_experiment import TOGETHER, Dispute, chosen, gives_poses, planned_experiment, possible
+from rig.planning.next_experiment import TOGETHER, Dispute, chosen, gives_poses, planned_experiment, possible
 
 STANDARD = Experiment("sweep", {}, (), "the sweep as it is without settings")
 FIRST = Experiment("sweep", {"step_deg": 45.0, "inclinations_deg": [90.0, 30.0, 150.0]}, (), "a little, to begin with")

@@ -28,8 +28,8 @@ from procedures.errors import ProcedureError
 from procedures.settings import parse
 from rig.bench import Bench
 from rig.errors import BenchError
-from rig.plan import Plan, plan
-from rig.planned_columns import columns
+from rig.planning.plan import Plan, plan
+from rig.planning.planned_columns import columns
 
 ALONE, TOGETHER = "probability_alone", "probability"  # of Expected
 LEAST = 1.0  # of lambda, to be called information

@@ -29,7 +29,7 @@ from calibrations.table import AXES, Array, Table
 from procedures.catalogue import Procedure
 from procedures.session import Pose
 from rig.bench import Bench
-from rig.plan import Plan, plan
+from rig.planning.plan import Plan, plan
 
 GRID_DEG = 15.0
 SIDE = 0.2  # how far the two directions of one pose count as apart, beside distances of gravity in g

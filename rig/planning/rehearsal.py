@@ -16,11 +16,11 @@ from typing import Any
 from procedures.questions import Dial, Question
 from procedures.session import Dwell, Pose, Samples, Session
 from rig.bench import SIMULATED, Bench
-from rig.instruments import Rig, absent, connected
-from rig.planned import Held, Ledger, PlanHost
+from rig.connected.instruments import Rig, absent, connected
+from rig.connected.technician import answer
+from rig.planning.planned import Held, Ledger, PlanHost
 from rig.record.measured import of_sensor
 from rig.record.values import Kept
-from rig.technician import answer
 
 
 class Counted:

@@ -20,18 +20,18 @@ from procedures.catalogue import Procedure, find
 from procedures.errors import Declined, NoAnswer, ProcedureError, SafetyLimit
 from procedures.settings import parse
 from rig.bench import Bench
-from rig.certificates import EXPIRED, expired
+from rig.bench.certificates import EXPIRED, expired
+from rig.connected.instruments import Rig, connected
 from rig.errors import RecordError, RigError, RunMismatch, Stopped
-from rig.instruments import Rig, connected
 from rig.lease import lease
-from rig.onward import leave_as
-from rig.plan import plan
+from rig.planning.plan import plan
 from rig.record import Record, Run
 from rig.results import Result, documents, judged, returned
-from rig.run_host import RunHost
-from rig.signals import stoppable
-from rig.trace import Trace
-from rig.watch import Outcome, Watch, Wish
+from rig.running.onward import leave_as
+from rig.running.run_host import RunHost
+from rig.running.signals import stoppable
+from rig.running.trace import Trace
+from rig.running.watch import Outcome, Watch, Wish
 
 __all__ = ["REPEATED", "Outcome", "RunHost", "Watch", "Wish", "resume", "start"]
 

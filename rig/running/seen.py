@@ -18,10 +18,10 @@ from procedures.level_check import reversal
 from procedures.session import Limits, Reading
 from rig.bench import Bench
 from rig.numerals import duration
-from rig.plan import Plan
+from rig.planning.plan import Plan
 from rig.record import Kept
-from rig.soak_forecast import outlook, present, soak_watch
-from rig.way import Way
+from rig.running.soak_forecast import outlook, present, soak_watch
+from rig.running.way import Way
 
 UNUSUAL = 2.0  # times the usual scatter, or less than a half of it
 REMEMBERED = 200  # dwells of a kind that say what scatter is usual

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rig.instruments import Rig
+from rig.connected.instruments import Rig
 from rig.record import Record
 
 

@@ -15,11 +15,11 @@ from calibrations.model import Model
 from calibrations.model_file import read_model
 from calibrations.still.fit import noise_terms
 from calibrations.still.record import Samples, Still, reduced
-from rig.asked import DEFAULTS, check_unit, effects_of
+from rig.analysis.asked import DEFAULTS, check_unit, effects_of
+from rig.analysis.still import BESIDE, Stream, axes, repairs
 from rig.errors import UnknownRun
 from rig.record.measured import Measured
 from rig.record.store import Record
-from rig.still import BESIDE, Stream, axes, repairs
 
 CHANNELS = {f"{what}{axis}{end}" for what in ("v", "a", "g", "m", "") for axis in "xyz" for end in ("", "_v")}
 TRIADS = ({"ax", "ay", "az"}, {"mx", "my", "mz"})  # with times: a raw log of positions, unless a noise model is named

@@ -22,8 +22,8 @@ from procedures.pose_list import written
 from procedures.session import Pose
 from rig.bench import Bench
 from rig.errors import PlanError
-from rig.sweep_range import Judged, Range
-from rig.travel import from_home_s, moves_s
+from rig.planning.sweep_range import Judged, Range
+from rig.planning.travel import from_home_s, moves_s
 
 MOST_POSES = 60
 ONE_IN = 10  # poses is measured again, and as many are kept out of the fit

@@ -19,7 +19,7 @@ from calibrations.reading.units import UNITS, unit_of
 from calibrations.search.blind import blind_to
 from calibrations.table import Table
 from calibrations.turning import earth_unknown
-from rig.data import load
+from rig.analysis.data import load
 
 DEFAULTS = {
     "poses": "linear",

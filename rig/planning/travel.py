@@ -11,7 +11,7 @@ import numpy as np
 from calibrations.table import Array
 from procedures.session import SHORTEST_APPROACH_DEG, Pose
 from rig.bench import Bench
-from rig.planned import EXCHANGE_S
+from rig.planning.planned import EXCHANGE_S
 
 REMOUNT_S = 900.0  # a person turns the sensor over, and it takes its temperature again: as seldom as possible
 HOME = Pose(0.0, 0.0)

@@ -18,9 +18,9 @@ from procedures.catalogue import Procedure
 from procedures.questions import Question
 from procedures.session import Pose, Session
 from rig.bench import ROLES, TURNING, Bench
+from rig.connected.instruments import absent
 from rig.errors import BenchError
-from rig.instruments import absent
-from rig.planned import (
+from rig.planning.planned import (
     Held,
     Ledger,
     PlanHost,
@@ -31,7 +31,7 @@ from rig.planned import (
     PlannedStage,
     Step,
 )
-from rig.rehearsal import rehearsing
+from rig.planning.rehearsal import rehearsing
 
 BYTES_PER_SAMPLE = 0.4  # in the record, measured on a sweep; an estimate for other noise
 BYTES_PER_POSE = 512  # the rest of a pose in the record

@@ -21,12 +21,12 @@ from calibrations.evaluations.stability import FEWEST, Stability, stability
 from calibrations.fit import fit
 from calibrations.model import Model
 from calibrations.noise import rms
-from rig.certificates import EXPIRED
+from rig.analysis.sensors import members, sensors
+from rig.bench.certificates import EXPIRED
 from rig.errors import RecordError
 from rig.nearest import did_you_mean
 from rig.record import Record, Run
 from rig.record.measured import Measured
-from rig.sensors import members, sensors
 
 STALE_DAYS = 365.0  # where no limit says when a calibration is due
 Limit = float | tuple[float, float]

@@ -11,7 +11,7 @@ from calibrations.effect import Effect
 from calibrations.still.diagnose import Diagnosis
 from calibrations.still.discover import Discovery
 from rig.bench import read_bench
-from rig.next_experiment import Answer, as_told, proposed
+from rig.planning.next_experiment import Answer, as_told, proposed
 from rig.record import Record
 
 NoiseAnswer = TypeVar("NoiseAnswer", Diagnosis, Discovery)

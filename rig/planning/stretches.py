@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import groupby
 
 from procedures.session import Pose
-from rig.plan import Plan
+from rig.planning.plan import Plan
 
 PLAIN = re.compile(
     r"(alpha|beta) (from|seeks|turns|brakes)|adc records|wait |level is read"

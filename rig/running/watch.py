@@ -7,7 +7,7 @@ from typing import Literal, Protocol
 
 from procedures.questions import Question
 from procedures.session import Reading
-from rig.plan import Plan
+from rig.planning.plan import Plan
 from rig.record import Kept, Run
 
 Wish = Literal["resume", "repeat", "end"]

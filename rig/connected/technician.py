@@ -11,7 +11,7 @@ from drivers.manual_stage_twin import Hand
 from drivers.simulation.batch import Batch
 from drivers.simulation.world import World
 from procedures.questions import Choice, Confirm, Dial, Mounting, Number, PowerCycle, Question, Remount
-from rig.instruments import Rig
+from rig.connected.instruments import Rig
 
 
 def answer(question: Question, rig: Rig) -> str | None:

@@ -27,8 +27,8 @@ from drivers.simulation.batch import Batch
 from drivers.simulation.config import WorldConfig
 from drivers.simulation.world import World
 from rig.bench import Bench
+from rig.connected.guard import GuardedClock
 from rig.errors import InstrumentFailed
-from rig.guard import GuardedClock
 from rig.home import home
 from rig.lease import lease
 

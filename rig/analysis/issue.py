@@ -26,10 +26,10 @@ from calibrations.fit import Fit
 from calibrations.model_file import dump_model
 from calibrations.numerals import as_written
 from calibrations.table import Table
+from rig.analysis.provenance import program, today
 from rig.bench import Bench
-from rig.certificates import EXPIRED, certificates
+from rig.bench.certificates import EXPIRED, certificates
 from rig.errors import UnknownRun
-from rig.provenance import program, today
 from rig.record import Record, Run
 from rig.record.digest import digest_of
 from rig.record.measured import Measured

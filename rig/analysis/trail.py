@@ -16,7 +16,7 @@ from calibrations.fit import Fit, refit
 from calibrations.model import Model
 from calibrations.search.outliers import fit_without
 from calibrations.table import Table
-from rig.asked import asked
+from rig.analysis.asked import asked
 
 
 @dataclass(frozen=True)

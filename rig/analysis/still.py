@@ -16,7 +16,7 @@ from calibrations.errors import DataError, nearest
 from calibrations.table import AXES, Array, Table
 from procedures.noise_floor import STILL
 from procedures.soak import HOLD
-from rig.data import load
+from rig.analysis.data import load
 from rig.errors import RecordError
 from rig.record.measured import Measured
 from rig.record.store import Record

@@ -1,0 +1,1 @@
+"""What data are asked: by the command line and the workbench alike."""

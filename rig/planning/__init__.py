@@ -1,0 +1,1 @@
+"""Dry runs, and what to run next: every move counted before anything moves."""
