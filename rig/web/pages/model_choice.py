@@ -16,7 +16,7 @@ from rig.web.told import message
 
 if TYPE_CHECKING:
     from rig.analysis.trail import Trail
-    from rig.web.pages.model import Workbench
+    from rig.web.pages.model_page import ModelPage
 
 MOST_BYTES = 200_000_000
 
@@ -24,7 +24,7 @@ MOST_BYTES = 200_000_000
 class Choice:
     """Selects data and model by going to their address; acts on the model that is there."""
 
-    def __init__(self, page: Workbench) -> None:
+    def __init__(self, page: ModelPage) -> None:
         self.page = page
         with box("chosen"):
             self.data = ui.select(

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from calibrations.discover import Added
     from calibrations.search.candidates import Candidate
     from rig.web.counted import Counted
-    from rig.web.pages.model import Workbench
+    from rig.web.pages.model_page import ModelPage
 
 FIRST = 6  # cards that are shown at once
 PROGRESS_S = 0.15
@@ -28,7 +28,7 @@ PROGRESS_S = 0.15
 class Missing:
     """The side of the page on which a person decides."""
 
-    def __init__(self, page: Workbench) -> None:
+    def __init__(self, page: ModelPage) -> None:
         self.page = page
         self.looked_at: Candidate | None = None
         self.tried: dict[str, Added] = {}

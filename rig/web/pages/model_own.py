@@ -14,7 +14,7 @@ from rig.web.told import message
 if TYPE_CHECKING:
     from calibrations.discover import Added
     from calibrations.search.patterns import Pattern
-    from rig.web.pages.model import Workbench
+    from rig.web.pages.model_page import ModelPage
 
 PAUSE_S = 0.35  # without a keystroke, before what is written is tried
 HELP = (
@@ -26,7 +26,7 @@ HELP = (
 class Own:
     """The field, its preview and its errors."""
 
-    def __init__(self, page: Workbench) -> None:
+    def __init__(self, page: ModelPage) -> None:
         self.page, self.asked = page, 0
         self.step: Added | None = None
         with box("own") as self.box:
