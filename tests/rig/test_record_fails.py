@@ -6,6 +6,7 @@ import shutil
 import sqlite3
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
@@ -109,8 +110,9 @@ def read_only(rig_home: Path) -> Any:
     with Record() as record:
         run = swept(record, lambda: None).run.run
     rig_home.chmod(0o555)
-    for parent in rig_home.parents[:3]:
-        parent.chmod(0o755)
+    for parent in rig_home.parents:
+        if Path(tempfile.gettempdir()) in parent.parents:
+            parent.chmod(0o755)
     yield run
     rig_home.chmod(0o755)
 

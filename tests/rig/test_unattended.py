@@ -35,7 +35,7 @@ def bench_without_level() -> Bench:
 @pytest.fixture
 def deserted(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Nobody stands at the simulated bench; what was stopped there, in order."""
-    monkeypatch.setattr("rig.running.runner.answer", lambda question, rig: None)
+    monkeypatch.setattr("rig.running.run_host.answer", lambda question, rig: None)
     stopped: list[str] = []
     stop = Rig.stop
 
@@ -85,7 +85,7 @@ def test_a_table_that_is_not_level_stops_it_and_is_read_again_when_it_was_levell
     shown = iter([(1.0, 0.0)] * 2 + [(-1.0, 0.0)] * 2)  # before it is levelled: each axis on its own
     real = World.level_deg
     monkeypatch.setattr(World, "level_deg", lambda world: next(shown, None) or real(world))
-    monkeypatch.setattr("rig.running.runner.answer", typed)
+    monkeypatch.setattr("rig.running.run_host.answer", typed)
     watch = Onlooker(wishes=["resume"])
     with Record() as record:
         outcome = start(record, bench_without_level(), *small_sweep(), watch)
