@@ -48,6 +48,8 @@ class Problem:
             )
         if table.kind == "positions":
             _check_positions(table)
+        if table.kind == "rates":
+            _check_changes(table, "a table that turns changes each output that senses it")
         _check_fields(model, table)
         model = model.for_table(table)
         if not model.terms:
@@ -202,6 +204,10 @@ def _check_positions(table: Table) -> None:
             f"{table.source}: models of positions need the columns ax, ay, az, or mx, my, mz; "
             f"it has: {', '.join(table.columns)}"
         )
+    _check_changes(table, "positions turn each axis up and down")
+
+
+def _check_changes(table: Table, but: str) -> None:
     still = [name for name, spread in zip(table.output_names, np.ptp(table.outputs, axis=0), strict=True) if not spread]
     if still:
-        raise DataError(f'{table.source}: the column "{still[0]}" never changes; positions turn each axis up and down')
+        raise DataError(f'{table.source}: the column "{still[0]}" never changes; {but}')

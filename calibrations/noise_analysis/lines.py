@@ -73,9 +73,25 @@ def _turns(windowed: Array, near: int) -> float:
     return float(minimize_scalar(negative, bounds=(near - 1, near + 1), method="bounded", options={"xatol": 1e-4}).x)
 
 
+def _around(density: Array) -> Array:
+    """The noise around each ordinate: the median of as many on its left as on its right.
+
+    Where a spectrum only falls, or only rises, that is the ordinate's own level: behind a filter, or beside flicker,
+    a window that reached further to one side would take the slope for a line. Too near an end nothing can be said.
+    """
+    around = np.full(len(density), np.inf)
+    most = AROUND // 2
+    if len(density) >= AROUND:
+        around[most:-most] = median_filter(density, AROUND)[most:-most]
+    for k in range(LOBE + 1, min(most, len(density) // 2)):
+        around[k] = np.median(density[: 2 * k + 1])
+        around[-1 - k] = np.median(density[-1 - 2 * k :])
+    return around
+
+
 def fast_lines(f: Array, density: Array, freedom: float, above_hz: float, length_s: float) -> tuple[Array, list[Line]]:
     """(densities (f,) with the lines taken off, the lines above a frequency, strongest first)."""
-    around = median_filter(density, AROUND, mode="nearest")
+    around = _around(density)
     found, left = [], density.copy()
     for _ in range(MOST):
         height = np.where(f > above_hz, left / around, 0.0)

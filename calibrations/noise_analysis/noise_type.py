@@ -14,7 +14,7 @@ import numpy as np
 
 from calibrations.table import Array
 
-FEWEST = 30  # means below which their correlation says nothing
+FEWEST = 120  # means: of fewer the correlation is too uncertain to tell a type from the next, by 2.7 standard errors
 STATIONARY = 0.25  # order of integration up to which noise need not be differenced
 REDDEST, BLUEST = -3, 2
 

@@ -26,6 +26,8 @@ from calibrations.search.screen import Screen, Search, of_search
 from calibrations.table import Array
 
 SIGNIFICANT = 0.003  # chance of naming anything at all where nothing is missing, over the whole search
+OFFSETS = {"bias", "hard-iron", "gyro-bias"}
+DRIFTING = {"t_s", "temperature_c"}  # what an effect goes by that lets an offset drift
 NOT_TOLD_APART = 6.0  # a loss of twice the log-likelihood below this: odds of less than 20 to 1
 
 
@@ -115,10 +117,12 @@ def _applies(effect: Effect, before: Fit) -> bool:
     """Whether the model can miss it, and the data can have it.
 
     Where iron cannot be asked for, as directions leave parts of the sphere out, it looks like anything else that
-    changed from one direction to the next: nothing but iron is asked for then.
+    changed from one direction to the next: nothing but iron is asked for then. And what drifts is an offset: a model
+    without one would take a drift that hardly moves for it.
     """
     model = before.model
     known = set(effect.after) <= set(model.effects) and not model.holds(effect.name)
+    known = known and (not DRIFTING & set(effect.needs) or bool(OFFSETS & set(model.effects)))
     askable = effect.kinds == ("fields",) or uncovered(before.table) is None
     return known and askable and effect.excluded(before.table) is None
 

@@ -8,17 +8,17 @@ from pathlib import Path
 
 import click
 
-from rig.cli.output import emit, json_option, notes
+from rig.cli.output import Positive, emit, json_option, notes
 
 
 @click.command("noise")
 @click.argument("data")
 @click.option("--channel", help="Of several channels: vx, vy ... Default: the first.")
-@click.option("--rate", "rate_hz", type=click.FloatRange(min=0, min_open=True), help="Samples a second, for an array.")
+@click.option("--rate", "rate_hz", type=Positive(), help="Samples a second, for an array.")
 @click.option(
     "--tau",
     "tau_s",
-    type=float,
+    type=Positive(),
     multiple=True,
     help="Averaging time, s, with every overlap; repeatable. Default: octaves.",
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Iterable, Sequence
 from functools import wraps
 from pathlib import Path
@@ -27,6 +28,21 @@ bench_option = click.option(
 )
 
 
+class Positive(click.FloatRange):
+    """A number above 0 that is one: neither infinite nor none."""
+
+    name = "positive number"
+
+    def __init__(self) -> None:
+        super().__init__(min=0, min_open=True)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        number = float(super().convert(value, param, ctx))
+        if not math.isfinite(number):
+            self.fail(f"{value} is no number to compute with; give one above 0", param, ctx)
+        return number
+
+
 def sampled_options(function: Callable[..., Any]) -> Callable[..., Any]:
     """--channel and --rate, as one argument `sampled`: of a still record."""
 
@@ -34,8 +50,7 @@ def sampled_options(function: Callable[..., Any]) -> Callable[..., Any]:
     def inside(*args: Any, channel: str | None, rate_hz: float | None, **kwargs: Any) -> Any:
         return function(*args, sampled=(channel, rate_hz), **kwargs)
 
-    positive = click.FloatRange(min=0, min_open=True)
-    inside = click.option("--rate", "rate_hz", type=positive, help="Samples a second, for an array (.npy).")(inside)
+    inside = click.option("--rate", "rate_hz", type=Positive(), help="Samples a second, for an array (.npy).")(inside)
     return click.option("--channel", help="Of a still record: vx, vy ... Default: every axis.")(inside)
 
 

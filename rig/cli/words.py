@@ -145,6 +145,8 @@ def _verdict(result: Discovery) -> str:
     if not result.steps:
         if result.verdict == "unexplained":
             return f"Unexplained: nothing in the catalogue describes what is left: {result.residual_structure}."
+        if result.verdict == "ambiguous":
+            return "Nothing shows that an effect is missing, but these data could not show all."
         return "Nothing is missing: what is left is noise."
     what = f"Missing {'was' if len(result.causes) == 1 else 'were'} {joined(result.causes)}"
     refines = "refines" if len(result.refinements) == 1 else "refine"

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import importlib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from calibrations.errors import CalibrationError
+from calibrations.reports.words import joined
 from rig.bench import Bench
 from rig.errors import RecordError
 from rig.record import Record, Run
@@ -24,8 +26,16 @@ def judged(record: Record, run: Run) -> tuple[dict[str, Any], str | None]:
     except (CalibrationError, RecordError) as error:
         return {}, f"none: {error}"
     given = {name: result for name, result in found.items() if isinstance(result, Result)}
-    missing = [f"no {name}: {result.why}" for name, result in found.items() if isinstance(result, Missing)]
-    return documents(given, Bench.model_validate(run.bench).result_limits), "; ".join(missing) or None
+    return documents(given, Bench.model_validate(run.bench).result_limits), _missing(found)
+
+
+def _missing(found: Mapping[str, Result | Missing]) -> str | None:
+    """What is missing, each reason once; None where nothing is."""
+    by_reason: dict[str, list[str]] = {}
+    for name, result in found.items():
+        if isinstance(result, Missing):
+            by_reason.setdefault(result.why, []).append(name)
+    return "; ".join(f"no {joined(names, 'or')}: {why}" for why, names in by_reason.items()) or None
 
 
 def evaluated(record: Record, run: Run) -> dict[str, Result | Missing]:

@@ -14,6 +14,7 @@ from calibrations.errors import DataError, TooFewRows
 from calibrations.noise_analysis.analysis import NoiseAnalysis, analyse
 from calibrations.noise_analysis.bands import slow_bands
 from calibrations.noise_analysis.identify import Spectrum, bounded, estimates, mixture
+from calibrations.noise_analysis.lines import fast_lines
 from calibrations.noise_analysis.processes import Sampling
 from tests.calibrations import noises
 
@@ -222,3 +223,14 @@ def test_whatever_a_record_holds_all_numbers_are_finite(n: int, kind: str, seed:
     numbers = [v for each in found.coefficients.values() for v in (each.value, each.std, each.upper) if v is not None]
     assert np.all(np.isfinite([*numbers, *found.allan.low, *found.allan.high]))
     assert min(numbers) >= 0
+
+
+def test_a_spectrum_that_falls_is_no_line() -> None:
+    """Behind a filter and beside flicker the noise around a line has a slope, near the lower end on one side only."""
+    f, freedom = np.arange(2049) * 1000 / 4096, 12_000
+    noise = np.random.default_rng(1).chisquare(freedom, len(f)) / freedom
+    density = noise * (1 / (1 + (f / 15) ** 2) + 3 / np.maximum(f, 0.1))
+    assert fast_lines(f, density, freedom, 1.0, 14_400.0)[1] == []
+    density[40:45] *= [1.02, 1.2, 1.5, 1.2, 1.02]  # as the window spreads it
+    (line,) = fast_lines(f, density, freedom, 1.0, 14_400.0)[1]
+    assert line.frequency_hz == pytest.approx(f[42], abs=0.1)

@@ -132,3 +132,10 @@ def test_intervals_of_95_percent_cover() -> None:
         curve = octaves([random.standard_normal(2048)], 1.0)
         held.append((curve.low * np.sqrt(curve.tau_s) < 1) & (curve.high * np.sqrt(curve.tau_s) > 1))
     assert np.all((np.mean(held, axis=0)[:7] > 0.9) & (np.mean(held, axis=0)[:7] < 0.99))
+
+
+def test_few_means_do_not_change_the_noise_type() -> None:
+    """Of 36 means the type would be off in every tenth record, and the interval a third of what it should be."""
+    records = [np.random.default_rng(seed).standard_normal(36_000) for seed in range(40)]
+    told = [alpha for each in records for alpha in octaves([each], 10.0).alpha]
+    assert set(told) == {0}
