@@ -26,6 +26,7 @@ BLOCK = 1 << 17
 BESIDE = ("t_s", "temperature_c", "supply_v", "n", "direction", "path")  # columns that are no channels
 LATE = 0.5  # sampling intervals by which a sample may be off before that is a gap
 MOST_MISSING = 0.1  # of a record, in gaps that are closed up
+WHOLE = 0.1  # of a step, by which steps may be off whole numbers of them where single samples were lost
 FEW_GAPS = 0.01  # of all steps
 UNEVEN = 1e-3  # of a record, by which times may be off an even row: those of a computer that samples reach in bursts
 DISAGREE = 0.01  # of two rates
@@ -84,8 +85,9 @@ def repairs(samples: Stream, n: int) -> Iterable[str]:
     """What was done to the samples before anything was computed."""
     if samples.closed:
         missing = sum(length for _, length in samples.closed)
+        gaps = "a gap is" if len(samples.closed) == 1 else f"{len(samples.closed)} gaps are"
         yield (
-            f"{len(samples.closed)} gaps, {missing:.3g} s in all, are closed up: longer times are too short by up to "
+            f"{gaps} closed up, {missing:.3g} s in all: longer times are too short by up to "
             f"{100 * missing * samples.rate_hz / n:.2g} %."
         )
     if samples.uneven_s:
@@ -187,6 +189,12 @@ def _times(table: Table) -> _Times | None:
         gaps = tuple((float(t_s[i]), float(step_s[i] - typical)) for i in far)
         _check_gaps(gaps, (table.n - 1) * typical, table.source)
         return _Times((table.n - 1 - len(far)) / float(np.sum(np.delete(step_s, far))), gaps)
+    lost = np.round(step_s / typical) - 1
+    if 0 < lost.sum() < table.n and np.all(np.abs(step_s / typical - 1 - lost) < WHOLE):
+        raise DataError(
+            f"{table.source}: {lost.sum():.0f} samples are missing, here and there, the first after row {far[0] + 2}; "
+            f"interpolate them onto equal steps of {typical:.6g} s first"
+        )
     off_s = float(np.max(np.abs(t_s - np.linspace(t_s[0], t_s[-1], table.n))))
     if off_s > UNEVEN * length_s:
         raise DataError(

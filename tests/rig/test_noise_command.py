@@ -171,7 +171,7 @@ def test_short_gaps_are_closed_up_and_told(rig: Rig, folder: Path) -> None:
     t_s[2000:] += 1.0
     ended = rig("noise", table(folder / "gap.csv", t_s, vx_v=samples()), "--json")
     assert document(ended)["rate_hz"] == pytest.approx(50)
-    assert "1 gaps, 1 s in all, are closed up" in ended.err
+    assert "a gap is closed up, 1 s in all" in ended.err
 
 
 def test_times_of_a_computer_that_samples_reach_in_bursts(rig: Rig, folder: Path) -> None:
@@ -192,3 +192,13 @@ def test_times_that_are_asked_for(rig: Rig, folder: Path) -> None:
     again = document(rig("noise", "still.npy", "--rate", "50", "--tau", "0.16", "--json"))["allan"]
     for name in ("deviation", "low", "high"):
         assert again[name][0] == pytest.approx(octaves[name][3])
+
+
+def test_single_samples_that_were_lost_are_no_jitter(rig: Rig, folder: Path) -> None:
+    kept = np.random.default_rng(2).random(6000) > 0.03
+    kept[[0, 1]] = True
+    file = table(folder / "lost.csv", (np.arange(6000) / 50)[kept], vx_v=samples()[kept])
+    ended = rig("noise", file)
+    assert ended.status == 2
+    assert f"{np.sum(~kept[: np.flatnonzero(kept)[-1]])} samples are missing, here and there" in ended.err
+    assert "interpolate them onto equal steps of 0.02 s first" in ended.err
