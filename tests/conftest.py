@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import os
+import signal
 from pathlib import Path
 
 import hypothesis
 import pytest
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as `rig` does; numpy is imported after this
+
+# A shell that runs the tests in the background lets SIGINT be ignored, and every process they start inherits that.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # The same examples in every run, however slow the machine.
 hypothesis.settings.register_profile("steady", derandomize=True, deadline=None, database=None)
