@@ -86,14 +86,21 @@ def _tell(context: ExceptionContext, path: Path) -> None:
 
 def _make_tables(engine: Engine, path: Path) -> None:
     with engine.begin() as to:
-        version = to.execute(text("PRAGMA user_version")).scalar_one()
-        if version > SCHEMA:
-            raise RecordError(
-                f"{path}: written by a newer version of this program (schema {version}, this one knows {SCHEMA}); "
-                "update the program, or name another folder in RIG_HOME"
-            )
-        if version < SCHEMA:
+        if _version(to, path) < SCHEMA:
+            to.exec_driver_sql("BEGIN IMMEDIATE")  # two processes may come to a new file at once: one makes its tables
+            version = _version(to, path)
             metadata.create_all(to)
             for statement in (each for old in range(version or SCHEMA, SCHEMA) for each in MIGRATIONS[old]):
                 to.execute(text(statement))
             to.execute(text(f"PRAGMA user_version = {SCHEMA:d}"))
+
+
+def _version(to: Connection, path: Path) -> int:
+    """Of the file's tables; 0 where there are none. Raises RecordError for those of a newer program."""
+    version = int(to.execute(text("PRAGMA user_version")).scalar_one())
+    if version > SCHEMA:
+        raise RecordError(
+            f"{path}: written by a newer version of this program (schema {version}, this one knows {SCHEMA}); "
+            "update the program, or name another folder in RIG_HOME"
+        )
+    return version
