@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterable
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from calibrations.diagnose import Diagnosis
 from calibrations.discover import Added, Discovery
 from calibrations.experiment import Experiment
 from calibrations.fit import Fit
+from calibrations.model import Model
 from calibrations.noise import rms
 from calibrations.search.candidates import Candidate
 from calibrations.table import Array
@@ -24,26 +26,31 @@ def fit_document(found: Fit, path: str | None) -> Document:
     return {
         "schema": "rig.fit/1",
         "data": found.table.source,
-        "parameters": [
-            {
-                "effect": term.name,
-                "axis": e.axis or None,
-                "name": e.name,
-                "value": e.value,
-                "std": e.std,
-                "unit": e.unit,
-                "identified": e.identified,
-                "why": e.why,
-            }
-            for term in found.model.terms
-            for e in term.estimates
-        ],
+        "parameters": parameters_document(found.model),
         "n": found.table.n,
         "rmse": _by_channel(found, found.rmse),
         **_noise(found),
         "excess": _by_channel(found, found.excess),
         "model": path,
     }
+
+
+def parameters_document(model: Model) -> list[Document]:
+    """Every estimate of a model."""
+    return [
+        {
+            "effect": term.name,
+            "axis": e.axis or None,
+            "name": e.name,
+            "value": e.value,
+            "std": e.std,
+            "unit": e.unit,
+            "identified": e.identified,
+            "why": e.why,
+        }
+        for term in model.terms
+        for e in term.estimates
+    ]
 
 
 def comparison_document(result: Comparison, model: str) -> Document:
@@ -57,11 +64,33 @@ def comparison_document(result: Comparison, model: str) -> Document:
         "rmse": _by_channel(found, found.rmse),
         **_noise(found),
         "excess": _by_channel(found, found.excess),
-        "fails": [
-            {"where": p.where, "from": p.low, "to": p.high, "axis": p.axis, "excess": p.excess, "text": p.text}
-            for p in result.fails
-        ],
+        "fails": places_document(result.fails),
     }
+
+
+class Failing(Protocol):
+    """A place where a model fails, of poses or of a still record."""
+
+    @property
+    def where(self) -> str: ...
+    @property
+    def low(self) -> float: ...
+    @property
+    def high(self) -> float: ...
+    @property
+    def axis(self) -> str: ...
+    @property
+    def excess(self) -> float: ...
+    @property
+    def text(self) -> str: ...
+
+
+def places_document(fails: Iterable[Failing]) -> list[Document]:
+    """Where a model fails."""
+    return [
+        {"where": p.where, "from": p.low, "to": p.high, "axis": p.axis, "excess": p.excess, "text": p.text}
+        for p in fails
+    ]
 
 
 def diagnosis_document(result: Diagnosis, model: str) -> Document:

@@ -14,6 +14,7 @@ from calibrations.compensation.cost import Size
 from calibrations.compensation.inverse import Compensation
 from calibrations.compensation.program import Line
 from calibrations.compensation.vectors import Vectors
+from calibrations.documents import parameters_document
 
 
 def files(made: Compensation, origin: Origin, checks: Vectors) -> dict[str, str]:
@@ -61,18 +62,7 @@ def summary(made: Compensation, origin: Origin) -> dict[str, Any]:
         ],
         "out_of_gravity": _size(made.costs.out_of_gravity),
         "uncertainty": _size(made.costs.parameters),
-        "parameters": [
-            {
-                "effect": term.name,
-                "axis": e.axis or None,
-                "name": e.name,
-                "value": e.value,
-                "std": e.std,
-                "unit": e.unit,
-            }
-            for term in made.model.terms
-            for e in term.estimates
-        ],
+        "parameters": parameters_document(made.model),
     }
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from calibrations.documents import experiment_document
+from calibrations.documents import experiment_document, parameters_document, places_document
 from calibrations.still.allan import averaged
 from calibrations.still.compare import Comparison
 from calibrations.still.diagnose import Candidate, Diagnosis
@@ -21,22 +21,14 @@ Document = dict[str, Any]
 
 def fit_document(found: NoiseFit, path: str | None) -> Document:
     """`rig.fit/1`."""
-    parameters = [
-        {
-            "effect": term.name,
-            "axis": e.axis or None,
-            "name": e.name,
-            "value": e.value,
-            "std": e.std,
-            "unit": e.unit,
-            "identified": e.identified,
-            "why": e.why,
-        }
-        for term in found.model.terms
-        for e in term.estimates
-    ]
-    head = {"schema": "rig.fit/1", "data": found.still.source, "parameters": parameters, "n": found.still.n}
-    return {**head, **_errors(found), "model": path}
+    return {
+        "schema": "rig.fit/1",
+        "data": found.still.source,
+        "parameters": parameters_document(found.model),
+        "n": found.still.n,
+        **_errors(found),
+        "model": path,
+    }
 
 
 def comparison_document(result: Comparison, model: str) -> Document:
@@ -58,10 +50,7 @@ def comparison_document(result: Comparison, model: str) -> Document:
         "n": result.fit.still.n,
         **_errors(result.fit),
         "allan": curves,
-        "fails": [
-            {"where": p.where, "from": p.low, "to": p.high, "axis": p.axis, "excess": p.excess, "text": p.text}
-            for p in result.fails
-        ],
+        "fails": places_document(result.fails),
     }
 
 

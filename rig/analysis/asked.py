@@ -20,6 +20,7 @@ from calibrations.search.blind import blind_to
 from calibrations.table import Table
 from calibrations.turning import earth_unknown
 from rig.analysis.data import load
+from rig.analysis.request import Request
 
 DEFAULTS = {
     "poses": "linear",
@@ -40,18 +41,14 @@ def effects_of(bench_file: Path | None) -> Mapping[str, Effect]:
     return catalogue(read_bench(bench_file).folders.effects)
 
 
-def asked(
-    data: str, model: str | None, bench_file: Path | None, tell: Callable[[str], None], noise: str | None = None
-) -> tuple[Table, Model, Mapping[str, Effect]]:
+def asked(request: Request, tell: Callable[[str], None]) -> tuple[Table, Model, Mapping[str, Effect]]:
     """The table, the model (by default that of its kind) and the effects; `tell` hears what a person should know.
-
-    `noise` names a model of the sensor's noise, which then is not guessed.
 
     Raises DataError, UnknownRun, ModelError, UnknownName.
     """
-    effects = effects_of(bench_file)
-    chosen = read_model(model, effects) if model is not None else None
-    table = with_known_noise(load(data, tell=tell), noise, effects)
+    effects = effects_of(request.bench_file)
+    chosen = read_model(request.model, effects) if request.model is not None else None
+    table = with_known_noise(load(request.data, tell=tell), request.noise, effects)
     if chosen is not None:
         check_unit(chosen, table.unit, table.source)
     if table.kind == "poses" and not correlation_known(table):

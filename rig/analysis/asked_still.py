@@ -10,12 +10,13 @@ from pathlib import Path
 import numpy as np
 
 from calibrations.effect import Effect
-from calibrations.errors import ModelError
+from calibrations.errors import DataError, ModelError
 from calibrations.model import Model
 from calibrations.model_file import read_model
 from calibrations.still.fit import noise_terms
 from calibrations.still.record import Samples, Still, reduced
 from rig.analysis.asked import DEFAULTS, check_unit, effects_of
+from rig.analysis.request import Request
 from rig.analysis.still import BESIDE, Stream, axes, repairs
 from rig.errors import UnknownRun
 from rig.record.measured import Measured
@@ -34,35 +35,35 @@ class AskedStill:
     effects: Mapping[str, Effect]
 
 
-def asked_still(
-    data: str,
-    model: str | None,
-    bench_file: Path | None,
-    channel: str | None,
-    rate_hz: float | None,
-    tell: Callable[[str], None],
-) -> AskedStill | None:
+def asked_still(request: Request, tell: Callable[[str], None]) -> AskedStill | None:
     """None where the data are no still record: then they are a table of another kind.
 
     They are one where their kind is still, an array, or a model of noise is named. `tell` hears what was done to them.
     Raises DataError, RecordError, ModelError, UnknownName.
     """
-    effects = effects_of(bench_file)
-    chosen = read_model(model, effects) if model is not None else None
-    if not (_is_noise(chosen) or is_still(data)):
+    effects = effects_of(request.bench_file)
+    chosen = read_model(request.model, effects) if request.model is not None else None
+    if not (_is_noise(chosen) or is_still(request.data)):
+        if request.channel or request.rate_hz:
+            raise DataError(
+                f"{request.data}: --channel and --rate are for still records, and this is none (or name --model still)"
+            )
         return None
+    if request.noise is not None:
+        raise ModelError("--noise is for poses and rates; the model of a still record is named with --model")
     if chosen is not None:
         noise_terms(chosen)
-    still = still_of(data, channel, rate_hz, tell)
+    still = still_of(request, tell)
     if chosen is not None:
         check_unit(chosen, still.unit, still.source)
     return AskedStill(still, chosen or read_model(DEFAULTS["still"], effects), effects)
 
 
-def still_of(data: str, channel: str | None, rate_hz: float | None, tell: Callable[[str], None]) -> Still:
-    """The still record that `data` names, each channel read once. Raises DataError, RecordError, TooFewRows."""
+def still_of(request: Request, tell: Callable[[str], None]) -> Still:
+    """The still record that is asked of, each channel read once. Raises DataError, RecordError, TooFewRows."""
+    data = request.data
     with nullcontext() if Path(data).exists() or data.endswith(".npy") else Record.to_find(data) as record:
-        streams = axes(record, data, channel, rate_hz)
+        streams = axes(record, data, request.channel, request.rate_hz)
         first = next(iter(streams.values()))
         still = reduced((_samples(axis, each) for axis, each in streams.items()), first.source, first.constants)
     taken = {each.channel for each in streams.values()}

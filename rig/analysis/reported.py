@@ -18,26 +18,18 @@ from rig.analysis.asked import asked
 from rig.analysis.asked_still import AskedStill, asked_still
 from rig.analysis.night import Page, night_of
 from rig.analysis.provenance import program, today
+from rig.analysis.request import Request
 from rig.analysis.shaken import shaken_of
 from rig.planning.foresight import with_next, with_noise_next
 
 
-def reported(
-    data: str,
-    model: str | None,
-    bench_file: Path | None,
-    tell: Callable[[str], None],
-    sampled: tuple[str | None, float | None] = (None, None),
-) -> Page:
-    """On a model, or on the night of a soak where none is named. Raises what `asked` and `fit` raise.
-
-    `sampled` is the channel and the rate of a still record, where they are given.
-    """
-    night = night_of(data, today(), program()) if model is None else None
-    still = None if night else asked_still(data, model, bench_file, *sampled, tell)
+def reported(request: Request, tell: Callable[[str], None]) -> Page:
+    """On a model, or on the night of a soak where none is named. Raises what `asked` and `fit` raise."""
+    night = night_of(request.data, today(), program()) if request.model is None and request.channel is None else None
+    still = None if night else asked_still(request, tell)
     if still is not None:
-        return _on_noise(still, bench_file)
-    return night or _on_a_model(data, model, bench_file, tell)
+        return _on_noise(still, request.bench_file)
+    return night or _on_a_model(request, tell)
 
 
 def _on_noise(asked: AskedStill, bench_file: Path | None) -> Page:
@@ -48,10 +40,10 @@ def _on_noise(asked: AskedStill, bench_file: Path | None) -> Page:
     return pictures, lambda: still_report(found, first, beside, today(), program(), pictures)
 
 
-def _on_a_model(data: str, model: str | None, bench_file: Path | None, tell: Callable[[str], None]) -> Page:
-    table, start, effects = asked(data, model, bench_file, tell)
-    found = with_next(discover(table, start, effects), data, effects, bench_file, tell)
+def _on_a_model(request: Request, tell: Callable[[str], None]) -> Page:
+    table, start, effects = asked(request, tell)
+    found = with_next(discover(table, start, effects), request.data, effects, request.bench_file, tell)
     beside = compare(table, start)
-    shaken = shaken_of(data)
+    shaken = shaken_of(request.data)
     pictures = album(found, beside, shaken)
     return pictures, lambda: report(found, beside, today(), program(), pictures, shaken)

@@ -17,6 +17,7 @@ from calibrations.model import Model
 from calibrations.search.outliers import fit_without
 from calibrations.table import Table
 from rig.analysis.asked import asked
+from rig.analysis.request import Request
 
 
 @dataclass(frozen=True)
@@ -77,7 +78,7 @@ def trail(data: str, model: str | None, bench_file: Path | None) -> Trail:
     """The beginning: `data` (a file or a run) and a model by name or file. Raises what `asked` and `fit` raise."""
     notes: list[str] = []
     tell: Callable[[str], None] = notes.append
-    table, start, effects = asked(data, model, bench_file, tell)
+    table, start, effects = asked(Request(data, model, bench_file), tell)
     found, _ = fit_without(start, table)
     return Trail(start, table, effects, tuple(notes), found)
 

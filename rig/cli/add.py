@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING
 
 import click
 
-from rig.cli.output import Sampled, bench_option, emit, json_option, noise_option, note, notes, sampled_options
+from rig.cli.output import emit, note, notes
+from rig.cli.request import request_options
 
 if TYPE_CHECKING:
     from calibrations.effect import Effect
     from calibrations.table import Table
+    from rig.analysis.request import Request
 
 PLAIN = re.compile(r"[A-Za-z0-9_-]+")  # what no expression that means anything looks like
 
@@ -24,21 +26,8 @@ PLAIN = re.compile(r"[A-Za-z0-9_-]+")  # what no expression that means anything 
 @click.option("--model", required=True, help="A shipped model by name, or a model file.")
 @click.option("--data", required=True, help="A file or a run.")
 @click.option("--out", required=True, type=click.Path(dir_okay=False, path_type=Path), help="The new model file.")
-@bench_option
-@noise_option
-@sampled_options
-@json_option
-def command(
-    effect: str,
-    name: str | None,
-    model: str,
-    data: str,
-    out: Path,
-    bench_file: Path | None,
-    as_json: bool,
-    noise: str | None,
-    sampled: Sampled,
-) -> None:
+@request_options
+def command(request: Request, effect: str, name: str | None, out: Path, as_json: bool) -> None:
     """Add EFFECT to a model, fit both to the data, and write the new model; the old one stays.
 
     EFFECT is a name of the catalogue (`rig effects`), a Python file of your own (my_effect.py), or, with --name, an
@@ -54,24 +43,26 @@ def command(
     from rig.cli.still import of_still, told_add
     from rig.cli.words import addition, parameters, warning
 
-    if (still := of_still(data, model, bench_file, sampled, out, noise=noise)) is not None:
-        told_add(still, effect, out, as_json, data)
+    if (still := of_still(request, out)) is not None:
+        told_add(still, request, effect, out, as_json)
         return
-    table, start, effects = asked(data, model, bench_file, out, noise)
+    table, start, effects = asked(request, out)
     chosen = _chosen(effect, name, table, effects)
     if start.holds(chosen.name):
-        raise ModelError(f"{model}: {chosen.name} is in the model already; its effects: {', '.join(start.effects)}")
+        raise ModelError(
+            f"{request.model}: {chosen.name} is in the model already; its effects: {', '.join(start.effects)}"
+        )
     if (why := chosen.excluded(table)) is not None:
         raise ModelError(f"{chosen.name} {why}; {table.source} is a table of {table.kind}: {', '.join(table.columns)}")
     result = add(chosen, start, table, {**effects, chosen.name: chosen})
     if chosen.expression:
-        require_new(result.end, chosen.name, model)
+        require_new(result.end, chosen.name, request.model or start.name)
     write_model(result.end, start, out)
     if as_json:
         emit(discovery_document(result, str(out)))
         notes(warning(result.caution))
     else:
-        told = addition(result, data, out)
+        told = addition(result, request.data, out)
         click.echo(f"{chosen.name} added to {start.name}\n\n{told}\n\n{parameters(result.end.model)}\n")
         click.echo(f"written to {out}")
     if effect.endswith(".py"):

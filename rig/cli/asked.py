@@ -14,20 +14,24 @@ from calibrations.table import Table
 from rig.analysis.asked import asked as read_asked
 from rig.analysis.asked import blind
 from rig.analysis.provenance import with_provenance
+from rig.analysis.request import Request
 from rig.cli.output import note
 from rig.files import require_out, write_whole
 
 
-def asked(
-    data: str, model: str | None, bench_file: Path | None, out: Path | None = None, noise: str | None = None
-) -> tuple[Table, Model, Mapping[str, Effect]]:
+def asked(request: Request, out: Path | None = None) -> tuple[Table, Model, Mapping[str, Effect]]:
     """The table, the model and the effects that a command was asked for.
 
     Raises OutputError where `out` cannot be written, before anything is computed.
     """
+    require_place(request, out)
+    return read_asked(request, note)
+
+
+def require_place(request: Request, out: Path | None) -> None:
+    """A result needs a folder, and takes the place of nothing that it is made from. Raises OutputError."""
     if out is not None:
-        require_out(out, data, model, bench_file)
-    return read_asked(data, model, bench_file, note, noise)
+        require_out(out, request.data, request.model, request.bench_file)
 
 
 def tell_blind(found: Fit, effects: Mapping[str, Effect]) -> None:

@@ -53,10 +53,11 @@ def command(
     from calibrations.model_file import read_model
     from rig.analysis.asked import asked
     from rig.analysis.issue import Asked, issue, limits
+    from rig.analysis.request import Request
     from rig.bench import read_bench
 
     paths = _paths(out)
-    table, given, effects = asked(data, model, bench_file, note)
+    table, given, effects = asked(Request(data, model, bench_file), note)
     bench = read_bench(bench_file) if bench_file is not None else None
     earlier, of = given, Path(model).name
     if before is not None:

@@ -2,27 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from rig.cli.output import (
-    Sampled,
-    bench_option,
-    check_option,
-    columns,
-    emit,
-    json_option,
-    model_option,
-    noise_option,
-    note,
-    notes,
-    sampled_options,
-)
+from rig.cli.output import check_option, columns, emit, model_option, note, notes
+from rig.cli.request import request_options
 
 if TYPE_CHECKING:
     from calibrations.diagnose import Diagnosis
+    from rig.analysis.request import Request
 
 SHOWN = 6
 
@@ -31,19 +20,8 @@ SHOWN = 6
 @click.argument("data")
 @model_option
 @check_option
-@bench_option
-@noise_option
-@sampled_options
-@json_option
-def command(
-    data: str,
-    model: str | None,
-    check: bool,
-    bench_file: Path | None,
-    as_json: bool,
-    noise: str | None,
-    sampled: Sampled,
-) -> int:
+@request_options
+def command(request: Request, check: bool, as_json: bool) -> int:
     """Find the physical effect that a model misses on DATA (a file or a run)."""
     from calibrations.diagnose import diagnose
     from calibrations.documents import diagnosis_document
@@ -53,24 +31,22 @@ def command(
     from rig.cli.words import warning
     from rig.planning.foresight import with_next
 
-    if (still := of_still(data, model, bench_file, sampled, noise=noise)) is not None:
-        return told_diagnose(still, model, bench_file, check, as_json, data)
-    table, start, effects = asked(data, model, bench_file, noise=noise)
-    result = diagnose(table, start, effects)
-    result = with_next(result, data, effects, bench_file, note)
+    if (still := of_still(request)) is not None:
+        return told_diagnose(still, request, check, as_json)
+    table, start, effects = asked(request)
+    result = with_next(diagnose(table, start, effects), request.data, effects, request.bench_file, note)
     tell_blind(result.fit, effects)
-    name = model or start.name
+    name = request.model or start.name
     if as_json:
-        own = own_effect(result.pattern, name, data, bench_file)
+        own = own_effect(result.pattern, name, request)
         emit(diagnosis_document(result, name) | {"own_effect": own})
         notes(warning(result.caution))
     else:
-        text = _told(result, data, name, f" --bench {bench_file}" if bench_file else "")
-        click.echo("\n".join([text, *told(result.pattern, name, data, bench_file)]))
+        click.echo("\n".join([_told(result, name, request), *told(result.pattern, name, request)]))
     return 1 if check and result.verdict != "adequate" else 0
 
 
-def _told(result: Diagnosis, data: str, model: str, bench: str) -> str:
+def _told(result: Diagnosis, model: str, request: Request) -> str:
     from calibrations.documents import why
     from calibrations.reports.verdict import headline
     from rig.cli.words import experiment
@@ -93,7 +69,9 @@ def _told(result: Diagnosis, data: str, model: str, bench: str) -> str:
     if result.verdict in ("effect-missing", "ambiguous") and result.path.steps:
         best = result.candidates[0]
         lines += [f"{best.name}: {why(best, result)}", "", f"    {best.effect.formula.splitlines()[0]}", ""]
-        lines.append(f"Add it: rig add {best.name} --model {model} --data {data} --out model.yaml{bench}")
+        lines.append(
+            f"Add it: rig add {best.name} --model {model} --data {request.data} --out model.yaml{request.bench_words}"
+        )
     if result.next_experiment:
-        lines += experiment(result.next_experiment, data)
+        lines += experiment(result.next_experiment, request.data)
     return "\n".join(lines).rstrip()

@@ -3,22 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from rig.cli.output import (
-    Sampled,
-    bench_option,
-    check_option,
-    emit,
-    json_option,
-    model_option,
-    noise_option,
-    note,
-    notes,
-    sampled_options,
-)
+from rig.cli.output import check_option, emit, model_option, note, notes
+from rig.cli.request import request_options
 from rig.cli.watch import watch_options
+
+if TYPE_CHECKING:
+    from rig.analysis.request import Request
 
 
 @click.command("discover")
@@ -29,23 +23,17 @@ from rig.cli.watch import watch_options
 @click.option("--time", "minutes", type=click.FloatRange(min=0, min_open=True), help="Rig time for --live, minutes.")
 @watch_options
 @check_option
-@bench_option
-@noise_option
-@sampled_options
-@json_option
+@request_options
 def command(
-    data: tuple[str, ...],
-    model: str | None,
+    request: Request,
+    several: tuple[str, ...],
     out: Path | None,
     live: bool,
     minutes: float | None,
     unattended: bool,
     answers: Path | None,
     check: bool,
-    bench_file: Path | None,
     as_json: bool,
-    noise: str | None,
-    sampled: Sampled,
 ) -> int:
     """Diagnose and add until nothing is missing on DATA (a file or a run; several are judged together).
 
@@ -55,29 +43,21 @@ def command(
     if live:
         from rig.cli.live import discover_live
 
-        if data:
+        if several:
             raise click.UsageError("--live measures its own data; leave out DATA, or --live")
-        return discover_live(model, out, minutes, unattended, answers, check, bench_file, as_json)
-    if not data:
+        return discover_live(request, out, minutes, unattended, answers, check, as_json)
+    if not several:
         raise click.UsageError("name DATA (a file or a run), or --live to measure it")
     from rig.cli.still import of_still, told_discover
 
-    if (still := of_still(data[0], model, bench_file, sampled, out, noise=noise)) is not None:
-        if len(data) > 1:
+    if (still := of_still(request, out)) is not None:
+        if len(several) > 1:
             raise click.UsageError("still records are judged one at a time; name one")
-        return told_discover(still, out, bench_file, check, as_json, data[0])
-    return _discover(data, model, out, check, bench_file, as_json, noise)
+        return told_discover(still, request, out, check, as_json)
+    return _discover(request, several, out, check, as_json)
 
 
-def _discover(
-    data: tuple[str, ...],
-    model: str | None,
-    out: Path | None,
-    check: bool,
-    bench_file: Path | None,
-    as_json: bool,
-    noise: str | None,
-) -> int:
+def _discover(request: Request, several: tuple[str, ...], out: Path | None, check: bool, as_json: bool) -> int:
     from calibrations.discover import discover
     from calibrations.documents import discovery_document
     from rig.analysis.asked import with_known_noise
@@ -87,14 +67,13 @@ def _discover(
     from rig.cli.words import discovery, parameters, warning
     from rig.planning.foresight import with_next
 
-    table, start, effects = asked(data[0], model, bench_file, out, noise)
-    table = with_known_noise(load_all(data, note), noise, effects) if len(data) > 1 else table
-    result = discover(table, start, effects)
-    result = with_next(result, data[0], effects, bench_file, note)
+    table, start, effects = asked(request, out)
+    table = with_known_noise(load_all(several, note), request.noise, effects) if len(several) > 1 else table
+    result = with_next(discover(table, start, effects), request.data, effects, request.bench_file, note)
     if out is not None:
         write_model(result.end, start, out)
-    reached = str(out) if out else model or start.name
-    own = (result.pattern if len(data) == 1 else None, reached, data[0], bench_file)
+    reached = str(out) if out else request.model or start.name
+    own = (result.pattern if len(several) == 1 else None, reached, request)
     if as_json:
         emit(discovery_document(result, str(out) if out else None) | {"own_effect": own_effect(*own)})
         notes(warning(result.caution))

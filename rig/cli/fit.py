@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from rig.cli.output import (
-    Sampled,
-    bench_option,
-    check_option,
-    emit,
-    json_option,
-    model_option,
-    noise_option,
-    notes,
-    sampled_options,
-)
+from rig.cli.output import check_option, emit, model_option, notes
+from rig.cli.request import request_options
+
+if TYPE_CHECKING:
+    from rig.analysis.request import Request
 
 
 @click.command("fit")
@@ -24,20 +19,8 @@ from rig.cli.output import (
 @model_option
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="Write the fitted model to this file.")
 @check_option
-@bench_option
-@noise_option
-@sampled_options
-@json_option
-def command(
-    data: str,
-    model: str | None,
-    out: Path | None,
-    check: bool,
-    bench_file: Path | None,
-    as_json: bool,
-    noise: str | None,
-    sampled: Sampled,
-) -> int:
+@request_options
+def command(request: Request, out: Path | None, check: bool, as_json: bool) -> int:
     """Estimate the parameters of a model from DATA (a file or a run), with standard uncertainties."""
     from calibrations.compare import compare
     from calibrations.documents import fit_document
@@ -52,9 +35,9 @@ def command(
     from rig.cli.still import of_still, told_fit
     from rig.cli.words import errors, paper, parameters, warning
 
-    if (still := of_still(data, model, bench_file, sampled, out, noise=noise)) is not None:
+    if (still := of_still(request, out)) is not None:
         return told_fit(still, out, check, as_json)
-    table, start, effects = asked(data, model, bench_file, out, noise)
+    table, start, effects = asked(request, out)
     found = fit(start, table)
     if out is not None:
         write_model(found, start, out)
@@ -66,7 +49,7 @@ def command(
         notes([*warning(caution), *warning(kept(found))])
     else:
         click.echo(f"{found.model.name} fitted to {table.n} rows of {table.source}\n\n{parameters(found.model)}\n")
-        told = [*calibrated.lines(found), *warning(caution), *warning(kept(found)), *lines(checked, data)]
+        told = [*calibrated.lines(found), *warning(caution), *warning(kept(found)), *lines(checked, request.data)]
         click.echo("\n".join([errors(found), *(f"\n{line}" for line in told)]))
         if "cross-axis-bias" in start.effects and table.kind == "poses":
             click.echo(f"\n{paper(table)}")

@@ -17,6 +17,7 @@ from calibrations.table import Table
 from procedures.catalogue import find
 from procedures.settings import parse
 from rig.analysis.asked import effects_of
+from rig.analysis.request import Request
 from rig.analysis.several import begun, joined_runs
 from rig.bench import Bench, read_bench
 from rig.cli.asked import write_model
@@ -69,20 +70,20 @@ class Taken:
 
 
 def discover_live(
-    model: str | None,
+    request: Request,
     out: Path | None,
     minutes: float | None,
     unattended: bool,
     answers: Path | None,
     check: bool,
-    bench_file: Path | None,
     as_json: bool,
 ) -> int:
     """The command, from the bench file to the verdict; its exit status."""
+    bench_file = request.bench_file
     bench, effects = read_bench(bench_file), effects_of(bench_file)
     if out is not None:
-        require_out(out, model, bench_file)
-    given = read_model(model or "linear", effects)
+        require_out(out, request.model, bench_file)
+    given = read_model(request.model or "linear", effects)
     with Record() as record:
         taken = Taken(record, bench, unattended, answers)
         live = Live(bench, bench_file, given, effects, 60 * (minutes or 0.0), taken.measure)

@@ -4,21 +4,16 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterable, Sequence
-from functools import wraps
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 import click
 
-Sampled = tuple[str | None, float | None]  # --channel and --rate
 json_option = click.option("--json", "as_json", is_flag=True, help="One JSON document on standard output.")
 check_option = click.option("--check", is_flag=True, help="Exit with 1 unless the model is adequate.")
 model_option = click.option(
     "--model", default=None, help="A shipped model by name, or a model file. Default: by kind of data."
-)
-noise_option = click.option(
-    "--noise", help="A noise model of this sensor, fitted to a still record: slow noise is then known, and not guessed."
 )
 bench_option = click.option(
     "--bench",
@@ -41,17 +36,6 @@ class Positive(click.FloatRange):
         if not math.isfinite(number):
             self.fail(f"{value} is no number to compute with; give one above 0", param, ctx)
         return number
-
-
-def sampled_options(function: Callable[..., Any]) -> Callable[..., Any]:
-    """--channel and --rate, as one argument `sampled`: of a still record."""
-
-    @wraps(function)
-    def inside(*args: Any, channel: str | None, rate_hz: float | None, **kwargs: Any) -> Any:
-        return function(*args, sampled=(channel, rate_hz), **kwargs)
-
-    inside = click.option("--rate", "rate_hz", type=Positive(), help="Samples a second, for an array (.npy).")(inside)
-    return click.option("--channel", help="Of a still record: vx, vy ... Default: every axis.")(inside)
 
 
 def emit(document: dict[str, Any]) -> None:

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from rig.cli.output import Sampled, bench_option, emit, json_option, model_option, note, sampled_options
+from rig.cli.output import emit, model_option, note
+from rig.cli.request import request_options
+
+if TYPE_CHECKING:
+    from rig.analysis.request import Request
 
 
 @click.command("report")
@@ -15,19 +20,8 @@ from rig.cli.output import Sampled, bench_option, emit, json_option, model_optio
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="Write the page to this HTML file.")
 @click.option("--pictures", "folder", type=click.Path(file_okay=False, path_type=Path), help="Write all pictures here.")
 @click.option("--format", "form", type=click.Choice(["png", "svg"]), default="png", show_default=True)
-@bench_option
-@sampled_options
-@json_option
-def command(
-    data: str,
-    model: str | None,
-    out: Path | None,
-    folder: Path | None,
-    form: str,
-    bench_file: Path | None,
-    as_json: bool,
-    sampled: Sampled,
-) -> None:
+@request_options
+def command(request: Request, out: Path | None, folder: Path | None, form: str, as_json: bool) -> None:
     """Write a page on DATA (a file or a run) and a model: what the model misses, and the model with it.
 
     The page is one file that needs no network. Of a soak it shows the night, unless a model is named. --pictures
@@ -37,11 +31,11 @@ def command(
         raise click.UsageError("nothing to write: give --out FILE.html, --pictures FOLDER, or both")
     from calibrations.pictures.save import save_all
     from rig.analysis.reported import reported
-    from rig.files import require_out, write_whole
+    from rig.cli.asked import require_place
+    from rig.files import write_whole
 
-    if out is not None:
-        require_out(out, data, model, bench_file)
-    pictures, page = reported(data, model, bench_file, note, sampled)
+    require_place(request, out)
+    pictures, page = reported(request, note)
     if out is not None:
         write_whole(out, page())
     written = save_all({picture.name: picture.figure for picture in pictures}, folder, form) if folder else []

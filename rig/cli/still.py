@@ -19,40 +19,27 @@ from calibrations.still.documents import (
 )
 from calibrations.still.fit import fit
 from rig.analysis.asked_still import AskedStill, asked_still
-from rig.cli.asked import write_model
-from rig.cli.output import Sampled, emit, note
+from rig.analysis.request import Request
+from rig.cli.asked import require_place, write_model
+from rig.cli.output import emit, note
 from rig.cli.still_words import added, compared, diagnosed, discovered, fitted
-from rig.files import require_out
 from rig.planning.foresight import with_noise_next
 
 
-def of_still(
-    data: str,
-    model: str | None,
-    bench_file: Path | None,
-    sampled: Sampled,
-    out: Path | None = None,
-    noise: str | None = None,
-) -> AskedStill | None:
-    """What a command was asked of a still record; None where the data are none. `sampled`: --channel and --rate.
+def of_still(request: Request, out: Path | None = None) -> AskedStill | None:
+    """What a command was asked of a still record; None where the data are none.
 
     Raises what `asked_still` raises; OutputError where `out` cannot be written, before anything is computed.
     """
-    if out is not None:
-        require_out(out, data, model, bench_file)
-    found = asked_still(data, model, bench_file, *sampled, note)
-    if found is None and any(sampled):
-        raise click.UsageError("--channel and --rate are for still records, and DATA is none (or name --model still)")
-    if found is not None and noise is not None:
-        raise click.UsageError("--noise is for poses and rates; the model of a still record is named with --model")
-    return found
+    require_place(request, out)
+    return asked_still(request, note)
 
 
-def told_compare(asked: AskedStill, model: str | None, check: bool, as_json: bool, data: str) -> int:
+def told_compare(asked: AskedStill, request: Request, check: bool, as_json: bool) -> int:
     """`rig compare`."""
     result: Comparison = compare(asked.still, asked.model)
-    name = model or asked.model.name
-    _emit(as_json, lambda: comparison_document(result, name), lambda: compared(result, name, data))
+    name = request.model or asked.model.name
+    _emit(as_json, lambda: comparison_document(result, name), lambda: compared(result, name, request.data))
     return int(check and not result.adequate)
 
 
@@ -66,21 +53,19 @@ def told_fit(asked: AskedStill, out: Path | None, check: bool, as_json: bool) ->
     return int(check and not compare(asked.still, found.model).adequate)
 
 
-def told_diagnose(
-    asked: AskedStill, model: str | None, bench_file: Path | None, check: bool, as_json: bool, data: str
-) -> int:
+def told_diagnose(asked: AskedStill, request: Request, check: bool, as_json: bool) -> int:
     """`rig diagnose`."""
-    result = with_noise_next(diagnose(asked.still, asked.model, asked.effects), bench_file)
-    name = model or asked.model.name
+    result = with_noise_next(diagnose(asked.still, asked.model, asked.effects), request.bench_file)
+    name = request.model or asked.model.name
     _emit(
         as_json,
         lambda: diagnosis_document(result, name) | {"own_effect": None},
-        lambda: diagnosed(result, name, data, f" --bench {bench_file}" if bench_file else ""),
+        lambda: diagnosed(result, name, request.data, request.bench_words),
     )
     return int(check and result.verdict != "adequate")
 
 
-def told_add(asked: AskedStill, effect: str, out: Path, as_json: bool, data: str) -> None:
+def told_add(asked: AskedStill, request: Request, effect: str, out: Path, as_json: bool) -> None:
     """`rig add`. Raises ModelError for an effect that is none of noise, or is in the model already."""
     from calibrations.effect import find
     from calibrations.errors import ModelError
@@ -93,21 +78,19 @@ def told_add(asked: AskedStill, effect: str, out: Path, as_json: bool, data: str
         raise ModelError(f"{asked.model.name}: {effect} is in the model already")
     result = add(chosen, asked.model, asked.still, asked.effects)
     write_model(result.end, asked.model, out)
-    _emit(as_json, lambda: discovery_document(result, str(out)), lambda: added(result, data, str(out)))
+    _emit(as_json, lambda: discovery_document(result, str(out)), lambda: added(result, request.data, str(out)))
 
 
-def told_discover(
-    asked: AskedStill, out: Path | None, bench_file: Path | None, check: bool, as_json: bool, data: str
-) -> int:
+def told_discover(asked: AskedStill, request: Request, out: Path | None, check: bool, as_json: bool) -> int:
     """`rig discover`."""
-    result = with_noise_next(discover(asked.still, asked.model, asked.effects), bench_file)
+    result = with_noise_next(discover(asked.still, asked.model, asked.effects), request.bench_file)
     written = str(out) if out else None
     if out is not None:
         write_model(result.end, asked.model, out)
     _emit(
         as_json,
         lambda: discovery_document(result, written) | {"own_effect": None},
-        lambda: discovered(result, data, written),
+        lambda: discovered(result, request.data, written),
     )
     return int(check and result.verdict != "adequate")
 

@@ -7,6 +7,7 @@ from nicegui import ui
 from calibrations.fit import fit
 from calibrations.numerals import measured, plain, unit
 from rig.analysis.asked import asked
+from rig.analysis.request import Request
 from rig.analysis.side_by_side import Pair, parameters_of, results_of
 from rig.record import Record
 from rig.web.desk import Desk
@@ -58,8 +59,8 @@ def _results(first: str, second: str) -> list[Pair]:
 
 def _parameters(desk: Desk, first: str, second: str, model: str) -> tuple[str, list[Pair]]:
     notes: list[str] = []
-    one = asked(first, model or None, desk.bench_file, notes.append)
-    other = asked(second, model or None, desk.bench_file, notes.append)
+    one = asked(Request(first, model or None, desk.bench_file), notes.append)
+    other = asked(Request(second, model or None, desk.bench_file), notes.append)
     return one[1].name, parameters_of(fit(one[1], one[0]), fit(one[1], other[0]))
 
 

@@ -131,12 +131,15 @@ class Choice:
     async def _report(self) -> None:
         """The report of `rig report`, as a file of the browser's."""
         from rig.analysis.reported import reported
+        from rig.analysis.request import Request
 
         page, trail = self.page, self.page.trail
         hint = ui.notification("Making the report: all pictures, all candidates", spinner=True, timeout=None)
         try:
             notes: list[str] = []
-            _, made = await off_loop(reported, page.data, page.model or None, page.desk.bench_file, notes.append)
+            _, made = await off_loop(
+                reported, Request(page.data, page.model or None, page.desk.bench_file), notes.append
+            )
             text = await off_loop(made)
             ui.download.content(text, f"{Path(page.data).stem}-{trail.model.name if trail else 'model'}.html")
         except Exception as error:

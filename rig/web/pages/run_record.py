@@ -11,6 +11,7 @@ from nicegui import ui
 from calibrations.numerals import bound, measured, unit
 from rig.analysis.next_steps import next_steps
 from rig.analysis.reported import reported
+from rig.analysis.request import Request
 from rig.export import export
 from rig.record import Event, Record, Run
 from rig.web.desk import Desk
@@ -120,7 +121,7 @@ class OneRun:
         hint = ui.notification("Making the report", spinner=True, timeout=None)
         try:
             notes: list[str] = []
-            _, make = await off_loop(reported, data, None, self.desk.bench_file, notes.append)
+            _, make = await off_loop(reported, Request(data, None, self.desk.bench_file), notes.append)
             ui.download.content(await off_loop(make), f"{data.replace('/', '-')}.html")
         except Exception as error:
             ui.notify(message(error), type="negative", multi_line=True, timeout=0, close_button="Close")
