@@ -22,7 +22,7 @@ from drivers.links.address import Address
 from drivers.links.faults import Faults
 from drivers.links.link import connection_key
 from drivers.links.url import Url
-from drivers.links.wire_faults import Said, Wire, disturbed
+from drivers.links.wire_faults import END, Said, Wire, disturbed
 
 NO_FAULTS = Faults()
 FAULTS_OF = "faults of"
@@ -60,6 +60,7 @@ class Connection:
         self._last_s = -math.inf
         self._full = False
         self._heard_s = -math.inf
+        self.ended = False  # whether it is to be closed
 
     def read(self, now_s: float, patience_s: float) -> bool:
         """Take in what is there; False at the end of the connection.
@@ -81,6 +82,8 @@ class Connection:
 
     def send(self, data: bytes, due_s: float) -> None:
         """Send `data` at `due_s`, after all that was sent before; a fault of the wire may make it other data, later."""
+        if not data:
+            return
         self._last_s = max(self._last_s, due_s)
         pieces = list(self._leaving(Said(data, self._last_s)))
         for piece in pieces:
@@ -93,6 +96,7 @@ class Connection:
         self._full = False
         while self._outbox and not self._full and self._outbox[0][0] <= now_s:
             due_s, order, data = heapq.heappop(self._outbox)
+            self.ended = self.ended or data == END
             written = self._write(data)
             self.emitted += written
             if written < len(data):
@@ -137,6 +141,12 @@ class Port:
     def filenos(self) -> list[int]:
         own = [self._socket.fileno()] if self._socket else []
         return [*own, *self.connections]
+
+    def emit(self, now_s: float) -> None:
+        for connection in list(self.connections.values()):
+            connection.emit(now_s)
+            if connection.ended:
+                self._drop(connection)
 
     def receive(self, fileno: int, now_s: float) -> None:
         if self._socket and fileno == self._socket.fileno():
@@ -255,8 +265,7 @@ class Server:
 
     def emit(self, now_s: float) -> None:
         for port in self._ports:
-            for connection in port.connections.values():
-                connection.emit(now_s)
+            port.emit(now_s)
 
     def due_s(self) -> float:
         twins = [twin.due_s() for twin in self._twins.values()]

@@ -2,7 +2,7 @@
 
 silence       hears nothing and says nothing      } what comes to the instrument is dropped,
 disconnect    the connection is closed            } see server.Port
-all others    a message becomes other messages, at other times
+all others    a message becomes other messages, at other times; an empty one is the end of the connection
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from typing import NamedTuple
 from drivers.links.faults import Fault, Faults, Kind
 from drivers.links.person import PERSON
 
+END = b""  # as a read that finds nothing
 MENDED_S = 0.2  # until TCP sends a spoilt segment again
 BABBLE_S = 60.0  # how long it babbles for one message
 MOST_PIECES = 1000  # of a message
@@ -47,6 +48,11 @@ Effect = Callable[[Said, float, Wire], list[Said]]
 def nothing(_said: Said, _size: float, _wire: Wire) -> list[Said]:
     """Nothing arrives."""
     return []
+
+
+def the_end(said: Said, _size: float, _wire: Wire) -> list[Said]:
+    """The connection ends where it would have come."""
+    return [Said(END, said.due_s)]
 
 
 def later(said: Said, size: float, _wire: Wire) -> list[Said]:
@@ -109,7 +115,10 @@ def other_unit(said: Said, size: float, wire: Wire) -> list[Said]:
 
 EFFECTS: dict[str, tuple[Kind, Effect]] = {
     "silence": (Kind("hears nothing and says nothing, as with a cable that is out"), nothing),
-    "disconnect": (Kind("the connection is closed as soon as it is asked; it can be opened again"), nothing),
+    "disconnect": (
+        Kind("the connection is closed as soon as it is asked or would say something; it can be opened again"),
+        the_end,
+    ),
     "lost-answers": (Kind("hears and obeys, but nothing that it says arrives"), nothing),
     "delay": (Kind("all that it says comes later", 0.7, "s", least=0), later),
     "garbage": (Kind("says noise in place of what it should", 8, "byte", least=1), noise),
@@ -132,8 +141,13 @@ def disturbed(said: Said, faults: Faults, wire: Wire) -> list[Said]:
     messages = [said]
     for what, (_, effect) in EFFECTS.items() if faults else ():
         if (size := faults.size(what, said.due_s)) is not None:
-            messages = [each for message in messages for each in effect(message, size, wire)]
+            messages = [each for message in messages for each in _effect(effect, message, size, wire)]
     return messages
+
+
+def _effect(effect: Effect, message: Said, size: float, wire: Wire) -> list[Said]:
+    """What becomes of one message; of an end, nothing else."""
+    return [message] if message.data == END else effect(message, size, wire)
 
 
 def kinds_of(driver: str) -> dict[str, Kind]:

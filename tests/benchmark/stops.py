@@ -27,13 +27,14 @@ from rig.connected.guard import GuardedClock
 from rig.connected.instruments import Rig
 from rig.connected.wiring import Wiring, serve, world_of
 from rig.running.signals import stoppable
+from rig.warm import main as compile_all
 from tests.rig.misbehaving import guarded_bench
 
 TARGET_S = 0.1
 FAULTS = {
     "interlock opens": ("adc", "open-interlock"),
     "alarm of the other stage": ("beta", "alarm"),
-    "converter falls silent": ("adc", "disconnect"),
+    "the converter's connection is lost": ("adc", "disconnect"),
 }
 SIGNAL = "Ctrl-C"
 
@@ -92,7 +93,8 @@ def _nobody() -> object:
 
 def main(times: int = 20) -> None:
     luck = random.Random(1)
-    latency_s(SIGNAL, luck)  # what is compiled or loaded first is not counted
+    compile_all()  # else the first exchange with a twin runs out of time
+    latency_s(SIGNAL, luck)  # what is loaded first is not counted
     found = {what: [latency_s(what, luck) for _ in range(times)] for what in (*FAULTS, SIGNAL)}
     longest = max(max(each) for each in found.values())
     said = {
