@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import secrets
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
+from datetime import UTC, datetime
 from pathlib import Path
 
 from rig.home import home
@@ -39,6 +41,11 @@ class Order:
     def read(text: str) -> Order:
         """The order that was written as `text`."""
         return Order(**json.loads(text))
+
+
+def new_key() -> str:
+    """A name for a process; names sort by time."""
+    return f"{datetime.now(UTC):%Y%m%d-%H%M%S-%f}-{secrets.token_hex(2)}"
 
 
 def file(key: str, ending: str) -> Path:

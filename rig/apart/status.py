@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from typing import Any, Literal
 
 from rig.apart.order import FOLDER, file
@@ -12,7 +13,9 @@ from rig.files import write_whole
 from rig.home import home
 from rig.lease import is_held
 
+KEPT = 20
 Phase = Literal["starting", "running", "asking", "paused", "ended"]
+Seat = Literal["page", "terminal", "nobody"]
 
 
 @dataclass(frozen=True)
@@ -35,6 +38,7 @@ class Asked:
 class Status:
     """`values` are keywords of `rig.running.seen.Value`, with `near`. `state` is the run's once it has ended.
 
+    `seat`: where a person is asked, a page, the terminal that it was begun in, or nowhere: then it cannot pause.
     `error`: why it is paused, or why it did not end as it should. `moving`: what could not be stopped.
     """
 
@@ -54,6 +58,7 @@ class Status:
     moving: Sequence[str] = ()
     state: str = ""
     attitude: Mapping[str, Any] = field(default_factory=dict)
+    seat: Seat = "page"
 
     def write(self) -> None:
         """Into its file, whole."""
@@ -81,7 +86,20 @@ def lock(key: str) -> str:
 
 def keys() -> list[str]:
     """All processes that there were, newest last."""
-    return sorted(path.stem for path in (home() / FOLDER).glob("*.json"))
+    return sorted(path.stem for path in folder().glob("*.json"))
+
+
+def folder() -> Path:
+    """Where their files are."""
+    return home() / FOLDER
+
+
+def tidy() -> None:
+    """Remove the files of all processes but the last KEPT; the record keeps their runs."""
+    for key in keys()[:-KEPT]:
+        if not is_held(home(), lock(key)):
+            for ending in ("answers", "log", "json"):
+                file(key, ending).unlink(missing_ok=True)
 
 
 def _last_words(key: str) -> str:

@@ -5,31 +5,30 @@ from __future__ import annotations
 import errno
 import json
 import os
-import secrets
 import signal
 import subprocess
 import sys
 from collections.abc import Mapping
 from contextlib import suppress
-from datetime import UTC, datetime
 from pathlib import Path
 
-from rig.apart.order import Order, file
-from rig.apart.status import Status, keys, read
+from rig.apart.order import Order, file, new_key
+from rig.apart.status import Status, keys, read, tidy
 from rig.errors import RigError
 
-KEPT = 20
+UNATTENDED = "it runs unattended, and a pause would end it: stop it, and resume it later"
+IN_ITS_TERMINAL = "it was begun in a terminal, and asks there"
 _children: list[subprocess.Popen[bytes]] = []  # so that those that have ended are taken notice of
 
 
 def begin(procedure: str, settings: Mapping[str, str], bench_file: Path | None, attended: bool) -> str:
     """Start `procedure` in a process of its own; its key. What is wrong with it, its status will say."""
-    return _begin(Order(_new_key(), procedure, dict(settings), str(bench_file or ""), attended=attended))
+    return _begin(Order(new_key(), procedure, dict(settings), str(bench_file or ""), attended=attended))
 
 
 def go_on(run: str, procedure: str, bench_file: Path | None, attended: bool) -> str:
     """Resume a run in a process of its own; its key."""
-    return _begin(Order(_new_key(), procedure, {}, str(bench_file or ""), run, attended))
+    return _begin(Order(new_key(), procedure, {}, str(bench_file or ""), run, attended))
 
 
 def _begin(order: Order) -> str:
@@ -43,35 +42,32 @@ def _begin(order: Order) -> str:
     return order.key
 
 
-def tidy() -> None:
-    """Remove the files of all processes but the last KEPT; the record keeps their runs."""
-    for key in keys()[:-KEPT]:
-        for ending in ("answers", "log", "json"):
-            file(key, ending).unlink(missing_ok=True)
-
-
 def latest() -> Status | None:
-    """How the newest process stands; None where there was none."""
+    """How the newest process stands that has not ended, else the newest; None where there was none."""
     _children[:] = [child for child in _children if child.poll() is None]
-    found = keys()
-    return read(found[-1]) if found else None
+    found = [status for key in reversed(keys()) if (status := read(key)) is not None]
+    return next((status for status in found if status.phase != "ended"), found[0] if found else None)
 
 
 def pause(status: Status) -> None:
-    """Bring the stages to rest at once; the run waits for what it is told."""
+    """Bring the stages to rest at once; the run waits for what it is told. Raises RigError where nobody would tell."""
+    if status.seat == "nobody":
+        raise RigError(UNATTENDED)
     _signal(status, signal.SIGINT)
 
 
 def stop(status: Status) -> None:
     """Bring the stages to rest at once and end the run; `rig resume` could go on with it."""
-    if status.phase == "paused":
+    if status.phase == "paused" and status.seat == "page":
         answer(status, "end")
     else:
         _signal(status, signal.SIGTERM)
 
 
 def answer(status: Status, text: str) -> None:
-    """Answer what is asked. Raises RigError where nothing is asked any more."""
+    """Answer what is asked. Raises RigError where nothing is asked any more, or another asks."""
+    if status.seat == "terminal":
+        raise RigError(IN_ITS_TERMINAL)
     if status.asked is None:
         raise RigError("nothing is asked")
     try:
@@ -88,7 +84,3 @@ def _signal(status: Status, number: signal.Signals) -> None:
     if status.phase != "ended":
         with suppress(ProcessLookupError):
             os.kill(status.pid, number)
-
-
-def _new_key() -> str:
-    return f"{datetime.now(UTC):%Y%m%d-%H%M%S-%f}-{secrets.token_hex(2)}"

@@ -16,6 +16,7 @@ from procedures.errors import BadAnswer, NoAnswer
 from procedures.questions import Question
 from procedures.session import Reading
 from rig.analysis.next_steps import next_steps
+from rig.apart.beside import Beside
 from rig.bench import Bench
 from rig.bench.certificates import EXPIRED
 from rig.cli.output import emit, note, notes
@@ -83,15 +84,16 @@ class Quiet:
 
 @contextmanager
 def watching(procedure: Procedure, bench: Bench, unattended: bool, answers: Path | None) -> Iterator[Watch]:
-    """Who looks on: a person in a terminal, unless the run is unattended or nobody is there."""
+    """Who looks on: a person in a terminal, unless the run is unattended or nobody is there; pages beside them."""
     given = _answers(answers)
     if unattended or not (sys.stdin.isatty() and sys.stderr.isatty()):
-        yield Quiet(given, soak_watch(procedure.name))
+        with Beside(Quiet(given, soak_watch(procedure.name)), procedure.name, bench, "nobody") as watch:
+            yield watch
         return
     from rig.cli.guide import Guide  # rich is only imported where somebody sees it
 
-    with Guide(procedure, bench, given) as guide:
-        yield guide
+    with Guide(procedure, bench, given) as guide, Beside(guide, procedure.name, bench, "terminal") as watch:
+        yield watch
 
 
 def _answers(path: Path | None) -> dict[str, str]:

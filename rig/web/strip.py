@@ -35,7 +35,7 @@ class Strip:
         if status is not None and going:
             count = f" {status.done}/{status.total}" if status.total else ""
             self.link.set_text(f"{status.procedure}{count} {PHASES[status.phase]}")
-            self.pause.set_visibility(status.phase == "running")
+            self.pause.set_visibility(status.phase == "running" and status.seat != "nobody")
 
 
 def steer(how: Callable[[Status], None]) -> None:

@@ -10,14 +10,20 @@ from dataclasses import replace
 
 import pytest
 
+from procedures.catalogue import find
 from procedures.errors import SettingError
+from procedures.settings import parse
 from rig.apart import process, steering
+from rig.apart.beside import Beside
 from rig.apart.order import Order, file
-from rig.apart.status import Asked, Status, keys, lock, read
+from rig.apart.status import KEPT, Asked, Seat, Status, folder, keys, lock, read, tidy
+from rig.bench import read_bench
+from rig.cli.watch import Quiet
 from rig.errors import RigError
 from rig.home import home
 from rig.lease import lease
-from rig.record import Record
+from rig.record import Kept, Record
+from rig.running.runner import Outcome, start
 from tests.rig.rigging import POSES, SMALL
 
 POLL_S = 0.002
@@ -136,8 +142,77 @@ def test_only_the_last_ones_are_kept() -> None:
     file(KEY, "json").parent.mkdir(parents=True)
     for number in range(25):
         Status(f"{KEY}-{number:02}", 4711, "sweep", "a bench", phase="ended").write()
-    steering.tidy()
-    assert [key[-2:] for key in keys()] == [f"{number:02}" for number in range(25 - steering.KEPT, 25)]
+    tidy()
+    assert [key[-2:] for key in keys()] == [f"{number:02}" for number in range(25 - KEPT, 25)]
+
+
+def test_of_those_that_are_kept_none_is_under_way() -> None:
+    folder().mkdir(parents=True)
+    for number in range(25):
+        Status(f"{KEY}-{number:02}", 4711, "sweep", "a bench", phase="running").write()
+    with lease(home(), lock(f"{KEY}-03"), "a test"):
+        tidy()
+        assert keys()[0] == f"{KEY}-03"
+        status = steering.latest()  # the one that is under way, though others are newer
+        assert status is not None
+        assert (status.key, status.phase) == (f"{KEY}-03", "running")
+
+
+class Onlooker(Quiet):
+    """Nobody in a terminal; at each pose it looks at what other processes see."""
+
+    def __init__(self, stop_at: int = 10**6) -> None:
+        super().__init__({})
+        self.seen: list[Status | None] = []
+        self.stop_at = stop_at
+
+    def kept(self, kept: Kept) -> None:
+        super().kept(kept)
+        self.seen.append(steering.latest())
+        if len(self.seen) == self.stop_at and (status := self.seen[-1]):
+            steering.stop(status)
+
+
+def in_a_terminal(onlooker: Onlooker, seat: Seat) -> Outcome:
+    """A small sweep as `rig run` does it."""
+    bench, sweep = read_bench(), find("sweep")
+    with Record() as record, Beside(onlooker, "sweep", bench, seat) as watch:
+        return start(record, bench, sweep, parse(sweep, SMALL), watch)
+
+
+def test_a_run_of_a_terminal_is_told_as_well() -> None:
+    onlooker = Onlooker()
+    run = in_a_terminal(onlooker, "nobody").run.run
+    last = onlooker.seen[-1]
+    assert last is not None
+    assert (last.run, last.phase, last.done, last.total, last.seat) == (run, "running", POSES - 1, POSES, "nobody")
+    assert {value["name"] for value in last.values} >= {"temperature", "vx", "vy"}
+    ended = steering.latest()
+    assert ended is not None
+    assert (ended.phase, ended.state, ended.error) == ("ended", "complete", "")
+    with pytest.raises(RigError, match="a pause would end it"):
+        steering.pause(last)
+
+
+def test_a_run_of_a_terminal_is_stopped_from_elsewhere() -> None:
+    assert in_a_terminal(Onlooker(stop_at=3), "nobody").run.state == "stopped"
+    ended = steering.latest()
+    assert ended is not None
+    assert (ended.phase, ended.state) == ("ended", "stopped")
+    assert "stopped by SIGTERM" in ended.error
+
+
+def test_what_a_terminal_asks_is_answered_there() -> None:
+    asked = Asked("mounting", "Is it mounted?", "yes or no")
+    status = Status(KEY, 4711, "sweep", "a bench", phase="asking", asked=asked, seat="terminal")
+    with pytest.raises(RigError, match="asks there"):
+        steering.answer(status, "yes")
+
+
+def test_a_run_goes_on_where_nothing_can_be_told() -> None:
+    home().mkdir(parents=True, exist_ok=True)
+    folder().write_text("a file is in the way")
+    assert in_a_terminal(Onlooker(), "nobody").run.state == "complete"
 
 
 def test_nobody_is_answered_who_does_not_ask() -> None:

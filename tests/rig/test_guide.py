@@ -23,7 +23,7 @@ from rig.cli.gauge import WIDTH, gauge
 from rig.cli.guide import Guide
 from rig.cli.output import columns
 from rig.cli.screen import screen
-from rig.cli.watch import Quiet, watching
+from rig.cli.watch import watching
 from rig.drawings import Attitude, page
 from rig.errors import Stopped
 from rig.numerals import duration, size
@@ -323,7 +323,6 @@ def test_the_menu_says_what_each_answer_means(said: Callable[..., None], outcome
 
 def test_who_is_not_at_a_terminal_is_not_asked(outcome: Outcome) -> None:
     with watching(SWEEP, read_bench(), unattended=False, answers=None) as watch:
-        assert isinstance(watch, Quiet)
         watch.planned(planned())
         assert watch.interrupted(outcome) == "end"
         assert watch.ask(MOUNTED, "yes") == "yes"

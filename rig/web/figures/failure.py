@@ -9,12 +9,12 @@ import numpy as np
 from calibrations.pictures.columns import columns, specific_force
 from calibrations.table import Array
 from rig.web.figures.rows import Shown
-from rig.web.figures.style import EDGE, SIGNED, Figure, Trace, figure
+from rig.web.figures.style import EDGE, SIGNED, Figure, Trace, figure, scale
 
 PALE = 3.0  # times the noise floor: below, noise alone stays pale
 APART = 0.22  # of the step between inclinations, by which both directions of turning are set apart
 SYMBOLS = {1: "triangle-up", -1: "triangle-down", 0: "circle"}
-TOWARDS = "towards x, left: z upwards, right: z downwards (equal-area map)"
+TOWARDS = "towards x; left: z upwards, right: downwards"
 
 
 def failure(shown: Shown) -> Figure:
@@ -23,7 +23,6 @@ def failure(shown: Shown) -> Figure:
     over = shown.residual / shown.floor
     reach = max(PALE, float(np.abs(over).max(initial=0.0)))
     side = np.sign(shown.fit.table.optional("direction", 0.0))[shown.rows]
-    bar = {"title": {"text": "residual / floor", "side": "right"}, "thickness": 10, "outlinewidth": 0, "xpad": 4}
     dots: Trace = {
         "type": "scatter",
         "mode": "markers",
@@ -40,7 +39,7 @@ def failure(shown: Shown) -> Figure:
             "cmin": -reach,
             "cmax": reach,
             "line": {"width": 0.6, "color": EDGE},
-            "colorbar": bar,
+            "colorbar": scale("residual / floor"),
         },
     }
     return figure([dots], labels[0], labels[1], "map", **layout)

@@ -22,6 +22,7 @@ CONFIG = {
     "scrollZoom": False,
     "modeBarButtonsToRemove": ["toImage", "autoScale2d", "zoomIn2d", "zoomOut2d"],
 }
+SIZE = 11.5  # of the letters, px
 MARGIN = {"l": 62, "r": 12, "t": 8, "b": 44}
 
 
@@ -34,7 +35,7 @@ def figure(traces: list[Trace], x: str, y: str, keep: str, **more: Any) -> Figur
         "dragmode": "select",
         "paper_bgcolor": "rgba(0,0,0,0)",
         "plot_bgcolor": "rgba(0,0,0,0)",
-        "font": {"family": "inherit", "size": 12},
+        "font": {"family": "inherit", "size": SIZE},
         "uirevision": keep,
         "xaxis": axis(x),
         "yaxis": axis(y),
@@ -43,8 +44,9 @@ def figure(traces: list[Trace], x: str, y: str, keep: str, **more: Any) -> Figur
 
 
 def axis(title: str) -> dict[str, Any]:
-    """One axis; numbers are written in full where that is short."""
-    return {"title": {"text": title, "standoff": 6}, "zeroline": False, "automargin": True, "exponentformat": "power"}
+    """One axis; its numbers are written in full, as units are chosen for that."""
+    look = {"zeroline": False, "automargin": True, "exponentformat": "none"}
+    return {"title": {"text": title, "standoff": 6, "font": {"size": SIZE}}, **look}
 
 
 def merged(base: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
@@ -62,7 +64,13 @@ def band(floor: float) -> dict[str, Any]:
     return {"type": "rect", "layer": "below", "fillcolor": FLOOR, "line": {"width": 0}, **ends}
 
 
+def scale(title: str) -> dict[str, Any]:
+    """The bar that tells what colours mean."""
+    named = {"text": title, "side": "right", "font": {"size": SIZE}}
+    return {"title": named, "thickness": 10, "outlinewidth": 0, "xpad": 4, "exponentformat": "none"}
+
+
 def coloured(values: list[float], title: str) -> dict[str, Any]:
     """Markers coloured by a column, with its bar."""
-    bar = {"title": {"text": title, "side": "right"}, "thickness": 10, "outlinewidth": 0, "xpad": 4}
+    bar = scale(title)
     return {"color": values, "colorscale": VALUES, "size": 6, "line": {"width": 0.6, "color": EDGE}, "colorbar": bar}

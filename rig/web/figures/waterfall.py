@@ -10,6 +10,7 @@ from calibrations.pictures.waterfall import Falling, levels
 from rig.web.figures.style import FLOOR, GOOD, MEASURED, MODEL, UNSEEN, Figure, Trace, figure
 
 BELOW = 0.5  # times the floor: where the logarithmic axis begins
+FEWEST = 4  # bars that there is room for: one alone is no thicker than they
 NEAR = 1.15  # times the floor: as good as noise
 
 
@@ -42,8 +43,8 @@ def waterfall(found: Falling) -> Figure:
         "name": "",
     }
     reach = 2.2 * max(*seen, *(level.unseen for level in steps), 2.0)
-    x = {"type": "log", "range": [log10(BELOW), log10(reach)], "dtick": 1, "exponentformat": "none"}
-    y = {"autorange": "reversed", "title": {"text": ""}}
+    x = {"type": "log", "range": [log10(BELOW), log10(reach)], "dtick": 1}
+    y = {"range": [max(len(steps), FEWEST) - 0.5, -0.5], "title": {"text": ""}}
     floor = {"type": "rect", "layer": "below", "fillcolor": FLOOR, "line": {"width": 0}, "yref": "paper"}
     shapes = [{**floor, "x0": BELOW, "x1": 1, "y0": 0, "y1": 1}]
     return figure(

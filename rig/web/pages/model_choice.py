@@ -36,7 +36,7 @@ class Choice:
                 label="Model",
                 value=page.model,
                 on_change=lambda e: self._chose(page.data, e.value),
-            )
+            ).props("dense options-dense")
             ui.button(icon="upload_file", on_click=self._ask_file).props("flat dense aria-label='Open a file'").tooltip(
                 "Open a file of this computer"
             )

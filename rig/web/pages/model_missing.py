@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 from urllib.parse import urlencode
 
@@ -160,7 +161,7 @@ class Card:
     def _told(self, result: Diagnosis) -> None:
         c, unit = self.c, result.fit.table.unit
         words(capital(c.effect.summary))
-        words(c.effect.formula.replace("{out}", unit), "formula")
+        words(_formula(c.effect.formula, unit), "formula")
         with div("chance"):
             div("").style(f"width: {100 * c.probability:.1f}%")
         rivals = ", ".join(c.indistinguishable_from)
@@ -191,11 +192,17 @@ class Card:
             await self.open()
 
 
+def _formula(text: str, unit: str) -> str:
+    """A formula with the table's unit; what stands beside it comes in a line of its own, as a card is narrow."""
+    return re.sub(r" {3,}", "\n", text.replace("{out}", unit)).replace("\n\n", "\n")
+
+
 def _share(probability: float) -> str:
     """Only approximate: neither certain nor impossible."""
-    return (
-        "above 99.9 %" if probability > 0.999 else "below 0.1 %" if probability < 1e-3 else f"{100 * probability:.2g} %"
-    )
+    for limit, told in ((0.999, "above 99.9 %"), (0.99, "above 99 %")):
+        if probability > limit:
+            return told
+    return "below 0.1 %" if probability < 1e-3 else f"{100 * probability:.2g} %"
 
 
 def _written(value: object) -> str:

@@ -34,7 +34,7 @@ def register(desk: Desk) -> None:
                     planning = Planning(desk, bench, dict(request.query_params))
                     Instruments(bench)
                 with div("stack"):
-                    live = Live(bench)
+                    live = Live()
                     planning.lay_out_plan()
             planning.started = live.look
             keys["s"] = Key("start the planned run", planning.start)

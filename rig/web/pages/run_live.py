@@ -12,13 +12,10 @@ from urllib.parse import urlencode
 
 from nicegui import ui
 
-from rig.analysis.course import Course, kind_of
 from rig.apart import steering
 from rig.apart.status import Asked, Status
-from rig.bench import Bench
 from rig.drawings import Attitude, page
-from rig.record import Record
-from rig.web.figures.series import series
+from rig.web.pages.over_time import OverTime
 from rig.web.parts import box, div, failed, off_loop, words
 from rig.web.strip import steer
 
@@ -29,16 +26,20 @@ PHASES = {
     "asking": ("asks you", "doubt"),
     "paused": ("paused", "doubt"),
 }
+SEATS = {
+    "page": "",
+    "terminal": "It was begun in a terminal: Pause brings it to rest, and the terminal asks how it goes on.",
+    "nobody": "It was begun in a terminal, unattended: a pause would end it. Stop brings it to rest; resume it later.",
+}
 ENDS = {"complete": "good", "stopped": "doubt", "failed": "bad"}
 
 
 class Live:
     """Looks at the status as long as the page is open."""
 
-    def __init__(self, bench: Bench) -> None:
-        self.bench = bench
+    def __init__(self) -> None:
         self.status: Status | None = None
-        with box("stack") as self.box:
+        with box("stack live") as self.box:
             with div("row-of"):
                 self.title = words("", "title")
                 self.phase = words("", "chip")
@@ -47,12 +48,13 @@ class Live:
             self.now = words("", "quiet")
             self.bar = ui.linear_progress(0.0, show_value=False).props("aria-label=progress")
             self.count = words("", "small number")
+            self.hint = words("", "quiet small")
             self.alarm = div("")
             self.question = div("")
             with div("values"):
                 self.values = div("")
-                self.attitude = div("attitude")
-            self.pictures = Pictures()
+                self.attitude = div("attitude").on("click", self._enlarge)
+            self.over_time = OverTime()
         ui.timer(LOOK_S, self.look)
 
     def buttons(self) -> None:
@@ -77,6 +79,13 @@ class Live:
         elif self.status is not None and self.status.phase == "running":
             steer(steering.pause)
 
+    def _enlarge(self) -> None:
+        """The drawing, as large as the window."""
+        if self.status is not None and self.status.attitude:
+            with ui.dialog() as dialog, ui.card().classes("enlarged attitude").on("click", dialog.close):
+                ui.html(_drawn(self.status.attitude), sanitize=False)
+            dialog.open()
+
     def _see(self) -> None:
         """What the run measured, beside a model."""
         if self.status is not None:
@@ -96,7 +105,7 @@ class Live:
         if status != self.status:
             before, self.status = self.status, status
             self._show(status, before)
-        await self.pictures.follow(status.run)
+        await self.over_time.follow(status.run)
 
     def _show(self, status: Status, before: Status | None) -> None:
         word, look = PHASES.get(status.phase, (status.state or "ended", ENDS.get(status.state, "plain")))
@@ -109,16 +118,18 @@ class Live:
         poses = f"{status.done} of {status.total} poses" if status.total else ""
         self.count.set_text("; ".join(filter(None, (poses, status.left if going else ""))))
         self._links(status)
-        self.pause.set_visibility(status.phase == "running")
-        self.resume.set_visibility(status.phase == "paused")
-        self.repeat.set_visibility(status.phase == "paused")
+        paused = status.phase == "paused" and status.seat == "page"
+        self.pause.set_visibility(status.phase == "running" and status.seat != "nobody")
+        self.resume.set_visibility(paused)
+        self.repeat.set_visibility(paused)
+        self.hint.set_text(SEATS[status.seat] if going else "")
         self.stop.set_visibility(going)
         self.see.set_visibility(status.state == "complete")
         self.again.set_visibility(not going and status.state == "stopped" and bool(status.run))
         if before is None or (before.error, before.moving) != (status.error, status.moving):
             self._alarm(status)
         if before is None or before.asked != status.asked:
-            self._ask(status.asked if status.phase == "asking" else None)
+            self._ask(status.asked if status.phase == "asking" else None, status.seat == "page")
         if before is None or before.values != status.values:
             self._values(status)
 
@@ -134,7 +145,7 @@ class Live:
             if status.error:
                 failed("Why it stands still" if status.phase == "paused" else "How it ended", status.error)
 
-    def _ask(self, asked: Asked | None) -> None:
+    def _ask(self, asked: Asked | None, here: bool) -> None:
         self.question.clear()
         if asked is None:
             return
@@ -145,14 +156,20 @@ class Live:
                     ui.html(_drawn(asked.attitude), sanitize=False)
             if asked.refused:
                 words(asked.refused, "fault")
-            with div("row-of"):
-                if asked.choices:
-                    for choice in asked.choices:
-                        ui.button(choice, on_click=partial(self._answer, choice)).props("dense")
-                else:
-                    typed = ui.input(asked.accepts, value=asked.proposed).props("dense autofocus")
-                    typed.on("keydown.enter", lambda: self._answer(str(typed.value)))
-                    ui.button("Answer", on_click=lambda: self._answer(str(typed.value))).props("dense")
+            if here:
+                self._answers(asked)
+            else:
+                words("Answer it in the terminal that the run was begun in.", "quiet")
+
+    def _answers(self, asked: Asked) -> None:
+        """A button for each answer, or a field."""
+        with div("row-of"):
+            for choice in asked.choices:
+                ui.button(choice, on_click=partial(self._answer, choice))
+            if not asked.choices:
+                typed = ui.input(asked.accepts, value=asked.proposed).props("dense autofocus")
+                typed.on("keydown.enter", lambda: self._answer(str(typed.value)))
+                ui.button("Answer", on_click=lambda: self._answer(str(typed.value)))
 
     def _answer(self, text: str) -> None:
         steer(lambda status: steering.answer(status, text))
@@ -173,70 +190,6 @@ class Live:
         if status.attitude:
             with self.attitude:
                 ui.html(_drawn(status.attitude), sanitize=False)
-
-
-class Pictures:
-    """What a run has measured so far, over time; thinned, so that a night is no larger than an hour."""
-
-    def __init__(self) -> None:
-        self.run, self.last = "", -1
-        self.courses: dict[str, Course] = {}
-        with div("row-of"):
-            self.kind = ui.select([], label="of", on_change=self.draw).props("dense options-dense")
-            self.name = ui.select([], label="over time", on_change=self.draw).props("dense options-dense")
-        for select in (self.kind, self.name):
-            select.style("min-width: 150px").set_visibility(False)
-        self.place = div("")
-        self.plot: ui.plotly | None = None
-
-    async def follow(self, run: str) -> None:
-        """Take in what is new of `run`."""
-        if run != self.run:
-            self.run, self.last, self.courses, self.plot = run, -1, {}, None
-            self.place.clear()
-        if not run:
-            return
-        new = await off_loop(_new, run, self.last)
-        if not new or run != self.run:
-            return
-        for number, dwell in new:
-            self.courses.setdefault(kind_of(dwell), Course()).add(dwell)
-            self.last = number
-        self._offer()
-        self.draw()
-
-    def _offer(self) -> None:
-        """The kinds of poses and the quantities that there are; first those with most."""
-        kinds = {kind: kind or "poses" for kind in self.courses}
-        if list(kinds) != list(self.kind.options):
-            most = max(self.courses, key=lambda kind: len(self.courses[kind].parts))
-            value = self.kind.value if self.kind.value in kinds else most
-            self.kind.set_options(kinds, value=value)
-            self.kind.set_visibility(len(kinds) > 1)
-        names = self.courses[str(self.kind.value or "")].names
-        if names != list(self.name.options):
-            self.name.set_options(names, value=self.name.value if self.name.value in names else names[0])
-            self.name.set_visibility(True)
-
-    def draw(self) -> None:
-        """The picture anew."""
-        course = self.courses.get(str(self.kind.value or ""))
-        if course is None or self.name.value not in course.names:
-            return
-        self.lay_out().update_figure(series(course, str(self.name.value)))
-
-    def lay_out(self) -> ui.plotly:
-        """The picture's place, where it was not made yet: the browser can fetch what draws it meanwhile."""
-        if self.plot is None:
-            with self.place:
-                self.plot = ui.plotly({"data": [], "layout": {}}).classes("live-plot")
-                self.plot.props('aria-label="the run over time"')
-        return self.plot
-
-
-def _new(run: str, after: int) -> list[tuple[int, Any]]:
-    with Record() as record:
-        return record.dwells(run, after)
 
 
 def _limits(value: Mapping[str, Any]) -> str:

@@ -22,6 +22,7 @@ from rig.web.told import message
 
 MOST_STRETCHES = 12
 FIRST = "sweep"
+UNITS = {"deg_s": "deg/s", "deg": "deg", "s": "s", "c": "°C", "hz": "Hz", "um": "µm"}  # ends of names, longest first
 
 
 class Planning:
@@ -136,12 +137,9 @@ def _show(found: Plan, bench: Bench) -> None:
 
 def _label(name: str) -> str:
     """`step_deg` as `step (deg)`."""
-    head, _, unit = name.rpartition("_")
-    return (
-        f"{head.replace('_', ' ')} ({unit})"
-        if head and unit in ("deg", "s", "c", "hz", "um")
-        else name.replace("_", " ")
-    )
+    unit = next((end for end in UNITS if name.endswith(f"_{end}")), "")
+    head = name.removesuffix(f"_{unit}").replace("_", " ")
+    return f"{head} ({UNITS[unit]})" if unit else head
 
 
 def _written(value: Any) -> str:

@@ -16,7 +16,7 @@ from rig.export import export
 from rig.record import Event, Record, Run
 from rig.web.desk import Desk
 from rig.web.frame import frame
-from rig.web.pages.run_live import Pictures
+from rig.web.pages.over_time import OverTime
 from rig.web.parts import box, div, facts, failed, off_loop, table, words
 from rig.web.told import message
 
@@ -54,15 +54,15 @@ class OneRun:
                     words(line, "quiet small")
             with box("stack"):
                 words("Over time", "title")
-                self.pictures = Pictures()
+                self.over_time = OverTime()
                 if run.bench:
-                    self.pictures.lay_out()
+                    self.over_time.lay_out()
             with box("stack"):
                 words("How it was made", "title")
                 facts({name: str(value)[:SHOWN] for name, value in _made(run).items()})
             with box("stack"):
                 self._notes()
-        ui.timer(0.0, lambda: self.pictures.follow(run.run), once=True)
+        ui.timer(0.0, lambda: self.over_time.follow(run.run), once=True)
 
     def _head(self) -> None:
         run = self.run
