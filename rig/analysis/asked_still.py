@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass
+from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,7 @@ from rig.record.measured import Measured
 from rig.record.store import Record
 
 CHANNELS = {f"{what}{axis}{end}" for what in ("v", "a", "g", "m", "") for axis in "xyz" for end in ("", "_v")}
+LONGEST_BEGINNING = 1 << 16  # characters
 TRIADS = ({"ax", "ay", "az"}, {"mx", "my", "mz"})  # with times: a raw log of positions, unless a noise model is named
 
 
@@ -118,13 +120,10 @@ def _has_channels_alone(path: Path) -> bool:
 
 
 def _beginning(path: Path) -> tuple[set[str], list[str]]:
-    """(constants above a table's header, names in the header)."""
-    stated: set[str] = set()
+    """(constants above a table's header, names in the header). No more is read than they need, whatever the file is."""
     with path.open(encoding="utf-8", errors="replace") as file:
-        for line in file:
-            if not line.startswith("#"):
-                return stated, [
-                    name.strip().strip('"') for name in line.replace(";", ",").replace("\t", ",").split(",")
-                ]
-            stated.add(line.lstrip("# ").partition(":")[0].strip())
-    return stated, []
+        lines = file.read(LONGEST_BEGINNING).splitlines()
+    above = list(takewhile(lambda line: line.startswith("#"), lines))
+    header = lines[len(above)] if len(lines) > len(above) else ""
+    names = [name.strip().strip('"') for name in header.replace(";", ",").replace("\t", ",").split(",")]
+    return {line.lstrip("# ").partition(":")[0].strip() for line in above}, names
