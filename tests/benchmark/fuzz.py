@@ -1,7 +1,8 @@
-"""Inputs tried on every decoder and reader: `python -m tests.benchmark.fuzz [INPUTS] [PROCESSES]`; else ten million.
+"""Inputs tried on every decoder and reader: `python -m tests.benchmark.fuzz [INPUTS] [PROCESSES] [FILE]`.
 
-Each target gets its share by weight, heavy ones less. An error that is not documented, an input that takes longer than
-LONGEST_S, or a process beyond MOST_BYTES ends it with the input that did it.
+Else ten million, on all processors. Each target gets its share by weight, heavy ones less. An error that is not
+documented, an input that takes longer than LONGEST_S, or a process beyond MOST_BYTES ends it with the input that did
+it. With a file, what was tried is kept there, and another run goes on from it.
 """
 
 from __future__ import annotations
@@ -13,8 +14,10 @@ import resource
 import sys
 import time
 import warnings
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from pathlib import Path
 
 from tests.fuzz.files import remove
 from tests.fuzz.mutation import mutated
@@ -27,12 +30,17 @@ MOST_BYTES = 4 << 30
 
 @dataclass(frozen=True)
 class Tried:
-    """What became of some inputs of one target."""
+    """What became of the inputs of one target that a seed gives."""
 
     name: str
+    seed: int
     inputs: int
     taken: int
     longest_s: float
+
+    @property
+    def task(self) -> tuple[str, int, int]:
+        return self.name, self.seed, self.inputs
 
 
 def tried(name: str, seed: int, count: int) -> Tried:
@@ -53,7 +61,7 @@ def tried(name: str, seed: int, count: int) -> Tried:
         longest_s = max(longest_s, time.process_time() - began)
         if longest_s > LONGEST_S:
             raise AssertionError(f"{name}, {data!r}: takes {longest_s:.1f} s")
-    return Tried(name, count, taken, longest_s)
+    return Tried(name, seed, count, taken, longest_s)
 
 
 def tasks(inputs: int) -> list[tuple[str, int, int]]:
@@ -67,23 +75,36 @@ def tasks(inputs: int) -> list[tuple[str, int, int]]:
     ]
 
 
-def main(inputs: int = 10_000_000, processes: int = os.cpu_count() or 1) -> None:
-    began, done = time.perf_counter(), []
+def kept(file: Path | None) -> list[Tried]:
+    """What earlier runs have tried."""
+    return [Tried(**json.loads(line)) for line in file.read_text().splitlines()] if file and file.exists() else []
+
+
+def main(inputs: int, processes: int, file: Path | None) -> None:
+    began, wanted = time.perf_counter(), tasks(inputs)
+    done = [each for each in kept(file) if each.task in wanted]
+    known = {each.task for each in done}
     with ProcessPoolExecutor(processes) as pool:
-        for future in as_completed([pool.submit(tried, *task) for task in tasks(inputs)]):
+        for future in as_completed([pool.submit(tried, *task) for task in wanted if task not in known]):
             done.append(future.result())
-    targets = {
-        name: {
-            "inputs": sum(each.inputs for each in done if each.name == name),
-            "taken": sum(each.taken for each in done if each.name == name),
-            "longest_ms": round(1e3 * max(each.longest_s for each in done if each.name == name), 1),
-        }
-        for name in TARGETS
-    }
+            if file:
+                with file.open("a") as lines:
+                    lines.write(json.dumps(asdict(done[-1])) + "\n")
+    targets = {name: summed([each for each in done if each.name == name]) for name in TARGETS}
     total = sum(target["inputs"] for target in targets.values())
     seconds = round(time.perf_counter() - began, 1)
     print(json.dumps({"inputs": total, "seconds": seconds, "undocumented": 0, "targets": targets}, indent=1))
 
 
+def summed(done: Sequence[Tried]) -> dict[str, float]:
+    """One target's."""
+    return {
+        "inputs": sum(each.inputs for each in done),
+        "taken": sum(each.taken for each in done),
+        "longest_ms": round(1e3 * max(each.longest_s for each in done), 1),
+    }
+
+
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:]))
+    asked = dict(enumerate(sys.argv[1:]))
+    main(int(asked.get(0, 10_000_000)), int(asked.get(1, os.cpu_count() or 1)), Path(asked[2]) if 2 in asked else None)
