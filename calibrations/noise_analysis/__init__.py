@@ -5,6 +5,10 @@
     asked_times  the Allan deviation at times that are asked for
     freedom      degrees of freedom of a deviation, and its interval
     noise_type   the power of frequency that a spectrum follows, from neighbouring means
+    outliers     single samples that are far from their neighbours
+    stuck        a stretch of samples that are all the same
+    oddities     both in words
+    reduction    all that is kept of a record, in one pass
     decimated    a record of any length as at most 2^17 means
     welch        the spectrum of what is faster than these
     bands        both as averages over narrow bands, each a chi-square variable

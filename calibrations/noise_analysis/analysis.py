@@ -9,10 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from calibrations.errors import DataError, TooFewRows
 from calibrations.noise_analysis.bands import Bands, fast_bands, slow_bands
-from calibrations.noise_analysis.clipping import Ends
-from calibrations.noise_analysis.decimated import Means
 from calibrations.noise_analysis.identify import (
     Mixture,
     Spectrum,
@@ -23,7 +20,8 @@ from calibrations.noise_analysis.identify import (
     settled,
 )
 from calibrations.noise_analysis.lines import MOST, Line, fast_lines, without_line
-from calibrations.noise_analysis.octaves import KINDS, Curve, Octaves
+from calibrations.noise_analysis.octaves import KINDS, Curve
+from calibrations.noise_analysis.oddities import Oddity
 from calibrations.noise_analysis.processes import (
     GAUSS_MARKOV,
     LINEAR,
@@ -32,12 +30,12 @@ from calibrations.noise_analysis.processes import (
     allan_gauss_markov,
     allan_sinusoid,
 )
-from calibrations.noise_analysis.welch import LENGTH, Welch
+from calibrations.noise_analysis.reduction import Reduction
+from calibrations.noise_analysis.welch import LENGTH, Segments
 from calibrations.table import Array
 
 Estimates = Mapping[str, tuple[float, float]]
 TO_BOUND = 1.96  # standard deviations
-FEWEST = 64  # samples below which nothing can be said
 
 
 @dataclass(frozen=True)
@@ -62,15 +60,27 @@ class Coefficient:
 class NoiseAnalysis:
     """What a still record shows. `spectrum` is two-sided; lines have been taken off it, strongest first."""
 
-    rate_hz: float
-    n: int
-    unit: str
+    record: Record
     curves: dict[str, Curve]
     spectrum: Spectrum
     lines: tuple[Line, ...]
     found: Mixture
     line_bound: float
-    corner_hz: float = np.inf
+
+    @property
+    def rate_hz(self) -> float:
+        """Samples a second."""
+        return self.record.rate_hz
+
+    @property
+    def n(self) -> int:
+        """Samples."""
+        return self.record.n
+
+    @property
+    def unit(self) -> str:
+        """Of the values."""
+        return self.record.unit
 
     @property
     def allan(self) -> Curve:
@@ -100,8 +110,8 @@ class NoiseAnalysis:
         """Allan variance of a process whose coefficient is 1; white noise behind a filter is Gauss-Markov."""
         if process == GAUSS_MARKOV:
             return allan_gauss_markov(tau_s, self.found.time_constant_s)
-        if process == "white-noise" and np.isfinite(self.corner_hz):
-            filter_s = 1 / (2 * np.pi * self.corner_hz)
+        if process == "white-noise" and np.isfinite(self.record.corner_hz):
+            filter_s = 1 / (2 * np.pi * self.record.corner_hz)
             return allan_gauss_markov(tau_s, filter_s) / (2 * filter_s)
         return LINEAR[process].allan(tau_s)
 
@@ -135,55 +145,44 @@ def analyse(blocks: Iterable[Any], rate_hz: float, unit: str, source: str, corne
 
     Raises DataError naming the sample that is no number, or where all are the same; TooFewRows.
     """
-    octaves, means, welch, ends = Octaves(rate_hz), Means(), Welch(rate_hz), Ends()
-    for block in blocks:
-        samples = checked(np.asarray(block), octaves.n, source)
-        for each in (octaves, means, welch, ends):
-            each.add(samples)
-    check_length(octaves.n, rate_hz, corner_hz, source)
-    ends.check(source)
-    return _analysed(octaves, means, welch, Record(rate_hz, unit, corner_hz))
+    reduction = Reduction(rate_hz, corner_hz)
+    for _ in reduction.read(blocks, source):
+        pass
+    means, segments = reduction.means, reduction.welch.segments()
+    record = Record(rate_hz, reduction.n, unit, corner_hz, means.values(), means.size, segments, reduction.oddities())
+    return analysed(record, {kind: reduction.octaves.curve(kind) for kind in KINDS})
 
 
-def check_length(n: int, rate_hz: float, corner_hz: float, source: str) -> None:
-    """Raises TooFewRows for a record that is too short to show noise, behind a filter or without one."""
-    if n < FEWEST:
-        raise TooFewRows(f"{source}: {n} samples; the noise of a record needs {FEWEST} or more: record for longer")
-    if corner_hz * n < FEWEST * rate_hz:
-        raise TooFewRows(
-            f"{source}: {n / rate_hz:.3g} s are too short behind a low-pass of {corner_hz:g} Hz, which lets "
-            f"through little noise in that time: record for {FEWEST / corner_hz:.3g} s or more"
-        )
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Record:
-    """What is known of a record beside its samples."""
+    """What is kept of a record: means (m,) over `size` samples each, less their mean; spectra of what is faster."""
 
     rate_hz: float
+    n: int
     unit: str
     corner_hz: float
+    means: Array
+    size: int
+    segments: Segments
+    oddities: tuple[Oddity, ...] = ()
 
 
-def _analysed(octaves: Octaves, means: Means, welch: Welch, record: Record) -> NoiseAnalysis:
-    sampling = Sampling(record.rate_hz, means.size)
+def analysed(record: Record, curves: dict[str, Curve]) -> NoiseAnalysis:
+    """The processes of a record, and the lines in it."""
+    sampling = Sampling(record.rate_hz, record.size)
     fast: list[Bands] = []
     lines: list[Line] = []
     slow_hz = 0.5 / sampling.interval_s  # what the means show; lines are looked for there where no filter is
     above_hz = min(slow_hz, record.corner_hz / 2)
-    if above_hz < record.rate_hz / 2 and octaves.n >= 2 * LENGTH:
-        seen = welch.segments()
+    if above_hz < record.rate_hz / 2 and record.n >= 2 * LENGTH:
+        seen = record.segments
         f, density, freedom = seen.frequency_hz, seen.density, seen.freedom
-        density, lines = fast_lines(f, density, freedom, above_hz, octaves.n / record.rate_hz)
+        density, lines = fast_lines(f, density, freedom, above_hz, record.n / record.rate_hz)
         chosen = f > slow_hz
         fast = [fast_bands(f[chosen], density[chosen], freedom, record.rate_hz, record.corner_hz)]
-    spectrum, found, slow, bound = _without_lines(means.values(), sampling, fast, record.corner_hz)
-    curves = {kind: octaves.curve(kind) for kind in KINDS}
+    spectrum, found, slow, bound = _without_lines(record.means, sampling, fast, record.corner_hz)
     strongest = sorted([*lines, *slow], key=lambda line: -line.amplitude)
-    return NoiseAnalysis(
-        record.rate_hz, octaves.n, record.unit, curves, spectrum, tuple(strongest), settled(found), bound,
-        record.corner_hz,
-    )  # fmt: skip
+    return NoiseAnalysis(record, curves, spectrum, tuple(strongest), settled(found), bound)
 
 
 def _without_lines(
@@ -208,19 +207,3 @@ def _between(slow: Bands, found: Mixture) -> Callable[[Array], Array]:
     """The spectrum of the processes, read off at any frequency between the bands."""
     at, level = np.log(slow.frequency_hz), np.log(found.expected(slow))
     return lambda f: np.asarray(np.exp(np.interp(np.log(f), at, level)))
-
-
-def checked(samples: Array, before: int, source: str) -> Array:
-    """As float64. Raises DataError where one is no number."""
-    try:
-        samples = samples.astype(np.float64, casting="same_kind" if samples.dtype.kind == "f" else "safe")
-    except TypeError:
-        raise DataError(f"{source}: holds {samples.dtype}, not real numbers; save one column of real numbers") from None
-    finite = np.isfinite(samples)
-    if not finite.all():
-        row = int(np.argmin(finite))
-        raise DataError(
-            f"{source}: sample {before + row + 1} is {samples[row]:g}, not a number; "
-            "cut the record there and analyse a part without gaps"
-        )
-    return samples

@@ -1,51 +1,100 @@
-"""What no noise process makes: a step, a drift, a settling.
+"""What no noise process makes: a step, a drift, a settling, what follows a column that was logged beside.
 
-A step looks like a random walk to a spectrum, and so does a drift. In the cosine transform of the means each has a form
-of its own, and its coefficients are independent there: the amplitude that fits best, and what it gains, are those of a
-matched filter, for a step at every place at once.
+Each looks like a random walk to a spectrum. In the cosine transform of the means each has a form of its own, and its
+coefficients are independent there: the amplitude that fits best, and what it gains, are those of a matched filter, for
+a step at every place at once. Of two columns that both wander, one explains the other by what it gains beside noise
+that wanders as well, so that it takes no chance likeness for a cause.
 
 Source  Van Trees, Detection, Estimation, and Modulation Theory, part I, 4.3: a known signal in coloured noise.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.fft import dct, dst
+from scipy.signal import lfilter
 
+from calibrations.search.candidates import NOT_TOLD_APART
 from calibrations.still.bands import means_without
 from calibrations.still.channel_fit import ChannelFit
 from calibrations.still.record import Channel
 from calibrations.table import Array
 
-SETTLING = np.geomspace(1 / 50, 1 / 2, 16)  # time constants that are tried, of the record
+STEP, DRIFT, SETTLING, FOLLOWS = "step", "drift", "settling", "follows"
+TIMES = np.geomspace(1 / 50, 1 / 2, 16)  # time constants of a settling that are tried, of the record
+LAGS = (0.0, *np.geomspace(1 / 400, 1 / 5, 10))  # of an output behind a column, of the record
 EDGE = 8  # means from either end within which a step would be one odd value
 AMPLITUDE = 14.0  # what the amplitude of a pattern has to gain, before what is searched for
+CERTAIN = 60.0  # what a form that is searched for in the record itself has to gain beyond its price to be no chance:
+# noise that goes by jumps has steps and slopes of its own; a column that was logged knows nothing of them
+PER = {"temperature_c": "K", "supply_v": "V"}  # units of columns
 
 
 @dataclass(frozen=True)
 class Pattern:
-    """A part of one channel's means (m,) that is no noise. `gain`: twice the log-likelihood; `price`: of its search."""
+    """A part of one channel's means that is no noise: a `form` (m,), its amount, and how uncertain that is.
 
+    `words` has a place for that amount. `gain`: twice the log-likelihood; `price`: of its search. `cause` is the logged
+    column that it follows; `rivals` are the other patterns that explain as much.
+    """
+
+    kind: str
     axis: str
-    text: str
+    words: str
+    form: Array
+    size: float
+    std: float
     gain: float
     price: float
-    means: Array
+    cause: str = ""
+    rivals: tuple[Pattern, ...] = ()
+
+    @property
+    def worth(self) -> float:
+        """What it gains beyond its price."""
+        return self.gain - self.price
+
+    @property
+    def plain(self) -> str:
+        """In words."""
+        return self.words.replace("{}", f"{self.size:+.4g} +- {self.std:.1g}")
+
+    @property
+    def certain(self) -> bool:
+        """Whether it is no chance beside whatever was fitted."""
+        return self.worth > (0.0 if self.kind == FOLLOWS else CERTAIN)
+
+    @property
+    def text(self) -> str:
+        """In words, with what it cannot be told from."""
+        others = " or ".join(each.plain for each in self.rivals)
+        return f"{self.plain} (on this record it cannot be told from {others})" if others else self.plain
 
     def taken_off(self, channel: Channel) -> Channel:
         """The record without it."""
-        return replace(channel, means=channel.means - self.means) if channel.axis == self.axis else channel
+        return replace(channel, means=channel.means - self.size * self.form) if channel.axis == self.axis else channel
 
 
 def pattern_of(found: ChannelFit) -> Pattern | None:
     """The pattern that explains most of what one channel does, where it is no chance."""
     spectrum, unit = _Ordinates.of(found), found.channel.unit
-    every = [_step(found.channel, spectrum, unit), *_courses(found.channel, spectrum, unit)]
-    best = max(every, key=lambda each: each.gain - each.price)
-    return best if best.gain > best.price else None
+    every = [
+        _step(found.channel, spectrum, unit), *_courses(found.channel, spectrum, unit),
+        *_followed(found.channel, spectrum, unit),
+    ]  # fmt: skip
+    kinds = {(each.kind, each.cause) for each in every}
+    best, *others = sorted((_best(every, *kind) for kind in kinds), key=lambda each: -each.worth)
+    if best.worth <= 0:
+        return None
+    return replace(best, rivals=tuple(each for each in others if best.worth - each.worth < NOT_TOLD_APART))
+
+
+def _best(every: Iterable[Pattern], kind: str, cause: str) -> Pattern:
+    """Of one kind."""
+    return max((each for each in every if (each.kind, each.cause) == (kind, cause)), key=lambda each: each.worth)
 
 
 @dataclass(frozen=True)
@@ -65,9 +114,13 @@ class _Ordinates:
         seen = dct(means_without(channel, found.lines), type=2, norm="ortho")[1:last]
         return cls(seen, found.level(f) / step_s, n)
 
+    def coefficients(self, form: Array) -> Array:
+        """Of a form of the means (n,), shape (k,)."""
+        return np.asarray(dct(form, type=2, norm="ortho")[1 : len(self.seen) + 1])
+
     def matched(self, form: Array) -> tuple[float, float, float]:
         """(amplitude, its standard deviation, gain) of a form of the means (n,)."""
-        c = dct(form, type=2, norm="ortho")[1 : len(self.seen) + 1]
+        c = self.coefficients(form)
         weight = float(np.sum(c * c / self.variance))
         amplitude = float(np.sum(c * self.seen / self.variance)) / weight
         return amplitude, weight**-0.5, amplitude**2 * weight
@@ -87,24 +140,52 @@ def _step(channel: Channel, by: _Ordinates, unit: str) -> Pattern:
     gain = np.where(bottom > 0, top**2 / np.maximum(bottom, np.finfo(float).tiny), 0.0)
     gain[: EDGE - 1] = gain[n - EDGE :] = 0.0
     at = int(np.argmax(gain))
-    size = float(top[at] / bottom[at]) if bottom[at] > 0 else 0.0
-    text = f"a step of {size:+.3g} {unit} of {channel.axis} at t = {(at + 1) * channel.sampling.interval_s:.6g} s"
-    form = size * (np.arange(n) > at)
-    return Pattern(channel.axis, text, float(gain[at]), AMPLITUDE + 2 * float(np.log(n)), form - form.mean())
+    text = f"a step of {{}} {unit} of {channel.axis} at t = {(at + 1) * channel.sampling.interval_s:.6g} s"
+    form = np.asarray(np.arange(n) > at, dtype=float)
+    return _matched(STEP, channel, text, form, by, AMPLITUDE + 2 * float(np.log(n)))
+
+
+def _matched(
+    kind: str, channel: Channel, words: str, form: Array, by: _Ordinates, price: float, cause: str = ""
+) -> Pattern:
+    form = form - form.mean()
+    size, std, gain = by.matched(form)
+    return Pattern(kind, channel.axis, words, form, size, std, gain, price, cause)
 
 
 def _courses(channel: Channel, by: _Ordinates, unit: str) -> Iterator[Pattern]:
     """A drift in a straight line, and settlings."""
-    u = (np.arange(by.n) + 0.5) / by.n - 0.5
-    slope, _, gain = by.matched(u)
-    per_hour = 3600 * slope / channel.length_s
-    yield Pattern(channel.axis, f"a drift of {channel.axis} by {per_hour:+.3g} {unit}/h", gain, AMPLITUDE, slope * u)
-    for share in SETTLING.tolist():
-        form = np.exp(-(u + 0.5) / share)
-        size, _, gain = by.matched(form)
-        text = (
-            f"{channel.axis} settles by {-size:+.3g} {unit}, with a time constant of about "
-            f"{share * channel.length_s:.2g} s"
-        )
-        price = AMPLITUDE + 2 * float(np.log(len(SETTLING)))
-        yield Pattern(channel.axis, text, gain, price, size * (form - form.mean()))
+    hours = (np.arange(by.n) + 0.5) * channel.sampling.interval_s / 3600
+    yield _matched(DRIFT, channel, f"a drift of {channel.axis} by {{}} {unit}/h", hours, by, AMPLITUDE)
+    price = AMPLITUDE + 2 * float(np.log(len(TIMES)))
+    for share in TIMES.tolist():
+        left = -np.exp(-(np.arange(by.n) + 0.5) / by.n / share)
+        text = f"{channel.axis} settles by {{}} {unit}, with a time constant of about {share * channel.length_s:.2g} s"
+        yield _matched(SETTLING, channel, text, left, by, price)
+
+
+def _followed(channel: Channel, by: _Ordinates, unit: str) -> Iterator[Pattern]:
+    """What follows a column, at once or some time behind it."""
+    price = AMPLITUDE + 2 * float(np.log(len(LAGS) * max(1, len(channel.logged))))
+    for name, values in channel.logged.items():
+        for share in LAGS:
+            form = values if share == 0 else _behind(values, share * len(values))
+            behind = f", {share * channel.length_s:.2g} s behind it" if share else ""
+            text = f"{channel.axis} follows {name} by {{}} {unit}/{PER.get(name, name)}{behind}"
+            yield _matched(FOLLOWS, channel, text, form, by, price, name)
+
+
+def _behind(values: Array, steps: float) -> Array:
+    """Values (n,) through a first-order lag of so many steps, that stood at the first value before."""
+    kept = np.exp(-1 / steps)
+    out, _ = lfilter([1 - kept], [1, -kept], values, zi=[kept * values[0]])
+    return np.asarray(out)
+
+
+def refitted(patterns: tuple[Pattern, ...], found: ChannelFit, whole: Channel) -> tuple[Pattern, ...]:
+    """The patterns of one channel with their amounts fitted together to the `whole` record, beside a fit's effects."""
+    by = _Ordinates.of(replace(found, channel=whole))
+    forms = np.column_stack([by.coefficients(each.form) for each in patterns]) / np.sqrt(by.variance)[:, None]
+    size, *_ = np.linalg.lstsq(forms, by.seen / np.sqrt(by.variance), rcond=None)
+    std = np.sqrt(np.diag(np.linalg.pinv(forms.T @ forms)))
+    return tuple(replace(p, size=float(a), std=float(s)) for p, a, s in zip(patterns, size, std, strict=True))

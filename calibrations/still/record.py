@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from calibrations.noise_analysis.analysis import check_length, checked
-from calibrations.noise_analysis.clipping import Ends
 from calibrations.noise_analysis.decimated import Means
-from calibrations.noise_analysis.octaves import Curve, Octaves
+from calibrations.noise_analysis.octaves import Curve
+from calibrations.noise_analysis.oddities import Oddity
 from calibrations.noise_analysis.processes import Sampling
-from calibrations.noise_analysis.welch import Segments, Welch
+from calibrations.noise_analysis.reduction import Reduction
+from calibrations.noise_analysis.welch import Segments
 from calibrations.table import Array
 
 
@@ -33,6 +33,8 @@ class Channel:
     means: Array
     size: int  # samples to a mean
     segments: Segments
+    logged: Mapping[str, Array] = field(default_factory=dict)  # by column: its means (m,), less their mean
+    oddities: tuple[Oddity, ...] = ()
 
     @property
     def sampling(self) -> Sampling:
@@ -53,12 +55,14 @@ class Channel:
         """The first and the second half of the record, each a record of its own."""
         middle, parts = len(self.means) // 2, len(self.segments.stretches)
         return (
-            self._part(self.means[:middle], self.segments.part(0, parts // 2)),
-            self._part(self.means[middle:], self.segments.part(parts // 2, parts)),
+            self._part(slice(None, middle), self.segments.part(0, parts // 2)),
+            self._part(slice(middle, None), self.segments.part(parts // 2, parts)),
         )
 
-    def _part(self, means: Array, segments: Segments) -> Channel:
-        return replace(self, n=len(means) * self.size, means=means - means.mean(), segments=segments)
+    def _part(self, which: slice, segments: Segments) -> Channel:
+        means = self.means[which]
+        logged = {name: values[which] - values[which].mean() for name, values in self.logged.items()}
+        return replace(self, n=len(means) * self.size, means=means - means.mean(), segments=segments, logged=logged)
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +106,7 @@ class Samples:
     rate_hz: float
     unit: str
     corner_hz: float = np.inf
+    logged: Mapping[str, Sequence[Array]] = field(default_factory=dict)  # columns beside it, known when it was read
 
 
 def reduced(each: Iterable[Samples], source: str, constants: Mapping[str, str | float] | None = None) -> Still:
@@ -111,28 +116,32 @@ def reduced(each: Iterable[Samples], source: str, constants: Mapping[str, str | 
     """
     digest, channels, curves, unit = hashlib.sha256(), [], {}, ""
     for samples in each:
-        octaves, means = Octaves(samples.rate_hz, third_order=False), Means()
-        welch, ends = Welch(samples.rate_hz), Ends()
-        where = f"{source}, channel {samples.axis}"
-        for block in samples.blocks:
-            values = checked(np.asarray(block), octaves.n, where)
-            for part in (octaves, means, welch, ends):
-                part.add(values)
+        reduction = Reduction(samples.rate_hz, samples.corner_hz, third_order=False)
+        for values in reduction.read(samples.blocks, f"{source}, channel {samples.axis}"):
             digest.update(np.ascontiguousarray(values).tobytes())
-        check_length(octaves.n, samples.rate_hz, samples.corner_hz, where)
-        ends.check(where)
-        channels.append(
-            Channel(
-                samples.axis,
-                samples.unit,
-                samples.rate_hz,
-                samples.corner_hz,
-                octaves.n,
-                means.values(),
-                means.size,
-                welch.segments(),
-            )
-        )
-        curves[samples.axis] = octaves.curve()
+        channels.append(_channel(samples, reduction))
+        curves[samples.axis] = reduction.octaves.curve()
         unit = samples.unit
     return Still(source, unit, tuple(channels), curves, digest.hexdigest(), constants or {})
+
+
+def _channel(samples: Samples, reduction: Reduction) -> Channel:
+    means = reduction.means
+    return Channel(
+        samples.axis, samples.unit, samples.rate_hz, samples.corner_hz, reduction.n, means.values(), means.size,
+        reduction.welch.segments(), _logged(samples, reduction.n), reduction.oddities(),
+    )  # fmt: skip
+
+
+def _logged(samples: Samples, n: int) -> dict[str, Array]:
+    """Means of what was logged beside, each over as many samples as one of the channel; what is constant tells
+    nothing."""
+    found = {}
+    for name, blocks in samples.logged.items():
+        means = Means()
+        for block in blocks:
+            means.add(block)
+        values = means.values()
+        if sum(map(len, blocks)) == n and np.ptp(values) > 0:
+            found[name] = values
+    return found

@@ -2,7 +2,8 @@
 
 1. lines that stand out above the widest mixture are taken off, if the catalogue can name them;
 2. every mixture beside the model is fitted to what is left (`mixtures`);
-3. a step or a drift is taken off as well where it makes needless a process that would stand for it.
+3. a step, a drift, or what follows a logged column is taken off as well where it makes needless a process that would
+   stand for it; and once more, as long as there is one.
 """
 
 from __future__ import annotations
@@ -11,18 +12,21 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+import numpy as np
+
 from calibrations.effect import Effect
 from calibrations.model import Model
+from calibrations.noise_analysis.octaves import Curve, octaves
 from calibrations.search.candidates import NOT_TOLD_APART
 from calibrations.still.bands import Lines
 from calibrations.still.channel_fit import ChannelFit
 from calibrations.still.fit import NoiseFit, fitted, lines_of, most_lines, noise_terms, seen, tried
 from calibrations.still.mixtures import Mixture, Mixtures
-from calibrations.still.patterns import Pattern, pattern_of
-from calibrations.still.record import Still
+from calibrations.still.patterns import Pattern, pattern_of, refitted
+from calibrations.still.record import Channel, Still
 
 NEARLY = 0.9  # of the longest time constant
-CERTAIN = 60.0  # what a pattern has to gain beyond its price to be no chance beside whatever was fitted
+MOST_PATTERNS = 3  # of a channel
 
 
 @dataclass(frozen=True)
@@ -100,13 +104,38 @@ def search(still: Still, model: Model, effects: Mapping[str, Effect]) -> Search:
     given = tuple(term.effect for term in noise_terms(model))
     known = {name: effect for name, effect in effects.items() if "still" in effect.kinds}
     known |= {effect.name: effect for effect in given}
-    plain = _searched(still, model, known, given)
-    beside = [patterns for patterns in map(_patterns, (plain.mixture.channels, plain.mixtures.base)) if patterns]
-    tried = [replace(_searched(_without(still, each), model, known, given), patterns=each) for each in beside]
-    best = max(tried, key=_worth, default=plain)
-    needless = len(best.gains) < len(plain.gains) and _worth(best) > _worth(plain)
-    certain = any(pattern.gain - pattern.price > CERTAIN for pattern in _patterns(plain.mixture.channels))
-    return best if needless or certain else plain
+    found = _searched(still, model, known, given)
+    while len(found.patterns) < MOST_PATTERNS * len(still.channels):
+        more = _with_patterns(found, given)
+        if more is found:
+            break
+        found = more
+    return _together(still, found, given) if len(found.patterns) > 1 else found
+
+
+def _together(whole: Still, found: Search, given: tuple[Effect, ...]) -> Search:
+    """With the amounts of all patterns fitted at once, beside the processes that are left."""
+    patterns: list[Pattern] = []
+    for channel, fit in zip(whole.channels, found.mixture.channels, strict=True):
+        own = tuple(pattern for pattern in found.patterns if pattern.axis == channel.axis)
+        patterns += refitted(own, fit, channel) if own else ()
+    left = _searched(without(whole, tuple(patterns)), found.model, found.effects, given)
+    return replace(left, patterns=tuple(patterns))
+
+
+def _with_patterns(found: Search, given: tuple[Effect, ...]) -> Search:
+    """With the patterns that stand out, taken off each channel where they make a process needless; or as it was."""
+    sure, likely = _patterns(found.mixture.channels), _patterns(found.mixtures.base)
+    tried = [
+        replace(
+            _searched(without(found.still, each), found.model, found.effects, given), patterns=found.patterns + each
+        )
+        for each in (sure, likely)
+        if each
+    ]
+    best = max(tried, key=_worth, default=found)
+    needless = len(best.gains) < len(found.gains) and _worth(best) > _worth(found)
+    return best if needless or any(pattern.certain for pattern in sure) else found
 
 
 def _patterns(channels: tuple[ChannelFit, ...]) -> tuple[Pattern, ...]:
@@ -114,12 +143,24 @@ def _patterns(channels: tuple[ChannelFit, ...]) -> tuple[Pattern, ...]:
     return tuple(filter(None, map(pattern_of, channels)))
 
 
-def _without(still: Still, patterns: tuple[Pattern, ...]) -> Still:
-    """The record without them."""
-    channels = still.channels
+def without(still: Still, patterns: tuple[Pattern, ...]) -> Still:
+    """The record less the patterns; its Allan deviations from a mean's length on, where they show."""
+    channels, curves = still.channels, dict(still.allan)
     for pattern in patterns:
         channels = tuple(pattern.taken_off(channel) for channel in channels)
-    return replace(still, channels=channels)
+    for channel in channels:
+        if channel.axis in {pattern.axis for pattern in patterns}:
+            curves[channel.axis] = _from_means(curves[channel.axis], channel)
+    return replace(still, channels=channels, allan=curves)
+
+
+def _from_means(curve: Curve, channel: Channel) -> Curve:
+    """The curve of a channel whose means have changed."""
+    slow = octaves([channel.means], 1 / channel.sampling.interval_s)
+    fast = np.arange(len(curve.tau_s)) < len(curve.tau_s) - len(slow.tau_s)
+    parts = ((getattr(curve, name)[fast], getattr(slow, name)) for name in ("tau_s", "deviation", "low", "high", "edf"))
+    tau_s, deviation, low, high, edf = map(np.concatenate, parts)
+    return Curve(curve.kind, tau_s, deviation, low, high, (*np.array(curve.alpha)[fast].tolist(), *slow.alpha), edf)
 
 
 def _worth(found: Search) -> float:

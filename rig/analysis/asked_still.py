@@ -94,7 +94,7 @@ def is_still(data: str) -> bool:
 
 
 def _samples(axis: str, stream: Stream) -> Samples:
-    return Samples(axis, stream.blocks, stream.rate_hz, stream.unit, stream.corner_hz)
+    return Samples(axis, stream.blocks, stream.rate_hz, stream.unit, stream.corner_hz, stream.logged)
 
 
 def _is_noise(model: Model | None) -> bool:

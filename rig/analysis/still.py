@@ -24,6 +24,7 @@ from rig.record.values import Kept
 
 BLOCK = 1 << 17
 BESIDE = ("t_s", "temperature_c", "supply_v", "n", "direction", "path")  # columns that are no channels
+FOLLOWED = ("temperature_c", "supply_v")  # of these, those that an output may follow
 LATE = 0.5  # sampling intervals by which a sample may be off before that is a gap
 MOST_MISSING = 0.1  # of a record, in gaps that are closed up
 WHOLE = 0.1  # of a step, by which steps may be off whole numbers of them where single samples were lost
@@ -49,6 +50,7 @@ class Stream:
     uneven_s: float = 0.0  # by how much the times are off the even row that is taken for them
     upright_v: dict[int, float] = field(default_factory=dict)  # output along gravity, +1 and -1 g
     constants: Mapping[str, str | float] = field(default_factory=dict)
+    logged: dict[str, list[Array]] = field(default_factory=dict)  # what was read beside the samples, in their blocks
 
     @property
     def scale_v_per_g(self) -> float | None:
@@ -149,9 +151,18 @@ def _of_table(table: Table, channel: str | None, rate_hz: float | None) -> Strea
     corner_hz = table.number("filter_corner_hz", np.inf)
     others = tuple(name for name in channels if name != chosen)
     found = Stream(
-        table.source, chosen, rate, unit, iter([table.column(chosen)]), corner_hz, others, constants=table.constants
-    )
+        table.source, chosen, rate, unit, iter([table.column(chosen)]), corner_hz, others, constants=table.constants,
+        logged={name: [table.column(name)] for name in _logged(table, chosen)},
+    )  # fmt: skip
     return replace(found, closed=list(times.gaps), uneven_s=times.uneven_s) if times else found
+
+
+def _logged(table: Table, channel: str) -> Iterator[str]:
+    """Columns that an output may follow: temperature, supply, and what is no output of a sensor by its name."""
+    for name in table.columns:
+        own = name not in BESIDE and AXIS.fullmatch(channel) is not None and AXIS.fullmatch(name) is None
+        if name in FOLLOWED or (own and name != channel):
+            yield name
 
 
 def _chosen(channels: tuple[str, ...], channel: str | None, source: str) -> str:
@@ -266,6 +277,8 @@ def _still_blocks(measured: Measured, into: Stream) -> Iterator[NDArray[Any]]:
         if next_s is not None and abs(samples.start_s - next_s) > LATE / into.rate_hz:
             into.closed.append((next_s, samples.start_s - next_s))
         next_s = samples.start_s + len(volts) / into.rate_hz
+        if kept.temperature_c is not None:
+            into.logged.setdefault(FOLLOWED[0], []).append(np.broadcast_to(kept.temperature_c, len(volts)))
         yield volts
 
 

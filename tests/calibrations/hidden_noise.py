@@ -113,3 +113,44 @@ def _ringing() -> Array:
     """The answer to a blow: a resonance near 0.32 Hz."""
     k = np.arange(300)
     return np.sin(0.2 * k) * np.exp(-k / 60)
+
+
+def room(random: Random, n: int = SAMPLES) -> Array:
+    """Temperature of a room in C, read to a hundredth: a heater that goes on and off, and a door."""
+    air, on, wall = np.empty(n), False, 21.0
+    now = 21.5
+    doors = random.random(n) < 3e-4
+    for k in range(n):
+        on = now < 21.2 or (on and now < 22.0)
+        now += (wall - now) / 2000 + 0.0012 * on - 0.6 * doors[k] + 0.003 * random.standard_normal()
+        air[k] = now
+    return np.round(air, 2)
+
+
+def lagged(values: Array, steps: float) -> Array:
+    """What warms up behind something else."""
+    out, now = np.empty(len(values)), float(values[0])
+    for k, value in enumerate(values.tolist()):
+        now += (value - now) / steps
+        out[k] = now
+    return out
+
+
+Logged = Callable[[Random], tuple[Array, Array]]
+FOLLOWING: Mapping[str, tuple[Logged, str | None]] = {  # (samples, a logged temperature), and what is to be told
+    "follows": (lambda r: _beside(r, lambda c, n: n + 0.5 * c), "x follows temperature_c by +0."),
+    "follows behind": (lambda r: _beside(r, lambda c, n: n - 0.8 * lagged(c, 600)), "x follows temperature_c by -0."),
+    "follows beside flicker": (
+        lambda r: _beside(r, lambda c, n: n + 0.3 * traps(r) + 1.0 * c), "x follows temperature_c by +"
+    ),
+    "wanders by itself": (lambda r: _beside(r, lambda c, n: n + 0.005 * walk(r)), None),
+    "flickers by itself": (lambda r: _beside(r, lambda c, n: n + 0.4 * traps(r)), None),
+    "white by itself": (lambda r: _beside(r, lambda c, n: n), None),
+    "both walk": (lambda r: (white(r) + 0.01 * walk(r), 22 + 0.002 * walk(r)), None),
+}  # fmt: skip
+
+
+def _beside(random: Random, made: Callable[[Array, Array], Array]) -> tuple[Array, Array]:
+    """(what is made of a room's temperature and of white noise, that temperature)."""
+    warm = room(random)
+    return made(warm, white(random)), warm

@@ -1,0 +1,73 @@
+"""An output that follows what was logged beside it is told as that, and chance likeness is none."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from calibrations.model_file import read_model
+from calibrations.still.diagnose import diagnose
+from calibrations.still.discover import Discovery, discover
+from calibrations.still.patterns import FOLLOWS, STEP
+from calibrations.still.record import Samples, Still, reduced
+from calibrations.table import Array
+from tests.calibrations.hidden_noise import FOLLOWING, RATE_HZ, SAMPLES, room, white
+
+
+def beside(x: Array, **logged: Array) -> Still:
+    blocks = {name: list(np.array_split(values, 7)) for name, values in logged.items()}
+    return reduced([Samples("x", np.array_split(x, 5), RATE_HZ, "V", logged=blocks)], "made")
+
+
+def found(x: Array, **logged: Array) -> Discovery:
+    return discover(beside(x, **logged), read_model("still"))
+
+
+@pytest.mark.parametrize("name", FOLLOWING)
+def test_what_follows_a_logged_temperature_is_told_and_nothing_else(name: str) -> None:
+    make, told = FOLLOWING[name]
+    x, warm = make(np.random.default_rng(3))
+    result = found(x, temperature_c=warm)
+    if told is None:
+        assert result.verdict in ("adequate", "ambiguous")
+        return
+    assert result.verdict == "unexplained"
+    assert told in str(result.residual_structure)
+    assert "rate-random-walk" not in result.causes
+    assert ("flicker" in name) == ("flicker-noise" in result.causes)
+
+
+def test_slope_and_lag_are_those_of_the_sensor() -> None:
+    x, warm = FOLLOWING["follows behind"][0](np.random.default_rng(2))
+    (pattern,) = diagnose(beside(x, temperature_c=warm), read_model("still")).search.patterns
+    assert pattern.size == pytest.approx(-0.8, abs=5 * pattern.std)
+    assert pattern.std < 0.05
+    assert float(pattern.plain.split("V/K, ")[1].split(" s behind")[0]) == pytest.approx(60, rel=0.4)
+
+
+def test_a_drift_that_the_temperature_shares_is_told_with_its_rival() -> None:
+    random = np.random.default_rng(1)
+    along = np.linspace(20, 22, SAMPLES)
+    said = str(found(white(random) + 0.5 * along, temperature_c=np.round(along, 2)).residual_structure)
+    assert "a drift of x by" in said
+    assert "x follows temperature_c by" in said
+    assert "cannot be told from" in said
+
+
+def test_a_temperature_and_a_step_are_two_things() -> None:
+    random = np.random.default_rng(1)
+    warm = room(random)
+    result = found(white(random) + 0.5 * warm + 0.5 * (np.arange(SAMPLES) > 9000), temperature_c=warm)
+    (follows, step) = result.search.patterns
+    assert (follows.kind, step.kind) == (FOLLOWS, STEP)
+    for pattern in (follows, step):
+        assert pattern.size == pytest.approx(0.5, abs=3 * pattern.std)
+        assert pattern.std < 0.05
+    assert str(result.residual_structure).count("; ") == 1
+    assert result.causes == ()
+
+
+def test_a_column_that_is_constant_or_too_short_is_left_out() -> None:
+    random = np.random.default_rng(1)
+    (channel,) = beside(white(random), temperature_c=np.full(SAMPLES, 22.0), supply_v=np.ones(5)).channels
+    assert channel.logged == {}
