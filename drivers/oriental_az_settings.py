@@ -17,10 +17,11 @@ class Settings:
 
     With a `communication_timeout_s`, the drive stops by itself (alarm 85) when its controller falls silent for so long
     in the middle of a move; 0 is off. It is off unless the bench file sets it, since the address of the drive's
-    parameter "Communication timeout (Modbus)", which counts ms, is from memory [M]: look it up first.
+    parameter "Communication timeout (Modbus)", which counts ms, is from memory [M]: look it up in HM-60262 first. AR
+    drives of the same maker have theirs elsewhere, at 0x1200.
 
     With `own_limits`, `limits_deg` are written into the drive as its software limits and read back, before the first
-    move: it brakes there by itself, whoever sent it. Off unless the bench file sets it, for the same reason.
+    move: it brakes there by itself, whoever sent it. Off unless the bench file sets it: see oriental_az_table.
 
     Raises ValueError for what no stage can be.
     """

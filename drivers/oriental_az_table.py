@@ -1,4 +1,6 @@
-"""Oriental Motor AZ: the part of its register map that the rig uses. Source: AZ function manual; [M] from memory.
+"""Oriental Motor AZ: the part of its register map that the rig uses.
+
+Source: AZ function manual, HM-60262; [M] from memory.
 
 32-bit values, high word first. Default line: 115200 baud, 8 data bits, even parity. Functions 03, 06, 10h, 17h.
 """
@@ -31,9 +33,11 @@ HOME_END = 1 << 4  # [M] on while coordinates are set
 READY, ALARM_ON, BUSY = (1 << bit for bit in (5, 7, 8))
 MOVE, IN_POSITION = (1 << bit for bit in (13, 14))
 
-# The drive's own limits; steps. Addresses are those of the same maker's CVD drives, for the AZ they are [M].
+# The drive's own limits; steps. The maker's CVD and AR drives have them here, behind the motor's direction at 0x0384;
+# AZ drives have the direction there too: it is their EtherCAT object 41C2h, which is 4000h and half of 0x0384. That the
+# limits follow it in the AZ as well is likely, and not confirmed by its manual (HM-60262).
 OVERTRAVEL = Register(0x0386, "int32", "action at a software limit")
-BRAKE_AND_ALARM = 3  # [M] brake, then alarm 67
+BRAKE_AND_ALARM = 3  # [M] brake, then alarm 67; -1 none, 0 and 1 stop or brake, 2 and 3 the same with the alarm
 HIGH_LIMIT = Register(0x0388, "int32", "positive software limit", "step")
 LOW_LIMIT = Register(0x038A, "int32", "negative software limit", "step")
 OWN_LIMITS = (OVERTRAVEL, HIGH_LIMIT, LOW_LIMIT)
