@@ -4,7 +4,8 @@ RigError (2)             bad usage or bad input
 ├── BenchError           the bench file: file, key and nearest key
 ├── PlanError            a plan that cannot be made as asked
 ├── RecordError          the record cannot be opened, or does not hold what is asked
-│   └── UnknownRun       no run of this name; names the nearest
+│   ├── UnknownRun       no run of this name; names the nearest
+│   └── LabAway          the lab's record cannot be reached, or not any more
 ├── Busy                 another process works on this run, or with this instrument
 ├── BeyondLimits         what is planned would pass a limit of the bench
 ├── RunMismatch          the bench is not the one that the run was begun with
@@ -37,6 +38,10 @@ class RecordError(RigError):
 
 class UnknownRun(RecordError):
     """No run of this name is in the record."""
+
+
+class LabAway(RecordError):
+    """The lab's record cannot be reached, or not any more."""
 
 
 class Busy(RigError):

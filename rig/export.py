@@ -54,7 +54,7 @@ def _write_csv(data: str, path: Path) -> int:
 def _write_events(data: str, path: Path) -> int:
     if Path(data).is_file():
         raise ExportError(f"{data} is a file; event-model documents tell of a run of the record")
-    with Record() as record:
+    with Record.to_read() as record:
         run, table = record.run(data), table_of(record, data)
     lines = [json.dumps({"name": name, "doc": document}) for name, document in documents(run, table)]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")

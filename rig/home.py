@@ -1,9 +1,12 @@
-"""Where this application keeps its data: `RIG_HOME`, else the user's data folder."""
+"""Where this application keeps its data: `RIG_HOME`, else the user's data folder; and which record is read."""
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
+
+RECORD = "RIG_RECORD"  # the lab's record, by its URL, where that is read instead of the rig's own
+LAB = "RIG_LAB"  # where `rig push` brings runs
 
 
 def home() -> Path:

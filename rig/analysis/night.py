@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
-from rig.home import home
 from rig.record import Record
 from rig.record.measured import Measured
-from rig.record.store import FILE
 
 if TYPE_CHECKING:
     from calibrations.pictures.album import Picture
@@ -21,9 +19,9 @@ def night_of(data: str, date: str, program: str) -> Page | None:
 
     Raises RecordError, DataError where it holds too little.
     """
-    if not (home() / FILE).is_file():
+    if not Record.is_there():
         return None
-    with Record() as record:
+    with Record.to_read() as record:
         if data.partition("/")[0] not in {run.run for run in record.runs() if run.procedure == "soak"}:
             return None
         from calibrations.pictures.soak import soak_album

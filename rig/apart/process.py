@@ -23,6 +23,7 @@ from rig.errors import Stopped
 from rig.home import home
 from rig.lease import lease
 from rig.record import Record
+from rig.record.catch_up import push_after
 from rig.running.runner import Outcome, Wish, resume, start
 
 LONGEST = 4096  # bytes of an answer, which a pipe hands over in one piece
@@ -105,6 +106,7 @@ def main(text: str) -> None:
             error=str(outcome.error or outcome.run.message or ""),
             moving=outcome.moving,
         )
+        push_after(record, outcome.run, Bench.model_validate(outcome.run.bench).lab, print)
 
 
 def _carried_out(order: Order, record: Record, teller: Attendant) -> Outcome:

@@ -14,7 +14,7 @@ faults.py  what is wrong with it, in words
 from rig.bench.bench import Bench
 from rig.bench.check import drivers
 from rig.bench.file import DEFAULT, read_bench
-from rig.bench.parts import D63, ROLES, SIMULATED, TURNING, Certificate, Instrument, Sensor
+from rig.bench.parts import D63, ROLES, SIMULATED, TURNING, Certificate, Instrument, Lab, Sensor
 
 __all__ = [
     "D63",
@@ -25,6 +25,7 @@ __all__ = [
     "Bench",
     "Certificate",
     "Instrument",
+    "Lab",
     "Sensor",
     "drivers",
     "read_bench",

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from procedures.session import Limits
-from rig.bench.parts import Certificate, Displacement, Folders, Instrument, Laboratory, Sensor, Strict, Uncertainty
+from rig.bench.parts import Certificate, Displacement, Folders, Instrument, Lab, Laboratory, Sensor, Strict, Uncertainty
 
 SENSOR = "^[A-Za-z0-9_-]+$"  # name of a batch's sensor: part of channels and of RUN/SENSOR
 
@@ -27,6 +27,7 @@ class Bench(Strict):
     d63: Displacement | None = None
     uncertainty: Uncertainty = Uncertainty()
     laboratory: Laboratory = Laboratory()
+    lab: Lab | None = None
     certificates: dict[str, Certificate] = Field(default_factory=dict)  # of what plays no role, such as a hand level
     world: dict[str, Any] = Field(default_factory=dict)
     folders: Folders = Folders()
@@ -72,6 +73,8 @@ class Bench(Strict):
 
     def configuration(self, procedure: str, settings: Mapping[str, Any]) -> str:
         """Hash of all that a run depends on: procedure, settings, bench. Faults are not: they can be repaired."""
-        bench = self.model_dump(mode="json", exclude={"instruments": {"__all__": {"faults"}}, "laboratory": True})
+        bench = self.model_dump(
+            mode="json", exclude={"instruments": {"__all__": {"faults"}}, "laboratory": True, "lab": True}
+        )
         text = json.dumps([procedure, settings, bench])
         return hashlib.sha256(text.encode()).hexdigest()

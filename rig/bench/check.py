@@ -15,7 +15,7 @@ from drivers.simulation.errors import SimulationError
 from rig.bench.bench import Bench
 from rig.bench.faults import fault_of
 from rig.bench.parts import D63, ROLES, Instrument
-from rig.errors import BenchError
+from rig.errors import BenchError, RecordError
 from rig.nearest import did_you_mean
 
 
@@ -26,6 +26,7 @@ def check(bench: Bench, path: Path) -> None:
     _check_worlds(bench, path)
     _check_batch(bench, path)
     _check_d63(bench, path)
+    _check_lab(bench, path)
 
 
 def drivers() -> list[str]:
@@ -49,6 +50,21 @@ def _check_instrument(role: str, instrument: Instrument, path: Path) -> None:
         names = [field.name for field in dataclasses.fields(kind)]
         raise BenchError(f"{key}.{where}: {fault_of(fault, names)}") from None
     _check_faults(f"{key}.faults", instrument)
+
+
+def _check_lab(bench: Bench, path: Path) -> None:
+    """Raises BenchError for what is no URL of a lab's record, and for a password: the bench is kept with every run."""
+    if bench.lab is None:
+        return
+    from rig.record.lab_url import has_password, lab_url  # only a rig with a lab needs SQL to read its bench
+
+    key = f"{path}, key lab.url"
+    try:
+        url = lab_url(bench.lab.url, key)
+    except RecordError as error:
+        raise BenchError(str(error)) from None
+    if has_password(url):
+        raise BenchError(f"{key}: has a password, which every run would keep; leave it to ~/.pgpass or PGPASSWORD")
 
 
 def _check_faults(key: str, instrument: Instrument) -> None:

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ValidationError
 
 from drivers.links.faults import Fault
 from procedures.session import Limits
-from rig.bench.parts import Certificate, Displacement, Folders, Instrument, Sensor, Uncertainty
+from rig.bench.parts import Certificate, Displacement, Folders, Instrument, Lab, Sensor, Uncertainty
 from rig.nearest import did_you_mean
 
 UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
@@ -20,6 +20,8 @@ def told(error: ValidationError, model: type[BaseModel]) -> str:
     faults = error.errors()
     fault = min(faults, key=lambda fault: fault["type"] not in UNKNOWN)
     where = [str(part) for part in fault["loc"] if "[" not in str(part)]  # a type of several is no key
+    if where[0] == "lab":  # a URL may hold a password
+        fault = {**fault, "input": "..."}
     return f"key {'.'.join(where)}: {fault_of(fault, _keys(model, where[:-1]))}"
 
 
@@ -34,7 +36,7 @@ def fault_of(fault: Any, keys: list[str]) -> str:
 
 def _keys(model: Any, where: list[str]) -> list[str]:
     """The keys that are known at a place of the file."""
-    own = {"limits": Limits, "d63": Displacement, "uncertainty": Uncertainty}
+    own = {"limits": Limits, "d63": Displacement, "uncertainty": Uncertainty, "lab": Lab}
     parts = {"instruments": Instrument, "sensor": Sensor, "folders": Folders, **own}
     part = parts.get(where[0], model) if where else model
     if where and (where[0] == "certificates" or where[-1] == "certificate"):

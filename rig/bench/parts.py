@@ -121,6 +121,13 @@ class Laboratory(Strict):
     customer: str = ""
 
 
+class Lab(Strict):
+    """Where `rig push` brings runs: a PostgreSQL database, without a password; `push` it after every run."""
+
+    url: str
+    push: bool = False
+
+
 class Displacement(Strict):
     """The D63 behind the channel `d63`: its calibration curve, which side of the optical peak it works on, and
     whether the gap grows (1) or closes (-1) as the carriage moves towards the sensor's +x.

@@ -18,6 +18,7 @@ from typing import Any, cast
 import click
 
 from rig.cli.failure import exit_status
+from rig.cli.record_option import with_record
 
 FOLDER = Path(__file__).parent
 
@@ -32,7 +33,7 @@ class Commands(click.Group):
         path = _path(cmd_name)
         if not path.is_file() or _name(path) != cmd_name or not _defines_command(path):
             return None
-        return cast(click.Command, importlib.import_module(f"{__name__}.{path.stem}").command)
+        return with_record(cast(click.Command, importlib.import_module(f"{__name__}.{path.stem}").command))
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]

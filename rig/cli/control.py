@@ -32,7 +32,7 @@ def command(sensor: str | None, baseline: int, since: str | None, folder: Path |
     The first runs set the limits; a later one beyond them is out of control, and so is a slow drift of their weighted
     mean. Exit status 1: out of control.
     """
-    with Record() as record:
+    with Record.to_read() as record:
         found = controlled(record.runs(), sensor, baseline, since)
     written = _write(found, folder, form) if folder else []
     if as_json:

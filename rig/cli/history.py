@@ -56,7 +56,7 @@ def command(
 
     read = read_model(model, effects_of(bench_file))
     limits = _limits(bench_file, given)
-    with Record() as record:
+    with Record.to_read() as record:
         found = _only(history(record, sensor, read, limits, baseline), chosen)
         other = history(record, beside, read, limits, baseline) if beside is not None else None
     compared = _compared(found, other, between, rigs)

@@ -38,7 +38,7 @@ def command(file: Path, kind: str | None, mapped: tuple[str, ...], given: tuple[
         kind, columns = ask_mapping(laid, kind, columns, given)
     taken = take(laid, kind, columns, constants)
     table = averaged(taken.table, note)
-    with Record() as record:
+    with Record.to_read() as record:
         run = record.add_table(table, taken.settings)
     if as_json:
         names = [*table.columns, *table.labels]

@@ -8,9 +8,10 @@ import click
 
 from procedures.catalogue import find
 from rig.bench import Bench, read_bench
-from rig.cli.output import bench_option, json_option
+from rig.cli.output import bench_option, json_option, note
 from rig.cli.watch import tell, trace_option, watch_options, watching
 from rig.record import Record
+from rig.record.catch_up import push_after
 from rig.running.runner import Outcome, resume
 
 
@@ -28,11 +29,12 @@ def command(
     With --bench the run goes on only if that file is still the same.
     """
     bench = read_bench(bench_file) if bench_file else None
-    with Record.to_find(run) as record:
+    with Record.to_find(run, own=True) as record:
         found = record.run(run)
         if found.state == "complete":
             return tell(record, Outcome(found), as_json)
         own = Bench.model_validate(found.bench)
         with watching(find(found.procedure, own.folders.procedures), own, unattended, answers) as watch:
             outcome = resume(record, run, watch, bench, trace)
+        push_after(record, outcome.run, (bench or own).lab, note)
         return tell(record, outcome, as_json)

@@ -9,10 +9,11 @@ import click
 from procedures.catalogue import find
 from procedures.settings import parse
 from rig.bench import read_bench
-from rig.cli.output import bench_option, json_option
+from rig.cli.output import bench_option, json_option, note
 from rig.cli.settings import PASS_ON, read_settings, settings_arguments
 from rig.cli.watch import tell, trace_option, watch_options, watching
 from rig.record import Record
+from rig.record.catch_up import push_after
 from rig.running.runner import start
 
 
@@ -44,4 +45,5 @@ def command(
     with Record() as record:
         with watching(found, bench, unattended, answers) as watch:
             outcome = start(record, bench, found, settings, watch, trace=trace)
+        push_after(record, outcome.run, bench.lab, note)
         return tell(record, outcome, as_json)

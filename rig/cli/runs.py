@@ -12,7 +12,7 @@ from rig.record import Record, Run
 @json_option
 def command(as_json: bool) -> None:
     """List the runs of the record, newest first."""
-    with Record() as record:
+    with Record.to_read() as record:
         runs = record.runs()
     if as_json:
         emit({"schema": "rig.runs/1", "runs": [_document(run) for run in runs]})

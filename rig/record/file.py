@@ -13,6 +13,7 @@ from pathlib import Path
 from sqlalchemy import Connection, Engine, ExceptionContext, create_engine, event, text
 
 from rig.errors import RecordError
+from rig.record.dialects import give_sha256
 from rig.record.schema import MIGRATIONS, SCHEMA, metadata
 
 RECOVER = "move it away, or `rig doctor --recover FOLDER` copies what can still be read"
@@ -36,6 +37,7 @@ def open_file(path: Path) -> Engine:
     opened, is damaged, or was written by a newer program; what is done with the engine later raises it too.
     """
     engine = create_engine(f"sqlite:///{path}", creator=lambda: _connected(path))
+    event.listen(engine, "connect", lambda connection, _: give_sha256(connection))
     event.listen(engine, "handle_error", lambda context: _tell(context, path))
     event.listen(engine, "begin", lambda connection: _require_there(connection, path))
     try:

@@ -1,10 +1,15 @@
-"""The tables of the record. `SCHEMA` counts their versions; it is kept in the file's `user_version`."""
+"""The tables of the record, the rig's own and the lab's. `SCHEMA` counts their versions.
+
+The number is kept beside the tables: in a file's `user_version`, on a server in the comment on the table `runs`.
+"""
 
 from __future__ import annotations
 
-from sqlalchemy import JSON, Column, Float, ForeignKey, Index, Integer, LargeBinary, MetaData, String, Table
+from sqlalchemy import Column, Float, ForeignKey, Index, Integer, LargeBinary, MetaData, String, Table
 
-SCHEMA = 6
+from rig.record.dialects import Counter, Document
+
+SCHEMA = 7
 metadata = MetaData()
 
 runs = Table(
@@ -14,16 +19,17 @@ runs = Table(
     Column("kind", String, nullable=False),  # of the table that its rows make: poses, positions, ...
     Column("procedure", String, nullable=False),  # "import" where a file was read
     Column("state", String, nullable=False),  # running, complete, stopped, failed
-    Column("settings", JSON, nullable=False),
-    Column("bench", JSON, nullable=False),  # the whole configuration, as it was
-    Column("identities", JSON, nullable=False),  # of the instruments, by role
+    Column("settings", Document, nullable=False),
+    Column("bench", Document, nullable=False),  # the whole configuration, as it was
+    Column("identities", Document, nullable=False),  # of the instruments, by role
     Column("configuration", String, nullable=False),  # hash of procedure, settings and bench
-    Column("constants", JSON, nullable=False),
+    Column("constants", Document, nullable=False),
     Column("source", String, nullable=False),
     Column("created", String, nullable=False),  # ISO 8601, UTC
     Column("ended", String),
     Column("message", String),  # why it stopped or failed
-    Column("results", JSON, nullable=False),
+    Column("results", Document, nullable=False),
+    Column("uid", String, nullable=False, server_default=""),  # the same in every record that the run is copied to
 )
 
 poses = Table(
@@ -64,7 +70,7 @@ blocks = Table(
     Column("number", Integer, primary_key=True),  # of the pose
     Column("rate_hz", Float, nullable=False),
     Column("start_s", Float, nullable=False),
-    Column("channels", JSON, nullable=False),
+    Column("channels", Document, nullable=False),
     Column("codec", String, nullable=False),
     Column("samples", LargeBinary, nullable=False),
 )
@@ -75,8 +81,8 @@ dwells = Table(  # what a page draws of a night without reading its samples
     Column("run", ForeignKey("runs.run"), primary_key=True),
     Column("number", Integer, primary_key=True),  # of the pose
     Column("n", Integer, nullable=False),  # samples
-    Column("means", JSON, nullable=False),  # V, by channel
-    Column("stds", JSON, nullable=False),
+    Column("means", Document, nullable=False),  # V, by channel
+    Column("stds", Document, nullable=False),
 )
 
 columns = Table(  # of imported tables
@@ -86,20 +92,20 @@ columns = Table(  # of imported tables
     Column("name", String, primary_key=True),
     Column("position", Integer, nullable=False),
     Column("numbers", LargeBinary),  # float64, little-endian
-    Column("texts", JSON),
+    Column("texts", Document),
 )
 
 states = Table(  # of a simulated bench after the last kept pose: clock, world, twins
     "states",
     metadata,
     Column("run", ForeignKey("runs.run"), primary_key=True),
-    Column("state", JSON, nullable=False),
+    Column("state", Document, nullable=False),
 )
 
 events = Table(
     "events",
     metadata,
-    Column("event", Integer, primary_key=True),
+    Column("event", Counter, primary_key=True),
     Column("run", ForeignKey("runs.run"), nullable=False),
     Column("at", String, nullable=False),  # ISO 8601, UTC
     Column("what", String, nullable=False),
@@ -110,7 +116,7 @@ events = Table(
 log = Table(  # of what happened in a run, step by step; and of messages on the wires, where they were asked for
     "log",
     metadata,
-    Column("line", Integer, primary_key=True),
+    Column("line", Counter, primary_key=True),
     Column("run", ForeignKey("runs.run"), nullable=False),
     Column("at", String, nullable=False),  # ISO 8601, UTC
     Column("clock_s", Float, nullable=False),  # of the rig: simulated time on a simulated bench
@@ -118,6 +124,16 @@ log = Table(  # of what happened in a run, step by step; and of messages on the 
     Column("what", String, nullable=False),  # doing, kept, read, sent, heard, error, ...
     Column("text", String, nullable=False),
     Index("log_of_run", "run"),
+)
+
+arrivals = Table(  # of runs that rigs push into the lab's record; those that are not whole yet are not shown
+    "arrivals",
+    metadata,
+    Column("uid", String, primary_key=True),  # of the run
+    Column("run", ForeignKey("runs.run"), nullable=False, unique=True),  # its name here
+    Column("at", String, nullable=False),  # ISO 8601, UTC
+    Column("head", String),  # digest of what can change of a finished run; NULL while it is on its way
+    Column("digest", String),  # SHA-256 of all that is here of it, computed here when it was whole
 )
 
 # What brings an older file to the next version. Tables that are wholly new are made before.
@@ -130,4 +146,5 @@ MIGRATIONS = {
     ),
     4: (),  # a new table
     5: (),  # a new table
+    6: ("ALTER TABLE runs ADD COLUMN uid VARCHAR NOT NULL DEFAULT ''",),  # and a new table
 }

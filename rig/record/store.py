@@ -6,7 +6,9 @@ nothing else.
 
 from __future__ import annotations
 
+import os
 import secrets
+import uuid
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -17,20 +19,20 @@ from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from sqlalchemy import Connection, Integer, Row, Select, func, insert, select, text, update
+from sqlalchemy import URL, Connection, Engine, Integer, Row, Select, exists, func, insert, select, update
 from sqlalchemy import Table as SqlTable
-from sqlalchemy.dialects.sqlite import insert as insert_or
 from sqlalchemy.exc import DatabaseError
 
 from calibrations.table import Table
 from procedures.session import Dwell, Pose, Reading
 from rig.errors import RecordError, UnknownRun
-from rig.home import home
+from rig.home import RECORD, home
 from rig.lease import is_held
 from rig.nearest import did_you_mean
 from rig.record import codec
+from rig.record.dialects import insert_or, newest_first
 from rig.record.file import RECOVER, open_file
-from rig.record.schema import blocks, columns, dwells, events, log, poses, readings, runs, states
+from rig.record.schema import arrivals, blocks, columns, dwells, events, log, poses, readings, runs, states
 from rig.record.values import Block, Event, Kept, Line, Run
 
 FILE = "record.db"
@@ -40,23 +42,38 @@ _BESIDE = ("t_s", "temperature_c", "alpha_read_deg", "beta_read_deg")
 
 
 class Record:
-    """The runs in `folder` (default: the application's own). A context manager.
+    """The runs in the folder `place` (default: the application's own), or on the server that it names.
 
-    Raises RecordError where the file cannot be opened, is damaged, or was written by a newer program.
+    A context manager. Raises RecordError where the file cannot be opened, is damaged, or was written by a newer
+    program; LabAway for a server that cannot be reached.
     """
 
-    def __init__(self, folder: Path | None = None) -> None:
-        self.folder = folder or home()
+    def __init__(self, place: Path | URL | None = None) -> None:
+        self.folder = home() if isinstance(place, URL) else place or home()  # of the locks, too
         self.path = self.folder / FILE
-        self._engine = open_file(self.path)
+        self.where, self._engine = _opened(place) if isinstance(place, URL) else (str(self.path), open_file(self.path))
         self._lines: list[dict[str, Any]] = []  # of the log, on their way into the file
 
     @classmethod
-    def to_find(cls, run: str) -> Self:
-        """The application's own record, to look for a run in, which makes none. Raises UnknownRun."""
-        if not (home() / FILE).is_file():
+    def to_read(cls) -> Self:
+        """The lab's record where it is the one to be read (`--record URL`, RIG_RECORD), else the application's own."""
+        if not (url := os.environ.get(RECORD)):
+            return cls()
+        from rig.record.lab_url import lab_url  # a rig without a lab needs no driver
+
+        return cls(lab_url(url, RECORD))
+
+    @classmethod
+    def to_find(cls, run: str, own: bool = False) -> Self:
+        """The record to read, or the application's `own`, to look for a run in, which makes none. Raises UnknownRun."""
+        if not (home() / FILE).is_file() and (own or not cls.is_there()):
             raise UnknownRun(f"no run {run!r}: nothing is recorded yet in {home()}")
-        return cls()
+        return cls() if own else cls.to_read()
+
+    @staticmethod
+    def is_there() -> bool:
+        """Whether the record to read has been made; a server's is asked for when it is opened."""
+        return bool(os.environ.get(RECORD)) or (home() / FILE).is_file()
 
     def __enter__(self) -> Self:
         return self
@@ -65,6 +82,11 @@ class Record:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+    @property
+    def engine(self) -> Engine:
+        """The database, for whoever copies whole runs."""
+        return self._engine
 
     def close(self) -> None:
         self._engine.dispose()
@@ -110,14 +132,14 @@ class Record:
         """Readings and the simulated bench's `state`, in one transaction; a name that is there is replaced."""
         with self._engine.begin() as to:
             for reading in read:
-                _put(to, readings, {"run": run, "at": _now(), **vars(reading)}, ("run", "name"))
+                _put(to, readings, {"run": run, "at": now(), **vars(reading)}, ("run", "name"))
             if state is not None:
                 _put_state(to, run, state)
             self._put_lines(to)
 
     def log(self, run: str, clock_s: float, who: str, what: str, text: str) -> None:
         """A line of a run's log. It is on the disk with what is kept next, or when MOST_LINES wait for that."""
-        line = {"run": run, "at": _now(), "clock_s": clock_s, "who": who, "what": what, "text": text}
+        line = {"run": run, "at": now(), "clock_s": clock_s, "who": who, "what": what, "text": text}
         self._lines.append(line)
         if len(self._lines) >= MOST_LINES:
             with self._engine.begin() as to:
@@ -133,7 +155,7 @@ class Record:
             if not to.execute(update(poses).where(chosen).values(excluded=reason)).rowcount:
                 raise RecordError(f"run {run} has no pose {number}; `rig show {run} --poses` lists those that it has")
             what = f"pose {number} {'included' if reason is None else 'excluded'}"
-            to.execute(insert(events), {"run": run, "at": _now(), "what": what, "text": reason or "again"})
+            to.execute(insert(events), {"run": run, "at": now(), "what": what, "text": reason or "again"})
 
     def keep_state(self, run: str, state: Mapping[str, Any]) -> None:
         """The simulated bench's state before the first pose."""
@@ -144,7 +166,7 @@ class Record:
         self, run: str, state: str, message: str | None = None, results: Mapping[str, Any] | None = None
     ) -> None:
         """running, complete, stopped or failed; the last three end the run."""
-        ended = None if state == "running" else _now()
+        ended = None if state == "running" else now()
         values = {"state": state, "message": message, "ended": ended, "results": dict(results or {})}
         with self._engine.begin() as to:
             to.execute(update(runs).where(runs.c.run == run).values(values))
@@ -158,7 +180,7 @@ class Record:
     def note(self, run: str, what: str, text: str) -> None:
         """Something that happened in a run."""
         with self._engine.begin() as to:
-            to.execute(insert(events), {"run": run, "at": _now(), "what": what, "text": text})
+            to.execute(insert(events), {"run": run, "at": now(), "what": what, "text": text})
 
     def add_table(self, table: Table, settings: Mapping[str, Any] | None = None) -> str:
         """An imported table as a run of its own, with how it was taken from its file; its id."""
@@ -170,7 +192,7 @@ class Record:
             *({"name": name, "texts": list(column)} for name, column in table.labels.items()),
         ]
         with self._engine.begin() as to:
-            run = _new_run(to, values | {"ended": _now()})
+            run = _new_run(to, values | {"ended": now()})
             for position, cell in enumerate(cells):
                 to.execute(insert(columns), {**cell, "run": run, "position": position})
         return run
@@ -180,7 +202,7 @@ class Record:
     def runs(self) -> list[Run]:
         """Every run, newest first."""
         with self._reading() as at:
-            rows = at.execute(_select_runs().order_by(text("runs.rowid DESC")))
+            rows = at.execute(_select_runs().order_by(newest_first(at)))
             return [self._seen(Run(**row._mapping)) for row in rows]
 
     def run(self, run: str) -> Run:
@@ -190,7 +212,7 @@ class Record:
             if row is not None:
                 return self._seen(Run(**row._mapping))
             known = at.execute(select(runs.c.run)).scalars().all()
-        raise UnknownRun(f"no run {run!r} in {self.path}.{did_you_mean(run, known[-20:])}")
+        raise UnknownRun(f"no run {run!r} in {self.where}.{did_you_mean(run, known[-20:])}")
 
     def poses(self, run: str) -> list[Pose]:
         """The kept poses, in their order, without those that were excluded."""
@@ -280,7 +302,7 @@ class Record:
                 yield at
         except (ValueError, TypeError, LookupError, OverflowError, DatabaseError) as error:
             what = f"{type(error).__name__}: {error}".partition("\n")[0]
-            raise RecordError(f"{self.path}: the record is damaged; {RECOVER} ({what})") from None
+            raise RecordError(f"{self.where}: the record is damaged; {RECOVER} ({what})") from None
 
     def _put_lines(self, to: Connection) -> None:
         """Lines of the log that wait are written; where that fails they are not tried again."""
@@ -295,7 +317,15 @@ class Record:
         return replace(run, state="stopped", message="its process was killed")
 
 
-def _now() -> str:
+def _opened(url: URL) -> tuple[str, Engine]:
+    from rig.record.lab_url import shown
+    from rig.record.server import open_server
+
+    return shown(url), open_server(url)
+
+
+def now() -> str:
+    """ISO 8601, UTC."""
     return datetime.now(UTC).isoformat(timespec="milliseconds")
 
 
@@ -303,8 +333,8 @@ def _new_run(to: Connection, values: Mapping[str, Any]) -> str:
     """Its id sorts by time and reads well: 20261121-093012-sweep-a1b."""
     while True:
         run = f"{datetime.now(UTC):%Y%m%d-%H%M%S}-{values['procedure']}-{secrets.token_hex(2)[:3]}"
-        row = {"results": {}, "identities": {}, **values, "run": run, "created": _now()}
-        if to.execute(insert_or(runs).values(row).on_conflict_do_nothing()).rowcount:
+        row = {"results": {}, "identities": {}, **values, "run": run, "created": now(), "uid": uuid.uuid4().hex}
+        if to.execute(insert_or(to, runs).values(row).on_conflict_do_nothing()).rowcount:
             return run  # else another of the same second has it: draw again
 
 
@@ -314,13 +344,14 @@ def _put_state(to: Connection, run: str, state: Mapping[str, Any]) -> None:
 
 def _put(to: Connection, table: SqlTable, values: Mapping[str, Any], key: Sequence[str]) -> None:
     """Insert a row, or replace the one of the same key."""
-    to.execute(insert_or(table).values(values).on_conflict_do_update(index_elements=list(key), set_=dict(values)))
+    to.execute(insert_or(to, table).values(values).on_conflict_do_update(index_elements=list(key), set_=dict(values)))
 
 
 def _select_runs() -> Select[Any]:
     kept = select(func.count()).where(poses.c.run == runs.c.run).scalar_subquery()
     imported = select(func.max(func.length(columns.c.numbers, type_=Integer) // 8)).where(columns.c.run == runs.c.run)
-    return select(runs, func.coalesce(imported.scalar_subquery(), kept).label("rows"))
+    on_its_way = exists().where(arrivals.c.run == runs.c.run, arrivals.c.digest.is_(None))
+    return select(runs, func.coalesce(imported.scalar_subquery(), kept).label("rows")).where(~on_its_way)
 
 
 def _dwell(row: Row[Any]) -> Dwell:

@@ -16,7 +16,8 @@ from procedures.session import Dwell, Pose, Samples
 class Run:
     """One run. `state`: running, complete, stopped or failed; `created` and `ended` are ISO 8601, UTC.
 
-    `rows`: kept poses, or the rows of an imported table.
+    `rows`: kept poses, or the rows of an imported table. `uid` is the run's own wherever it is copied to; runs of
+    older programs have none.
     """
 
     run: str
@@ -34,6 +35,7 @@ class Run:
     message: str | None
     results: Mapping[str, Any]
     rows: int
+    uid: str = ""
 
     @property
     def extent(self) -> str:

@@ -65,7 +65,7 @@ class SoakWatch:
 
     def begun(self, run: str) -> None:
         """The run begins, or goes on: what the record holds of it is followed first."""
-        with Record.to_find(run) as record:
+        with Record() as record:
             found = record.run(run)
             named = [Measured(record, found, name) for name in sensors_of(found)]
             self.followers = [Follower.of(each) for each in named or [Measured(record, found)]]
@@ -74,7 +74,7 @@ class SoakWatch:
     def kept(self, kept: Kept) -> dict[str, Forecast]:
         """What is known of each quantity by name, where a reversal is complete by this pose."""
         if self.on_s is None:
-            with Record.to_find(self.run) as record:
+            with Record() as record:
                 self.on_s = Measured(record, record.run(self.run)).power_on_s()
         turned = [follower.kept(kept, self.on_s) for follower in self.followers]
         if not any(turned):

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 from rig.home import home
 from rig.record import Record, Run
-from rig.record.store import FILE
 
 if TYPE_CHECKING:
     from rig.analysis.trail import Trail
@@ -50,9 +49,9 @@ class Desk:
 
 def runs() -> list[Run]:
     """Every run, newest first; none where nothing is recorded yet. Raises RecordError."""
-    if not (home() / FILE).is_file():
+    if not Record.is_there():
         return []
-    with Record() as record:
+    with Record.to_read() as record:
         return record.runs()
 
 

@@ -88,7 +88,7 @@ class OneRun:
 
             def keep() -> None:
                 if text := str(note.value or "").strip():
-                    with Record() as record:
+                    with Record.to_read() as record:
                         record.note(self.run.run, "note", text)
                     note.set_value("")
                     self._show_events()
@@ -98,7 +98,7 @@ class OneRun:
         self._show_events()
 
     def _show_events(self) -> None:
-        with Record() as record:
+        with Record.to_read() as record:
             found = record.events(self.run.run)
         self.events.clear()
         with self.events:
