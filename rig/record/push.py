@@ -77,11 +77,8 @@ def push(own: Record, lab: Record, run: str) -> Pushed:
 
 
 def _require_finished(own: Record, run: str) -> None:
-    found = own.run(run)
-    if found.state != FINISHED:
-        raise RecordError(
-            f"run {run} is {found.state}: only complete runs are pushed; `rig resume {run}` goes on with it"
-        )
+    if (state := own.run(run).state) != FINISHED:
+        raise RecordError(f"run {run} is {state}: only complete runs are pushed; `rig resume {run}` goes on with it")
 
 
 def _step(at: Connection, to: Connection, parcel: _Parcel) -> Pushed | None:

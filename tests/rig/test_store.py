@@ -169,6 +169,7 @@ def test_a_record_of_the_first_version_is_brought_up_to_date(tmp_path: Path) -> 
     with closing(sqlite3.connect(tmp_path / "record.db")) as connection:
         for column in ("excluded", "alpha_read_deg", "beta_read_deg", "up", "rate_deg_s"):
             connection.execute(f"ALTER TABLE poses DROP COLUMN {column}")
+        connection.execute("ALTER TABLE runs DROP COLUMN uid")
         connection.executescript("DROP TABLE readings; PRAGMA user_version = 1")
     with Record(tmp_path) as record:
         record.keep_readings(run, [Reading("level-x", 0.02, "deg", 0.001)], None)

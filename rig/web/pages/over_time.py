@@ -74,5 +74,5 @@ class OverTime:
 
 
 def _new(run: str, after: int) -> list[tuple[int, Any]]:
-    with Record() as record:
+    with Record.to_read() as record:
         return record.dwells(run, after)
