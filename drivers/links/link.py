@@ -22,7 +22,7 @@ from drivers.links.url import Url
 
 CONNECT_TIMEOUT_S = 5.0
 DISCARD_S = 1.0
-Tap = Callable[[float, str, Literal["sent", "heard"], bytes], None]  # told of every message: when, on which wire, what
+Tap = Callable[[float, str, Literal["sent", "heard"], bytes], None]  # told of every message: when, on whose wire, what
 LOST = (OSError, termios.error, serial.SerialException)  # what a dead connection raises
 
 
@@ -69,7 +69,7 @@ class Link:
         """`name` is the instrument's, for its errors. Raises LinkRefused when nobody is there."""
         self.url, self.clock = url.text, clock
         self._parsed, self._place = url, f"{name}: {url.text}" if name else url.text
-        self._name, self._tap = name or url.text, tap
+        self.users, self._tap = [name] if name else [], tap  # instruments whose wire it is
         self._closed = False
         self._line: Connected | None = self._opened()
 
@@ -82,7 +82,7 @@ class Link:
             raise self._lost(error) from error
         line.sent += len(data)
         if self._tap:
-            self._tap(self.clock.now(), self._name, "sent", data)
+            self._tap(self.clock.now(), self._names, "sent", data)
 
     def read(self, timeout_s: float) -> bytes:
         """What arrives first, or nothing when `timeout_s` is over. Raises LinkRefused at the end."""
@@ -97,7 +97,7 @@ class Link:
             raise self._lost("the other side closed it")
         line.received += len(data)
         if self._tap:
-            self._tap(self.clock.now(), self._name, "heard", data)
+            self._tap(self.clock.now(), self._names, "heard", data)
         return data
 
     def discard(self, quiet_s: float = 0.0) -> int:
@@ -114,6 +114,10 @@ class Link:
         """For good."""
         self._closed = True
         self._drop()
+
+    @property
+    def _names(self) -> str:
+        return ", ".join(dict.fromkeys(self.users)) or self.url
 
     def _connected(self) -> Connected:
         if self._closed:

@@ -24,7 +24,9 @@ class Links:
         """The Modbus instrument at `address`. Raises LinkRefused when its wire cannot be opened."""
         if address.url not in self._buses:
             self._buses[address.url] = Bus(self.link(address.url))
-        return Unit(self._buses[address.url], address.unit, name)
+        bus = self._buses[address.url]
+        bus.link.users.append(name)
+        return Unit(bus, address.unit, name)
 
     def link(self, url: str, name: str = "") -> Link:
         """A wire of bytes that is not shared; `name` is the instrument's."""

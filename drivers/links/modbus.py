@@ -29,6 +29,14 @@ logging.getLogger("pymodbus").addHandler(logging.NullHandler())  # what it says 
 TIMEOUT_S = 0.5  # for one answer; the slowest instrument needs a tenth of it
 LATE_S = 2 * TIMEOUT_S  # of quiet, after which no answer to an earlier request comes any more
 RETRIES = 2  # after silence, a bad frame or a wrong unit; every request of ours may be repeated
+ON_A_LINE = (  # what to look at after silence, and after noise
+    "that baud rate and parity are the instrument's",
+    "shielding, termination, baud rate and parity of the line",
+)
+ON_A_NETWORK = (
+    "that nothing else has the instrument's address",
+    "that this address and port are the instrument's, and speak Modbus TCP",
+)
 WRITES = (WriteSingleCoilRequest, WriteSingleRegisterRequest, WriteMultipleRegistersRequest)
 REFUSALS = {
     1: ("it does not know the function", "Check that the model of the instrument is the one in the bench file"),
@@ -47,6 +55,7 @@ class Bus:
         self._url = Url.parse(link.url)
         decoder = DecodePDU(is_server=False)
         self._framer = FramerRTU(decoder) if self._url.rtu else FramerSocket(decoder)
+        self._look_at = ON_A_LINE if self._url.rtu else ON_A_NETWORK
         self._transaction = 0
         self._owed = False  # whether answers may still come to what was asked before
 
@@ -91,7 +100,7 @@ class Bus:
         if answer.isError() and answer.function_code & 0x7F == request.function_code:
             raise _refused(what, answer.exception_code)
         if not _fits(request, answer):
-            raise _bad_frame(what, "the answer to another request came")
+            raise self._bad_frame(what, "the answer to another request came")
         return answer
 
     def _receive(self, what: str) -> ModbusPDU:
@@ -106,10 +115,10 @@ class Bus:
             data = data[used:]
         self._owed = self._url.rtu
         if data:
-            raise _bad_frame(what, f"{len(data)} bytes came that are no answer ({data[:16].hex(' ')})")
+            raise self._bad_frame(what, f"{len(data)} bytes came that are no answer ({data[:16].hex(' ')})")
         raise LinkTimeout(
             f"{what}: no answer within {TIMEOUT_S:g} s on {self.link.url}",
-            "Check power, cable and unit id, and that baud rate and parity are the instrument's",
+            f"Check power, cable and unit id, and {self._look_at[0]}",
         )
 
     def _decode(self, data: bytes, what: str) -> tuple[int, ModbusPDU | None]:
@@ -118,10 +127,13 @@ class Bus:
         try:
             used, answer = self._framer.handleFrame(data, 0, expected)
         except ModbusException as error:
-            raise _bad_frame(what, str(error)) from error
+            raise self._bad_frame(what, str(error)) from error
         if self._url.rtu and used and answer is None:
-            raise _bad_frame(what, f"the checksum of {data[:16].hex(' ')} is wrong")
+            raise self._bad_frame(what, f"the checksum of {data[:16].hex(' ')} is wrong")
         return used, answer
+
+    def _bad_frame(self, what: str, why: str) -> LinkError:
+        return BadFrame(f"{what}: {why}", f"Check {self._look_at[1]}")
 
 
 class Unit:
@@ -182,10 +194,6 @@ def _fits(request: ModbusPDU, answer: ModbusPDU) -> bool:
     if isinstance(request, ReadHoldingRegistersRequest):
         return len(answer.registers) == request.count
     return isinstance(request, ReadCoilsRequest) or answer.address == request.address
-
-
-def _bad_frame(what: str, why: str) -> LinkError:
-    return BadFrame(f"{what}: {why}", "Check shielding, termination, baud rate and parity of the line")
 
 
 def _refused(what: str, code: int) -> Refused:

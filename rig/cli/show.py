@@ -19,6 +19,7 @@ from rig.record import Event, Kept, Line, Record, Run
 from rig.record.digest import digest_of
 from rig.record.measured import Measured, sensors_of
 
+TURNS = ("begun", "error", "stopped", "complete")  # of a run's log: its beginnings and its ends
 Ranges = Mapping[str, tuple[float, float]]
 
 
@@ -30,7 +31,9 @@ Ranges = Mapping[str, tuple[float, float]]
 def command(run: str, poses: bool, wants_log: bool, as_json: bool) -> None:
     """Show how RUN was made, how it ended, its results, and the range of each of its columns."""
     with Record.to_find(run) as record:
-        found, events, left_out = record.run(run), record.events(run), record.excluded(run)
+        found, left_out = record.run(run), record.excluded(run)
+        turns = [Event(line.at, line.what, line.text) for line in record.lines(run, TURNS)]
+        events = sorted([*record.events(run), *turns], key=lambda event: event.at)
         ranges = _ranges(record, found)
         listed = [_pose(number, kept) for number, kept in enumerate(record.kept(run))] if poses else None
         lines = record.lines(run) if wants_log else []

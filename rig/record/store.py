@@ -19,7 +19,7 @@ from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from sqlalchemy import URL, Connection, Engine, Integer, Row, Select, exists, func, insert, select, update
+from sqlalchemy import URL, Connection, Engine, Integer, Row, Select, exists, func, insert, select, true, update
 from sqlalchemy import Table as SqlTable
 from sqlalchemy.exc import DatabaseError
 
@@ -280,11 +280,12 @@ class Record:
         with self._reading() as at:
             return [Event(*row) for row in at.execute(query.order_by(events.c.event))]
 
-    def lines(self, run: str) -> list[Line]:
-        """A run's log, in order."""
+    def lines(self, run: str, what: Sequence[str] = ()) -> list[Line]:
+        """A run's log, in order; of `what` only, where it says some."""
         columns = [log.c[name] for name in ("at", "clock_s", "who", "what", "text")]
+        chosen = (log.c.run == run) & (log.c.what.in_(what) if what else true())
         with self._reading() as at:
-            return [Line(*row) for row in at.execute(select(*columns).where(log.c.run == run).order_by(log.c.line))]
+            return [Line(*row) for row in at.execute(select(*columns).where(chosen).order_by(log.c.line))]
 
     def columns(self, run: str) -> tuple[dict[str, NDArray[np.float64]], dict[str, tuple[str, ...]]]:
         """The columns of an imported table: numbers, and texts, by name."""

@@ -163,7 +163,7 @@ def _carry_out(record: Record, rig: Rig, run: Run, procedure: Procedure, watch: 
         error = _told(failure, run)
         log("error", f"{type(error).__name__}: {error}")
         complaints = _stop(rig)
-        log("stopped", "; ".join(complaints) or "all stands still")
+        log("stopped", " ".join(complaints) or "all stands still")
         with suppress(RecordError):  # what has failed may be the record, and that is told already
             for complaint in complaints:
                 record.note(run.run, "not stopped", complaint)

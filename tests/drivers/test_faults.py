@@ -255,6 +255,16 @@ def test_an_answer_on_its_way_is_lost_with_the_connection(afflicted: Callable[..
     assert clock.now() < 1.01
 
 
+@pytest.mark.parametrize("what", ["silence", "garbage"])
+def test_what_to_look_at_depends_on_the_wire(afflicted: Callable[..., Any], what: str) -> None:
+    for name, told in (("labjack_t7", "address"), ("oriental_az", "parity")):
+        instrument, _ = afflicted(name, Fault(what))
+        with pytest.raises(DriverError) as failed:
+            instrument.identify()
+        assert told in str(failed.value)
+        assert told == "parity" or "parity" not in str(failed.value), "a network has none"
+
+
 # Every wait has a bound.
 
 

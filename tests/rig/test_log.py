@@ -33,7 +33,7 @@ def test_a_message_is_shown_as_text_where_it_is_some(data: bytes, text: str) -> 
 
 
 @pytest.mark.sockets
-def test_a_run_tells_what_it_did_what_stopped_it_and_that_it_went_on() -> None:
+def test_a_run_tells_what_it_did_what_stopped_it_and_that_it_went_on(rig: Callable[..., Any]) -> None:
     bench = read_bench()
     with Record() as record:
         broken = afflicted(bench, "alpha", Fault("alarm", at_s=30.0))
@@ -53,6 +53,10 @@ def test_a_run_tells_what_it_did_what_stopped_it_and_that_it_went_on() -> None:
     assert 30.0 <= lines[error].clock_s < 40.0
     assert lines[-1].what == "complete"
     assert {line.who for line in lines} == {"run"}, "messages are logged on request"
+    told = [line[23:] for line in rig("show", run.run).out.splitlines() if line.startswith("  20")]
+    assert [line.partition(":")[0] for line in told if not line.startswith("answer")] == [
+        "begun", "error", "stopped", "begun", "complete"
+    ]  # fmt: skip
 
 
 @pytest.mark.sockets
@@ -65,7 +69,7 @@ def test_every_message_is_logged_on_request_and_shown(rig: Callable[..., Any], b
     assert len(sent) > 100
     assert len(heard) > 100
     assert any(line["text"].startswith("01 10 00 58 00 10 20") for line in sent), "a move, as the manual writes it"
-    assert {line["who"] for line in sent} >= {"level", "positioner"}
+    assert {line["who"] for line in sent} >= {"alpha, beta", "adc", "oven", "level", "positioner"}, "whose wire"
     assert log[0]["clock_s"] < log[-1]["clock_s"]
     shown_log = rig("show", run, "--log").out
     assert "positioner  sent: '*IDN?" in shown_log
