@@ -16,7 +16,7 @@ from calibrations.still.discover import Discovery
 from calibrations.still.documents import mismatch
 from calibrations.still.fit import NoiseFit
 from calibrations.still.held_out import held_out_excess
-from calibrations.still.words import of_record
+from calibrations.still.words import doubt, of_record
 
 VERDICTS = {
     "adequate": "nothing missing",
@@ -70,7 +70,9 @@ def _headline(found: Discovery) -> str:
         return f"Nothing is missing from the noise model {model}."
     doubts = [f"{a} cannot be told from {joined(b, 'or')}" for a, b in found.alternatives.items()]
     text = f"The noise model {model} misses {joined(found.causes)}"
-    return f"{text}; on this record {joined(doubts)}." if doubts else f"{text}."
+    if doubts:
+        return f"{text}; on this record {joined(doubts)}."
+    return f"{text}, and something is left." if found.verdict == "ambiguous" else f"{text}."
 
 
 def _summary(found: Discovery) -> str:
@@ -83,6 +85,8 @@ def _summary(found: Discovery) -> str:
         )
     else:
         text += f"The spectrum differs from the model's by {plain(found.start.pooled_excess)} times what chance leaves."
+    if found.verdict == "ambiguous":
+        return text + doubt(found.reason)
     return f"{text} Left over: {found.residual_structure}." if found.residual_structure else text
 
 
@@ -101,18 +105,22 @@ def _figures(found: Discovery) -> list[tuple[str, str, str]]:
 
 
 def _steps(found: Discovery) -> Iterable[dict[str, str]]:
-    start = found.start
-    yield _step(start.model.name, start, held_out_excess(start.model, start.still), start)
+    """Rows whose gains add up; beside them what the whole loses without each alone."""
+    start, cleaned = found.start, found.cleaned
+    yield _step(start.model.name, start)
+    if cleaned is not None:
+        yield _step("less what no noise is", cleaned, cleaned.log_likelihood - start.log_likelihood)
     for step in found.steps:
-        yield _step(f"+ {step.name}", step.after, step.held_out_after, start)
+        yield _step(f"+ {step.name}", step.after, step.gained, step.alone)
 
 
-def _step(name: str, fit: NoiseFit, unseen: float, start: NoiseFit) -> dict[str, str]:
+def _step(name: str, fit: NoiseFit, gained: float | None = None, alone: float | None = None) -> dict[str, str]:
     return {
         "name": name,
-        "gain": plain(fit.log_likelihood - start.log_likelihood) if fit is not start else "0",
+        "gained": "–" if gained is None else plain(gained),
+        "alone": "–" if alone is None else plain(alone),
         "seen": plain(fit.pooled_excess),
-        "unseen": plain(unseen),
+        "unseen": plain(held_out_excess(fit.model, fit.still)),
         "allan": _off(fit),
     }
 

@@ -7,6 +7,8 @@
     mixtures   every mixture of noise effects beside a model, and which of them is missed least
     patterns   what is no noise process: a step, a drift, a level that changes, a bump of the spectrum, a line
     compare    where a model fails: averaging times and frequencies
+    answer     what a search comes to: verdict, alternatives or reason, next experiment
+    filtered   white noise behind a low-pass that nobody stated
     diagnose   which process it is missing
     discover   the model with all that it was missing
 

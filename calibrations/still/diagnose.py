@@ -1,9 +1,4 @@
-"""Which noise process is a model missing on a still record?
-
-The four answers are those of poses (`calibrations.diagnose`). `effect-missing`: a process, or several, explain what is
-left. `ambiguous`: another one does so as well on this record. `unexplained`: what is left is no mixture of processes
-and lines: a step, a level that changes, a bump of the spectrum.
-"""
+"""Which noise process is a model missing on a still record? The verdicts are those of `answer`."""
 
 from __future__ import annotations
 
@@ -16,12 +11,10 @@ import numpy as np
 from calibrations.effect import Effect, catalogue
 from calibrations.experiment import Experiment
 from calibrations.model import Model
-from calibrations.search.share import MOST_LEFT
+from calibrations.still.answer import alternatives, answer
 from calibrations.still.chance import chance, tube
-from calibrations.still.experiment import separating
 from calibrations.still.fit import NoiseFit, fit
 from calibrations.still.held_out import held_out_excess
-from calibrations.still.left import left
 from calibrations.still.record import Still
 from calibrations.still.search import Search, search
 
@@ -49,17 +42,16 @@ class Diagnosis:
     """The verdict on a model, the candidates behind it, best first, and what is left with the missing ones."""
 
     fit: NoiseFit
+    cleaned: NoiseFit  # the same model on the record less what no noise is: what the candidates are set beside
     verdict: str
     candidates: tuple[Candidate, ...]
     held_out_before: float
+    missing: tuple[str, ...]  # in the order in which each gains most beside those before it
+    alternatives: Mapping[str, tuple[str, ...]]
+    reason: str | None  # why it is not decided, in words
     residual_structure: str | None
     next_experiment: Experiment | None
     search: Search
-
-    @property
-    def missing(self) -> tuple[str, ...]:
-        """All effects that are missed, those that gain most first."""
-        return tuple(self.search.gains)
 
     @cached_property
     def end(self) -> NoiseFit:
@@ -71,40 +63,24 @@ def diagnose(still: Still, model: Model, effects: Mapping[str, Effect] | None = 
     """Fit `model` to the record and find what it misses. Raises ModelError for a model without noise."""
     before = fit(model, still)
     found = search(still, before.model, catalogue() if effects is None else effects)
-    structure = structure_of(found)
-    verdict = _verdict(found, before, structure)
-    shown = _candidates(found, before)
+    told = answer(found, before)
+    cleaned = fit(before.model, found.still) if found.patterns else before
     return Diagnosis(
         fit=before,
-        verdict=verdict,
-        candidates=shown,
-        held_out_before=held_out_excess(model, still),
-        residual_structure=structure if verdict == "unexplained" else None,
-        next_experiment=separating(found) if verdict == "ambiguous" else None,
+        cleaned=cleaned,
+        verdict=told.verdict,
+        candidates=_candidates(found, cleaned, alternatives(found, tuple(found.gains))),
+        held_out_before=held_out_excess(cleaned.model, found.still),
+        missing=told.missing,
+        alternatives=told.alternatives,
+        reason=told.reason,
+        residual_structure=told.structure,
+        next_experiment=told.next_experiment,
         search=found,
     )
 
 
-def structure_of(found: Search) -> str | None:
-    """What no effect of the catalogue is, in words: what was taken off the record, and what its best mixture leaves."""
-    return "; ".join(pattern.text for pattern in found.patterns) or left(found.end)
-
-
-def share_left(before: NoiseFit, end: NoiseFit) -> float:
-    """Of the excess variance, the share that is left."""
-    excess = before.pooled_excess**2 - 1
-    return (end.pooled_excess**2 - 1) / excess if excess > 0 else 1.0
-
-
-def _verdict(found: Search, before: NoiseFit, structure: str | None) -> str:
-    if structure is not None and (found.patterns or not found.gains or share_left(before, found.end) > MOST_LEFT):
-        return "unexplained"
-    if not found.gains:
-        return "adequate"
-    return "ambiguous" if any(found.rivals.values()) else "effect-missing"
-
-
-def _candidates(found: Search, before: NoiseFit) -> tuple[Candidate, ...]:
+def _candidates(found: Search, before: NoiseFit, doubts: Mapping[str, tuple[str, ...]]) -> tuple[Candidate, ...]:
     """Every effect that the model does not hold, each alone on top of it; those that are missed come first."""
     others = [effect for name, effect in found.effects.items() if name not in before.model.effects]
     after = {effect.name: fit(before.model.with_effect(effect), found.still) for effect in others}
@@ -119,7 +95,7 @@ def _candidates(found: Search, before: NoiseFit) -> tuple[Candidate, ...]:
         Candidate(
             effect, after[effect.name], gains[effect.name], _p_value(effect, gains[effect.name], before, len(others)),
             float(probability[k]), held_out_excess(after[effect.name].model, found.still),
-            found.rivals.get(effect.name, ()),
+            doubts.get(effect.name, ()),
         )
         for k, effect in enumerate(others)
     ]  # fmt: skip

@@ -15,6 +15,8 @@ from calibrations.still.compare import Comparison
 from calibrations.still.diagnose import Candidate, Diagnosis
 from calibrations.still.discover import Added, Discovery
 from calibrations.still.fit import NoiseFit
+from calibrations.still.patterns import Pattern
+from calibrations.still.search import Search
 
 Document = dict[str, Any]
 
@@ -62,6 +64,9 @@ def diagnosis_document(result: Diagnosis, model: str) -> Document:
         "model": model,
         "verdict": result.verdict,
         "candidates": [_candidate(c, result) for c in result.candidates],
+        "alternatives": {name: list(names) for name, names in result.alternatives.items()},
+        "reason": result.reason,
+        "disturbances": disturbances(result.search),
         "residual_structure": result.residual_structure,
         "next_experiment": experiment_document(result.next_experiment),
     }
@@ -77,9 +82,33 @@ def discovery_document(result: Discovery, path: str | None) -> Document:
         "causes": list(result.causes),
         "refinements": [],
         "alternatives": {name: list(names) for name, names in result.alternatives.items()},
+        "reason": result.reason,
+        "disturbances": disturbances(result.search),
         "residual_structure": result.residual_structure,
         "next_experiment": experiment_document(result.next_experiment),
         "model": path,
+    }
+
+
+def disturbances(found: Search) -> list[Document]:
+    """What no noise is: what was taken off the record, then odd samples."""
+    odd = [(each.axis, oddity) for each in found.still.channels for oddity in each.oddities]
+    return [
+        *map(_pattern, found.patterns),
+        *({"kind": each.kind, "axis": axis, "text": each.text, "matters": each.matters} for axis, each in odd),
+    ]
+
+
+def _pattern(pattern: Pattern) -> Document:
+    return {
+        "kind": pattern.kind,
+        "axis": pattern.axis,
+        "text": pattern.plain,
+        "matters": True,
+        "column": pattern.cause or None,
+        "value": pattern.size,
+        "std": pattern.std,
+        "cannot_be_told_from": [rival.plain for rival in pattern.rivals],
     }
 
 
@@ -114,7 +143,7 @@ def _candidate(c: Candidate, result: Diagnosis) -> Document:
     return {
         "effect": c.name,
         "axes": list(result.fit.still.axes),
-        "excess_before": result.fit.pooled_excess,
+        "excess_before": result.cleaned.pooled_excess,
         "excess_after": c.after.pooled_excess,
         "held_out_before": result.held_out_before,
         "held_out_after": c.held_out_after,
@@ -135,6 +164,7 @@ def _step(step: Added) -> Document:
         "held_out_after": step.held_out_after,
         "log_likelihood_before": step.before.log_likelihood,
         "log_likelihood_after": step.after.log_likelihood,
+        "log_likelihood_alone": step.alone,
         "allan_mismatch_before": mismatch(step.before),
         "allan_mismatch_after": mismatch(step.after),
     }

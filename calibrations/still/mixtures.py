@@ -66,7 +66,7 @@ class Mixtures:
         """The model with some of the others."""
         effects = tuple(effects)
         channels = self._fitted(effects)
-        gain = 2 * (_likelihood(channels) - _likelihood(self.base))
+        gain = 2 * (likelihood(channels) - likelihood(self.base))
         return Mixture(effects, channels, gain, gain - sum(self.prices[effect.name] for effect in effects))
 
     @cached_property
@@ -89,5 +89,6 @@ class Mixtures:
         return tuple(with_effects(each, (*self.given, *effects)) for each in self.seen)
 
 
-def _likelihood(channels: Iterable[ChannelFit]) -> float:
+def likelihood(channels: Iterable[ChannelFit]) -> float:
+    """Logarithm, of all channels together."""
     return sum(each.log_likelihood for each in channels)

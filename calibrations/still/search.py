@@ -8,7 +8,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -20,8 +20,8 @@ from calibrations.noise_analysis.octaves import Curve, octaves
 from calibrations.search.candidates import NOT_TOLD_APART
 from calibrations.still.bands import Lines
 from calibrations.still.channel_fit import ChannelFit
-from calibrations.still.fit import NoiseFit, fitted, lines_of, most_lines, noise_terms, seen, tried
-from calibrations.still.mixtures import Mixture, Mixtures
+from calibrations.still.fit import NoiseFit, fit, fitted, lines_of, most_lines, noise_terms, seen, tried
+from calibrations.still.mixtures import Mixture, Mixtures, likelihood
 from calibrations.still.patterns import Pattern, pattern_of, refitted
 from calibrations.still.record import Channel, Still
 
@@ -53,11 +53,34 @@ class Search:
 
     @cached_property
     def gains(self) -> dict[str, float]:
-        """The effects that are missed, and what each gains beside the others; those that gain most first."""
-        gains = {name: self.mixtures.lost_without(self.mixture, name) for name in self.mixture.names}
+        """The effects that are missed, and twice the log-likelihood that the whole loses without each.
+
+        In the order in which each gains most beside those before it: so the error falls at once where it can.
+        """
+        each = {name: self.mixtures.lost_without(self.mixture, name) for name in self.mixture.names}
         if self.liner is not None:
-            gains[self.liner.name] = sum((line.amplitude / line.std) ** 2 for lines in self.lines for line in lines)
-        return dict(sorted(gains.items(), key=lambda item: -item[1]))
+            each[self.liner.name] = 2 * (likelihood(self.mixture.channels) - self._without_lines().log_likelihood)
+        return {name: each[name] for name in self._in_order(each)}
+
+    def _without_lines(self) -> NoiseFit:
+        """The best mixture fitted to the record with its lines in it."""
+        model = self.model
+        for name in self.mixture.names:
+            model = model.with_effect(self.effects[name])
+        return fit(model, self.still)
+
+    def _in_order(self, each: Mapping[str, float]) -> Iterator[str]:
+        """Lines stand by themselves, and gain the same wherever they are added."""
+        left, level = list(each), 0.0
+        present: list[Effect] = []
+        while left:
+            rest = [effect for effect in self.mixture.effects if effect.name in left]
+            tried = {effect.name: self.mixtures.of([*present, effect]).gain - level for effect in rest}
+            best = max(left, key=lambda name: tried.get(name, each[name]))
+            yield best
+            left.remove(best)
+            present += [effect for effect in rest if effect.name == best]
+            level += tried.get(best, 0.0)
 
     @cached_property
     def rivals(self) -> dict[str, tuple[str, ...]]:

@@ -16,17 +16,17 @@ def of_record(still: Still) -> str:
 
 
 def headline(result: Diagnosis) -> str:
-    """The verdict of a diagnosis in a sentence."""
+    """The verdict of a diagnosis in a sentence or two."""
     if result.verdict == "adequate":
         return "nothing is missing; what is left is chance."
-    if result.verdict == "unexplained":
-        return f"no mixture of noise explains this. Left over: {result.residual_structure}."
-    first, *more = result.missing
+    first, *more = result.missing or ("",)
     also = f" With it, {' and '.join(more)} {'is' if len(more) == 1 else 'are'} missing as well." if more else ""
-    rivals = {
-        name: c.indistinguishable_from for c in result.candidates for name in [c.name] if c.indistinguishable_from
-    }
-    doubts = [f"{name} cannot be told from {' or '.join(names)}" for name, names in rivals.items()]
-    if result.verdict == "ambiguous":
-        return f"noise is missing: {first}; on this record {' and '.join(doubts)}.{also}"
-    return f"noise is missing: {first}.{also}"
+    if result.verdict == "unexplained":
+        beside = f" Beside that, noise is missing: {first}.{also}" if first else ""
+        return f"no mixture of noise explains this. Left over: {result.residual_structure}.{beside}"
+    return f"noise is missing: {first}.{also}{doubt(result.reason)}"
+
+
+def doubt(reason: str | None) -> str:
+    """Why an answer is not decided, as a sentence behind it; nothing where it is."""
+    return f" It is not decided: {reason}." if reason else ""

@@ -76,7 +76,7 @@ def told_add(asked: AskedStill, request: Request, effect: str, out: Path, as_jso
         raise ModelError(f"{effect} is no noise, and a still record shows noise alone; effects of noise: {known}")
     if asked.model.holds(effect):
         raise ModelError(f"{asked.model.name}: {effect} is in the model already")
-    result = add(chosen, asked.model, asked.still, asked.effects)
+    result = with_noise_next(add(chosen, asked.model, asked.still, asked.effects), request.bench_file)
     write_model(result.end, asked.model, out)
     _emit(as_json, lambda: discovery_document(result, str(out)), lambda: added(result, request.data, str(out)))
 

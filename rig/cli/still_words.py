@@ -9,11 +9,16 @@ from calibrations.still.discover import Discovery
 from calibrations.still.documents import mismatch, why
 from calibrations.still.fit import NoiseFit
 from calibrations.still.held_out import held_out_excess
-from calibrations.still.words import headline, of_record
+from calibrations.still.words import doubt, headline, of_record
 from rig.cli.output import columns
 from rig.cli.words import experiment, parameters, quantity
 
 SHOWN = 6
+HEAD = (
+    "model", "log-likelihood gained", "lost without it alone", "mismatch / chance", "on the other half",
+    "mismatch of the Allan deviation",
+)  # fmt: skip
+LOST = 2  # a column that one step alone does not need
 
 
 def compared(result: Comparison, model: str, data: str) -> str:
@@ -38,7 +43,7 @@ def diagnosed(result: Diagnosis, model: str, data: str, bench: str) -> str:
         (
             c.name,
             f"{result.held_out_before:.3g} -> {c.held_out_after:.3g}",
-            f"{c.gain / 2:.4g}",
+            f"{c.gain / 2:.4g}" if c.gain > 1e-6 else "0",
             f"{c.p_value:.1g}",
             f"{c.probability:.3f}",
             ", ".join(c.indistinguishable_from) or "-",
@@ -54,7 +59,7 @@ def diagnosed(result: Diagnosis, model: str, data: str, bench: str) -> str:
         "not told apart from",
     )
     lines += [columns(head, rows), ""] if rows else []
-    if result.missing and result.verdict in ("effect-missing", "ambiguous"):
+    if result.missing:
         best = next(c for c in result.candidates if c.name == result.missing[0])
         lines += [f"{best.name}: {why(best, result)}", "", f"    {best.effect.formula.splitlines()[0]}", ""]
         lines.append(f"Add it: rig add {best.name} --model {model} --data {data} --out model.yaml{bench}")
@@ -66,7 +71,6 @@ def diagnosed(result: Diagnosis, model: str, data: str, bench: str) -> str:
 def discovered(result: Discovery, data: str, out: str | None) -> str:
     """The falling error, the verdict, and the final model."""
     lines = [of_record(result.start.still), "", _falling(result), "", _verdict(result)]
-    lines += [f"This record cannot tell {a} from {' or '.join(b)}." for a, b in result.alternatives.items()]
     lines += experiment(result.next_experiment, data) if result.next_experiment else []
     lines += ["", parameters(result.end.model)]
     return "\n".join([*lines, *(["", f"written to {out}"] if out else [])])
@@ -75,38 +79,41 @@ def discovered(result: Discovery, data: str, out: str | None) -> str:
 def added(result: Discovery, data: str, out: str) -> str:
     """The falling error with one effect added, and whether more is missing."""
     lines = [f"{result.steps[0].name} added to {result.start.model.name}", "", _falling(result), ""]
-    lines += [f"This record cannot tell {a} from {' or '.join(b)}." for a, b in result.alternatives.items()]
     if result.residual_structure:
         lines.append(f"Something is left: {result.residual_structure}.")
         lines.append(f"What else is missing: rig diagnose {data} --model {out}")
     else:
-        lines.append("Nothing more is missing.")
+        lines.append(f"Nothing more is missing.{doubt(result.reason)}")
+    lines += experiment(result.next_experiment, data) if result.next_experiment else []
     return "\n".join([*lines, "", parameters(result.end.model), "", f"written to {out}"])
 
 
 def _verdict(result: Discovery) -> str:
     names = " and ".join(result.causes)
+    missing = f"Missing {'was' if len(result.causes) == 1 else 'were'} {names}."
     if result.verdict == "unexplained":
         beside = f"Beside {names}, there" if names else "There"
         return f"Unexplained. {beside} is something that no mixture of noise is: {result.residual_structure}."
-    if not result.steps:
-        return "Nothing is missing: what is left is chance."
-    left = f" What is left still shows something: {result.residual_structure}." if result.residual_structure else ""
-    return f"Missing {'was' if len(result.causes) == 1 else 'were'} {names}.{left}"
+    return missing + doubt(result.reason) if names else "Nothing is missing: what is left is chance."
 
 
 def _falling(result: Discovery) -> str:
-    first = result.start
-    rows = [_row(first.model.name, first, held_out_excess(first.model, first.still), first)]
-    rows += [_row(f"+ {s.name}", s.after, s.held_out_after, first) for s in result.steps]
-    head = ("model", "log-likelihood", "mismatch / chance", "on the other half", "mismatch of the Allan deviation")
-    return columns(head, rows)
+    first, cleaned = result.start, result.cleaned
+    rows = [_row(first.model.name, first)]
+    if cleaned is not None:
+        rows.append(_row("less what no noise is", cleaned, cleaned.log_likelihood - first.log_likelihood))
+    several = len(result.steps) > 1
+    rows += [_row(f"+ {s.name}", s.after, s.gained, s.alone if several else None) for s in result.steps]
+    chosen = [k for k in range(len(HEAD)) if k != LOST or several]
+    return columns([HEAD[k] for k in chosen], [[row[k] for k in chosen] for row in rows])
 
 
-def _row(name: str, found: NoiseFit, unseen: float, first: NoiseFit) -> tuple[str, ...]:
-    gained = found.log_likelihood - first.log_likelihood
+def _row(name: str, found: NoiseFit, gained: float | None = None, lost: float | None = None) -> tuple[str, ...]:
+    """In the order of HEAD. What is gained depends on what is above, and adds up; what is lost does not."""
     off = ", ".join(f"{100 * value:.3g} %" for value in mismatch(found).values())
-    return name, f"{gained:+.5g}" if gained else "0", f"{found.pooled_excess:.2f}", f"{unseen:.2f}", off
+    unseen = held_out_excess(found.model, found.still)
+    shown = ["" if value is None else f"{value:+.5g}" for value in (gained, None if lost is None else -lost)]
+    return name, *shown, f"{found.pooled_excess:.2f}", f"{unseen:.2f}", off
 
 
 def _errors(found: NoiseFit) -> str:

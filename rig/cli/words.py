@@ -110,7 +110,7 @@ def _rivals(result: Discovery) -> list[str]:
 
 def experiment(e: Experiment, data: str) -> list[str]:
     """Why the next experiment can tell, its command line, what it takes, and what it is expected to bring."""
-    lines = [f"To tell them apart: {e.why}."]
+    lines = [f"{'To tell them apart' if e.separates else 'What to do next'}: {e.why}."]
     if e.command:
         takes = [duration(e.duration_s)] if e.duration_s else []
         lines += [f"    {e.command}", f"    {', '.join([*takes, _brings(e.expected, data)])}"]
