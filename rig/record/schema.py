@@ -9,7 +9,7 @@ from sqlalchemy import Column, Float, ForeignKey, Index, Integer, LargeBinary, M
 
 from rig.record.dialects import Counter, Document
 
-SCHEMA = 7
+SCHEMA = 8
 metadata = MetaData()
 
 runs = Table(
@@ -136,6 +136,16 @@ arrivals = Table(  # of runs that rigs push into the lab's record; those that ar
     Column("digest", String),  # SHA-256 of all that is here of it, computed here when it was whole
 )
 
+answers = Table(  # about one sensor of a fleet, so that the same question is not worked out again
+    "answers",
+    metadata,
+    Column("key", String, primary_key=True),  # digest of the data, the question and the program
+    Column("sensor", String, nullable=False),
+    Column("data", String, nullable=False),  # a file or a run
+    Column("at", String, nullable=False),  # ISO 8601, UTC
+    Column("answer", Document, nullable=False),
+)
+
 # What brings an older file to the next version. Tables that are wholly new are made before.
 MIGRATIONS = {
     1: ("ALTER TABLE poses ADD COLUMN excluded VARCHAR",),
@@ -147,4 +157,5 @@ MIGRATIONS = {
     4: (),  # a new table
     5: (),  # a new table
     6: ("ALTER TABLE runs ADD COLUMN uid VARCHAR NOT NULL DEFAULT ''",),  # and a new table
+    7: (),  # a new table
 }
