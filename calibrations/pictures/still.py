@@ -2,24 +2,38 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from scipy.special import chdtri
 
 from calibrations.noise_analysis.freedom import COVERAGE
 from calibrations.pictures.album import Picture
 from calibrations.pictures.noise import COLOURS, mark_powers, root
 from calibrations.pictures.style import BAND, INK, QUIET, VERMILION, panels, styled
+from calibrations.pictures.waterfall import Level
 from calibrations.still.allan import deviation, parts
 from calibrations.still.channel_fit import ChannelFit
-from calibrations.still.discover import Discovery
+from calibrations.still.discover import Added, Discovery
+from calibrations.still.documents import mismatch
 from calibrations.still.fit import NoiseFit
+from calibrations.still.held_out import held_out_excess
 
 POINTS = 200
 ROOM = 4.0  # above and below a spectrum
 HEIGHT = 3.6
 OTHER = "#7b5ea7"  # of effects that are not in the catalogue
+
+
+def levels(start: NoiseFit, steps: Sequence[Added]) -> list[Level]:
+    """The falling error of a noise model: the mismatch of its spectrum, and beside it that of its Allan deviation."""
+    first = Level(start.model.name, start.pooled_excess, held_out_excess(start.model, start.still), _off(start))
+    return [first, *(Level(f"+ {s.name}", s.after.pooled_excess, s.held_out_after, _off(s.after)) for s in steps)]
+
+
+def _off(found: NoiseFit) -> str:
+    return " and ".join(f"{100 * value:.2g} %" for value in mismatch(found).values())
 
 
 def still_album(found: Discovery, given: NoiseFit) -> list[Picture]:
@@ -67,12 +81,11 @@ def allan(end: NoiseFit, given: NoiseFit) -> Figure:
 def density(end: NoiseFit, given: NoiseFit) -> Figure:
     """Measured and expected one-sided amplitude densities, a panel for each axis."""
     figure, axes = panels(1, len(end.channels), HEIGHT, sharex=True, sharey=True)
-    tail = (1 - COVERAGE) / 2
     for ax, after, before in zip(axes[0], end.channels, given.channels, strict=True):
         order = np.argsort(after.frequency_hz)
-        f, nu, expected = after.frequency_hz[order], after.freedom[order], after.expected[order]
-        low, high = (root(expected * chdtri(nu, p) / nu) for p in (1 - tail, tail))
-        ax.fill_between(f, low, high, color=BAND, lw=0)
+        f, expected = after.frequency_hz[order], after.expected[order]
+        low, high = after.interval(COVERAGE)
+        ax.fill_between(f, root(low[order]), root(high[order]), color=BAND, lw=0)
         ax.plot(f, root(after.seen[order]), "o", color=INK, ms=2.0, label="measured")
         there = np.argsort(before.frequency_hz)
         ax.plot(

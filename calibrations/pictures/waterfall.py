@@ -25,7 +25,9 @@ MOST_LEVEL = 7  # names beside each other; more are written aslant
 
 @dataclass(frozen=True)
 class Level:
-    """The error at one point of the way, in multiples of the noise floor, and its rms, such as "3.8 mg"."""
+    """The error at one point of the way, in multiples of the noise floor (of noise: of chance), and what it is
+    otherwise, such as "3.8 mg".
+    """
 
     name: str
     seen: float

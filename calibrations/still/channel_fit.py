@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.special import digamma
+from scipy.special import chdtri, digamma
 
 from calibrations.effect import Effect
 from calibrations.noise_analysis.bands import Bands
@@ -56,6 +56,11 @@ class ChannelFit:
         """The model's density."""
         total = sum((self.part_of(effect) for effect in self.effects), np.zeros(len(self.seen)))
         return np.asarray(np.maximum(total, LEAST * self.seen.max()))
+
+    def interval(self, coverage: float) -> tuple[Array, Array]:
+        """(lowest, highest) density: between them the model expects this part of what is seen."""
+        low, high = (chdtri(self.freedom, (1 + side * coverage) / 2) for side in (1, -1))
+        return self.expected * low / self.freedom, self.expected * high / self.freedom
 
     def level(self, frequency_hz: Array) -> Array:
         """The model's density of the means, read off between the bands."""

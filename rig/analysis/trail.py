@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 from calibrations.compare import Comparison, compare
 from calibrations.diagnose import Diagnosis, diagnose
@@ -18,6 +17,7 @@ from calibrations.search.outliers import fit_without
 from calibrations.table import Table
 from rig.analysis.asked import asked
 from rig.analysis.request import Request
+from rig.planning.foresight import with_next
 
 
 @dataclass(frozen=True)
@@ -27,6 +27,7 @@ class Trail:
     `notes` is what a person should know of the data; `effects` are those that may be added.
     """
 
+    request: Request
     model: Model
     table: Table
     effects: Mapping[str, Effect]
@@ -38,6 +39,11 @@ class Trail:
     def end(self) -> Fit:
         """The fit of the model as it is now."""
         return self.steps[-1].after if self.steps else self.start
+
+    @property
+    def unit(self) -> str:
+        """Of the outputs."""
+        return self.table.unit
 
     def tried(self, effect: Effect) -> Added:
         """The present model with one effect more, all fitted. Raises ModelError where that says nothing new."""
@@ -73,14 +79,17 @@ class Trail:
         """What the present model misses."""
         return diagnose(self.table, self.end.model if self.steps else self.model, self.effects)
 
+    def with_next(self, result: Diagnosis, tell: Callable[[str], None]) -> Diagnosis:
+        """The diagnosis with its next experiment planned on the bench; `tell` hears where that is another bench."""
+        return with_next(result, self.request.data, self.effects, self.request.bench_file, tell)
 
-def trail(data: str, model: str | None, bench_file: Path | None) -> Trail:
-    """The beginning: `data` (a file or a run) and a model by name or file. Raises what `asked` and `fit` raise."""
+
+def trail(request: Request) -> Trail:
+    """The beginning: data (a file or a run) and a model by name or file. Raises what `asked` and `fit` raise."""
     notes: list[str] = []
-    tell: Callable[[str], None] = notes.append
-    table, start, effects = asked(Request(data, model, bench_file), tell)
+    table, start, effects = asked(request, notes.append)
     found, _ = fit_without(start, table)
-    return Trail(start, table, effects, tuple(notes), found)
+    return Trail(request, start, table, effects, tuple(notes), found)
 
 
 def require_new(found: Fit, name: str, model: str) -> None:

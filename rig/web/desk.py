@@ -12,6 +12,9 @@ from rig.record import Record, Run
 
 if TYPE_CHECKING:
     from rig.analysis.trail import Trail
+    from rig.analysis.trail_still import StillTrail
+
+    AnyTrail = Trail | StillTrail
 
 MOST_OPEN = 6  # trails that are kept: each holds its data
 MODELS = "models"  # the folder in the home where the workbench saves models
@@ -24,17 +27,20 @@ class Desk:
 
     bench_file: Path | None
     dark: bool | None = None
-    trails: OrderedDict[tuple[str, str], Trail] = field(default_factory=OrderedDict)
+    trails: OrderedDict[tuple[str, str], AnyTrail] = field(default_factory=OrderedDict)
 
-    def open(self, data: str, model: str) -> Trail:
+    def open(self, data: str, model: str) -> AnyTrail:
         """The trail that lies open, or a new one; `model` "" is the one by default. Raises what `trail` raises."""
+        from rig.analysis.request import Request
         from rig.analysis.trail import trail
+        from rig.analysis.trail_still import still_trail
 
-        found = self.trails.get((data, model)) or trail(data, model or None, self.bench_file)
+        request = Request(data, model or None, self.bench_file)
+        found = self.trails.get((data, model)) or still_trail(request) or trail(request)
         self.keep(data, model, found)
         return found
 
-    def keep(self, data: str, model: str, trail: Trail) -> None:
+    def keep(self, data: str, model: str, trail: AnyTrail) -> None:
         """How far the model has grown."""
         self.trails[data, model] = trail
         self.trails.move_to_end((data, model))

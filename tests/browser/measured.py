@@ -41,6 +41,15 @@ def hundred_thousand(folder: Path) -> str:
     return _written(folder, "log", rows)
 
 
+def wandering(folder: Path) -> str:
+    """A still record of 20,000 samples at 10 Hz: white noise, and a walk that its data sheet does not name."""
+    rng = np.random.default_rng(2)
+    volts = 2.5 + 1e-3 * rng.standard_normal(20_000) + 2e-5 * np.cumsum(rng.standard_normal(20_000))
+    table = Table.from_columns("still", {"vx_v": volts}, {"sample_rate_hz": 10.0}, "wandering")
+    write_csv(table, path := folder / "wandering.csv")
+    return str(path)
+
+
 def _written(folder: Path, name: str, columns: dict[str, Array]) -> str:
     path = folder / f"{name}.csv"
     write_csv(Table.from_columns("poses", columns, CONSTANTS, name), path)

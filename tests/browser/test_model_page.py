@@ -11,7 +11,7 @@ from playwright.sync_api import Page, expect
 
 from calibrations.model_file import read_model
 from tests.browser.conftest import Workbench
-from tests.browser.measured import hidden, hundred_thousand, thousand, unexplained
+from tests.browser.measured import hidden, hundred_thousand, thousand, unexplained, wandering
 
 DOTS = "[aria-label='What the model leaves'] .points path"
 ALIVE_MS = 5000  # on a busy machine; else a tenth of that
@@ -77,6 +77,27 @@ def test_an_effect_of_ones_own_with_a_mistake_and_then_right(workbench: Workbenc
     add.click()
     expect(page.locator(BARS)).to_have_count(2)
     expect(page.get_by_role("button", name="Undo my-worm")).to_be_enabled()
+
+
+def test_of_a_still_record_the_allan_deviation_is_shown(workbench: Workbench, tmp_path: Path) -> None:
+    page = looked_at(workbench, wandering(tmp_path), "Noise is missing: rate-random-walk")
+    for picture in ("Allan deviation beside the model", "Spectrum beside the model", "Where it fails"):
+        expect(page.locator(f"[aria-label='{picture}'] .points path").first).to_be_attached()
+    expect(page.get_by_role("button", name="with rate-random-walk")).to_be_visible()  # its curve is drawn
+    expect(page.locator(".card.first")).to_contain_text("× chance")
+    workbench.shot(page, "noise")
+    page.get_by_role("button", name="Add rate-random-walk").click()
+    expect(page.locator(BARS)).to_have_count(2)
+    expect(page.locator(".verdict .headline").first).to_contain_text("Nothing is missing")
+
+
+def test_a_search_is_told_cancelled_and_begun_again(workbench: Workbench, tmp_path: Path) -> None:
+    page = workbench.visit(f"/?data={quote(thousand(tmp_path))}")
+    page.get_by_role("button", name="Cancel").dispatch_event("click")  # at once, while the page still moves
+    expect(page.get_by_text("The search was cancelled.")).to_be_visible()
+    expect(page.locator(".verdict .headline").first).to_have_text("Not diagnosed")
+    page.get_by_role("button", name="Look for what is missing").click()
+    expect(page.locator(".verdict.good, .verdict.bad, .verdict.doubt").first).to_be_visible()
 
 
 def test_selection_units_axes_and_poses(workbench: Workbench, tmp_path: Path) -> None:

@@ -8,13 +8,15 @@ import pytest
 
 from calibrations.errors import ExpressionError, ModelError
 from calibrations.pictures.waterfall import levels
+from rig.analysis.request import Request
 from rig.analysis.trail import Trail, trail
-from tests.browser.measured import hidden
+from rig.analysis.trail_still import still_trail
+from tests.browser.measured import hidden, wandering
 
 
 @pytest.fixture
 def turned(tmp_path: Path) -> Trail:
-    return trail(hidden(tmp_path, "package turned"), None, None)
+    return trail(Request(hidden(tmp_path, "package turned")))
 
 
 def test_an_effect_is_tried_added_and_undone(turned: Trail) -> None:
@@ -44,3 +46,24 @@ def test_an_effect_of_ones_own_is_tried_like_any_other(turned: Trail) -> None:
         turned.written("mine", "a*sin(5*betta)")
     with pytest.raises(ModelError, match="in the catalogue already"):
         turned.written("bias", "a*sin(5*beta)")
+
+
+def test_a_noise_model_grows_as_well(tmp_path: Path) -> None:
+    request = Request(wandering(tmp_path))
+    found = still_trail(request)
+    assert found is not None
+    result = found.diagnosed()
+    assert (result.verdict, result.missing) == ("effect-missing", ("rate-random-walk",))
+    step = found.tried(result.candidates[0].effect)
+    grown = found.with_step(step)
+    assert grown.end.pooled_excess == pytest.approx(1.0, abs=0.15)
+    assert found.compared().fails
+    assert not grown.compared().fails
+    assert grown.diagnosed().verdict == "adequate"
+    assert grown.undone() == found
+    with pytest.raises(ModelError, match="rate-random-walk is in the model already"):
+        grown.tried(result.candidates[0].effect)
+
+
+def test_rows_are_no_still_record(tmp_path: Path) -> None:
+    assert still_trail(Request(hidden(tmp_path, "package turned"))) is None

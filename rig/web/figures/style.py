@@ -49,6 +49,12 @@ def axis(title: str) -> dict[str, Any]:
     return {"title": {"text": title, "standoff": 6, "font": {"size": SIZE}}, **look}
 
 
+def decades() -> dict[str, Any]:
+    """Both axes by powers of ten."""
+    log = {"type": "log", "exponentformat": "power", "dtick": 1, "tickfont": {"size": SIZE - 2}}
+    return {"xaxis": log, "yaxis": log}
+
+
 def merged(base: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
     """`more` laid over `base`, mappings within mappings joined."""
     both = dict(base)

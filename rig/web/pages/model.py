@@ -4,22 +4,29 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
+from typing import TYPE_CHECKING, Any
 from urllib.parse import urlencode
 
 from nicegui import ui
 
-from calibrations.diagnose import Diagnosis
-from calibrations.discover import Added
-from rig.analysis.trail import Trail
-from rig.web.counted import Counted
+from rig.analysis.trail_still import StillTrail
+from rig.web.counted import Cancelled, Counted
 from rig.web.desk import Desk, runs
 from rig.web.frame import Key, frame
 from rig.web.pages.model_choice import Choice
 from rig.web.pages.model_missing import Missing
+from rig.web.pages.model_noise import NoisePictures
+from rig.web.pages.model_page import AnyPictures
 from rig.web.pages.model_pictures import Pictures
 from rig.web.pages.model_verdict import Verdict
+from rig.web.pages.model_words import OfRows, Words, words_of
 from rig.web.parts import box, div, failed, off_loop, state, words
 from rig.web.told import message
+
+if TYPE_CHECKING:
+    from rig.analysis.trail import Trail
+
+    AnyTrail = Trail | StillTrail
 
 
 def register(desk: Desk) -> None:
@@ -35,9 +42,11 @@ class Workbench:
 
     def __init__(self, desk: Desk, data: str, model: str) -> None:
         self.desk, self.data, self.model = desk, data, model
-        self.trail: Trail | None = None
+        self.trail: AnyTrail | None = None
+        self.told: Words = OfRows()
+        self.search = Counted({})
         self.turn = 0  # answers to questions that were asked before the last one are let go
-        self.diagnoses: dict[tuple[str, ...], Diagnosis] = {}
+        self.diagnoses: dict[tuple[str, ...], Any] = {}
 
     def build(self) -> None:
         """The page, laid out; what takes long is asked for as soon as the browser shows it."""
@@ -51,15 +60,22 @@ class Workbench:
                 return
             self.notes = div("stack")
             self.verdict = Verdict()
-            with div("analysis"):
-                self.pictures = Pictures()
-                self.missing = Missing(self)
-        keys["a"] = Key("add the effect that is looked at", self.missing.add_shown)
-        keys["u"] = Key("undo the last effect", self.undo)
-        keys["x"] = Key("the next axis", self.pictures.next_axis)
-        keys["g"] = Key("V, or g", self.pictures.other_unit)
-        keys["Escape"] = Key("select nothing", partial(self.pictures.select, []))
+            self.analysis = div("analysis")
+        self.keys = keys
+        self._lay_out(still=False)
         ui.timer(0.0, self.open, once=True)
+
+    def _lay_out(self, still: bool) -> None:
+        """The places of pictures and candidates, as the kind of data wants them."""
+        self.analysis.clear()
+        with self.analysis:
+            self.pictures: AnyPictures = NoisePictures() if still else Pictures()
+            self.missing = Missing(self, own=not still)
+        self.keys["a"] = Key("add the effect that is looked at", self.missing.add_shown)
+        self.keys["u"] = Key("undo the last effect", self.undo)
+        self.keys["x"] = Key("the next axis", self.pictures.next_axis)
+        self.keys["g"] = Key("V, or g", self.pictures.other_unit)
+        self.keys["Escape"] = Key("select nothing", partial(self.pictures.select, []))
 
     def go(self, data: str, model: str) -> None:
         """Another address: data and model are part of it, so that it can be kept and passed on."""
@@ -76,13 +92,16 @@ class Workbench:
             with self.body:
                 failed(f"{self.data} cannot be looked at with this model", message(error))
             return
+        self.told = words_of(trail)
+        if isinstance(trail, StillTrail):
+            self._lay_out(still=True)
         self.chosen.opened(trail)
         for note in trail.notes:
             with self.notes, box("note"):
                 words(note, "small")
         await self.show(trail)
 
-    async def show(self, trail: Trail) -> None:
+    async def show(self, trail: AnyTrail) -> None:
         """Pictures and error of the model as it is now; then, when it is found, what it misses."""
         self.turn += 1
         turn = self.turn
@@ -91,28 +110,43 @@ class Workbench:
         compared = await off_loop(trail.compared)
         if turn != self.turn:
             return
-        self.pictures.show(compared.fit, trail)
-        self.verdict.error(compared, trail)
+        self.pictures.show(compared, trail)
+        self.verdict.error(self.told, compared, trail)
         self.chosen.grown(trail)
         await self._diagnose(trail, turn)
 
-    async def _diagnose(self, trail: Trail, turn: int) -> None:
+    async def _diagnose(self, trail: AnyTrail, turn: int) -> None:
+        self.search.cancelled = True  # the one before, which nobody waits for any more
         key = tuple(step.name for step in trail.steps)
-        counted = Counted(trail.effects)
         if key not in self.diagnoses:
-            self.missing.wait(counted)
+            self.search = Counted(trail.effects)
+            self.missing.wait(self.search)
             self.verdict.wait("Looking for what is missing")
             try:
-                self.diagnoses[key] = await off_loop(replace(trail, effects=counted).diagnosed)
+                self.diagnoses[key] = await off_loop(replace(trail, effects=self.search).diagnosed)
+            except Cancelled:
+                return
             except Exception as error:
                 if turn == self.turn:
                     self.missing.fail(message(error))
                 return
         if turn == self.turn:
-            self.verdict.found(self.diagnoses[key])
+            self.verdict.found(self.told, self.diagnoses[key])
             await self.missing.show(self.diagnoses[key])
 
-    async def add(self, step: Added) -> None:
+    def cancel(self) -> None:
+        """Wait no longer for what is missing."""
+        self.turn += 1
+        self.search.cancelled = True
+        self.verdict.cancelled()
+        self.missing.cancelled()
+
+    async def again(self) -> None:
+        """Look for what is missing after all."""
+        if self.trail is not None:
+            await self._diagnose(self.trail, self.turn)
+
+    async def add(self, step: Any) -> None:
         """The model gains an effect."""
         if self.trail is not None:
             if (effect := step.after.model.terms[-1].effect).expression:
@@ -138,6 +172,5 @@ def _nothing() -> None:
 
 
 def _newest() -> str:
-    """The newest run that a model can be fitted to; "" where there is none."""
-    kinds = ("poses", "positions", "motion", "rates")
-    return next((run.run for run in runs() if run.kind in kinds and run.rows and not run.bench.get("sensors")), "")
+    """The newest run of one sensor; "" where there is none."""
+    return next((run.run for run in runs() if run.rows and not run.bench.get("sensors")), "")

@@ -15,7 +15,7 @@ from rig.web.parts import box, off_loop, words
 from rig.web.told import message
 
 if TYPE_CHECKING:
-    from rig.analysis.trail import Trail
+    from rig.web.desk import AnyTrail
     from rig.web.pages.model_page import ModelPage
 
 MOST_BYTES = 200_000_000
@@ -53,7 +53,7 @@ class Choice:
         if (data or "", model or "") != (self.page.data, self.page.model):
             self.page.go(data or "", model or "")
 
-    def opened(self, trail: Trail) -> None:
+    def opened(self, trail: AnyTrail) -> None:
         """What lies open has a name, even where the address has none."""
         data = self.page.data
         self.data.set_options({**_data(data)}, value=data)
@@ -62,7 +62,7 @@ class Choice:
         self.save.enable()
         self.report.enable()
 
-    def grown(self, trail: Trail) -> None:
+    def grown(self, trail: AnyTrail) -> None:
         """Undo is there as soon as there is something to undo."""
         self.undo.set_enabled(bool(trail.steps))
         self.undo.set_text(f"Undo {trail.steps[-1].name}" if trail.steps else "Undo")

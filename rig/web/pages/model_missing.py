@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-import re
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from urllib.parse import urlencode
 
 from nicegui import ui
 
-from calibrations.numerals import chance, plain
+from calibrations.numerals import plain
 from calibrations.reports.words import capital, next_takes, next_words
-from calibrations.search.candidates import SIGNIFICANT
 from rig.web.pages.model_own import Own
+from rig.web.pages.model_words import chances, formula
 from rig.web.parts import box, div, facts, failed, off_loop, waiting, words
 from rig.web.told import message
 
 if TYPE_CHECKING:
-    from calibrations.diagnose import Diagnosis
-    from calibrations.discover import Added
-    from calibrations.search.candidates import Candidate
     from rig.web.counted import Counted
     from rig.web.pages.model_page import ModelPage
 
@@ -29,24 +25,44 @@ PROGRESS_S = 0.15
 class Missing:
     """The side of the page on which a person decides."""
 
-    def __init__(self, page: ModelPage) -> None:
+    def __init__(self, page: ModelPage, own: bool) -> None:
         self.page = page
-        self.looked_at: Candidate | None = None
-        self.tried: dict[str, Added] = {}
+        self.looked_at: Any = None
+        self.tried: dict[str, Any] = {}
         with div("side"):
             words("What is missing", "title")
             self.cards = div("stack")
             self.own = Own(page)
+        self.own.box.set_visibility(own)
+
+    @property
+    def unit(self) -> str:
+        """Of the outputs."""
+        return self.page.trail.unit if self.page.trail is not None else ""
 
     def wait(self, counted: Counted) -> None:
         """A search is on its way: how far it is."""
         self.cards.clear()
         self.own.begin()
         with self.cards, box():
-            hint = waiting("fitting")
-            ui.timer(PROGRESS_S, lambda: hint.set_text(counted.told))
+            hint = waiting(counted.told)
+            bar = ui.linear_progress(0.0, show_value=False).props("aria-label='share of the round'")
+
+            def told() -> None:
+                hint.set_text(counted.told)
+                bar.set_value(counted.share)
+
+            ui.timer(PROGRESS_S, told)
+            ui.button("Cancel", icon="close", on_click=self.page.cancel).props("dense flat")
             for _ in range(3):
                 ui.skeleton(height="58px").style("margin-top: 8px")
+
+    def cancelled(self) -> None:
+        """Nobody wanted to wait; an effect of one's own can be tried all the same."""
+        self.cards.clear()
+        with self.cards, box("stack"):
+            words("The search was cancelled.", "quiet")
+            ui.button("Look for what is missing", icon="search", on_click=self.page.again).props("dense outline")
 
     def fail(self, why: str) -> None:
         """The search ended in an error."""
@@ -54,12 +70,12 @@ class Missing:
         with self.cards:
             failed("The search for effects failed", why)
 
-    async def show(self, result: Diagnosis) -> None:
+    async def show(self, result: Any) -> None:
         """The candidates, best first; the best is looked at where there is one to add."""
         self.cards.clear()
         self.tried, self.looked_at = {}, None
-        self.own.begin(result.pattern)
-        missing = result.verdict in ("effect-missing", "ambiguous") and bool(result.path.steps)
+        self.own.begin(getattr(result, "pattern", None))
+        missing = self.page.told.missing(result)
         with self.cards:
             if not missing:
                 self._nothing_to_add(result)
@@ -71,38 +87,35 @@ class Missing:
         if missing and cards:
             await cards[0].open()
 
-    def _nothing_to_add(self, result: Diagnosis) -> None:
+    def _nothing_to_add(self, result: Any) -> None:
         good = result.verdict == "adequate"
         with box("verdict good" if good else "verdict doubt"):
             if good:
                 words("Nothing is missing: save the model, or see below what was tried.")
             elif result.residual_structure:
-                words(f"Unexplained: {result.residual_structure}. What it may be, you can write above; what was tried:")
+                above = " What it may be, you can write above;" if self.own.box.visible else ""
+                words(f"Unexplained: {result.residual_structure}.{above} What was tried:")
             else:
                 words("Nothing shows that an effect is missing; what was tried:")
 
-    def _others(self, result: Diagnosis) -> None:
+    def _others(self, result: Any) -> None:
         rest = result.candidates[FIRST:]
         with ui.expansion(f"{len(rest)} more, less likely").props("dense"):
             for c in rest:
                 Card(self, c, result, best=False)
 
-    async def _next(self, result: Diagnosis) -> None:
+    async def _next(self, result: Any) -> None:
         """The experiment that would tell, planned on the bench."""
-        from rig.bench import read_bench
-        from rig.planning.next_experiment import proposed
-
-        page = self.page
+        page, notes = self.page, list[str]()
         assert page.trail is not None  # noqa: S101 a diagnosis is of a trail
         with box("note"):
             words("Next experiment", "title")
             hint = waiting("Planning it on the bench")
         try:
-            bench = read_bench(page.desk.bench_file)
-            found = await off_loop(proposed, result, page.trail.effects, bench, page.desk.bench_file)
+            found: Any = await off_loop(page.trail.with_next, result, notes.append)
             experiment = found.next_experiment
             assert experiment is not None  # noqa: S101 it had one before
-            hint.set_text(f"{next_words(experiment)} {next_takes(experiment)}")
+            hint.set_text(" ".join([next_words(experiment), next_takes(experiment), *notes]))
             given = {name: _written(value) for name, value in experiment.settings.items()}
             to = f"/run?{urlencode({'procedure': experiment.procedure, **given})}"
             with hint.parent_slot.parent:  # type: ignore[union-attr]
@@ -110,14 +123,14 @@ class Missing:
         except Exception as error:
             hint.set_text(message(error))
 
-    async def look_at(self, c: Candidate) -> None:
+    async def look_at(self, c: Any) -> None:
         """Draw the candidate's curve through the residual."""
         self.looked_at = c
         step = await self.step_of(c)
         if step is not None and self.looked_at is c:
             self.page.pictures.consider(step)
 
-    async def step_of(self, c: Candidate) -> Added | None:
+    async def step_of(self, c: Any) -> Any:
         """The candidate fitted in full; None where that fails, which is told."""
         trail = self.page.trail
         if c.name not in self.tried and trail is not None:
@@ -132,7 +145,7 @@ class Missing:
         if self.looked_at is not None:
             await self.add(self.looked_at)
 
-    async def add(self, c: Candidate) -> None:
+    async def add(self, c: Any) -> None:
         """The model gains this effect."""
         step = await self.step_of(c)
         if step is not None:
@@ -142,7 +155,7 @@ class Missing:
 class Card:
     """One candidate: what it is, what it does to the error, and the button that adds it."""
 
-    def __init__(self, side: Missing, c: Candidate, result: Diagnosis, best: bool) -> None:
+    def __init__(self, side: Missing, c: Any, result: Any, best: bool) -> None:
         self.side, self.c = side, c
         with div("card first" if best else "card"):
             with ui.element("button").classes("head").props("type=button aria-expanded=false") as self.head:
@@ -158,20 +171,18 @@ class Card:
                     ui.button(f"Add {c.name}", icon="add", on_click=lambda: side.add(c)).props("dense unelevated")
                     ui.button("Show its curve", on_click=lambda: side.look_at(c)).props("dense flat")
 
-    def _told(self, result: Diagnosis) -> None:
-        c, unit = self.c, result.fit.table.unit
+    def _told(self, result: Any) -> None:
+        c = self.c
         words(capital(c.effect.summary))
-        words(_formula(c.effect.formula, unit), "formula")
+        words(formula(c.effect.formula, self.side.unit), "formula")
         with div("chance"):
             div("").style(f"width: {100 * c.probability:.1f}%")
         rivals = ", ".join(c.indistinguishable_from)
         facts(
             {
                 "Symptom": capital(c.effect.symptom),
-                "Error, rows of the fit": f"{plain(result.excess_before)} → {plain(c.excess_after)} × the noise floor",
-                "Error, unseen rows": f"{plain(result.held_out_before)} → {plain(c.held_out_after)} × the noise floor",
-                "Probability": f"{_share(c.probability)}; by chance {chance(c.p_value)}"
-                + ("" if c.p_value < SIGNIFICANT else ", which is not significant"),
+                **self.side.page.told.facts(c, result),
+                "Probability": chances(c),
                 "Cannot be told from": rivals or "nothing in the catalogue",
                 "Source": c.effect.source or "–",
             }
@@ -190,19 +201,6 @@ class Card:
             self.head.props("aria-expanded=false")
         else:
             await self.open()
-
-
-def _formula(text: str, unit: str) -> str:
-    """A formula with the table's unit; what stands beside it comes in a line of its own, as a card is narrow."""
-    return re.sub(r" {3,}", "\n", text.replace("{out}", unit)).replace("\n\n", "\n")
-
-
-def _share(probability: float) -> str:
-    """Only approximate: neither certain nor impossible."""
-    for limit, told in ((0.999, "above 99.9 %"), (0.99, "above 99 %")):
-        if probability > limit:
-            return told
-    return "below 0.1 %" if probability < 1e-3 else f"{100 * probability:.2g} %"
 
 
 def _written(value: object) -> str:

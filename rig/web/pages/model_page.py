@@ -1,13 +1,37 @@
-"""What the parts of the page Model ask of the whole: its data, its model, and that the model grows."""
+"""What the parts of the page Model ask of the whole: its data, its model, and that the model grows.
+
+A trail is of rows (`rig.analysis.trail`) or of a still record (`rig.analysis.trail_still`); a part that shows either
+takes what belongs to it (a diagnosis, a candidate, a step) as `Any`, and what is said of it from `Words`.
+"""
 
 from __future__ import annotations
 
-from typing import Protocol
+from collections.abc import Sequence
+from typing import Any, Protocol
 
-from calibrations.discover import Added
 from rig.analysis.trail import Trail
+from rig.analysis.trail_still import StillTrail
 from rig.web.desk import Desk
-from rig.web.pages.model_pictures import Pictures
+from rig.web.pages.model_words import Words
+
+
+class AnyPictures(Protocol):
+    """Pictures of a model beside its data."""
+
+    def show(self, compared: Any, trail: Any) -> None:
+        """A new fit."""
+
+    def consider(self, step: Any) -> None:
+        """Draw what an effect would change; None takes it away."""
+
+    def next_axis(self) -> None:
+        """The next channel."""
+
+    def other_unit(self) -> None:
+        """Another unit, where there is one."""
+
+    def select(self, points: Sequence[Any]) -> None:
+        """Mark these points in all pictures."""
 
 
 class ModelPage(Protocol):
@@ -16,14 +40,21 @@ class ModelPage(Protocol):
     desk: Desk
     data: str
     model: str
-    trail: Trail | None
-    pictures: Pictures
+    trail: Trail | StillTrail | None
+    told: Words
+    pictures: AnyPictures
 
     def go(self, data: str, model: str) -> None:
         """To another address: other data, or another model."""
 
-    async def add(self, step: Added) -> None:
+    async def add(self, step: Any) -> None:
         """The model gains an effect."""
 
     async def undo(self) -> None:
         """The last effect is taken back."""
+
+    def cancel(self) -> None:
+        """Wait no longer for what is missing."""
+
+    async def again(self) -> None:
+        """Look for what is missing after all."""

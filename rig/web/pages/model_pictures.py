@@ -9,6 +9,7 @@ from nicegui import events, ui
 
 from calibrations.pictures.candidate import most_telling
 from calibrations.pictures.columns import Column
+from calibrations.pictures.waterfall import levels
 from rig.web.figures.failure import failure
 from rig.web.figures.measurement import measurement
 from rig.web.figures.residual import residual
@@ -18,6 +19,7 @@ from rig.web.figures.waterfall import waterfall
 from rig.web.parts import box, div, words
 
 if TYPE_CHECKING:
+    from calibrations.compare import Comparison
     from calibrations.discover import Added
     from calibrations.fit import Fit
     from rig.analysis.trail import Trail
@@ -77,8 +79,9 @@ class Pictures:
             plot.on("plotly_selected", self._brushed, js_handler=POINTS)
             plot.on("plotly_deselect", lambda: self.select([]), js_handler="() => emit()")
 
-    def show(self, fit: Fit, trail: Trail) -> None:
+    def show(self, compared: Comparison, trail: Trail) -> None:
         """A new fit: what was chosen stays chosen where it can."""
+        fit = compared.fit
         if self.fit is None or self.fit.table.n != fit.table.n:
             self.selected = []
         self.fit, self.trail, self.step = fit, trail, None
@@ -126,13 +129,17 @@ class Pictures:
         """All pictures anew."""
         if self.fit is None or self.trail is None or self.x.value not in self.columns:
             return
-        shown, colour = self.shown, self.columns.get(self.colour.value or "", self.columns[self.x.value])
+        trail, shown, colour = (
+            self.trail,
+            self.shown,
+            self.columns.get(self.colour.value or "", self.columns[self.x.value]),
+        )
         plain = self.columns[self.x.value if self.x.value != FOLLOWED else next(iter(self.columns))]
         drawn: dict[str, Callable[[], Figure]] = {
             "measurement": lambda: measurement(shown, plain, colour),
             "residual": lambda: residual(shown, self.columns[self.x.value], colour, self.step),
             "failure": lambda: failure(shown),
-            "waterfall": lambda: waterfall(self.trail),  # type: ignore[arg-type] # checked above
+            "waterfall": lambda: waterfall(levels(trail)),
         }
         for name, make in drawn.items():
             figure = make()

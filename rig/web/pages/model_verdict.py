@@ -1,21 +1,18 @@
-"""The verdict: one sentence, and the two numbers that it rests on."""
+"""The verdict: one sentence, and the numbers that it rests on."""
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 from nicegui import ui
 
-from calibrations.compare import Comparison
-from calibrations.diagnose import Diagnosis
-from calibrations.numerals import plain
-from calibrations.pictures.view import milli, pooled_mg, rows_of
-from calibrations.reports.verdict import headline
 from calibrations.reports.words import capital
-from calibrations.search.held_out import held_out_excess
-from rig.analysis.trail import Trail
 from rig.web.parts import box, div, words
 
+if TYPE_CHECKING:
+    from rig.web.pages.model_words import Words
+
 LOOKS = {"adequate": "good", "effect-missing": "bad", "ambiguous": "doubt", "unexplained": "doubt"}
-MOST_PLACES = 3
 
 
 class Verdict:
@@ -28,41 +25,40 @@ class Verdict:
                 self.detail = words("", "detail quiet small")
                 with self.detail:
                     self.whole = ui.tooltip("").props("max-width=640px")
-            self.seen, self.unseen, self.floor = (_figure(what) for what in ("error", "on unseen rows", "noise floor"))
+            self.numbers = div("row-of numbers")
 
-    def error(self, compared: Comparison, trail: Trail) -> None:
+    def error(self, told: Words, compared: Any, trail: Any) -> None:
         """How large the error is, and where it is largest: known before anything is diagnosed."""
-        fit = compared.fit
-        (error, floor), unit = pooled_mg(fit), milli(fit)
-        self.seen.set_text(f"{plain(fit.pooled_excess)} × ({plain(error, 2)} {unit})")
-        self.unseen.set_text(f"{plain(held_out_excess(trail.end))} ×")
-        self.floor.set_text(f"{plain(floor, 2)} {unit}")
-        places = "; ".join(place.text for place in compared.fails[:MOST_PLACES])
-        rows = f"{compared.fit.model.name} on {fit.table.n} {rows_of(fit.table)}"
-        self._tell(f"{rows}. Fails at {places}." if places else f"{rows}. No place stands out.")
+        self.numbers.clear()
+        with self.numbers:
+            for what, value in told.numbers(compared, trail).items():
+                with div("figure"):
+                    words(value, "value")
+                    words(what, "quiet small")
+        self._tell(told.detail(compared))
 
     def wait(self, what: str) -> None:
         """The verdict is on its way."""
         self.headline.set_text(f"{what} ...")
         self.box.classes(remove="good bad doubt")
 
-    def found(self, result: Diagnosis) -> None:
+    def found(self, told: Words, result: Any) -> None:
         """The verdict."""
-        text = capital(headline(result)).replace(" x the noise", " × the noise")
-        self.headline.set_text(text)
-        if result.caution:
-            self._tell(f"But {result.caution}. {self.detail.text}")
+        self.headline.set_text(_times(capital(told.verdict(result))))
+        if caution := getattr(result, "caution", None):
+            self._tell(f"But {caution}. {self.detail.text}")
         self.box.classes(remove="good bad doubt", add=LOOKS[result.verdict])
+
+    def cancelled(self) -> None:
+        """Nobody wanted to wait for it."""
+        self.headline.set_text("Not diagnosed")
+        self.box.classes(remove="good bad doubt")
 
     def _tell(self, text: str) -> None:
         """A line; all of it when it is pointed at."""
-        self.detail.set_text(text.replace(" x the noise", " × the noise"))
+        self.detail.set_text(_times(text))
         self.whole.set_text(self.detail.text)
 
 
-def _figure(what: str) -> ui.label:
-    """A number, and under it what it is."""
-    with div("figure"):
-        value = words("...", "value")
-        words(what, "quiet small")
-    return value
+def _times(text: str) -> str:
+    return text.replace(" x the noise", " × the noise").replace(" x that of", " × that of")
