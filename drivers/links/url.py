@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from urllib.parse import parse_qs, urlsplit
 
@@ -9,6 +10,7 @@ from drivers.errors import LinkRefused
 
 SCHEMES = ("tcp", "rtu+tcp", "serial", "pty")
 TCP_LATENCY_S = 150e-6  # one way through a switch and a small embedded stack
+USER = re.compile("//.*@")
 REMEDY = "Write tcp://host:port, rtu+tcp://host:port or serial:/dev/ttyUSB0?baud=115200&parity=E"
 
 
@@ -47,9 +49,11 @@ class Url:
                 int(options.pop("stop", "1")),
             )
         except ValueError as error:
-            raise LinkRefused(f"{text!r} is not the address of a wire ({error})", REMEDY) from error
-        if options or "@" in parts.netloc or not url._complete():
-            raise LinkRefused(f"{text!r} is not the address of a wire", REMEDY)
+            raise LinkRefused(f"{_shown(text)} is not the address of a wire ({error})", REMEDY) from error
+        if "@" in parts.netloc:
+            raise LinkRefused(f"{_shown(text)} has a user, whom no wire asks for", REMEDY)
+        if options or not url._complete():
+            raise LinkRefused(f"{_shown(text)} is not the address of a wire", REMEDY)
         return url
 
     def _complete(self) -> bool:
@@ -74,3 +78,8 @@ class Url:
     def line_s(self, count: int) -> float:
         """How long `count` bytes are under way."""
         return count * self.character_s + self.gap_s if self.rtu else TCP_LATENCY_S
+
+
+def _shown(text: str) -> str:
+    """As it may be printed: who and by which password is left out."""
+    return repr(USER.sub("//***@", text))

@@ -8,6 +8,9 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
+from drivers.errors import LinkRefused
+from drivers.links.person import PERSON
+from drivers.links.url import Url
 from drivers.links.wire_faults import kinds_of
 from drivers.simulation.batch import with_own
 from drivers.simulation.config import WorldConfig
@@ -41,6 +44,7 @@ def _check_instrument(role: str, instrument: Instrument, path: Path) -> None:
         raise BenchError(f"{key}: no such role.{did_you_mean(role, ROLES)}")
     if instrument.driver not in drivers():
         raise BenchError(f"{key}.driver: no driver {instrument.driver!r}.{did_you_mean(instrument.driver, drivers())}")
+    _check_addresses(key, instrument)
     try:
         instrument.typed_settings()
     except ValidationError as error:
@@ -50,6 +54,16 @@ def _check_instrument(role: str, instrument: Instrument, path: Path) -> None:
         names = [field.name for field in dataclasses.fields(kind)]
         raise BenchError(f"{key}.{where}: {fault_of(fault, names)}") from None
     _check_faults(f"{key}.faults", instrument)
+
+
+def _check_addresses(key: str, instrument: Instrument) -> None:
+    """Raises BenchError for what is the address of no wire; a simulated instrument and a person have none."""
+    own = None if instrument.simulated or instrument.url == PERSON else instrument.url
+    for name, url in (("url", own), ("stream_url", instrument.stream_url)):
+        try:
+            _ = url and Url.parse(url)
+        except LinkRefused as refused:
+            raise BenchError(f"{key}.{name}: {refused}") from None
 
 
 def _check_lab(bench: Bench, path: Path) -> None:

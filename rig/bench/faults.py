@@ -31,7 +31,8 @@ def fault_of(fault: Any, keys: list[str]) -> str:
         return f"no such key.{did_you_mean(str(fault['loc'][-1]), keys)}"
     if fault["type"] == "missing":
         return "is missing; `rig check --example` prints a bench file that has all"
-    return f"{fault['msg']}, is {fault['input']!r}"
+    why = fault["msg"].removeprefix("Value error, ")  # what a part of ours says itself
+    return f"{why}, is {fault['input']!r}"
 
 
 def _keys(model: Any, where: list[str]) -> list[str]:

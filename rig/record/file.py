@@ -55,8 +55,10 @@ def _connected(path: Path) -> sqlite3.Connection:
     connection = sqlite3.connect(path, check_same_thread=False)
     try:
         _prepare(connection)
-    except UnicodeDecodeError:  # SQLite quotes what it cannot read
-        raise RecordError(f"{path}: {FAILURES[sqlite3.SQLITE_CORRUPT]}") from None
+    except (UnicodeDecodeError, sqlite3.OperationalError) as error:  # SQLite quotes what it cannot read
+        if getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR) == sqlite3.SQLITE_ERROR:  # at no fault of ours
+            raise RecordError(f"{path}: {FAILURES[sqlite3.SQLITE_CORRUPT]} ({error})") from None
+        raise
     return connection
 
 

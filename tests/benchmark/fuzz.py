@@ -18,6 +18,7 @@ from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from tempfile import NamedTemporaryFile
 
 from tests.fuzz.files import remove
 from tests.fuzz.mutation import mutated
@@ -26,6 +27,7 @@ from tests.fuzz.targets import TARGETS
 AT_ONCE = 20_000  # inputs of one task
 LONGEST_S = 5.0  # of processor time for one input
 MOST_BYTES = 4 << 30
+SHOWN_BYTES = 200
 
 
 @dataclass(frozen=True)
@@ -57,11 +59,18 @@ def tried(name: str, seed: int, count: int) -> Tried:
         except target.errors:
             pass
         except BaseException as error:
-            raise AssertionError(f"{name}, {data!r}: {type(error).__name__}: {error}") from error
+            raise AssertionError(f"{_kept(name, data)}: {type(error).__name__}: {error}") from error
         longest_s = max(longest_s, time.process_time() - began)
         if longest_s > LONGEST_S:
-            raise AssertionError(f"{name}, {data!r}: takes {longest_s:.1f} s")
+            raise AssertionError(f"{_kept(name, data)}: takes {longest_s:.1f} s")
     return Tried(name, seed, count, taken, longest_s)
+
+
+def _kept(name: str, data: bytes) -> str:
+    """What an input is called: its beginning, and the file that has all of it."""
+    with NamedTemporaryFile(prefix=f"{name}-", delete=False) as file:
+        file.write(data)
+    return f"{name}, {data[:SHOWN_BYTES]!r}, all of it in {file.name}"
 
 
 def tasks(inputs: int) -> list[tuple[str, int, int]]:

@@ -23,7 +23,7 @@ def numbers(version: str) -> list[int]:
 
 @pytest.mark.parametrize("asked", ASKED, ids=lambda asked: re.match(r"[\w-]+", asked)[0])
 def test_a_dependency_has_a_range_and_a_version_in_it(asked: str) -> None:
-    told = re.fullmatch(r"([\w-]+)(?:~=([\d.]+)|>=([\d.]+),<([\d.]+))", asked)
+    told = re.fullmatch(r"([\w-]+)(?:\[\w+\])?(?:~=([\d.]+)|>=([\d.]+),<([\d.]+))", asked)
     assert told, "write it as name>=lowest,<first-that-is-not-known or name~=lowest"
     name, compatible, least, beyond = told.groups()
     version = numbers(PINNED[name])

@@ -152,6 +152,15 @@ def test_a_folder_that_cannot_be_made_is_said(tmp_path: Path) -> None:
         Record(tmp_path / "file" / "home")
 
 
+def test_a_record_whose_header_asks_for_an_unknown_format_is_damaged(tmp_path: Path) -> None:
+    Record(tmp_path).close()
+    with (tmp_path / "record.db").open("r+b") as file:
+        file.seek(44)  # the number of the schema's format, which is at most 4
+        file.write(b"\0\0\0\x05")
+    with pytest.raises(RecordError, match=r"the record is damaged; .* \(unsupported file format\)"):
+        Record(tmp_path)
+
+
 def test_a_damaged_block_names_its_pose() -> None:
     with Record() as record:
         run = begin(record)

@@ -141,6 +141,17 @@ def test_a_compressed_file_is_no_bomb(tmp_path: Path, monkeypatch: pytest.Monkey
         assert sum(1 for _ in lines) < 0
 
 
+ADDRESS = "tcp://me:hush@192.168.1.40:502"
+
+
 def test_an_address_has_no_password() -> None:
-    with pytest.raises(LinkRefused, match="is not the address of a wire"):
-        Url.parse("tcp://me:hush@192.168.1.40:502")
+    with pytest.raises(LinkRefused, match=r"'tcp://\*\*\*@192.168.1.40:502' has a user, whom no wire asks for"):
+        Url.parse(ADDRESS)
+
+
+@pytest.mark.parametrize("key", ["url", "stream_url"])
+def test_a_bench_with_a_password_is_refused_before_anything_is_kept(bench_file: Callable[..., Path], key: str) -> None:
+    part = {"driver": "labjack_t7", "url": "tcp://192.168.1.40:502", "settings": {"channels": {"vx": 0}}}
+    with pytest.raises(BenchError, match=rf"key instruments.adc.{key}: .*has a user") as refused:
+        read_bench(bench_file({"instruments": {"adc": part | {key: ADDRESS}}}))
+    assert "hush" not in str(refused.value)
