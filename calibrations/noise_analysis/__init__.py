@@ -13,6 +13,7 @@
     welch        the spectrum of what is faster than these
     bands        both as averages over narrow bands, each a chi-square variable
     processes    the spectra of white noise, flicker, random walk ...
+    expected     the Allan variance that a spectrum makes
     whittle      their coefficients by maximum likelihood
     identify     which of them the data shows, and bounds on the others
     lines        sinusoids

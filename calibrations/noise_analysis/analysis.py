@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from calibrations.noise_analysis.bands import Bands, fast_bands, slow_bands
+from calibrations.noise_analysis.expected import of_line, steps_of, weighted
 from calibrations.noise_analysis.identify import (
     Mixture,
     Spectrum,
@@ -22,14 +23,7 @@ from calibrations.noise_analysis.identify import (
 from calibrations.noise_analysis.lines import MOST, Line, fast_lines, without_line
 from calibrations.noise_analysis.octaves import KINDS, Curve
 from calibrations.noise_analysis.oddities import Oddity
-from calibrations.noise_analysis.processes import (
-    GAUSS_MARKOV,
-    LINEAR,
-    SINUSOIDAL,
-    Sampling,
-    allan_gauss_markov,
-    allan_sinusoid,
-)
+from calibrations.noise_analysis.processes import GAUSS_MARKOV, LINEAR, SINUSOIDAL, Sampling
 from calibrations.noise_analysis.reduction import Reduction
 from calibrations.noise_analysis.welch import LENGTH, Segments
 from calibrations.table import Array
@@ -102,18 +96,17 @@ class NoiseAnalysis:
 
     def modelled(self, tau_s: Array) -> Array:
         """Allan deviation of the processes that were identified, shape of `tau_s`."""
-        parts = [power * self.allan_of(name, tau_s) for name, power in self.found.power.items()]
-        parts += [line.amplitude**2 * allan_sinusoid(tau_s, line.frequency_hz) for line in self.lines]
-        return np.asarray(np.sqrt(np.sum(parts, axis=0)))
+        steps = steps_of(tau_s, self.rate_hz)
+        lines = [line.amplitude**2 * of_line(line.frequency_hz / self.rate_hz, steps) for line in self.lines]
+        return np.asarray(np.sqrt(np.sum([*self.parts(tau_s).values(), *lines], axis=0)))
 
-    def allan_of(self, process: str, tau_s: Array) -> Array:
-        """Allan variance of a process whose coefficient is 1; white noise behind a filter is Gauss-Markov."""
-        if process == GAUSS_MARKOV:
-            return allan_gauss_markov(tau_s, self.found.time_constant_s)
-        if process == "white-noise" and np.isfinite(self.record.corner_hz):
-            filter_s = 1 / (2 * np.pi * self.record.corner_hz)
-            return allan_gauss_markov(tau_s, filter_s) / (2 * filter_s)
-        return LINEAR[process].allan(tau_s)
+    def parts(self, tau_s: Array) -> dict[str, Array]:
+        """Allan variance of each process that was identified, at averaging times (k,), taken to whole samples."""
+        asked = [weighted(m, self.rate_hz, self.record.corner_hz) for m in steps_of(tau_s, self.rate_hz)]
+        return {
+            name: power * np.array([w @ at.column(name, self.found.time_constant_s) for at, w in asked])
+            for name, power in self.found.power.items()
+        }
 
     def _linear(self, name: str, known: Estimates) -> Coefficient:
         unit = self.unit + LINEAR[name].per

@@ -6,19 +6,43 @@ from dataclasses import asdict
 from typing import Any
 
 from calibrations.noise_analysis.analysis import Coefficient, NoiseAnalysis
+from calibrations.noise_analysis.octaves import KINDS, Curve
+
+OVERLAPPING = "overlapping"
 
 
 def noise_document(found: NoiseAnalysis) -> dict[str, Any]:
-    """`rig.noise/1`: the overlapping Allan deviation with its 95 % interval, and every coefficient."""
-    curve = found.allan
-    allan = {"tau_s": curve.tau_s, "deviation": curve.deviation, "low": curve.low, "high": curve.high}
+    """`rig.noise/1`: deviations and spectrum with intervals of 95 %, and every coefficient.
+
+    `allan` is the overlapping Allan deviation, `deviations` holds the others; `spectrum` is two-sided, less the lines.
+    """
+    spectrum, per = found.spectrum, found.spectrum.frequency_hz.argsort()
+    low, high = spectrum.interval
+    bands = {
+        "frequency_hz": spectrum.frequency_hz, "density": spectrum.density, "low": low, "high": high,
+        "model": found.found.expected(spectrum),
+    }  # fmt: skip
     return {
         "schema": "rig.noise/1",
         "rate_hz": found.rate_hz,
         "n": found.n,
-        "allan": {name: values.tolist() for name, values in allan.items()},
-        "coefficients": {name: _coefficient(each) for name, each in found.coefficients.items()},
+        "unit": found.unit,
+        "allan": _curve(found.allan),
+        "deviations": {kind: _curve(found.curves[kind]) for kind in KINDS if kind != OVERLAPPING},
+        "spectrum": {name: values[per].tolist() for name, values in bands.items()} | {"unit": f"({found.unit})^2/Hz"},
+        "lines": [{"frequency_hz": line.frequency_hz, "amplitude": line.amplitude} for line in found.lines],
+        "coefficients": coefficients_document(found),
     }
+
+
+def coefficients_document(found: NoiseAnalysis) -> dict[str, Any]:
+    """Every process by its name."""
+    return {name: _coefficient(each) for name, each in found.coefficients.items()}
+
+
+def _curve(curve: Curve) -> dict[str, list[float]]:
+    each = {"tau_s": curve.tau_s, "deviation": curve.deviation, "low": curve.low, "high": curve.high}
+    return {name: values.tolist() for name, values in each.items()}
 
 
 def _coefficient(each: Coefficient) -> dict[str, Any]:

@@ -17,8 +17,10 @@ from itertools import combinations
 
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
+from scipy.stats import chi2
 
 from calibrations.noise_analysis.bands import Bands
+from calibrations.noise_analysis.freedom import COVERAGE
 from calibrations.noise_analysis.processes import GAUSS_MARKOV, LINEAR
 from calibrations.noise_analysis.whittle import information, maximise
 from calibrations.table import Array
@@ -56,6 +58,13 @@ class Spectrum:
     @cached_property
     def freedom(self) -> Array:
         return np.concatenate([part.freedom for part in self.parts])
+
+    @property
+    def interval(self) -> tuple[Array, Array]:
+        """Bounds (b,) between which the true densities lie with a probability of COVERAGE each."""
+        tail, nu = (1 - COVERAGE) / 2, self.freedom
+        low, high = (self.density * nu / chi2.ppf(p, nu) for p in (1 - tail, tail))
+        return low, high
 
     def column(self, process: str, time_constant_s: float = 0.0) -> Array:
         """What is expected of a process whose coefficient is 1."""

@@ -1,4 +1,4 @@
-"""The processes that noise is made of: spectrum and Allan variance of each, for a coefficient of 1.
+"""The processes that noise is made of: spectrum of each for a coefficient of 1, and its Allan variance at long times.
 
     process             spectrum S(f), two-sided    Allan variance        coefficient, unit of the values U
     white-noise         N^2                         N^2 / tau             U/sqrt(Hz): angle or velocity random walk
@@ -87,32 +87,18 @@ def gauss_markov(f: Array, by: Sampling, time_constant_s: float) -> Array:
 
 @dataclass(frozen=True)
 class Process:
-    """Spectrum for a coefficient of 1, Allan variance likewise, and what to multiply a value's unit with."""
+    """Spectrum for a coefficient of 1, and what to multiply a value's unit with."""
 
     spectrum: Callable[[Array, Sampling], Array]
-    allan: Callable[[Array], Array]
     per: str
 
 
 LINEAR: Mapping[str, Process] = MappingProxyType(
     {
-        "white-noise": Process(white, lambda tau: 1 / tau, "/sqrt(Hz)"),
-        "flicker-noise": Process(flicker, lambda tau: np.full_like(tau, 2 * np.log(2) / np.pi), ""),
-        "rate-random-walk": Process(random_walk, lambda tau: tau / 3, "/sqrt(s)"),
-        "quantisation-noise": Process(quantisation, lambda tau: 3 / tau**2, "*s"),
+        "white-noise": Process(white, "/sqrt(Hz)"),
+        "flicker-noise": Process(flicker, ""),
+        "rate-random-walk": Process(random_walk, "/sqrt(s)"),
+        "quantisation-noise": Process(quantisation, "*s"),
     }
 )
 GAUSS_MARKOV, SINUSOIDAL = "gauss-markov-noise", "sinusoidal-noise"
-
-
-def allan_gauss_markov(tau_s: Array, time_constant_s: float) -> Array:
-    """Allan variance of unit variance."""
-    r = tau_s / time_constant_s
-    brackets = 2 * r - 3 + 4 * np.exp(-r) - np.exp(-2 * r)
-    return np.asarray(np.where(r < 1e-3, 2 * r / 3, brackets / np.maximum(r, 1e-3) ** 2))
-
-
-def allan_sinusoid(tau_s: Array, frequency_hz: float) -> Array:
-    """Allan variance of unit amplitude."""
-    x = np.pi * frequency_hz * tau_s
-    return np.asarray((np.sin(x) ** 2 / x) ** 2)

@@ -17,6 +17,8 @@ from calibrations.pictures.style import AMBER, BLUE, GREEN, INK, QUIET, VERMILIO
 from calibrations.table import Array
 
 FEW_DECADES = 2.5
+POINTS = 200
+SUM = "their sum"
 COLOURS = {
     "white-noise": BLUE,
     "flicker-noise": AMBER,
@@ -30,11 +32,13 @@ def noise_album(found: NoiseAnalysis) -> list[Picture]:
     """Both pictures, with words for a page."""
     averaging = (
         "How much neighbouring means differ, over the time that each is taken over. Dots are measured, bars are "
-        "intervals of 95 %; the full line is the sum of the processes that were identified, broken lines are these."
+        "intervals of 95 %; the full line is the sum of the processes that were identified, broken lines are these. "
+        "On the right the other deviations, with theirs."
     )
     spectrum = (
-        "Power over frequency, one-sided. Dots are averages over narrow bands, the grey band is where 95 % of them "
-        "should be; the full line is the sum of the processes, marks on top are lines that were taken off."
+        "Power over frequency, one-sided. Dots are averages over narrow bands with intervals of 95 %, the grey band is "
+        "where 95 % of them should be; the full line is the sum of the processes, marks on top are lines that were "
+        "taken off."
     )
     return [
         Picture("allan", "Allan deviation", averaging, allan(found)),
@@ -52,12 +56,13 @@ def allan(found: NoiseAnalysis) -> Figure:
     ax.errorbar(
         curve.tau_s, curve.deviation, bars, fmt="o", color=INK, elinewidth=0.8, ms=3.4, label="measured", zorder=3
     )
-    tau_s = np.geomspace(curve.tau_s[0], curve.tau_s[-1], 300)
-    ax.plot(tau_s, found.modelled(tau_s), color=INK, lw=1.4, label="these processes")
-    for name, power in found.found.power.items():
-        ax.plot(tau_s, np.sqrt(power * found.allan_of(name, tau_s)), "--", color=COLOURS[name], label=name)
+    tau_s = whole_steps(curve.tau_s[0], curve.tau_s[-1], found.rate_hz)
+    ax.plot(tau_s, found.modelled(tau_s), color=INK, lw=1.4, label=SUM)
+    for name, variance in found.parts(tau_s).items():
+        ax.plot(tau_s, np.sqrt(variance), "--", color=COLOURS[name], label=name)
     for kind, colour in (("modified", BLUE), ("hadamard", GREEN), ("total", VERMILION)):
         other = found.curves[kind]
+        beside.fill_between(other.tau_s, other.low, other.high, color=colour, alpha=0.18, lw=0)
         beside.plot(other.tau_s, other.deviation, "o-", color=colour, ms=2.6, label=kind)
     beside.plot(curve.tau_s, curve.deviation, color=QUIET, label="Allan")
     room = 2.0
@@ -81,8 +86,9 @@ def density(found: NoiseAnalysis) -> Figure:
     tail = (1 - COVERAGE) / 2
     low, high = (root(expected * chi2.ppf(p, freedom) / freedom) for p in (tail, 1 - tail))
     ax.fill_between(f, low, high, color=QUIET, alpha=0.22, lw=0)
+    ax.vlines(f, *(root(bound[order]) for bound in spectrum.interval), color=INK, lw=0.5, alpha=0.35)
     ax.plot(f, root(spectrum.density[order]), "o", color=INK, ms=2.2, label="measured")
-    ax.plot(f, root(expected), color=INK, lw=1.2, label="these processes")
+    ax.plot(f, root(expected), color=INK, lw=1.2, label=SUM)
     for name, power in found.found.power.items():
         column = spectrum.column(name, found.found.time_constant_s)[order]
         ax.plot(f, root(power * column), "--", color=COLOURS[name], label=name)
@@ -92,6 +98,12 @@ def density(found: NoiseAnalysis) -> Figure:
     ax.legend()
     mark_powers(ax)
     return figure
+
+
+def whole_steps(first_s: float, last_s: float, rate_hz: float) -> Array:
+    """Averaging times in whole samples, evenly spaced on a logarithmic axis."""
+    steps = np.geomspace(first_s * rate_hz, last_s * rate_hz, POINTS)
+    return np.unique(np.round(steps)).astype(np.float64) / rate_hz
 
 
 def mark_powers(ax: Axes) -> None:

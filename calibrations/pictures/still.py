@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from calibrations.noise_analysis.freedom import COVERAGE
 from calibrations.pictures.album import Picture
-from calibrations.pictures.noise import COLOURS, mark_powers, root
+from calibrations.pictures.noise import COLOURS, mark_powers, root, whole_steps
 from calibrations.pictures.style import BAND, INK, QUIET, VERMILION, panels, styled
 from calibrations.pictures.waterfall import Level
 from calibrations.still.allan import deviation, parts
@@ -20,7 +20,6 @@ from calibrations.still.documents import mismatch
 from calibrations.still.fit import NoiseFit
 from calibrations.still.held_out import held_out_excess
 
-POINTS = 200
 ROOM = 4.0  # above and below a spectrum
 HEIGHT = 3.6
 OTHER = "#7b5ea7"  # of effects that are not in the catalogue
@@ -63,8 +62,7 @@ def allan(end: NoiseFit, given: NoiseFit) -> Figure:
         curve = end.still.allan[after.channel.axis]
         bars = np.array([curve.deviation - curve.low, curve.high - curve.deviation])
         ax.errorbar(curve.tau_s, curve.deviation, bars, fmt="o", color=INK, elinewidth=0.8, label="measured", zorder=3)
-        steps = np.geomspace(1, curve.tau_s[-1] * after.channel.rate_hz, POINTS)
-        tau_s = np.unique(np.round(steps)).astype(np.float64) / after.channel.rate_hz
+        tau_s = whole_steps(1 / after.channel.rate_hz, curve.tau_s[-1], after.channel.rate_hz)
         ax.plot(tau_s, deviation(before, tau_s), "--", color=QUIET, lw=1.4, label=given.model.name)
         ax.plot(tau_s, deviation(after, tau_s), color=INK, lw=1.4, label=end.model.name)
         if len(after.effects) + len(after.lines) > 1:

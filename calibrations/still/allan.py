@@ -1,11 +1,7 @@
 """The Allan deviation that a noise model expects, and how far the measured one is from it.
 
-    sigma^2(m) = int S(f) 2 sin^4(pi f m dt) / (m sin(pi f dt))^2 df        over all frequencies of the sampled process
-
-computed from the spectra of the effects, and so exact at one sample as well. Behind a filter it is only asked from a
-few times of its time constant on: what the converter adds shows at shorter ones.
-
-Source  NIST SP 1065, 3.2; Percival and Walden, Spectral Analysis for Physical Applications, 8.6.
+It is computed from the spectra of the effects (`noise_analysis.expected`). Behind a filter it is only asked from a few
+times of its time constant on: what the converter adds shows at shorter ones.
 """
 
 from __future__ import annotations
@@ -13,21 +9,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import chdtr, chdtrc
+from scipy.special import chdtr, chdtrc, digamma, polygamma
 
-from calibrations.noise_analysis.bands import Bands
+from calibrations.noise_analysis.expected import of_line, steps_of, weighted
 from calibrations.noise_analysis.octaves import Curve
-from calibrations.noise_analysis.processes import Sampling
 from calibrations.still.channel_fit import ChannelFit, spectrum_of
-from calibrations.still.record import Channel
 from calibrations.table import Array
 
-NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
-SLOWEST = 1e-7  # in cycles to an averaging time
-WHOLE = 8.0  # cycles beyond which a fourth power of a sine is its mean
-MEAN = 3 / 8
 BEHIND = 4.0  # periods of a filter's corner from which on it is judged
-FEW = 3.0  # degrees of freedom below which a deviation tells too little for the mismatch
 
 
 @dataclass(frozen=True)
@@ -54,15 +43,15 @@ class Averaged:
 
     @property
     def mismatch(self) -> float:
-        """Rms of the logarithm of the ratio, over times with more than a few degrees of freedom."""
-        some = self.edf >= min(FEW, float(self.edf.max()))
-        return float(np.sqrt(np.mean(np.log(self.ratio[some]) ** 2)))
+        """Rms of the logarithm of the ratio, each time weighted by its degrees of freedom."""
+        return float(np.sqrt(np.average(np.log(self.ratio) ** 2, weights=self.edf)))
 
     @property
     def by_chance(self) -> float:
-        """The mismatch that chance alone leaves."""
-        some = self.edf >= min(FEW, float(self.edf.max()))
-        return float(np.sqrt(np.mean(1 / (2 * self.edf[some]))))
+        """The mismatch that chance alone leaves: of half the logarithm of chi-square over its degrees of freedom."""
+        half = self.edf / 2
+        square = (polygamma(1, half) + (digamma(half) - np.log(half)) ** 2) / 4
+        return float(np.sqrt(np.average(square, weights=self.edf)))
 
 
 def averaged(found: ChannelFit, curve: Curve) -> Averaged:
@@ -83,40 +72,12 @@ def deviation(found: ChannelFit, tau_s: Array) -> Array:
 
 def parts(found: ChannelFit, tau_s: Array) -> dict[str, Array]:
     """The variance that each effect makes at averaging times (k,), which are taken to whole samples."""
-    steps = np.maximum(1, np.round(tau_s * found.channel.rate_hz))
-    weighted = [_weights(m, found.channel) for m in steps]
+    rate_hz, steps = found.channel.rate_hz, steps_of(tau_s, found.channel.rate_hz)
+    asked = [weighted(m, rate_hz, found.channel.corner_hz) for m in steps]
     each = {
-        effect.name: np.array([w @ spectrum_of(effect, (at,), found.values[effect.name]) for at, w in weighted])
+        effect.name: np.array([w @ spectrum_of(effect, (at,), found.values[effect.name]) for at, w in asked])
         for effect in found.effects
     }
     for line in found.lines:
-        each[f"{line.frequency_hz:.4g} Hz"] = line.amplitude**2 * _of_line(
-            line.frequency_hz / found.channel.rate_hz, steps
-        )
+        each[f"{line.frequency_hz:.4g} Hz"] = line.amplitude**2 * of_line(line.frequency_hz / rate_hz, steps)
     return each
-
-
-def _of_line(turns: float, m: Array) -> Array:
-    """Variance of a sinusoid of unit amplitude, `turns` of it to a sample."""
-    return np.asarray(np.sin(np.pi * turns * m) ** 4 / (m * np.sin(np.pi * turns)) ** 2)
-
-
-def _weights(m: float, channel: Channel) -> tuple[Bands, Array]:
-    """Frequencies at which spectra are asked, and what to add them up with to a variance at `m` samples."""
-    cycles, width = _nodes(m / 2)
-    f = cycles * channel.rate_hz / m
-    sine = np.sin(np.pi * f / channel.rate_hz)
-    power = np.where(cycles < WHOLE, np.sin(np.pi * cycles) ** 4, MEAN)
-    none = np.zeros(len(f))
-    at = Bands(f, none, none, Sampling(channel.rate_hz), none, channel.corner_hz)
-    return at, 2 * width * channel.rate_hz / m * 2 * power / (m * sine) ** 2
-
-
-def _nodes(end: float) -> tuple[Array, Array]:
-    """Gauss's nodes and weights from 0 to `end` cycles, in panels: fine where the sine turns, else by decades."""
-    fine = np.arange(0.25, min(end, WHOLE) + 0.25, 0.25)
-    slow, fast = np.geomspace(SLOWEST, 0.25, 30), np.geomspace(WHOLE, max(end, WHOLE), 60)
-    edges = np.unique(np.concatenate([[0.0], slow, fine, fast]))
-    edges = np.append(edges[edges < end], end)
-    half = np.diff(edges)[:, None] / 2
-    return ((edges[:-1, None] + half) + half * NODES).ravel(), (half * WEIGHTS).ravel()

@@ -10,10 +10,12 @@ from __future__ import annotations
 from typing import Any
 
 from calibrations.documents import experiment_document, parameters_document, places_document
+from calibrations.noise_analysis.document import coefficients_document
 from calibrations.still.allan import averaged
 from calibrations.still.compare import Comparison
 from calibrations.still.diagnose import Candidate, Diagnosis
 from calibrations.still.discover import Added, Discovery
+from calibrations.still.disturbed import Disturbed
 from calibrations.still.fit import NoiseFit
 from calibrations.still.patterns import Pattern
 from calibrations.still.search import Search
@@ -97,6 +99,16 @@ def disturbances(found: Search) -> list[Document]:
         *map(_pattern, found.patterns),
         *({"kind": each.kind, "axis": axis, "text": each.text, "matters": each.matters} for axis, each in odd),
     ]
+
+
+def disturbed_document(found: Disturbed) -> Document:
+    """Beside a noise analysis: what no noise is, and the coefficients without what could be taken off."""
+    return {
+        "disturbances": [
+            {"kind": d.kind, "text": d.text, "spoils": list(d.spoils), "matters": d.matters} for d in found.disturbances
+        ],
+        "coefficients_without": None if found.rest is None else coefficients_document(found.rest),
+    }
 
 
 def _pattern(pattern: Pattern) -> Document:

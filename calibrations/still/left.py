@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 from calibrations.noise_analysis.lines import Line
 from calibrations.search.candidates import SIGNIFICANT
 from calibrations.still.bands import strongest
@@ -10,28 +13,43 @@ from calibrations.still.fit import NoiseFit
 from calibrations.still.scan import stretches
 from calibrations.still.stationary import levels
 
-KINDS = 3  # of things that are looked for
+LINE, LEVEL, STRETCH = "line", "level", "spectrum"
+
+
+@dataclass(frozen=True)
+class Left:
+    """Of what kind it is, and in words."""
+
+    kind: str
+    text: str
 
 
 def left(found: NoiseFit) -> str | None:
-    """The first that is no chance over all channels; None where what is left is noise."""
-    limit = SIGNIFICANT / (KINDS * len(found.channels))
-    told = (_line(each) or _level(each, limit) or _stretch(each, limit) for each in found.channels)
-    return next((text for text in told if text is not None), None)
+    """In words; None where what is left is noise."""
+    first = left_in(found.channels)
+    return None if first is None else first.text
 
 
-def _line(found: ChannelFit) -> str | None:
+def left_in(channels: Sequence[ChannelFit]) -> Left | None:
+    """The first that is no chance over all channels."""
+    limit = SIGNIFICANT / (len((LINE, LEVEL, STRETCH)) * len(channels))
+    told = (_line(each) or _level(each, limit) or _stretch(each, limit) for each in channels)
+    return next((each for each in told if each is not None), None)
+
+
+def _line(found: ChannelFit) -> Left | None:
     line = strongest(found.channel, found.lines, found.level)
     if not isinstance(line, Line):
         return None
-    return f"a line of {found.channel.axis} at {line.frequency_hz:.6g} Hz, of amplitude {line.amplitude:.3g}"
+    where = f"at {line.frequency_hz:.6g} Hz, of amplitude {line.amplitude:.3g}"
+    return Left(LINE, f"a line of {found.channel.axis} {where}")
 
 
-def _level(found: ChannelFit, limit: float) -> str | None:
+def _level(found: ChannelFit, limit: float) -> Left | None:
     level = levels(found)
-    return level.text if level is not None and level.chance < limit else None
+    return Left(LEVEL, level.text) if level is not None and level.chance < limit else None
 
 
-def _stretch(found: ChannelFit, limit: float) -> str | None:
+def _stretch(found: ChannelFit, limit: float) -> Left | None:
     worst = stretches(found, most=1)[0]
-    return worst.text if worst.chance < limit else None
+    return Left(STRETCH, worst.text) if worst.chance < limit else None

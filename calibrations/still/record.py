@@ -129,15 +129,15 @@ def _channel(samples: Samples, reduction: Reduction) -> Channel:
     means = reduction.means
     return Channel(
         samples.axis, samples.unit, samples.rate_hz, samples.corner_hz, reduction.n, means.values(), means.size,
-        reduction.welch.segments(), _logged(samples, reduction.n), reduction.oddities(),
+        reduction.welch.segments(), logged_means(samples.logged, reduction.n), reduction.oddities(),
     )  # fmt: skip
 
 
-def _logged(samples: Samples, n: int) -> dict[str, Array]:
-    """Means of what was logged beside, each over as many samples as one of the channel; what is constant tells
-    nothing."""
+def logged_means(logged: Mapping[str, Sequence[Array]], n: int) -> dict[str, Array]:
+    """Of what was read beside n samples, in blocks: means over as many as one of the channel; none of what is constant,
+    which tells nothing."""
     found = {}
-    for name, blocks in samples.logged.items():
+    for name, blocks in logged.items():
         means = Means()
         for block in blocks:
             means.add(block)

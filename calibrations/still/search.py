@@ -139,9 +139,9 @@ def search(still: Still, model: Model, effects: Mapping[str, Effect]) -> Search:
 def _together(whole: Still, found: Search, given: tuple[Effect, ...]) -> Search:
     """With the amounts of all patterns fitted at once, beside the processes that are left."""
     patterns: list[Pattern] = []
-    for channel, fit in zip(whole.channels, found.mixture.channels, strict=True):
+    for channel, beside in zip(whole.channels, found.mixture.channels, strict=True):
         own = tuple(pattern for pattern in found.patterns if pattern.axis == channel.axis)
-        patterns += refitted(own, fit, channel) if own else ()
+        patterns += refitted(own, beside, channel) if own else ()
     left = _searched(without(whole, tuple(patterns)), found.model, found.effects, given)
     return replace(left, patterns=tuple(patterns))
 

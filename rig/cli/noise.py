@@ -44,6 +44,8 @@ def command(
     from calibrations.noise_analysis.analysis import analyse
     from calibrations.noise_analysis.asked_times import KIND, curve_at
     from calibrations.noise_analysis.document import noise_document
+    from calibrations.still.disturbed import disturbed
+    from calibrations.still.documents import disturbed_document
     from rig.analysis.still import stream
     from rig.cli.noise_words import remarks, summary
     from rig.record.store import Record
@@ -57,11 +59,12 @@ def command(
         found = analyse(samples.blocks, samples.rate_hz, samples.unit, source, samples.corner_hz)
         if tau_s:
             found = replace(found, curves={**found.curves, KIND: curve_at(whole, found.rate_hz, tau_s, source)})
-    notes(remarks(samples, found))
+    told = disturbed(found, samples.channel, samples.logged)
+    notes(remarks(samples, found, told))
     if as_json:
-        emit(noise_document(found))
+        emit(noise_document(found) | disturbed_document(told))
     else:
-        click.echo(summary(samples, found))
+        click.echo(summary(samples, found, told))
     if folder is not None:
         from calibrations.pictures.noise import noise_album
         from calibrations.pictures.save import save_all

@@ -8,6 +8,7 @@ import numpy as np
 
 from calibrations.noise_analysis.analysis import Coefficient, NoiseAnalysis
 from calibrations.numerals import exponent
+from calibrations.still.disturbed import Disturbed
 from rig.analysis.still import Stream, repairs
 from rig.cli.output import columns
 from rig.numerals import duration
@@ -26,7 +27,7 @@ G_M_S2 = 9.80665
 Factor = tuple[float, str]
 
 
-def summary(samples: Stream, found: NoiseAnalysis) -> str:
+def summary(samples: Stream, found: NoiseAnalysis, told: Disturbed) -> str:
     """All that there is to say, for a terminal."""
     length_s = found.n / found.rate_hz
     head = (
@@ -34,10 +35,11 @@ def summary(samples: Stream, found: NoiseAnalysis) -> str:
         if length_s >= 1
         else f"{samples.source}, {samples.channel}: {found.n} samples at {found.rate_hz:g} Hz\n"
     )
-    return "\n".join([head, _coefficients(samples, found), "", _density(samples, found), "", _allan(found)])
+    said = [head, _coefficients(samples, found), "", *_disturbances(found, told)]
+    return "\n".join([*said, _density(samples, found), "", _allan(found)])
 
 
-def remarks(samples: Stream, found: NoiseAnalysis) -> Iterable[str]:
+def remarks(samples: Stream, found: NoiseAnalysis, told: Disturbed) -> Iterable[str]:
     """What was done to the data, and what to be careful about."""
     if samples.others:
         yield f"Channel {samples.channel}; --channel takes another: {', '.join(samples.others)}."
@@ -49,7 +51,7 @@ def remarks(samples: Stream, found: NoiseAnalysis) -> Iterable[str]:
         )
     if doubtful := [name for name in found.found.power if not found.coefficients[name].identified]:
         yield f"There is slow noise; the record cannot tell of which kind ({', '.join(doubtful)}?): record for longer."
-    if found.misfit > MISFIT:
+    if found.misfit > MISFIT and not told.disturbances:
         yield (
             f"The spectrum is {found.misfit:.2g} times as far from these processes as chance leaves it: there is "
             "something else (a filter, a resonance, a disturbance); look at the pictures (--pictures FOLDER)."
@@ -64,6 +66,23 @@ def _coefficients(samples: Stream, found: NoiseAnalysis) -> str:
         rows.append((name, _shown(each, 1.0, found.unit), *beside, MEANS[name] + _detail(each)))
     head = ("process", "coefficient", *(() if second is None else ("or",)), "")
     return columns(head, rows)
+
+
+def _disturbances(found: NoiseAnalysis, told: Disturbed) -> Iterable[str]:
+    """What is no noise, what it spoils, and what the coefficients are without it."""
+    if not told.disturbances:
+        return
+    yield "There is something that is no noise:"
+    for each in told.disturbances:
+        spoilt = f"; it spoils {' and '.join(each.spoils)}" if each.spoils else ""
+        yield f"  {each.text}{spoilt if each.matters else '; too little to matter'}"
+    if told.rest is not None:
+        changed = {name for each in told.disturbances for name in each.spoils}
+        yield "Without what could be taken off:"
+        for name in (name for name in found.coefficients if name in changed):
+            each_left = told.rest.coefficients[name]
+            yield f"  {name}: {_shown(each_left, 1.0, found.unit)}{_detail(each_left)}"
+    yield ""
 
 
 def _engineering(unit: str, scale_v_per_g: float | None) -> Factor | None:

@@ -10,14 +10,8 @@ import pytest
 from calibrations.noise_analysis.bands import fast_bands, flickering, slow_bands
 from calibrations.noise_analysis.decimated import MOST, Means
 from calibrations.noise_analysis.exact import deviations
-from calibrations.noise_analysis.processes import (
-    LINEAR,
-    Sampling,
-    allan_gauss_markov,
-    allan_sinusoid,
-    gauss_markov,
-    random_walk,
-)
+from calibrations.noise_analysis.expected import of_line, weighted
+from calibrations.noise_analysis.processes import Sampling, gauss_markov, random_walk
 from calibrations.noise_analysis.welch import LENGTH, Welch
 from tests.calibrations import noises
 
@@ -78,21 +72,34 @@ def test_the_first_coefficients_of_flicker_noise() -> None:
     assert bands.column("flicker-noise")[0] == pytest.approx(0.774 / (2 * np.pi / 2000), rel=1e-3)
 
 
-@pytest.mark.parametrize("name", LINEAR)
+@pytest.mark.parametrize("name", MADE)
 def test_allan_variances_are_those_of_the_processes(name: str) -> None:
-    tau_s = np.array([16.0, 64.0])
+    """At one sample too, where a Gauss-Markov process is not what it is in continuous time."""
+    steps = [1, 2, 16, 64]
     records = [MADE[name](np.random.default_rng(seed), 1 << 14) for seed in range(20)]
-    shown = np.mean([deviations(each, tau_s.astype(int)) ** 2 for each in records], axis=0)
-    assert shown == pytest.approx(LINEAR[name].allan(tau_s), rel=0.12)
+    shown = np.mean([deviations(each, steps) ** 2 for each in records], axis=0)
+    asked = [weighted(m, 1.0, np.inf) for m in steps]
+    assert shown == pytest.approx([w @ at.column(name, 30.0) for at, w in asked], rel=0.12)
 
 
-def test_allan_variance_of_a_gauss_markov_process_and_of_a_sinusoid() -> None:
-    tau_s = np.array([8.0, 64.0, 256.0])
-    records = [noises.gauss_markov(np.random.default_rng(seed), 1 << 14, 50.0) for seed in range(20)]
-    shown = np.mean([deviations(each, tau_s.astype(int)) ** 2 for each in records], axis=0)
-    assert shown == pytest.approx(allan_gauss_markov(tau_s, 50.0), rel=0.15)
+@pytest.mark.parametrize(
+    ("name", "continuous"),
+    [
+        ("white-noise", lambda tau_s: 1 / tau_s),
+        ("flicker-noise", lambda tau_s: 2 * np.log(2) / np.pi),
+        ("rate-random-walk", lambda tau_s: tau_s / 3),
+        ("quantisation-noise", lambda tau_s: 3 / tau_s**2),
+    ],
+)
+def test_at_long_times_they_are_those_of_the_standard(name: str, continuous: Callable[[float], float]) -> None:
+    """IEEE 952, annex C."""
+    at, weights = weighted(500, 1.0, np.inf)
+    assert weights @ at.column(name) == pytest.approx(continuous(500.0), rel=0.01)
+
+
+def test_allan_variance_of_a_sinusoid() -> None:
     wave = noises.sinusoid(1 << 14, 0.01)
-    assert deviations(wave, [16, 40]) ** 2 == pytest.approx(allan_sinusoid(np.array([16.0, 40.0]), 0.01), rel=0.02)
+    assert deviations(wave, [1, 16, 40]) ** 2 == pytest.approx(of_line(0.01, np.array([1.0, 16.0, 40.0])), rel=0.02)
 
 
 def test_means_take_twice_as_many_samples_when_they_are_full() -> None:

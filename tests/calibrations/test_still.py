@@ -172,6 +172,15 @@ def test_hum_beyond_the_means_is_found_at_its_own_frequency() -> None:
     assert ("sinusoidal-noise", "frequency_2") not in known
 
 
+def test_the_mismatch_of_a_complete_model_is_that_of_chance() -> None:
+    """Weighted by degrees of freedom: over many records its mean square is as computed."""
+    curves = [compare(still(x=white(np.random.default_rng(seed), 4000)), model()).averaged[0] for seed in range(25)]
+    squares = np.array([curve.mismatch**2 for curve in curves])
+    assert squares.mean() == pytest.approx(curves[0].by_chance ** 2, abs=3.5 * squares.std() / 5)
+    worst = replace(curves[0], measured=curves[0].measured * np.where(curves[0].edf < 5, 3.0, 1.0))
+    assert worst.mismatch < 3 * curves[0].mismatch + 0.05
+
+
 def test_adding_what_is_not_enough_says_so() -> None:
     random = np.random.default_rng(7)
     record = still(x=white(random) + 0.5 * traps(random) + 0.4 * noises.sinusoid(SAMPLES, 0.05))

@@ -50,7 +50,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_the_document_of_an_array(rig: Rig, folder: Path, kind: str) -> None:
     np.save("some.npy", (samples() * 1000).astype(kind))
     said = document(rig("noise", "some.npy", "--rate", "50", "--json"))
-    assert set(said) == {"schema", "rate_hz", "n", "allan", "coefficients"}
+    assert {"schema", "rate_hz", "n", "allan", "coefficients"} <= set(said)
     assert (said["schema"], said["rate_hz"], said["n"]) == ("rig.noise/1", 50.0, 6000)
     assert set(said["allan"]) == {"tau_s", "deviation", "low", "high"}
     assert said["allan"]["tau_s"][:2] == [0.02, 0.04]
@@ -63,6 +63,72 @@ def test_the_document_of_an_array(rig: Rig, folder: Path, kind: str) -> None:
     for name in PROCESSES - {"white-noise"}:
         assert not said["coefficients"][name]["identified"]
         assert said["coefficients"][name]["upper"] > 0
+
+
+def test_other_deviations_and_the_spectrum_have_intervals(rig: Rig, folder: Path) -> None:
+    said = document(rig("noise", "still.npy", "--rate", "50", "--json"))
+    assert set(said["deviations"]) == {"modified", "hadamard", "total"}
+    for curve in said["deviations"].values():
+        assert set(curve) == {"tau_s", "deviation", "low", "high"}
+        held = [
+            low < 0.1 / np.sqrt(50 * tau) < high
+            for tau, low, high in zip(*[curve[k] for k in ("tau_s", "low", "high")], strict=True)
+        ]
+        assert held.count(False) <= (len(held) if curve is said["deviations"]["modified"] else 1)
+        assert all(
+            low < value < high
+            for low, value, high in zip(*[curve[k] for k in ("low", "deviation", "high")], strict=True)
+        )
+    spectrum = {name: np.array(values) for name, values in said["spectrum"].items() if name != "unit"}
+    assert said["spectrum"]["unit"] == "(count)^2/Hz"
+    assert np.all(np.diff(spectrum["frequency_hz"]) > 0)
+    true = 0.1**2 / 50
+    assert np.mean((spectrum["low"] < true) & (true < spectrum["high"])) == pytest.approx(0.95, abs=0.04)
+    assert spectrum["model"] == pytest.approx(true, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "says", "spoils"),
+    [
+        ("step", "step", "a step of +0.0", "rate-random-walk"),
+        ("drift", "drift", "a drift of vx_v by +", "rate-random-walk"),
+        ("louder", "level", "the level of vx_v changes with time", "white-noise"),
+        ("wild", "wild-samples", "of vx_v, a single sample is far from the neighbours", "white-noise"),
+        ("stuck", "constant-stretch", "of vx_v, 300 samples from t = 40 s on are all the same", "white-noise"),
+        ("warm", "follows", "vx_v follows temperature_c by +0.1", "rate-random-walk"),
+    ],
+)
+def test_what_is_no_noise_is_said_beside_the_coefficients_that_it_spoils(
+    rig: Rig, folder: Path, name: str, kind: str, says: str, spoils: str
+) -> None:
+    k = np.arange(6000)
+    warm = 22 + 0.5 * np.sin(k / 700) + 0.3 * np.sin(k / 230)
+    x = samples() + {
+        "step": 0.05 * (k > 2500), "drift": 0.1 * k / 6000, "louder": (k > 4500) * 0.6 * (samples() - 2.5),
+        "wild": 7.0 * (k == 1000), "stuck": 0 * k, "warm": 0.12 * warm,
+    }[name]  # fmt: skip
+    if name == "stuck":
+        x[2000:2300] = x[2000]
+    file = table(folder / "odd.csv", k / 50, vx_v=x, temperature_c=np.round(warm, 3))
+    said = document(rig("noise", file, "--json"))
+    found = next(each for each in said["disturbances"] if each["kind"] == kind)
+    assert says in found["text"]
+    assert spoils in found["spoils"]
+    shown = rig("noise", file).out
+    assert "There is something that is no noise:" in shown
+    assert f"{found['text']}; it spoils " in shown
+    taken_off = kind in ("step", "drift", "follows")
+    assert ("Without what could be taken off:" in shown) == taken_off
+    if taken_off:
+        assert said["coefficients"][spoils]["identified"]
+        assert not said["coefficients_without"][spoils]["identified"]
+        assert said["coefficients_without"]["white-noise"]["identified"]
+
+
+def test_a_clean_record_has_no_disturbance(rig: Rig, folder: Path) -> None:
+    said = document(rig("noise", "still.npy", "--rate", "50", "--json"))
+    assert (said["disturbances"], said["coefficients_without"]) == ([], None)
+    assert "no noise" not in rig("noise", "still.npy", "--rate", "50").out
 
 
 def test_a_table_with_its_rate_in_its_times(rig: Rig, folder: Path) -> None:
