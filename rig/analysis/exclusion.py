@@ -2,25 +2,44 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+
+from rig.errors import UnknownRun
+from rig.home import home
 from rig.lease import lease
 from rig.record import Record, Run
+from rig.record.store import FILE
 from rig.results import judged
 
+NUMBERED = ("poses", "positions", "rates")  # kinds of which a row is a pose
 RESULTS = "results"  # the event that says how they were made anew
 
 
-def exclude(record: Record, run_id: str, number: int, reason: str | None) -> Run:
-    """Leave pose `number` out, with a reason; None takes it in again. The run as it is then.
+def exclude(record: Record, run_id: str, numbers: Sequence[int], reason: str | None) -> Run:
+    """Leave poses out, with a reason; None takes them in again. The run as it is then.
 
     Results of a complete run are evaluated again. Raises UnknownRun, RecordError for a pose that is not there, Busy
     while a process works on the run.
     """
     run = record.run(run_id)
     with lease(record.folder, run_id, f"run {run_id}"):
-        record.exclude(run_id, number, reason)
+        for number in numbers:
+            record.exclude(run_id, number, reason)
         if run.state == "complete":
             _evaluate_again(record, run)
     return record.run(run_id)
+
+
+def numbered_run(data: str) -> str | None:
+    """The run that `data` names, where it has poses that can be left out; None of a file, and of an imported table."""
+    if Path(data).exists() or not (home() / FILE).is_file():
+        return None
+    with suppress(UnknownRun), Record() as record:
+        run = record.run(data.partition("/")[0])
+        return run.run if run.bench and run.kind in NUMBERED else None
+    return None
 
 
 def _evaluate_again(record: Record, run: Run) -> None:

@@ -44,7 +44,8 @@ class StillTrail:
         """The present model with one effect more, all fitted. Raises ModelError where it is in the model."""
         if self.end.model.holds(effect.name):
             raise ModelError(f"{effect.name} is in the model already")
-        return Added(effect.name, self.end, fit(self.end.model.with_effect(effect), self.still))
+        after = fit(self.end.model.with_effect(effect), self.still)
+        return Added(effect.name, self.end, after, after.log_likelihood - self.end.log_likelihood)
 
     def with_step(self, step: Added) -> StillTrail:
         """One step further."""

@@ -86,7 +86,7 @@ def test_even_without_any_pose_it_can_be_shown(rig: Rig) -> None:
     with Record() as record:
         run = start(record, *_small()).run.run
         for number in range(POSES):
-            exclude(record, run, number, "all wrong")
+            exclude(record, run, [number], "all wrong")
     assert json.loads(rig("show", run, "--json").out)["columns"] == {}
     assert len(json.loads(rig("show", run, "--poses", "--json").out)["kept"]) == POSES
 
@@ -122,7 +122,7 @@ def test_what_the_procedure_gave_itself_stays(tmp_path: Path) -> None:
     )
     with Record() as record:
         run = start(record, read_bench(), find("weigh", tmp_path), {}, Onlooker()).run.run
-        assert exclude(record, run, 0, "why not").results["mass"]["value"] == 2.0
+        assert exclude(record, run, [0], "why not").results["mass"]["value"] == 2.0
     assert events(run)[-1][0] == RESULTS
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -9,10 +10,12 @@ from urllib.parse import urlencode
 
 from nicegui import ui
 
+from rig.analysis.exclusion import numbered_run
 from rig.analysis.trail_still import StillTrail
 from rig.web.counted import Cancelled, Counted
 from rig.web.desk import Desk, runs
 from rig.web.frame import Key, frame
+from rig.web.pages import left_out
 from rig.web.pages.model_choice import Choice
 from rig.web.pages.model_missing import Missing
 from rig.web.pages.model_noise import NoisePictures
@@ -69,13 +72,23 @@ class Workbench:
         """The places of pictures and candidates, as the kind of data wants them."""
         self.analysis.clear()
         with self.analysis:
-            self.pictures: AnyPictures = NoisePictures() if still else Pictures()
+            self.pictures: AnyPictures = NoisePictures() if still else Pictures(self._leaving_out())
             self.missing = Missing(self, own=not still)
         self.keys["a"] = Key("add the effect that is looked at", self.missing.add_shown)
         self.keys["u"] = Key("undo the last effect", self.undo)
         self.keys["x"] = Key("the next axis", self.pictures.next_axis)
         self.keys["g"] = Key("V, or g", self.pictures.other_unit)
+        self.keys["l"] = Key("leave out what is selected", self.pictures.leave_selected)
         self.keys["Escape"] = Key("select nothing", partial(self.pictures.select, []))
+
+    def _leaving_out(self) -> Callable[[Sequence[int]], None] | None:
+        """What asks why selected poses are to be left out; None where the data are no run of the rig."""
+        return partial(left_out.ask, self.data, done=self.afresh) if numbered_run(self.data) else None
+
+    def afresh(self) -> None:
+        """Read the data again, which have changed."""
+        self.desk.forget(self.data)
+        self.go(self.data, self.model)
 
     def go(self, data: str, model: str) -> None:
         """Another address: data and model are part of it, so that it can be kept and passed on."""
@@ -99,6 +112,9 @@ class Workbench:
         for note in trail.notes:
             with self.notes, box("note"):
                 words(note, "small")
+        if found := left_out.left_out(self.data):
+            with self.notes, ui.expansion(f"{len(found)} left out of every analysis").props("dense").classes("box"):
+                left_out.listed(self.data, self.afresh)
         await self.show(trail)
 
     async def show(self, trail: AnyTrail) -> None:

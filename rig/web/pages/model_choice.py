@@ -40,7 +40,7 @@ class Choice:
             ui.button(icon="upload_file", on_click=self._ask_file).props("flat dense aria-label='Open a file'").tooltip(
                 "Open a file of this computer"
             )
-            ui.button(icon="refresh", on_click=self._again).props("flat dense aria-label='Read again'").tooltip(
+            ui.button(icon="refresh", on_click=page.afresh).props("flat dense aria-label='Read again'").tooltip(
                 "Read the data again"
             )
             self.undo = ui.button("Undo", icon="undo", on_click=page.undo).props("outline dense")
@@ -66,10 +66,6 @@ class Choice:
         """Undo is there as soon as there is something to undo."""
         self.undo.set_enabled(bool(trail.steps))
         self.undo.set_text(f"Undo {trail.steps[-1].name}" if trail.steps else "Undo")
-
-    def _again(self) -> None:
-        self.page.desk.forget(self.page.data)
-        self.page.go(self.page.data, self.page.model)
 
     def _ask_file(self) -> None:
         with ui.dialog() as dialog, ui.card():

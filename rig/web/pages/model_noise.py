@@ -85,3 +85,6 @@ class NoisePictures:
 
     def select(self, points: Sequence[Any]) -> None:
         """Averaging times have no poses to be selected."""
+
+    def leave_selected(self) -> None:
+        """Nor left out."""

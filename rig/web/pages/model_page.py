@@ -33,6 +33,9 @@ class AnyPictures(Protocol):
     def select(self, points: Sequence[Any]) -> None:
         """Mark these points in all pictures."""
 
+    def leave_selected(self) -> None:
+        """Ask whether what is selected is to be left out."""
+
 
 class ModelPage(Protocol):
     """The page, as its parts see it."""
@@ -46,6 +49,9 @@ class ModelPage(Protocol):
 
     def go(self, data: str, model: str) -> None:
         """To another address: other data, or another model."""
+
+    def afresh(self) -> None:
+        """Read the data again, which have changed."""
 
     async def add(self, step: Any) -> None:
         """The model gains an effect."""

@@ -40,7 +40,9 @@ POINTS = (
 class Pictures:
     """Draws a fit; knows what it is drawn against, in which unit, and which rows are selected."""
 
-    def __init__(self) -> None:
+    def __init__(self, leave_out: Callable[[Sequence[int]], None] | None) -> None:
+        """`leave_out` is told the numbers of the rows that are selected; None where they can be left out by nobody."""
+        self.leave_out = leave_out
         self.fit: Fit | None = None
         self.trail: Trail | None = None
         self.step: Added | None = None
@@ -60,7 +62,9 @@ class Pictures:
             self.colour = self._column("coloured by")
             self.told = words("", "told quiet small")
             self.clear = ui.button("Select nothing", on_click=lambda: self.select([])).props("flat dense")
-            self.clear.set_visibility(False)
+            self.leave = ui.button("Leave out", icon="block", on_click=self.leave_selected).props("flat dense")
+            for button in (self.clear, self.leave):
+                button.set_visibility(False)
 
     def _column(self, label: str) -> ui.select:
         return ui.select({}, label=label, on_change=self.draw).props("dense options-dense").style("min-width: 150px")
@@ -158,6 +162,11 @@ class Pictures:
         if len(self.unit.options) > 1:
             self.unit.set_value(not self.unit.value)
 
+    def leave_selected(self) -> None:
+        """Ask whether what is selected is to be left out."""
+        if self.selected and self.fit is not None and self.leave_out is not None:
+            self.leave_out([int(number) for number in self.fit.table.numbered(self.shown.rows[self.selected])])
+
     def _brushed(self, event: events.GenericEventArguments) -> None:
         self.select(event.args if isinstance(event.args, list) else [])
 
@@ -177,6 +186,7 @@ class Pictures:
     def _tell(self, shown: Shown) -> None:
         """What is selected, or that not all is drawn, or what can be done."""
         self.clear.set_visibility(bool(self.selected))
+        self.leave.set_visibility(bool(self.selected) and self.leave_out is not None)
         self.told.set_text(shown.summary(self.selected) if self.selected else shown.thinned or
                            "Draw a box in a picture to select poses in all of them.")  # fmt: skip
 

@@ -16,6 +16,7 @@ from rig.export import export
 from rig.record import Event, Record, Run
 from rig.web.desk import Desk
 from rig.web.frame import frame
+from rig.web.pages import left_out
 from rig.web.pages.over_time import OverTime
 from rig.web.parts import box, div, facts, failed, off_loop, table, words
 from rig.web.told import message
@@ -33,35 +34,41 @@ def register(desk: Desk) -> None:
         with frame(desk, "/record"):
             try:
                 with Record.to_find(run) as record:
-                    found, left_out = record.run(run), record.excluded(run)
+                    found, excluded = record.run(run), record.excluded(run)
             except Exception as error:
                 failed("No such run", message(error))
                 return
-            OneRun(desk, found, left_out)
+            OneRun(desk, found, excluded)
 
 
 class OneRun:
     """All that is known of it."""
 
-    def __init__(self, desk: Desk, run: Run, left_out: dict[int, str]) -> None:
+    def __init__(self, desk: Desk, run: Run, excluded: dict[int, str]) -> None:
         self.desk, self.run = desk, run
         self._head()
         with div("two"):
-            with box("stack"):
-                words("Results", "title")
-                _results(run)
-                for line in next_steps(run, left_out):
-                    words(line, "quiet small")
-            with box("stack"):
-                words("Over time", "title")
-                self.over_time = OverTime()
-                if run.bench:
-                    self.over_time.lay_out()
-            with box("stack"):
-                words("How it was made", "title")
-                facts({name: str(value)[:SHOWN] for name, value in _made(run).items()})
-            with box("stack"):
-                self._notes()
+            with div("stack"):
+                with box("stack"):
+                    words("Results", "title")
+                    _results(run)
+                    for line in next_steps(run, excluded):
+                        words(line, "quiet small")
+                with box("stack"):
+                    words("How it was made", "title")
+                    facts({name: str(value)[:SHOWN] for name, value in _made(run).items()})
+            with div("stack"):
+                with box("stack"):
+                    words("Over time", "title")
+                    self.over_time = OverTime()
+                    if run.bench:
+                        self.over_time.lay_out()
+                if excluded:
+                    with box("stack"):
+                        words("Poses that are left out", "title")
+                        left_out.listed(run.run, ui.navigate.reload)
+                with box("stack"):
+                    self._notes()
         ui.timer(0.0, lambda: self.over_time.follow(run.run), once=True)
 
     def _head(self) -> None:
