@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import sqlite3
+from collections.abc import Mapping
 from typing import Any
 
 from sqlalchemy import JSON, BigInteger, Connection, Dialect, Integer, Table, Text, TypeDecorator, text
@@ -32,6 +33,12 @@ class Document(TypeDecorator[Any]):
 
     def process_result_value(self, value: Any, dialect: Dialect) -> Any:
         return json.loads(value) if dialect.name == SERVER and value is not None else value
+
+
+def is_new(to: Connection, table: Table, values: Mapping[str, Any]) -> bool:
+    """Insert a row, unless there is one of its key; whether it was inserted."""
+    statement = insert_or(to, table).values(values).on_conflict_do_nothing()
+    return bool(to.execute(statement, execution_options={"preserve_rowcount": True}).rowcount)
 
 
 def insert_or(to: Connection, table: Table) -> sqlite.Insert | postgresql.Insert:

@@ -16,7 +16,7 @@ from sqlalchemy import Connection, Table, insert, select, update
 
 from rig.errors import RecordError
 from rig.record.content import count, digest, head, rows_of, run_row, uid_of
-from rig.record.dialects import insert_or
+from rig.record.dialects import is_new
 from rig.record.schema import arrivals, poses, runs
 from rig.record.store import Record, now
 
@@ -99,7 +99,7 @@ def _arrival(to: Connection, parcel: _Parcel) -> tuple[str, str | None]:
         if (row := to.execute(mine).one_or_none()) is not None:
             return row.run, row.head
         values = {**parcel.row, "run": name, "uid": parcel.uid}
-        if to.execute(insert_or(to, runs).values(values).on_conflict_do_nothing()).rowcount:
+        if is_new(to, runs, values):
             to.execute(insert(arrivals), {"uid": parcel.uid, "run": name, "at": now()})
             return name, None
     raise RecordError(f"run {parcel.run}: the lab has two other runs of that name")

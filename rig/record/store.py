@@ -30,7 +30,7 @@ from rig.home import RECORD, home
 from rig.lease import is_held
 from rig.nearest import did_you_mean
 from rig.record import codec
-from rig.record.dialects import insert_or, newest_first
+from rig.record.dialects import insert_or, is_new, newest_first
 from rig.record.file import RECOVER, open_file
 from rig.record.schema import arrivals, blocks, columns, dwells, events, log, poses, readings, runs, states
 from rig.record.values import Block, Event, Kept, Line, Run
@@ -335,7 +335,7 @@ def _new_run(to: Connection, values: Mapping[str, Any]) -> str:
     while True:
         run = f"{datetime.now(UTC):%Y%m%d-%H%M%S}-{values['procedure']}-{secrets.token_hex(2)[:3]}"
         row = {"results": {}, "identities": {}, **values, "run": run, "created": now(), "uid": uuid.uuid4().hex}
-        if to.execute(insert_or(to, runs).values(row).on_conflict_do_nothing()).rowcount:
+        if is_new(to, runs, row):
             return run  # else another of the same second has it: draw again
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,7 +13,10 @@ from calibrations.reading.read_csv import write_csv
 from rig.bench import DEFAULT
 from rig.cli import main
 from rig.record import Record
+from rig.record.lab_url import lab_url
+from rig.record.roles import prepare
 from tests.calibrations.synthetic import components, poses, turns
+from tests.rig.postgres import Server, serving
 
 MODEL = """schema: rig.model/1
 name: mine
@@ -110,3 +113,18 @@ def contents(folder: Path) -> Mapping[str, bytes | None]:
     """Every file below a folder, but for what Python keeps of what it compiled."""
     paths = [path for path in sorted(folder.rglob("*")) if "__pycache__" not in path.parts]
     return {str(path.relative_to(folder)): path.read_bytes() if path.is_file() else None for path in paths}
+
+
+@pytest.fixture(scope="session")
+def server() -> Iterator[Server]:
+    """A PostgreSQL server, with an empty lab's record to make others of."""
+    with serving() as started:
+        started.sql("CREATE DATABASE prepared")
+        prepare(lab_url(started.url("prepared")))
+        yield started
+
+
+@pytest.fixture
+def database(server: Server) -> str:
+    """An empty lab's record on the server, by its name."""
+    return server.new_database(like="prepared")
