@@ -14,8 +14,8 @@ import click
 from rig.home import RECORD
 
 TAKE_IT = frozenset(
-    {"add", "certificate", "compare", "control", "diagnose", "discover", "exclude", "export", "fit", "history"}
-    | {"import", "noise", "plan", "report", "runs", "show", "web"}
+    {"add", "certificate", "compare", "compensate", "control", "diagnose", "discover", "exclude", "export"}
+    | {"fit", "history", "import", "noise", "plan", "report", "runs", "show", "web"}
 )
 
 

@@ -62,6 +62,8 @@ def _tell(context: ExceptionContext, url: URL) -> None:
     if context.is_disconnect or isinstance(context.sqlalchemy_exception, OperationalError | InterfaceError):
         raise LabAway(f"{shown(url)}: the lab's record cannot be reached ({_first_line(error)}); nothing is lost, "
                       "the next `rig push` goes on") from None  # fmt: skip
+    if context.connection is None:  # what libpq does not take
+        raise RecordError(f"{shown(url)}: {_first_line(error)}; put the URL right") from None
 
 
 def _first_line(error: BaseException) -> str:

@@ -71,7 +71,7 @@ def serving() -> Iterator[Server]:
 
         call("initdb", "-U", OWNER, "-E", "UTF8", "--no-locale", "--no-sync", "-A", "trust")
         (folder / "data" / "pg_hba.conf").write_text(HBA)
-        port = _free_port()
+        port = free_port()
         options = " ".join([f"-p {port} -k {folder}", *(f"-c {each}" for each in SETTINGS)])
         call("pg_ctl", "-w", "-l", str(folder / "log"), "-o", options, "start")
         try:
@@ -93,7 +93,8 @@ def _binaries(folder: Path) -> Path:
     return package / "pginstall" / "bin"
 
 
-def _free_port() -> int:
+def free_port() -> int:
+    """That nobody listens at, for now."""
     with socket.socket() as found:
         found.bind(("127.0.0.1", 0))
         port: int = found.getsockname()[1]

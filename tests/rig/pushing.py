@@ -22,17 +22,19 @@ CHANNELS = ("vx", "vy")
 def a_run(record: Record, seed: int = 1, state: str = "complete", poses: int = POSES) -> str:
     """A run as the runner leaves it: poses, readings, log, events, the state of a bench without limits."""
     draw = np.random.default_rng(seed)
-    bench = {"seed": seed, "limits_deg": [-math.inf, math.inf]}
+    bench = {"seed": seed, "instruments": {}, "world": {"limits_deg": [-math.inf, math.inf]}}
     made = {"bench": bench, "identities": {"adc": {"model": "T7"}}, "configuration": "abc", "source": "a test"}
     run = record.begin("sweep", {"step_deg": 0.1 + 0.2}, constants={"sensor": "ADXL203"}, **made)
     for number in range(poses):
         record.log(run, number / 3, "run", "kept", f"pose {number}")
         samples = Block(draw.normal(2.5, 1e-3, (SAMPLES, 2)), CHANNELS, 1000.0, number / 7)
-        kept = Kept(Pose(90, 10.0 * number / 3, 1, "A+ to B-"), samples, number / 3, None, alpha_read_deg=90.1)
+        kept = Kept(Pose(90, 10.0 * number / 3, 1, "A+ to B-"), samples, number / 3, 20 + number / 9)
         record.keep(run, number, kept, {"clock": number})
     record.keep_readings(run, [Reading("level-x", 1 / 3, "deg", None), Reading("bias-x", 2.5, "V", 1e-4)], None)
     record.note(run, "answer mounting", "yes")
-    record.set_state(run, state, None, {"bias-x": {"value": 2.5, "std": 1e-4, "unit": "V", "verdict": None}})
+    record.set_state(
+        run, state, None, {"bias-x": {"value": 2.5, "std": 1e-4, "unit": "V", "limit": None, "verdict": None}}
+    )
     return run
 
 

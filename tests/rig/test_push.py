@@ -19,7 +19,6 @@ from tests.rig.cutting import Enough, Judge, after_bytes, at_random, whole, wire
 from tests.rig.postgres import Server
 from tests.rig.pushing import POSES, a_run, a_table, held, pushed, until_there
 
-
 COMMITS = 5  # of a push of one run in small batches
 
 

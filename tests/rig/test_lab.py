@@ -1,0 +1,221 @@
+"""The lab's record as people meet it: commands by URL, roles, a lab that is away, versions, passwords nobody sees."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rig.cli import rig as commands
+from rig.cli.record_option import OPTION
+from rig.errors import RecordError
+from rig.home import LAB, RECORD
+from rig.record import Record
+from rig.record.lab_url import lab_url
+from rig.record.push import push
+from rig.record.roles import prepare
+from rig.record.schema import SCHEMA
+from rig.web.desk import runs as runs_of_workbench
+from tests.rig.conftest import Ended
+from tests.rig.postgres import Server, free_port
+from tests.rig.pushing import a_run, held
+from tests.rig.rigging import POSES, SMALL_ARGUMENTS
+
+Rig = Callable[..., Ended]
+WORD = "g3heim"
+SWEEP = ("run", "sweep", *SMALL_ARGUMENTS, "--unattended")
+
+
+@pytest.fixture(scope="session")
+def people(server: Server) -> Server:
+    """The server, with a rig and a reader that have roles of their own."""
+    for name, role in (("rig7", "rig_writer"), ("anna", "rig_reader")):
+        server.sql(f"CREATE ROLE {name} LOGIN PASSWORD '{WORD}' IN ROLE {role}")
+    return server
+
+
+@pytest.fixture
+def writer(people: Server, database: str, monkeypatch: pytest.MonkeyPatch) -> str:
+    monkeypatch.setenv("PGPASSWORD", WORD)
+    return people.url(database, "rig7")
+
+
+@pytest.fixture
+def reader(people: Server, database: str, monkeypatch: pytest.MonkeyPatch) -> str:
+    monkeypatch.setenv("PGPASSWORD", WORD)
+    return people.url(database, "anna")
+
+
+def said(ended: Ended) -> Any:
+    assert ended.status == 0, ended.err
+    return json.loads(ended.out)
+
+
+def test_every_analysis_reads_the_same_from_the_lab(
+    rig: Rig, work: Path, writer: str, reader: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    measured = said(rig(*SWEEP, "--json"))["run"]
+    table = said(rig("import", "good.csv", "--kind", "poses", "--constant", "serial=17", "--json"))["run"]
+    assert len(said(rig("push", "--to", writer, "--json"))["runs"]) == 2
+    asked: Mapping[str, tuple[str, ...]] = {
+        "runs": (),
+        "show": (measured, "--poses", "--log"),
+        "compare": (table,),
+        "fit": (measured,),
+        "diagnose": (table,),
+        "history": ("17",),
+        "certificate": (table, "--model", "mine.yaml", "--out", "c.html"),
+        "report": (table, "--out", "r.html"),
+        "export": (measured, "--out", "x.csv"),
+    }
+    own = {name: rig(name, *words, "--json") for name, words in asked.items()}
+    exported = (work / "x.csv").read_bytes()
+    monkeypatch.setenv("RIG_HOME", str(work / "elsewhere"))
+    for name, words in asked.items():
+        assert said(rig(name, *words, "--json", "--record", reader)) == said(own[name]), name
+    assert (work / "x.csv").read_bytes() == exported
+    monkeypatch.setenv(RECORD, reader)
+    assert [run.run for run in runs_of_workbench()] == [table, measured]
+    assert rig("runs").out.startswith("run ")
+
+
+def test_every_command_that_reads_runs_takes_the_record() -> None:
+    names = commands.list_commands(None)  # type: ignore[arg-type]
+    found = {name: commands.get_command(None, name) for name in names}  # type: ignore[arg-type]
+    takes = {name for name, each in found.items() if each and OPTION in each.params}
+    reads = {n for n, c in found.items() if c and {p.name for p in c.params} & {"data", "run", "sensor", "request"}}
+    assert reads - {"resume", "doctor"} <= takes
+    assert not takes & {"run", "resume", "push", "demo", "simulate", "doctor"}
+
+
+def denied(url: str, statement: str) -> str:
+    """Why a role may not."""
+    with Record(lab_url(url)) as lab, pytest.raises(RecordError) as error:
+        lab.engine.connect().exec_driver_sql(statement)
+    return str(error.value)
+
+
+@pytest.mark.usefixtures("work")
+def test_a_reader_writes_nothing(reader: str, writer: str, rig: Rig) -> None:
+    with Record() as own:
+        run = a_run(own)
+    refused = rig("push", "--to", reader)
+    assert refused.status == 2
+    assert "anna may not do that (permission denied for table" in refused.err
+    assert rig("push", "--to", writer).status == 0
+    for words in (("exclude", run, "3", "--reason", "no"), ("import", "good.csv", "--kind", "poses")):
+        refused = rig(*words, "--record", reader)
+        assert refused.status == 2
+        assert "its owner can give it rig_writer" in refused.err
+    for table in ("runs", "poses", "blocks", "arrivals", "events", "log"):
+        for statement in ("DELETE FROM {}", "UPDATE {} SET run = run", "INSERT INTO {} DEFAULT VALUES"):
+            assert "permission denied" in denied(reader, statement.format(table))
+    assert "permission denied" in denied(writer, "DELETE FROM poses")
+    assert rig("exclude", run, "3", "--reason", "a lorry", "--record", writer).status == 0
+    with Record(lab_url(reader)) as lab:
+        assert lab.excluded(run) == {3: "a lorry"}
+
+
+def test_a_rig_that_is_offline_goes_on_and_catches_up(
+    rig: Rig, bench_file: Callable[..., Path], server: Server, database: str
+) -> None:
+    away = f"postgresql://rig7@127.0.0.1:{free_port()}/rigs"
+    bench = str(bench_file({"lab": {"url": away, "push": True}}))
+    ended = rig(*SWEEP, "--bench", bench, "--json")
+    run = said(ended)["run"]
+    assert f"not pushed: {away}: the lab's record cannot be reached (connection" in ended.err
+    assert "nothing is lost, the next `rig push` goes on" in ended.err
+    assert rig("push", "--bench", bench).status == 2
+    there = server.url(database)
+    again = rig(*SWEEP, "--bench", str(bench_file({"lab": {"url": there, "push": True}})), "--json")
+    assert f"{run}: pushed to {there}" in again.err
+    with Record(lab_url(there)) as lab, Record() as own:
+        assert [each.rows for each in lab.runs()] == [POSES] * 2
+        assert held(lab, run) == held(own, run)
+    assert rig("push", "--to", there).out == f"{there} has all finished runs\n"
+
+
+def test_a_run_of_another_lab_is_resumed_at_home(rig: Rig, writer: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where runs are made, the lab is not asked, whatever the environment says."""
+    monkeypatch.setenv(RECORD, writer)
+    run = said(rig(*SWEEP, "--json"))["run"]
+    assert said(rig("resume", run, "--json"))["state"] == "complete"
+    assert said(rig("runs", "--json"))["runs"] == []
+
+
+def test_a_password_is_nowhere(
+    rig: Rig, people: Server, database: str, bench_file: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with Record() as own:
+        run = a_run(own)
+    right = people.url(database, "rig7", WORD)
+    monkeypatch.setenv(LAB, right)
+    monkeypatch.setenv(RECORD, right)
+    pushes = ((), ("--json",), ("--verify",), ("--prepare",), ("--help",), ("no-run",))
+    shown = [rig("push", *words) for words in pushes]
+    shown += [rig("show", each) for each in (run, "no-run")]
+    assert [each.status for each in shown] == [0, 0, 0, 2, 0, 2, 0, 2], shown[6]
+    for url in (
+        right.replace("rig7", "nobody"),
+        right.replace(f":{people.port}", f":{free_port()}"),
+        right.replace(database, "nowhere"),
+        right.replace(f"{WORD}@", f"{WORD}@{WORD}@"),
+        right.replace(f":{people.port}", f":{WORD}"),
+        right.replace("postgresql", "mysql"),
+        f"{WORD}",
+        f"{right}?sslmod=require",
+    ):
+        shown.append(rig("push", "--to", url))
+        assert shown[-1].status == 2, shown[-1]
+    for lab in ({"url": right}, {"url": f"{people.url(database)}?password={WORD}"}, right, {"url": right, "user": 1}):
+        shown.append(rig("push", "--bench", str(bench_file({"lab": lab})), "--to", right))
+        shown.append(rig("check", "--bench", str(bench_file({"lab": lab}))))
+        assert shown[-1].status == 2, shown[-1]
+    for each in shown:
+        assert WORD not in each.out + each.err
+        assert "Traceback" not in each.err
+    with Record(lab_url(right)) as lab:
+        assert WORD not in str([held(lab, each.run) for each in lab.runs()])
+
+
+def test_a_bench_with_a_password_is_refused_with_its_key(bench_file: Callable[..., Path], rig: Rig) -> None:
+    file = bench_file({"lab": {"url": f"postgresql://rig7:{WORD}@lab/rigs"}})
+    assert (
+        "bench.yaml, key lab.url: has a password, which every run would keep" in rig("check", "--bench", str(file)).err
+    )
+
+
+def test_which_lab_it_is_must_be_said(rig: Rig) -> None:
+    assert "no lab is named: give --to postgresql://USER@HOST/DATABASE, set RIG_LAB" in rig("push").err
+
+
+def test_a_database_is_prepared_once_and_brought_up_to_date(server: Server, rig: Rig) -> None:
+    name = server.new_database()
+    url = server.url(name)
+    assert "there is no record yet; `rig push --prepare --to URL`" in rig("runs", "--record", url).err
+    assert said(rig("push", "--prepare", "--to", url, "--json"))["before"] == 0
+    assert "CREATE ROLE rig7 LOGIN PASSWORD '...' IN ROLE rig_writer" in rig("push", "--prepare", "--to", url).out
+    with Record() as own, Record(lab_url(url)) as lab:
+        run = a_run(own)
+        push(own, lab, run)
+    server.sql("ALTER TABLE runs DROP COLUMN uid; DROP TABLE arrivals; COMMENT ON TABLE runs IS 'schema 6'", name)
+    assert f"of an older version (schema 6 of {SCHEMA}); `rig push --prepare" in rig("runs", "--record", url).err
+    assert prepare(lab_url(url)) == 6
+    assert f"{run}  complete" in rig("runs", "--record", url).out
+    server.sql(f"COMMENT ON TABLE runs IS 'schema {SCHEMA + 1}'", name)
+    for words in (("runs", "--record", url), ("push", "--prepare", "--to", url)):
+        assert f"of a newer version of this program (schema {SCHEMA + 1}" in rig(*words).err
+
+
+def test_verify_says_what_has_changed(rig: Rig, server: Server, database: str) -> None:
+    with Record() as own:
+        run = a_run(own)
+    url = server.url(database)
+    rig("push", run, "--to", url)
+    assert rig("push", "--verify", "--to", url).out == "1 runs as they arrived, 0 on their way\n"
+    rig("exclude", run, "3", "--reason", "no", "--record", url)
+    ended = rig("push", "--verify", "--to", url, "--json")
+    assert (ended.status, json.loads(ended.out)["changed"]) == (1, [run])
