@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from matplotlib.figure import Figure
 
@@ -51,16 +53,12 @@ def _models(result: MotionResult) -> tuple[tuple[str, Array, Quantity], ...]:
 def measurement(fit: Fit) -> Figure:
     """A panel for each axis: output less its mean over a few periods, mV; dots measured, line the model."""
     table = _stretches(fit)
-    axes_of = table.axes
-    figure, axes = panels(len(axes_of), 1, 2.6, sharex=True)
-    predicted, measured, t = _predicted(fit), table.samples.outputs, table.samples.time_s
-    start = int(np.searchsorted(t, table.time_s[len(table.time_s) // 2]))
-    rows = slice(start, int(np.searchsorted(t, t[start] + SHOWN_S)))
-    for c, ax in enumerate(axes[:, 0]):
-        middle = predicted[rows, c].mean()
-        ax.plot(t[rows], 1e3 * (predicted[rows, c] - middle), color=BLUE, zorder=1.5)
-        ax.plot(t[rows], 1e3 * (measured[rows, c] - middle), "o", color=INK, mfc="none", mew=0.7)
-        ax.set(title=f"axis {axes_of[c]}", ylabel=f"output less mean (m{table.unit})")
+    figure, axes = panels(len(table.axes), 1, 2.6, sharex=True)
+    for axis, ax in zip(table.axes, axes[:, 0], strict=True):
+        shown = waveform(fit, axis)
+        ax.plot(shown.at, 1e3 * shown.model, color=BLUE, zorder=1.5)
+        ax.plot(shown.at, 1e3 * shown.measured, "o", color=INK, mfc="none", mew=0.7)
+        ax.set(title=f"axis {axis}", ylabel=f"output less mean (m{table.unit})")
     axes[-1, 0].set_xlabel("time (s)")
     return figure
 
@@ -70,20 +68,57 @@ def failure(fit: Fit) -> Figure:
     """A panel for each axis: mean residual over one period of the strongest line, mV, the noise of a mean as a band."""
     table = _stretches(fit)
     figure, axes = panels(len(table.axes), 1, 2.6, sharex=True)
+    for axis, ax in zip(table.axes, axes[:, 0], strict=True):
+        shown = over_a_period(fit, axis)
+        floor_band(ax, 1e3 * shown.floor)
+        ax.plot(shown.phase_deg, 1e3 * shown.residual, "o-", color=VERMILION)
+        quarters(ax)
+        ax.set(title=f"axis {axis}", ylabel=f"mean residual (m{table.unit})")
+    axes[-1, 0].set_xlabel(f"phase of the motion {shown.line} (deg)")
+    return figure
+
+
+@dataclass(frozen=True)
+class Waveform:
+    """A few periods of one axis: time (s), and outputs less the model's mean, in the table's unit."""
+
+    at: Array
+    measured: Array
+    model: Array
+
+
+def waveform(fit: Fit, axis: str) -> Waveform:
+    """Those in the middle of the record."""
+    table = _stretches(fit)
+    c, t = table.axes.index(axis), table.samples.time_s
+    start = int(np.searchsorted(t, table.time_s[len(table.time_s) // 2]))
+    rows = slice(start, int(np.searchsorted(t, t[start] + SHOWN_S)))
+    model = _predicted(fit)[rows, c]
+    return Waveform(t[rows], table.samples.outputs[rows, c] - model.mean(), model - model.mean())
+
+
+@dataclass(frozen=True)
+class Period:
+    """Mean residual of one axis over the phase of the strongest `line`, and the noise of a mean."""
+
+    phase_deg: Array
+    residual: Array
+    floor: float
+    line: str
+
+
+def over_a_period(fit: Fit, axis: str) -> Period:
+    """All periods laid over each other, in BINS parts."""
+    table = _stretches(fit)
     phase, line = _phase(table)
     part = np.minimum((phase * BINS / 360).astype(int), BINS - 1)
     count = np.bincount(part, minlength=BINS)
-    centres = (np.arange(BINS) + 0.5) * 360 / BINS
-    for c, ax in enumerate(axes[:, 0]):
-        residual = table.samples.outputs[:, c] - _predicted(fit)[:, c]
-        mean = np.bincount(part, residual, minlength=BINS) / np.maximum(count, 1)
-        # a part of the period comes once in a period: by then the output filter has forgotten
-        floor_band(ax, 1e3 * float(rms(residual - mean[part])) / np.sqrt(np.median(count)))
-        ax.plot(centres[count > 0], 1e3 * mean[count > 0], "o-", color=VERMILION)
-        quarters(ax)
-        ax.set(title=f"axis {table.axes[c]}", ylabel=f"mean residual (m{table.unit})")
-    axes[-1, 0].set_xlabel(f"phase of the motion {line} (deg)")
-    return figure
+    c, there = table.axes.index(axis), count > 0
+    residual = table.samples.outputs[:, c] - _predicted(fit)[:, c]
+    mean = np.bincount(part, residual, minlength=BINS) / np.maximum(count, 1)
+    # a part of the period comes once in a period: by then the output filter has forgotten
+    floor = float(rms(residual - mean[part])) / np.sqrt(np.median(count))
+    return Period(((np.arange(BINS) + 0.5) * 360 / BINS)[there], mean[there], float(floor), line)
 
 
 def _stretches(fit: Fit) -> Stretches:

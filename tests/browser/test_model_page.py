@@ -10,6 +10,12 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from calibrations.model_file import read_model
+from procedures.catalogue import find
+from procedures.settings import parse
+from rig.bench import read_bench
+from rig.cli.watch import Quiet
+from rig.record import Record
+from rig.running.runner import start
 from tests.browser.conftest import Workbench
 from tests.browser.measured import hidden, hundred_thousand, thousand, unexplained, wandering
 
@@ -91,6 +97,17 @@ def test_of_a_still_record_the_allan_deviation_is_shown(workbench: Workbench, tm
     expect(page.locator(".verdict .headline").first).to_contain_text("Nothing is missing")
 
 
+def test_of_a_motion_its_samples_are_drawn(workbench: Workbench) -> None:
+    with Record() as record:
+        run = start(record, read_bench(), find("motion"), {}, Quiet({})).run.run
+    page = workbench.visit(f"/?data={run}")
+    expect(page.locator("[aria-label='Measurement beside model'] .ytitle")).to_have_text("x less its mean (mV)")
+    expect(page.locator("[aria-label='Where it fails'] .xtitle")).to_have_text("phase of the motion at 10 Hz (deg)")
+    page.keyboard.press("x")
+    expect(page.locator("[aria-label='What the model leaves'] .ytitle")).to_contain_text("residual of x in phase")
+    workbench.shot(page, "motion")
+
+
 def test_a_search_is_told_cancelled_and_begun_again(workbench: Workbench, tmp_path: Path) -> None:
     page = workbench.visit(f"/?data={quote(thousand(tmp_path))}")
     page.get_by_role("button", name="Cancel").dispatch_event("click")  # at once, while the page still moves
@@ -121,6 +138,32 @@ def test_selection_units_axes_and_poses(workbench: Workbench, tmp_path: Path) ->
     expect(page.locator("[aria-label='What the model leaves'] .xtitle")).to_have_text("temperature (°C)")
     page.locator("[aria-label='Where it fails'] .points path").nth(9).hover(force=True)
     expect(page.locator("[aria-label='Where it fails'] .hovertext")).to_contain_text("α 90°, β 90°")
+
+
+def test_selected_poses_are_left_out_with_a_reason_and_taken_in_again(workbench: Workbench) -> None:
+    bench, sweep = read_bench(), find("sweep")
+    with Record() as record:
+        settings = parse(sweep, {"inclinations_deg": "90,30", "step_deg": "45", "dwell_s": "0.5"})
+        run = start(record, bench, sweep, settings, Quiet({})).run
+    page = workbench.visit(f"/?data={run.run}")
+    expect(page.locator(".verdict .detail")).to_contain_text(f"on {run.rows} poses")
+    brushed(page, "Where it fails")
+    page.get_by_role("button", name="Leave out").click()
+    dialog = page.get_by_role("dialog")
+    dialog.get_by_role("button", name="Leave out").click()
+    expect(dialog.get_by_text("Say why")).to_be_visible()
+    dialog.get_by_label("Why").fill("a lorry passed")
+    dialog.get_by_role("button", name="Leave out").click()
+    expect(page.get_by_text("left out of every analysis")).to_be_visible()
+    with Record() as record:
+        out = record.excluded(run.run)
+    assert out
+    assert set(out.values()) == {"a lorry passed"}
+    expect(page.locator(".verdict .detail")).to_contain_text(f"on {run.rows - len(out)} poses")
+    page.goto(f"{workbench.origin}/record/{run.run}")
+    expect(page.get_by_text("Poses that are left out")).to_be_visible()
+    page.get_by_role("button", name="Take in again").first.click()
+    expect(page.get_by_role("button", name="Take in again")).to_have_count(len(out) - 1)
 
 
 def test_what_cannot_be_looked_at_says_what_to_do(workbench: Workbench) -> None:

@@ -43,9 +43,6 @@ def _sides(shown: Shown) -> tuple[Array, Array, str]:
     if fit.table.kind == "positions":
         what = "|m| (share of the field)" if fit.table.content == "fields" else "|a| (g)"
         return 1.0 + fit.residual[0], np.ones(fit.table.n), what
-    if fit.table.kind == "motion":
-        model = np.zeros(fit.table.n)
-        return shown.factor * fit.residual[c], model, f"{fit.channels[c]} ({shown.unit})"
     measured = fit.table.outputs[:, c]
     model = measured - fit.residual[c]
     if not shown.in_g:

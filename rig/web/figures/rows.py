@@ -85,8 +85,8 @@ class Shown:
     @property
     def label(self) -> str:
         """Of the residual's axis."""
-        what = f"|{'m' if self.fit.table.content == 'fields' else 'a'}|"
-        return f"residual of {what if self.fit.table.kind == 'positions' else self.fit.channels[self.c]} ({self.unit})"
+        of = "" if self.fit.table.kind == "positions" else f" of {self.fit.channels[self.c]}"
+        return f"residual{of} ({self.unit})"
 
     @cached_property
     def hover(self) -> list[str]:

@@ -10,6 +10,7 @@ from nicegui import events, ui
 from calibrations.pictures.candidate import most_telling
 from calibrations.pictures.columns import Column
 from calibrations.pictures.waterfall import levels
+from rig.web.figures import motion
 from rig.web.figures.failure import failure
 from rig.web.figures.measurement import measurement
 from rig.web.figures.residual import residual
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from calibrations.fit import Fit
     from rig.analysis.trail import Trail
 
+LONG = 4  # letters of a channel's name
 LINKED = ("measurement", "residual", "failure")
 TITLES = {
     "measurement": "Measurement beside model",
@@ -56,7 +58,8 @@ class Pictures:
 
     def _controls(self) -> None:
         with box("controls row-of"):
-            self.axis = ui.toggle({0: "x"}, value=0, on_change=self.draw).props("dense no-caps")
+            self.axis: ui.toggle | ui.select = ui.toggle({0: "x"}, value=0, on_change=self.draw)
+            self.axis.props("dense no-caps")
             self.unit = ui.toggle({False: "V", True: "g"}, value=False, on_change=self.draw).props("dense no-caps")
             self.x = self._column("against")
             self.colour = self._column("coloured by")
@@ -91,15 +94,26 @@ class Pictures:
         self.fit, self.trail, self.step = fit, trail, None
         self.columns = choices(fit)
         x, colour = first_choices(list(self.columns))
-        self.axis.set_options(
-            dict(enumerate(fit.channels)), value=min(int(self.axis.value or 0), len(fit.channels) - 1)
-        )
+        self._offer(fit.channels)
         self.unit.set_options(_units(fit), value=fit.table.kind == "positions" or bool(self.unit.value))
+        self.unit.set_visibility(len(self.unit.options) > 1)
         for select, first in ((self.x, x), (self.colour, colour)):
             value = select.value if select.value in self.columns else first
             select.set_options({name: column.labels[0] for name, column in self.columns.items()}, value=value)
         self.considered.set_visibility(False)
         self.draw()
+
+    def _offer(self, channels: Sequence[str]) -> None:
+        """The channels: buttons where their names are short, else a list."""
+        value = min(self.c, len(channels) - 1)
+        if max(map(len, channels)) > LONG and isinstance(self.axis, ui.toggle):
+            with self.axis.parent_slot.parent:  # type: ignore[union-attr] # it has a place
+                chosen = ui.select({0: ""}, value=0, label="output", on_change=self.draw).props("dense options-dense")
+            chosen.move(target_index=0)
+            self.axis.delete()
+            self.axis = chosen
+        self.axis.set_options(dict(enumerate(channels)), value=value)
+        self.axis.set_visibility(len(channels) > 1)
 
     def consider(self, step: Added | None) -> None:
         """Draw the curve of an effect through the residual, against what it follows; None takes it away."""
@@ -138,16 +152,17 @@ class Pictures:
             self.shown,
             self.columns.get(self.colour.value or "", self.columns[self.x.value]),
         )
+        moving = shown.fit.table.kind == "motion"  # its samples are drawn, which are no rows
         plain = self.columns[self.x.value if self.x.value != FOLLOWED else next(iter(self.columns))]
         drawn: dict[str, Callable[[], Figure]] = {
-            "measurement": lambda: measurement(shown, plain, colour),
+            "measurement": lambda: motion.measurement(shown) if moving else measurement(shown, plain, colour),
             "residual": lambda: residual(shown, self.columns[self.x.value], colour, self.step),
-            "failure": lambda: failure(shown),
+            "failure": lambda: motion.failure(shown) if moving else failure(shown),
             "waterfall": lambda: waterfall(levels(trail)),
         }
         for name, make in drawn.items():
             figure = make()
-            if name in LINKED and self.selected:
+            if "customdata" in figure["data"][0] and self.selected:
                 figure["data"][0]["selectedpoints"] = self.selected
             self.plots[name].update_figure(figure)
         self._tell(shown)
@@ -175,12 +190,13 @@ class Pictures:
         if self.fit is None:
             return
         self.selected = sorted({int(point) for point in points})
-        for name in LINKED:
-            self.plots[name].figure["data"][0]["selectedpoints"] = self.selected or None
-            marked = {"selectedpoints": [self.selected or None]}
-            self.plots[name].run_plot_method("restyle", marked, [0])
+        for plot in (self.plots[name] for name in LINKED):
+            if "customdata" not in plot.figure["data"][0]:
+                continue
+            plot.figure["data"][0]["selectedpoints"] = self.selected or None
+            plot.run_plot_method("restyle", {"selectedpoints": [self.selected or None]}, [0])
             if not self.selected:
-                self.plots[name].run_plot_method("relayout", {"selections": []})
+                plot.run_plot_method("relayout", {"selections": []})
         self._tell(self.shown)
 
     def _tell(self, shown: Shown) -> None:
