@@ -57,9 +57,10 @@ def allan(found: NoiseAnalysis) -> Figure:
         curve.tau_s, curve.deviation, bars, fmt="o", color=INK, elinewidth=0.8, ms=3.4, label="measured", zorder=3
     )
     tau_s = whole_steps(curve.tau_s[0], curve.tau_s[-1], found.rate_hz)
-    ax.plot(tau_s, found.modelled(tau_s), color=INK, lw=1.4, label=SUM)
-    for name, variance in found.parts(tau_s).items():
+    parts = found.parts(tau_s)
+    for name, variance in parts.items() if _several(found) else ():
         ax.plot(tau_s, np.sqrt(variance), "--", color=COLOURS[name], label=name)
+    ax.plot(tau_s, found.modelled(tau_s), color=INK, lw=1.4, label=SUM if _several(found) else next(iter(parts)))
     for kind, colour in (("modified", BLUE), ("hadamard", GREEN), ("total", VERMILION)):
         other = found.curves[kind]
         beside.fill_between(other.tau_s, other.low, other.high, color=colour, alpha=0.18, lw=0)
@@ -70,9 +71,14 @@ def allan(found: NoiseAnalysis) -> Figure:
     ax.set(xlabel="averaging time (s)", ylabel=f"deviation ({found.unit})", title="Allan deviation, overlapping")
     beside.set(xlabel="averaging time (s)", title="other deviations")
     for each in (ax, beside):
-        each.legend()
+        each.legend(loc="upper center")  # the curves fall on the left, and bars are long on the right
         mark_powers(each)
     return figure
+
+
+def _several(found: NoiseAnalysis) -> bool:
+    """Whether the sum is anything but its one part."""
+    return len(found.found.power) + len(found.lines) > 1
 
 
 @styled
@@ -86,12 +92,13 @@ def density(found: NoiseAnalysis) -> Figure:
     tail = (1 - COVERAGE) / 2
     low, high = (root(expected * chi2.ppf(p, freedom) / freedom) for p in (tail, 1 - tail))
     ax.fill_between(f, low, high, color=QUIET, alpha=0.22, lw=0)
-    ax.vlines(f, *(root(bound[order]) for bound in spectrum.interval), color=INK, lw=0.5, alpha=0.35)
+    ax.vlines(f, *(root(bound[order]) for bound in spectrum.interval), color=INK, lw=0.5, alpha=0.25)
     ax.plot(f, root(spectrum.density[order]), "o", color=INK, ms=2.2, label="measured")
-    ax.plot(f, root(expected), color=INK, lw=1.2, label=SUM)
-    for name, power in found.found.power.items():
+    several = len(found.found.power) > 1
+    for name, power in found.found.power.items() if several else ():
         column = spectrum.column(name, found.found.time_constant_s)[order]
         ax.plot(f, root(power * column), "--", color=COLOURS[name], label=name)
+    ax.plot(f, root(expected), color=INK, lw=1.2, label=SUM if several else next(iter(found.found.power)))
     ax.set(xscale="log", yscale="log", ylim=(low.min() / 2, 2 * max(high.max(), root(spectrum.density).max())))
     _mark_lines(ax, found)
     ax.set(xlabel="frequency (Hz)", ylabel=f"density ({found.unit}/√Hz)")

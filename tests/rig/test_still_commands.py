@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -245,3 +246,24 @@ def test_known_noise_lets_a_quiet_model_be_adequate(rig: Rig, folder: Path) -> N
     assert document(rig("diagnose", "sweep.csv", "--json"))["verdict"] == "unexplained"
     assert document(rig("diagnose", "sweep.csv", "--noise", "noise.yaml", "--json"))["verdict"] == "adequate"
     assert rig("compare", "sweep.csv", "--noise", "noise.yaml", "--check").status == 0
+
+
+def test_no_legend_names_a_thing_twice(rig: Rig, folder: Path) -> None:
+    """Of a model that misses nothing, of one whose record had something taken off, and of a single process."""
+    random = np.random.default_rng(3)
+    np.save("white.npy", white(random, N))
+    np.save("step.npy", white(random, N) + 2.0 * (np.arange(N) > 2000))
+    shown = {}
+    for name in ("white", "step"):
+        for words in (("report", f"{name}.npy", "--out", f"{name}.html"), ("noise", f"{name}.npy")):
+            made = f"{name}-{words[0]}"
+            ended = rig(*words, "--rate", "10", "--pictures", made, "--format", "svg")
+            assert ended.status == 0, ended.err
+            for path in Path(made).iterdir():
+                texts = re.findall(r"<text[^>]*>([^<]+)</text>", path.read_text())
+                shown[made, path.stem] = [text for text in texts if re.fullmatch(r"[a-z][a-z ,-]+", text)]
+    for legend in shown.values():
+        assert len(set(legend)) == len(legend)
+    assert "their sum" not in shown["white-noise", "allan"]
+    assert "measured, less what no noise is" in shown["step-report", "allan"]
+    assert "measured, less what no noise is" not in shown["white-report", "allan"]
