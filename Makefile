@@ -32,7 +32,7 @@ setup: .venv/ready
 # The stamp is newer than what it was made from, so that a second call starts at once.
 .venv/ready: pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test,fleet]'
 	for tool in mbpoll gcc clang chromium; do [ "$$(id -u)" != 0 ] || command -v $$tool >/dev/null || { apt-get -qq update && apt-get -qq install -y $$tool || true; }; done
 	command -v chromium >/dev/null || $(BIN)/python -m playwright install chromium || true
 	$(BIN)/python -m rig.warm

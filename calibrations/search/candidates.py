@@ -57,11 +57,7 @@ def candidates(before: Fit, effects: Mapping[str, Effect]) -> list[Candidate]:
     """All candidates, best first: by likelihood, a parameter costing log(rows) (Schwarz); those that do not lower
     the error on unseen poses come last."""
     screen = Screen(before)
-    tried = [
-        (effect, *_columns(screen, effect))
-        for effect in effects.values()
-        if _applies(effect, before) and _fits(before, effect)
-    ]
+    tried = [(effect, *_columns(screen, effect)) for effect in askable(before, effects)]
     tried = [each for each in tried if each[3].shape[1]]
     search = Search(screen, [basis for *_, basis in tried])
     extras = [columns for *_, columns, _ in tried]
@@ -111,6 +107,11 @@ def schwarz(c: Candidate, rows: int) -> float:
 def added(before: Fit, c: Candidate) -> Fit:
     """The model with the candidate added, all parameters fitted jointly."""
     return refit(before, before.model.with_effect(c.effect), c.start)
+
+
+def askable(before: Fit, effects: Mapping[str, Effect]) -> list[Effect]:
+    """The effects that the model can miss and that the data can show, with rows enough for their parameters."""
+    return [effect for effect in effects.values() if _applies(effect, before) and _fits(before, effect)]
 
 
 def _applies(effect: Effect, before: Fit) -> bool:

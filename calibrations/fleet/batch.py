@@ -1,0 +1,125 @@
+"""What a batch misses: effects that its sensors show together, though perhaps none of them shows it alone.
+
+Two tests of each effect, both with the sensors as replicates, so that neither leans on any one sensor's noise model:
+
+    common   its sensors have the same value: Hotelling's T^2 of their scores against no effect. Scores are bounded (no
+             sensor counts more than twice as much as the median one), so that one defect does not speak for a batch.
+    own      each sensor has a value of its own: how many gain more by it than it costs (Mallows: the fall of the sum of
+             squares above twice the parameters), against how many would on noise alone. Half of them must.
+
+The chance is multiplied by the number of tests (Bonferroni). Among those that are significant the one with the greatest
+gain is the batch's, a parameter costing log(rows) in each sensor, or log(sensors) where all have one value (Schwarz).
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Container, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import bdtrc, chdtrc, fdtrc
+
+from calibrations.fleet.look import Look, Score
+from calibrations.search.candidates import NOT_TOLD_APART, SIGNIFICANT
+from calibrations.table import Array
+
+FEWEST = 4  # sensors that make a batch
+MOST_OF_ONE = 2.0  # times the length of the median score: what one sensor may say
+WORTH = 2.0  # fall of the sum of squares for each parameter that is worth having it (Mallows' C_p)
+MOST = 0.5  # of the sensors that gain from an effect of their batch
+RANK = 1e-9  # eigenvalue of a covariance of scores, over the greatest: less is rounding
+
+
+@dataclass(frozen=True)
+class BatchEffect:
+    """An effect as a batch shows it. `sensors` show it alone, out of `of`; `common`: all have about one value.
+
+    `p_value` is corrected for the search, `gain` twice the log-likelihood less the price of the parameters; `rivals`
+    would do as well.
+    """
+
+    effect: str
+    common: bool
+    p_value: float
+    gain: float
+    sensors: int
+    of: int
+    rivals: tuple[str, ...] = ()
+
+
+def batch_effects(looks: Sequence[Look], of_stage: Container[str] = ()) -> list[BatchEffect]:
+    """The significant effects of a batch beside the model of `looks`, best first; none in a batch of too few.
+
+    Effects `of_stage` are of the rig, which every sensor finds as it is: they are asked for in common only.
+    """
+    if len(looks) < FEWEST:
+        return []
+    tried: dict[tuple[str, int], list[tuple[Score, int]]] = defaultdict(list)
+    for look in looks:
+        for score in look.scores:
+            tried[score.effect, score.start].append((score, look.rows))
+    asked = [of for of in tried.values() if len(of) >= max(FEWEST, len(looks) / 2)]
+    found = [_judged(of, 2 * len(asked), of[0][0].effect not in of_stage) for of in asked]
+    found = sorted((each for each in found if each.p_value < SIGNIFICANT), key=lambda e: e.gain, reverse=True)
+    best: dict[str, BatchEffect] = {}
+    for each in found:
+        best.setdefault(each.effect, each)
+    return [_with_rivals(each, list(best.values())) for each in best.values()]
+
+
+def _with_rivals(each: BatchEffect, found: list[BatchEffect]) -> BatchEffect:
+    rivals = tuple(o.effect for o in found if o is not each and o.gain > each.gain - NOT_TOLD_APART)
+    return BatchEffect(**{**vars(each), "rivals": rivals})
+
+
+def _judged(of: list[tuple[Score, int]], tests: int, may_differ: bool) -> BatchEffect:
+    scores = [score for score, _ in of]
+    statistics, ranks = np.array([s.statistic for s in scores]), np.array([s.rank for s in scores])
+    price = float(np.median(ranks)) * float(np.median(np.log([rows for _, rows in of])))
+    asked = [(True, *_common(scores, int(np.median(ranks))))]
+    if may_differ:
+        asked.append((False, _own(statistics, ranks), len(of) * (float(np.median(statistics)) - price)))
+    significant = [each for each in asked if each[1] * tests < SIGNIFICANT]
+    common, p_value, gain = max(significant or asked, key=lambda each: each[2])
+    return BatchEffect(
+        effect=scores[0].effect,
+        common=common,
+        p_value=min(1.0, tests * p_value),
+        gain=gain,
+        sensors=int(np.sum([s.p_value * tests / 2 < SIGNIFICANT for s in scores])),
+        of=len(of),
+    )
+
+
+def _common(scores: list[Score], rank: int) -> tuple[float, float]:
+    """Chance of so much in common without an effect, and the gain by one value for all."""
+    u, weights = _bounded(scores)
+    n, total = len(u), u.sum(axis=0)
+    values, vectors = np.linalg.eigh(u.T @ u)
+    kept = values > RANK * values[-1]
+    rank = min(rank, int(kept.sum()))
+    if not rank or n <= rank + 1:
+        return 1.0, 0.0
+    along = (vectors.T @ total)[kept][-rank:]
+    share = float(np.sum(along**2 / values[kept][-rank:])) / n  # of all that they say, what they say alike
+    f = share / max(1 - share, 1e-12) * (n - rank) / rank
+    information = sum((w * s.information for w, s in zip(weights, scores, strict=True)), np.zeros((u.shape[1],) * 2))
+    gain = float(total @ np.linalg.pinv(information, rcond=1e-9, hermitian=True) @ total)
+    return float(fdtrc(rank, n - rank, f)), gain - rank * float(np.log(n))
+
+
+def _bounded(scores: list[Score]) -> tuple[Array, Array]:
+    """Scores (n, k), none longer than MOST_OF_ONE times the median, and the factors (n,) that make them so."""
+    length = np.sqrt([s.statistic for s in scores])
+    weights = np.minimum(1.0, MOST_OF_ONE * np.median(length) / np.maximum(length, 1e-300))
+    return np.array([s.score for s in scores]) * weights[:, None], weights
+
+
+def _own(statistics: Array, ranks: Array) -> float:
+    """Chance that noise makes as many sensors gain from the effect; 1 where they are fewer than MOST."""
+    n, gaining = len(statistics), int(np.sum(statistics > WORTH * ranks))
+    if gaining < MOST * n:
+        return 1.0
+    each = float(np.max(chdtrc(ranks, WORTH * ranks)))
+    return float(bdtrc(gaining - 1, n, each))

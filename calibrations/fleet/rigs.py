@@ -1,0 +1,217 @@
+"""Errors of rigs, found from the sensors that they measured: what all sensors of one rig share is the rig's.
+
+One sensor cannot tell its own misalignment from its stage's zero offset. Over a fleet, parameter j of an effect on the
+pose, as sensor i of batch b on rig r shows it, is
+
+    y_i = beta_b + rho_r + e_i        var e_i = tau^2 + v_i
+
+with tau^2 what sensors of one batch differ by on one rig (Paule and Mandel), whatever of the sensor looks like it: the
+sensors are taken to have come to the rigs by chance. rho is tested by F (Knapp and Hartung, 2003). The strongest effect
+is taken, its rigs' values taken off, and the search goes on.
+
+What this cannot tell: an error that all rigs share from one of the sensors' design; a rig's from a batch's where each
+batch was on one rig. Values are therefore told from the median of the rigs that batches connect.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+from scipy.special import fdtrc, stdtr
+
+from calibrations.fleet.look import Stage
+from calibrations.search.candidates import SIGNIFICANT
+from calibrations.table import Array
+
+FAR = 5.0  # robust standard deviations off the others of its batch and rig: a sensor that tells nothing of the rig
+TO_STD = 1.4826
+DETERMINED = 1e-8  # share of an information matrix: less is not known
+FEWEST = 3  # sensors beyond what is estimated
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A sensor's part: where it was measured, of which batch, and what it shows of the stage."""
+
+    batch: str
+    rig: str
+    stage: Stage
+
+
+@dataclass(frozen=True)
+class RigError:
+    """One parameter of one rig's error: value and standard uncertainty against the median of the rigs, in `unit`.
+
+    `p_value` is that of the effect, over all rigs and the whole search; `sensors` measured there.
+    """
+
+    rig: str
+    effect: str
+    parameter: str
+    unit: str
+    value: float
+    std: float
+    p_value: float
+    sensors: int
+    beyond: bool  # whether this rig's own value is more than chance
+
+
+@dataclass(frozen=True)
+class _Found:
+    """What one effect would be on every rig, and by how much it would take off the sums of squares of all sensors."""
+
+    errors: tuple[RigError, ...] = ()
+    fall: float = 0.0
+
+    @property
+    def p_value(self) -> float:
+        return self.errors[0].p_value if self.errors else 1.0
+
+
+def rig_errors(fleet: Sequence[Measured]) -> list[RigError]:
+    """The errors of rigs that the fleet shows, effect by effect in the order found; none where no two are connected."""
+    names = next((each.stage.names for each in fleet if each.stage.names), ())
+    fleet = [each for each in fleet if each.stage.names == names]
+    effects = list(dict.fromkeys(effect for effect, *_ in names))
+    taken = {rig: np.zeros(len(names)) for rig in {each.rig for each in fleet}}
+    errors: list[RigError] = []
+    while effects and fleet:
+        found = {effect: _effect(fleet, names, effect, taken) for effect in effects}
+        significant = [e for e, of in found.items() if of.p_value * len(effects) < SIGNIFICANT and of.fall > 0]
+        if not significant:
+            break
+        best = max(significant, key=lambda effect: found[effect].fall)
+        errors += found[best].errors
+        for error in found[best].errors:
+            if error.beyond:
+                taken[error.rig][_place(names, error.effect, error.parameter)] = error.value
+        effects.remove(best)
+    return errors
+
+
+def unconnected(fleet: Sequence[Measured]) -> list[tuple[str, ...]]:
+    """Groups of rigs between which no batch connects; one group where all can be compared."""
+    groups: list[set[str]] = []
+    for batch in dict.fromkeys(each.batch for each in fleet):
+        rigs = {each.rig for each in fleet if each.batch == batch}
+        joined = [group for group in groups if group & rigs]
+        groups = [group for group in groups if not group & rigs] + [rigs.union(*joined)]
+    return [tuple(sorted(group)) for group in groups]
+
+
+def _place(names: Sequence[tuple[str, str, str]], effect: str, parameter: str) -> int:
+    return next(k for k, (e, p, _) in enumerate(names) if (e, p) == (effect, parameter))
+
+
+def _effect(
+    fleet: Sequence[Measured], names: Sequence[tuple[str, str, str]], effect: str, taken: Mapping[str, Array]
+) -> _Found:
+    """The errors of one effect, of every rig, beside what is taken off already."""
+    mine = [k for k, name in enumerate(names) if name[0] == effect]
+    sensors, values, variances, scores, informations = [], [], [], [], []
+    for each in fleet:
+        A = each.stage.information
+        own = A[mine][:, mine]
+        size = np.diag(own)
+        if not np.all(size > 0) or np.linalg.cond(own / np.sqrt(np.outer(size, size))) > 1 / DETERMINED:
+            continue
+        score = each.stage.score[mine] + A[mine] @ taken[each.rig]
+        inverse = np.linalg.inv(own)
+        sensors.append(each)
+        values.append(-inverse @ score)  # the residual falls as the prediction grows
+        scores.append(score)
+        variances.append(np.diag(inverse))
+        informations.append(own)
+    if not sensors:
+        return _Found()
+    y, v = np.array(values), np.array(variances)
+    found = [_parameter(sensors, y[:, j], v[:, j], names[k]) for j, k in enumerate(mine)]
+    least = min(len(mine) * min((e.p_value for of in found for e in of), default=1.0), 1.0)
+    errors = tuple(RigError(**{**vars(error), "p_value": least}) for of in found for error in of)
+    off = {rig: np.zeros(len(mine)) for rig in taken}
+    for error in errors:
+        if error.beyond:
+            off[error.rig][[names[k][1] for k in mine].index(error.parameter)] = error.value
+    falls = (
+        -2 * score @ off[each.rig] - off[each.rig] @ own @ off[each.rig]
+        for each, score, own in zip(sensors, scores, informations, strict=True)
+    )
+    return _Found(errors, float(sum(falls)))
+
+
+def _parameter(sensors: Sequence[Measured], y: Array, v: Array, name: tuple[str, str, str]) -> list[RigError]:
+    """One parameter of every rig; nothing where the rigs cannot be compared."""
+    alike = ~_far(sensors, y, v)
+    sensors = [each for each, good in zip(sensors, alike, strict=True) if good]
+    y, v = y[alike], v[alike]
+    batches, rigs = sorted({each.batch for each in sensors}), sorted({each.rig for each in sensors})
+    of_batch = np.array([[each.batch == batch for batch in batches] for each in sensors], dtype=float)
+    both = np.hstack([of_batch, np.array([[each.rig == rig for rig in rigs] for each in sensors], dtype=float)])
+    more = int(np.linalg.matrix_rank(both)) - len(batches)
+    free = len(y) - len(batches) - more
+    if more <= 0 or free < FEWEST:
+        return []
+    total = v + _between(both, y, v, free)
+    left, theta, cov = _least_squares(both, y, total)
+    scale = max(1.0, left / free)
+    f = (_least_squares(of_batch, y, total)[0] - left) / more / scale
+    p_value = float(fdtrc(more, free, max(f, 0.0)))
+    errors = []
+    for group in unconnected(sensors):
+        places = [len(batches) + rigs.index(rig) for rig in group]
+        middle = _middle(theta[places])
+        for k, rig in enumerate(group if len(group) > 1 else ()):
+            along = np.zeros(len(theta))
+            along[places] = np.eye(len(group))[k] - middle
+            value, std = float(along @ theta), float(np.sqrt(scale * along @ cov @ along))
+            beyond = std > 0 and 2 * float(stdtr(free, -abs(value) / std)) * len(rigs) < SIGNIFICANT
+            here = sum(each.rig == rig for each in sensors)
+            errors.append(RigError(rig, name[0], name[1], name[2], value, std, p_value, here, beyond))
+    return errors
+
+
+def _middle(values: Array) -> Array:
+    """Weights (n,) that make the median of `values`."""
+    order, n = np.argsort(values), len(values)
+    weights = np.zeros(n)
+    weights[order[(n - 1) // 2]] += 0.5
+    weights[order[n // 2]] += 0.5
+    return weights
+
+
+def _far(sensors: Sequence[Measured], y: Array, v: Array) -> NDArray[np.bool_]:
+    """Sensors far off the others of their batch on their rig, (n,)."""
+    far = np.zeros(len(y), dtype=bool)
+    places: dict[tuple[str, str], list[int]] = {}
+    for k, each in enumerate(sensors):
+        places.setdefault((each.batch, each.rig), []).append(k)
+    for chosen in map(np.array, places.values()):
+        off = np.abs(y[chosen] - np.median(y[chosen]))
+        far[chosen] = off > FAR * np.sqrt((TO_STD * np.median(off)) ** 2 + v[chosen])
+    return far
+
+
+def _between(X: Array, y: Array, v: Array, free: int) -> float:
+    """tau^2 that makes the weighted sum of squares what its degrees of freedom are; 0 where it is less without."""
+
+    def beyond(tau2: float) -> float:
+        return _least_squares(X, y, v + tau2)[0] - free
+
+    if beyond(0.0) <= 0:
+        return 0.0
+    high = float(np.var(y)) + float(np.max(v))
+    while beyond(high) > 0:
+        high *= 4
+    return float(brentq(beyond, 0.0, high, rtol=1e-6))
+
+
+def _least_squares(X: Array, y: Array, variance: Array) -> tuple[float, Array, Array]:
+    """Weighted sum of squares left, the solution of least length, and its covariance."""
+    w = 1 / np.sqrt(variance)
+    inverse = np.linalg.pinv((X * w[:, None]).T @ (X * w[:, None]), rcond=1e-10, hermitian=True)
+    theta = inverse @ ((X * w[:, None]).T @ (y * w))
+    return float(np.sum(((y - X @ theta) * w) ** 2)), theta, np.asarray(inverse)

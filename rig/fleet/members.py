@@ -1,0 +1,179 @@
+"""Which sensors a fleet has: of which batch each is, which rig measured it, and where its table is.
+
+A source is one of
+    an index   a CSV file with a column `file` or `data` (a file beside it, or a run), and if known sensor, batch, rig
+    a folder   all its CSV files; an index in it named `fleet.csv` is preferred
+    a table    one CSV file
+    a run      RUN or RUN/SENSOR of the record, RUN alone for all its sensors
+Where an index does not say, batch, rig and sensor are the constants of the table (`# batch: L7`), the name of the run's
+bench, and the file's name.
+"""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from calibrations.errors import DataError
+from calibrations.numerals import as_written
+from calibrations.reading.text_file import text_file
+from rig.analysis.sensors import CALIBRATING, members
+from rig.errors import RigError, UnknownRun
+from rig.record import Record, Run
+
+INDEX = "fleet.csv"
+COLUMNS = ("sensor", "batch", "rig", "file", "data")
+
+
+@dataclass(frozen=True)
+class Member:
+    """One sensor's table. `text` is that of a file, None for what the record holds under `data`.
+
+    `digest` is the same for the same data; `fault` says why there is none.
+    """
+
+    sensor: str
+    batch: str
+    rig: str
+    data: str
+    digest: str = ""
+    fault: str | None = None
+    run: bool = False
+
+
+def fleet_of(sources: Iterable[str]) -> list[Member]:
+    """Every sensor that the sources name, once each; without a source, of all complete runs of the record.
+
+    What cannot be read is a member with a fault. Raises RigError where there is no such source, or two members are
+    called alike.
+    """
+    named = list(sources)
+    found = [member for source in named for member in _of(source)] if named else list(_of_record())
+    if not found:
+        raise RigError(f"no sensor in {', '.join(named) or 'the record'}; name an index, a folder, tables or runs")
+    unique = list({(member.data, member.sensor): member for member in found}.values())
+    seen: dict[str, Member] = {}
+    for member in unique:
+        if (other := seen.setdefault(member.sensor, member)) is not member:
+            raise RigError(
+                f"the sensor {member.sensor} is there twice: {other.data} and {member.data}; "
+                "give each its name in the column `sensor` of an index, or leave one out"
+            )
+    return unique
+
+
+def content(member: Member) -> str:
+    """The text of a member's file. Raises DataError."""
+    with text_file(Path(member.data)).lines() as lines:
+        return "".join(lines)
+
+
+def _of(source: str) -> Iterator[Member]:
+    path = Path(source)
+    if path.is_dir():
+        index = path / INDEX
+        files = sorted(path.glob("*.csv"))
+        yield from _of_index(index) if index.is_file() else (_of_file(file, {}) for file in files)
+    elif path.is_file():
+        yield from _of_index(path) if _is_index(path) else [_of_file(path, {})]
+    else:
+        yield from _of_run(source, {})
+
+
+def _is_index(path: Path) -> bool:
+    head = _head(path)
+    return bool({"file", "data"} & set(head)) and set(head) <= set(COLUMNS)
+
+
+def _head(path: Path) -> list[str]:
+    try:
+        with text_file(path).lines() as lines:
+            first = next((line for line in lines if not line.startswith("#") and line.strip()), "")
+    except DataError:
+        return []
+    return [cell.strip() for cell in next(csv.reader([first]), [])]
+
+
+def _of_index(path: Path) -> Iterator[Member]:
+    """Raises RigError for a column that an index has not, and for a row that names no data."""
+    with text_file(path).lines() as lines:
+        rows = list(csv.DictReader(io.StringIO("".join(line for line in lines if not line.startswith("#")))))
+    for number, row in enumerate(rows, 2):
+        said = {
+            name.strip(): (cell or "").strip() for name, cell in row.items() if isinstance(cell, str | None) and name
+        }
+        if unknown := set(said) - set(COLUMNS):
+            raise RigError(f"{path}: an index has the columns {', '.join(COLUMNS)}, not {', '.join(sorted(unknown))}")
+        named = said.get("file") or said.get("data")
+        if not named:
+            raise RigError(f"{path}, line {number}: names no file and no run; fill in the column `file` or `data`")
+        beside = path.parent / named
+        known = {name: said[name] for name in ("sensor", "batch", "rig") if said.get(name)}
+        if said.get("file") or beside.is_file():
+            yield _of_file(beside, known)
+        else:
+            yield from _of_run(named, known)
+
+
+def _of_file(path: Path, said: dict[str, str]) -> Member:
+    member = Member(said.get("sensor", path.stem), said.get("batch", ""), said.get("rig", ""), str(path))
+    try:
+        text = content(member)
+    except DataError as error:
+        return replace(member, fault=str(error))
+    constants = {
+        key.strip(): value.strip() for key, _, value in map(_constant, text.splitlines()[:50]) if value.strip()
+    }
+    return Member(
+        sensor=said.get("sensor") or constants.get("serial") or constants.get("sensor") or path.stem,
+        batch=said.get("batch") or constants.get("batch", ""),
+        rig=said.get("rig") or constants.get("rig", ""),
+        data=str(path),
+        digest=hashlib.sha256(text.encode()).hexdigest(),
+    )
+
+
+def _constant(line: str) -> tuple[str, str, str]:
+    return line[1:].partition(":") if line.startswith("#") else ("", "", "")
+
+
+def _of_run(name: str, said: dict[str, str]) -> Iterator[Member]:
+    """The sensors of a run, or the one that is named. Raises UnknownRun."""
+    run_id, slash, chosen = name.partition("/")
+    try:
+        with Record.to_find(run_id) as record:
+            found = list(_members(record, record.run(run_id)))
+    except UnknownRun as error:
+        raise UnknownRun(f"{name}: there is no such file or folder, and {error}") from None
+    mine = [member for member in found if not slash or member.data == name]
+    if not mine:
+        raise UnknownRun(f"run {run_id} has no sensor {chosen!r}; it has {', '.join(m.data for m in found)}")
+    for m in mine:
+        yield replace(
+            m, sensor=said.get("sensor", m.sensor), batch=said.get("batch", m.batch), rig=said.get("rig", m.rig)
+        )
+
+
+def _of_record() -> Iterator[Member]:
+    """The last complete run of each sensor."""
+    if not Record.is_there():
+        return
+    with Record.to_read() as record:
+        seen: set[str] = set()
+        for run in record.runs():
+            if run.state == "complete" and run.kind in CALIBRATING:
+                yield from (m for m in _members(record, run) if m.sensor not in seen)
+                seen |= set(members(run))
+
+
+def _members(record: Record, run: Run) -> Iterator[Member]:
+    batch, rig = (str(as_written(run.constants[name])) if name in run.constants else "" for name in ("batch", "rig"))
+    state = hashlib.sha256(f"{run.run} {run.configuration} {run.ended} {record.excluded(run.run)}".encode()).hexdigest()
+    for sensor, member in (members(run) or {run.run: ""}).items():
+        data = f"{run.run}/{member}" if member else run.run
+        digest = hashlib.sha256(f"{state} {member}".encode()).hexdigest()
+        yield Member(sensor, batch, rig or str(run.bench.get("name", "")), data, digest, run=True)

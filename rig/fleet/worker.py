@@ -1,0 +1,108 @@
+"""What a worker does with a handful of sensors: read, look or diagnose, answer.
+
+A sensor that cannot be read is answered with the reason. Answers are plain values, as they go through the network and
+into the record.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+from calibrations.diagnose import Diagnosis, diagnose
+from calibrations.effect import catalogue
+from calibrations.errors import CalibrationError
+from calibrations.fleet.columns import Shared
+from calibrations.fleet.corrected import Values, corrected
+from calibrations.fleet.look import look
+from calibrations.model import Model
+from calibrations.model_file import parse_model
+from calibrations.reading.read_csv import parse_csv
+from calibrations.table import Table
+from rig.analysis.data import averaged
+from rig.errors import RigError
+from rig.fleet.written import write_look
+
+Answer = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is asked of every sensor of a batch on a rig. `model` is the text of a model file."""
+
+    what: Literal["look", "diagnosis"]
+    model: str
+    effects: tuple[str, ...] = ()  # of its batch, beside the model
+    errors: Values = field(default_factory=dict)  # of its rig
+
+
+@dataclass(frozen=True)
+class Task:
+    """One sensor and its question. `text` is that of a file; else the run `data` of the record in `home`."""
+
+    key: str
+    data: str
+    question: Question
+    text: str | None = None
+    home: str | None = None
+
+
+def answer(tasks: Sequence[Task]) -> list[tuple[str, Answer]]:
+    """Every task's key and answer; where there is none, its `fault`. Columns are shared by the sensors of a call."""
+    shared: dict[tuple[str, tuple[str, ...]], tuple[Model, Shared]] = {}
+    return [(task.key, _answered(task, shared)) for task in tasks]
+
+
+def _answered(task: Task, shared: dict[tuple[str, tuple[str, ...]], tuple[Model, Shared]]) -> Answer:
+    asked = task.question
+    try:
+        key = (asked.model, asked.effects)
+        if key not in shared:
+            shared[key] = (model_of(asked), Shared(catalogue()))
+        model, columns = shared[key]
+        table = corrected(_read(task), asked.errors, catalogue())
+        return write_look(look(table, model, columns)) if asked.what == "look" else _told(diagnose(table, model))
+    except (CalibrationError, RigError) as error:
+        return {"fault": str(error)}
+    except Exception as error:  # one sensor never stops a fleet
+        return {"fault": f"a fault of this program: {type(error).__name__}: {error}"}
+
+
+def model_of(asked: Question) -> Model:
+    """The model with the effects of the batch, in which nothing is known yet."""
+    model = parse_model(asked.model, "the model", catalogue())
+    for name in asked.effects:
+        model = model.with_effect(catalogue()[name])
+    return model
+
+
+def _read(task: Task) -> Table:
+    """Raises DataError, RecordError."""
+    if task.text is not None:
+        return averaged(parse_csv(task.text, task.data), _nobody)
+    from rig.record.measured import table_of
+    from rig.record.store import Record
+
+    with Record(Path(task.home) if task.home else None) as record:
+        return averaged(table_of(record, task.data), _nobody)
+
+
+def _nobody(_: str) -> None:
+    """What would be said to a person of one sensor is not said of thousands."""
+
+
+def _told(found: Diagnosis) -> Answer:
+    steps = found.path.steps if found.verdict in ("effect-missing", "ambiguous") else ()
+    rivals: Mapping[str, tuple[str, ...]] = (
+        {found.candidates[0].name: found.candidates[0].indistinguishable_from} if steps else {}
+    )
+    return {
+        "verdict": found.verdict,
+        "effects": [step.taken.name for step in steps],
+        "rivals": {name: list(others) for name, others in rivals.items() if others},
+        "excess": found.path.end.pooled_excess,
+        "left": found.residual_structure,
+        "caution": found.caution,
+    }
