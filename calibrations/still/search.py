@@ -59,15 +59,15 @@ class Search:
         """
         each = {name: self.mixtures.lost_without(self.mixture, name) for name in self.mixture.names}
         if self.liner is not None:
-            each[self.liner.name] = 2 * (likelihood(self.mixture.channels) - self._without_lines().log_likelihood)
+            each[self.liner.name] = max(self._of_lines(), sum(map(_seen, self.lines)))
         return {name: each[name] for name in self._in_order(each)}
 
-    def _without_lines(self) -> NoiseFit:
-        """The best mixture fitted to the record with its lines in it."""
+    def _of_lines(self) -> float:
+        """What the bands lose where lines are left in the record; of what is faster than the bands, nothing."""
         model = self.model
         for name in self.mixture.names:
             model = model.with_effect(self.effects[name])
-        return fit(model, self.still)
+        return 2 * (likelihood(self.mixture.channels) - fit(model, self.still).log_likelihood)
 
     def _in_order(self, each: Mapping[str, float]) -> Iterator[str]:
         """Lines stand by themselves, and gain the same wherever they are added."""
@@ -107,6 +107,11 @@ class Search:
             if self.mixture.gain - swapped.gain < NOT_TOLD_APART and not _idle(swapped, other):
                 found.append(other.name)
         return found
+
+
+def _seen(lines: Lines) -> float:
+    """Twice the log-likelihood that lines gain where they are, by their amplitudes."""
+    return float(sum((line.amplitude / line.std) ** 2 for line in lines))
 
 
 def _idle(mixture: Mixture, effect: Effect) -> bool:

@@ -70,7 +70,7 @@ def diagnosed(result: Diagnosis, model: str, data: str, bench: str) -> str:
 
 def discovered(result: Discovery, data: str, out: str | None) -> str:
     """The falling error, the verdict, and the final model."""
-    lines = [of_record(result.start.still), "", _falling(result), "", _verdict(result)]
+    lines = [of_record(result.start.still), "", _falling(result), *_beyond(result.end), "", _verdict(result)]
     lines += experiment(result.next_experiment, data) if result.next_experiment else []
     lines += ["", parameters(result.end.model)]
     return "\n".join([*lines, *(["", f"written to {out}"] if out else [])])
@@ -95,6 +95,13 @@ def _verdict(result: Discovery) -> str:
         beside = f"Beside {names}, there" if names else "There"
         return f"Unexplained. {beside} is something that no mixture of noise is: {result.residual_structure}."
     return missing + doubt(result.reason) if names else "Nothing is missing: what is left is chance."
+
+
+def _beyond(found: NoiseFit) -> list[str]:
+    """Lines that the log-likelihood knows nothing of."""
+    if any(line.frequency_hz > each.channel.highest_hz for each in found.channels for line in each.lines):
+        return ["Lines beyond half the corner of the low-pass are outside of what is fitted, and gain no likelihood."]
+    return []
 
 
 def _falling(result: Discovery) -> str:
