@@ -6,6 +6,8 @@ to blame for is LabAway; what a role may not do, and a record that is not as thi
 
 from __future__ import annotations
 
+import logging
+
 from sqlalchemy import URL, Connection, Engine, ExceptionContext, create_engine, event, text
 from sqlalchemy.exc import InterfaceError, OperationalError
 
@@ -18,6 +20,9 @@ PREPARE = "`rig push --prepare --to URL`, by the owner of the database,"
 PATIENCE = {"connect_timeout": "5", "keepalives_idle": "10", "keepalives_interval": "5", "keepalives_count": "3"}
 PATIENCE |= {"tcp_user_timeout": "20000", "application_name": "rig"}
 FORBIDDEN, READ_ONLY = "42501", "25006"  # SQLSTATE: insufficient privilege, read-only transaction
+
+for _name in ("psycopg", "sqlalchemy"):  # of a cut wire our message tells; their reports are for who asks for them
+    logging.getLogger(_name).addHandler(logging.NullHandler())
 
 
 def connected(url: URL) -> Engine:
