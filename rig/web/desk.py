@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from collections import OrderedDict
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rig.home import home
+from rig.home import RECORD, home
 from rig.record import Record, Run
 
 if TYPE_CHECKING:
@@ -59,6 +60,15 @@ def runs() -> list[Run]:
         return []
     with Record.to_read() as record:
         return record.runs()
+
+
+def lab_read() -> str | None:
+    """The lab's record, for people, where the workbench shows that instead of the rig's own."""
+    if not (url := os.environ.get(RECORD)):
+        return None
+    from rig.record.lab_url import lab_url, shown
+
+    return shown(lab_url(url, RECORD))
 
 
 def saved_models() -> dict[str, str]:

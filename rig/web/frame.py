@@ -12,7 +12,7 @@ from typing import Any
 from nicegui import app, ui
 from nicegui.events import KeyEventArguments
 
-from rig.web.desk import Desk
+from rig.web.desk import Desk, lab_read
 from rig.web.strip import Strip
 
 STATIC = Path(__file__).parent / "static"
@@ -46,6 +46,8 @@ def frame(desk: Desk, here: str) -> Iterator[dict[str, Key]]:
         with ui.element("nav").classes("ways"):
             for to, title in WAYS.items():
                 ui.link(title, to).classes("here" if to == here else "")
+        if (lab := lab_read()) is not None:
+            ui.label(f"reads {lab}").classes("quiet small")
         ui.element("div").classes("space")
         Strip()
         _keys(keys)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -20,6 +22,7 @@ from rig.record.roles import prepare
 from rig.record.schema import SCHEMA
 from rig.web.desk import runs as runs_of_workbench
 from tests.rig.conftest import Ended
+from tests.rig.cutting import after_bytes, wire
 from tests.rig.postgres import Server, free_port
 from tests.rig.pushing import a_run, held
 from tests.rig.rigging import POSES, SMALL_ARGUMENTS
@@ -219,3 +222,15 @@ def test_verify_says_what_has_changed(rig: Rig, server: Server, database: str) -
     rig("exclude", run, "3", "--reason", "no", "--record", url)
     ended = rig("push", "--verify", "--to", url, "--json")
     assert (ended.status, json.loads(ended.out)["changed"]) == (1, [run])
+
+
+def test_a_cut_is_told_in_one_message(server: Server, database: str) -> None:
+    """The driver's own reports of a broken wire, of which there are several, are not a person's business."""
+    with Record() as own:
+        a_run(own)
+    with wire(server.port, after_bytes(lambda: 60_000)) as cut:
+        words = [sys.executable, "-m", "rig", "push", "--to", server.url(database, port=cut.port)]
+        ended = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stdout) == (2, "")
+    assert len(ended.stderr.splitlines()) == 1
+    assert "nothing is lost, the next `rig push` goes on" in ended.stderr

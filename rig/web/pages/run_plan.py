@@ -16,7 +16,7 @@ from rig.numerals import duration, size
 from rig.planning.plan import Plan, plan
 from rig.planning.stretches import stretches
 from rig.room import free_bytes
-from rig.web.desk import Desk
+from rig.web.desk import Desk, lab_read
 from rig.web.parts import box, div, facts, failed, off_loop, table, waiting, words
 from rig.web.told import message
 
@@ -103,6 +103,9 @@ class Planning:
 
     async def start(self) -> None:
         """Begin the run in a process of its own."""
+        if lab_read() is not None:
+            ui.notify("This workbench reads the lab's record; `rig web` without --record makes runs", type="warning")
+            return
         under_way = steering.latest()
         if under_way is not None and under_way.phase != "ended":
             ui.notify(f"{under_way.procedure} is under way; stop it first", type="warning")

@@ -12,6 +12,7 @@ from calibrations.numerals import bound, measured, unit
 from rig.analysis.next_steps import next_steps
 from rig.analysis.reported import reported
 from rig.analysis.request import Request
+from rig.errors import RecordError
 from rig.export import export
 from rig.record import Event, Record, Run
 from rig.web.desk import Desk
@@ -95,8 +96,12 @@ class OneRun:
 
             def keep() -> None:
                 if text := str(note.value or "").strip():
-                    with Record.to_read() as record:
-                        record.note(self.run.run, "note", text)
+                    try:
+                        with Record.to_read() as record:
+                            record.note(self.run.run, "note", text)
+                    except RecordError as error:  # such as the lab's, which this role may only read
+                        ui.notify(message(error), type="negative")
+                        return
                     note.set_value("")
                     self._show_events()
 
