@@ -12,6 +12,7 @@ from nicegui import ui
 
 from rig.analysis.exclusion import numbered_run
 from rig.analysis.trail_still import StillTrail
+from rig.errors import RecordError
 from rig.web.counted import Cancelled, Counted
 from rig.web.desk import Desk, runs
 from rig.web.frame import Key, frame
@@ -53,7 +54,12 @@ class Workbench:
 
     def build(self) -> None:
         """The page, laid out; what takes long is asked for as soon as the browser shows it."""
-        self.data = self.data or _newest()
+        try:
+            self.data = self.data or _newest()
+        except RecordError as error:  # such as a lab that is away
+            with frame(self.desk, "/"):
+                failed("The record cannot be read", message(error))
+            return
         with frame(self.desk, "/") as keys:
             self.chosen = Choice(self)
             self.body = div("stack")
