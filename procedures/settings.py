@@ -15,6 +15,7 @@ from procedures.catalogue import Procedure
 from procedures.errors import SettingError, nearest
 
 Value = Any
+YES_OR_NO = ("yes", "no")
 
 
 def parse(procedure: Procedure, given: Mapping[str, Value]) -> dict[str, Value]:
@@ -31,6 +32,13 @@ def parse(procedure: Procedure, given: Mapping[str, Value]) -> dict[str, Value]:
         name: _value(f"{procedure.name}: the setting {name}", types.get(name, str), value)
         for name, value in given.items()
     }
+
+
+def choices(procedure: Procedure) -> dict[str, tuple[str, ...]]:
+    """The settings that take one of a few texts, and which."""
+    types = get_type_hints(procedure.function)
+    few = {name: tuple(map(str, get_args(kind))) for name, kind in types.items() if get_origin(kind) is Literal}
+    return few | {name: YES_OR_NO for name, kind in types.items() if kind is bool}
 
 
 def _value(what: str, kind: Any, value: Value) -> Value:

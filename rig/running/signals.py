@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
@@ -17,24 +18,37 @@ AGAIN_S = 0.001
 def stoppable() -> Iterator[None]:
     """Inside, the first signal raises KeyboardInterrupt with its name; further ones do not disturb the cleaning up.
 
-    One that comes while the simulated world is computed or the screen is written waits for an instant.
+    One that comes while the simulated world is computed or the screen is written waits for an instant. One that is
+    raised where Python cannot hand it on, as in what is called when rubbish is collected, is raised again.
     """
 
     put_off: list[int] = []
+    raised: list[int] = []
+
+    def later(number: int) -> None:
+        put_off[:] = [number]
+        signal.setitimer(signal.ITIMER_REAL, AGAIN_S)  # no thread: what it needs may be held where this interrupts
 
     def stop(number: int, frame: FrameType | None) -> None:
         if _indivisible(frame):
-            put_off[:] = [number]
-            signal.setitimer(signal.ITIMER_REAL, AGAIN_S)  # no thread: what it needs may be held where this interrupts
+            later(number)
             return
         for each in SIGNALS:
             signal.signal(each, signal.SIG_IGN)
+        raised[:] = [number]
         raise KeyboardInterrupt(signal.Signals(number).name)
 
     def again(_: int, frame: FrameType | None) -> None:
         if put_off:
             stop(put_off.pop(), frame)
 
+    def lost(what: sys.UnraisableHookArgs) -> None:
+        if raised and isinstance(what.exc_value, KeyboardInterrupt):
+            later(raised.pop())
+        else:
+            hook(what)
+
+    hook, sys.unraisablehook = sys.unraisablehook, lost
     ignored = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN  # by nohup: a closed terminal shall not end it
     before = {each: signal.signal(each, stop) for each in SIGNALS if not (ignored and each == signal.SIGHUP)}
     before[signal.SIGALRM] = signal.signal(signal.SIGALRM, again)
@@ -42,6 +56,7 @@ def stoppable() -> Iterator[None]:
         yield
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
+        sys.unraisablehook = hook
         for each, handler in before.items():
             signal.signal(each, handler)
 

@@ -1,6 +1,7 @@
 """A signal ends a run once; a terminal that closes does not end what nohup started."""
 
 import signal
+import sys
 import time
 from threading import Event
 from types import FunctionType
@@ -32,6 +33,40 @@ def test_nohup_is_respected() -> None:
             signal.raise_signal(signal.SIGHUP)
     finally:
         signal.signal(signal.SIGHUP, before)
+
+
+class Forgotten:
+    """What a signal comes into as it is forgotten, where Python hands no exception on."""
+
+    def __del__(self) -> None:
+        signal.raise_signal(signal.SIGTERM)
+
+
+def test_one_that_comes_while_something_is_forgotten_is_not_lost() -> None:
+    hook = sys.unraisablehook
+
+    def forget_and_wait() -> None:
+        Forgotten()
+        Event().wait(30)  # the signal ends it
+
+    begun_s = time.monotonic()
+    with pytest.raises(KeyboardInterrupt, match="SIGTERM"), stoppable():
+        forget_and_wait()
+    assert time.monotonic() - begun_s < 10, "the signal was lost"
+    assert sys.unraisablehook is hook
+
+
+def test_what_else_cannot_be_handed_on_is_told_as_ever(monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[object] = []
+    monkeypatch.setattr(sys, "unraisablehook", lambda what: told.append(what.exc_value))
+
+    class Faulty:
+        def __del__(self) -> None:
+            raise ValueError("a fault")
+
+    with stoppable():
+        Faulty()
+    assert [str(error) for error in told] == ["a fault"]
 
 
 def signalled_in(module: str, name: str) -> list[str]:

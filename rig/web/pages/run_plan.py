@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Mapping
+import inspect
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from typing import Any
 
 from nicegui import ui
 
 from procedures.catalogue import Procedure, find, paths, summary
-from procedures.settings import parse
+from procedures.settings import choices, parse
 from rig.apart import steering
 from rig.bench import Bench
 from rig.home import home
@@ -41,6 +42,8 @@ class Planning:
             self.name.props("dense options-dense").on_value_change(self._chosen).style("width: 100%")
             self.about = words("", "quiet small")
             self.fields = div("settings")
+            with ui.expansion("What the settings mean").props("dense") as self.meant:
+                self.meaning = words("", "quiet small")
             self.attended = ui.switch("Ask me, even where the simulated rig could answer", value=not bench.simulated)
             self.attended.set_visibility(bench.simulated)
             with div("row-of"):
@@ -62,12 +65,14 @@ class Planning:
         """Another procedure has other settings."""
         procedure = self.procedure
         self.about.set_text(" ".join(procedure.doc.partition("\n\n")[2].split("Source")[0].split()))
+        self.meaning.set_text(_meaning(procedure))
+        self.meant.set_visibility(bool(procedure.defaults))
         self.fields.clear()
+        few = choices(procedure)
         self.inputs: dict[str, Any] = {}
         with self.fields:
             for name, default in procedure.defaults.items():
-                value = self.given.get(name, _written(default))
-                field = ui.input(_label(name), value=value).props("dense debounce=300")
+                field = _field(name, self.given.get(name, _written(default)), few.get(name, ()))
                 self.inputs[name] = field.on_value_change(self.replan)
         ui.timer(0.0, self.replan, once=True)
 
@@ -136,6 +141,21 @@ def _show(found: Plan, bench: Bench) -> None:
     table(("at", "what"), lines[:MOST_STRETCHES])
     if len(lines) > MOST_STRETCHES:
         words(f"and {len(lines) - MOST_STRETCHES} more: rig plan {found.procedure}", "quiet small")
+
+
+def _field(name: str, value: str, few: Sequence[str]) -> ui.select | ui.input:
+    """One setting: a list where it takes one of a few texts."""
+    if value in few:
+        return ui.select(list(few), label=_label(name), value=value).props("dense options-dense")
+    return ui.input(_label(name), value=value).props("dense debounce=300")
+
+
+def _meaning(procedure: Procedure) -> str:
+    """What the procedure says of its settings, by the names that they have on the page."""
+    text = " ".join(inspect.cleandoc(procedure.function.__doc__ or "").split())
+    for name in sorted(procedure.defaults, key=len, reverse=True):
+        text = text.replace(f"`{name}`", _label(name).partition(" (")[0]).replace(f"`{name}=", f"`{_label(name)} = ")
+    return text.replace("`", "")
 
 
 def _label(name: str) -> str:
