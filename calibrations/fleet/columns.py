@@ -41,7 +41,7 @@ class Group:
 
     def of(self, table: Table) -> Array:
         """The columns for a sensor that was measured on the same design."""
-        return self.columns * _ranges(table) if self.scaled else self.columns
+        return self.columns * _ranges(table, len(self.columns)) if self.scaled else self.columns
 
 
 @dataclass(frozen=True)
@@ -92,9 +92,10 @@ def _key(table: Table, needs: tuple[str, ...]) -> Key:
     return tuple(part for name in names for part in (name, table.column(name).tobytes()))
 
 
-def _ranges(table: Table) -> Array:
-    """The range of each output, (channels, 1, 1)."""
-    return np.asarray(np.ptp(table.outputs, axis=0))[:, None, None]
+def _ranges(table: Table, channels: int) -> Array:
+    """The range of each channel's output, (channels, 1, 1); 1 where the residual is none of an output."""
+    ranges = np.asarray(np.ptp(table.outputs, axis=0))
+    return (ranges if len(ranges) == channels else np.ones(channels))[:, None, None]
 
 
 def _derivatives(found: Fit, effect: Effect) -> Iterator[Group]:
@@ -105,7 +106,7 @@ def _derivatives(found: Fit, effect: Effect) -> Iterator[Group]:
     for start, theta in enumerate(problem.layout.starts()):
         columns = problem.jacobian(theta, mine)
         if np.any(columns):
-            yield Group(effect.name, start, columns / _ranges(found.table) if scaled else columns, scaled)
+            yield Group(effect.name, start, columns / _ranges(found.table, len(columns)) if scaled else columns, scaled)
 
 
 def _patterns(found: Fit) -> Iterator[Group]:

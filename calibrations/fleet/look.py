@@ -62,8 +62,7 @@ class Look:
     `chance`: that noise alone shows as much, over the whole search. `excess` is the error over the noise floor.
     """
 
-    source: str
-    digest: str
+    unit: str  # of the output
     names: tuple[tuple[str, str, str, str], ...]  # effect, parameter, axis, unit
     theta: Array
     information: Array
@@ -85,8 +84,7 @@ def look(table: Table, model: Model, shared: Shared) -> Look:
     screen = Screen(found)
     scores, chance, gram, along = _weighed(screen, groups, columns)
     return Look(
-        source=table.source,
-        digest=table.digest,
+        unit=table.unit,
         names=tuple((found.model.terms[s.term].name, s.parameter.name, s.axis, _unit(found, s.parameter.unit))
                     for s in found.problem.layout.slots),
         theta=found.theta,

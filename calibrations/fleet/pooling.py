@@ -49,7 +49,7 @@ class Pooled:
     def intervals(self, coverage: float = 0.95) -> tuple[Array, Array]:
         """Lowest and highest values, (n, p) each."""
         ends = np.array([each.interval(coverage) for each in self.parameters])  # (p, 2, n)
-        return ends[:, 0].T * self.scale, ends[:, 1].T * self.scale
+        return np.asarray(ends[:, 0].T * self.scale), np.asarray(ends[:, 1].T * self.scale)
 
     @property
     def apart(self) -> Array:
@@ -82,7 +82,7 @@ def _alone(known: Array, said: Array, prior: Array, mean: Array, k: int) -> tupl
     others[:, k] = 0.0
     total = known + others[:, :, None] * np.eye(known.shape[1])
     inverse = np.linalg.inv(total)[:, k]
-    return np.einsum("nj,nj->n", inverse, said + others * mean), inverse[:, k]
+    return np.einsum("nj,nj->n", inverse, said + others * mean), np.asarray(inverse[:, k])
 
 
 def _foretold(found: Siblings) -> tuple[Array | float, Array | float]:

@@ -33,8 +33,8 @@ class SensorVerdict:
 
     @property
     def needs_a_person(self) -> bool:
-        """Whether nothing that the fleet knows explains it."""
-        return self.verdict in ("failed", "unexplained", "ambiguous") or bool(self.own)
+        """Whether it is unlike its siblings or could not be judged; what a whole batch misses is no sensor's matter."""
+        return self.verdict in ("failed", "unexplained") or bool(self.own or self.remark)
 
 
 @dataclass(frozen=True)

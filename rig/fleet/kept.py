@@ -6,10 +6,13 @@ import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 from sqlalchemy import select
 
+import calibrations
 from rig.analysis.provenance import program
 from rig.fleet.worker import Question
 from rig.record import Record
@@ -17,14 +20,23 @@ from rig.record.dialects import insert_or
 from rig.record.schema import answers
 from rig.record.store import now
 
-FORM = 1  # of an answer: another one is worked out anew
 MOST = 500  # keys of one query
 
 
 def key_of(digest: str, question: Question) -> str:
     """The same for the same data, question and program."""
-    asked = json.dumps([FORM, program(), digest, asdict(question)], sort_keys=True)
+    asked = json.dumps([_program(), digest, asdict(question)], sort_keys=True)
     return hashlib.sha256(asked.encode()).hexdigest()
+
+
+@cache
+def _program() -> str:
+    """Digest of the library's and the fleet's code: a version's number stays while a program is being changed."""
+    sha = hashlib.sha256(program().encode())
+    for folder in (Path(calibrations.__file__).parent, Path(__file__).parent):
+        for path in sorted(folder.rglob("*.py")):
+            sha.update(path.read_bytes())
+    return sha.hexdigest()
 
 
 def keep(record: Record, found: Iterable[tuple[str, str, str, Mapping[str, Any]]]) -> None:
