@@ -1,7 +1,7 @@
 """Estimators: unknowns from measurements that are linear in them, all at once or one after another.
 
     least_squares   all at once, weighted
-    recursive       one after another, with the same answer; old ones may be forgotten
+    recursive       one after another, with the same answer: what is told while poses come
     kalman          unknowns that change by themselves: prediction and correction
     approach        an exponential approach to a steady state, followed by a bank of Kalman filters
 

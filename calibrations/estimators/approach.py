@@ -1,20 +1,24 @@
 """An exponential approach to a steady state, followed while it happens.
 
-    value(t) = c + r(t) + slow noise + white noise      r' = -r / tau      what is left to come, slowest first; none,
-                                                                           one (a board's hours) or two (and a package's
-                                                                           minutes)
+    value(t) = c + r(t) + room + slow noise + white noise
+    r' = -r / tau      what is left to come, slowest first; none, one (a board's hours) or two (and a package's minutes)
+    room               a swing of a day, which keeps its phase for two
 
 A bank of extended Kalman filters runs side by side. Each has its cell of time constants, within which it estimates
-them, and its own slow noise: Gauss-Markov processes of many time constants, all alike (flicker) or not, with or without
-a random walk. How well each foresaw what came is its weight. So what cannot be known yet, the time constant of a drift
-that has hardly bent and the noise of a record that has hardly begun, is in the bounds, which are those of the whole
-bank.
+them, a room of its own, and its own slow noise: Gauss-Markov processes of many time constants, up to days, all alike
+(flicker) or not, with or without a random walk. How well each foresaw what came is its weight. So what cannot be known
+yet, the time constant of a drift that has hardly bent and the noise of a record that has hardly begun, is in the
+bounds, which are those of the whole bank.
+
+Heat that flows through a board makes many exponentials, not two. The processes of minutes to hours therefore begin
+larger than they stay: what begins and dies away is an exponential.
 
 Values are in units of the white standard error of one of them.
 
 Source  Barshan and Durrant-Whyte, IEEE Trans. Robotics and Automation 11 (1995) 328: the model, and the filter; Magill,
         IEEE Trans. Automatic Control 10 (1965) 434: a bank; Alspach and Sorenson, ibid. 17 (1972) 439: Gaussian sums.
-        What is likely beforehand: Ang III.B, steady after 2 to 12 h over eight axes.
+        Solin and Särkkä, AISTATS 33 (2014) 904: a cycle as states. What is likely beforehand: Ang III.B, steady after
+        7 h, 2 to 12 h over eight axes, which is within four to five time constants.
 """
 
 from __future__ import annotations
@@ -27,35 +31,39 @@ import numpy as np
 from calibrations.estimators.kalman import Belief, corrected, predicted
 from calibrations.table import Array
 
-LEVEL, OFFSET, REST, LN_TAU, SLOW, WALK = 0, 1, 2, 4, 6, 11  # places in a state: REST and LN_TAU have two each
-SIZE = 12
-CELL = np.array([0.3, 0.8])  # of a logarithm of a time constant, the slower and the faster one
+LEVEL, OFFSET, REST, LN_TAU, SLOW, WALK, ROOM = 0, 1, 2, 4, 6, 11, 12  # places in a state: REST, LN_TAU, ROOM: two
+SIZE = 14
+CELL = np.array([0.4, 0.8])  # of a logarithm of a time constant, the slower and the faster one
 TAUS_S = np.exp(np.arange(np.log(150.0), np.log(100e3), CELL[0]))
 FAST_S = np.exp(np.arange(np.log(60.0), np.log(1300.0), CELL[1]))
 APART = 3.0  # nearer than this factor, two time constants are one to any noise
-USUAL_S, USUALLY = 3600.0, 1.2  # of a slow time constant beforehand: its median, and the std of its logarithm
+USUAL_S, USUALLY = 5400.0, 0.8  # of a slow time constant beforehand: its median, and the std of its logarithm
 COUNTS = (0.3, 0.4, 0.3)  # probability beforehand of no exponential, one, two
-SLOW_S = np.array([20.0, 120.0, 800.0, 5e3, 3e4])  # time constants of slow noise
-RMS = (0.5, 1.7, 6.0)  # of a slow process, in units
+SLOW_S = np.array([120.0, 800.0, 5e3, 3e4, 1.8e5])  # time constants of slow noise
+RMS = ((0.5, 0.45), (1.5, 0.3), (3.5, 0.17), (8.0, 0.08))  # of a slow process, in units, and probability beforehand
 SHAPES = (
-    ((1.0, 1.0, 1.0, 1.0, 1.0), 0.0, 0.35),  # flicker
-    ((0.2, 0.5, 1.0, 2.0, 4.0), 0.0, 0.15),  # the slower the larger
-    ((1.0, 1.0, 0.5, 0.5, 0.7), 0.0, 0.1),  # of seconds to minutes, beside weaker flicker
-    ((0.0, 1.0, 1.0, 0.5, 0.7), 0.0, 0.1),  # of minutes, beside weaker flicker of hours
-    ((0.0, 0.0, 1.0, 1.0, 0.8), 0.0, 0.1),  # of hours, likewise
-    ((1.0, 1.0, 1.0, 1.0, 1.0), 1.5, 0.1),
-    ((1.0, 1.0, 1.0, 1.0, 1.0), 6.0, 0.1),
+    (1.0, (1.0, 1.0, 1.0, 1.0, 1.0), 0.0, 0.45),  # flicker
+    (0.2, (0.5, 1.0, 2.0, 4.0, 4.0), 0.0, 0.15),  # the slower the larger
+    (1.0, (1.0, 0.3, 0.3, 0.3, 0.3), 0.0, 0.15),  # of seconds to minutes, beside weaker flicker
+    (0.0, (1.0, 1.0, 0.5, 0.7, 0.7), 0.0, 0.1),  # of minutes, beside weaker flicker of hours
+    (0.0, (0.0, 1.0, 1.0, 0.8, 0.8), 0.0, 0.1),  # of hours, likewise
+    (1.0, (1.0, 1.0, 1.0, 1.0, 1.0), 3.0, 0.05),
 )
-"""Of slow noise: how large its processes are beside each other, random walk per root of an hour, probability
-beforehand."""
-NONE = 0.2  # probability beforehand of no slow process
-UNLIKELY = 1e-6  # a filter of less weight is let go
+"""Of slow noise: how large its processes are beside each other, with what is over within a value first; random walk per
+root of an hour; probability beforehand."""
+NONE = 0.3  # probability beforehand of no slow process
+UNLIKELY = 1e-5  # a filter of less weight is let go
 HOUR_S = 3600.0
+DAY_S, LASTING_S = 24 * HOUR_S, 48 * HOUR_S  # the room's cycle, and how long it keeps its phase
+ROOMS = ((0.0015, 0.55), (0.005, 0.35), (0.02, 0.1))  # rms of its swing over `most`, and probability beforehand
+SPREAD = 0.015  # of `most`: further exponentials that heat's way through a board adds, rms of each when it begins
+SPREAD_S = 1e4  # the slowest of them: what is slower is no part of warming up
 
 
 @dataclass(frozen=True)
 class Bank:
-    """k filters at `t_s`: what each believes; rms of its slow processes (k, 5), its random walk (k,), log weight (k,).
+    """k filters at `t_s`: what each believes; rms of its slow processes (k, 5), its scatter of single values, its
+    random walk, the rms of its room, log weight, (k,) each.
 
     `nis` is the sum of the normalised innovations squared so far, of `count` values.
     """
@@ -63,7 +71,9 @@ class Bank:
     t_s: float
     belief: Belief
     slow: Array
+    scatter: Array
     walk: Array
+    room: Array
     log_weight: Array
     nis: float = 0.0
     count: int = 0
@@ -76,8 +86,8 @@ class Bank:
 
     @property
     def noise(self) -> float:
-        """Standard deviation of one value about what it comes to, slow noise included."""
-        return float(np.sqrt(self.weight @ (1 + np.sum(self.slow**2, axis=1))))
+        """Standard deviation of one value about what it comes to, slow noise and room included."""
+        return float(np.sqrt(self.weight @ (1 + np.sum(self.slow**2, axis=1) + self.scatter**2 + self.room**2)))
 
     @property
     def surprise(self) -> float:
@@ -98,17 +108,21 @@ class Bank:
             step[:, SLOW + k, SLOW + k] = slow[k]
             noise[:, SLOW + k, SLOW + k] = self.slow[:, k] ** 2 * (1 - slow[k] ** 2)
         noise[:, WALK, WALK] = self.walk**2 * gap_s / HOUR_S
+        step[:, ROOM:, ROOM:], lost = _swung(gap_s)
+        noise[:, range(ROOM, SIZE), range(ROOM, SIZE)] = self.room[:, None] ** 2 * lost
         mean[:, REST:LN_TAU] *= kept
         mean[:, SLOW:WALK] *= slow
+        mean[:, ROOM:] = mean[:, ROOM:] @ step[0, ROOM:, ROOM:].T
         return replace(self, t_s=t_s, belief=Belief(mean, predicted(self.belief, step, noise).covariance))
 
     def after(self, t_s: float, value: float, std: float, *, offset: bool = False) -> Bank:
         """One more value of white standard error `std`; with an `offset`, it is shifted by a constant of its own."""
         matrix = np.zeros((1, SIZE))
-        matrix[0, [LEVEL, REST, REST + 1, *range(SLOW, SIZE)]] = 1.0
+        matrix[0, [LEVEL, REST, REST + 1, *range(SLOW, ROOM + 1)]] = 1.0
         matrix[0, OFFSET] = float(offset)
         ahead = self.at(t_s)
-        done = corrected(ahead.belief, np.array([value]), matrix, np.array([[std**2]]))
+        noise = (std**2 + self.scatter**2)[:, None, None]
+        done = corrected(ahead.belief, np.array([value]), matrix, noise)
         weighed = replace(ahead, belief=done.belief, log_weight=self.log_weight + done.log_likelihood)
         return weighed._pruned(self.nis + float(weighed.weight @ done.nis))
 
@@ -125,23 +139,33 @@ class Bank:
     def _pruned(self, nis: float) -> Bank:
         likely = self.weight > UNLIKELY
         belief = Belief(self.belief.mean[likely], self.belief.covariance[likely])
-        return Bank(
-            self.t_s, belief, self.slow[likely], self.walk[likely], self.log_weight[likely], nis, self.count + 1
-        )
+        mine = {name: getattr(self, name)[likely] for name in ("slow", "scatter", "walk", "room", "log_weight")}
+        return replace(self, belief=belief, nis=nis, count=self.count + 1, **mine)
 
 
 def bank(t_s: float, value: float, most: float) -> Bank:
     """Before anything is measured: the first `value`, at `t_s`, is near; a drift is seldom much beyond `most`."""
-    members = [(tau, noise, p * q) for (tau, p), (noise, q) in product(_approaches(), _noises())]
+    kinds = product(_approaches(), _noises(), ROOMS)
+    members = [(tau, (*noise, room * most), p * q * w) for (tau, p), (noise, q), (room, w) in kinds]
     taus_s, noise = np.array([m[0] for m in members]), np.array([m[1] for m in members])
-    slow, walk = noise[:, :-1], noise[:, -1]
+    scatter, slow, walk, room = noise[:, 0], noise[:, 1:-2], noise[:, -2], noise[:, -1]
     mean, covariance = np.zeros((len(members), SIZE)), np.zeros((len(members), SIZE, SIZE))
     mean[:, LEVEL] = value
     mean[:, LN_TAU:SLOW] = np.log(np.where(taus_s > 0, taus_s, 1.0))
-    variances = np.column_stack([np.full((len(members), 2), (3 * most) ** 2), (taus_s > 0) * most**2,
-                                 (taus_s > 0) * (CELL / 2) ** 2, slow**2, np.zeros(len(members))])  # fmt: skip
+    begins = (SLOW_S < SPREAD_S) * (SPREAD * most) ** 2
+    variances = np.column_stack([
+        np.full((len(members), 2), (3 * most) ** 2), (taus_s > 0) * most**2, (taus_s > 0) * (CELL / 2) ** 2,
+        slow**2 + begins, np.zeros(len(members)), room**2, room**2,
+    ])  # fmt: skip
     covariance[:, range(SIZE), range(SIZE)] = variances
-    return Bank(t_s, Belief(mean, covariance), slow, walk, np.log([m[2] for m in members]))
+    return Bank(t_s, Belief(mean, covariance), slow, scatter, walk, room, np.log([m[2] for m in members]))
+
+
+def _swung(gap_s: float) -> tuple[Array, float]:
+    """How a room's swing goes on over a gap, (2, 2), and the share of its variance that is new by then."""
+    angle, kept = 2 * np.pi * gap_s / DAY_S, np.exp(-gap_s / LASTING_S)
+    c, s = np.cos(angle), np.sin(angle)
+    return kept * np.array([[c, s], [-s, c]]), 1 - kept**2
 
 
 def _approaches() -> list[tuple[tuple[float, float], float]]:
@@ -157,7 +181,10 @@ def _approaches() -> list[tuple[tuple[float, float], float]]:
 
 
 def _noises() -> list[tuple[tuple[float, ...], float]]:
-    """Rms of each slow process, and the random walk; and their probability beforehand."""
-    quiet = [((*np.zeros(len(SLOW_S)), walk), NONE * p) for walk, p in ((0.0, 0.8), (1.5, 0.1), (6.0, 0.1))]
-    share = (1 - NONE) / len(RMS)
-    return quiet + [((*(rms * np.array(shape)), walk), share * p) for rms, (shape, walk, p) in product(RMS, SHAPES)]
+    """Scatter, rms of each slow process, and the random walk; and their probability beforehand."""
+    none = np.zeros(1 + len(SLOW_S))
+    quiet = [((*none, walk), NONE * p) for walk, p in ((0.0, 0.95), (3.0, 0.05))]
+    return quiet + [
+        ((rms * scatter, *(rms * np.array(shape)), walk), (1 - NONE) * p * q)
+        for (rms, q), (scatter, shape, walk, p) in product(RMS, SHAPES)
+    ]

@@ -6,17 +6,14 @@
 The covariance is corrected in Joseph's form, which keeps it symmetric and positive whatever the gain is rounded to.
 
 Source  Book (18.9)-(18.10); Bucy and Joseph, Filtering for Stochastic Processes (1968); Bar-Shalom, Li and Kirubarajan,
-        Estimation with Applications to Tracking and Navigation (2001), 5.4: consistency of innovations; Rauch, Tung and
-        Striebel, AIAA Journal 3 (1965) 1445: the smoother.
+        Estimation with Applications to Tracking and Navigation (2001), 5.4: consistency of innovations.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
 
 from calibrations.table import Array
 
@@ -70,26 +67,3 @@ def corrected(belief: Belief, measured: Array, matrix: Array, noise: Array) -> C
 def _turned(matrix: Array) -> Array:
     """Transposed."""
     return np.swapaxes(matrix, -1, -2)
-
-
-def smoothed(
-    predictions: Sequence[Belief], corrections: Sequence[Belief], transitions: Sequence[Array]
-) -> list[Belief]:
-    """What all measurements say of each time: `predictions[k]` and `corrections[k]` before and after measurement k,
-    `transitions[k]` from k to k + 1."""
-    beliefs = [corrections[-1]]
-    for k in range(len(corrections) - 2, -1, -1):
-        now, ahead, later = corrections[k], predictions[k + 1], beliefs[0]
-        gain = np.linalg.solve(ahead.covariance, transitions[k] @ now.covariance).T
-        covariance = now.covariance + gain @ (later.covariance - ahead.covariance) @ gain.T
-        beliefs.insert(0, Belief(now.mean + gain @ (later.mean - ahead.mean), (covariance + covariance.T) / 2))
-    return beliefs
-
-
-def consistency(corrections: Sequence[Correction]) -> float:
-    """Probability that innovations of the right size, and no trend of their own, come out as large as these, or larger.
-
-    Near 0, they are larger than the model says; near 1, smaller.
-    """
-    freedom = sum(len(each.innovation) for each in corrections)
-    return float(chi2.sf(sum(float(each.nis) for each in corrections), freedom))

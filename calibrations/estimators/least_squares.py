@@ -22,7 +22,8 @@ SMALLEST = 1e-12  # of a diagonal element over the greatest, below which columns
 
 @dataclass(frozen=True)
 class Estimate:
-    """Unknowns (n,), their covariance (n, n), and the weighted sum of the squared residuals.
+    """Unknowns (n,), their covariance (n, n), the weighted sum of the squared residuals, and how many measurements
+    there are beyond the unknowns.
 
     The covariance is that of the variances that were given; where none were, of a variance of 1.
     """
@@ -30,6 +31,13 @@ class Estimate:
     values: Array
     covariance: Array
     square: float
+    freedom: int
+
+    @property
+    def scattered(self) -> Array:
+        """Standard errors (n,) where no variance is known: noise is what is left over. NaN where nothing is."""
+        variance = self.square / self.freedom if self.freedom > 0 else np.nan
+        return np.asarray(np.sqrt(variance * np.diag(self.covariance)))
 
 
 def least_squares(matrix: Array, measured: Array, variances: Array | float = 1.0) -> Estimate:
@@ -37,17 +45,12 @@ def least_squares(matrix: Array, measured: Array, variances: Array | float = 1.0
 
     Raises TooFewRows where the measurements do not determine every unknown.
     """
-    std = np.sqrt(np.broadcast_to(variances, len(measured)))
-    weighted = np.column_stack([matrix, measured]) / std[:, None]
-    return solved(np.asarray(np.linalg.qr(weighted, mode="r")))
-
-
-def solved(triangle: Array) -> Estimate:
-    """From the triangular factor of (H, z), weighted: shape (k, n + 1), k <= n + 1. Raises TooFewRows."""
-    n = triangle.shape[1] - 1
+    m, n = matrix.shape
+    std = np.sqrt(np.broadcast_to(variances, m))
+    triangle = np.asarray(np.linalg.qr(np.column_stack([matrix, measured]) / std[:, None], mode="r"))
     diagonal = np.abs(np.diag(triangle)[:n])
     if len(diagonal) < n or diagonal.min() <= SMALLEST * diagonal.max():
         raise TooFewRows(f"the measurements do not determine {n} unknowns; measure more, or at other places")
     inverse = solve_triangular(triangle[:n, :n], np.eye(n))
     left = triangle[n:, n]
-    return Estimate(inverse @ triangle[:n, n], inverse @ inverse.T, float(left @ left))
+    return Estimate(inverse @ triangle[:n, n], inverse @ inverse.T, float(left @ left), m - n)

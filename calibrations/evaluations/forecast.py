@@ -27,13 +27,14 @@ from calibrations.noise_estimation.mean_noise import white_std
 from calibrations.table import Array, Table
 
 STRETCH_S, STRETCHES = 300.0, 3  # of the still record: a value is the mean of so much, or of a third of a hold
-MOST = 5e-3  # of a drift beforehand, over the scale factor: in g, and as a fraction
+MOST = 4e-3  # of a drift beforehand, over the scale factor: in g, and as a fraction
 QUIET = 2e-5  # white standard error over the scale factor, where it is not known
 DRAWS = 1000
 LOOKS = 24
 NARROW = 0.25  # of the whole change: half the width of the bounds of what is known
 SURPRISED = 3.0  # mean normalised innovation squared beyond which no filter's model holds
 TINY = 1e-12  # of a unit
+FARTHEST_S = 48 * HOUR_S  # from now: a bound beyond it is none
 AHEAD_S = np.concatenate([[0.0], np.geomspace(60.0, 100 * HOUR_S, 60)])
 
 
@@ -70,7 +71,12 @@ class Forecast:
     @property
     def known(self) -> bool:
         """Whether the final value is."""
-        return self.surprise < SURPRISED and self.final.half <= max(self.tolerance, NARROW * abs(self.change))
+        return not self.surprised and self.final.half <= max(self.tolerance, NARROW * abs(self.change))
+
+    @property
+    def surprised(self) -> bool:
+        """Whether what came is not what any filter foresaw: then its bounds hold nothing."""
+        return self.surprise >= SURPRISED
 
     @property
     def steady(self) -> bool:
@@ -186,6 +192,16 @@ class Foreseen:
                 break
             since = each.t_s
         return since
+
+
+def steady_from(found: Mapping[str, Foreseen], axis: str = "") -> Bounds | None:
+    """When all quantities of an axis, or of all axes, are steady by the last forecasts, s since power-on: the latest of
+    each bound, infinite beyond FARTHEST_S. None where one of them is no approach."""
+    last = [course.last for name, course in found.items() if name.endswith(axis)]
+    if not last or any(each.surprised for each in last):
+        return None
+    within = [[s if s - each.t_s < FARTHEST_S else np.inf for s in each.steady_s] for each in last]
+    return Bounds(*np.max(within, axis=0).tolist())
 
 
 def foreseen(table: Table, oven_c: float = 0.0) -> dict[str, Foreseen]:

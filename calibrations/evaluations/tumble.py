@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrations.errors import DataError
+from calibrations.estimators.least_squares import least_squares
 from calibrations.noise_estimation.mean_noise import white_std
 from calibrations.table import Table
 
@@ -67,18 +68,18 @@ def _missing(table: Table, rows: Rows) -> str:
 def _tumble(table: Table, axis: str, path: str, rows: Rows) -> Tumble:
     volts, beta = table.column(f"v{axis}_v")[rows], np.radians(table.column("beta_deg")[rows])
     columns = np.column_stack([np.cos(beta), np.sin(beta), np.ones(len(beta))])
-    inverse = np.linalg.pinv(columns)
-    factors = inverse @ volts
     white = white_std(table)
     noise = np.zeros(len(rows)) if white is None else white[rows, table.axes.index(axis)]
-    std = np.sqrt((inverse * noise) ** 2 @ np.ones(len(rows)))
-    scale = float(factors[OWN[axis]])
+    known = bool(np.all(noise > 0))
+    found = least_squares(columns, volts, noise**2 if known else 1.0)
+    std = np.sqrt(np.diag(found.covariance)) * known
+    scale = float(found.values[OWN[axis]])
     temperature_c = table.optional("temperature_c", float("nan"))[rows]
     return Tumble(
         path,
         float(table.time_s[rows].mean()),
         float(temperature_c.mean()),
-        float(factors[2]),
+        float(found.values[2]),
         scale,
         float(std[2]),
         float(std[OWN[axis]] / abs(scale)),

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from calibrations.evaluations.forecast import Foreseen
+from calibrations.evaluations.forecast import Foreseen, steady_from
 from calibrations.evaluations.soak import HOUR_S, Course, Gap, Soak
 from calibrations.numerals import bound, measured, minus, plain
 from calibrations.pictures.album import Picture
@@ -33,7 +33,7 @@ def soak_report(
     steady = found.time_s() is not None
     return page(
         "soak.html",
-        headline=_headline(found),
+        headline=_headline(found, foreseen),
         verdict="steady" if steady else "not steady",
         state="adequate" if steady else "ambiguous",
         what=f"Soak, {facts['sensor']}",
@@ -48,7 +48,7 @@ def soak_report(
     )
 
 
-def _headline(found: Soak) -> str:
+def _headline(found: Soak, foreseen: Mapping[str, Foreseen]) -> str:
     time = found.time_s()
     if time is not None and found.from_start():
         return (
@@ -59,7 +59,14 @@ def _headline(found: Soak) -> str:
     if any(course.state is None for course in found.courses.values()):
         return "Whether bias and scale factor are steady cannot be told from so few reversals."
     waiting = [name.replace("-", " of ") for name, course in found.courses.items() if course.time_s is None]
-    return f"Steady state is not shown within {_span_h(found)} h: {joined(waiting)} may still drift."
+    shown = f"Steady state is not shown within {_span_h(found)} h: {joined(waiting)} may still drift."
+    bounds = steady_from(foreseen)
+    if bounds is None:
+        return shown
+    low, value, high = (plain(each / HOUR_S, 2) for each in bounds)
+    if np.isfinite(bounds.high):
+        return f"{shown} Foreseen: {value} h after power-on, {low} to {high} h by 95 %."
+    return f"{shown} Foreseen: later than {low} h after power-on."
 
 
 def _summary(found: Soak) -> str:
@@ -125,13 +132,14 @@ def _outlook(name: str, course: Foreseen) -> dict[str, str]:
     """One row of what was foreseen: the final value with its 95 % bounds at the end, and since when it was known."""
     quantity, _, axis = name.partition("-")
     final, known_s = course.last.final, course.known_s
+    bounds = f"not known: {plain(1e3 * final.low, 6)} to {plain(1e3 * final.high, 6)}"
     return {
         "name": quantity.replace("scale", "scale factor"),
         "axis": axis,
         "unit": "mV" if quantity == "bias" else "mV/g",
         "final": f"{plain(1e3 * final.value, 7)} ± {plain(1e3 * final.half, 2)}"
         if known_s is not None
-        else "not known",
+        else ("no approach to a steady state" if course.last.surprised else bounds),
         "known": "–" if known_s is None else plain(known_s / HOUR_S),
     }
 

@@ -69,6 +69,7 @@ def _by_hand(table: Table) -> dict[str, Any]:
     if np.ptp(table.outputs[:, 2]) < FLAT * np.ptp(table.outputs[:, :2]):
         found = ellipse(left[:, :2])
         angle = float(np.degrees(found.angle_rad))
+        told["hard_iron"][2] = None  # the middle of z is the field that stands upright, too
         told["soft_iron"] = {"greatest": found.greatest, "least": found.least, "angle_deg": angle}
         left = by_hand(table.outputs)[:, :2]
     size = np.linalg.norm(left, axis=1)
@@ -78,11 +79,12 @@ def _by_hand(table: Table) -> dict[str, Any]:
 def _book(table: Table) -> str:
     """The same for people."""
     told = _by_hand(table)["by_hand"]
-    shown = ", ".join(f"{value:.5g}" for value in told["hard_iron"])
+    shown = ", ".join(f"{value:.5g}" for value in told["hard_iron"] if value is not None)
     text = f"The Book's way, from the extremes: hard iron {shown} {table.unit}"
     if soft := told.get("soft_iron"):
         text += (
             f"; soft iron in the plane: radii {soft['greatest']:.5g} and {soft['least']:.5g} {table.unit}, the greater "
-            f"at {soft['angle_deg']:.3g} deg from x"
+            f"at {soft['angle_deg']:.3g} deg from x. In the hard iron is what iron makes of the field along z, and of "
+            "z itself nothing is known: turn the sensor over, and about its other edges"
         )
     return f"{text}. The magnitude then varies by {told['left_per_mille']:.3g} per mille."

@@ -24,8 +24,8 @@ from rig.cli.verdicts import lines as results
 from rig.planning.plan import Plan
 from rig.record import Kept, Record
 from rig.running.runner import Outcome, Watch, Wish
+from rig.running.so_far import SoFar
 from rig.running.soak_forecast import SoakWatch, soak_watch
-from rig.running.soak_forecast import lines as told_lines
 
 trace_option = click.option("--trace", is_flag=True, help="Log every message to and from instruments.")
 
@@ -40,19 +40,20 @@ def watch_options(function: Callable[..., Any]) -> Callable[..., Any]:
 class Quiet:
     """Nobody looks on. A question takes its answer from the file, or from the technician of a simulated bench.
 
-    What a soak will come to is told on standard error, after every reversal.
+    What a soak will come to is told on standard error, after every reversal; of other runs, what their poses tell so
+    far, after every path.
     """
 
-    def __init__(self, answers: Mapping[str, str], soak: SoakWatch | None = None) -> None:
-        self._answers, self._soak = answers, soak
+    def __init__(self, answers: Mapping[str, str], follower: SoakWatch | SoFar | None = None) -> None:
+        self._answers, self._follower = answers, follower
 
     def planned(self, plan: Plan) -> None:
         """It is done as it is planned."""
 
     def begun(self, run: str) -> None:
         note(f"run {run}")
-        if self._soak:
-            self._soak.begun(run)
+        if self._follower:
+            self._follower.begun(run)
 
     def doing(self, text: str) -> None:
         """Nobody reads it."""
@@ -62,8 +63,8 @@ class Quiet:
 
     def kept(self, kept: Kept) -> None:
         """The record has it."""
-        if self._soak and (told := self._soak.kept(kept)):
-            note(told_lines(told))
+        if self._follower and (told := self._follower.told(kept)):
+            note(told)
 
     def read(self, reading: Reading) -> None:
         """The record has it."""
@@ -87,7 +88,7 @@ def watching(procedure: Procedure, bench: Bench, unattended: bool, answers: Path
     """Who looks on: a person in a terminal, unless the run is unattended or nobody is there; pages beside them."""
     given = _answers(answers)
     if unattended or not (sys.stdin.isatty() and sys.stderr.isatty()):
-        with Beside(Quiet(given, soak_watch(procedure.name)), procedure.name, bench, "nobody") as watch:
+        with Beside(Quiet(given, soak_watch(procedure.name) or SoFar()), procedure.name, bench, "nobody") as watch:
             yield watch
         return
     from rig.cli.guide import Guide  # rich is only imported where somebody sees it

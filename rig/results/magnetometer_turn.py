@@ -22,11 +22,13 @@ from rig.results.turned import estimates, fitted, result
 
 AXES = "xyz"
 SOFT = ("xx", "yy", "xy", "xz", "yz")
-ELEMENTS = {"F": "field-total", "H": "field-horizontal", "D": "field-declination", "I": "field-inclination"}
+ELEMENTS = {"F": "field-total", "H": "field-horizontal", "D": "field-azimuth", "I": "field-inclination"}
+HEADING = "heading_deg"
+DECLINATION = "field-declination"
 NAMES = (
     *("hard-iron-{axis}", "hard-iron-by-hand-{axis}", "soft-iron-by-hand", "soft-iron-angle-by-hand"),
     *(f"soft-iron-{pair}" for pair in SOFT),
-    *ELEMENTS.values(),
+    *(*ELEMENTS.values(), DECLINATION),
     *(f"{ELEMENTS[name]}-by-hand" for name in "HD"),
     *("left-by-ellipsoid", "left-by-hand"),
 )
@@ -39,7 +41,8 @@ def evaluate(measured: Measured) -> dict[str, Result | Missing]:
     soft-iron                relative, as in the effect soft-iron
     left-by-ellipsoid        rms of what is left of the magnitude, per mille of the field
     field-total, -horizontal F and H, V                 (17.6)
-    field-declination        D, deg from the base's x axis, clockwise seen from above    (17.9)
+    field-azimuth            deg from the base's x axis, clockwise seen from above
+    field-declination        D, deg from true north, where the bench knows the base's `heading_deg`    (17.9)
     field-inclination        I, deg below the horizontal    (17.10)
 
     and by hand, from the extremes of each turn, (17.11)-(17.15):
@@ -48,7 +51,11 @@ def evaluate(measured: Measured) -> dict[str, Result | Missing]:
     soft-iron-by-hand        least over greatest radius of the turn about z
     soft-iron-angle-by-hand  deg from x to its major axis, from -90 to 90
     left-by-hand             what the magnitude then varies by, per mille
-    field-horizontal-by-hand, field-declination-by-hand    H and D of the turn about z alone
+    field-horizontal-by-hand, field-azimuth-by-hand    of the turn about z alone
+
+    In the uncertainties by hand stands what the extremes cannot see (`horizontal_turn.py`): what iron lets of the
+    upright field into the level axes, unless the sensor was turned over; what it makes of H; the steps.
+    How the sensor sits in its mount shows in several turns: of one, the azimuth has no uncertainty.
 
     Where the directions cover too little of the sphere, what the ellipsoid gives is missing and says so. Raises
     DataError where the turn about z was left out.
@@ -58,12 +65,16 @@ def evaluate(measured: Measured) -> dict[str, Result | Missing]:
         raise DataError(
             f"run {measured.name} holds nothing of the turn about z any more; rig exclude --include takes it in again"
         )
-    extremes = by_hand(table.outputs, [p.up for p in poses], [p.path for p in poses], _std_v(table))
+    names, std_v = [p.path for p in poses], _std_v(table)
+    extremes = by_hand(table.outputs, [p.up for p in poses], names, std_v)
     why = uncovered(table)
     ellipsoid = _all_missing(why) if why else _by_ellipsoid(table, poses)
     level = [k for k, pose in enumerate(poses) if pose.path == poses[0].path]  # the turn about z, upward, is first
     attitudes = np.array([sensor_from_base(poses[k]) for k in level])
-    return ellipsoid | _by_extremes(extremes, level_by_hand(table.outputs[level], attitudes))
+    azimuth = ellipsoid[ELEMENTS["D"]]
+    std_deg = azimuth.std if isinstance(azimuth, Result) else None
+    turn_std_deg = None if std_deg is None else std_deg * len(set(names)) ** 0.5
+    return ellipsoid | _by_extremes(extremes, level_by_hand(table.outputs[level], attitudes, turn_std_deg), std_v)
 
 
 def _std_v(table: Table) -> float:
@@ -101,10 +112,13 @@ def _elements(found: Fit, table: Table, poses: list[Pose]) -> dict[str, Result |
             (strength.std or 0.0) * value / strength.value if units[name] == "V" else 0.0,
         )
         results[ELEMENTS[name]] = Result(value, units[name], None if std is None else hypot(std, of_strength))
+        if name == "D" and HEADING in table.constants:
+            from_north = (value + table.number(HEADING, 0.0) + 180) % 360 - 180
+            results[DECLINATION] = Result(from_north, "deg", std)
     return results
 
 
-def _by_extremes(found: ByHand, level: Elements) -> dict[str, Result | Missing]:
+def _by_extremes(found: ByHand, level: Elements, noise_v: float) -> dict[str, Result | Missing]:
     results: dict[str, Result | Missing] = {}
     for name, unit in (("H", "V"), ("D", "deg")):
         results[f"{ELEMENTS[name]}-by-hand"] = Result(level.value[name], unit, level.std[name])
@@ -115,8 +129,9 @@ def _by_extremes(found: ByHand, level: Elements) -> dict[str, Result | Missing]:
             if np.isfinite(value)
             else Missing(f"{axis} was upright throughout; use more mounts")
         )
-    ratio = found.soft_iron.least / found.soft_iron.greatest
-    results["soft-iron-by-hand"] = Result(ratio, "")
-    angle_deg = (np.degrees(found.soft_iron.angle_rad) + 90) % 180 - 90  # an axis has no direction
-    results["soft-iron-angle-by-hand"] = Result(float(angle_deg), "deg")
+    soft = found.soft_iron
+    ratio, noise = soft.least / soft.greatest, noise_v * hypot(1 / soft.least, 1 / soft.greatest)
+    results["soft-iron-by-hand"] = Result(ratio, "", hypot(soft.ratio_std, ratio * noise))
+    angle_deg = (np.degrees(soft.angle_rad) + 90) % 180 - 90  # an axis has no direction
+    results["soft-iron-angle-by-hand"] = Result(float(angle_deg), "deg", soft.angle_std_deg(noise_v))
     return results | {"left-by-hand": Result(found.left_per_mille, "per mille")}

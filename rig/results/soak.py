@@ -7,7 +7,7 @@ from itertools import groupby
 
 import numpy as np
 
-from calibrations.evaluations.forecast import Foreseen, foreseen
+from calibrations.evaluations.forecast import Foreseen, foreseen, steady_from
 from calibrations.evaluations.soak import AXES, HOUR_S, Course, Soak
 from calibrations.evaluations.soak import soak as soak_of
 from calibrations.evaluations.steady_state import COVERAGE, FEWEST, SteadyState
@@ -20,6 +20,8 @@ from rig.results.result import Result
 SEEN = 3  # reversals after the steady state before a soak is ended by it
 NAMES = (
     *("steady-state", "steady-state-time", "steady-state-{axis}", "steady-state-time-{axis}"),
+    *("steady-state-earliest", "steady-state-expected", "steady-state-latest"),
+    *("steady-state-earliest-{axis}", "steady-state-expected-{axis}", "steady-state-latest-{axis}"),
     *("bias-drift-{axis}", "scale-drift-{axis}", "bias-tolerance-{axis}", "scale-tolerance-{axis}"),
     *("time-constant-{axis}", "scale-time-constant-{axis}", "temperature-wander", "gap"),
     *("bias-final-{axis}", "scale-final-{axis}", "bias-foreseen-{axis}", "scale-foreseen-{axis}"),
@@ -31,6 +33,9 @@ def evaluate(measured: Measured) -> dict[str, Result]:
 
     steady-state           1 where it is reached within the soak, 0 where it is not
     steady-state-time      h since power-on, where it is reached: the later one of bias and scale factor
+    steady-state-earliest  h since power-on, where it is not reached: it is later than that, by 97.5 %, as foreseen
+    steady-state-latest    the same: it is sooner than that, by 97.5 %; where that is within two days
+    steady-state-expected  the median, where there is a latest
     bias-drift             V, the fitted bias at the last reversal less that at the first
     scale-drift            the same of the scale factor, over its final value
     time-constant          h, of the slowest exponential of the bias, where there is one
@@ -44,16 +49,16 @@ def evaluate(measured: Measured) -> dict[str, Result]:
 
     A soak with too few reversals to tell drift from noise has its gaps only.
     """
-    found = night(measured)
+    found, ahead = night(measured), foreseen_of(measured)
     results: dict[str, Result] = {}
     for axis in ("", *found.axes) if all(course.state for course in found.courses.values()) else ():
-        results |= _steady(found, axis)
+        results |= _steady(found, ahead, axis)
     for course in found.courses.values():
         if course.state is not None:
             results |= _drift(course, course.state)
     if (wander_k := found.temperature_wander_k) is not None:
         results["temperature-wander"] = Result(wander_k, "K")
-    results |= _foreseen(foreseen_of(measured))
+    results |= _foreseen(ahead)
     return results | {"gap": Result(sum(gap.length_s for gap in found.gaps), "s")}
 
 
@@ -116,12 +121,17 @@ def table_of(
     return Table.from_columns("poses", columns, constants or {}, "the run", labels)
 
 
-def _steady(found: Soak, axis: str) -> dict[str, Result]:
+def _steady(found: Soak, ahead: Mapping[str, Foreseen], axis: str) -> dict[str, Result]:
+    """When it was reached; else when it will be."""
     time, end = found.time_s(axis), f"-{axis}" if axis else ""
     results = {f"steady-state{end}": Result(float(time is not None), "")}
     if time is not None:
-        results[f"steady-state-time{end}"] = Result(time[0] / HOUR_S, "h", time[1] / HOUR_S)
-    return results
+        return results | {f"steady-state-time{end}": Result(time[0] / HOUR_S, "h", time[1] / HOUR_S)}
+    bounds = steady_from(ahead, axis)
+    shown = {} if bounds is None else {"earliest": bounds.low}
+    if bounds is not None and np.isfinite(bounds.high):
+        shown |= {"expected": bounds.value, "latest": bounds.high}
+    return results | {f"steady-state-{name}{end}": Result(s / HOUR_S, "h") for name, s in shown.items()}
 
 
 def _foreseen(found: Mapping[str, Foreseen]) -> dict[str, Result]:

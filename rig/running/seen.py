@@ -20,6 +20,7 @@ from rig.bench import Bench
 from rig.numerals import duration
 from rig.planning.plan import Plan
 from rig.record import Kept
+from rig.running.so_far import SoFar
 from rig.running.soak_forecast import outlook, present, soak_watch
 from rig.running.way import Way
 
@@ -33,7 +34,7 @@ class Seen:
     """What is known of a run at one moment.
 
     `usual_v`: by channel the usual scatter of dwells of this kind. `tilt`: the level's readings by name, deg.
-    `foreseen`: of a soak, what bias and scale factor come to.
+    `foreseen`: of a soak, what bias and scale factor come to. `so_far`: of others, what they are by the poses so far.
     `range_v`: what the converter can take. `simulated`: the rig's time is faster than the wall's.
     """
 
@@ -47,6 +48,7 @@ class Seen:
     usual_v: Mapping[str, float] = field(default_factory=dict)
     tilt: Mapping[str, float] = field(default_factory=dict)
     foreseen: Mapping[str, Forecast] = field(default_factory=dict)
+    so_far: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def count(self) -> str:
@@ -86,7 +88,7 @@ class Sight:
         adc = bench.instruments.get("adc")
         range_v = getattr(adc.typed_settings(), "range_v", None) if adc else None
         self.seen = Seen(title, bench.limits, range_v, bench.simulated)
-        self._soak = soak_watch(title)
+        self._soak, self._so_far = soak_watch(title), SoFar()
         self._scatter: dict[tuple[str, str], deque[float]] = defaultdict(lambda: deque(maxlen=REMEMBERED))
 
     def planned(self, plan: Plan) -> None:
@@ -98,6 +100,8 @@ class Sight:
         """The run begins, or goes on; the title may be its name."""
         if self._soak:
             self._soak.begun(run or title)
+        else:
+            self._so_far.begun(run or title)
         self.seen = replace(self.seen, title=title, way=self.seen.way.begin(time.monotonic()))
 
     def doing(self, text: str) -> None:
@@ -116,8 +120,8 @@ class Sight:
                 usual[name] = statistics.median(before_it)
             before_it.append(std)
         foreseen = (self._soak.kept(kept) if self._soak else {}) or self.seen.foreseen
-        way = self.seen.way.step(time.monotonic())
-        self.seen = replace(self.seen, kept=kept, usual_v=usual, foreseen=foreseen, way=way)
+        way, so_far = self.seen.way.step(time.monotonic()), self._so_far.kept(kept)
+        self.seen = replace(self.seen, kept=kept, usual_v=usual, foreseen=foreseen, so_far=so_far, way=way)
 
     def read(self, reading: Reading) -> None:
         self.seen = replace(self.seen, tilt={**self.seen.tilt, reading.name: reading.value})
@@ -147,6 +151,8 @@ def values(seen: Seen) -> Iterator[Value]:
             yield _channel(name, dwell.means[name], dwell.stds[name], farthest, seen)
     for name, each in seen.foreseen.items():
         yield Value(name, present(name, each), outlook(name, each))
+    for name, shown in seen.so_far.items():
+        yield Value(name, shown, "by the poses so far")
 
 
 def _channel(name: str, mean: float, std: float, farthest: float, seen: Seen) -> Value:

@@ -5,18 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from calibrations.evaluations.forecast import STRETCH_S, Forecast, SoakForecast, followed
+from calibrations.evaluations.forecast import FARTHEST_S, STRETCH_S, Forecast, SoakForecast, followed
 from calibrations.evaluations.soak import HOLD, HOUR_S, REVERSAL
 from calibrations.numerals import plain
 from procedures.session import Dwell
 from procedures.tumbles import tumble
-from rig.numerals import duration
 from rig.record import Kept, Record
 from rig.record.measured import Measured, of_sensor, sensors_of
 from rig.results.soak import table_of
 
 WHOLE = len(list(tumble(REVERSAL)))  # poses of a reversal
-FARTHEST_S = 48 * HOUR_S  # beyond it, when it will be steady is not told
 
 
 @dataclass
@@ -85,6 +83,10 @@ class SoakWatch:
             for name, each in follower.told.forecasts().items()
         }
 
+    def told(self, kept: Kept) -> str:
+        """The same in words, a line each; nothing where no reversal is complete by this pose."""
+        return lines(forecasts) if (forecasts := self.kept(kept)) else ""
+
 
 def soak_watch(procedure: str) -> SoakWatch | None:
     """Who follows a run of `procedure`: nobody but a soak's."""
@@ -97,23 +99,33 @@ def present(name: str, forecast: Forecast) -> str:
 
 
 def outlook(name: str, forecast: Forecast) -> str:
-    """What it comes to, and when, in words."""
-    unit = "uV/g" if "scale" in name else "uV"
+    """What it comes to, and when, in words; bounds are those of 95 %, however wide."""
+    if forecast.surprised:
+        return "what came is no approach to a steady state: nothing is foreseen"
+    return f"{_final(name, forecast)}; {_when(forecast)}"
+
+
+def _final(name: str, forecast: Forecast) -> str:
+    """What it comes to."""
+    unit, final = ("V/g" if "scale" in name else "V"), forecast.final
     if forecast.known:
-        comes = f"comes to {forecast.final.value:.5f} +- {plain(1e6 * forecast.final.half, 2)} {unit} (95 %)"
-    else:
-        comes = "not yet known what it comes to"
-    return f"{comes}; {_when(forecast)}"
+        return f"comes to {final.value:.5f} +- {plain(1e6 * final.half, 2)} u{unit} (95 %)"
+    return f"not yet known what it comes to: {final.low:.4f} to {final.high:.4f} {unit} (95 %)"
 
 
 def _when(forecast: Forecast) -> str:
+    """When it is steady, from now."""
     if forecast.steady:
         return "steady"
-    low_s, value_s, high_s = (each - forecast.t_s for each in forecast.steady_s)
-    if not forecast.known or value_s > FARTHEST_S:
-        return "not yet known when it is steady" if low_s <= 0 else f"steady in {duration(low_s)} at the earliest"
-    latest = duration(high_s) if high_s < FARTHEST_S else "days"
-    return f"steady in {duration(value_s)} ({duration(low_s)} to {latest})"
+    low_s, value_s, high_s = (max(each - forecast.t_s, 0.0) for each in forecast.steady_s)
+    if high_s > FARTHEST_S:
+        return f"steady in {_span(low_s)} at the earliest" if low_s else "not yet known when it is steady"
+    bounds = f"{_span(low_s)} to {_span(high_s)}"
+    return f"steady in {_span(value_s)} ({bounds})" if forecast.known else f"steady in {bounds}"
+
+
+def _span(seconds: float) -> str:
+    return f"{plain(seconds / HOUR_S, 2)} h" if seconds >= HOUR_S else f"{seconds / 60:.0f} min"
 
 
 def lines(forecasts: Mapping[str, Forecast]) -> str:

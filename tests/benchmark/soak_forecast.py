@@ -1,8 +1,9 @@
 """How early a soak's final bias is known, how often the bounds hold it, and what the filters cost.
 
 Beside it the batch fit of exponentials (`steady_state`) of the reversals so far, with 1.96 standard errors as bounds.
-Soaks by laws of their own (tests/calibrations/drifting.py) and of the simulated world. Each is looked at after 1, 1.5,
-2, 3, 4, 6, 8 and 12 hours. A prediction is within its limit where it says that it is known, and its bounds hold.
+Soaks by laws of their own (tests/calibrations/drifting.py), out of physics (tests/calibrations/warming.py), and of the
+simulated world. Each is looked at after 1, 1.5, 2, 3, 4, 6, 8 and 12 hours. A prediction is within its limit where it
+says that it is known, and its bounds hold.
 """
 
 from __future__ import annotations
@@ -21,7 +22,8 @@ from calibrations.errors import TooFewRows
 from calibrations.evaluations.forecast import NARROW, Followed, Forecast, followed
 from calibrations.evaluations.steady_state import steady_state
 from calibrations.evaluations.tumble import tumbles
-from tests.calibrations.drifting import drifting, soak_of_world
+from tests.calibrations.drifting import Drifting, drifting, soak_of_world
+from tests.calibrations.warming import warming
 
 LOOKS_H = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0)
 SIGMAS = 1.96
@@ -61,7 +63,17 @@ def looked(forecast: Forecast, at_h: float, final_v: float, reversals: list[tupl
 
 def of_laws(seed: int) -> Iterator[Look]:
     """A bias by laws of its own."""
-    soak, looks = drifting(seed), list(LOOKS_H)
+    return of_bias(drifting(seed))
+
+
+def of_physics(seed: int) -> Iterator[Look]:
+    """A bias that follows heat through a board into a house."""
+    return of_bias(warming(seed))
+
+
+def of_bias(soak: Drifting) -> Iterator[Look]:
+    """Looked at while its values come."""
+    looks = list(LOOKS_H)
     first, *rest = soak.values
     told, reversals = Followed.of(first.t_s, first.volts, first.std_v, 1.0), [(first.t_s, first.volts, first.std_v)]
     for value in rest:
@@ -122,7 +134,7 @@ def cost() -> dict[str, float]:
 
 
 def main(kind: str, first: str, last: str) -> None:
-    maker = {"laws": of_laws, "world": of_world}[kind]
+    maker = {"laws": of_laws, "physics": of_physics, "world": of_world}[kind]
     looks = [look for seed in range(int(first), int(last)) for look in maker(seed)]
     at = [summary([look for look in looks if look.at_h == h]) for h in LOOKS_H]
     every = [look for look in looks if look.known]

@@ -66,15 +66,40 @@ def test_hard_iron_by_hand_is_the_middle_of_each_turn_and_soft_iron_that_of_the_
     assert np.degrees(found.soft_iron.angle_rad) % 180 == pytest.approx(30.0, abs=1.0)
 
 
+def test_uncertainties_by_hand_hold_what_one_side_cannot_show() -> None:
+    """Iron of any direction: one turn takes what it makes of the upright field for hard iron, and says how much."""
+    off: dict[str, list[float]] = {"one": [], "both": [], "H": [], "angle": []}
+    for seed in range(80):
+        rng = np.random.default_rng(seed)
+        soft = rng.normal(0, 0.03, (3, 3))
+        bent = np.eye(3) + soft + soft.T - np.eye(3) * np.trace(soft + soft.T) / 3
+        for kind, sides in (("one", ("z up",)), ("both", ("z up", "z down"))):
+            attitudes, edges, names = turns(sides, step_deg=15.0)
+            outputs = (attitudes @ EARTH) @ bent.T + [7.0, -3.0, 11.0] + 0.005 * rng.standard_normal((len(edges), 3))
+            found = by_hand(outputs, edges, names, std=0.005)
+            off[kind] += ((found.hard_iron - [7.0, -3.0, 11.0]) / found.hard_iron_std)[:2].tolist()
+        level = level_by_hand(outputs[:24], attitudes[:24], 0.0)
+        off["H"].append((level.value["H"] - np.hypot(18.0, 10.0)) / (level.std["H"] or 1.0))
+        _, ways = np.linalg.eigh((bent.T @ bent)[:2, :2])
+        turned = np.degrees(found.soft_iron.angle_rad - np.arctan2(*ways[::-1, 1]))
+        off["angle"].append(((turned + 90) % 180 - 90) / found.soft_iron.angle_std_deg(0.005))
+    share = {kind: np.mean(np.abs(each) < 2) for kind, each in off.items()}
+    assert 0.9 < share["one"] < 0.99
+    assert share["both"] > 0.9
+    assert 0.9 < share["H"] <= 1.0
+    assert share["angle"] > 0.9
+
+
 def test_by_one_horizontal_turn_the_third_component_is_not_known() -> None:
     attitudes, edges, names = turns(("z up",))
     found = by_hand(attitudes @ EARTH + [7.0, -3.0, 11.0], edges, names, std=0.0)
     assert found.hard_iron[:2] == pytest.approx([7.0, -3.0], abs=0.2)
     assert np.isnan(found.hard_iron[2])
-    level = level_by_hand(attitudes @ EARTH + [7.0, -3.0, 11.0], attitudes)
+    level = level_by_hand(attitudes @ EARTH + [7.0, -3.0, 11.0], attitudes, 0.1)
     assert level.value["H"] == pytest.approx(np.hypot(18.0, 10.0), rel=0.02)
     assert level.value["D"] == pytest.approx(np.degrees(np.arctan2(10.0, 18.0)), abs=1.0)
-    assert 0 < (level.std["D"] or 0.0) < 0.3
+    assert 0.1 <= (level.std["D"] or 0.0) < 0.3
+    assert level_by_hand(attitudes @ EARTH, attitudes, None).std["D"] is None  # how it sits in its mount
     assert found.left_per_mille < 5.0
 
 

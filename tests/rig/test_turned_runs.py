@@ -61,7 +61,7 @@ def test_a_magnetometer_is_calibrated_by_the_ellipsoid_and_by_hand(rig: Rig, fol
     """The field of the simulated laboratory is 52.4 uT, dips by 66.8 deg, and stands 34.3 deg before the base's x."""
     found = run(rig, folder, FIELD)["results"]
     assert found["field-inclination"]["value"] == pytest.approx(66.8, abs=0.2)
-    assert found["field-declination"]["value"] == pytest.approx(-34.3, abs=0.4)
+    assert found["field-azimuth"]["value"] == pytest.approx(-34.3, abs=0.4)
     assert found["field-total"]["value"] == pytest.approx(52.4 * 0.02, rel=0.01)
     horizontal = found["field-total"]["value"] * np.cos(np.radians(found["field-inclination"]["value"]))
     assert found["field-horizontal"]["value"] == pytest.approx(horizontal, rel=1e-6)
@@ -80,9 +80,9 @@ def test_one_horizontal_turn_says_what_it_cannot_show(rig: Rig, folder: Path) ->
     document = run(rig, folder, arguments)
     assert set(document["results"]) == {
         *("hard-iron-by-hand-x", "hard-iron-by-hand-y", "soft-iron-by-hand", "soft-iron-angle-by-hand", "left-by-hand"),
-        *("field-horizontal-by-hand", "field-declination-by-hand"),
+        *("field-horizontal-by-hand", "field-azimuth-by-hand"),
     }
-    assert document["results"]["field-declination-by-hand"]["value"] == pytest.approx(-34.3, abs=5.0)
+    assert document["results"]["field-azimuth-by-hand"]["value"] == pytest.approx(-34.3, abs=5.0)
     told = rig("show", document["run"]).out  # and its exit status is 1
     assert "no hard-iron-x, hard-iron-y, " in told
     assert "or left-by-ellipsoid: hard-iron and soft-iron cannot be asked: the orientations cover too little" in told
