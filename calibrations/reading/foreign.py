@@ -16,12 +16,14 @@ from calibrations.reading.cells import cells
 from calibrations.reading.plausible import check_at_rest, doubts
 from calibrations.reading.proposal import command, proposed
 from calibrations.reading.separated import Sheet, is_number, sheet
+from calibrations.reading.sessions import RATE, is_session, sample_rates
 from calibrations.reading.text_file import text_file
 from calibrations.reading.units import UNITS, Mapped, own_unit
 from calibrations.table import KINDS, NUMBERS, Array, Constant, Table, guess_kind
 
 TRIADS = (("ax", "ay", "az"), ("mx", "my", "mz"))
 RATES = ("gx", "gy", "gz")
+PATH = "path"
 
 
 @dataclass(frozen=True)
@@ -67,11 +69,16 @@ def take(
         raise MissingColumn(f"{laid.name}, line {laid.line}: {what}{proposed(laid, kind, chosen)}") from None
     known = {**laid.constants, **(constants or {})} | _output_unit(chosen, kind, laid.name)
     taken = {m.theirs for m in chosen}
-    numbers, texts = cells(laid, [name for name in laid.header if name not in taken and _is_text(laid, name)])
-    columns = {m.name: _converted(numbers[m.theirs], m) for m in chosen}
+    path = next((m.theirs for m in chosen if m.name == PATH), PATH)
+    words = [name for name in laid.header if name not in taken and _is_text(laid, name)]
+    numbers, texts = cells(laid, list(dict.fromkeys([*words, path])) if path in laid.header else words)
+    columns = {m.name: _converted(numbers[m.theirs], m) for m in chosen if m.name != PATH}
     columns |= {name: numbers[name] for name in kept if name in numbers}
+    labels = {k: texts[k] for k in kept if k in texts} | ({PATH: texts[path]} if path in texts else {})
+    if is_session(kind, columns, labels.get(PATH)):
+        columns[RATE] = sample_rates(columns, labels[PATH], known, laid.name)
     try:
-        table = Table.from_columns(kind, columns, known, laid.name, {k: texts[k] for k in kept if k in texts})
+        table = Table.from_columns(kind, columns, known, laid.name, labels)
     except MissingColumn as error:
         raise MissingColumn(f"{error}{proposed(laid, kind, chosen)}") from None
     _check_units(table, laid, chosen)

@@ -1,7 +1,7 @@
 """How a separated text is laid out, as its first lines show: separator, header, units, constants above the header.
 
-Any separator, a header or none, units in the header's names or in a row below it, decimal commas. The rows themselves
-are read by `calibrations/reading/cells.py`.
+Any separator, or JSON (`json_arrays.py`); a header or none, units in the header's names or in a row below it, decimal
+commas. The rows themselves are read by `calibrations/reading/cells.py`.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from itertools import islice
 
 from calibrations.errors import DataError
+from calibrations.reading.json_arrays import as_lines
 from calibrations.reading.text_file import Source
 from calibrations.reading.units import name_and_unit, unit_of
 from calibrations.table import Constant
@@ -66,6 +67,7 @@ class Sheet:
 
 def sheet(source: Source) -> Sheet:
     """The layout of `source`. Raises DataError naming file and line."""
+    source = as_lines(source)
     constants, start, head = _head(source)
     separator = _separator(head)
     rows = list(split(head, separator, source.name, start + 1))

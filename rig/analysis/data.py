@@ -12,6 +12,7 @@ from calibrations.reading.directions import one_for_each_direction
 from calibrations.reading.duplicates import without_copies
 from calibrations.reading.dwells import is_pose_log, pose_means
 from calibrations.reading.read_csv import read_csv
+from calibrations.reading.sessions import is_log, section_means
 from calibrations.reading.stills import is_raw_log, positions
 from calibrations.table import Table
 from rig.errors import RecordError, UnknownRun
@@ -36,7 +37,8 @@ def averaged(log: Table, tell: Callable[[str], None]) -> Table:
 def _taken(table: Table) -> str:
     if table.content == "fields":
         return f"{table.n} samples, one for each direction of the field"
-    return f"the means of {table.n} {'poses' if table.kind == 'poses' else 'still positions'}"
+    what = {"poses": "poses", "rates": "rests and turns"}.get(table.kind, "still positions")
+    return f"the means of {table.n} {what}"
 
 
 def _included(table: Table, tell: Callable[[str], None]) -> Table:
@@ -57,6 +59,8 @@ def _means(log: Table) -> Table:
         return pose_means(log)
     if is_raw_log(log) and log.content == "fields":
         return one_for_each_direction(log)
+    if is_log(log):
+        return section_means(log)
     return positions(log, _rate_hz(log)) if is_raw_log(log) else log
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from calibrations.evaluations.horizontal_turn import by_hand, ellipse, hard_iron
+from calibrations.evaluations.six_faces import Faces, faces
 from calibrations.fit import Fit
 from calibrations.general import General, general
 from calibrations.model import Estimate
@@ -28,11 +29,16 @@ def lines(found: Fit) -> Iterator[str]:
         yield columns(("axis", "M", "", "", "S", "b"), _rows(made))
     if found.table.content == "fields":
         yield _book(found.table)
+    if (held := _held(found.table)) is not None:
+        shown = (", ".join(f"{value:.7g}" for value in each) for each in (held.bias, held.scale))
+        yield "The accelerometer beside it, by its six faces: bias {}; {} a g.".format(*shown)
 
 
 def document(found: Fit) -> dict[str, Any]:
     """The keys `calibration` and `by_hand` of a fit's document; an uncertainty that is not determined is null."""
     made, extremes = general(found), _by_hand(found.table)
+    if (held := _held(found.table)) is not None:
+        extremes |= {"accelerometer": {"bias": held.bias.tolist(), "scale_per_g": held.scale.tolist()}}
     if made is None:
         return extremes
     parts = {
@@ -57,6 +63,14 @@ def _told(value: float, std: float) -> str:
 
 def _nullable(std: Array) -> Any:
     return [_nullable(row) for row in std] if std.ndim > 1 else [None if np.isnan(s) else float(s) for s in std]
+
+
+def _held(table: Table) -> Faces | None:
+    """What an accelerometer shows that was read beside a gyroscope; None where there is none, or a face is missing."""
+    if table.kind != "rates" or not all(f"a{axis}" in table for axis in "xyz"):
+        return None
+    still = table.column("rate_deg_s") == 0
+    return faces(np.column_stack([table.column(f"a{axis}")[still] for axis in "xyz"])) if still.any() else None
 
 
 def _by_hand(table: Table) -> dict[str, Any]:

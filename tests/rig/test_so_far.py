@@ -33,8 +33,9 @@ def follower(rig_home: Any) -> Any:
 
     def begun(kind: str, before: list[Kept] | None = None) -> SoFar:
         with Record() as record:
-            known = {"bench": {}, "identities": {}, "configuration": "", "constants": {}, "source": "made"}
-            run = record.begin("made", {}, kind=kind, **known)
+            run = record.begin(
+                "made", {}, bench={}, identities={}, configuration="", constants={}, source="made", kind=kind
+            )
             for each in before or []:
                 record.keep(run, each.number, each, None)
         told = SoFar()
