@@ -138,7 +138,7 @@ def search(still: Still, model: Model, effects: Mapping[str, Effect]) -> Search:
         if more is found:
             break
         found = more
-    return _together(still, found, given) if len(found.patterns) > 1 else found
+    return _together(still, found, given) if found.patterns else found
 
 
 def _together(whole: Still, found: Search, given: tuple[Effect, ...]) -> Search:

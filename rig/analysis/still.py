@@ -277,9 +277,21 @@ def _still_blocks(measured: Measured, into: Stream) -> Iterator[NDArray[Any]]:
         if next_s is not None and abs(samples.start_s - next_s) > LATE / into.rate_hz:
             into.closed.append((next_s, samples.start_s - next_s))
         next_s = samples.start_s + len(volts) / into.rate_hz
-        if kept.temperature_c is not None:
-            into.logged.setdefault(FOLLOWED[0], []).append(np.broadcast_to(kept.temperature_c, len(volts)))
+        for name, values in _beside(kept):
+            into.logged.setdefault(name, []).extend(values)
         yield volts
+
+
+def _beside(kept: Kept) -> Iterator[tuple[str, list[Array]]]:
+    """Temperature of a block, and supply, as means of a second each: in blocks that take no room."""
+    samples, n = kept.samples, len(kept.samples.volts)
+    temperature, supply = FOLLOWED
+    if kept.temperature_c is not None:
+        yield temperature, [np.broadcast_to(kept.temperature_c, n)]
+    if (channel := supply.removesuffix("_v")) in samples.channels:
+        volts = samples.volts[:, samples.channels.index(channel)]
+        pieces = np.array_split(volts, max(1, round(n / samples.rate_hz)))
+        yield supply, [np.broadcast_to(piece.mean(), len(piece)) for piece in pieces]
 
 
 def _note_upright(kept: Kept, volts: Array, into: Stream) -> None:

@@ -186,6 +186,10 @@ def test_no_block_of_a_run_is_read_twice(run: str) -> None:
         still = stream(record, run, "vy", None)
         lengths = [len(block) for block in still.blocks]
     assert lengths == [10_000] * 3
+    assert {name: sum(map(len, blocks)) for name, blocks in still.logged.items()} == dict.fromkeys(
+        ("temperature_c", "supply_v"), 30_000
+    )
+    assert {len(block) for block in still.logged["supply_v"]} == {1000}
     assert still.scale_v_per_g == pytest.approx(1.0, rel=0.05)
     assert still.closed == []
 
