@@ -70,6 +70,7 @@ def _figures(folder: Path) -> Iterator[tuple[str, Figure]]:
     yield "noise coefficients", _noise(folder)
     yield "compensation in C", json.loads(subject(folder, "compensation").out)
     yield "100 kills", _inside("", subject(folder, "kills", "100"))
+    yield "1,000 pushes from 8 rigs", json.loads(subject(folder, "push").out)
     yield "stops in real time", json.loads(subject(folder, "stops").out)
     yield "10 million inputs", json.loads(subject(folder, "fuzz").out)
     yield "every fault in every procedure", json.loads(subject(folder, "faults").out)

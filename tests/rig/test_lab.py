@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from rig.bench import read_bench
 from rig.cli import rig as commands
 from rig.cli.record_option import OPTION
 from rig.errors import RecordError
@@ -189,6 +190,12 @@ def test_a_bench_with_a_password_is_refused_with_its_key(bench_file: Callable[..
     assert (
         "bench.yaml, key lab.url: has a password, which every run would keep" in rig("check", "--bench", str(file)).err
     )
+
+
+def test_where_runs_are_pushed_is_no_part_of_what_they_depend_on(bench_file: Callable[..., Path]) -> None:
+    lab = {"url": "postgresql://rig7@lab.example/rigs", "push": True}
+    with_lab, without = (read_bench(bench_file({"lab": each})).configuration("sweep", {}) for each in (lab, None))
+    assert with_lab == without
 
 
 def test_which_lab_it_is_must_be_said(rig: Rig) -> None:

@@ -208,10 +208,15 @@ def test_a_byte_that_is_lost_in_the_lab_is_noticed(own: Record, lab: Record, ser
     assert set(verify(lab).changed) == {run, other}
 
 
-def test_a_run_of_an_older_program_has_one_identity_in_every_copy_of_its_record(own: Record, lab: Record) -> None:
-    run = a_run(own)
+def test_a_run_of_an_older_program_has_one_identity_in_every_copy_of_its_record(
+    own: Record, lab: Record, tmp_path: Path
+) -> None:
+    runs = [a_run(own, 1), a_run(own, 2)]
     with own.engine.begin() as to:
         to.exec_driver_sql("UPDATE runs SET uid = ''")
-    (first,) = pushed(own, lab.where)
-    assert unsent(own, lab) == []
-    assert push(own, lab, run) == Pushed(run, run, "there", first.digest)
+    copy = shutil.copytree(own.folder, tmp_path / "copy")
+    assert [each.name for each in pushed(own, lab.where)] == runs
+    with Record(Path(copy)) as another:
+        assert unsent(another, lab) == []
+        assert [push(another, lab, run).how for run in runs] == ["there", "there"]
+    assert [run.run for run in lab.runs()] == runs[::-1]
