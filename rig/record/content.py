@@ -1,7 +1,7 @@
 """What a run holds, as digests that are equal in every record that holds the same, and as rows to copy.
 
 digest   SHA-256 of all of it: of the run, and of every row that belongs to it, in their order
-head     of what can still change once a run is complete (results, what is left out, notes): quick, samples unread
+head     of what changes once a run is complete, its results and events (each exclusion is one): quick, samples unread
 
 Of bytes (samples, columns) the database gives their own SHA-256, so that they are counted where they are. A run's name
 is no part of it, nor are numbers that a database gives; nor the state of a simulated bench, which only resuming needs.
@@ -44,12 +44,9 @@ def digest(at: Connection, run: str) -> str:
 
 
 def head(at: Connection, run: str) -> str:
-    """Of what can change of a complete run."""
-    left_out = select(poses.c.number, poses.c.excluded).where(poses.c.run == run, poses.c.excluded.is_not(None))
-    noted = at.execute(rows_of(events, run)).all()
+    """Of what can change of a complete run. A pose that is left out is told by its event."""
     sha = hashlib.sha256(_line(run_row(at, run)))
-    sha.update(_line(at.execute(left_out.order_by(poses.c.number)).all()))
-    sha.update(_line(noted))
+    sha.update(_line(at.execute(rows_of(events, run)).all()))
     return sha.hexdigest()
 
 

@@ -181,6 +181,8 @@ def test_a_pose_that_is_excluded_later_is_excluded_by_the_next_push(own: Record,
     own.set_results(run, {"bias-x": {"value": 2.4}})
     assert unsent(own, lab) == [run]
     assert [each.how for each in pushed(own, lab.where)] == ["pushed"]
+    own.note(run, "note", "the door was open")
+    assert unsent(own, lab) == [run]
     own.exclude(run, 3, None)
     own.exclude(run, 4, "another")
     pushed(own, lab.where)
