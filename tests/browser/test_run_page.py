@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 from playwright.sync_api import Page, expect
 
 from rig.record import Record
@@ -62,6 +65,20 @@ def test_a_run_is_paused_left_alone_opened_again_and_stopped(workbench: Workbenc
     assert (run.procedure, run.state) == ("soak", "stopped")
 
 
+def test_a_run_of_a_terminal_is_watched_and_stopped(workbench: Workbench) -> None:
+    words = [sys.executable, "-m", "rig", "run", "soak", "--unattended", "--duration-s", "43200"]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as terminal:
+        page = workbench.visit("/run")
+        phase(page, "running")
+        expect(page.get_by_text("unattended: a pause would end it")).to_be_visible()
+        expect(page.locator(".values").get_by_text("as usual").first).to_be_visible()
+        expect(page.get_by_role("button", name="Pause")).to_have_count(0)
+        page.get_by_role("button", name="Stop").first.click()
+        phase(page, "stopped")
+        assert "stopped by SIGTERM" in terminal.communicate(timeout=60)[1]
+    assert terminal.returncode == 4
+
+
 def test_questions_are_asked_and_a_wrong_answer_is_refused(workbench: Workbench) -> None:
     page = workbench.visit("/run?procedure=sweep&step_deg=180&inclinations_deg=90")
     expect(page.get_by_text("Takes", exact=True)).to_be_visible()
@@ -82,11 +99,11 @@ def test_a_plan_that_cannot_be_says_why_and_does_not_start(workbench: Workbench)
 
 def test_a_setting_that_takes_one_of_a_few_is_a_list_and_what_they_mean_is_told(workbench: Workbench) -> None:
     page = workbench.visit("/run?procedure=sweep&step_deg=45")
+    page.get_by_text("What the settings mean").click()
+    expect(page.get_by_text('face = "both" has the sensor turned over half way')).to_be_visible()
     page.get_by_label("face").click()
     page.get_by_role("option", name="both").click()
     expect(page.get_by_text("252 poses")).to_be_visible()
-    page.get_by_text("What the settings mean").click()
-    expect(page.get_by_text("face = \"both\" has the sensor turned over half way")).to_be_visible()
 
 
 def test_the_bench_is_checked(workbench: Workbench) -> None:
