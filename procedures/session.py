@@ -301,7 +301,7 @@ class Session:
         low, high = self.limits.temperature_c
         if temperature_c is not None and not (math.isfinite(temperature_c) and low <= temperature_c <= high):
             raise SafetyLimit(
-                f"the sensor is at {temperature_c:g} C, outside the bench's limits of {low:g} to {high:g} C; "
+                f"oven: the sensor is at {temperature_c:g} C, outside the bench's limits of {low:g} to {high:g} C; "
                 "let it come back, or change limits.temperature_c in the bench file"
             )
 

@@ -99,3 +99,15 @@ def test_an_alarm_is_seen_by_whoever_looks(stage: Make, server: Server, clock: S
     server.afflict("alpha", faults_of("oriental_az", [Fault("alarm", at_s=clock.now(), size=0x10)]))
     with pytest.raises(StageAlarm, match="alarm 10, excessive position deviation"):
         sound.look()
+
+
+def test_a_stage_that_is_told_to_halt_brakes_while_others_are_told(stage: Make, clock: SimulatedClock) -> None:
+    moving = stage()
+    moving.start(90.0)
+    clock.sleep(1.0)
+    asked_s = clock.now()
+    moving.halt()
+    assert clock.now() - asked_s < 0.02
+    clock.sleep(1.0)
+    assert moving.angle_deg() < 60.0
+    moving.stop()

@@ -86,6 +86,11 @@ def endured(procedure: str, role: str, fault: Fault) -> End:
         assert (done.run.state, done.error) == ("complete", None)
         if procedure in STRETCHES:
             return "stopped"
+        if (role, fault.what) == ("oven", "runaway"):  # what was kept before it was noticed is hotter, and says so
+            assert [kept.pose for kept in record.kept(done.run.run)] == [
+                kept.pose for kept in undisturbed(procedure)[1]
+            ]
+            return "stopped"
         if fault.what in OTHER_NOISE or (role, fault.what) == ("level", "lies"):  # what the level said is read again
             _require_right(record, done, procedure, guarded)
         else:
