@@ -26,6 +26,7 @@ HARMLESS: dict[str, Made] = {
     "coarse steps": lambda r: np.round(0.6 * white(r)),
     "a slow sensor under coarse steps": lambda r: np.round(room(r), 1),
     "a step": lambda r: white(r) + 50.0 * (np.arange(20_000) > 7000),
+    "a step that takes a sample": lambda r: white(r) + 50.0 * np.clip(np.arange(20_000) - 7000.0, -1, 1),
     "sawtooth": lambda r: white(r) + np.arange(20_000) % 500.0,
 }
 
