@@ -109,5 +109,5 @@ def test_a_stage_that_is_told_to_halt_brakes_while_others_are_told(stage: Make, 
     moving.halt()
     assert clock.now() - asked_s < 0.02
     clock.sleep(1.0)
-    assert moving.angle_deg() < 60.0
+    assert moving.angle_deg() < 35.0  # 22.5 when it was told, 7.5 to brake; else 52.5
     moving.stop()
