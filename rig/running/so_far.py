@@ -45,7 +45,7 @@ class SoFar:
 
     def begun(self, run: str) -> None:
         """The run begins, or goes on: what the record holds of it counts."""
-        with Record.to_find(run) as record:
+        with Record() as record:
             self.law, self.known = LAWS.get(record.run(run).kind), {}
             for _, dwell in record.dwells(run) if self.law else ():
                 self._take(dwell)
