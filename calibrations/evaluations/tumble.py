@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from calibrations.errors import DataError
 from calibrations.estimators.least_squares import least_squares
+from calibrations.noise import rms
 from calibrations.noise_estimation.mean_noise import white_std
 from calibrations.table import Table
 
@@ -69,10 +70,9 @@ def _tumble(table: Table, axis: str, path: str, rows: Rows) -> Tumble:
     volts, beta = table.column(f"v{axis}_v")[rows], np.radians(table.column("beta_deg")[rows])
     columns = np.column_stack([np.cos(beta), np.sin(beta), np.ones(len(beta))])
     white = white_std(table)
-    noise = np.zeros(len(rows)) if white is None else white[rows, table.axes.index(axis)]
-    known = bool(np.all(noise > 0))
-    found = least_squares(columns, volts, noise**2 if known else 1.0)
-    std = np.sqrt(np.diag(found.covariance)) * known
+    noise = 0.0 if white is None else float(rms(white[rows, table.axes.index(axis)]))
+    found = least_squares(columns, volts)  # of equal weight: only so does hysteresis drop out
+    std = noise * np.sqrt(np.diag(found.covariance))
     scale = float(found.values[OWN[axis]])
     temperature_c = table.optional("temperature_c", float("nan"))[rows]
     return Tumble(

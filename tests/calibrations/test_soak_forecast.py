@@ -20,6 +20,7 @@ from calibrations.evaluations.forecast import (
 )
 from calibrations.evaluations.tumble import tumbles
 from calibrations.table import Array, Table
+from procedures.tumbles import tumble
 from tests.calibrations.drifting import Drifting, drifting, soak_of_world
 from tests.calibrations.soaks import WHITE_V, noise, paths, soak_table, times_s
 from tests.calibrations.warming import warming
@@ -205,6 +206,18 @@ def test_the_parts_of_a_table_are_reversals_and_stretches() -> None:
     assert [path for part in found for path in paths(part)][:4] == ["reversal 0", "hold 0", "reversal 1", "hold 1"]
     assert all(len(paths(part)) == 1 for part in found)
     assert max(float(np.ptp(part.time_s)) for part in found if paths(part)[0].startswith("hold")) <= 300.0
+
+
+def test_hysteresis_drops_out_of_a_tumble_however_noisy_one_pose_was() -> None:
+    table = soak_table(3600.0)
+    whole = next(parts(table))
+    way = np.array([pose.direction for pose in tumble("reversal 0")])
+    sticky = whole.column("vx_v") + 1e-3 * way
+    noisy = changed(changed(whole, "vx_v", sticky), "vx_std_v", np.where(np.arange(whole.n) == 1, 0.1, 8e-4))
+    (plain,), (found,) = tumbles(whole, "x"), tumbles(noisy, "x")
+    assert found.bias_v == pytest.approx(plain.bias_v, abs=1e-12)
+    assert found.scale_v_per_g == pytest.approx(plain.scale_v_per_g, abs=1e-12)
+    assert found.bias_std_v > 5 * plain.bias_std_v
 
 
 def changed(table: Table, name: str, values: Array) -> Table:
