@@ -54,6 +54,11 @@ def chance(p: float) -> str:
     return f"{p:.2g}"
 
 
+def percent(share: float) -> str:
+    """`3.3 %`, `100 %`."""
+    return f"{100 * share:.0f} %" if share >= 0.1 else f"{100 * share:.2g} %"
+
+
 def unit(text: str) -> str:
     """`V/g^2` as `V/g²`, `degC` as `°C`; nothing for a pure number."""
     head, *powers = text.replace("degC", "°C").split("^")

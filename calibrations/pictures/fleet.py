@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from calibrations.fleet.population import Population
 from calibrations.fleet.rigs import RigError
+from calibrations.numerals import percent
 from calibrations.pictures.style import BLUE, FAINT, INK, MARKER, QUIET, SIGNED, VERMILION, panels, styled
 from calibrations.table import Array
 
@@ -32,7 +33,7 @@ def shares(found: Population) -> Figure:
     ax.imshow(share, cmap=SIGNED, vmin=-1, vmax=1, aspect="auto")
     for (row, column), value in np.ndenumerate(share):
         if value:
-            text, colour = f"{100 * value:.2g} %", "white" if value > HALF else INK
+            text, colour = percent(float(value)), "white" if value > HALF else INK
             ax.text(column, row, text, ha="center", va="center", color=colour)
     ax.set_xticks(range(len(found.batches)), [batch.batch or "no batch" for batch in found.batches])
     ax.set_yticks(range(len(effects)), effects)

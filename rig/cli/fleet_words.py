@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from calibrations.fleet.batch import BatchEffect
 from calibrations.fleet.population import Population, SensorVerdict
 from calibrations.model import Estimate
+from calibrations.numerals import percent
 from calibrations.reports.words import joined
 from rig.cli.output import columns
 from rig.cli.words import with_uncertainty
@@ -40,7 +41,7 @@ def _with_rivals(name: str, rivals: Iterable[str]) -> str:
 
 
 def _shares(shares: Mapping[str, float], shared: set[str]) -> str:
-    return ", ".join(f"{name} {100 * share:.2g} %" for name, share in shares.items() if name not in shared) or "-"
+    return ", ".join(f"{name} {percent(share)}" for name, share in shares.items() if name not in shared) or "-"
 
 
 def _rigs(found: Population) -> Iterator[str]:

@@ -38,7 +38,7 @@ class Fleet:
             if key in known:
                 yield member, known[key]
         done = len(asked) - len(open_)
-        for found in self._new(open_):
+        for found in self._new(open_) if open_ else ():
             done += len(found)
             self.tell(done, len(asked))
             yield from found

@@ -1,13 +1,12 @@
 """The workers: a local Dask cluster, or the scheduler of the lab.
 
-Chunks of tasks are handed out a few ahead of what the workers do, so that memory does not grow with the fleet. Dask
-gives the chunk of a worker that died to another. One that has killed LIVES of them is halved, until the sensor to blame
-is alone.
+Chunks of tasks are handed out a few ahead of what the workers do, so that memory does not grow with the fleet. What was
+under way on a worker that died is done again at the end, one task at a time and alone: so a task that kills its worker
+is found, and no other is blamed for it.
 """
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from itertools import islice
@@ -18,9 +17,10 @@ from rig.errors import RigError
 if TYPE_CHECKING:
     from distributed import Client
 
-LIVES = 2  # workers that one chunk may kill before it is divided
 AHEAD = 3  # chunks on their way for each thread of a worker
 PATIENCE_S = 10  # for a scheduler to answer
+
+LOST = "the scheduler is lost; what was done is in the record: give the same command again"
 
 T = TypeVar("T")
 
@@ -42,7 +42,10 @@ def crew(scheduler: str | None, workers: int | None) -> Iterator[Client]:
         from distributed import Client, LocalCluster
     except ImportError:
         raise FleetError("fleets need Dask; install it with: pip install 'inertial-rig[fleet]'") from None
-    quiet = {"distributed.scheduler.allowed-failures": LIVES - 1, "distributed.logging.distributed": "critical"}
+    quiet = {
+        "distributed.scheduler.allowed-failures": 0,
+        "distributed.comm.timeouts.connect": f"{PATIENCE_S} s",
+    }
     with dask.config.set(quiet):
         if scheduler is not None:
             try:
@@ -53,7 +56,9 @@ def crew(scheduler: str | None, workers: int | None) -> Iterator[Client]:
                 yield client
             return
         with (
-            LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None, host="127.0.0.1") as cluster,
+            LocalCluster(
+                n_workers=workers, threads_per_worker=1, dashboard_address="127.0.0.1:0", host="127.0.0.1"
+            ) as cluster,
             Client(cluster) as client,
         ):
             yield client
@@ -64,40 +69,41 @@ def answered(
 ) -> Iterator[tuple[list[T], Any]]:
     """Chunks of `size` tasks with what `work` makes of them, as they are done; None for a task that kills its worker.
 
-    Raises FleetError where the scheduler is lost, or no worker is left.
+    Raises FleetError where the scheduler is lost.
     """
     from concurrent.futures import CancelledError
 
     from distributed import KilledWorker, as_completed
 
-    waiting = iter(tasks)
-    again: deque[list[T]] = deque()
+    chunks = _chunks(tasks, size)
     under_way: dict[Any, list[T]] = {}
-    done = as_completed()
+    suspects: list[T] = []
+    done = as_completed(loop=client.loop)
+    try:
+        ahead = AHEAD * max(sum(client.nthreads().values()), 1)
+        while True:
+            for chunk in islice(chunks, ahead - len(under_way)):
+                future = client.submit(work, chunk, pure=False)
+                under_way[future] = chunk
+                done.add(future)
+            if not under_way:
+                break
+            future = next(done)
+            chunk = under_way.pop(future)
+            try:
+                yield chunk, future.result()
+            except KilledWorker:
+                suspects += chunk
+        for task in suspects:
+            try:
+                yield [task], client.submit(work, [task], pure=False).result()
+            except KilledWorker:
+                yield [task], None
+    except (CancelledError, OSError):
+        raise FleetError(LOST) from None
 
-    def hand_out() -> None:
-        threads = max(sum(client.nthreads().values()), 1)
-        while len(under_way) < AHEAD * threads:
-            chunk = again.popleft() if again else list(islice(waiting, size))
-            if not chunk:
-                return
-            future = client.submit(work, chunk, pure=False)
-            under_way[future] = chunk
-            done.add(future)
 
-    hand_out()
-    while under_way:
-        future = next(done)
-        chunk = under_way.pop(future)
-        try:
-            yield chunk, future.result()
-        except KilledWorker:
-            if len(chunk) == 1:
-                yield chunk, None
-            else:
-                again += [chunk[: len(chunk) // 2], chunk[len(chunk) // 2 :]]
-        except (CancelledError, OSError):
-            raise FleetError(
-                "the scheduler is lost; what is done is in the record: give the same command again"
-            ) from None
-        hand_out()
+def _chunks(tasks: Iterable[T], size: int) -> Iterator[list[T]]:
+    waiting = iter(tasks)
+    while chunk := list(islice(waiting, size)):
+        yield chunk

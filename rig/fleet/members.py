@@ -21,6 +21,7 @@ from pathlib import Path
 from calibrations.errors import DataError
 from calibrations.numerals import as_written
 from calibrations.reading.text_file import text_file
+from calibrations.table import NUMBERS
 from rig.analysis.sensors import CALIBRATING, members
 from rig.errors import RigError, UnknownRun
 from rig.record import Record, Run
@@ -86,7 +87,7 @@ def _of(source: str) -> Iterator[Member]:
 
 def _is_index(path: Path) -> bool:
     head = _head(path)
-    return bool({"file", "data"} & set(head)) and set(head) <= set(COLUMNS)
+    return bool({"file", "data"} & set(head)) and not NUMBERS & set(head)
 
 
 def _head(path: Path) -> list[str]:

@@ -1,0 +1,157 @@
+"""Fleets: effects that a batch shares, errors that a rig adds, and what poses are saved by siblings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+import pytest
+
+from calibrations.chain import nominal_pose, specific_force
+from calibrations.effect import catalogue
+from calibrations.fit import fit
+from calibrations.fleet.batch import batch_effects
+from calibrations.fleet.columns import Shared
+from calibrations.fleet.corrected import corrected
+from calibrations.fleet.look import Look, information, look
+from calibrations.fleet.pooling import pooled
+from calibrations.fleet.rigs import Measured, RigError, rig_errors, unconnected
+from calibrations.model_file import read_model
+from calibrations.search.candidates import candidates
+from calibrations.search.screen import Screen
+from calibrations.table import Table
+from tests.calibrations.fleets import Flaw, Rig, sensor
+
+LINEAR = read_model("linear")
+EFFECTS = {k: e for k, e in catalogue().items() if not {"t_s", "temperature_c"} & set(e.needs) and k != "quantisation"}
+SHARED = Shared(EFFECTS)
+STAGE = [name for name, effect in catalogue().items() if effect.pose is not None]
+
+
+def looks(tables: Iterable[Table]) -> list[Look]:
+    return [look(table, LINEAR, SHARED) for table in tables]
+
+
+def test_a_look_scores_as_the_search_for_one_sensor_does() -> None:
+    """Columns are another sensor's, and scores come from one Gram matrix: the statistics are those of the search."""
+    first, table = sensor(1, Flaw(bend=3e-4)), sensor(2, Flaw(bend=3e-4))
+    found, fitted = looks([first, table])[1], fit(LINEAR, table)
+    screen = Screen(fitted)
+    own = {c.name: screen.statistic(c.basis) for c in candidates(fitted, EFFECTS)}
+    statistics = {name: max(s.statistic for s in found.scores if s.effect == name) for name in own}
+    assert statistics == pytest.approx(own, rel=0.03, abs=0.3)
+    assert found.chance < 1e-6
+
+
+def test_information_is_that_of_the_stated_uncertainties() -> None:
+    found = fit(LINEAR, sensor(3))
+    stated = [e.std for term in found.model.terms for e in term.estimates]
+    assert np.sqrt(np.diag(np.linalg.inv(information(found)))) == pytest.approx(stated)
+
+
+def test_a_batch_shows_what_none_of_its_sensors_does() -> None:
+    found = looks(sensor(100 + k, Flaw(bend=30e-6)) for k in range(20))
+    assert sum(each.chance < 0.003 for each in found) <= 1
+    first = batch_effects(found, STAGE)[0]
+    assert "quadratic-nonlinearity" in (first.effect, *first.rivals)
+    assert first.common
+    assert first.p_value < 1e-3
+
+
+def test_sensors_that_each_have_their_own_value_make_a_batch_too_and_it_is_no_stage_that_has() -> None:
+    first = batch_effects(looks(sensor(200 + k, Flaw(askew=0.1)) for k in range(8)), STAGE)[0]
+    assert (first.effect, first.common) == ("axis-misalignment", False)
+
+
+def test_an_equal_batch_misses_nothing_and_one_defect_does_not_speak_for_it() -> None:
+    clean = looks(sensor(300 + k) for k in range(14))
+    assert not batch_effects(clean, STAGE)
+    assert not batch_effects([*clean[1:], *looks([sensor(400, Flaw(bend=0.01))])], STAGE)
+
+
+def fleet(rigs: dict[str, Rig], count: int = 5) -> list[Measured]:
+    """Sensors of one batch, each askew by an angle of its own, some on each rig."""
+    places = [rig for rig in rigs for _ in range(count)]
+    found = looks(sensor(500 + k, Flaw(askew=0.1), rigs[rig]) for k, rig in enumerate(places))
+    return [Measured("lot", rig, each.stage) for rig, each in zip(places, found, strict=True)]
+
+
+def beyond(errors: Iterable[RigError]) -> dict[tuple[str, str, str], RigError]:
+    return {(e.rig, e.effect, e.parameter): e for e in errors if e.beyond}
+
+
+def test_what_all_sensors_of_a_rig_share_is_the_rigs() -> None:
+    """Each sensor is askew by an angle of its own, which looks like its stage's zero: a fleet tells them apart."""
+    members = fleet({"a": Rig(), "b": Rig(wave=0.05), "c": Rig(), "d": Rig(zero=0.8)})
+    found = beyond(rig_errors(members))
+    assert set(found) == {("b", "stage-eccentricity", "sine"), ("d", "stage-zero-offset", "beta")}
+    wave, zero = found["b", "stage-eccentricity", "sine"], found["d", "stage-zero-offset", "beta"]
+    assert abs(wave.value - 0.05) < 4 * wave.std < 0.02
+    assert abs(zero.value - 0.8) < 4 * zero.std < 0.5
+
+
+def test_rigs_that_are_alike_have_no_error_and_one_rig_alone_tells_none() -> None:
+    assert not rig_errors(fleet({"a": Rig(), "b": Rig(), "c": Rig()}, count=4))
+    assert not rig_errors(fleet({"a": Rig(wave=0.1)}))
+
+
+def test_rigs_are_compared_where_a_batch_connects_them() -> None:
+    stage = looks([sensor(1)])[0].stage
+    of = [Measured(batch, rig, stage) for batch, rig in ("1a", "1b", "2c", "3b", "3d")]
+    assert unconnected(of) == [("c",), ("a", "b", "d")] or unconnected(of) == [("a", "b", "d"), ("c",)]
+
+
+def test_a_corrected_table_stands_where_the_stage_truly_was() -> None:
+    table = sensor(1)
+    errors = {"stage-zero-offset": {"beta": 0.3, "alpha": 0.1}, "base-tilt": {"x": 0.2}}
+    moved = corrected(table, errors, EFFECTS)
+    pose = nominal_pose(table)
+    for name, values in errors.items():
+        hook = EFFECTS[name].pose
+        assert hook is not None
+        pose = hook(pose, table, {p.name: np.asarray(values.get(p.name, 0.0)) for p in EFFECTS[name].parameters})
+    assert specific_force(nominal_pose(moved)) == pytest.approx(specific_force(pose), abs=1e-12)
+    assert corrected(table, {}, EFFECTS) is table
+
+
+def test_siblings_save_poses() -> None:
+    """A third of the poses, pooled, know a batch's bend better than all of them alone; and the intervals hold."""
+    bent = LINEAR.with_effect(EFFECTS["quadratic-nonlinearity"])
+    rng, truth, few, alone = np.random.default_rng(3), [], [], []
+    for k in range(20):
+        bend = 2e-4 + 2e-5 * rng.standard_normal()
+        truth.append(bend)
+        few.append(fit(bent, sensor(700 + k, Flaw(bend=bend), chosen=slice(0, 60, 3))))
+        alone.append(fit(bent, sensor(700 + k, Flaw(bend=bend))))
+    together = pooled(
+        np.array([f.theta for f in few]), np.array([information(f) for f in few]), few[0].problem.layout.typical
+    )
+    error = np.sqrt(np.mean((together.values[:, 4] - truth) ** 2))
+    assert error < np.sqrt(np.mean((np.array([f.theta[4] for f in alone]) - truth) ** 2))
+    low, high = together.intervals()
+    assert np.mean((low[:, 4] <= truth) & (high[:, 4] >= truth)) >= 0.85
+
+
+@pytest.mark.parametrize("count", [5, 40])
+def test_pooled_intervals_of_correlated_parameters_hold_what_they_say(count: int) -> None:
+    rng, held = np.random.default_rng(count), []
+    for _ in range(240 // count):
+        J = rng.standard_normal((count, 5, 3)) @ np.array([[1.0, 0.9, 0.5], [0, 0.4, 0.3], [0, 0, 1.0]])
+        A = np.swapaxes(J, 1, 2) @ J
+        truth = np.array([1.0, -2.0, 0.5]) + np.array([2.0, 0.3, 0.0]) * rng.standard_normal((count, 3))
+        cov = np.linalg.inv(A)
+        theta = truth + np.einsum("nij,nj->ni", np.linalg.cholesky(cov), rng.standard_normal((count, 3)))
+        low, high = pooled(theta, A, np.ones(3)).intervals()
+        held.append(np.mean((low <= truth) & (high >= truth), axis=0))
+    assert np.all(np.mean(held, axis=0) > 0.9)
+
+
+def test_what_a_sensors_poses_do_not_tell_is_foretold_by_its_siblings() -> None:
+    A = np.tile(np.diag([4.0, 4.0]), (10, 1, 1))
+    A[0] = np.diag([4.0, 0.0])
+    theta = np.tile([1.0, 5.0], (10, 1)) + 0.1 * np.random.default_rng(0).standard_normal((10, 2))
+    theta[0, 1] = 50.0
+    found = pooled(theta, A, np.ones(2))
+    assert found.values[0, 1] == pytest.approx(5, abs=0.5)
+    assert np.isinf(found.alone[0, 1])
+    assert found.stds[0, 1] < 1

@@ -1,0 +1,226 @@
+"""Fleets through Dask: whatever dies, nothing is lost and nothing worked out twice; bad files; the commands."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import dask
+import pytest
+from distributed import Client, LocalCluster
+
+from calibrations.model_file import dump_model, read_model
+from calibrations.reading.read_csv import write_csv
+from rig.errors import RigError
+from rig.fleet.asked import Fleet
+from rig.fleet.crew import FleetError, answered, crew
+from rig.fleet.discover import discover_fleet
+from rig.fleet.members import Member, fleet_of
+from rig.fleet.worker import Question
+from rig.fleet.written import read_look, write_look
+from rig.record import Record
+from tests.calibrations.fleets import Flaw, Rig, sensor
+
+Command = Callable[..., Any]
+LINEAR = dump_model(read_model("linear"))
+RIGS = {"a": Rig(), "b": Rig(wave=0.06), "c": Rig()}
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[LocalCluster]:
+    """A scheduler that listens, with one worker in this process."""
+    with LocalCluster(
+        n_workers=1,
+        threads_per_worker=1,
+        processes=False,
+        protocol="tcp://",
+        host="127.0.0.1",
+        dashboard_address="127.0.0.1:0",
+    ) as made:
+        yield made
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A fleet of 12: one of three rigs is off, one sensor follows temperature, one file is none, one is missing."""
+    made = tmp_path_factory.mktemp("fleet")
+    lines = ["sensor,batch,rig,file"]
+    for k in range(12):
+        rig = "abc"[k % 3]
+        write_csv(sensor(900 + k, Flaw(warmth=1e-3 * (k == 4)), RIGS[rig]), made / f"{k}.csv")
+        lines.append(f"S{k},L7,{rig},{k}.csv")
+    (made / "bad.csv").write_text("alpha_deg,beta_deg,vx_v\n1,2,x\n")
+    (made / "fleet.csv").write_text("\n".join([*lines, "BAD,L7,a,bad.csv", "GONE,L7,a,gone.csv", ""]))
+    return made
+
+
+@pytest.fixture(scope="module")
+def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("record")
+
+
+@pytest.fixture
+def discovered(
+    cluster: LocalCluster, folder: Path, home: Path, rig: Command, monkeypatch: pytest.MonkeyPatch
+) -> dict[str, Any]:
+    """What `rig fleet discover` says of it; after the first time out of the record."""
+    monkeypatch.setenv("RIG_HOME", str(home))
+    address = cluster.scheduler_address
+    ended = rig("fleet", "discover", str(folder), "--scheduler", address, "--out", str(home / "guide"),
+                "--report", str(home / "fleet.html"), "--json")  # fmt: skip
+    assert ended.status == 0, ended.err
+    return dict(json.loads(ended.out))
+
+
+def test_the_rig_in_error_and_the_strange_sensor_are_found_and_bad_files_are_listed(
+    discovered: Mapping[str, Any], home: Path
+) -> None:
+    assert discovered["schema"] == "rig.fleet/1"
+    of = {each["sensor"]: each for each in discovered["sensors"]}
+    beyond = [(e["rig"], e["effect"], e["parameter"]) for e in discovered["rigs"] if e["beyond"]]
+    assert beyond == [("b", "stage-eccentricity", "sine")]
+    assert of["S4"]["own"] == ["temperature-bias"]
+    assert of["S4"]["judged"] == "in full"
+    assert {name for name, each in of.items() if each["verdict"] == "failed"} == {"BAD", "GONE"}
+    assert "line 2" in of["BAD"]["remark"]
+    assert "gone.csv" in of["GONE"]["remark"]
+    assert [name for name, each in of.items() if each["needs_a_person"]] == ["S4", "BAD", "GONE"]
+    page = (home / "fleet.html").read_text()
+    assert "http" not in page.replace("http://www.w3.org", "")
+    assert all(word in page for word in ("stage-eccentricity", "S4", "temperature-bias", "gone.csv"))
+
+
+def test_what_the_record_knows_is_not_worked_out_again(
+    discovered: Mapping[str, Any], folder: Path, home: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rig.fleet.asked.answered", lambda *_: pytest.fail("asked again"))
+    members = [m for m in fleet_of([str(folder)]) if m.sensor not in ("BAD", "GONE")]
+    with Record(home) as record:
+        again = discover_fleet(Fleet(None, record, lambda *_: None), members, LINEAR)  # type: ignore[arg-type]
+    assert [each.verdict for each in again.sensors] == [each["verdict"] for each in discovered["sensors"][:12]]
+
+
+def test_calibrate_goes_by_the_discovered_models_and_writes_each_sensors(
+    discovered: Mapping[str, Any], cluster: LocalCluster, folder: Path, home: Path, rig: Command
+) -> None:
+    address = cluster.scheduler_address
+    ended = rig("fleet", "calibrate", str(folder), "--scheduler", address, "--model", str(home / "guide"),
+                "--out", str(home / "models"), "--report", str(home / "calibrated.html"), "--json")  # fmt: skip
+    document = json.loads(ended.out)
+    (batch,) = document["batches"]
+    assert len(batch["sensors"]) == 12
+    assert {each["sensor"] for each in document["failed"]} == {"BAD", "GONE"}
+    assert [each["sensor"] for each in batch["sensors"] if each["stands_out"]] == ["S4"]
+    for parameter in batch["sensors"][1]["parameters"]:
+        assert parameter["interval"][0] < parameter["value"] < parameter["interval"][1]
+        assert parameter["std"] <= 1.05 * parameter["std_alone"]
+    model = read_model(home / "models" / "S1.yaml")
+    assert model.terms[0].estimates[0].value == batch["sensors"][1]["parameters"][0]["value"]
+    assert (home / "calibrated.html").stat().st_size > 5_000
+
+
+def test_answers_are_kept_as_they_come(cluster: LocalCluster, folder: Path, tmp_path: Path) -> None:
+    """Who is stopped in the middle, or loses the scheduler, goes on where the last answers came."""
+    members = [m for m in fleet_of([str(folder)]) if m.fault is None][:3]
+    asked = [(member, Question("diagnosis", LINEAR)) for member in members]
+    with Client(cluster) as client, Record(tmp_path) as record, pytest.MonkeyPatch.context() as patch:
+        patch.setitem(__import__("rig.fleet.asked").fleet.asked.CHUNK, "diagnosis", 1)
+        stopped = Fleet(client, record, lambda *_: None).ask(asked)
+        first, _ = next(stopped)
+        stopped.close()
+        left: list[list[Any]] = []
+        patch.setattr("rig.fleet.asked.answered", lambda _client, _work, tasks, _size: left.append(list(tasks)) or [])
+        again = [member for member, _ in Fleet(client, record, lambda *_: None).ask(asked)]
+    assert again == [first]
+    assert len(left[0]) == 2
+
+
+def fragile(tasks: list[int]) -> list[int]:
+    """Work that kills its process at 1."""
+    if 1 in tasks:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return tasks
+
+
+def test_a_worker_that_dies_loses_nothing_and_what_kills_it_is_told_alone() -> None:
+    with crew(None, 1) as client:
+        found = list(answered(client, fragile, range(5), 2))
+    assert sorted(task for chunk, _ in found for task in chunk) == [0, 1, 2, 3, 4]
+    assert [chunk for chunk, said in found if said is None] == [[1]]
+    assert all(said == chunk for chunk, said in found if said is not None)
+
+
+def test_no_scheduler_is_one_message(rig: Command, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rig.fleet.crew.PATIENCE_S", 0.2)
+    ended = rig("fleet", "discover", str(folder), "--scheduler", "tcp://127.0.0.1:1")
+    assert ended.status == 3
+    assert "tcp://127.0.0.1:1: no scheduler answers" in ended.err
+
+
+def numbered(tasks: list[int]) -> list[int]:
+    return tasks
+
+
+def test_a_lost_scheduler_says_how_to_go_on() -> None:
+    with (
+        dask.config.set({"distributed.comm.timeouts.connect": "0.5 s"}),
+        LocalCluster(
+            n_workers=1, threads_per_worker=1, processes=False, protocol="tcp://", host="127.0.0.1",
+            dashboard_address="127.0.0.1:0",
+        ) as lost,
+        Client(lost.scheduler_address) as client,
+    ):  # fmt: skip
+        going_on = answered(client, numbered, range(50), 1)
+        next(going_on)
+        lost.close()
+        with pytest.raises(FleetError, match="give the same command again"):
+            list(going_on)
+
+
+def test_members_of_files_folders_and_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("RIG_HOME", str(tmp_path / "home"))
+    (tmp_path / "home").mkdir()
+    write_csv(sensor(1), tmp_path / "one.csv")
+    text = (tmp_path / "one.csv").read_text()
+    (tmp_path / "two.csv").write_text(f"# serial: 17\n# batch: L8\n# rig: east\n{text}")
+    with Record() as record:
+        run = record.add_table(sensor(2))
+    of = {m.sensor: m for m in fleet_of([str(tmp_path), run])}
+    assert set(of) == {"one", "17", run}
+    assert (of["17"].batch, of["17"].rig, of["one"].batch) == ("L8", "east", "")
+    assert of[run].run
+    assert of["one"].digest != of["17"].digest
+    with pytest.raises(RigError, match="no such file or folder"):
+        fleet_of(["nowhere"])
+    (tmp_path / "index.csv").write_text("sensor,file\nS,one.csv\nS,two.csv\n")
+    with pytest.raises(RigError, match="the sensor S is there twice"):
+        fleet_of([str(tmp_path / "index.csv")])
+    (tmp_path / "index.csv").write_text("sensor,file,lot\nS,one.csv,1\n")
+    with pytest.raises(RigError, match="not lot"):
+        fleet_of([str(tmp_path / "index.csv")])
+
+
+def test_a_look_is_written_and_read_to_the_last_bit() -> None:
+    from calibrations.fleet.columns import Shared
+    from calibrations.fleet.look import look
+
+    found = look(sensor(1), read_model("linear"), Shared({}))
+    document = json.dumps(write_look(found))
+    assert json.dumps(write_look(read_look(json.loads(document)))) == document
+
+
+def test_a_run_is_looked_at_by_its_worker(
+    cluster: LocalCluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("RIG_HOME", str(tmp_path))
+    with Record() as record:
+        run = record.add_table(sensor(3))
+        (member,) = fleet_of([run])
+        with Client(cluster) as client:
+            ((asked, said),) = Fleet(client, record, lambda *_: None).ask([(member, Question("look", LINEAR))])
+    assert isinstance(asked, Member)
+    assert "fault" not in said
