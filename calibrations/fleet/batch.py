@@ -55,10 +55,10 @@ def batch_effects(looks: Sequence[Look], of_stage: Container[str] = ()) -> list[
     """
     if len(looks) < FEWEST:
         return []
-    tried: dict[tuple[str, int], list[tuple[Score, int]]] = defaultdict(list)
+    tried: dict[tuple[str, int, int], list[tuple[Score, int]]] = defaultdict(list)
     for look in looks:
         for score in look.scores:
-            tried[score.effect, score.start].append((score, look.rows))
+            tried[score.effect, score.start, len(score.score)].append((score, look.rows))
     asked = [of for of in tried.values() if len(of) >= max(FEWEST, len(looks) / 2)]
     found = [_judged(of, 2 * len(asked), of[0][0].effect not in of_stage) for of in asked]
     found = sorted((each for each in found if each.p_value < SIGNIFICANT), key=lambda e: e.gain, reverse=True)

@@ -3,7 +3,8 @@
 Derivatives of the residual cost more than all that is done with them, and at the same poses they are nearly the same
 for every sensor: an effect on pose or force goes with the range of the output, the others do not depend on the sensor
 to first order. So they are made for the first sensor of a design and scaled for the others. An effect that needs
-columns beside the angles (time, temperature) is shared only by sensors for which these are the same.
+columns beside the angles (time, temperature), or constants of the table, is shared only by sensors for which these are
+the same.
 
 An effect whose start is searched for in the data itself (`Effect.searched`) is left out: it would have to be refitted.
 """
@@ -80,7 +81,8 @@ class Shared:
         return self._can[key]
 
     def _effect(self, found: Fit, effect: Effect) -> tuple[Group, ...]:
-        key = (effect.name, *_key(found.table, effect.needs))
+        constants = [float(constant(found.table)) for constant in effect.constants.values()]
+        key = (effect.name, np.array(constants).tobytes(), *_key(found.table, effect.needs))
         if key not in self._made:
             self._made[key] = tuple(_derivatives(found, effect))
         return self._made[key]

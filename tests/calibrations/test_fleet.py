@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from calibrations.fit import fit
 from calibrations.fleet.batch import batch_effects
 from calibrations.fleet.columns import Shared
 from calibrations.fleet.corrected import corrected
-from calibrations.fleet.look import Look, information, look
+from calibrations.fleet.look import Look, Score, information, look
 from calibrations.fleet.pooling import pooled
 from calibrations.fleet.rigs import Measured, RigError, rig_errors, unconnected
 from calibrations.model_file import read_model
@@ -61,6 +62,18 @@ def test_a_batch_shows_what_none_of_its_sensors_does() -> None:
 def test_sensors_that_each_have_their_own_value_make_a_batch_too_and_it_is_no_stage_that_has() -> None:
     first = batch_effects(looks(sensor(200 + k, Flaw(askew=0.1)) for k in range(8)), STAGE)[0]
     assert (first.effect, first.common) == ("axis-misalignment", False)
+
+
+def test_an_effect_may_have_more_parameters_in_one_sensor_than_in_another() -> None:
+    found = looks(sensor(330 + k) for k in range(8))
+    short = [
+        replace(each, scores=tuple(_cut(s) if k == 0 else s for k, s in enumerate(each.scores))) for each in found[:4]
+    ]
+    assert not batch_effects([*short, *found[4:]], STAGE)
+
+
+def _cut(score: Score) -> Score:
+    return replace(score, score=score.score[:1], information=score.information[:1, :1], rank=1)
 
 
 def test_an_equal_batch_misses_nothing_and_one_defect_does_not_speak_for_it() -> None:
