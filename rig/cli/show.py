@@ -46,7 +46,7 @@ def command(run: str, poses: bool, wants_log: bool, as_json: bool) -> None:
         after += [
             f"{count} runs of the sensor {name} are in the record: rig history {name}" for name, count in known.items()
         ]
-        told = [_event(event) for event in events]
+        told = [_event(event, found.message) for event in events]
         parts = (_head(found), after, _columns(ranges), told, _listed(listed or []), _logged(lines))
         click.echo("\n\n".join("\n".join(part) for part in parts if part))
 
@@ -99,8 +99,10 @@ def _columns(ranges: Ranges) -> list[str]:
     return [f"  {name:16}{low:12.6g} .. {high:.6g}" for name, (low, high) in ranges.items()]
 
 
-def _event(event: Event) -> str:
-    return f"  {event.at[:19].replace('T', ' ')}  {event.what}: {event.text}"
+def _event(event: Event, message: str | None) -> str:
+    """When, what, and its text but for the run's message, which stands above already."""
+    said = f": {event.text}" if event.text and not (message or "").endswith(event.text) else ""
+    return f"  {event.at[:19].replace('T', ' ')}  {event.what}{said}"
 
 
 def _logged(lines: Sequence[Line]) -> Iterator[str]:
