@@ -120,8 +120,8 @@ def _when(forecast: Forecast) -> str:
     low_s, value_s, high_s = (max(each - forecast.t_s, 0.0) for each in forecast.steady_s)
     if high_s > FARTHEST_S:
         return f"steady in {_span(low_s)} at the earliest" if low_s else "not yet known when it is steady"
-    bounds = f"{_span(low_s)} to {_span(high_s)}"
-    return f"steady in {_span(value_s)} ({bounds})" if forecast.known else f"steady in {bounds}"
+    bounds = f"{_span(low_s)} to {_span(high_s)}" if low_s else f"at most {_span(high_s)}"
+    return f"steady in {_span(value_s)} ({bounds})" if forecast.known and value_s else f"steady in {bounds}"
 
 
 def _span(seconds: float) -> str:

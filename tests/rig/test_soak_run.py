@@ -6,6 +6,7 @@ import json
 import random
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,14 +14,14 @@ import numpy as np
 import pytest
 import yaml
 
-from calibrations.evaluations.forecast import SoakForecast
+from calibrations.evaluations.forecast import Bounds, Forecast, SoakForecast
 from procedures.soak import schedule
 from rig.bench import DEFAULT
 from rig.record import Record
 from rig.record.measured import Measured
 from rig.results.names import names
 from rig.results.soak import night
-from rig.running.soak_forecast import SoakWatch, lines
+from rig.running.soak_forecast import SoakWatch, lines, outlook
 from tests.rig.nursery import Harm, Nursery
 
 pytestmark = pytest.mark.sockets
@@ -88,6 +89,25 @@ def test_a_soak_that_goes_on_is_foreseen_as_one_that_was_not_interrupted(rig: Ri
     told = [forecasts for each in kept if (forecasts := resumed.kept(each))]
     assert len(told) == len([pose for pose in schedule(**SHORT) if pose.path.startswith("reversal")]) / 8
     assert told[-1]["scale-x"].final.value == pytest.approx(begun["scale-x"].final.value, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("steady_h", "half_v", "said"),
+    [
+        ((3.0, 5.0, 9.0), 1e-5, "comes to 2.50000 +- 10 uV (95 %); steady in 3.0 h (1.0 h to 7.0 h)"),
+        ((2.0, 3.0, 9.0), 5e-3, "not yet known what it comes to: 2.4950 to 2.5050 V (95 %); steady in at most 7.0 h"),
+        ((3.0, 5.0, 99.0), 5e-3, "2.5050 V (95 %); steady in 1.0 h at the earliest"),
+        ((2.0, 5.0, 99.0), 5e-3, "2.5050 V (95 %); not yet known when it is steady"),
+        ((1.0, 1.5, 2.0), 1e-5, "+- 10 uV (95 %); steady"),
+    ],
+)
+def test_bounds_are_told_however_wide(steady_h: tuple[float, float, float], half_v: float, said: str) -> None:
+    final = Bounds(2.5 - half_v, 2.5, 2.5 + half_v)
+    steady_s = Bounds(*(3600.0 * h for h in steady_h))
+    forecast = Forecast(7200.0, Bounds(2.49, 2.491, 2.492), final, steady_s, 1e-4, 9e-3, 1.0)
+    assert outlook("bias-x", forecast).endswith(said)
+    step = replace(forecast, surprise=9.0)
+    assert outlook("bias-x", step) == "what came is no approach to a steady state: nothing is foreseen"
 
 
 def test_until_steady_it_ends_early_and_says_when(rig: Rig, cold: str) -> None:
