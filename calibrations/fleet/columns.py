@@ -11,8 +11,9 @@ An effect whose start is searched for in the data itself (`Effect.searched`) is 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -26,6 +27,9 @@ from calibrations.table import Array, Table
 
 ANGLES = ("alpha_deg", "beta_deg", "direction", "mount_deg", "flip")
 Key = tuple[str | bytes, ...]
+MOST = 300
+
+V = TypeVar("V")
 
 
 @dataclass(frozen=True)
@@ -53,39 +57,46 @@ class Groups:
     trials: float
 
 
-@dataclass
 class Shared:
-    """The columns of the designs met so far, of `effects` beside one model."""
+    """The columns of the designs met lately, of `effects` beside one model."""
 
-    effects: Mapping[str, Effect]
-    _made: dict[Key, tuple[Group, ...]] = field(default_factory=dict)
-    _can: dict[Key, list[Effect]] = field(default_factory=dict)
-    _trials: dict[Key, float] = field(default_factory=dict)
+    def __init__(self, effects: Mapping[str, Effect]) -> None:
+        self.effects = effects
+        self._asked: dict[Key, tuple[Effect, ...]] = {}
+        self._groups: dict[Key, tuple[Group, ...]] = {}
+        self._trials: dict[Key, float] = {}
 
     def of(self, found: Fit) -> Groups:
         """Those for a fitted table."""
-        design = _key(found.table, ())
-        asked = self._asked(found)
+        table = found.table
+        design = _key(table, ())
+        can: Key = (*table.columns, *design)
+        asked = _once(self._asked, can, lambda: _asked(found, self.effects))
         groups = [group for effect in asked for group in self._effect(found, effect)]
-        if (key := ("", *design)) not in self._made:
-            self._made[key] = tuple(_patterns(found))
-        groups += self._made[key]
-        if (key := (*(effect.name for effect in asked), *design)) not in self._trials:
-            self._trials[key] = _trials(found, groups)
-        return Groups(tuple(groups), self._trials[key])
-
-    def _asked(self, found: Fit) -> list[Effect]:
-        key = (*found.table.columns, *_key(found.table, ()))
-        if key not in self._can:
-            self._can[key] = [e for e in askable(found, self.effects) if e.searched(found.table) <= 1]
-        return self._can[key]
+        shapes: tuple[Group, ...] = _once(self._groups, design, lambda: tuple(_patterns(found)))
+        groups += shapes
+        search: Key = (*(effect.name for effect in asked), *design)
+        return Groups(tuple(groups), _once(self._trials, search, lambda: _trials(found, groups)))
 
     def _effect(self, found: Fit, effect: Effect) -> tuple[Group, ...]:
-        constants = [float(constant(found.table)) for constant in effect.constants.values()]
-        key = (effect.name, np.array(constants).tobytes(), *_key(found.table, effect.needs))
-        if key not in self._made:
-            self._made[key] = tuple(_derivatives(found, effect))
-        return self._made[key]
+        constants = np.array([float(constant(found.table)) for constant in effect.constants.values()])
+        key = (effect.name, constants.tobytes(), *_key(found.table, effect.needs))
+        return _once(self._groups, key, lambda: tuple(_derivatives(found, effect)))
+
+
+def _once(made: dict[Key, V], key: Key, make: Callable[[], V]) -> V:
+    """What was made for a key, or is now; where there are MOST of them all are forgotten, so that memory stays flat."""
+    value = made.get(key)
+    if value is None:
+        value = make()
+        if len(made) >= MOST:
+            made.clear()
+        made[key] = value
+    return value
+
+
+def _asked(found: Fit, effects: Mapping[str, Effect]) -> tuple[Effect, ...]:
+    return tuple(effect for effect in askable(found, effects) if effect.searched(found.table) <= 1)
 
 
 def _key(table: Table, needs: tuple[str, ...]) -> Key:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.special import fdtrc
+from scipy.special import chdtrc, fdtrc
 
 from calibrations.effect import Effect
 from calibrations.fit import Fit, cautiously
@@ -23,9 +23,12 @@ from calibrations.noise_estimation.noise_fit import gains
 from calibrations.search.identify import covariance
 from calibrations.search.outliers import fit_without
 from calibrations.search.screen import SMALLEST, Screen, of_search
+from calibrations.search.structure import without_slow
 from calibrations.table import Array, Table
 
 LEAST = 1e-10  # eigenvalue of a Gram matrix of columns of length 1: less is rounding
+
+LIKELY = 0.05  # chance, if all that is slow were an effect's, below which it is weighed against slow noise
 
 
 @dataclass(frozen=True)
@@ -153,19 +156,30 @@ def statistics_of(grams: list[Array], scores: list[Array]) -> tuple[Array, Array
 def _beside_slow_noise(found: Fit, groups: Groups, columns: list[Array], ranks: Array) -> Array:
     """How often noise alone gains as much as each effect where the noise is fitted anew beside it.
 
-    1 for patterns, and where no slow noise was found, so that there is nothing to weigh an effect against.
+    1 for patterns, where no slow noise was found, so that there is nothing to weigh an effect against, and for effects
+    that would be nothing even without any slow noise.
     """
     p_values = np.ones(len(columns))
-    if not np.any(found.noise.slow):
+    effects = [k for k, group in enumerate(groups.all) if group.effect and ranks[k]]
+    if not effects or not np.any(found.noise.slow):
         return p_values
-    tried = [k for k, group in enumerate(groups.all) if group.effect and ranks[k]]
+    tried = [k for k, p in zip(effects, _without_slow(found, [columns[k] for k in effects]), strict=True) if p < LIKELY]
     scaled = [columns[k] / np.maximum(np.sqrt(np.sum(columns[k] ** 2, axis=(0, 1))), 1e-300) for k in tried]
     smooth = found.problem.smooth
-    worth = np.array(gains(found.noise, found.residual, found.jacobian, scaled, smooth))
+    worth = np.array(gains(found.noise, found.residual, found.jacobian, scaled, smooth)) if tried else np.zeros(0)
     rows, rank = found.residual.size, ranks[tried]
     free = np.maximum(rows - found.jacobian.shape[2] - rank - smooth.shape[1] * len(found.channels), 1)
     p_values[tried] = fdtrc(rank, free, np.expm1(np.minimum(worth / rows, 500.0)) * free / rank)
     return p_values
+
+
+def _without_slow(found: Fit, columns: list[Array]) -> Array:
+    """Chances of the effects if all that is slow were theirs to explain."""
+    screen = Screen(without_slow(found))
+    falls = screen.reductions(columns)
+    ranks = np.array([each.shape[2] for each in columns])
+    level = max(float(screen.residual @ screen.residual) / screen.free, 1.0)
+    return np.asarray(chdtrc(ranks, falls / level))
 
 
 def _stage(groups: Groups, effects: Mapping[str, Effect], gram: Array, along: Array) -> Stage:

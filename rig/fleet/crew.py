@@ -7,6 +7,7 @@ is found, and no other is blamed for it.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from itertools import islice
@@ -42,11 +43,13 @@ def crew(scheduler: str | None, workers: int | None) -> Iterator[Client]:
         from distributed import Client, LocalCluster
     except ImportError:
         raise FleetError("fleets need Dask; install it with: pip install 'inertial-rig[fleet]'") from None
-    quiet = {
+    for name in [name for name in logging.root.manager.loggerDict if name.startswith("distributed")]:
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # what a person should know is said by us, once
+    settings = {
         "distributed.scheduler.allowed-failures": 0,
         "distributed.comm.timeouts.connect": f"{PATIENCE_S} s",
     }
-    with dask.config.set(quiet):
+    with dask.config.set(settings):
         if scheduler is not None:
             try:
                 client = Client(scheduler, timeout=PATIENCE_S)

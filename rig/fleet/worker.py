@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal
 
@@ -50,24 +51,26 @@ class Task:
 
 
 def answer(tasks: Sequence[Task]) -> list[tuple[str, Answer]]:
-    """Every task's key and answer; where there is none, its `fault`. Columns are shared by the sensors of a call."""
-    shared: dict[tuple[str, tuple[str, ...]], tuple[Model, Shared]] = {}
-    return [(task.key, _answered(task, shared)) for task in tasks]
+    """Every task's key and answer; where there is none, its `fault`."""
+    return [(task.key, _answered(task)) for task in tasks]
 
 
-def _answered(task: Task, shared: dict[tuple[str, tuple[str, ...]], tuple[Model, Shared]]) -> Answer:
+def _answered(task: Task) -> Answer:
     asked = task.question
     try:
-        key = (asked.model, asked.effects)
-        if key not in shared:
-            shared[key] = (model_of(asked), Shared(catalogue()))
-        model, columns = shared[key]
+        model, columns = _beside(asked.model, asked.effects)
         table = corrected(_read(task), asked.errors, catalogue())
         return write_look(look(table, model, columns)) if asked.what == "look" else _told(diagnose(table, model))
     except (CalibrationError, RigError) as error:
         return {"fault": str(error)}
     except Exception as error:  # one sensor never stops a fleet
         return {"fault": f"a fault of this program: {type(error).__name__}: {error}"}
+
+
+@lru_cache(maxsize=8)
+def _beside(model: str, effects: tuple[str, ...]) -> tuple[Model, Shared]:
+    """The model, and the columns that the sensors of this worker share beside it."""
+    return model_of(Question("look", model, effects)), Shared(catalogue())
 
 
 def model_of(asked: Question) -> Model:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -74,6 +75,33 @@ def test_an_effect_may_have_more_parameters_in_one_sensor_than_in_another() -> N
 
 def _cut(score: Score) -> Score:
     return replace(score, score=score.score[:1], information=score.information[:1, :1], rank=1)
+
+
+def scored(scores: Iterable[np.ndarray[Any, np.dtype[np.float64]]]) -> list[Look]:
+    """Looks of sensors with these scores of one effect, whose information is 1 for each parameter."""
+    bare = looks([sensor(1)])[0]
+    return [replace(bare, scores=(Score("bent", 0, s, np.eye(len(s)), float(s @ s), len(s), 1.0),)) for s in scores]
+
+
+def test_one_sensor_far_off_does_not_hide_what_all_others_have() -> None:
+    rng = np.random.default_rng(1)
+    scores = [np.array([1.5, 1.5]) + rng.standard_normal(2) for _ in range(30)]
+    assert batch_effects(scored([*scores, np.array([-300.0, 200.0])]))[0].common
+
+
+def test_what_less_than_half_of_the_sensors_have_is_not_their_batchs() -> None:
+    rng = np.random.default_rng(2)
+    scores = [40.0 * (k < 18) * rng.choice([-1, 1], 3) + rng.standard_normal(3) for k in range(40)]
+    assert not batch_effects(scored(scores))
+    assert batch_effects(scored(scores[:30]))[0].common is False
+
+
+def test_columns_of_another_sensor_are_scaled_to_its_outputs() -> None:
+    table = sensor(2)
+    outputs = {"vx_v": 3 * table.column("vx_v"), "vy_v": 0.5 * table.column("vy_v")}
+    other = replace(table, columns={**table.columns, **outputs})
+    after, alone = (look(other, LINEAR, shared).stage for shared in (SHARED, Shared(EFFECTS)))
+    assert after.information == pytest.approx(alone.information, rel=0.1, abs=0.02 * np.max(alone.information))
 
 
 def test_an_equal_batch_misses_nothing_and_one_defect_does_not_speak_for_it() -> None:
@@ -157,6 +185,15 @@ def test_pooled_intervals_of_correlated_parameters_hold_what_they_say(count: int
         low, high = pooled(theta, A, np.ones(3)).intervals()
         held.append(np.mean((low <= truth) & (high >= truth), axis=0))
     assert np.all(np.mean(held, axis=0) > 0.9)
+
+
+def test_what_siblings_tell_of_one_parameter_tells_of_another_that_poses_mix_with_it() -> None:
+    rng, cov = np.random.default_rng(4), np.array([[1.0, 0.97], [0.97, 1.0]])
+    truth = np.column_stack([np.full(40, 2.0), 5 * rng.standard_normal(40)])
+    theta = truth + rng.multivariate_normal(np.zeros(2), cov, 40)
+    found = pooled(theta, np.tile(np.linalg.inv(cov), (40, 1, 1)), np.ones(2))
+    assert np.std(found.values[:, 1] - truth[:, 1]) < 0.5 * np.std(theta[:, 1] - truth[:, 1])
+    assert np.all(found.stds[:, 1] < 0.6)
 
 
 def test_what_a_sensors_poses_do_not_tell_is_foretold_by_its_siblings() -> None:

@@ -77,7 +77,7 @@ def discovered(
 
 
 def test_the_rig_in_error_and_the_strange_sensor_are_found_and_bad_files_are_listed(
-    discovered: Mapping[str, Any], home: Path
+    discovered: Mapping[str, Any], folder: Path, home: Path
 ) -> None:
     assert discovered["schema"] == "rig.fleet/1"
     of = {each["sensor"]: each for each in discovered["sensors"]}
@@ -86,7 +86,7 @@ def test_the_rig_in_error_and_the_strange_sensor_are_found_and_bad_files_are_lis
     assert of["S4"]["own"] == ["temperature-bias"]
     assert of["S4"]["judged"] == "in full"
     assert {name for name, each in of.items() if each["verdict"] == "failed"} == {"BAD", "GONE"}
-    assert "line 2" in of["BAD"]["remark"]
+    assert of["BAD"]["remark"].startswith(str(folder / "bad.csv") + ", line 2")
     assert "gone.csv" in of["GONE"]["remark"]
     assert [name for name, each in of.items() if each["needs_a_person"]] == ["S4", "BAD", "GONE"]
     page = (home / "fleet.html").read_text()
