@@ -37,6 +37,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for role in ("alpha", "beta"):
         bench["instruments"][role]["settings"] |= {"speed_deg_s": 180, "acceleration_deg_s2": 600}
     del bench["limits"]["level_deg"]
+    bench["sensor"]["heading_deg"] = 25.0
     (folder / "quick.yaml").write_text(yaml.safe_dump(bench), encoding="utf-8")
     return folder
 
@@ -62,6 +63,9 @@ def test_a_magnetometer_is_calibrated_by_the_ellipsoid_and_by_hand(rig: Rig, fol
     found = run(rig, folder, FIELD)["results"]
     assert found["field-inclination"]["value"] == pytest.approx(66.8, abs=0.2)
     assert found["field-azimuth"]["value"] == pytest.approx(-34.3, abs=0.4)
+    declination, azimuth = found["field-declination"], found["field-azimuth"]
+    assert declination["value"] == pytest.approx(25.0 + azimuth["value"], abs=1e-9)  # of the base, from true north
+    assert declination["std"] == azimuth["std"]
     assert found["field-total"]["value"] == pytest.approx(52.4 * 0.02, rel=0.01)
     horizontal = found["field-total"]["value"] * np.cos(np.radians(found["field-inclination"]["value"]))
     assert found["field-horizontal"]["value"] == pytest.approx(horizontal, rel=1e-6)
