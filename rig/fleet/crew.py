@@ -7,7 +7,6 @@ is found, and no other is blamed for it.
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from itertools import islice
@@ -41,10 +40,11 @@ def crew(scheduler: str | None, workers: int | None) -> Iterator[Client]:
     try:
         import dask
         from distributed import Client, LocalCluster
+
+        from rig.fleet.deaf import Deaf, hush
     except ImportError:
         raise FleetError("fleets need Dask; install it with: pip install 'inertial-rig[fleet]'") from None
-    for name in [name for name in logging.root.manager.loggerDict if name.startswith("distributed")]:
-        logging.getLogger(name).setLevel(logging.CRITICAL)  # what a person should know is said by us, once
+    hush()
     settings = {
         "distributed.scheduler.allowed-failures": 0,
         "distributed.comm.timeouts.connect": f"{PATIENCE_S} s",
@@ -64,6 +64,7 @@ def crew(scheduler: str | None, workers: int | None) -> Iterator[Client]:
             ) as cluster,
             Client(cluster) as client,
         ):
+            client.register_plugin(Deaf())
             yield client
 
 

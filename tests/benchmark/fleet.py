@@ -58,15 +58,16 @@ def measured(folder: Path, workers: int) -> dict[str, object]:
     """One discovery into a record of its own."""
     memory = Memory()
     with tempfile.TemporaryDirectory() as home, Record(Path(home)) as record, crew(None, workers) as client, memory:
-        began = time.perf_counter()
+        began, own_s = time.perf_counter(), time.process_time()
         found = discover_fleet(
             Fleet(client, record, lambda *_: None), fleet_of([str(folder)]), dump_model(read_model("linear"))
         )
-        wall_s = time.perf_counter() - began
+        wall_s, own_s = time.perf_counter() - began, time.process_time() - own_s
     return {
         "sensors": len(found.sensors),
         "workers": workers,
         "wall_s": round(wall_s, 1),
+        "cpu_s_command": round(own_s, 1),
         "cpu_s_workers": round(memory.cpu_s, 1),
         "largest_worker_mb": memory.worker_mb,
         "command_mb": memory.own_mb,
