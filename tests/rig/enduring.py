@@ -41,7 +41,7 @@ NEEDS_A_GUARD = {"open-interlock"}  # felt only by a bench that has interlocks
 OTHER_NOISE = {"delay", "endless", "trickle"}  # after which a run may go on, at other times: as good, but not the same
 NAMES: dict[str, str] = {}  # what a message calls an instrument, where it is not the role
 NEAR_V = 5e-3  # of a dwell's mean: ten times its noise
-NEAR = 0.05  # of a reading, deg
+NEAR = {"deg": 0.05, "s": 1.0}  # of a reading; what is done again after a lost packet happens that much later
 
 
 @cache
@@ -107,7 +107,7 @@ def _require_right(record: Record, outcome: Outcome, procedure: str, guarded: bo
     means = [[list(each.dwell.means.values()) for each in run] for run in (kept, sound)]
     wrong = bool(kept) and bool(np.abs(np.subtract(*means)).max() > NEAR_V)
     found = {reading.name: reading.value for reading in record.readings(outcome.run.run)}
-    wrong = wrong or any(abs(found[reading.name] - reading.value) > NEAR for reading in readings)
+    wrong = wrong or any(abs(found[reading.name] - reading.value) > NEAR[reading.unit] for reading in readings)
     marked = any(result["verdict"] == "fail" for result in outcome.run.results.values()) or outcome.run.message
     assert not wrong or marked, "a wrong number without a mark"
 
