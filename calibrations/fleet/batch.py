@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Container, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import bdtrc, chdtrc, fdtrc
@@ -70,7 +70,7 @@ def batch_effects(looks: Sequence[Look], of_stage: Container[str] = ()) -> list[
 
 def _with_rivals(each: BatchEffect, found: list[BatchEffect]) -> BatchEffect:
     rivals = tuple(o.effect for o in found if o is not each and o.gain > each.gain - NOT_TOLD_APART)
-    return BatchEffect(**{**vars(each), "rivals": rivals})
+    return replace(each, rivals=rivals)
 
 
 def _judged(of: list[tuple[Score, int]], tests: int, may_differ: bool) -> BatchEffect:

@@ -16,7 +16,7 @@ batch was on one rig. Values are therefore told from the median of the rigs that
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -131,7 +131,7 @@ def _effect(
     y, v = np.array(values), np.array(variances)
     found = [_parameter(sensors, y[:, j], v[:, j], names[k]) for j, k in enumerate(mine)]
     least = min(len(mine) * min((e.p_value for of in found for e in of), default=1.0), 1.0)
-    errors = tuple(RigError(**{**vars(error), "p_value": least}) for of in found for error in of)
+    errors = tuple(replace(error, p_value=least) for of in found for error in of)
     off = {rig: np.zeros(len(mine)) for rig in taken}
     for error in errors:
         if error.beyond:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -75,8 +75,8 @@ def read(key: str) -> Status | None:
     status = Status(**document, asked=Asked(**asked) if asked else None)
     if status.phase == "ended" or is_held(home(), lock(key)):
         return status
-    killed = {"phase": "ended", "state": "stopped", "asked": None, "error": f"its process ended: {_last_words(key)}"}
-    return Status(**{**vars(status), **killed})
+    error = f"its process ended: {_last_words(key)}"
+    return replace(status, phase="ended", state="stopped", asked=None, error=error)
 
 
 def lock(key: str) -> str:
