@@ -155,8 +155,8 @@ def _carry_out(record: Record, rig: Rig, run: Run, procedure: Procedure, watch: 
 
     log("begun", f"{procedure.name} at pose {run.rows}")
     record.set_state(run.run, "running")
-    watch.begun(run.run)
     try:
+        watch.begun(run.run)  # a person may end it from now on
         own = _perform(record, rig, run, procedure, watch)
         results, why = (documents(own, rig.bench.result_limits), None) if own else judged(record, run)
     except BaseException as failure:

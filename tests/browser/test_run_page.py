@@ -28,6 +28,8 @@ def started(workbench: Workbench, path: str) -> Page:
 
 def test_a_newcomer_gets_from_the_empty_record_to_the_falling_error(workbench: Workbench) -> None:
     page = workbench.visit("/")
+    expect(page.get_by_text("Nothing is measured yet")).to_be_visible()
+    workbench.shot(page, "empty")
     page.get_by_role("button", name="Measure").click()
     page.get_by_label("step (deg)").fill("45")
     page.get_by_label("inclinations (deg)").fill("90,30,150")

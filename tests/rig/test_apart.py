@@ -37,17 +37,20 @@ def carried_out(procedure: str, settings: dict[str, str], steer: Callable[[], No
     file(KEY, "log").parent.mkdir(parents=True)
     os.mkfifo(file(KEY, "answers"))
     faults: list[Exception] = []
+    ended = threading.Event()
 
     def act() -> None:
         try:
             steer()
         except Exception as fault:
             faults.append(fault)
-            os.kill(os.getpid(), signal.SIGTERM)  # else the run would wait for ever
+            if not ended.is_set():
+                os.kill(os.getpid(), signal.SIGTERM)  # else the run would wait for ever
 
     person = threading.Thread(target=act)
     person.start()
     process.main(order.text())
+    ended.set()
     person.join()
     assert faults == []
     status = steering.latest()

@@ -28,7 +28,7 @@ from rig.drawings import Attitude, page
 from rig.errors import Stopped
 from rig.numerals import duration, size
 from rig.planning.plan import Plan, plan
-from rig.record import Block, Kept
+from rig.record import Block, Kept, Record
 from rig.room import free_bytes
 from rig.running.runner import Outcome
 from rig.running.seen import Seen, nearness
@@ -36,7 +36,6 @@ from rig.running.way import Way
 from tests.rig.rigging import POSES, small_sweep
 
 TODAY = date(2026, 11, 21)
-RUN = "20261121-093012-sweep-a1b"
 SWEEP = find("sweep")
 
 
@@ -68,6 +67,14 @@ def said(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
         monkeypatch.setattr("builtins.input", answer)
 
     return say
+
+
+@pytest.fixture
+def run() -> str:
+    """A run that has begun, as the record has it."""
+    with Record() as record:
+        made = {"bench": {}, "configuration": "", "constants": {}, "source": "test", "identities": {}}
+        return record.begin("sweep", {}, kind="poses", **made)  # type: ignore[arg-type]
 
 
 def guide(**answers: str) -> tuple[Guide, io.StringIO]:
@@ -150,16 +157,16 @@ def test_a_file_of_answers_begins_it_too(said: Callable[..., None]) -> None:
 # during
 
 
-def test_it_shows_what_happens_progress_readings_and_time() -> None:
+def test_it_shows_what_happens_progress_readings_and_time(run: str) -> None:
     shown_to, told = guide()
     with shown_to:
-        shown_to.begun(RUN)
+        shown_to.begun(run)
         shown_to.expect(4, 1)
         shown_to.read(Reading("level-front-x", 0.25, "deg"))
         shown_to.doing("moving to alpha 90, beta 10 deg")
         shown_to.kept(kept(1))
     text = told.getvalue()
-    for piece in (RUN, "moving to alpha 90, beta 10 deg", "2/4 poses", "2.50000 V", "rms 141", "28.3 C", "left"):
+    for piece in (run, "moving to alpha 90, beta 10 deg", "2/4 poses", "2.50000 V", "rms 141", "28.3 C", "left"):
         assert piece in text
     assert "level-front-x = 0.25 deg" in text
     assert "Ctrl-C stops the stages" in text
@@ -195,10 +202,10 @@ def test_the_level_is_shown_when_it_was_read_both_ways_round() -> None:
     assert "near its limit" in text
 
 
-def test_scatter_is_compared_with_what_is_usual_for_such_poses() -> None:
+def test_scatter_is_compared_with_what_is_usual_for_such_poses(run: str) -> None:
     shown_to, _ = guide()
     with shown_to:
-        shown_to.begun(RUN)
+        shown_to.begun(run)
         for number in range(3):
             shown_to.kept(kept(number, 0.001, "still 1"))
         assert "as usual" in shown(shown_to._screen())
@@ -293,18 +300,17 @@ def test_a_terminal_that_closes_is_nobody(said: Callable[..., None]) -> None:
 @pytest.fixture
 def outcome() -> Iterator[Outcome]:
     """A run that was stopped; alpha did not obey."""
-    from rig.record import Record
 
     with Record() as record:
         run = record.begin("sweep", {}, bench={}, identities={}, configuration="", constants={}, source="")
         yield Outcome(record.run(run), Stopped("stopped by SIGINT"), ("alpha may still move: silence",))
 
 
-def test_the_menu_says_what_each_answer_means(said: Callable[..., None], outcome: Outcome) -> None:
+def test_the_menu_says_what_each_answer_means(said: Callable[..., None], outcome: Outcome, run: str) -> None:
     said("go", "repeat")
     shown_to, told = guide()
     with shown_to:
-        shown_to.begun(RUN)
+        shown_to.begun(run)
         shown_to.kept(kept(1))
         assert shown_to.interrupted(outcome) == "repeat"
         assert shown_to.interrupted(outcome) == "end"  # the terminal is closed
