@@ -82,10 +82,12 @@ class Missing:
             cards = [Card(self, c, result, missing and not k) for k, c in enumerate(result.candidates[:FIRST])]
             if len(result.candidates) > FIRST:
                 self._others(result)
-            if result.next_experiment is not None:
-                await self._next(result)
+            below = div("stack")
         if missing and cards:
             await cards[0].open()
+        if result.next_experiment is not None:
+            with below:
+                await self._next(result)
 
     def _nothing_to_add(self, result: Any) -> None:
         good = result.verdict == "adequate"

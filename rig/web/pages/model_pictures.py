@@ -164,7 +164,8 @@ class Pictures:
             figure = make()
             if "customdata" in figure["data"][0] and self.selected:
                 figure["data"][0]["selectedpoints"] = self.selected
-            self.plots[name].update_figure(figure)
+            if figure != self.plots[name].figure:  # a picture that stays keeps its zoom, and a box that is being drawn
+                self.plots[name].update_figure(figure)
         self._tell(shown)
 
     def next_axis(self) -> None:
