@@ -18,7 +18,7 @@ from calibrations.still.channel_fit import ChannelFit
 from calibrations.still.fit import seen, with_effects
 from calibrations.still.left import left_in
 from calibrations.still.patterns import Pattern, pattern_of
-from calibrations.still.record import Channel, Still, logged_means
+from calibrations.still.record import Channel, Still, columns_beside
 from calibrations.still.search import search
 from calibrations.table import Array
 
@@ -49,7 +49,7 @@ def disturbed(found: NoiseAnalysis, axis: str, logged: Mapping[str, Sequence[Arr
     """Of an analysis of the channel called `axis`; `logged`: blocks of what was read beside it."""
     of = found.record
     channel = Channel(
-        axis, of.unit, of.rate_hz, of.corner_hz, of.n, of.means, of.size, of.segments, logged_means(logged, of.n),
+        axis, of.unit, of.rate_hz, of.corner_hz, of.n, of.means, of.size, of.segments, columns_beside(logged, of.n),
         of.oddities,
     )  # fmt: skip
     patterns, rest = _patterns(found, channel)

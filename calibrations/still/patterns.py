@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from scipy.fft import dct, dst
@@ -165,14 +166,19 @@ def _courses(channel: Channel, by: _Ordinates, unit: str) -> Iterator[Pattern]:
 
 
 def _followed(channel: Channel, by: _Ordinates, unit: str) -> Iterator[Pattern]:
-    """What follows a column, at once or some time behind it."""
-    price = AMPLITUDE + 2 * float(np.log(len(LAGS) * max(1, len(channel.logged))))
-    for name, values in channel.logged.items():
-        for share in LAGS:
+    """What follows a column, as it was read or without its scatter, at once or some time behind it."""
+    price = AMPLITUDE + 2 * float(np.log(len(LAGS) * max(1, len(channel.logged))))  # both readings are much alike
+    for name, column in channel.logged.items():
+        for values, (share, behind) in product((column.read, column.level), _lags(channel.length_s)):
             form = values if share == 0 else _behind(values, share * len(values))
-            behind = f", {share * channel.length_s:.2g} s behind it" if share else ""
             text = f"{channel.axis} follows {name} by {{}} {unit}/{PER.get(name, name)}{behind}"
             yield _matched(FOLLOWS, channel, text, form, by, price, name)
+
+
+def _lags(length_s: float) -> Iterator[tuple[float, str]]:
+    """Shares of the record, and how they are told."""
+    for share in LAGS:
+        yield share, f", {share * length_s:.2g} s behind it" if share else ""
 
 
 def _behind(values: Array, steps: float) -> Array:

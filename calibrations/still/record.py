@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from calibrations.noise_analysis.decimated import Means
 from calibrations.noise_analysis.octaves import Curve
 from calibrations.noise_analysis.oddities import Oddity
 from calibrations.noise_analysis.processes import Sampling
 from calibrations.noise_analysis.reduction import Reduction
 from calibrations.noise_analysis.welch import Segments
+from calibrations.still.logged import Logged, logged
 from calibrations.table import Array
 
 
@@ -33,7 +33,7 @@ class Channel:
     means: Array
     size: int  # samples to a mean
     segments: Segments
-    logged: Mapping[str, Array] = field(default_factory=dict)  # by column: its means (m,), less their mean
+    logged: Mapping[str, Logged] = field(default_factory=dict)  # by column
     oddities: tuple[Oddity, ...] = ()
 
     @property
@@ -61,7 +61,7 @@ class Channel:
 
     def _part(self, which: slice, segments: Segments) -> Channel:
         means = self.means[which]
-        logged = {name: values[which] - values[which].mean() for name, values in self.logged.items()}
+        logged = {name: column.part(which) for name, column in self.logged.items()}
         return replace(self, n=len(means) * self.size, means=means - means.mean(), segments=segments, logged=logged)
 
 
@@ -129,19 +129,11 @@ def _channel(samples: Samples, reduction: Reduction) -> Channel:
     means = reduction.means
     return Channel(
         samples.axis, samples.unit, samples.rate_hz, samples.corner_hz, reduction.n, means.values(), means.size,
-        reduction.welch.segments(), logged_means(samples.logged, reduction.n), reduction.oddities(),
+        reduction.welch.segments(), columns_beside(samples.logged, reduction.n), reduction.oddities(),
     )  # fmt: skip
 
 
-def logged_means(logged: Mapping[str, Sequence[Array]], n: int) -> dict[str, Array]:
-    """Of what was read beside n samples, in blocks: means over as many as one of the channel; none of what is constant,
-    which tells nothing."""
-    found = {}
-    for name, blocks in logged.items():
-        means = Means()
-        for block in blocks:
-            means.add(block)
-        values = means.values()
-        if sum(map(len, blocks)) == n and np.ptp(values) > 0:
-            found[name] = values
-    return found
+def columns_beside(blocks: Mapping[str, Sequence[Array]], n: int) -> dict[str, Logged]:
+    """What was read beside n samples, in blocks; none of what is constant, which tells nothing."""
+    every = {name: logged(each, n) for name, each in blocks.items()}
+    return {name: column for name, column in every.items() if column is not None}

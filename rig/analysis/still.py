@@ -32,6 +32,7 @@ FEW_GAPS = 0.01  # of all steps
 UNEVEN = 1e-3  # of a record, by which times may be off an even row: those of a computer that samples reach in bursts
 DISAGREE = 0.01  # of two rates
 AXIS = re.compile(r"(v|a|g|m|)([xyz])(|_v)")  # of a channel, by its name
+FEW_CODES = 4  # of a converter: thousands of samples hold more where their noise is half a step
 UPRIGHT = 0.999  # g: a pose that is as good as along gravity
 
 
@@ -51,6 +52,7 @@ class Stream:
     upright_v: dict[int, float] = field(default_factory=dict)  # output along gravity, +1 and -1 g
     constants: Mapping[str, str | float] = field(default_factory=dict)
     logged: dict[str, list[Array]] = field(default_factory=dict)  # what was read beside the samples, in their blocks
+    coarse: dict[str, float] = field(default_factory=dict)  # of that, what was read with less noise than these steps
 
     @property
     def scale_v_per_g(self) -> float | None:
@@ -96,6 +98,11 @@ def repairs(samples: Stream, n: int) -> Iterable[str]:
         yield (
             f"Times are uneven, as where samples reach a computer in bursts, and off by {samples.uneven_s:.2g} s at "
             f"most; the samples are taken to be even, {samples.rate_hz:.6g} a second."
+        )
+    for name, step in samples.coarse.items():
+        yield (
+            f"{name} was read in steps of {1e3 * step:.3g} mV, with less noise than that: its means are off by parts "
+            "of a step, and how much an output follows it is known less well than is said."
         )
 
 
@@ -277,6 +284,8 @@ def _still_blocks(measured: Measured, into: Stream) -> Iterator[NDArray[Any]]:
         if next_s is not None and abs(samples.start_s - next_s) > LATE / into.rate_hz:
             into.closed.append((next_s, samples.start_s - next_s))
         next_s = samples.start_s + len(volts) / into.rate_hz
+        if not into.logged:
+            into.coarse |= _coarse(kept)
         for name, values in _beside(kept):
             into.logged.setdefault(name, []).extend(values)
         yield volts
@@ -292,6 +301,18 @@ def _beside(kept: Kept) -> Iterator[tuple[str, list[Array]]]:
         volts = samples.volts[:, samples.channels.index(channel)]
         pieces = np.array_split(volts, max(1, round(n / samples.rate_hz)))
         yield supply, [np.broadcast_to(piece.mean(), len(piece)) for piece in pieces]
+
+
+def _coarse(kept: Kept) -> dict[str, float]:
+    """The steps of the supply's readings, where a block holds so few of them that noise does not smooth them in means.
+
+    Source  Widrow and Kollar, Quantization Noise, on dither: no steps are left where noise is half a step or more.
+    """
+    channel = FOLLOWED[1].removesuffix("_v")
+    if channel not in kept.samples.channels:
+        return {}
+    codes = np.unique(kept.samples.volts[:, kept.samples.channels.index(channel)])
+    return {FOLLOWED[1]: float(np.diff(codes).min())} if 1 < len(codes) < FEW_CODES else {}
 
 
 def _note_upright(kept: Kept, volts: Array, into: Stream) -> None:

@@ -71,3 +71,22 @@ def test_a_column_that_is_constant_or_too_short_is_left_out() -> None:
     random = np.random.default_rng(1)
     (channel,) = beside(white(random), temperature_c=np.full(SAMPLES, 22.0), supply_v=np.ones(5)).channels
     assert channel.logged == {}
+
+
+@pytest.mark.parametrize("scatter", [0.0, 0.3, 1.0])
+def test_scatter_of_the_thermometer_does_not_hide_how_much_the_sensor_follows(scatter: float) -> None:
+    random = np.random.default_rng(4)
+    warm = room(random)
+    read = warm + scatter * random.standard_normal(SAMPLES)
+    (pattern,) = diagnose(beside(white(random) + 0.8 * warm, temperature_c=read), read_model("still")).search.patterns
+    assert pattern.size == pytest.approx(0.8, abs=3 * pattern.std)
+    assert pattern.std < 0.05
+    assert "behind" not in pattern.plain
+
+
+def test_a_jitter_that_the_sensor_feels_is_no_scatter() -> None:
+    random = np.random.default_rng(5)
+    supply = room(random) + 0.3 * random.standard_normal(SAMPLES)
+    (pattern,) = diagnose(beside(white(random) + 0.8 * supply, supply_v=supply), read_model("still")).search.patterns
+    assert pattern.size == pytest.approx(0.8, abs=3 * pattern.std)
+    assert pattern.std < 0.02

@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 
 from calibrations.noise_analysis.exact import deviations
-from rig.analysis.still import stream
-from rig.record import Record
+from procedures.noise_floor import STILL
+from procedures.session import Pose
+from rig.analysis.still import _coarse, stream
+from rig.record import Block, Kept, Record
 from tests.rig.conftest import Ended
 
 Rig = Callable[..., Ended]
@@ -176,6 +178,7 @@ def test_a_run_straight_from_its_record(rig: Rig, run: str) -> None:
     assert "uV/sqrt(Hz)" in ended.out
     assert "ug/sqrt(Hz)" in ended.out
     assert "15.07 Hz low-pass" in ended.err
+    assert "supply_v was read in steps of 0.316 mV, with less noise than that" in ended.err
     white = document(rig("noise", run, "--json"))["coefficients"]["white-noise"]
     assert white["unit"] == "V/sqrt(Hz)"
     assert white["value"] == pytest.approx(1.1e-4, rel=0.15)  # 3.1 mV peak to peak is 4 rms behind 15.07 Hz (Ang V)
@@ -192,6 +195,14 @@ def test_no_block_of_a_run_is_read_twice(run: str) -> None:
     assert {len(block) for block in still.logged["supply_v"]} == {1000}
     assert still.scale_v_per_g == pytest.approx(1.0, rel=0.05)
     assert still.closed == []
+
+
+@pytest.mark.parametrize(("noise_v", "told"), [(0.05e-3, True), (0.5e-3, False)])
+def test_a_supply_is_coarse_where_noise_does_not_smooth_its_steps(noise_v: float, told: bool) -> None:
+    step = 0.3e-3
+    volts = np.round((5.0 + noise_v * np.random.default_rng(1).standard_normal((10_000, 1))) / step + 0.4) * step
+    found = _coarse(Kept(Pose(0, 0, 0, STILL), Block(volts, ("supply",), 1000.0, 0.0), 0.0, 22.0))
+    assert found == ({"supply_v": pytest.approx(step)} if told else {})
 
 
 @pytest.mark.parametrize(
