@@ -49,11 +49,13 @@ def whiten(columns: Array, gap_s: Array, white: Array, slow: Array, tau_s: Array
     out = np.empty_like(columns)
     state = np.zeros((m, k))
     P = np.diag(slow * slow)
-    gain = np.zeros(m)
+    gain, phi = np.zeros(m), np.zeros(m)
     logdet = 0.0
     for i in range(n):
         if i:
-            phi = np.exp(-gap_s[i] / tau_s)
+            if i == 1 or gap_s[i] != gap_s[i - 1]:
+                for p in range(m):
+                    phi[p] = np.exp(-gap_s[i] / tau_s[p])
             for p in range(m):
                 for q in range(m):
                     P[p, q] *= phi[p] * phi[q]

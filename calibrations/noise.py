@@ -116,10 +116,15 @@ def correlated(
     columns: Array, gap_s: Array, fast: Array, slow: float, taus_s: tuple[float, ...], given: Processes = ()
 ) -> tuple[Array, float]:
     """Columns (n, k) of one channel made white, and log det Sigma."""
-    each = [(slow / np.sqrt(len(taus_s)), tau_s) for tau_s in taus_s if slow or not given]
-    stds, times_s = (np.array(values) for values in zip(*each, *given, strict=True))
+    stds, times_s = (np.array(values) for values in zip(*processes(slow, taus_s, given), strict=True))
     out, logdet = whiten(np.ascontiguousarray(columns), gap_s, fast, stds, times_s)
     return out, float(logdet)
+
+
+def processes(slow: float, taus_s: tuple[float, ...], given: Processes = ()) -> Processes:
+    """Those that make up slow noise of a standard deviation, evenly shared, and those that are given."""
+    std = slow / len(taus_s) ** 0.5
+    return (*((std, tau_s) for tau_s in taus_s if slow or not given), *given)
 
 
 def _about_mean(processes: Processes, span_s: float) -> float:

@@ -14,7 +14,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrations.noise import Noise, Processes, correlated, rms
+from calibrations.noise import Noise, Processes, processes, rms
+from calibrations.noise_estimation.kernels import products, profiled
 from calibrations.table import Array
 
 Point = tuple[float, tuple[float, ...]]  # slow noise over white and scatter, and its time constants
@@ -151,15 +152,19 @@ class Search:
         given = self.noise.given or ((),) * len(basis)
         return [_grams(gap_s, fast[c], columns[c], self.grid, k, given[c]) for c in range(len(basis))]
 
+    @cached_property
+    def _flickers(self) -> NDArray[np.bool_]:
+        """Which points of the grid are flicker noise, or none."""
+        return np.array([len(taus) > 1 or ratio == 0 for ratio, taus in self.grid])
+
     def _choose(self, score: Array) -> int:
         """The best point; flicker noise where the data cannot tell it from the best.
 
         Electronics flickers, and has more to say at long times than one process: steps and trends are then judged
         with caution.
         """
-        flickers = np.array([len(taus) > 1 or ratio == 0 for ratio, taus in self.grid])
         best = int(np.argmin(score))
-        flicker = int(np.argmin(np.where(flickers, score, np.inf)))
+        flicker = int(np.argmin(np.where(self._flickers, score, np.inf)))
         return flicker if score[flicker] - score[best] < NOT_TOLD_APART else best
 
     def best(self, group: int = 0) -> Best:
@@ -199,20 +204,21 @@ class Grams:
     def of(self, columns: NDArray[np.intp]) -> Grams:
         """The same with some of the columns, and the residual."""
         keep = np.append(columns, self.gram.shape[1] - 1)
-        return replace(self, gram=self.gram[:, keep[:, None], keep])
+        return replace(self, gram=np.ascontiguousarray(self.gram[:, keep[:, None], keep]))
 
 
 def _grams(gap_s: Array, fast: Array, columns: Array, grid: list[Point], k: int, given: Processes) -> Grams:
     """Gram matrices over the grid; the first `k` columns are set aside (Schur complement)."""
     w = float(rms(fast))
-    made = [correlated(columns, gap_s, fast, ratio * w, taus, given) for ratio, taus in grid]
-    gram = np.stack([out.T @ out for out, _ in made])
-    logdet = np.array([logdet for _, logdet in made])
+    each = [processes(ratio * w, taus, given) for ratio, taus in grid]
+    counts = np.array([len(of) for of in each])
+    padded = np.array([(*of, *((0.0, 1.0),) * (counts.max() - len(of))) for of in each])
+    gram, logdet = products(np.ascontiguousarray(columns), gap_s, fast, padded[..., 0], padded[..., 1], counts)
     if not k:
         return Grams(gram, logdet, np.zeros(len(grid)))
     S, cross = gram[:, :k, :k], gram[:, :k, k:]
     reduced = gram[:, k:, k:] - np.swapaxes(cross, 1, 2) @ np.linalg.solve(S, cross)
-    return Grams(reduced, logdet, np.linalg.slogdet(S)[1])
+    return Grams(np.ascontiguousarray(reduced), logdet, np.linalg.slogdet(S)[1])
 
 
 def scores(g: Grams, rest: Array, free: int, least: float) -> tuple[Array, Array]:
@@ -220,20 +226,5 @@ def scores(g: Grams, rest: Array, free: int, least: float) -> tuple[Array, Array
 
     `free` rows less smooth columns; the parameters that this channel bears, and not the others, are taken off here.
     """
-    p = len(rest) - 1
-    scale = np.ones(len(g.gram))
-    ridge = 1e-13 * np.eye(p)
-    for _ in range(3):
-        own = g.gram / scale[:, None, None] ** 2
-        total = own + rest
-        size = np.trace(total[:, :p, :p], axis1=1, axis2=2)[:, None, None]
-        normal = total[:, :p, :p] + ridge * size
-        solved = np.linalg.solve(normal, np.concatenate([total[:, :p, p:], own[:, :p, :p]], axis=2))
-        borne = np.trace(solved[:, :, 1:], axis1=1, axis2=2)
-        extended = np.concatenate([-solved[:, :, 0], np.ones((len(solved), 1))], axis=1)
-        rss = np.einsum("gi,gij,gj->g", extended, g.gram, extended)
-        variance = np.maximum(rss, 0.0) / np.maximum(free - borne, 1.0)
-        scale = np.maximum(np.sqrt(variance), least)
-    other = np.einsum("gi,ij,gj->g", extended, rest, extended)
-    information = g.information + np.linalg.slogdet(normal)[1]
-    return rss / scale**2 + other + g.logdet + information + 2 * free * np.log(scale), scale
+    scale, own, other, logdet = profiled(g.gram, rest, free, least)
+    return own / scale**2 + other + g.logdet + g.information + logdet + 2 * free * np.log(scale), scale
