@@ -18,7 +18,8 @@ from calibrations.still.fit import noise_terms
 from calibrations.still.record import Samples, Still, reduced
 from rig.analysis.asked import DEFAULTS, check_unit, effects_of
 from rig.analysis.request import Request
-from rig.analysis.still import BESIDE, Stream, axes, repairs
+from rig.analysis.still import axes
+from rig.analysis.stream import BESIDE, Stream, repairs
 from rig.errors import UnknownRun
 from rig.record.measured import Measured
 from rig.record.store import Record

@@ -9,7 +9,7 @@ import numpy as np
 from calibrations.noise_analysis.analysis import Coefficient, NoiseAnalysis
 from calibrations.numerals import exponent
 from calibrations.still.disturbed import Disturbed
-from rig.analysis.still import Stream, repairs
+from rig.analysis.stream import Stream, repairs
 from rig.cli.output import columns
 from rig.numerals import duration
 

@@ -13,7 +13,8 @@ import pytest
 from calibrations.noise_analysis.exact import deviations
 from procedures.noise_floor import STILL
 from procedures.session import Pose
-from rig.analysis.still import _coarse, stream
+from rig.analysis.still import stream
+from rig.analysis.still_run import coarse
 from rig.record import Block, Kept, Record
 from tests.rig.conftest import Ended
 
@@ -201,7 +202,7 @@ def test_no_block_of_a_run_is_read_twice(run: str) -> None:
 def test_a_supply_is_coarse_where_noise_does_not_smooth_its_steps(noise_v: float, told: bool) -> None:
     step = 0.3e-3
     volts = np.round((5.0 + noise_v * np.random.default_rng(1).standard_normal((10_000, 1))) / step + 0.4) * step
-    found = _coarse(Kept(Pose(0, 0, 0, STILL), Block(volts, ("supply",), 1000.0, 0.0), 0.0, 22.0))
+    found = coarse(Kept(Pose(0, 0, 0, STILL), Block(volts, ("supply",), 1000.0, 0.0), 0.0, 22.0))
     assert found == ({"supply_v": pytest.approx(step)} if told else {})
 
 

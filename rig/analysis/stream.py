@@ -1,0 +1,93 @@
+"""Samples of a sensor at rest as a stream, whatever they come from, and what was done to them before any analysis."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrations.errors import DataError, nearest
+from calibrations.table import Array
+
+FOLLOWED = ("temperature_c", "supply_v")  # columns beside the samples that an output may follow
+BESIDE = ("t_s", *FOLLOWED, "n", "direction", "path")  # columns that are no channels
+LATE = 0.5  # sampling intervals by which a sample may be off before that is a gap
+DISAGREE = 0.01  # of two rates
+AXIS = re.compile(r"(v|a|g|m|)([xyz])(|_v)")  # of a channel, by its name
+
+
+@dataclass
+class Stream:
+    """Samples of one channel, in blocks that are read once. What was seen on the way is known when they are read."""
+
+    source: str
+    channel: str
+    rate_hz: float
+    unit: str
+    blocks: Iterator[NDArray[Any]]
+    corner_hz: float = np.inf
+    others: tuple[str, ...] = ()
+    closed: list[tuple[float, float]] = field(default_factory=list)  # gaps: where each begins and how long it is, s
+    uneven_s: float = 0.0  # by how much the times are off the even row that is taken for them
+    upright_v: dict[int, float] = field(default_factory=dict)  # output along gravity, +1 and -1 g
+    constants: Mapping[str, str | float] = field(default_factory=dict)
+    logged: dict[str, list[Array]] = field(default_factory=dict)  # what was read beside the samples, in their blocks
+    coarse: dict[str, float] = field(default_factory=dict)  # of that, what was read with less noise than these steps
+
+    @property
+    def scale_v_per_g(self) -> float | None:
+        """From poses of the same run at +1 and -1 g; None where it has none."""
+        if {1, -1} <= self.upright_v.keys() and self.upright_v[1] != self.upright_v[-1]:
+            return abs(self.upright_v[1] - self.upright_v[-1]) / 2
+        return None
+
+
+def repairs(samples: Stream, n: int) -> Iterable[str]:
+    """What was done to the samples before anything was computed."""
+    if samples.closed:
+        missing = sum(length for _, length in samples.closed)
+        gaps = "a gap is" if len(samples.closed) == 1 else f"{len(samples.closed)} gaps are"
+        yield (
+            f"{gaps} closed up, {missing:.3g} s in all: longer times are too short by up to "
+            f"{100 * missing * samples.rate_hz / n:.2g} %."
+        )
+    if samples.uneven_s:
+        yield (
+            f"Times are uneven, as where samples reach a computer in bursts, and off by {samples.uneven_s:.2g} s at "
+            f"most; the samples are taken to be even, {samples.rate_hz:.6g} a second."
+        )
+    for name, step in samples.coarse.items():
+        yield (
+            f"{name} was read in steps of {1e3 * step:.3g} mV, with less noise than that: its means are off by parts "
+            "of a step, and how much an output follows it is known less well than is said."
+        )
+
+
+def channel_of(channels: tuple[str, ...], channel: str | None, source: str) -> str:
+    """The channel asked for, or the first. Raises DataError."""
+    if not channels:
+        raise DataError(f"{source}: has no channel beside the time; add a column with the sensor's output")
+    wanted = channel or channels[0]
+    found = next((name for name in (wanted, f"{wanted}_v") if name in channels), None)
+    if found is None:
+        raise DataError(f'{source}: has no channel "{wanted}"{nearest(wanted, channels)}')
+    return found
+
+
+def agreed(measured: float | None, stated: float, source: str) -> float:
+    """The rate, Hz. Raises DataError where two disagree, or there is none."""
+    if measured is None and not stated > 0:
+        raise DataError(
+            f"{source}: its rate is not known; give --rate HZ, or a line `# sample_rate_hz: 100` above the header"
+        )
+    if measured is None:
+        return stated
+    if stated > 0 and abs(measured / stated - 1) > DISAGREE:
+        raise DataError(
+            f"{source}: {stated:g} samples a second are stated, the column t_s has {measured:g}; correct one of them"
+        )
+    return measured
