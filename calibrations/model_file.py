@@ -63,7 +63,7 @@ def read_model(name_or_path: str | Path, effects: Mapping[str, Effect] | None = 
         path = Path(name_or_path)
         if path.suffix not in (".yaml", ".yml") and not path.exists():
             raise UnknownName(
-                f'unknown model "{name_or_path}"{nearest(str(name_or_path), shipped_names())}; or give a YAML file'
+                f'no shipped model and no file is called "{name_or_path}"{nearest(str(name_or_path), shipped_names())}'
             )
     try:
         text = path.read_text(encoding="utf-8")

@@ -145,6 +145,8 @@ def _constant(line: str) -> tuple[str, str, str]:
 def _of_run(name: str, said: dict[str, str]) -> Iterator[Member]:
     """The sensors of a run, or the one that is named. Raises UnknownRun."""
     run_id, slash, chosen = name.partition("/")
+    if not run_id:
+        raise UnknownRun(f"{name}: there is no such file or folder")
     try:
         with Record.to_find(run_id) as record:
             found = list(_members(record, record.run(run_id)))

@@ -113,7 +113,7 @@ def test_names_the_key(text: str, says: str) -> None:
 def test_unknown_names(tmp_path: Path) -> None:
     with pytest.raises(UnknownName, match=r'bad\.yaml: unknown effect "hysterisis"; did you mean "hysteresis"\?'):
         parse_model(f"{HEAD}effects: [{{effect: hysterisis}}]", "bad.yaml")
-    with pytest.raises(UnknownName, match='unknown model "phisical"; did you mean "physical"'):
+    with pytest.raises(UnknownName, match='no file is called "phisical"; did you mean "physical"'):
         read_model("phisical")
     with pytest.raises(ModelError, match=r"nowhere\.yaml: the model file cannot be read"):
         read_model(tmp_path / "nowhere.yaml")
