@@ -23,12 +23,16 @@ from calibrations.table import Array, Table
 
 ROUNDS = 2
 NEWTON_STEPS = 20
+STRAIGHT = 1e-6  # of what is left: a step that foretells it better is a linear model's
 SMALL_GAIN = 1e-6  # of a sum of squares whose unit is the noise
 
 
 @dataclass(frozen=True)
 class Fit:
-    """A model fitted to a table. `residual` has shape (channels, n), rows in order of time."""
+    """A model fitted to a table. `residual` has shape (channels, n), rows in order of time.
+
+    `all_noise`: what standard uncertainties were taken from (`cautiously`); None where none were.
+    """
 
     model: Model
     problem: Problem
@@ -36,6 +40,7 @@ class Fit:
     noise: Noise
     residual: Array
     jacobian: Array
+    all_noise: Noise | None = None
 
     @property
     def table(self) -> Table:
@@ -119,6 +124,9 @@ def _minimise(problem: Problem, noise: Noise, start: Array) -> tuple[Array, floa
         return start, 0.0
     if problem.table.kind == "motion":
         return _determined(problem, noise, start)
+    at_once = _at_once(problem, noise, start) if problem.adds else None
+    if at_once is not None:
+        return at_once
 
     def residual(theta: Array) -> Array:
         return noise.whiten(problem.residual(theta)[:, :, None])[:, 0]
@@ -143,6 +151,21 @@ def _minimise(problem: Problem, noise: Noise, start: Array) -> tuple[Array, floa
     if problem.rounds:
         answer = descended(answer.x, stairs=True)
     return answer.x, float(answer.cost)
+
+
+def _at_once(problem: Problem, noise: Noise, start: Array) -> tuple[Array, float] | None:
+    """As `_minimise`, where one step of Gauss and Newton's gets there: the model is linear. None where it is not."""
+    typical, (low, high) = problem.layout.typical, problem.layout.bounds
+    columns = np.concatenate([problem.residual(start)[:, :, None], problem.jacobian(start)], axis=2)
+    white = noise.whiten(columns)
+    J, before = white[:, 1:] * typical, white[:, 0]
+    step = np.linalg.lstsq(J, -before, rcond=None)[0]
+    theta = start + typical * step
+    left = noise.whiten(problem.residual(theta)[:, :, None])[:, 0]
+    linear = np.linalg.norm(before + J @ step - left) <= STRAIGHT * np.linalg.norm(left)
+    if not linear or np.any(theta < low) or np.any(theta > high):
+        return None
+    return theta, float(left @ left) / 2
 
 
 def _determined(problem: Problem, noise: Noise, start: Array) -> tuple[Array, float]:
@@ -178,7 +201,7 @@ def _result(problem: Problem, theta: Array, noise: Noise) -> Fit:
     cautious = cautiously(found)
     informative = np.asarray(cautious.whitened[:, 1:] / cautious.birge)
     wider = _wider(cautious)
-    return replace(found, model=estimates(model, problem.layout, theta, informative, wider))
+    return replace(found, model=estimates(model, problem.layout, theta, informative, wider), all_noise=cautious.noise)
 
 
 def _wider(cautious: Fit) -> Array:
@@ -195,5 +218,7 @@ def cautiously(found: Fit) -> Fit:
     Here nothing is set aside: where inclinations follow each other in time, smooth functions of the angles take up slow
     noise as well, and parameters would look more certain than they are.
     """
+    if found.all_noise is not None:
+        return replace(found, noise=found.all_noise)
     noise = estimate(found.noise, found.residual, found.jacobian, np.zeros((found.table.n, 0)))
     return replace(found, noise=noise.prolonged())

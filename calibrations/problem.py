@@ -103,6 +103,12 @@ class Problem:
         """Whether an effect makes a staircase of the output."""
         return any(term.effect.rounds for term in self.layout.model.terms)
 
+    @property
+    def adds(self) -> bool:
+        """Whether every effect only adds to the output: the model may then be linear in its parameters."""
+        effects = [term.effect for term in self.layout.model.terms]
+        return self.table.kind in KNOWN and not any(e.pose or e.force or e.output for e in effects)
+
     def jacobian(self, theta: Array, of: NDArray[np.bool_] | None = None, stairs: bool = False) -> Array:
         """d residual / d theta by central differences, shape (channels, n, p); only the entries `of` where given.
 
