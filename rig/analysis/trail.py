@@ -16,6 +16,7 @@ from calibrations.model import Model
 from calibrations.search.outliers import fit_without
 from calibrations.table import Table
 from rig.analysis.asked import asked
+from rig.analysis.provenance import with_provenance
 from rig.analysis.request import Request
 from rig.planning.foresight import with_next
 
@@ -45,6 +46,10 @@ class Trail:
         """Of the outputs."""
         return self.table.unit
 
+    def among(self, effects: Mapping[str, Effect]) -> Trail:
+        """The same with other effects to be added."""
+        return replace(self, effects=effects)
+
     def tried(self, effect: Effect) -> Added:
         """The present model with one effect more, all fitted. Raises ModelError where that says nothing new."""
         model, table = self.end.model, self.end.table
@@ -70,6 +75,10 @@ class Trail:
     def undone(self) -> Trail:
         """One step back; the beginning stays as it is."""
         return replace(self, steps=self.steps[:-1])
+
+    def kept(self) -> Model:
+        """The present model as a file keeps it, with where it comes from."""
+        return with_provenance(self.end, self.model)
 
     def compared(self) -> Comparison:
         """The present model beside the data: as given, where it came with values."""

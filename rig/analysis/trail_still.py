@@ -14,6 +14,7 @@ from calibrations.still.discover import Added
 from calibrations.still.fit import NoiseFit, fit
 from calibrations.still.record import Still
 from rig.analysis.asked_still import asked_still
+from rig.analysis.provenance import with_provenance
 from rig.analysis.request import Request
 from rig.planning.foresight import with_noise_next
 
@@ -40,6 +41,10 @@ class StillTrail:
         """Of the outputs."""
         return self.still.unit
 
+    def among(self, effects: Mapping[str, Effect]) -> StillTrail:
+        """The same with other effects to be added."""
+        return replace(self, effects=effects)
+
     def tried(self, effect: Effect) -> Added:
         """The present model with one effect more, all fitted. Raises ModelError where it is in the model."""
         if self.end.model.holds(effect.name):
@@ -54,6 +59,10 @@ class StillTrail:
     def undone(self) -> StillTrail:
         """One step back."""
         return replace(self, steps=self.steps[:-1])
+
+    def kept(self) -> Model:
+        """The present model as a file keeps it, with where it comes from."""
+        return with_provenance(self.end, self.model)
 
     def compared(self) -> Comparison:
         """The present model beside the record: as given, where it came with values."""

@@ -12,10 +12,7 @@ from rig.home import RECORD, home
 from rig.record import Record, Run
 
 if TYPE_CHECKING:
-    from rig.analysis.trail import Trail
-    from rig.analysis.trail_still import StillTrail
-
-    AnyTrail = Trail | StillTrail
+    from rig.analysis.growing import Growing
 
 MOST_OPEN = 6  # trails that are kept: each holds its data
 MODELS = "models"  # the folder in the home where the workbench saves models
@@ -28,9 +25,9 @@ class Desk:
 
     bench_file: Path | None
     dark: bool | None = None
-    trails: OrderedDict[tuple[str, str], AnyTrail] = field(default_factory=OrderedDict)
+    trails: OrderedDict[tuple[str, str], Growing] = field(default_factory=OrderedDict)
 
-    def open(self, data: str, model: str) -> AnyTrail:
+    def open(self, data: str, model: str) -> Growing:
         """The trail that lies open, or a new one; `model` "" is the one by default. Raises what `trail` raises."""
         from rig.analysis.request import Request
         from rig.analysis.trail import trail
@@ -41,7 +38,7 @@ class Desk:
         self.keep(data, model, found)
         return found
 
-    def keep(self, data: str, model: str, trail: AnyTrail) -> None:
+    def keep(self, data: str, model: str, trail: Growing) -> None:
         """How far the model has grown."""
         self.trails[data, model] = trail
         self.trails.move_to_end((data, model))

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 from urllib.parse import urlencode
 
 from nicegui import ui
@@ -28,9 +27,7 @@ from rig.web.parts import box, div, failed, off_loop, state, words
 from rig.web.told import message
 
 if TYPE_CHECKING:
-    from rig.analysis.trail import Trail
-
-    AnyTrail = Trail | StillTrail
+    from rig.analysis.growing import Diagnosis, Growing, Step
 
 
 def register(desk: Desk) -> None:
@@ -46,11 +43,11 @@ class Workbench:
 
     def __init__(self, desk: Desk, data: str, model: str) -> None:
         self.desk, self.data, self.model = desk, data, model
-        self.trail: AnyTrail | None = None
+        self.trail: Growing | None = None
         self.told: Words = OfRows()
         self.search = Counted({})
         self.turn = 0  # answers to questions that were asked before the last one are let go
-        self.diagnoses: dict[tuple[str, ...], Any] = {}
+        self.diagnoses: dict[tuple[str, ...], Diagnosis] = {}
 
     def build(self) -> None:
         """The page, laid out; what takes long is asked for as soon as the browser shows it."""
@@ -123,7 +120,7 @@ class Workbench:
                 left_out.listed(self.data, self.afresh)
         await self.show(trail)
 
-    async def show(self, trail: AnyTrail) -> None:
+    async def show(self, trail: Growing) -> None:
         """Pictures and error of the model as it is now; then, when it is found, what it misses."""
         self.turn += 1
         turn = self.turn
@@ -137,7 +134,7 @@ class Workbench:
         self.chosen.grown(trail)
         await self._diagnose(trail, turn)
 
-    async def _diagnose(self, trail: AnyTrail, turn: int) -> None:
+    async def _diagnose(self, trail: Growing, turn: int) -> None:
         self.search.cancelled = True  # the one before, which nobody waits for any more
         key = tuple(step.name for step in trail.steps)
         if key not in self.diagnoses:
@@ -145,7 +142,7 @@ class Workbench:
             self.missing.wait(self.search)
             self.verdict.wait("Looking for what is missing")
             try:
-                self.diagnoses[key] = await off_loop(replace(trail, effects=self.search).diagnosed)
+                self.diagnoses[key] = await off_loop(trail.among(self.search).diagnosed)
             except Cancelled:
                 return
             except Exception as error:
@@ -168,11 +165,11 @@ class Workbench:
         if self.trail is not None:
             await self._diagnose(self.trail, self.turn)
 
-    async def add(self, step: Any) -> None:
+    async def add(self, step: Step) -> None:
         """The model gains an effect."""
         if self.trail is not None:
             if (effect := step.after.model.terms[-1].effect).expression:
-                self.trail = replace(self.trail, effects={**self.trail.effects, effect.name: effect})
+                self.trail = self.trail.among({**self.trail.effects, effect.name: effect})
             await self.show(self.trail.with_step(step))
 
     async def undo(self) -> None:

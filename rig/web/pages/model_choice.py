@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from nicegui import events, ui
 
@@ -15,7 +15,7 @@ from rig.web.parts import box, off_loop, words
 from rig.web.told import message
 
 if TYPE_CHECKING:
-    from rig.web.desk import AnyTrail
+    from rig.analysis.growing import Growing
     from rig.web.pages.model_page import ModelPage
 
 MOST_BYTES = 200_000_000
@@ -53,7 +53,7 @@ class Choice:
         if (data or "", model or "") != (self.page.data, self.page.model):
             self.page.go(data or "", model or "")
 
-    def opened(self, trail: AnyTrail) -> None:
+    def opened(self, trail: Growing) -> None:
         """What lies open has a name, even where the address has none."""
         data = self.page.data
         self.data.set_options({**_data(data)}, value=data)
@@ -62,7 +62,7 @@ class Choice:
         self.save.enable()
         self.report.enable()
 
-    def grown(self, trail: AnyTrail) -> None:
+    def grown(self, trail: Growing) -> None:
         """Undo is there as soon as there is something to undo."""
         self.undo.set_enabled(bool(trail.steps))
         self.undo.set_text(f"Undo {trail.steps[-1].name}" if trail.steps else "Undo")
@@ -109,11 +109,10 @@ class Choice:
 
     def _text(self) -> str:
         from calibrations.model_file import dump_model
-        from rig.analysis.provenance import with_provenance
 
         trail = self.page.trail
         assert trail is not None  # noqa: S101 the button is enabled with the trail
-        return dump_model(with_provenance(trail.end, trail.model))
+        return dump_model(trail.kept())
 
     def _saved(self, name: str) -> Path:
         from rig.files import write_whole
@@ -157,7 +156,7 @@ def _data(chosen: str) -> dict[str, str]:
     return found
 
 
-def _models(chosen: str) -> dict[str, Any]:
+def _models(chosen: str) -> dict[str, str]:
     from calibrations.model_file import shipped_names
 
     found = {"": "by kind of data", **{name: name for name in shipped_names()}, **saved_models()}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 from urllib.parse import urlencode
 
 from nicegui import ui
@@ -15,6 +15,7 @@ from rig.web.parts import box, div, facts, failed, off_loop, waiting, words
 from rig.web.told import message
 
 if TYPE_CHECKING:
+    from rig.analysis.growing import Candidate, Diagnosis, Step
     from rig.web.counted import Counted
     from rig.web.pages.model_page import ModelPage
 
@@ -27,8 +28,8 @@ class Missing:
 
     def __init__(self, page: ModelPage, own: bool) -> None:
         self.page = page
-        self.looked_at: Any = None
-        self.tried: dict[str, Any] = {}
+        self.looked_at: Candidate | None = None
+        self.tried: dict[str, Step] = {}
         with div("side"):
             words("What is missing", "title")
             self.cards = div("stack")
@@ -70,11 +71,11 @@ class Missing:
         with self.cards:
             failed("The search for effects failed", why)
 
-    async def show(self, result: Any) -> None:
+    async def show(self, result: Diagnosis) -> None:
         """The candidates, best first; the best is looked at where there is one to add."""
         self.cards.clear()
         self.tried, self.looked_at = {}, None
-        self.own.begin(getattr(result, "pattern", None))
+        self.own.begin(self.page.told.left(result))
         missing = self.page.told.missing(result)
         with self.cards:
             if not missing:
@@ -89,7 +90,7 @@ class Missing:
             with below:
                 await self._next(result)
 
-    def _nothing_to_add(self, result: Any) -> None:
+    def _nothing_to_add(self, result: Diagnosis) -> None:
         good = result.verdict == "adequate"
         with box("verdict good" if good else "verdict doubt"):
             if good:
@@ -100,13 +101,13 @@ class Missing:
             else:
                 words("Nothing shows that an effect is missing; what was tried:")
 
-    def _others(self, result: Any) -> None:
+    def _others(self, result: Diagnosis) -> None:
         rest = result.candidates[FIRST:]
         with ui.expansion(f"{len(rest)} more, less likely").props("dense"):
             for c in rest:
                 Card(self, c, result, best=False)
 
-    async def _next(self, result: Any) -> None:
+    async def _next(self, result: Diagnosis) -> None:
         """The experiment that would tell, planned on the bench."""
         page, notes = self.page, list[str]()
         assert page.trail is not None  # noqa: S101 a diagnosis is of a trail
@@ -114,7 +115,7 @@ class Missing:
             words("Next experiment", "title")
             hint = waiting("Planning it on the bench")
         try:
-            found: Any = await off_loop(page.trail.with_next, result, notes.append)
+            found = await off_loop(page.trail.with_next, result, notes.append)
             experiment = found.next_experiment
             assert experiment is not None  # noqa: S101 it had one before
             hint.set_text(" ".join([next_words(experiment), next_takes(experiment), *notes]))
@@ -125,14 +126,14 @@ class Missing:
         except Exception as error:
             hint.set_text(message(error))
 
-    async def look_at(self, c: Any) -> None:
+    async def look_at(self, c: Candidate) -> None:
         """Draw the candidate's curve through the residual."""
         self.looked_at = c
         step = await self.step_of(c)
         if step is not None and self.looked_at is c:
             self.page.pictures.consider(step)
 
-    async def step_of(self, c: Any) -> Any:
+    async def step_of(self, c: Candidate) -> Step | None:
         """The candidate fitted in full; None where that fails, which is told."""
         trail = self.page.trail
         if c.name not in self.tried and trail is not None:
@@ -147,7 +148,7 @@ class Missing:
         if self.looked_at is not None:
             await self.add(self.looked_at)
 
-    async def add(self, c: Any) -> None:
+    async def add(self, c: Candidate) -> None:
         """The model gains this effect."""
         step = await self.step_of(c)
         if step is not None:
@@ -157,7 +158,7 @@ class Missing:
 class Card:
     """One candidate: what it is, what it does to the error, and the button that adds it."""
 
-    def __init__(self, side: Missing, c: Any, result: Any, best: bool) -> None:
+    def __init__(self, side: Missing, c: Candidate, result: Diagnosis, best: bool) -> None:
         self.side, self.c = side, c
         with div("card first" if best else "card"):
             with ui.element("button").classes("head").props("type=button aria-expanded=false") as self.head:
@@ -173,7 +174,7 @@ class Card:
                     ui.button(f"Add {c.name}", icon="add", on_click=lambda: side.add(c)).props("dense unelevated")
                     ui.button("Show its curve", on_click=lambda: side.look_at(c)).props("dense flat")
 
-    def _told(self, result: Any) -> None:
+    def _told(self, result: Diagnosis) -> None:
         c = self.c
         words(capital(c.effect.summary))
         words(formula(c.effect.formula, self.side.unit), "formula")

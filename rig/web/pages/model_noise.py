@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from nicegui import ui
 
@@ -83,7 +83,7 @@ class NoisePictures:
     def other_unit(self) -> None:
         """A still record has one unit."""
 
-    def select(self, points: Sequence[Any]) -> None:
+    def select(self, points: Sequence[int]) -> None:
         """Averaging times have no poses to be selected."""
 
     def leave_selected(self) -> None:

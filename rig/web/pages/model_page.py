@@ -1,7 +1,7 @@
 """What the parts of the page Model ask of the whole: its data, its model, and that the model grows.
 
-A trail is of rows (`rig.analysis.trail`) or of a still record (`rig.analysis.trail_still`); a part that shows either
-takes what belongs to it (a diagnosis, a candidate, a step) as `Any`, and what is said of it from `Words`.
+The data are rows or a still record. What both have in common is in `rig.analysis.growing`; what is said and drawn of
+one alone is behind `Words` and `AnyPictures`, which are given what belongs to their own kind.
 """
 
 from __future__ import annotations
@@ -9,8 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Protocol
 
-from rig.analysis.trail import Trail
-from rig.analysis.trail_still import StillTrail
+from rig.analysis.growing import Growing, Step
 from rig.web.desk import Desk
 from rig.web.pages.model_words import Words
 
@@ -30,7 +29,7 @@ class AnyPictures(Protocol):
     def other_unit(self) -> None:
         """Another unit, where there is one."""
 
-    def select(self, points: Sequence[Any]) -> None:
+    def select(self, points: Sequence[int]) -> None:
         """Mark these points in all pictures."""
 
     def leave_selected(self) -> None:
@@ -43,7 +42,7 @@ class ModelPage(Protocol):
     desk: Desk
     data: str
     model: str
-    trail: Trail | StillTrail | None
+    trail: Growing | None
     told: Words
     pictures: AnyPictures
 
@@ -53,7 +52,7 @@ class ModelPage(Protocol):
     def afresh(self) -> None:
         """Read the data again, which have changed."""
 
-    async def add(self, step: Any) -> None:
+    async def add(self, step: Step) -> None:
         """The model gains an effect."""
 
     async def undo(self) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from nicegui import events, ui
 
@@ -186,7 +186,7 @@ class Pictures:
     def _brushed(self, event: events.GenericEventArguments) -> None:
         self.select(event.args if isinstance(event.args, list) else [])
 
-    def select(self, points: Sequence[Any]) -> None:
+    def select(self, points: Sequence[int]) -> None:
         """Mark these points in all pictures; none unmarks all."""
         if self.fit is None:
             return

@@ -10,6 +10,7 @@ from calibrations.reports.words import capital
 from rig.web.parts import box, div, words
 
 if TYPE_CHECKING:
+    from rig.analysis.growing import Diagnosis, Growing
     from rig.web.pages.model_words import Words
 
 LOOKS = {"adequate": "good", "effect-missing": "bad", "ambiguous": "doubt", "unexplained": "doubt"}
@@ -27,7 +28,7 @@ class Verdict:
                     self.whole = ui.tooltip("").props("max-width=640px")
             self.numbers = div("row-of numbers")
 
-    def error(self, told: Words, compared: Any, trail: Any) -> None:
+    def error(self, told: Words, compared: Any, trail: Growing) -> None:
         """How large the error is, and where it is largest: known before anything is diagnosed."""
         self.numbers.clear()
         with self.numbers:
@@ -42,10 +43,10 @@ class Verdict:
         self.headline.set_text(f"{what} ...")
         self.box.classes(remove="good bad doubt")
 
-    def found(self, told: Words, result: Any) -> None:
+    def found(self, told: Words, result: Diagnosis) -> None:
         """The verdict."""
         self.headline.set_text(_times(capital(told.verdict(result))))
-        if caution := getattr(result, "caution", None):
+        if caution := told.caution(result):
             self._tell(f"But {caution}. {self.detail.text}")
         self.box.classes(remove="good bad doubt", add=LOOKS[result.verdict])
 

@@ -13,12 +13,15 @@ from calibrations.pictures.view import milli, pooled_mg, rows_of
 from calibrations.reports.verdict import headline
 from calibrations.search.candidates import SIGNIFICANT, Candidate
 from calibrations.search.held_out import held_out_excess
+from calibrations.search.patterns import Pattern
 from calibrations.still import compare as still_compare
 from calibrations.still import diagnose as still_diagnose
 from calibrations.still.documents import mismatch
 from calibrations.still.held_out import held_out_excess as still_held_out
 from calibrations.still.words import headline as still_headline
 from calibrations.still.words import of_record
+from rig.analysis.growing import Candidate as AnyCandidate
+from rig.analysis.growing import Growing
 from rig.analysis.trail import Trail
 from rig.analysis.trail_still import StillTrail
 
@@ -37,6 +40,12 @@ class Words(Protocol):
 
     def verdict(self, result: Any) -> str:
         """The verdict in a sentence."""
+
+    def caution(self, result: Any) -> str | None:
+        """What is to be known before the verdict is believed."""
+
+    def left(self, result: Any) -> Pattern | None:
+        """What is left unexplained, where that can be proposed as an effect of one's own."""
 
     def missing(self, result: Any) -> bool:
         """Whether there is something to add."""
@@ -63,6 +72,12 @@ class OfRows:
 
     def verdict(self, result: diagnose.Diagnosis) -> str:
         return headline(result)
+
+    def caution(self, result: diagnose.Diagnosis) -> str | None:
+        return result.caution
+
+    def left(self, result: diagnose.Diagnosis) -> Pattern | None:
+        return result.pattern
 
     def missing(self, result: diagnose.Diagnosis) -> bool:
         return result.verdict in ("effect-missing", "ambiguous") and bool(result.path.steps)
@@ -92,6 +107,12 @@ class OfNoise:
     def verdict(self, result: still_diagnose.Diagnosis) -> str:
         return still_headline(result)
 
+    def caution(self, result: still_diagnose.Diagnosis) -> None:  # noqa: ARG002 as that of rows
+        return None
+
+    def left(self, result: still_diagnose.Diagnosis) -> None:  # noqa: ARG002 as that of rows
+        return None
+
     def missing(self, result: still_diagnose.Diagnosis) -> bool:
         return result.verdict in ("effect-missing", "ambiguous") and bool(result.missing)
 
@@ -104,12 +125,12 @@ class OfNoise:
         }
 
 
-def words_of(trail: Trail | StillTrail) -> Words:
+def words_of(trail: Growing) -> Words:
     """Those for what lies open."""
     return OfNoise() if isinstance(trail, StillTrail) else OfRows()
 
 
-def chances(c: Candidate | still_diagnose.Candidate) -> str:
+def chances(c: AnyCandidate) -> str:
     """How probable it is that this is it, and that it is nothing."""
     beyond = "" if c.p_value < SIGNIFICANT else ", which is not significant"
     return f"{share(c.probability)}; by chance {chance(c.p_value)}{beyond}"
