@@ -35,6 +35,11 @@ form follows from geometry alone and needs no other effect to refine it; ROUNDS,
 whose slope says nothing; LACKS, a function of the table: why its rows cannot show the effect whatever their number, or
 None; and LEFT_OUT: why a compensation in the sensor's product cannot follow it (every other effect on force,
 transduction or output is inverted there). KINDS are kinds of tables, and "fields" for positions of a magnetometer.
+
+What `transduction` makes of the way from row to row, a product follows by
+
+    follow(a, table, p, before) -> (n, 3), after    what is added to the output of one sample more, and what is
+                                                    remembered then: like `before` MEMORY arrays (n, 3), 0 at first
 """
 
 from __future__ import annotations
@@ -45,7 +50,7 @@ import inspect
 import logging
 import re
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
@@ -143,6 +148,8 @@ class Effect:
     lines: Callable[..., tuple[tuple[float, float], ...]] | None = None
     expression: str = ""
     left_out: str = ""
+    follow: Callable[..., tuple[Array, Sequence[Array]]] | None = None
+    memory: int = 0
 
     @property
     def acts_on(self) -> str:
@@ -202,7 +209,8 @@ def _read_folder(folder: Path, package: str | None) -> Iterable[Effect]:
 
 def _guarded(effect: Effect, path: Path) -> Effect:
     """A user's effect, whose faults are told as such."""
-    hooks: dict[str, Any] = {hook: guarded(f, path) for hook in HOOKS if (f := getattr(effect, hook)) is not None}
+    named = (*HOOKS, "follow")
+    hooks: dict[str, Any] = {hook: guarded(f, path) for hook in named if (f := getattr(effect, hook)) is not None}
     return replace(effect, **hooks)
 
 
@@ -242,6 +250,8 @@ def _from_module(module: ModuleType, path: Path) -> Effect:
         rounds=bool(getattr(module, "ROUNDS", False)),
         lacks=getattr(module, "LACKS", _nothing),
         left_out=str(getattr(module, "LEFT_OUT", "")),
+        follow=getattr(module, "follow", None),
+        memory=int(getattr(module, "MEMORY", 0)),
         pose=hooks.get("pose"),
         force=hooks.get("force"),
         transduction=hooks.get("transduction"),

@@ -134,6 +134,12 @@ def _effects(made: Compensation) -> Iterator[str]:
     for fate in made.forward.fates:
         by_how.setdefault(fate.how, []).append(fate.effect)
     yield f"Inverted: {', '.join(by_how.get(INVERTED, ['nothing']))}."
+    if remembering := made.forward.remembering:
+        yield (
+            f"With a history: {', '.join(remembering)}. Give every sample, in order: {len(made.forward.memory)} "
+            "numbers are remembered from one to the next, 0 before the first. Until the way has turned round at both "
+            "ends of what the sensor comes through, the true history is not known."
+        )
     if rigs := by_how.get(OF_THE_RIG):
         yield f"Of the rig, not of the sensor, and dropped: {', '.join(rigs)}."
     if noise := by_how.get(NOISE):

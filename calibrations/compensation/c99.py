@@ -1,4 +1,7 @@
-"""The compensation as C99: a header, a source, and a self-test. No allocation, no state, one loop of fixed length."""
+"""The compensation as C99: a header, a source, and a self-test. No allocation, one loop of fixed length.
+
+The only state is what a model with a history remembers from one sample to the next: a structure of the caller's.
+"""
 
 from __future__ import annotations
 
@@ -47,7 +50,7 @@ typedef struct {{
 {outputs}
 }} {n}_output;
 
-{n}_output {n}_compensate(const {n}_input *in);
+{_declared_memory(made, n)}{n}_output {n}_compensate(const {n}_input *in{_taking_memory(made, n)});
 {_declared_in_gravity(made, n)}
 /* How many of the reference vectors fail: 0 is good. In {n}_self_test.c; with {n.upper()}_MAIN defined, a program. */
 int {n}_self_test(void);
@@ -64,6 +67,7 @@ def _source(made: Compensation, n: str) -> str:
     before = "".join(_line(line, n, f, "    ") for line in program.before)
     loop = "".join(_line(line, n, f, "        ") for line in program.loop)
     taken = "".join(f"    const {n}_real {name} = in->{name};\n" for name in program.inputs)
+    taken += "".join(f"    const {n}_real {name} = memory->{name};\n" for name in program.remembered)
     begin = "".join(f"    out.{name} = 0;\n" for name in program.sought)
     sought = "".join(f"        const {n}_real {name} = out.{name};\n" for name in program.sought)
     end = "".join(f"        out.{a} = {_word(b, f)};\n" for a, b in zip(program.sought, program.next, strict=True))
@@ -71,16 +75,50 @@ def _source(made: Compensation, n: str) -> str:
 
 #include <math.h>
 
-{n}_output {n}_compensate(const {n}_input *in)
+{n}_output {n}_compensate(const {n}_input *in{_taking_memory(made, n)})
 {{
 {taken}{before}    {n}_output out;
     int step;
 
 {begin}    for (step = 0; step < {program.steps}; ++step) {{
 {sought}{loop}{end}    }}
-    return out;
+{_remembered(made, n, f)}    return out;
 }}
 {_in_gravity(made, n, f)}"""
+
+
+def _taking_memory(made: Compensation, n: str) -> str:
+    return f", {n}_memory *memory" if made.program.remembered else ""
+
+
+def _declared_memory(made: Compensation, n: str) -> str:
+    if not made.program.remembered:
+        return ""
+    names = "".join(f"    {n}_real {name};\n" for name in made.program.remembered)
+    return f"""/* Remembered from one sample to the next; before the first all is 0: {n}_memory memory = {{0}}; */
+typedef struct {{
+{names}}} {n}_memory;
+
+"""
+
+
+def _remembered(made: Compensation, n: str, f: str) -> str:
+    """What the next sample is given, from what was found."""
+    program = made.program
+    if not program.remembered:
+        return ""
+    sought = "".join(
+        f"        const {n}_real {name} = out.{name};\n" for name in program.sought if _is_used(name, made)
+    )
+    lines = "".join(_line(line, n, f, "        ") for line in program.after)
+    kept = "".join(f"        memory->{name} = {_word(word, f)};\n" for name, word in program.remembered.items())
+    return f"    {{\n{sought}{lines}{kept}    }}\n"
+
+
+def _is_used(name: str, made: Compensation) -> bool:
+    """Whether what is remembered follows it: a compiler warns of what is not used."""
+    program = made.program
+    return any(name in line.inner for line in program.after) or name in program.remembered.values()
 
 
 def _declared_in_gravity(made: Compensation, n: str) -> str:
@@ -88,34 +126,40 @@ def _declared_in_gravity(made: Compensation, n: str) -> str:
         return ""
     return f"""
 /* Where nothing but gravity acts: in->az is not looked at; side is 1 where the z axis points up, else -1. */
-{n}_output {n}_in_gravity(const {n}_input *in, {n}_real side);
+{n}_output {n}_in_gravity(const {n}_input *in, {n}_real side{_taking_memory(made, n)});
 """
 
 
 def _in_gravity(made: Compensation, n: str, f: str) -> str:
     if made.costs.out_of_gravity is None:
         return ""
+    anew, given, last = "", "", ""
+    if made.program.remembered:  # each pass begins with what was remembered before the sample
+        anew, given, last = f"    {n}_memory then = *memory;\n", ", &then", "    *memory = then;\n"
+    again = "        then = *memory;\n" if given else ""
     return f"""
-{n}_output {n}_in_gravity(const {n}_input *in, {n}_real side)
+{n}_output {n}_in_gravity(const {n}_input *in, {n}_real side{_taking_memory(made, n)})
 {{
     {n}_input with = *in;
-    {n}_output out;
+{anew}    {n}_output out;
     int pass;
 
     with.az = 0;
-    out = {n}_compensate(&with);
+    out = {n}_compensate(&with{given});
     for (pass = 0; pass < {PASSES}; ++pass) {{
         const {n}_real left = 1 - out.ax * out.ax - out.ay * out.ay;
         with.az = left > 0 ? side * sqrt{f}(left) : 0;
-        out = {n}_compensate(&with);
+{again}        out = {n}_compensate(&with{given});
     }}
-    return out;
+{last}    return out;
 }}
 """
 
 
 def _self_test(made: Compensation, n: str, checks: Vectors) -> str:
     f, program = SUFFIX[made.precision], made.program
+    zeros = ", ".join(["0"] * len(program.remembered))
+    memory, given = (f"    {n}_memory memory = {{{zeros}}};\n", ", &memory") if program.remembered else ("", "")
     rows = zip(checks.inputs.tolist(), checks.expected.tolist(), strict=True)
     table = "".join(
         f"    {{{{{', '.join(_word(x, f) for x in given)}}}, {{{', '.join(_word(x, f) for x in true)}}}}},\n"
@@ -137,11 +181,11 @@ static const struct {{
 
 int {n}_self_test(void)
 {{
-    int failed = 0;
+{memory}    int failed = 0;
     unsigned k;
 
     for (k = 0; k < sizeof vectors / sizeof vectors[0]; ++k) {{
-        const {n}_output out = {n}_compensate(&vectors[k].in);
+        const {n}_output out = {n}_compensate(&vectors[k].in{given});
         if (!({close})) {{
             ++failed;
         }}

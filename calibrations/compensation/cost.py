@@ -14,6 +14,7 @@ import numpy as np
 
 from calibrations.chain import Step, nominal_pose, respond, sensed, specific_force
 from calibrations.compensation.forward import FORCES, INVERTED, Forward, steps_of
+from calibrations.compensation.memory import memory_at
 from calibrations.compensation.program import Program
 from calibrations.errors import CalibrationError
 from calibrations.model import Estimate, Model, Term
@@ -51,11 +52,12 @@ def costs(model: Model, forward: Forward, program: Program, reach: float, unit: 
     a = specific_force(nominal_pose(table)) * (1.0 if unit != "deg/s" else reach)
     fates = {fate.effect: fate.how for fate in forward.fates}
     followed = [step for step in steps_of(model) if fates[step[0].name] == INVERTED]
-    left = {name: _of_left_out(name, model, followed, table, a, forward, program) for name in forward.left_out}
+    memory = memory_at(table, sensed(a, table, followed), forward)
+    left = {name: _of_left_out(name, model, followed, table, a, forward, program, memory) for name in forward.left_out}
     hidden = unit == "g" and len(forward.axes) == 2 and "az" in program.inputs
     return Cost(
         left,
-        _of_gravity(followed, table, a, forward, program) if hidden else None,
+        _of_gravity(followed, table, a, forward, program, memory) if hidden else None,
         _of_parameters(model, forward, followed, table, a),
     )
 
@@ -72,11 +74,11 @@ def in_gravity(program: Program, inputs: Mapping[str, Array], side: Array) -> di
     return found
 
 
-def inputs_of(table: Table, v: Array, a: Array, program: Program) -> dict[str, Array]:
+def inputs_of(table: Table, v: Array, a: Array, program: Program, memory: Mapping[str, Array]) -> dict[str, Array]:
     """The program's inputs for outputs `v` and specific force `a`, both (n, 3), of a table's rows."""
     known = {f"v{axis}": v[:, k] for k, axis in enumerate("xyz")}
     known |= {name: a[:, k] for k, name in enumerate(FORCES)}
-    return {name: known[name] if name in known else table.column(name) for name in program.inputs}
+    return {name: known[name] if name in known else table.column(name) for name in program.inputs} | dict(memory)
 
 
 def _sweep(model: Model, program: Program) -> Table:
@@ -109,7 +111,14 @@ def _size(errors: Array) -> Size:
 
 
 def _of_left_out(
-    name: str, model: Model, followed: Sequence[Step], table: Table, a: Array, forward: Forward, program: Program
+    name: str,
+    model: Model,
+    followed: Sequence[Step],
+    table: Table,
+    a: Array,
+    forward: Forward,
+    program: Program,
+    memory: Mapping[str, Array],
 ) -> Size | None:
     """By the whole model with this effect, compensated without it."""
     steps = [s for s in steps_of(model) if s[0].name == name or any(s[0] is other[0] for other in followed)]
@@ -117,12 +126,19 @@ def _of_left_out(
         v = respond(sensed(a, table, steps), table, steps)
     except CalibrationError:  # it needs what no sweep has, such as a motion
         return None
-    return _size(_errors(program.run(inputs_of(table, v, a, program)), a, forward))
+    return _size(_errors(program.run(inputs_of(table, v, a, program, memory)), a, forward))
 
 
-def _of_gravity(followed: Sequence[Step], table: Table, a: Array, forward: Forward, program: Program) -> Size:
+def _of_gravity(
+    followed: Sequence[Step],
+    table: Table,
+    a: Array,
+    forward: Forward,
+    program: Program,
+    memory: Mapping[str, Array],
+) -> Size:
     v = respond(sensed(a, table, followed), table, followed)
-    found = in_gravity(program, inputs_of(table, v, a, program), np.where(a[:, 2] < 0, -1.0, 1.0))
+    found = in_gravity(program, inputs_of(table, v, a, program, memory), np.where(a[:, 2] < 0, -1.0, 1.0))
     return _size(_errors(found, a, forward))
 
 

@@ -1,7 +1,8 @@
 """The compensation as a JSON document, for whoever writes it in a language of their own: `rig.compensation/1`.
 
 `before` and `loop` are lines [name, operation, [what it is applied to]], names and numbers; run `before` once, begin
-with every output at 0, and `steps` times run `loop` and take `next` for the outputs.
+with every output at 0, and `steps` times run `loop` and take `next` for the outputs. Where something is `remembered`,
+each name is 0 before the first sample; run `after` once with the outputs found, and it is what its word says.
 """
 
 from __future__ import annotations
@@ -26,6 +27,8 @@ def files(made: Compensation, origin: Origin, checks: Vectors) -> dict[str, str]
         "before": [_line(line) for line in program.before],
         "loop": [_line(line) for line in program.loop],
         "next": list(program.next),
+        "after": [_line(line) for line in program.after],
+        "remembered": dict(program.remembered),
         "self_test": {
             "tolerance": checks.tolerance,
             "inputs": checks.inputs.tolist(),

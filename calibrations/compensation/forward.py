@@ -1,6 +1,7 @@
 """A model's way from specific force to output, as a graph of each output; and what becomes of each of its effects.
 
-inverted    the effect acts on force, transduction or output, and its function can be written down
+inverted    the effect acts on force, transduction or output, and its function can be written down; one that follows a
+            history does so by what it remembers from one sample to the next
 of the rig  it acts on the pose alone: the stages' errors are not the sensor's, and drop out
 noise       it has no value that could be taken off
 left out    it says itself why a product cannot follow it, its function cannot be written down, or it was asked for
@@ -8,14 +9,14 @@ left out    it says itself why a product cannot follow it, its function cannot b
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from calibrations.chain import Step
-from calibrations.compensation.graph import Node, given
+from calibrations.compensation.graph import Node, given, names
 from calibrations.compensation.inputs import can_be_written
 from calibrations.compensation.traced import NotTraced, RunTime, Traced, nodes_traced
 from calibrations.compensation.written import added
@@ -40,12 +41,22 @@ class Fate:
 
 @dataclass(frozen=True)
 class Forward:
-    """Outputs of the measured `axes` as graphs of ax, ay, az (those along `axes` are sought) and of what is given."""
+    """Outputs of the measured `axes` as graphs of ax, ay, az (those along `axes` are sought) and of what is given.
+
+    `memory`: what is remembered from one sample to the next, by name, as a graph of what it is after a sample.
+    """
 
     model: Model
     axes: tuple[str, ...]
     outputs: tuple[Node, ...]
     fates: tuple[Fate, ...]
+    memory: Mapping[str, Node] = field(default_factory=dict)
+
+    @property
+    def remembering(self) -> tuple[str, ...]:
+        """The effects that follow a history."""
+        inverted = {fate.effect for fate in self.fates if fate.how == INVERTED}
+        return tuple(t.name for t in self.model.terms if t.effect.follow is not None and t.name in inverted)
 
     @property
     def left_out(self) -> tuple[str, ...]:
@@ -85,6 +96,8 @@ def at_run_time(effect: Effect) -> str:
     """What a compensation does about an effect, as far as its file tells."""
     if effect.left_out:
         return f"left out: {effect.left_out}"
+    if effect.follow is not None:
+        return f"inverted, sample after sample, with {effect.memory} numbers for each axis remembered between them"
     if effect.force or effect.transduction or effect.output:
         return "inverted"
     return "dropped: it is the rig's" if effect.pose else "nothing: noise cannot be taken off"
@@ -97,8 +110,9 @@ def forward_of(model: Model, without: Collection[str] = ()) -> Forward:
     table = RunTime(axes, {name: name for name in (*KNOWN, *sorted(own))})
     fates = [_fate(step, table, without) for step in steps]
     taken = [step for step, fate in zip(steps, fates, strict=True) if fate.how == INVERTED]
-    outputs = _outputs(taken, table)
-    return Forward(model, axes, tuple(outputs.nodes[0, : len(axes)]), tuple(fates))
+    whole, after = _outputs(taken, table)
+    outputs = tuple(whole.nodes[0, : len(axes)])
+    return Forward(model, axes, outputs, tuple(fates), _used(outputs, after))
 
 
 def _values(term: Term) -> dict[str, Any]:
@@ -118,7 +132,7 @@ def _values(term: Term) -> dict[str, Any]:
 def _fate(step: Step, table: RunTime, without: Collection[str]) -> Fate:
     effect, _ = step
     if effect.name in without:
-        return Fate(effect.name, LEFT_OUT, "as was asked")
+        return Fate(effect.name, LEFT_OUT, "that was asked for")
     if effect.left_out:
         return Fate(effect.name, LEFT_OUT, effect.left_out)
     if not (effect.force or effect.transduction or effect.output):
@@ -132,18 +146,36 @@ def _fate(step: Step, table: RunTime, without: Collection[str]) -> Fate:
     return Fate(effect.name, INVERTED)
 
 
-def _outputs(steps: Sequence[Step], runtime: RunTime) -> Traced:
-    """Outputs of all three axes, shape (1, 3): the signal chain of `calibrations.chain`, without its poses."""
+def _used(outputs: Sequence[Node], after: Mapping[str, Node]) -> dict[str, Node]:
+    """Of what is remembered, that which the outputs follow, be it by way of what is remembered later."""
+    found: dict[str, Node] = {}
+    while new := {name for name in names([*outputs, *found.values()]) if name in after} - found.keys():
+        found |= {name: after[name] for name in sorted(new)}
+    return {name: found[name] for name in after if name in found}
+
+
+def _outputs(steps: Sequence[Step], runtime: RunTime) -> tuple[Traced, dict[str, Node]]:
+    """Outputs of all three axes, shape (1, 3), and what is remembered after the sample, by name.
+
+    The signal chain of `calibrations.chain`, without its poses.
+    """
     table: Any = runtime
     a: Any = Traced([[given(name) for name in FORCES]])
     for effect, p in steps:
         if effect.force is not None:
             a = effect.force(a, table, p)
     v: Any = nodes_traced(np.zeros((1, 3)))
+    memory: dict[str, Node] = {}
     for effect, p in steps:
-        if effect.transduction is not None:
+        if effect.follow is not None:
+            known = [[f"m{len(memory) // 3 + k}{axis}" for axis in AXES] for k in range(effect.memory)]
+            part, after = effect.follow(a, table, p, [Traced([[given(name) for name in row]]) for row in known])
+            for row, each in zip(known, after, strict=True):
+                memory |= dict(zip(row, nodes_traced(each).nodes[0], strict=True))
+            v = v + part
+        elif effect.transduction is not None:
             v = v + (added(effect, a, table, p) if effect.expression else effect.transduction(a, table, p))
     for effect, p in steps:
         if effect.output is not None:
             v = effect.output(v, table, p)
-    return nodes_traced(v)
+    return nodes_traced(v), memory

@@ -7,7 +7,7 @@ from keyword import iskeyword
 
 IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 TAKEN = re.compile(
-    r"t\d+|in|out|step|math|a[xyz]|v[xyz]"  # of the sources themselves
+    r"t\d+|in|out|step|math|memory|a[xyz]|v[xyz]|m\d+[xyz]"  # of the sources themselves
     r"|auto|case|char|const|default|do|double|enum|extern|float|goto|inline|int|long|register|restrict|short|signed"
     r"|sizeof|static|struct|switch|typedef|union|unsigned|void|volatile"  # of C
     r"|abs|min|max|fabs|sqrt|exp|log|sin|cos"  # functions

@@ -87,8 +87,9 @@ def invert(
 
 
 def _bound(forward: Forward, within: Range, precision: str) -> Bound | None:
-    others = within.of([name for name in names(forward.outputs) if name not in forward.sought])
-    return bound(forward.outputs, forward.sought, within.reach, others, WITHIN[precision] * within.reach)
+    others = within.of([name for name in names(forward.outputs) if name not in {*forward.sought, *forward.memory}])
+    want = WITHIN[precision] * within.reach
+    return bound(forward.outputs, forward.sought, within.reach, others, want, tuple(forward.memory))
 
 
 def _why_not(model: Model, within: Range, without: Collection[str], precision: str, unit: str) -> str:

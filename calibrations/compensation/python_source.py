@@ -30,17 +30,20 @@ VECTORS = (  # inputs that the model makes of true values, and the true values
 {rows})
 
 
-def compensate({", ".join(program.inputs)}):
-    """Return ({sought}) in {made.unit}."""
-{before}    {" = ".join(program.sought)} = 0.0
+{_declared_memory(made)}def compensate({", ".join([*program.inputs, *_memory(made)])}):
+    """Return ({sought}) in {made.unit}{"; `memory` is then that of the next sample" if _memory(made) else ""}."""
+{_recalled(made)}{before}    {" = ".join(program.sought)} = 0.0
     for _ in range(STEPS):
 {loop}        {sought} = {ends}
-    return {_tuple(program.sought)}
+{_remembered(made)}    return {_tuple(program.sought)}
 
 {_in_gravity(made)}
 def self_test():
     """Return how many of the reference vectors fail: 0 is good."""
-    errors = [max(abs(a - b) for a, b in zip(compensate(*given), true)) for given, true in VECTORS]
+{"    memory = begin()" + chr(10) if _memory(made) else ""}    errors = [
+        max(abs(a - b) for a, b in zip(compensate(*given{", memory" if _memory(made) else ""}), true))
+        for given, true in VECTORS
+    ]
     return sum(not error <= TOLERANCE for error in errors)
 
 
@@ -52,19 +55,50 @@ if __name__ == "__main__":
     return {f"{origin.name}.py": text}
 
 
+def _memory(made: Compensation) -> list[str]:
+    return ["memory"] if made.program.remembered else []
+
+
+def _declared_memory(made: Compensation) -> str:
+    if not _memory(made):
+        return ""
+    return f'''def begin():
+    """Return what is remembered before the first sample, a list that `compensate` brings up to date."""
+    return [0.0] * {len(made.program.remembered)}
+
+
+'''
+
+
+def _recalled(made: Compensation) -> str:
+    return f"    {', '.join(made.program.remembered)}, = memory\n" if _memory(made) else ""
+
+
+def _remembered(made: Compensation) -> str:
+    """What the next sample is given, from what was found."""
+    program = made.program
+    if not _memory(made):
+        return ""
+    lines = "".join(_line(line, "    ") for line in program.after)
+    return f"{lines}    memory[:] = {', '.join(_word(word) for word in program.remembered.values())},\n"
+
+
 def _in_gravity(made: Compensation) -> str:
     if made.costs.out_of_gravity is None:
         return ""
     others = [name for name in made.program.inputs if name != "az"]
     given = ", ".join(f"{name}={name}" for name in others)
+    again, last = ("", "")
+    if _memory(made):  # each pass begins with what was remembered before the sample
+        given, again, last = f"{given}, memory=then", "then = list(memory)", "    memory[:] = then\n"
     return f'''
-def in_gravity({", ".join(others)}, side):
+def in_gravity({", ".join([*others, "side", *_memory(made)])}):
     """The same where nothing but gravity acts; side is 1 where the z axis points up, else -1."""
-    ax, ay = compensate(az=0.0, {given})
+{again and "    " + again + chr(10)}    ax, ay = compensate(az=0.0, {given})
     for _ in range({PASSES}):
         az = side * math.sqrt(max(0.0, 1.0 - ax * ax - ay * ay))
-        ax, ay = compensate(az=az, {given})
-    return ax, ay
+{again and "        " + again + chr(10)}        ax, ay = compensate(az=az, {given})
+{last}    return ax, ay
 
 '''
 

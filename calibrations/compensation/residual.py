@@ -12,10 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from calibrations.chain import force
+from calibrations.chain import force, sensed
 from calibrations.compensation.cost import in_gravity
 from calibrations.compensation.forward import FORCES, OF_THE_RIG, steps_of
 from calibrations.compensation.inverse import Compensation
+from calibrations.compensation.memory import memory_at
 from calibrations.errors import DataError
 from calibrations.fit import fit
 from calibrations.model_file import read_model
@@ -87,6 +88,7 @@ def _compensated(made: Compensation, table: Table, a: Array) -> dict[str, Array]
     inputs = {
         name: table.column(f"{name}_v" if name[0] == "v" else name) for name in program.inputs if name not in FORCES
     }
+    memory = memory_at(table, sensed(a, table, steps_of(made.model)), made.forward)
     if made.costs.out_of_gravity is not None:
-        return in_gravity(program, inputs, np.where(a[:, 2] < 0, -1.0, 1.0))
-    return program.run(inputs | {name: a[:, k] for k, name in enumerate(FORCES) if name in program.inputs})
+        return in_gravity(program, inputs | memory, np.where(a[:, 2] < 0, -1.0, 1.0))
+    return program.run(inputs | memory | {name: a[:, k] for k, name in enumerate(FORCES) if name in program.inputs})

@@ -11,6 +11,8 @@ Confused with  stage-backlash, which moves both axes by the same angle.
 Source    Ang III.A (largest where the other axis is loaded most); Iwan (1966); IEEE Std 528, hysteresis error.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from calibrations.axes import other_in_plane
@@ -20,7 +22,6 @@ from calibrations.table import Array, Table
 from calibrations.visits import turning_points
 
 KINDS = ("poses",)
-LEFT_OUT = "it follows the way on which a specific force was reached"
 NEEDS = ("direction",)
 PARAMETERS = (
     Parameter("height", "{out}", typical=0.01, doc="half the opening of the loop"),
@@ -32,9 +33,28 @@ PARAMETERS = (
               doc="growth of the limits with the other axis's load"),
 )  # fmt: skip
 ELEMENTS = (np.arange(6) + 0.5) / 3 - 1  # midpoints of six equal parts of -1 .. 1
+MEMORY = len(ELEMENTS)
 
 
 def transduction(a: Array, table: Table, p: Values) -> Array:
-    limits = p["reach"] * (1 + p["spread"] * ELEMENTS)
-    pressed = 1 + p["pressing"] * np.abs(other_in_plane(a))
-    return slip(a, turning_points(table), pressed, limits) * p["height"]
+    return slip(a, turning_points(table), _pressed(a, p), _limits(p)) * p["height"]
+
+
+def follow(a: Array, table: Table, p: Values, before: Sequence[Array]) -> tuple[Array, list[Array]]:
+    """`before` and after: the specific force at which each element would be at rest, g."""
+    limits, pressed = _limits(p), _pressed(a, p)
+    held = [
+        np.minimum(limit * pressed, np.maximum(-limit * pressed, a - rest))
+        for limit, rest in zip(limits, before, strict=True)
+    ]
+    return sum(held[1:], held[0]) * (p["height"] / np.sum(limits)), [a - each for each in held]
+
+
+def _limits(p: Values) -> Array:
+    """Of each element, g, where the other axis is not loaded."""
+    return np.asarray(p["reach"] * (1 + p["spread"] * ELEMENTS))
+
+
+def _pressed(a: Array, p: Values) -> Array:
+    """Factor on the limits, shape (n, 3)."""
+    return 1 + p["pressing"] * np.abs(other_in_plane(a))

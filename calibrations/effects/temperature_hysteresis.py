@@ -8,13 +8,14 @@ Confused with  temperature-bias where temperature does not turn back; a temperat
 Source    Book 17.3.12; IEEE Std 1293, thermal hysteresis; the play operator: Krasnoselskii and Pokrovskii (1989).
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from calibrations.effect import Parameter, Values
 from calibrations.table import Array, Table
 
 KINDS = ("poses", "positions")
-LEFT_OUT = "it follows the way on which a temperature was reached"
 NEEDS = ("temperature_c", "t_s")
 CONTAINS = ("temperature-bias",)
 PARAMETERS = (
@@ -23,11 +24,20 @@ PARAMETERS = (
 )
 PARTS = (0.05, 0.15, 0.35)  # of the range of temperatures: plays to begin with
 STARTS = {"play": lambda table: np.outer(PARTS, np.full(len(table.axes), np.ptp(table.column("temperature_c"))))}
+MEMORY = 1
 CONSTANTS = {"reference_c": lambda table: float(np.mean(table.column("temperature_c")))}
 
 
 def transduction(a: Array, table: Table, p: Values) -> Array:
     return np.outer(behind(table.column("temperature_c"), float(p["play"])) - p["reference_c"], p["slope"])
+
+
+def follow(a: Array, table: Table, p: Values, before: Sequence[Array]) -> tuple[Array, list[Array]]:
+    """`before` and after: the temperature behind the play, less T0, K; so it begins at T0."""
+    (held,) = before
+    from_t0 = (table.column("temperature_c") - p["reference_c"])[:, None]
+    lagging = np.minimum(np.maximum(held, from_t0 - p["play"]), from_t0 + p["play"])
+    return lagging * p["slope"], [lagging]
 
 
 def behind(temperature_c: Array, play_k: float) -> Array:

@@ -7,10 +7,8 @@ from contextlib import suppress
 from pathlib import Path
 
 from rig.errors import UnknownRun
-from rig.home import home
 from rig.lease import lease
 from rig.record import Record, Run
-from rig.record.store import FILE
 from rig.results import judged
 
 NUMBERED = ("poses", "positions", "rates")  # kinds of which a row is a pose
@@ -34,9 +32,9 @@ def exclude(record: Record, run_id: str, numbers: Sequence[int], reason: str | N
 
 def numbered_run(data: str) -> str | None:
     """The run that `data` names, where it has poses that can be left out; None of a file, and of an imported table."""
-    if Path(data).exists() or not (home() / FILE).is_file():
+    if Path(data).exists():
         return None
-    with suppress(UnknownRun), Record() as record:
+    with suppress(UnknownRun), Record.to_find(data) as record:
         run = record.run(data.partition("/")[0])
         return run.run if run.bench and run.kind in NUMBERED else None
     return None

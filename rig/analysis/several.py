@@ -55,7 +55,11 @@ def _begun(name: str) -> datetime | None:
 
 def begun(record: Record, run: str) -> datetime | None:
     """When a run of the record began; None on a simulated bench, whose times count from when its sensor was powered."""
-    return None if record.state(run) is not None else datetime.fromisoformat(record.run(run).created)
+    from rig.bench import Bench
+
+    found = record.run(run)
+    simulated = found.bench.get("instruments") and Bench.model_validate(found.bench).simulated
+    return None if simulated else datetime.fromisoformat(found.created)
 
 
 def _later(table: Table, by_s: float) -> Table:

@@ -5,10 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
+from click.core import ParameterSource
 from sqlalchemy import URL
 
 from rig.bench import read_bench
 from rig.cli.output import bench_option, emit, json_option, note
+from rig.cli.record_option import require_no_password
 from rig.home import LAB
 from rig.record import Record
 from rig.record.lab_url import lab_url, shown
@@ -17,9 +19,17 @@ from rig.record.roles import READER, WRITER, prepare
 from rig.record.verify import verify
 
 
+def _given(context: click.Context, _: click.Parameter, url: str | None) -> str | None:
+    if url is not None and context.get_parameter_source("given") is ParameterSource.COMMANDLINE:
+        require_no_password(url, LAB)
+    return url
+
+
 @click.command("push")
 @click.argument("named", metavar="[RUNS]...", nargs=-1)
-@click.option("--to", "given", envvar=LAB, metavar="URL", help=f"postgresql://USER@HOST/DATABASE; else {LAB}.")
+@click.option(
+    "--to", "given", envvar=LAB, callback=_given, metavar="URL", help=f"postgresql://USER@HOST/DATABASE; else {LAB}."
+)
 @click.option("--prepare", "prepares", is_flag=True, help="Make the record and its roles, as the database's owner.")
 @click.option("--verify", "verifies", is_flag=True, help="Compute the digest of every run in the lab again.")
 @bench_option

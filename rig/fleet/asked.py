@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -11,6 +12,7 @@ from rig.fleet.crew import answered
 from rig.fleet.kept import keep, kept, key_of
 from rig.fleet.members import Member, content
 from rig.fleet.worker import Question, Task, answer
+from rig.home import RECORD
 from rig.record import Record
 
 if TYPE_CHECKING:
@@ -55,7 +57,8 @@ class Fleet:
     def _task(self, key: str, member: Member, question: Question) -> Task:
         """With the text of its file, which the worker's machine need not have."""
         if member.run:
-            return Task(key, member.data, question, home=str(self.record.folder))
+            of_lab = os.environ.get(RECORD)  # its URL, which may hold a password, is not sent: workers have their own
+            return Task(key, member.data, question, home=None if of_lab else str(self.record.folder))
         try:
             return Task(key, member.data, question, text=content(member))
         except DataError:  # gone since it was listed: the worker's reading says so

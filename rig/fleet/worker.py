@@ -41,7 +41,10 @@ class Question:
 
 @dataclass(frozen=True)
 class Task:
-    """One sensor and its question. `text` is that of a file; else the run `data` of the record in `home`."""
+    """One sensor and its question.
+
+    `text` is that of a file; else `data` is a run of the record in `home`, or of the lab's where there is none.
+    """
 
     key: str
     data: str
@@ -88,7 +91,7 @@ def _read(task: Task) -> Table:
     from rig.record.measured import table_of
     from rig.record.store import Record
 
-    with Record(Path(task.home) if task.home else None) as record:
+    with Record(Path(task.home)) if task.home else Record.to_read() as record:
         return averaged(table_of(record, task.data), _nobody)
 
 

@@ -1,12 +1,15 @@
 """Opening the lab's record: a database of a PostgreSQL server, named by its URL.
 
-What libpq knows beside the URL counts too: PGPASSWORD, ~/.pgpass, PGSSLROOTCERT. Whatever the network or the server is
-to blame for is LabAway; what a role may not do, and a record that is not as this program needs it, is a RecordError.
+What libpq knows beside the URL counts too: PGPASSWORD, ~/.pgpass, PGSSLROOTCERT. To another machine the connection is
+encrypted, or there is none, unless somebody says another sslmode. Whatever the network or the server is to blame for is
+LabAway; what a role may not do, a server that is not the right one, and a record that is not as this program needs it,
+is a RecordError.
 """
 
 from __future__ import annotations
 
 import logging
+import os
 
 from sqlalchemy import URL, Connection, Engine, ExceptionContext, create_engine, event, text
 from sqlalchemy.exc import InterfaceError, OperationalError
@@ -19,6 +22,9 @@ PREPARE = "`rig push --prepare --to URL`, by the owner of the database,"
 # Whoever waits for a lab that is away waits this long and no longer; a URL may say otherwise.
 PATIENCE = {"connect_timeout": "5", "keepalives_idle": "10", "keepalives_interval": "5", "keepalives_count": "3"}
 PATIENCE |= {"tcp_user_timeout": "20000", "application_name": "rig"}
+ENCRYPTED = {"sslmode": "require"}  # where nobody says otherwise; libpq's own default would go on in plain text
+HERE = ("/", "@", "127.", "localhost", "::1")  # how this machine begins; the first two are sockets of it
+TLS = ("SSL", "certificate")  # what libpq speaks of where it does not get or trust an encrypted connection
 FORBIDDEN, READ_ONLY = "42501", "25006"  # SQLSTATE: insufficient privilege, read-only transaction
 
 for _name in ("psycopg", "sqlalchemy"):  # of a cut wire our message tells; their reports are for who asks for them
@@ -27,9 +33,22 @@ for _name in ("psycopg", "sqlalchemy"):  # of a cut wire our message tells; thei
 
 def connected(url: URL) -> Engine:
     """The server's engine; nothing is sent yet."""
-    engine = create_engine(url, connect_args={k: v for k, v in PATIENCE.items() if k not in url.query})
+    engine = create_engine(url, connect_args=options(url))
     event.listen(engine, "handle_error", lambda context: _tell(context, url))
     return engine
+
+
+def options(url: URL) -> dict[str, str]:
+    """What libpq is told beside the URL, where that does not say it."""
+    stated = {"service", "sslmode"} & set(url.query) or "PGSSLMODE" in os.environ or _is_here(url)
+    return {k: v for k, v in PATIENCE.items() if k not in url.query} | ({} if stated else ENCRYPTED)
+
+
+def _is_here(url: URL) -> bool:
+    """Whether every host that is named is this machine."""
+    named = url.query.get("host") or url.host or os.environ.get("PGHOST", "")
+    hosts = named.split(",") if isinstance(named, str) else named
+    return all(not host or host.startswith(HERE) for host in hosts)
 
 
 def open_server(url: URL) -> Engine:
@@ -64,6 +83,10 @@ def _tell(context: ExceptionContext, url: URL) -> None:
         role = url.username or "this role"
         raise RecordError(f"{shown(url)}: {role} may not do that ({_first_line(error)}); its owner can give it "
                           "rig_writer, or rig_reader to read alone") from None  # fmt: skip
+    if context.connection is None and any(word in (said := _first_line(error)) for word in TLS):
+        raise RecordError(f"{shown(url)}: no encrypted connection to a server that can be trusted ({said}); nothing "
+                          "was sent. sslrootcert names the certificate of who signed the server's, and `ssl = on` in "
+                          "postgresql.conf has it encrypt (docs/lab.md)") from None  # fmt: skip
     if context.is_disconnect or isinstance(context.sqlalchemy_exception, OperationalError | InterfaceError):
         raise LabAway(f"{shown(url)}: the lab's record cannot be reached ({_first_line(error)}); nothing is lost, "
                       "the next `rig push` goes on") from None  # fmt: skip

@@ -28,6 +28,9 @@ int main(void)
     return 0;
 }
 """
+FOLLOWING = DRIVER.replace("sensor_input in;", "sensor_input in;\n    sensor_memory memory = {0};").replace(
+    "compensate(&in)", "compensate(&in, &memory)"
+)
 
 
 def written(made: Compensation, folder: Path, origin: Origin = ORIGIN) -> list[Path]:

@@ -142,7 +142,9 @@ def fates(fitted: Model) -> Any:
 
 def test_what_is_left_out_comes_with_its_cost() -> None:
     slips = {"hysteresis": {"height": (0.003, 0.002), "reach": 0.1, "spread": 0.5, "pressing": 0.0}}
-    made = invert(model({**PHYSICAL, **slips, "stage-zero-offset": {"alpha": 0.1, "beta": 0.2}}))
+    fitted = model({**PHYSICAL, **slips, "stage-zero-offset": {"alpha": 0.1, "beta": 0.2}})
+    assert invert(fitted).forward.left_out == ()
+    made = invert(fitted, without=["hysteresis"])
     size = made.costs.left_out["hysteresis"]
     assert size is not None
     assert 0.001 < size.rms < size.most < 1.1 * 0.003 / 1.01  # all elements slip: the whole height, in g

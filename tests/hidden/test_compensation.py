@@ -6,14 +6,16 @@ from pathlib import Path
 
 import numpy as np
 
-from calibrations.compensation.inverse import invert
+from calibrations.chain import nominal_pose, specific_force
+from calibrations.compensation.inverse import Compensation, invert
 from calibrations.compensation.residual import residual
 from calibrations.effect import catalogue
 from calibrations.fit import fit
 from calibrations.model_file import read_model
+from calibrations.noise import rms
 from calibrations.pictures.compensation import compensated
 from calibrations.pictures.save import save
-from calibrations.table import Table
+from calibrations.table import Array, Table
 from drivers.simulation.config import WorldConfig
 from drivers.simulation.world import World
 
@@ -53,3 +55,34 @@ def test_the_error_on_unseen_poses_falls_to_a_fiftieth(tmp_path: Path) -> None:
         assert compensated_ < linear / 50
     save(compensated(left), tmp_path / "residual.png")
     assert (tmp_path / "residual.png").stat().st_size > 10_000
+
+
+RUBBING = {"friction": {"stiffness_fraction": 0.0035, "slip_nm": 3.3, "pressing_per_g2": 0.5}}
+SLIPPING = WorldConfig.ideal().changed(
+    {"sensor": {"x": RUBBING, "y": RUBBING}, "spread": {"imperfection_fraction": 0.0}}
+)
+
+
+def streamed(made: Compensation, table: Table) -> Array:
+    """What a product finds that is given one row after the other, g, shape (n, 2)."""
+    found, remembered = [], {}
+    for vx, vy in table.outputs:
+        out = made.program.run({"vx": vx, "vy": vy} | remembered)
+        remembered = {name: out[name] for name in made.forward.memory}
+        found.append([out["ax"], out["ay"]])
+    return np.array(found, float)
+
+
+def test_hysteresis_that_is_remembered_errs_a_fifth_of_that_which_is_left_out() -> None:
+    world = World(SLIPPING, seed=7)
+    slips = read_model("linear").with_effect(catalogue()["hysteresis"])
+    fitted = fit(slips, turned(world, (90.0, 30.0, 150.0, 60.0), 30.0)).model
+    unseen = turned(world, (120.0, 70.0, 40.0), 10.0)
+    true = specific_force(nominal_pose(unseen))[:, :2]
+    left_out, remembered = (
+        1e3 * rms((streamed(invert(fitted, without=without), unseen) - true).T) for without in (["hysteresis"], [])
+    )
+    assert (left_out > 3).all()  # mg
+    assert (remembered < left_out / 5).all()
+    for linear, compensated_ in residual(invert(fitted), unseen).rmse.values():
+        assert compensated_ < linear / 4

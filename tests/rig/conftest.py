@@ -18,6 +18,7 @@ from rig.record.roles import prepare
 from tests.calibrations.synthetic import components, poses, turns
 from tests.rig.postgres import Server, serving
 
+WORD = "g3heim"  # the password of people who read and write a lab's record
 MODEL = """schema: rig.model/1
 name: mine
 unit: V
@@ -122,6 +123,14 @@ def server() -> Iterator[Server]:
         started.sql("CREATE DATABASE prepared")
         prepare(lab_url(started.url("prepared")))
         yield started
+
+
+@pytest.fixture(scope="session")
+def people(server: Server) -> Server:
+    """The server, with a rig and a reader that have roles of their own."""
+    for name, role in (("rig7", "rig_writer"), ("anna", "rig_reader")):
+        server.sql(f"CREATE ROLE {name} LOGIN PASSWORD '{WORD}' IN ROLE {role}")
+    return server
 
 
 @pytest.fixture

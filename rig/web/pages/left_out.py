@@ -22,7 +22,7 @@ def left_out(data: str) -> dict[int, str]:
     run = numbered_run(data)
     if run is None:
         return {}
-    with Record() as record:
+    with Record.to_find(run) as record:
         return record.excluded(run)
 
 
@@ -73,5 +73,5 @@ def _change(data: str, numbers: Sequence[int], reason: str | None) -> None:
     run = numbered_run(data)
     if run is None:
         raise RecordError(f"{data} is no run of the rig: put a column `excluded` into the file")
-    with Record() as record:
+    with Record.to_find(run) as record:
         exclude(record, run, numbers, reason)

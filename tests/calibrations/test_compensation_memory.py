@@ -1,0 +1,121 @@
+"""Compensations that remember: effects of a history are followed sample after sample, in every language alike."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from calibrations.chain import nominal_pose, respond, specific_force
+from calibrations.compensation import python_source
+from calibrations.compensation.about import lines
+from calibrations.compensation.forward import FORCES, steps_of
+from calibrations.compensation.graph import evaluate
+from calibrations.compensation.inverse import invert
+from calibrations.compensation.memory import memory_at
+from calibrations.compensation.vectors import vectors
+from calibrations.kernels import slip
+from calibrations.table import Table
+from tests.calibrations.compiled import FOLLOWING, ORIGIN, build, through, written
+from tests.calibrations.fitted import LINEAR, PHYSICAL, model
+
+SLIPS = {"hysteresis": {"height": (0.003, 0.002), "reach": 0.1, "spread": 0.5, "pressing": 0.4}}
+LAGS = {"temperature-hysteresis": {"slope": (0.001, -0.002), "play": 0.6}}
+BOTH = {**PHYSICAL, **SLIPS, **LAGS}
+COMPILERS = [
+    pytest.param(name, marks=pytest.mark.skipif(shutil.which(name) is None, reason=f"{name} is not installed"))
+    for name in ("gcc", "clang")
+]
+
+
+def test_what_an_effect_remembers_is_what_its_kernel_does() -> None:
+    ((effect, p),) = steps_of(model(SLIPS))
+    assert effect.follow is not None
+    a = np.cumsum(np.random.default_rng(3).normal(0, 0.05, (500, 3)), axis=0)
+    table: Any = None  # hysteresis asks nothing of it
+    held: Any = [np.zeros((1, 3))] * effect.memory
+    found = []
+    for row in a:
+        part, held = effect.follow(row[None], table, p, held)
+        found.append(part[0])
+    limits = p["reach"] * (1 + p["spread"] * (np.arange(6) + 0.5 - 3) / 3)
+    pressed = 1 + p["pressing"] * np.abs(a[:, [1, 0, 0]])
+    direct = slip(a, np.empty((len(a), 0, 3)), pressed, limits) * p["height"]
+    assert np.abs(np.array(found) - direct).max() < 1e-15
+
+
+def test_on_the_way_of_the_stages_it_remembers_what_the_model_has() -> None:
+    """So the model's own outputs at poses are undone, though a product sees more than the poses."""
+    beta = np.concatenate([np.arange(0.0, 361.0, 20.0), np.arange(360.0, -1.0, -20.0)])
+    t_s = 7.0 * np.arange(len(beta))
+    columns = {"alpha_deg": np.full(len(beta), 90.0), "beta_deg": beta, "t_s": t_s, "vx_v": 0 * beta, "vy_v": 0 * beta}
+    columns |= {"direction": np.repeat([1.0, -1.0], len(beta) // 2), "temperature_c": 25 + 2 * np.sin(t_s / 60)}
+    table = Table.from_columns("poses", columns)
+    made = invert(model({**LINEAR, **LAGS, "hysteresis": {**SLIPS["hysteresis"], "pressing": 0.0}}))
+    a = specific_force(nominal_pose(table))
+    v = respond(a, table, steps_of(made.model))
+    inputs = {"vx": v[:, 0], "vy": v[:, 1], "temperature_c": table.column("temperature_c")}
+    settled = slice(20, None)  # the play begins at the mean temperature, the table at its first
+    found = made.program.run(inputs | memory_at(table, a, made.forward))
+    assert np.abs(found["ax"] - a[:, 0])[settled].max() < 1e-9
+    forgetful = made.program.run(inputs)
+    assert np.abs(forgetful["ax"] - a[:, 0])[settled].max() > 1e-3
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_every_language_follows_the_same_samples(compiler: str, tmp_path: Path) -> None:
+    made = invert(model(BOTH))
+    sources = written(made, tmp_path)
+    (tmp_path / "driver.c").write_text(FOLLOWING)
+    checks = vectors(made, 512)
+    found = through(build(compiler, [*sources, tmp_path / "driver.c"], tmp_path / "driver"), checks.inputs, 2)
+    assert np.abs(found - checks.expected).max() < 1e-9
+    (text,) = python_source.files(made, ORIGIN, vectors(made)).values()
+    names: dict[str, Any] = {"__name__": "sensor"}
+    exec(compile(text, "sensor.py", "exec"), names)  # noqa: S102 it is what we wrote
+    memory = names["begin"]()
+    by_python = [names["compensate"](*row, memory) for row in checks.inputs.tolist()]
+    assert np.abs(by_python - found).max() < 1e-9
+    assert names["self_test"]() == 0
+    program = build(compiler, sources, tmp_path / "test", "-DSENSOR_MAIN")
+    assert subprocess.run([str(program)], capture_output=True, text=True, check=True).stdout.startswith("0 of 16")
+
+
+def test_the_proof_holds_whatever_is_remembered() -> None:
+    made = invert(model(BOTH))
+    random = np.random.default_rng(8)
+    n = 4000
+    at = {name: random.uniform(-1.5, 1.5, n) for name in FORCES}
+    at |= {"temperature_c": random.uniform(-20, 85, n)}
+    memory = {name: random.normal(0, 3, n) for name in made.forward.memory}
+    outputs = evaluate(made.forward.outputs, at | memory)
+    inputs = at | memory | dict(zip(("vx", "vy"), outputs, strict=True))
+    found = made.program.run({name: inputs[name] for name in (*made.program.inputs, *memory)})
+    worst = max(np.abs(found[name] - at[name]).max() for name in ("ax", "ay"))
+    assert worst < made.bound.within + 1e-14
+
+
+def test_gravity_stands_in_for_an_axis_and_what_is_remembered_is_kept_once() -> None:
+    made = invert(model({**PHYSICAL, **SLIPS}))
+    (text,) = python_source.files(made, ORIGIN, vectors(made)).values()
+    names: dict[str, Any] = {"__name__": "sensor"}
+    exec(compile(text, "sensor.py", "exec"), names)  # noqa: S102
+    angle = np.linspace(0, 4 * np.pi, 200)
+    a = np.column_stack([0.8 * np.cos(angle), 0.5 * np.sin(angle), np.zeros(200)])
+    a[:, 2] = np.sqrt(1 - a[:, 0] ** 2 - a[:, 1] ** 2)
+    memory, remembered = names["begin"](), dict.fromkeys(made.forward.memory, 0.0)
+    for row in a:
+        at = dict(zip(FORCES, row, strict=True)) | remembered
+        vx, vy, *after = evaluate((*made.forward.outputs, *made.forward.memory.values()), at)
+        remembered = dict(zip(made.forward.memory, map(float, after), strict=True))
+        found = names["in_gravity"](float(vx), float(vy), 1.0, memory)
+        assert found == pytest.approx(row[:2], abs=3e-5)
+
+
+def test_the_head_says_that_samples_come_in_order() -> None:
+    head = " ".join(" ".join(lines(invert(model(BOTH)), ORIGIN)).split())
+    assert "With a history: hysteresis, temperature-hysteresis. Give every sample, in order: 14 numbers" in head
