@@ -65,9 +65,20 @@ class Channel:
         return replace(self, n=len(means) * self.size, means=means - means.mean(), segments=segments, logged=logged)
 
 
+@dataclass(frozen=True)
+class Sensed:
+    """An output as what is sensed: multiplied with `factor` it is in `unit`, such as 1.02 g for a V."""
+
+    factor: float
+    unit: str
+
+
 @dataclass(frozen=True, eq=False)
 class Still:
-    """A still record of one sensor: its channels, and the overlapping Allan deviation of each by its axis."""
+    """A still record of one sensor: its channels, and the overlapping Allan deviation of each by its axis.
+
+    `sensed` is of those axes whose scale factor is known.
+    """
 
     source: str
     unit: str
@@ -75,6 +86,7 @@ class Still:
     allan: Mapping[str, Curve]
     digest: str  # SHA-256 of all samples
     constants: Mapping[str, str | float] = field(default_factory=dict)  # what is known of the sensor
+    sensed: Mapping[str, Sensed] = field(default_factory=dict)
 
     @property
     def n(self) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import takewhile
 from pathlib import Path
 
@@ -69,6 +69,7 @@ def still_of(request: Request, tell: Callable[[str], None]) -> Still:
         streams = axes(record, data, request.channel, request.rate_hz)
         first = next(iter(streams.values()))
         still = reduced((_samples(axis, each) for axis, each in streams.items()), first.source, first.constants)
+    sensed = {axis: found for axis, each in streams.items() if (found := each.sensed) is not None}  # known when read
     taken = {each.channel for each in streams.values()}
     if others := [name for name in first.others if name not in taken]:
         tell(f"{still.source}: {', '.join(taken)}; --channel takes another: {', '.join(others)}.")
@@ -79,7 +80,7 @@ def still_of(request: Request, tell: Callable[[str], None]) -> Still:
             f"Coefficients are those before the output's {first.corner_hz:g} Hz low-pass, "
             f"from what is slower than {first.corner_hz / 2:.3g} Hz."
         )
-    return still
+    return replace(still, sensed=sensed)
 
 
 def is_still(data: str) -> bool:

@@ -11,13 +11,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrations.errors import DataError, nearest
-from calibrations.table import Array
+from calibrations.still.record import Sensed
+from calibrations.table import STANDARD_GRAVITY, Array
 
 FOLLOWED = ("temperature_c", "supply_v")  # columns beside the samples that an output may follow
 BESIDE = ("t_s", *FOLLOWED, "n", "direction", "path")  # columns that are no channels
 LATE = 0.5  # sampling intervals by which a sample may be off before that is a gap
 DISAGREE = 0.01  # of two rates
 AXIS = re.compile(r"(v|a|g|m|)([xyz])(|_v)")  # of a channel, by its name
+SENSED = {  # what outputs in these units are better known in
+    "m/s^2": Sensed(1 / STANDARD_GRAVITY, "g"),
+    "m/s2": Sensed(1 / STANDARD_GRAVITY, "g"),
+    "deg/s": Sensed(3600.0, "deg/h"),
+}
+STATED = {"output_per_g": "g", "output_per_deg_s": "deg/s", "output_per_field": "field"}  # constants that data may have
 
 
 @dataclass
@@ -37,6 +44,17 @@ class Stream:
     constants: Mapping[str, str | float] = field(default_factory=dict)
     logged: dict[str, list[Array]] = field(default_factory=dict)  # what was read beside the samples, in their blocks
     coarse: dict[str, float] = field(default_factory=dict)  # of that, what was read with less noise than these steps
+
+    @property
+    def sensed(self) -> Sensed | None:
+        """The output as what is sensed, where its scale factor is known: by its unit, from poses along gravity, or as
+        the data state it (`output_per_g`, `output_per_deg_s`, `output_per_field`)."""
+        if self.unit in SENSED:
+            return SENSED[self.unit]
+        if self.unit == "V" and (scale := self.scale_v_per_g):
+            return Sensed(1 / scale, "g")
+        stated = ((_number(self.constants.get(name)), unit) for name, unit in STATED.items())
+        return next((Sensed(1 / abs(scale), unit) for scale, unit in stated if scale), None)
 
     @property
     def scale_v_per_g(self) -> float | None:
@@ -65,6 +83,11 @@ def repairs(samples: Stream, n: int) -> Iterable[str]:
             f"{name} was read in steps of {1e3 * step:.3g} mV, with less noise than that: its means are off by parts "
             "of a step, and how much an output follows it is known less well than is said."
         )
+
+
+def _number(constant: str | float | None) -> float:
+    """A scale factor as stated; 0 where none is."""
+    return constant if isinstance(constant, float) and np.isfinite(constant) else 0.0
 
 
 def channel_of(channels: tuple[str, ...], channel: str | None, source: str) -> str:

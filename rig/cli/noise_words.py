@@ -23,7 +23,6 @@ MEANS = {
     "gauss-markov-noise": "standard deviation",
 }
 MISFIT = 1.3  # of the spectrum, beyond which the processes do not describe it
-G_M_S2 = 9.80665
 Factor = tuple[float, str]
 
 
@@ -59,10 +58,10 @@ def remarks(samples: Stream, found: NoiseAnalysis, told: Disturbed) -> Iterable[
 
 
 def _coefficients(samples: Stream, found: NoiseAnalysis) -> str:
-    second = _engineering(found.unit, samples.scale_v_per_g)
+    second = samples.sensed
     rows = []
     for name, each in found.coefficients.items():
-        beside = () if second is None else (_shown(each, *second),)
+        beside = () if second is None else (_shown(each, second.factor, second.unit),)
         rows.append((name, _shown(each, 1.0, found.unit), *beside, MEANS[name] + _detail(each)))
     head = ("process", "coefficient", *(() if second is None else ("or",)), "")
     return columns(head, rows)
@@ -83,14 +82,6 @@ def _disturbances(found: NoiseAnalysis, told: Disturbed) -> Iterable[str]:
             each_left = told.rest.coefficients[name]
             yield f"  {name}: {_shown(each_left, 1.0, found.unit)}{_detail(each_left)}"
     yield ""
-
-
-def _engineering(unit: str, scale_v_per_g: float | None) -> Factor | None:
-    """What a value is multiplied with for a second unit, and that."""
-    if unit == "V" and scale_v_per_g:
-        return 1 / scale_v_per_g, "g"
-    known: dict[str, Factor] = {"m/s^2": (1 / G_M_S2, "g"), "m/s2": (1 / G_M_S2, "g"), "deg/s": (3600.0, "deg/h")}
-    return known.get(unit)
 
 
 def _detail(each: Coefficient) -> str:
@@ -132,8 +123,9 @@ def _density(samples: Stream, found: NoiseAnalysis) -> str:
     if not white.identified:
         return "No white noise was identified."
     scaled = Coefficient(white.value * np.sqrt(2), white.std * np.sqrt(2), white.unit)
-    second = _engineering(found.unit, samples.scale_v_per_g)
-    shown = [_shown(scaled, 1.0, found.unit), *([] if second is None else [_shown(scaled, *second)])]
+    shown = [_shown(scaled, 1.0, found.unit)]
+    if (second := samples.sensed) is not None:
+        shown.append(_shown(scaled, second.factor, second.unit))
     return f"Noise density as in data sheets (one-sided): {' or '.join(shown)}."
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 from nicegui import ui
 from nicegui.element import Element
@@ -74,6 +74,12 @@ def table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> None:
                 for cell in row:
                     with ui.element("td"):
                         words(cell)
+
+
+def redraw(plot: ui.plotly, figure: dict[str, Any]) -> None:
+    """A picture that stays as it is keeps its zoom, and a box that is being drawn in it."""
+    if figure != plot.figure:
+        plot.update_figure(figure)
 
 
 async def off_loop(call: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:

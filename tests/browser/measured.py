@@ -45,7 +45,7 @@ def wandering(folder: Path) -> str:
     """A still record of 20,000 samples at 10 Hz: white noise, and a walk that its data sheet does not name."""
     rng = np.random.default_rng(2)
     volts = 2.5 + 1e-3 * rng.standard_normal(20_000) + 2e-5 * np.cumsum(rng.standard_normal(20_000))
-    table = Table.from_columns("still", {"vx_v": volts}, {"sample_rate_hz": 10.0}, "wandering")
+    table = Table.from_columns("still", {"vx_v": volts}, {"sample_rate_hz": 10.0, "output_per_g": 0.8}, "wandering")
     write_csv(table, path := folder / "wandering.csv")
     return str(path)
 

@@ -91,6 +91,12 @@ def test_of_a_still_record_the_allan_deviation_is_shown(workbench: Workbench, tm
         expect(page.locator(f"[aria-label='{picture}'] .points path").first).to_be_attached()
     expect(page.get_by_role("button", name="with rate-random-walk")).to_be_visible()  # its curve is drawn
     expect(page.locator(".card.first")).to_contain_text("× chance")
+    label = page.locator("[aria-label='Allan deviation beside the model'] .ytitle")
+    expect(label).to_have_text("Allan deviation (V)")
+    page.keyboard.press("g")
+    expect(label).to_have_text("Allan deviation (mg)")
+    expect(page.locator("[aria-label='Spectrum beside the model'] .ytitle")).to_have_text("density (mg/√Hz)")
+    expect(page.locator("[aria-label='The record'] .ytitle")).to_have_text("x less its mean (mg)")
     workbench.shot(page, "noise")
     page.get_by_role("button", name="Add rate-random-walk").click()
     expect(page.locator(BARS)).to_have_count(2)

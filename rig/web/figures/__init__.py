@@ -4,8 +4,10 @@
     residual      what the model leaves, against any column, with the curve of an effect that is considered
     failure       the map of where the model fails
     motion        output beside model over a few periods, and what is left over one
+    record        a still record over time
     averaging     the Allan deviation of a still record beside the model
     spectrum      its spectrum beside the model
+    sensed        units of a still record: the output's own, or those of what is sensed
     waterfall     the error falling as effects are added, down to the noise floor
     series        values of a run over time, thinned
 

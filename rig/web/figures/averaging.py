@@ -9,23 +9,27 @@ from calibrations.pictures.still import OTHER
 from calibrations.still.allan import Averaged, deviation, parts
 from calibrations.still.channel_fit import ChannelFit
 from calibrations.table import Array
+from rig.web.figures.sensed import Scaled
 from rig.web.figures.style import CANDIDATE, MEASURED, MODEL, Figure, Trace, band, decades, figure
 
 POINTS = 120
+STEPS = [a * 10.0**b for b in range(-3, 4) for a in (1, 2, 5)]  # marked along a ratio
 TIME = "averaging time (s)"
 
 
-def allan(found: ChannelFit, curve: Averaged, unit: str, candidate: ChannelFit | None = None) -> Figure:
+def allan(found: ChannelFit, curve: Averaged, into: Scaled, candidate: ChannelFit | None = None) -> Figure:
     """Dots are measured, bars intervals of 95 %; a line is the model, thin ones its parts, a thick one a candidate."""
+    by = into.factor
     steps = np.geomspace(1, float(curve.tau_s[-1]) * found.channel.rate_hz, POINTS)
     tau_s = np.unique(np.round(steps)).astype(np.float64) / found.channel.rate_hz
-    lines = [_line(tau_s, deviation(found, tau_s), "the model", MODEL, 1.6)]
+    lines = [_line(tau_s, by * deviation(found, tau_s), "the model", MODEL, 1.6)]
     if len(found.effects) + len(found.lines) > 1:
-        lines += [_line(tau_s, np.sqrt(v), n, COLOURS.get(n, OTHER), 0.9) for n, v in parts(found, tau_s).items()]
+        lines += [_line(tau_s, by * np.sqrt(v), n, COLOURS.get(n, OTHER), 0.9) for n, v in parts(found, tau_s).items()]
     if candidate is not None:
-        lines.append(_line(tau_s, deviation(candidate, tau_s), "with the candidate", CANDIDATE, 2.6))
-    label = f"Allan deviation ({unit})"
-    return figure([*lines, _measured(curve)], TIME, label, f"allan {found.channel.axis}", **decades(), dragmode="zoom")
+        lines.append(_line(tau_s, by * deviation(candidate, tau_s), "with the candidate", CANDIDATE, 2.6))
+    label = f"Allan deviation ({into.unit})"
+    keep = f"allan {found.channel.axis} {into.unit}"
+    return figure([*lines, _measured(curve, by)], TIME, label, keep, **decades(), dragmode="zoom")
 
 
 def ratio(curve: Averaged, axis: str) -> Figure:
@@ -34,14 +38,15 @@ def ratio(curve: Averaged, axis: str) -> Figure:
                                                                                 strict=True)]  # fmt: skip
     above, below = (curve.high - curve.measured) / curve.modelled, (curve.measured - curve.low) / curve.modelled
     dots = _dots(curve.tau_s, curve.ratio, above, below) | {"text": off, "hovertemplate": "%{text}<extra></extra>"}
-    y = {"type": "log", "exponentformat": "none"}
+    y = {"type": "log", "tickvals": STEPS, "ticktext": [f"{step:g}" for step in STEPS]}
     shapes = [{**band(0.0), "type": "line", "y0": 1.0, "y1": 1.0, "line": {"width": 1.4, "color": MODEL}}]
     more = {"xaxis": decades()["xaxis"], "yaxis": y, "shapes": shapes, "dragmode": "zoom"}
     return figure([dots], TIME, "measured / model", f"ratio {axis}", **more)
 
 
-def _measured(curve: Averaged) -> Trace:
-    dots = _dots(curve.tau_s, curve.measured, curve.high - curve.measured, curve.measured - curve.low)
+def _measured(curve: Averaged, by: float) -> Trace:
+    above, below = curve.high - curve.measured, curve.measured - curve.low
+    dots = _dots(curve.tau_s, by * curve.measured, by * above, by * below)
     return dots | {"hovertemplate": "%{y:.3g} at %{x:.4g} s, measured<extra></extra>"}
 
 

@@ -14,7 +14,7 @@ def series(course: Course, name: str) -> Figure:
     """One quantity, V or °C, over the time of the run."""
     t_s, mean, low, high = course.line(name)
     length = t_s[-1] - t_s[0] if t_s else 0.0
-    size, unit = next((size, unit) for limit, size, unit in LENGTHS if length > limit)
+    size, unit = in_time(length)
     at = [t / size for t in t_s]
     colour = UNSEEN if name == "temperature" else MEASURED
     label = "temperature (°C)" if name == "temperature" else f"{name} (V)"
@@ -23,3 +23,8 @@ def series(course: Course, name: str) -> Figure:
     line: Trace = {"type": "scatter", "x": at, "y": mean, "marker": {"size": 4}, "hovertemplate": told, **look}
     band = [{**BAND, "x": at, "y": low}, {**BAND, "x": at, "y": high, "fill": "tonexty", "fillcolor": f"{colour}33"}]
     return figure([*(band if course.each > 1 else []), line], f"time ({unit})", label, name, dragmode="zoom")
+
+
+def in_time(length_s: float) -> tuple[float, str]:
+    """(unit in s, its name) that a stretch of time is told in."""
+    return next((size, unit) for limit, size, unit in LENGTHS if length_s > limit)

@@ -1,4 +1,5 @@
-"""The four pictures of the page Model of a still record: Allan deviation, spectrum, where they fail, the fall."""
+"""The five pictures of the page Model of a still record: Allan deviation, spectrum, where they fail, the fall,
+and the record over time."""
 
 from __future__ import annotations
 
@@ -9,9 +10,11 @@ from nicegui import ui
 
 from calibrations.pictures.still import levels
 from rig.web.figures.averaging import allan, ratio
+from rig.web.figures.record import record
+from rig.web.figures.sensed import scaled, units
 from rig.web.figures.spectrum import spectrum
 from rig.web.figures.waterfall import Measure, waterfall
-from rig.web.parts import box, div, words
+from rig.web.parts import box, div, redraw, words
 
 if TYPE_CHECKING:
     from calibrations.still.channel_fit import ChannelFit
@@ -24,6 +27,7 @@ TITLES = {
     "spectrum": "Spectrum beside the model",
     "ratio": "Where it fails",
     "waterfall": "The falling error; ◆ on the other half of the record",
+    "record": "The record",
 }
 MEASURE = Measure("mismatch of the spectrum / chance", "chance", "the record", "the other half")
 
@@ -38,12 +42,13 @@ class NoisePictures:
         with div("pictures"):
             with box("controls row-of"):
                 self.axis = ui.toggle({0: "x"}, value=0, on_change=self.draw).props("dense no-caps")
+                self.unit = ui.toggle({False: "V"}, value=False, on_change=self.draw).props("dense no-caps")
                 self.considered = ui.button(icon="close", on_click=lambda: self.consider(None)).props("flat dense")
                 self.considered.set_visibility(False)
                 words("Draw a box in a picture to zoom into it; a double click zooms out.", "told quiet small")
             self.plots: dict[str, ui.plotly] = {}
             for name, title in TITLES.items():
-                with box("picture"):
+                with box("picture wide" if name == "record" else "picture"):
                     words(title, "title")
                     plot = ui.plotly({"data": [], "layout": {}}).classes("plot")
                     self.plots[name] = plot.props(f'aria-label="{title}"')
@@ -53,6 +58,9 @@ class NoisePictures:
         self.compared, self.trail, self.step = compared, trail, None
         axes = dict(enumerate(compared.fit.still.axes))
         self.axis.set_options(axes, value=min(int(self.axis.value or 0), len(axes) - 1))
+        offered = units(compared.fit.still)
+        self.unit.set_options(offered, value=bool(self.unit.value) and True in offered)
+        self.unit.set_visibility(len(offered) > 1)
         self.considered.set_visibility(False)
         self.draw()
 
@@ -67,13 +75,19 @@ class NoisePictures:
         """All pictures anew."""
         if self.compared is None or self.trail is None:
             return
-        c, unit = int(self.axis.value or 0), self.compared.fit.still.unit
+        c, still = int(self.axis.value or 0), self.compared.fit.still
         found, curve = self.compared.fit.channels[c], self.compared.averaged[c]
+        into = scaled(still, found.channel.axis, bool(self.unit.value))
         candidate: ChannelFit | None = None if self.step is None else self.step.after.channels[c]
-        self.plots["allan"].update_figure(allan(found, curve, unit, candidate))
-        self.plots["spectrum"].update_figure(spectrum(found, unit, candidate))
-        self.plots["ratio"].update_figure(ratio(curve, found.channel.axis))
-        self.plots["waterfall"].update_figure(waterfall(levels(self.trail.start, self.trail.steps), MEASURE))
+        drawn = {
+            "allan": allan(found, curve, into, candidate),
+            "spectrum": spectrum(found, into, candidate),
+            "ratio": ratio(curve, found.channel.axis),
+            "waterfall": waterfall(levels(self.trail.start, self.trail.steps), MEASURE),
+            "record": record(found.channel, into),
+        }
+        for name, figure in drawn.items():
+            redraw(self.plots[name], figure)
 
     def next_axis(self) -> None:
         """The next channel."""
@@ -81,7 +95,9 @@ class NoisePictures:
             self.axis.set_value((int(self.axis.value or 0) + 1) % len(self.compared.fit.channels))
 
     def other_unit(self) -> None:
-        """A still record has one unit."""
+        """V to g, or back, where the scale factor is known."""
+        if len(self.unit.options) > 1:
+            self.unit.set_value(not self.unit.value)
 
     def select(self, points: Sequence[int]) -> None:
         """Averaging times have no poses to be selected."""

@@ -17,7 +17,7 @@ from rig.web.figures.residual import residual
 from rig.web.figures.rows import Shown, choices, first_choices
 from rig.web.figures.style import Figure
 from rig.web.figures.waterfall import waterfall
-from rig.web.parts import box, div, words
+from rig.web.parts import box, div, redraw, words
 
 if TYPE_CHECKING:
     from calibrations.compare import Comparison
@@ -164,8 +164,7 @@ class Pictures:
             figure = make()
             if "customdata" in figure["data"][0] and self.selected:
                 figure["data"][0]["selectedpoints"] = self.selected
-            if figure != self.plots[name].figure:  # a picture that stays keeps its zoom, and a box that is being drawn
-                self.plots[name].update_figure(figure)
+            redraw(self.plots[name], figure)
         self._tell(shown)
 
     def next_axis(self) -> None:
