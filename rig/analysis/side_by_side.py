@@ -11,9 +11,11 @@ from dataclasses import dataclass
 from math import hypot
 from typing import Any
 
-from calibrations.fit import Fit
 from calibrations.model import Estimate
+from rig.analysis.growing import Fitted
 from rig.record import Run
+
+DIFFERENT = 2.0  # standard uncertainties
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,11 @@ class Pair:
         """The difference in standard uncertainties."""
         return None if self.std is None else self.difference / self.std
 
+    @property
+    def differ(self) -> bool:
+        """Whether the difference is hardly chance."""
+        return self.deviations is not None and abs(self.deviations) > DIFFERENT
+
 
 def results_of(first: Run, second: Run, sensors: tuple[str, str] = ("", "")) -> list[Pair]:
     """The results that both have; of a batch those of the sensors named."""
@@ -53,7 +60,7 @@ def results_of(first: Run, second: Run, sensors: tuple[str, str] = ("", "")) -> 
     ]
 
 
-def parameters_of(first: Fit, second: Fit) -> list[Pair]:
+def parameters_of(first: Fitted, second: Fitted) -> list[Pair]:
     """The parameters of one model that was fitted to both."""
     other = dict(_estimates(second))
     return [
@@ -70,7 +77,7 @@ def _own(results: Mapping[str, Any], sensor: str) -> Mapping[str, Any]:
     return {name.rpartition("/")[2]: each for name, each in results.items() if name.startswith(f"{sensor}/")}
 
 
-def _estimates(fit: Fit) -> Iterator[tuple[str, Estimate]]:
+def _estimates(fit: Fitted) -> Iterator[tuple[str, Estimate]]:
     for term in fit.model.terms:
         for each in term.estimates:
             yield " ".join(dict.fromkeys(filter(None, (term.name, each.name, each.axis)))), each

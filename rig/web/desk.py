@@ -68,6 +68,14 @@ def lab_read() -> str | None:
     return shown(lab_url(url, RECORD))
 
 
+def models(default: str, chosen: str = "") -> dict[str, str]:
+    """The models to choose from, by name or file, with names for people; "" is that by default."""
+    from calibrations.model_file import shipped_names
+
+    found = {"": default, **{name: name for name in shipped_names()}, **saved_models()}
+    return found if chosen in found else {**found, chosen: chosen}
+
+
 def saved_models() -> dict[str, str]:
     """Models that the workbench saved: their files, and names for people."""
     return {str(path): f"{path.stem} (saved)" for path in sorted((home() / MODELS).glob("*.yaml"))}

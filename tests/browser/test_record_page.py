@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from urllib.parse import quote
 
 import numpy as np
 import pytest
@@ -13,7 +14,9 @@ from calibrations.reading.read_csv import read_csv
 from procedures.session import Pose
 from rig.record import Block, Kept, Record
 from tests.browser.conftest import Workbench
-from tests.browser.measured import hidden
+from tests.browser.measured import hidden, wandering
+
+BOTH, DIFFERENCE = "What the model leaves of both", "Second less first, at the poses that both have"
 
 
 @pytest.fixture
@@ -51,9 +54,27 @@ def test_two_runs_are_compared(workbench: Workbench, runs: list[str]) -> None:
     for run in runs[:2]:
         page.get_by_role("row", name=run).get_by_role("checkbox").click()
     page.get_by_role("button", name="Compare").click()
-    expect(page.get_by_text("Parameters of linear")).to_be_visible()
+    expect(page.get_by_text("Parameters of linear", exact=True)).to_be_visible()
     expect(page.get_by_role("cell", name="scale-factor scale x")).to_be_visible()
+    for picture, dots in (("How the parameters of linear differ", 4), (BOTH, 2 * 518), (DIFFERENCE, 518)):
+        expect(page.locator(f"[aria-label='{picture}'] .points path")).to_have_count(dots)
+    label = page.locator(f"[aria-label='{DIFFERENCE}'] .ytitle")
+    expect(label).to_have_text("second − first, x (mV)")
+    page.keyboard.press("x")
+    page.keyboard.press("g")
+    expect(label).to_have_text("second − first, y (mg)")
     workbench.shot(page, "compared")
+    expect(page.locator(".chosen .title").first).to_have_text(runs[0])  # the older one
+    page.get_by_role("button", name="Swap").click()
+    expect(page.locator(".chosen .title").first).to_have_text(runs[1])
+
+
+def test_what_is_of_two_kinds_is_not_compared_and_why(workbench: Workbench, runs: list[str], tmp_path: Path) -> None:
+    still = wandering(tmp_path)
+    page = workbench.visit(f"/compare?first={quote(still)}&second={runs[0]}")
+    expect(page.get_by_role("alert").first).to_contain_text("is a still record")
+    page.goto(f"{workbench.origin}/compare?first={quote(still)}&second={quote(still)}")
+    expect(page.locator("[aria-label^='Allan deviation of both'] .points path").first).to_be_attached()
 
 
 def test_a_run_is_exported_and_reported(workbench: Workbench, runs: list[str], tmp_path: Path) -> None:

@@ -7,6 +7,7 @@
     record        a still record over time
     averaging     the Allan deviation of a still record beside the model
     spectrum      its spectrum beside the model
+    beside        two runs: how their parameters differ, what one model leaves of both, what differs itself
     sensed        units of a still record: the output's own, or those of what is sensed
     waterfall     the error falling as effects are added, down to the noise floor
     series        values of a run over time, thinned

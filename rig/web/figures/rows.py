@@ -105,11 +105,15 @@ class Shown:
         times = plain(float(rms(left)) / self.floor, 2)
         return f"{told}: residual {minus(f'{left.mean():+.3g}')} {self.unit} on average, rms {times} × the noise floor"
 
+    def place(self, row: int) -> str:
+        """The pose of a row, and when it was."""
+        return "<br>".join(_place(self.fit.table, row))
+
     def _told(self, row: int) -> str:
         left = float(self.fit.residual[self.c, row])
         times = plain(abs(left) / float(self.fit.noise.floor[self.c]), 2)
         error = f"residual {minus(f'{self.factor * left:+.3g}')} {self.unit}, {times} × the noise floor"
-        return "<br>".join([*_place(self.fit.table, row), error])
+        return f"{self.place(row)}<br>{error}"
 
 
 def _place(table: Table, row: int) -> Iterator[str]:
@@ -155,3 +159,9 @@ def first_choices(found: Sequence[str]) -> tuple[str, str]:
     """What to draw against, and what to colour by, to begin with."""
     colour = next((name for name in ("alpha_deg", "time", "row") if name in found), found[-1])
     return found[0], colour
+
+
+def residual_units(fit: Fit) -> dict[bool, str]:
+    """What a residual can be given in: False the output's unit, True that of what is sensed."""
+    sensed = fit.table.input_unit
+    return {True: sensed} if fit.table.kind == "positions" else {False: fit.table.unit, True: sensed}

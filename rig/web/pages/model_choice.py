@@ -10,7 +10,7 @@ from nicegui import events, ui
 from calibrations.errors import CalibrationError
 from rig.errors import RigError
 from rig.home import home
-from rig.web.desk import FILES, MODELS, runs, saved_models
+from rig.web.desk import FILES, MODELS, models, runs, saved_models
 from rig.web.parts import box, off_loop, words
 from rig.web.told import message
 
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from rig.analysis.growing import Growing
     from rig.web.pages.model_page import ModelPage
 
+BY_KIND = "by kind of data"
 MOST_BYTES = 200_000_000
 
 
@@ -32,7 +33,7 @@ class Choice:
                 new_value_mode="add-unique", on_change=lambda e: self._chose(e.value, page.model),
             ).classes("data").props("dense options-dense")  # fmt: skip
             self.model = ui.select(
-                _models(page.model),
+                models(BY_KIND, page.model),
                 label="Model",
                 value=page.model,
                 on_change=lambda e: self._chose(page.data, e.value),
@@ -58,7 +59,7 @@ class Choice:
         data = self.page.data
         self.data.set_options({**_data(data)}, value=data)
         if not self.page.model:
-            self.model.set_options({**_models(""), "": f"{trail.model.name} (by default)"}, value="")
+            self.model.set_options(models(f"{trail.model.name} (by default)"), value="")
         self.save.enable()
         self.report.enable()
 
@@ -154,10 +155,3 @@ def _data(chosen: str) -> dict[str, str]:
         for name in [f"{run.run}/{sensor}" for sensor in run.bench.get("sensors", {})] or [run.run]:
             found[name] = f"{name}  ({run.extent}, {run.state})"
     return found
-
-
-def _models(chosen: str) -> dict[str, str]:
-    from calibrations.model_file import shipped_names
-
-    found = {"": "by kind of data", **{name: name for name in shipped_names()}, **saved_models()}
-    return found if chosen in found else {**found, chosen: chosen}

@@ -14,7 +14,7 @@ from rig.web.figures import motion
 from rig.web.figures.failure import failure
 from rig.web.figures.measurement import measurement
 from rig.web.figures.residual import residual
-from rig.web.figures.rows import Shown, choices, first_choices
+from rig.web.figures.rows import Shown, choices, first_choices, residual_units
 from rig.web.figures.style import Figure
 from rig.web.figures.waterfall import waterfall
 from rig.web.parts import box, div, redraw, words
@@ -95,7 +95,7 @@ class Pictures:
         self.columns = choices(fit)
         x, colour = first_choices(list(self.columns))
         self._offer(fit.channels)
-        self.unit.set_options(_units(fit), value=fit.table.kind == "positions" or bool(self.unit.value))
+        self.unit.set_options(residual_units(fit), value=fit.table.kind == "positions" or bool(self.unit.value))
         self.unit.set_visibility(len(self.unit.options) > 1)
         for select, first in ((self.x, x), (self.colour, colour)):
             value = select.value if select.value in self.columns else first
@@ -205,9 +205,3 @@ class Pictures:
         self.leave.set_visibility(bool(self.selected) and self.leave_out is not None)
         self.told.set_text(shown.summary(self.selected) if self.selected else shown.thinned or
                            "Draw a box in a picture to select poses in all of them.")  # fmt: skip
-
-
-def _units(fit: Fit) -> dict[bool, str]:
-    """What a residual can be given in."""
-    sensed = fit.table.input_unit
-    return {True: sensed} if fit.table.kind == "positions" else {False: fit.table.unit, True: sensed}

@@ -64,7 +64,9 @@ class Runs:
         self.compare.set_enabled(len(self.table.selected) == 2)
 
     def _compare(self) -> None:
-        second, first = (row["name"] for row in self.table.selected)
+        """The older one is the first, whichever was marked first."""
+        newest_first = [row["name"] for row in self.table.rows]
+        second, first = sorted((row["name"] for row in self.table.selected), key=newest_first.index)
         ui.navigate.to(f"/compare?{urlencode({'first': first, 'second': second})}")
 
     def _open(self, event: events.GenericEventArguments) -> None:

@@ -1,0 +1,86 @@
+"""Two tables by one model: the same poses are found in both, each visit once, and what is of two kinds is refused."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from calibrations.fit import Fit, fit
+from calibrations.model_file import read_model
+from calibrations.reading.read_csv import write_csv
+from calibrations.table import Table
+from rig.analysis.asked_still import asked_still
+from rig.analysis.both import again, both
+from rig.analysis.request import Request
+from rig.errors import RecordError
+
+ALPHA, BETA = (each.ravel() for each in np.meshgrid([30.0, 90.0, 150.0], np.arange(0.0, 360.0, 30.0)))
+
+
+def table(rows: Sequence[int], offset_v: float = 0.0) -> Table:
+    """Rows of a grid of poses, by an ideal sensor with a bias."""
+    a, b = np.radians(ALPHA[rows]), np.radians(BETA[rows])
+    volts = {"vx_v": 2.5 + np.sin(a) * np.cos(b) + offset_v, "vy_v": 2.5 + np.sin(a) * np.sin(b) + offset_v}
+    columns = {"alpha_deg": ALPHA[rows], "beta_deg": BETA[rows], "vx_std_v": np.full(len(rows), 1e-3)}
+    extra = {"vy_std_v": np.full(len(rows), 1e-3), "n": np.full(len(rows), 100.0), **volts}
+    return Table.from_columns("poses", columns | extra, {}, "a table")
+
+
+def fitted(rows: Sequence[int], offset_v: float = 0.0) -> Fit:
+    return fit(read_model("linear"), table(rows, offset_v))
+
+
+def test_poses_that_both_have_are_paired_whatever_their_order() -> None:
+    first, second = fitted(range(36)), fitted([*range(35, 9, -1)], 1e-3)
+    found = again(first, second)
+    assert found is not None
+    assert np.array_equal(first.table.column("beta_deg")[found.first], second.table.column("beta_deg")[found.second])
+    assert found.difference.shape == (2, 26)
+    assert found.difference == pytest.approx(1e-3)
+    assert found.floor == pytest.approx(np.sqrt(2) * first.noise.floor)
+
+
+def test_a_pose_visited_twice_is_paired_visit_by_visit() -> None:
+    found = again(fitted([*range(36), 0, 0]), fitted([*range(36), 0]))
+    assert found is not None
+    assert len(found.first) == 37
+    assert sorted(found.first[(found.first == 0) | (found.first >= 36)]) == [0, 36]
+
+
+def test_without_a_pose_in_common_there_is_nothing() -> None:
+    assert again(fitted(range(18)), fitted(range(18, 36))) is None
+
+
+def test_a_still_record_and_poses_have_no_model_in_common(tmp_path: Path) -> None:
+    write_csv(table(range(36)), poses := tmp_path / "poses.csv")
+    rows = {"vx_v": 2.5 + 1e-3 * np.random.default_rng(1).standard_normal(5000)}
+    write_csv(Table.from_columns("still", rows, {"sample_rate_hz": 10.0}, "still"), still := tmp_path / "still.csv")
+    asked = [Request(str(path)) for path in (poses, still)]
+    with pytest.raises(RecordError, match=r"still\.csv is a still record, .*poses\.csv is none: no model"):
+        both(*asked, print)
+
+
+@pytest.mark.parametrize(
+    ("constants", "columns", "expected"),
+    [
+        ({"output_per_g": -0.5}, ("vx_v",), (2.0, "g")),
+        ({"output_per_deg_s": 0.02}, ("vx_v",), (50.0, "deg/s")),
+        ({"output_per_field": 4.0}, ("vx_v",), (0.25, "field")),
+        ({"unit": "m/s^2"}, ("ax",), (1 / 9.80665, "g")),
+        ({"output_per_g": "a lot"}, ("vx_v",), None),
+        ({}, ("vx_v",), None),
+    ],
+)
+def test_a_still_record_is_told_as_what_is_sensed_where_its_scale_factor_is_stated(
+    tmp_path: Path, constants: dict[str, str | float], columns: tuple[str, ...], expected: tuple[float, str] | None
+) -> None:
+    rows = dict.fromkeys(columns, 2.5 + 1e-3 * np.random.default_rng(1).standard_normal(5000))
+    made = Table.from_columns("still", rows, {"sample_rate_hz": 10.0, **constants}, "still")
+    write_csv(made, path := tmp_path / "still.csv")
+    found = asked_still(Request(str(path)), print)
+    assert found is not None
+    sensed = found.still.sensed.get("x")
+    assert (None if sensed is None else (pytest.approx(sensed.factor), sensed.unit)) == expected
