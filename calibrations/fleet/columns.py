@@ -4,7 +4,8 @@ Derivatives of the residual cost more than all that is done with them, and at th
 for every sensor: an effect on pose or force goes with the range of the output, the others do not depend on the sensor
 to first order. So they are made for the first sensor of a design and scaled for the others. An effect that needs
 columns beside the angles (time, temperature), or constants of the table, is shared only by sensors for which these are
-the same.
+the same. Only poses are a design: of positions and rates the outputs themselves tell how a sensor stood, and nothing is
+shared.
 
 An effect whose start is searched for in the data itself (`Effect.searched`) is left out: it would have to be refitted.
 """
@@ -101,7 +102,8 @@ def _asked(found: Fit, effects: Mapping[str, Effect]) -> tuple[Effect, ...]:
 
 def _key(table: Table, needs: tuple[str, ...]) -> Key:
     """What columns at rows in order of time are a function of."""
-    names = [name for name in dict.fromkeys((*ANGLES, *needs)) if name in table]
+    design = ANGLES if table.kind == "poses" else table.columns
+    names = [name for name in dict.fromkeys((*design, *needs)) if name in table]
     return tuple(part for name in names for part in (name, table.column(name).tobytes()))
 
 

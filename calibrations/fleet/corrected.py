@@ -20,8 +20,8 @@ Values = Mapping[str, Mapping[str, float]]  # effect -> parameter -> value
 
 
 def corrected(table: Table, errors: Values, effects: Mapping[str, Effect]) -> Table:
-    """`table` at the poses that its stages truly took, given the parameters of effects on the pose."""
-    if not errors:
+    """`table` at the poses that its stages truly took, given the parameters of effects on the pose; any other as is."""
+    if not errors or table.kind != "poses":
         return table
     table = table.in_order()
     pose = nominal_pose(table)

@@ -57,6 +57,9 @@ class Stage:
     information: Array
 
 
+NOWHERE = Stage((), np.zeros(0), np.zeros((0, 0)))  # of a sensor on no stage
+
+
 @dataclass(frozen=True)
 class Look:
     """What is kept of one sensor. `information` (p, p) is the inverse covariance of the parameters `theta` (p,), with

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from rig.cli.output import emit, json_option, note
+from rig.cli.output import bench_option, emit, json_option, note
 
 if TYPE_CHECKING:
     from rig.fleet.asked import Fleet
@@ -32,6 +32,7 @@ def _fleet_options(function: Callable[..., Any]) -> Callable[..., Any]:
         click.option("--scheduler", metavar="tcp://HOST:PORT", help="Dask's scheduler; else a local cluster."),
         click.option("--workers", type=click.IntRange(min=1), help="Of the local cluster; else one for each core."),
         click.option("--report", type=click.Path(dir_okay=False, path_type=Path), help="Write a page on the fleet."),
+        bench_option,
         json_option,
     )
     for option in reversed(options):
@@ -48,25 +49,28 @@ def discover(
     scheduler: str | None,
     workers: int | None,
     report: Path | None,
+    bench_file: Path | None,
     as_json: bool,
     model: str,
     out: Path | None,
 ) -> None:
     """Find what the sensors of SOURCES miss: effects of batches, errors of rigs, and sensors unlike their siblings."""
-    from calibrations.effect import catalogue
     from calibrations.model_file import dump_model, read_model
     from rig.cli.fleet_words import population
     from rig.files import require_out, write_whole
     from rig.fleet.discover import discover_fleet
     from rig.fleet.documents import population_document
     from rig.fleet.guide import write_guide
+    from rig.fleet.own import effects_of, own_files
+    from rig.fleet.worker import Question
 
-    text = dump_model(read_model(model, catalogue()))
+    own = own_files(bench_file)
+    start = Question("look", dump_model(read_model(model, effects_of(own))), own=own)
     if report is not None:
         require_out(report, *sources)
     with _fleet(sources, scheduler, workers) as (fleet, members):
-        found = discover_fleet(fleet, members, text)
-    written = write_guide(found, text, out) if out is not None else []
+        found = discover_fleet(fleet, members, start)
+    written = write_guide(found, start, out) if out is not None else []
     if report is not None:
         from rig.fleet.reported import population_page
 
@@ -87,6 +91,7 @@ def calibrate(
     scheduler: str | None,
     workers: int | None,
     report: Path | None,
+    bench_file: Path | None,
     as_json: bool,
     model: str,
     out: Path | None,
@@ -98,11 +103,13 @@ def calibrate(
     from rig.fleet.calibrate import calibrate_fleet, models
     from rig.fleet.documents import calibration_document
     from rig.fleet.guide import made_folder, read_guide, safe
+    from rig.fleet.own import own_files
 
     if report is not None:
         require_out(report, *sources)
+    own = own_files(bench_file)
     with _fleet(sources, scheduler, workers) as (fleet, members):
-        found = calibrate_fleet(fleet, members, read_guide(model, {member.batch for member in members}))
+        found = calibrate_fleet(fleet, members, read_guide(model, {member.batch for member in members}, own))
     written: list[Path] = []
     for batch in found.batches if out is not None else ():
         for sensor, of in models(batch).items():

@@ -1,10 +1,14 @@
-"""Questions to a fleet: what the record knows is not asked again, and what comes is kept before it is used."""
+"""Questions to a fleet: what the record knows is not asked again, and what comes is kept before it is used.
+
+Answers pass through: no more of them are held than a few chunks, whatever the fleet's size.
+"""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 from calibrations.errors import DataError
@@ -18,7 +22,8 @@ from rig.record import Record
 if TYPE_CHECKING:
     from distributed import Client
 
-CHUNK = {"look": 20, "diagnosis": 4}  # sensors of one task: about a second's work
+CHUNK = {"look": 20, "diagnosis": 4}  # sensors of one task: about half a second's work
+SLICE = 100  # sensors that the record is asked for at a time
 KILLED = "its data kill the process that works on them; send them to a maintainer with `rig doctor`"
 Tell = Callable[[int, int], None]
 
@@ -32,25 +37,61 @@ class Fleet:
     tell: Tell
 
     def ask(self, asked: Sequence[tuple[Member, Question]]) -> Iterator[tuple[Member, Any]]:
-        """Every member with its answer, in any order; a `fault` in place of what could not be found."""
-        keys = [key_of(member.digest, question) for member, question in asked]
-        known = kept(self.record, keys)
-        open_ = {key: each for key, each in zip(keys, asked, strict=True) if key not in known}
-        for key, (member, _) in zip(keys, asked, strict=True):
-            if key in known:
-                yield member, known[key]
-        done = len(asked) - len(open_)
-        for found in self._new(open_) if open_ else ():
-            done += len(found)
-            self.tell(done, len(asked))
-            yield from found
+        """Every member with its answer, about in the order asked; a `fault` in place of what could not be found."""
+        known: list[tuple[Member, Any]] = []
+        open_: dict[str, list[tuple[Member, Question]]] = {}
+        chunks, done = self._chunks(asked, known, open_), 0
+        for found in self._answers(chunks, open_):
+            ready = [*known, *found]
+            known.clear()
+            yield from ready
+            done += len(ready)
+            if found:
+                self.tell(done, len(asked))
 
-    def _new(self, asked: dict[str, tuple[Member, Question]]) -> Iterator[list[tuple[Member, Any]]]:
-        size = min((CHUNK[question.what] for _, question in asked.values()), default=1)
-        tasks = (self._task(key, *each) for key, each in asked.items())
-        for chunk, found in answered(self.client, answer, tasks, size):
-            pairs = found if found is not None else [(task.key, {"fault": KILLED}) for task in chunk]
-            rows = [(key, *asked[key], said) for key, said in pairs]
+    def _chunks(
+        self,
+        asked: Sequence[tuple[Member, Question]],
+        known: list[tuple[Member, Any]],
+        open_: dict[str, list[tuple[Member, Question]]],
+    ) -> Iterator[list[Task]]:
+        """Tasks of what is not in the record, which is added to `open_`, by chunks; what is there is added to `known`.
+
+        A chunk is empty where so much is known that it had better be taken first.
+        """
+        tasks: list[Task] = []
+        size = min((CHUNK[question.what] for _, question in asked), default=1)
+        for first in range(0, len(asked), SLICE):
+            part = asked[first : first + SLICE]
+            keys = [key_of(member.digest, question) for member, question in part]
+            there = kept(self.record, keys)
+            known += [(member, there[key]) for key, (member, _) in zip(keys, part, strict=True) if key in there]
+            if known:
+                yield []
+            for key, each in zip(keys, part, strict=True):
+                if key in there:
+                    continue
+                if key not in open_:
+                    tasks.append(self._task(key, *each))
+                open_.setdefault(key, []).append(each)  # copies of a table are one question
+                if len(tasks) == size:
+                    yield tasks
+                    tasks = []
+        yield tasks
+
+    def _answers(
+        self, chunks: Iterator[list[Task]], open_: dict[str, list[tuple[Member, Question]]]
+    ) -> Iterator[list[tuple[Member, Any]]]:
+        """What the workers find, as it comes; nothing for an empty chunk."""
+        for chunk in chunks:
+            if chunk:
+                break
+            yield []
+        else:
+            return
+        for tasks, found in answered(self.client, answer, chain([chunk], chunks)):
+            pairs = found if found is not None else [(task.key, {"fault": KILLED}) for task in tasks]
+            rows = [(key, *each, said) for key, said in pairs for each in open_.pop(key)]
             keep(self.record, ((key, m.sensor, m.data, said) for key, m, _, said in rows if "fault" not in said))
             yield [(member, said) for _, member, _, said in rows]
 

@@ -10,13 +10,14 @@ from functools import cached_property
 import numpy as np
 
 from calibrations.fleet.corrected import Values
-from calibrations.fleet.look import Look
+from calibrations.fleet.look import NOWHERE, Look
 from calibrations.fleet.pooling import Pooled, pooled
 from calibrations.model import Estimate, Model
 from rig.analysis.provenance import program
 from rig.fleet.asked import Fleet
 from rig.fleet.discover import stands_out
 from rig.fleet.members import Member
+from rig.fleet.own import Own
 from rig.fleet.worker import Question, model_of
 from rig.fleet.written import read_look
 
@@ -25,15 +26,20 @@ Names = tuple[tuple[str, str, str, str], ...]
 
 @dataclass(frozen=True)
 class Guide:
-    """What sensors are fitted by: the text of a model file for each batch, `otherwise` for the rest; errors by rig."""
+    """What sensors are fitted by: the text of a model file for each batch, `otherwise` for the rest; errors by rig.
+
+    `own`: the files of the user's own effects.
+    """
 
     models: Mapping[str, str]
     otherwise: str
     errors: Mapping[str, Values]
+    own: Own = ()
 
     def question(self, member: Member) -> Question:
         """What is asked of a sensor."""
-        return Question("look", self.models.get(member.batch, self.otherwise), (), self.errors.get(member.rig, {}))
+        model, errors = self.models.get(member.batch, self.otherwise), self.errors.get(member.rig, {})
+        return Question("look", model, (), errors, self.own)
 
 
 @dataclass(frozen=True)
@@ -70,7 +76,7 @@ def calibrate_fleet(fleet: Fleet, members: Sequence[Member], guide: Guide) -> Ca
         if "fault" in said:
             faults[member] = said["fault"]
         else:
-            looks[member] = read_look(said)
+            looks[member] = replace(read_look(said), scores=(), stage=NOWHERE)  # what is pooled, and no more
     groups: dict[tuple[str, Names], list[Member]] = defaultdict(list)
     for member in members:
         if member in looks:

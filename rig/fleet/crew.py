@@ -7,9 +7,8 @@ is found, and no other is blamed for it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from itertools import islice
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rig.errors import RigError
@@ -48,6 +47,7 @@ def crew(scheduler: str | None, workers: int | None) -> Iterator[Client]:
     settings = {
         "distributed.scheduler.allowed-failures": 0,
         "distributed.comm.timeouts.connect": f"{PATIENCE_S} s",
+        "distributed.worker.profile.enabled": False,
     }
     with dask.config.set(settings):
         if scheduler is not None:
@@ -59,9 +59,7 @@ def crew(scheduler: str | None, workers: int | None) -> Iterator[Client]:
                 yield client
             return
         with (
-            LocalCluster(
-                n_workers=workers, threads_per_worker=1, dashboard_address="127.0.0.1:0", host="127.0.0.1"
-            ) as cluster,
+            LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None, host="127.0.0.1") as cluster,
             Client(cluster) as client,
         ):
             client.register_plugin(Deaf())
@@ -69,27 +67,31 @@ def crew(scheduler: str | None, workers: int | None) -> Iterator[Client]:
 
 
 def answered(
-    client: Client, work: Callable[[list[T]], Any], tasks: Iterable[T], size: int
+    client: Client, work: Callable[[list[T]], Any], chunks: Iterator[list[T]]
 ) -> Iterator[tuple[list[T], Any]]:
-    """Chunks of `size` tasks with what `work` makes of them, as they are done; None for a task that kills its worker.
+    """Chunks of tasks with what `work` makes of them, as they are done; None for a task that kills its worker.
 
-    Raises FleetError where the scheduler is lost.
+    An empty chunk is given back at once. Raises FleetError where the scheduler is lost.
     """
     from concurrent.futures import CancelledError
 
     from distributed import KilledWorker, as_completed
 
-    chunks = _chunks(tasks, size)
     under_way: dict[Any, list[T]] = {}
     suspects: list[T] = []
     done = as_completed(loop=client.loop)
     try:
         ahead = AHEAD * max(sum(client.nthreads().values()), 1)
         while True:
-            for chunk in islice(chunks, ahead - len(under_way)):
+            for chunk in chunks:
+                if not chunk:
+                    yield chunk, []
+                    continue
                 future = client.submit(work, chunk, pure=False)
                 under_way[future] = chunk
                 done.add(future)
+                if len(under_way) >= ahead:
+                    break
             if not under_way:
                 break
             future = next(done)
@@ -105,9 +107,3 @@ def answered(
                 yield [task], None
     except (CancelledError, OSError):
         raise FleetError(LOST) from None
-
-
-def _chunks(tasks: Iterable[T], size: int) -> Iterator[list[T]]:
-    waiting = iter(tasks)
-    while chunk := list(islice(waiting, size)):
-        yield chunk

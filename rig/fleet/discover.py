@@ -1,25 +1,28 @@
 """What a fleet's sensors miss, in rounds: every sensor is looked at, rigs and batches are judged, and what they explain
-is taken into the model of those sensors, which are looked at again. Who then still stands out is diagnosed in full.
+is taken into the model of those sensors, which are looked at again. At the end each effect of a batch is taken out of
+the whole, and dropped where the batch does as well without. Who then still stands out is diagnosed in full.
+
+Looks pass through: the scores of a batch are let go as soon as it is judged.
 """
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from scipy.special import chdtrc
 
-from calibrations.effect import catalogue
 from calibrations.fleet.batch import BatchEffect, batch_effects
 from calibrations.fleet.corrected import Values
-from calibrations.fleet.look import Look
+from calibrations.fleet.look import NOWHERE, Look
 from calibrations.fleet.population import BESIDE, IN_FULL, Population, SensorVerdict, batch_verdict
 from calibrations.fleet.rigs import Measured, RigError, rig_errors, unconnected
 from rig.fleet.asked import Fleet
 from rig.fleet.members import Member
+from rig.fleet.own import effects_of
 from rig.fleet.worker import Question
 from rig.fleet.written import read_look
 
@@ -27,37 +30,48 @@ STANDS_OUT = 0.05  # chance, over the whole search, below which a sensor is diag
 MOST_ROUNDS = 6
 FEWEST = 4  # sensors that tell how noisy their batch is
 
+Batches = Mapping[str, Sequence[Member]]
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What is kept of a look at a sensor, as there; `on_stages`: whether it was measured on any."""
+
+    excess: float
+    free: int
+    chance: float
+    outliers: bool
+    on_stages: bool
+
 
 @dataclass(frozen=True)
 class Stand:
-    """What is known between two rounds."""
+    """What is known between two rounds; `start` is what was asked first of every sensor."""
 
-    looks: Mapping[Member, Look] = field(default_factory=dict)
-    faults: Mapping[Member, str] = field(default_factory=dict)
+    start: Question
+    faults: Mapping[Member, str]
+    seen: Mapping[Member, Seen] = field(default_factory=dict)
     effects: Mapping[str, tuple[BatchEffect, ...]] = field(default_factory=dict)
     errors: tuple[RigError, ...] = ()
-    asked: Mapping[Member, Question] = field(default_factory=dict)
+
+    def question(self, what: Any, member: Member) -> Question:
+        """What is now asked of a sensor."""
+        effects = tuple(each.effect for each in self.effects.get(member.batch, ()))
+        return replace(self.start, what=what, effects=effects, errors=errors_of(self.errors, member.rig))
+
+    def judged_beside(self, batch: str, effects: tuple[BatchEffect, ...]) -> Stand:
+        """The same with other effects of a batch."""
+        return replace(self, effects={**self.effects, batch: effects})
 
 
-def discover_fleet(fleet: Fleet, members: Sequence[Member], model: str) -> Population:
-    """The population; `model` is the text of the model file that every sensor is held against at first."""
-    faulty = {member: member.fault for member in members if member.fault}
-    stand = _looked(fleet, Stand(faults=faulty), [m for m in members if m not in faulty], model)
-    stand = replace(stand, errors=tuple(rig_errors([_measured(m, look) for m, look in stand.looks.items()])))
-    stand = _looked(fleet, stand, list(stand.looks), model)
-    for _ in range(MOST_ROUNDS):
-        more = _batches(stand)
-        if not more:
-            break
-        effects = {batch: (*stand.effects.get(batch, ()), effect) for batch, effect in more.items()}
-        stand = _looked(fleet, replace(stand, effects={**stand.effects, **effects}), list(stand.looks), model)
-    diagnosed = _diagnosed(fleet, stand, model)
-    return _population(stand, diagnosed, members)
-
-
-def _question(what: Any, member: Member, stand: Stand, model: str) -> Question:
-    effects = tuple(each.effect for each in stand.effects.get(member.batch, ()))
-    return Question(what, model, effects, errors_of(stand.errors, member.rig))
+def discover_fleet(fleet: Fleet, members: Sequence[Member], start: Question) -> Population:
+    """The population; `start` holds the text of the model file that every sensor is held against at first."""
+    batches: dict[str, list[Member]] = defaultdict(list)
+    for member in members:
+        batches[member.batch].append(member)
+    stand = _rigs(fleet, Stand(start, {m: m.fault for m in members if m.fault}), batches)
+    stand = _settled(fleet, _grown(fleet, stand, batches), batches)
+    return _population(stand, _diagnosed(fleet, stand, batches), members)
 
 
 def errors_of(errors: Iterable[RigError], rig: str) -> Values:
@@ -69,45 +83,94 @@ def errors_of(errors: Iterable[RigError], rig: str) -> Values:
     return dict(values)
 
 
-def _looked(fleet: Fleet, stand: Stand, members: Sequence[Member], model: str) -> Stand:
-    """Look again at the members of which something else is asked than before."""
-    questions = {member: _question("look", member, stand, model) for member in members}
-    new = [(m, question) for m, question in questions.items() if stand.asked.get(m) != question]
-    looks, faults = dict(stand.looks), dict(stand.faults)
-    for member, said in fleet.ask(new):
+def _rigs(fleet: Fleet, stand: Stand, batches: Batches) -> Stand:
+    """With the errors of the rigs, where there are several."""
+    if len({member.rig for of in batches.values() for member in of}) < 2:
+        return stand
+    faults = dict(stand.faults)
+    stages = {member: look.stage for member, look in _looks(fleet, stand, batches, faults) if look}
+    measured = [Measured(m.batch, m.rig, stages[m]) for of in batches.values() for m in of if m in stages]
+    return replace(stand, faults=faults, errors=tuple(rig_errors(measured)))
+
+
+def _looks(
+    fleet: Fleet, stand: Stand, batches: Batches, faults: dict[Member, str]
+) -> Iterator[tuple[Member, Look | None]]:
+    """Every sensor with its look, batch by batch; where there is none, why is added to `faults`."""
+    asked = [(m, stand.question("look", m)) for of in batches.values() for m in of if m not in faults]
+    for member, said in fleet.ask(asked):
         if "fault" in said:
             faults[member] = said["fault"]
-            looks.pop(member, None)
-        else:
-            looks[member] = read_look(said)
-    ordered = {member: looks[member] for member in members if member in looks}
-    return replace(stand, looks=ordered, faults=faults, asked={**stand.asked, **questions})
+        yield member, None if "fault" in said else read_look(said)
 
 
-def _measured(member: Member, look: Look) -> Measured:
-    return Measured(member.batch, member.rig, look.stage)
+def _grown(fleet: Fleet, stand: Stand, batches: Batches) -> Stand:
+    """Every batch with the effects that it misses, added one after another."""
+    open_ = batches
+    for left in reversed(range(MOST_ROUNDS + 1)):
+        stand, found = _judged(fleet, stand, open_)
+        open_ = {batch: batches[batch] for batch, effects in found.items() if effects and left}
+        for batch in open_:
+            stand = stand.judged_beside(batch, (*stand.effects.get(batch, ()), found[batch][0]))
+    return stand
 
 
-def _batches(stand: Stand) -> dict[str, BatchEffect]:
-    """The next effect of each batch that misses one."""
-    stage = {name for name, effect in catalogue().items() if effect.pose is not None}
-    looks: dict[str, list[Look]] = defaultdict(list)
-    for member, look in stand.looks.items():
-        looks[member.batch].append(look)
-    found = {batch: batch_effects(of, stage) for batch, of in looks.items()}
-    return {batch: effects[0] for batch, effects in found.items() if effects}
+def _judged(fleet: Fleet, stand: Stand, batches: Batches) -> tuple[Stand, dict[str, list[BatchEffect]]]:
+    """The sensors of the batches seen, and what each batch misses; a batch is judged when its last sensor is in."""
+    stage = {name for name, effect in effects_of(stand.start.own).items() if effect.pose is not None}
+    faults, seen = dict(stand.faults), dict(stand.seen)
+    waiting = {batch: sum(m not in faults for m in of) for batch, of in batches.items()}
+    looks: dict[str, dict[Member, Look]] = defaultdict(dict)
+    found = {}
+    for member, look in _looks(fleet, stand, batches, faults):
+        batch = member.batch
+        if look is not None:
+            looks[batch][member] = look
+            seen[member] = Seen(look.excess, look.free, look.chance, bool(look.outliers), bool(look.stage.names))
+        waiting[batch] -= 1
+        if not waiting[batch]:
+            mine = looks.pop(batch, {})
+            found[batch] = batch_effects([mine[m] for m in batches[batch] if m in mine], stage)
+    return replace(stand, faults=faults, seen=seen), found
 
 
-def _diagnosed(fleet: Fleet, stand: Stand, model: str) -> dict[Member, Any]:
+def _settled(fleet: Fleet, stand: Stand, batches: Batches) -> Stand:
+    """Without those effects that a batch does as well without beside the others."""
+    for batch in [batch for batch, effects in stand.effects.items() if len(effects) > 1]:
+        stand = _needed(fleet, stand, batch, batches[batch])
+    return stand
+
+
+def _needed(fleet: Fleet, stand: Stand, batch: str, members: Sequence[Member]) -> Stand:
+    """With the effects of a batch as they show beside each other; the first found of the needless is dropped first."""
+    beside = _beside(fleet, stand, batch, members)
+    needed = tuple(each for each in beside if each is not None)
+    if len(needed) == len(beside):
+        return stand.judged_beside(batch, needed)
+    k, effects = beside.index(None), stand.effects[batch]
+    fewer, _ = _judged(fleet, stand.judged_beside(batch, (*effects[:k], *effects[k + 1 :])), {batch: members})
+    return _needed(fleet, fewer, batch, members) if len(effects) > 2 else fewer
+
+
+def _beside(fleet: Fleet, stand: Stand, batch: str, members: Sequence[Member]) -> list[BatchEffect | None]:
+    """Each effect of a batch as its sensors show it beside all others; None where it is then no more than chance."""
+    effects = stand.effects[batch]
+    found = []
+    for k, effect in enumerate(effects):
+        without = stand.judged_beside(batch, (*effects[:k], *effects[k + 1 :]))
+        missed = _judged(fleet, without, {batch: members})[1].get(batch, [])
+        found.append(next((each for each in missed if each.effect == effect.effect), None))
+    return found
+
+
+def _diagnosed(fleet: Fleet, stand: Stand, batches: Batches) -> dict[Member, Any]:
     """The diagnoses of those that stand out from their batch."""
-    usual: dict[str, list[float]] = defaultdict(list)
-    for member, look in stand.looks.items():
-        usual[member.batch].append(look.excess)
-    out = [m for m, look in stand.looks.items() if stands_out(look, usual[m.batch])]
-    return dict(fleet.ask([(m, _question("diagnosis", m, stand, model)) for m in out]))
+    usual = {batch: [stand.seen[m].excess for m in of if m in stand.seen] for batch, of in batches.items()}
+    out = [m for m, seen in stand.seen.items() if m not in stand.faults and stands_out(seen, usual[m.batch])]
+    return dict(fleet.ask([(m, stand.question("diagnosis", m)) for m in out]))
 
 
-def stands_out(look: Look, batch: Sequence[float]) -> bool:
+def stands_out(look: Look | Seen, batch: Sequence[float]) -> bool:
     """Whether noise alone would hardly leave so much: a pattern, a pose, or more than its batch leaves (`excess`)."""
     usual = max(1.0, float(np.median(batch))) if len(batch) >= FEWEST else 1.0
     noisy = chdtrc(look.free, look.free * (look.excess / usual) ** 2) < STANDS_OUT
@@ -120,7 +183,7 @@ def _population(stand: Stand, diagnosed: Mapping[Member, Any], members: Sequence
     for batch in dict.fromkeys(member.batch for member in members):
         mine = tuple(each for each in sensors if each.batch == batch)
         batches.append(batch_verdict(batch, stand.effects.get(batch, ()), mine))
-    apart = unconnected([_measured(m, look) for m, look in stand.looks.items()])
+    apart = unconnected([Measured(m.batch, m.rig, NOWHERE) for m, seen in stand.seen.items() if seen.on_stages])
     return Population(sensors, tuple(batches), stand.errors, tuple(apart))
 
 
@@ -133,7 +196,7 @@ def _verdict(member: Member, stand: Stand, diagnosis: Any | None) -> SensorVerdi
         return SensorVerdict(*of, "failed", remark=fault)
     if diagnosis is None:
         verdict = "adequate" if not names else "ambiguous" if rivals else "effect-missing"
-        return SensorVerdict(*of, verdict, names, (), stand.looks[member].excess, BESIDE, rivals)
+        return SensorVerdict(*of, verdict, names, (), stand.seen[member].excess, BESIDE, rivals)
     own = tuple(diagnosis["effects"])
     rivals |= {name: tuple(others) for name, others in diagnosis["rivals"].items()}
     verdict = diagnosis["verdict"]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
-from calibrations.effect import catalogue
 from calibrations.errors import ModelError
 from calibrations.fleet.corrected import Values
 from calibrations.fleet.population import BatchVerdict, Population
@@ -15,6 +15,7 @@ from rig.errors import OutputError
 from rig.files import write_whole
 from rig.fleet.calibrate import Guide
 from rig.fleet.discover import errors_of
+from rig.fleet.own import Own, effects_of
 from rig.fleet.worker import Question, model_of
 
 RIGS = "rigs.json"
@@ -22,10 +23,10 @@ SCHEMA = "rig.fleet-rigs/1"
 OTHERWISE = "other.yaml"  # for sensors of no batch
 
 
-def write_guide(found: Population, model: str, folder: Path) -> list[Path]:
+def write_guide(found: Population, start: Question, folder: Path) -> list[Path]:
     """A model file for each batch, and the rigs' errors. Raises OutputError."""
     made_folder(folder)
-    texts = {f"{safe(each.batch)}.yaml": _model(model, each) for each in found.batches}
+    texts = {f"{safe(each.batch)}.yaml": _model(start, each) for each in found.batches}
     rigs = {error.rig: errors_of(found.rigs, error.rig) for error in found.rigs}
     texts[RIGS] = json.dumps({"schema": SCHEMA, "rigs": {rig: of for rig, of in rigs.items() if of}}, indent=1) + "\n"
     for name, text in texts.items():
@@ -33,13 +34,13 @@ def write_guide(found: Population, model: str, folder: Path) -> list[Path]:
     return [folder / name for name in texts]
 
 
-def read_guide(given: str, batches: set[str]) -> Guide:
+def read_guide(given: str, batches: set[str], own: Own = ()) -> Guide:
     """The guide in a folder, or one model for all by its name or file. Raises ModelError, UnknownName."""
-    folder = Path(given)
+    folder, effects = Path(given), effects_of(own)
     if not folder.is_dir():
-        return Guide({}, dump_model(read_model(given, catalogue())), {})
-    texts = {batch: _text(folder / f"{safe(batch)}.yaml") for batch in batches}
-    return Guide(texts, "", _rigs(folder / RIGS))
+        return Guide({}, dump_model(read_model(given, effects)), {}, own)
+    texts = {batch: dump_model(read_model(folder / f"{safe(batch)}.yaml", effects)) for batch in batches}
+    return Guide(texts, "", _rigs(folder / RIGS), own)
 
 
 def made_folder(folder: Path) -> Path:
@@ -56,12 +57,8 @@ def safe(name: str) -> str:
     return "".join(c if c.isalnum() or c in "-_." else "_" for c in name).lstrip(".") or Path(OTHERWISE).stem
 
 
-def _model(model: str, batch: BatchVerdict) -> str:
-    return dump_model(model_of(Question("look", model, tuple(each.effect for each in batch.effects))))
-
-
-def _text(path: Path) -> str:
-    return dump_model(read_model(path, catalogue()))
+def _model(start: Question, batch: BatchVerdict) -> str:
+    return dump_model(model_of(replace(start, effects=tuple(each.effect for each in batch.effects))))
 
 
 def _rigs(path: Path) -> Mapping[str, Values]:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from calibrations.certificates.terms import name as result_name
-from calibrations.effect import catalogue
 from calibrations.fleet.population import Population
 from calibrations.numerals import measured, plain
 from calibrations.pictures.fleet import Spread
 from calibrations.reports.fleet import calibration_report, population_report
 from rig.analysis.provenance import program, today
 from rig.fleet.calibrate import Calibrated, Calibration
+from rig.fleet.own import effects_of
 
 HOLDS_95 = 1.96
 
@@ -26,7 +26,7 @@ def calibration_page(found: Calibration, model: str) -> str:
     quantities: dict[str, list[Spread]] = {}
     for batch in found.batches:
         for k, name in enumerate(batch.names):
-            quantities.setdefault(_titled(name), []).append(_spread(batch, k))
+            quantities.setdefault(_titled(batch, name), []).append(_spread(batch, k))
     rows = [row for batch in found.batches for row in _rows(batch)]
     head = ("batch", "sensors", "parameter", "mean", "spread", "standard uncertainty / alone", "unlike the rest")
     failed = [f"{member.sensor}: {why}" for member, why in found.faults.items()]
@@ -44,9 +44,9 @@ def _facts(model: str) -> dict[str, str]:
     return {"model": model, "program": program(), "made": today()}
 
 
-def _titled(name: tuple[str, str, str, str]) -> str:
+def _titled(batch: Calibrated, name: tuple[str, str, str, str]) -> str:
     effect, parameter, axis, unit = name
-    return f"{result_name(catalogue()[effect], parameter, axis)} in {unit}"
+    return f"{result_name(effects_of(batch.question.own)[effect], parameter, axis)} in {unit}"
 
 
 def _spread(batch: Calibrated, k: int) -> Spread:
@@ -65,7 +65,7 @@ def _rows(batch: Calibrated) -> list[tuple[object, ...]]:
         (
             batch.batch or "no batch",
             len(batch.members),
-            _titled(name),
+            _titled(batch, name),
             measured(each.mean * size, each.mean_std * size),
             plain(each.spread * size, 2),
             plain(float(gain), 2),

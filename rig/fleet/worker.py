@@ -13,17 +13,20 @@ from pathlib import Path
 from typing import Any, Literal
 
 from calibrations.diagnose import Diagnosis, diagnose
-from calibrations.effect import catalogue
-from calibrations.errors import CalibrationError
+from calibrations.errors import CalibrationError, DataError, ModelError
 from calibrations.fleet.columns import Shared
 from calibrations.fleet.corrected import Values, corrected
 from calibrations.fleet.look import look
 from calibrations.model import Model
 from calibrations.model_file import parse_model
 from calibrations.reading.read_csv import parse_csv
+from calibrations.reports.words import joined
 from calibrations.table import Table
+from rig.analysis.asked import DEFAULTS, check_unit
 from rig.analysis.data import averaged
+from rig.analysis.sensors import CALIBRATING
 from rig.errors import RigError
+from rig.fleet.own import Own, effects_of
 from rig.fleet.written import write_look
 
 Answer = dict[str, Any]
@@ -37,6 +40,7 @@ class Question:
     model: str
     effects: tuple[str, ...] = ()  # of its batch, beside the model
     errors: Values = field(default_factory=dict)  # of its rig
+    own: Own = ()  # the user's effects
 
 
 @dataclass(frozen=True)
@@ -61,9 +65,11 @@ def answer(tasks: Sequence[Task]) -> list[tuple[str, Answer]]:
 def _answered(task: Task) -> Answer:
     asked = task.question
     try:
-        model, columns = _beside(asked.model, asked.effects)
-        table = corrected(_read(task), asked.errors, catalogue())
-        return write_look(look(table, model, columns)) if asked.what == "look" else _told(diagnose(table, model))
+        model, columns = _beside(asked.model, asked.effects, asked.own)
+        table = corrected(_checked(_read(task), model), asked.errors, columns.effects)
+        if asked.what == "look":
+            return write_look(look(table, model, columns))
+        return _told(diagnose(table, model, columns.effects))
     except (CalibrationError, RigError) as error:
         return {"fault": str(error)}
     except Exception as error:  # one sensor never stops a fleet
@@ -71,17 +77,35 @@ def _answered(task: Task) -> Answer:
 
 
 @lru_cache(maxsize=8)
-def _beside(model: str, effects: tuple[str, ...]) -> tuple[Model, Shared]:
+def _beside(model: str, effects: tuple[str, ...], own: Own) -> tuple[Model, Shared]:
     """The model, and the columns that the sensors of this worker share beside it."""
-    return model_of(Question("look", model, effects)), Shared(catalogue())
+    return model_of(Question("look", model, effects, own=own)), Shared(effects_of(own))
 
 
 def model_of(asked: Question) -> Model:
     """The model with the effects of the batch, in which nothing is known yet."""
-    model = parse_model(asked.model, "the model", catalogue())
+    effects = effects_of(asked.own)
+    model = parse_model(asked.model, "the model", effects)
     for name in asked.effects:
-        model = model.with_effect(catalogue()[name])
+        model = model.with_effect(effects[name])
     return model
+
+
+def _checked(table: Table, model: Model) -> Table:
+    """The table, where a fleet may hold it against the model. Raises DataError, ModelError."""
+    if table.kind not in CALIBRATING:
+        instead = "noise" if table.kind == "still" else "discover"
+        raise DataError(
+            f"{table.source}: is a table of {table.kind}, and fleets have {joined(list(CALIBRATING))}; leave it out, "
+            f"and ask for it alone: rig {instead} {table.source}"
+        )
+    if not model.for_table(table).terms:
+        raise ModelError(
+            f"{table.source}: {model.name} is no model of {table.content}; make these sensors a fleet of their own, "
+            f"with --model {DEFAULTS[table.content]}"
+        )
+    check_unit(model, table.unit, table.source)
+    return table
 
 
 def _read(task: Task) -> Table:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -24,18 +25,24 @@ def read_look(document: dict[str, Any]) -> Look:
     said = dict(document)
     stage = said.pop("stage")
     scores = tuple(Score(**_arrays(score)) for score in said.pop("scores"))
-    names = tuple(tuple(name) for name in said.pop("names"))
+    names = _one(tuple(tuple(name) for name in said.pop("names")))
     k = len(stage["names"])
     return Look(
         **_arrays(said) | {"outliers": tuple(said["outliers"])},
         names=names,
         scores=scores,
         stage=Stage(
-            tuple(tuple(name) for name in stage["names"]),
+            _one(tuple(tuple(name) for name in stage["names"])),
             np.array(stage["score"], dtype=float),
             np.array(stage["information"], dtype=float).reshape(k, k),
         ),
     )
+
+
+@lru_cache(maxsize=1000)
+def _one(names: tuple[Any, ...]) -> tuple[Any, ...]:
+    """The same object for the same names, which all sensors of a batch have."""
+    return names
 
 
 def _plain(value: Any) -> dict[str, Any]:

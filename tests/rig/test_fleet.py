@@ -27,6 +27,7 @@ from tests.calibrations.fleets import Flaw, Rig, sensor
 
 Command = Callable[..., Any]
 LINEAR = dump_model(read_model("linear"))
+START = Question("look", LINEAR)
 RIGS = {"a": Rig(), "b": Rig(wave=0.06), "c": Rig()}
 
 
@@ -100,7 +101,7 @@ def test_what_the_record_knows_is_not_worked_out_again(
     monkeypatch.setattr("rig.fleet.asked.answered", lambda *_: pytest.fail("asked again"))
     members = [m for m in fleet_of([str(folder)]) if m.sensor not in ("BAD", "GONE")]
     with Record(home) as record:
-        again = discover_fleet(Fleet(None, record, lambda *_: None), members, LINEAR)  # type: ignore[arg-type]
+        again = discover_fleet(Fleet(None, record, lambda *_: None), members, START)  # type: ignore[arg-type]
     assert [each.verdict for each in again.sensors] == [each["verdict"] for each in discovered["sensors"][:12]]
 
 
@@ -133,10 +134,10 @@ def test_answers_are_kept_as_they_come(cluster: LocalCluster, folder: Path, tmp_
         first, _ = next(stopped)
         stopped.close()
         left: list[list[Any]] = []
-        patch.setattr("rig.fleet.asked.answered", lambda _client, _work, tasks, _size: left.append(list(tasks)) or [])
+        patch.setattr("rig.fleet.asked.answered", lambda _client, _work, chunks: left.extend(chunks) or [])
         again = [member for member, _ in Fleet(client, record, lambda *_: None).ask(asked)]
     assert again == [first]
-    assert len(left[0]) == 2
+    assert sum(map(len, left)) == 2
 
 
 def fragile(tasks: list[int]) -> list[int]:
@@ -148,7 +149,7 @@ def fragile(tasks: list[int]) -> list[int]:
 
 def test_a_worker_that_dies_loses_nothing_and_what_kills_it_is_told_alone() -> None:
     with crew(None, 1) as client:
-        found = list(answered(client, fragile, range(5), 2))
+        found = list(answered(client, fragile, iter([[0, 1], [], [2, 3], [4]])))
     assert sorted(task for chunk, _ in found for task in chunk) == [0, 1, 2, 3, 4]
     assert [chunk for chunk, said in found if said is None] == [[1]]
     assert all(said == chunk for chunk, said in found if said is not None)
@@ -174,7 +175,7 @@ def test_a_lost_scheduler_says_how_to_go_on() -> None:
         ) as lost,
         Client(lost.scheduler_address) as client,
     ):  # fmt: skip
-        going_on = answered(client, numbered, range(50), 1)
+        going_on = answered(client, numbered, iter([[k] for k in range(50)]))
         next(going_on)
         lost.close()
         with pytest.raises(FleetError, match="give the same command again"):
