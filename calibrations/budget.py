@@ -145,13 +145,27 @@ def _of_type_b(found: Fit, G: Array, c: Contribution) -> tuple[Line, float]:
     """One input that is not fitted, and the sum of squares that its errors leave in the residual."""
     if c.std is None:
         return Line(c.source, "B", c.unit, None, None, None, c.freedom), 0.0
-    # the residual is measured less predicted: a parameter follows an input against what the residual does
-    shown, number = -c.derivative(found.problem, found.theta), c.shared(found.table)
-    each = np.zeros((int(number.max()) + 1, len(G)))
-    np.add.at(each, number, np.einsum("pcn,cn->np", G, shown))
+    shown, number = _shown(found, c), c.shared(found.table)
+    each = followed(found, G, c)
     sensitivity = each[0] if len(each) == 1 else np.sqrt(np.sum(each**2, axis=0))
     line = Line(c.source, "B", c.unit, c.std, sensitivity, np.abs(sensitivity) * c.std, c.freedom)
     return line, c.std**2 * _left(shown, found.jacobian, each, number)
+
+
+def followed(found: Fit, G: Array, c: Contribution) -> Array:
+    """What each error of an input, shared by its rows, does to each parameter, shape (errors, p)."""
+    number = c.shared(found.table)
+    each = np.zeros((int(number.max()) + 1, len(G)))
+    np.add.at(each, number, np.einsum("pcn,cn->np", G, _shown(found, c)))
+    return each
+
+
+def _shown(found: Fit, c: Contribution) -> Array:
+    """Which error of the rows looks like one of an input, shape (channels, n).
+
+    The residual is measured less predicted: a parameter follows an input against what the residual does.
+    """
+    return -c.derivative(found.problem, found.theta)
 
 
 def _left(shown: Array, jacobian: Array, each: Array, number: NDArray[np.intp]) -> float:

@@ -92,7 +92,8 @@ def of_step(effect: Effect, step: float) -> Derivative:
 
 def contributions(table: Table) -> tuple[Contribution, ...]:
     """Every input that this kind of table has. Raises DataError for a constant that is no number."""
-    made = [*_of_any(table), *(_of_poses() if table.kind == "poses" else ())]
+    own = {"poses": _of_poses, "rates": _of_rates}.get(table.kind, list)
+    made = [*_of_any(table), *own()]
     return tuple(replace(c, std=_given(table, constant)) for constant, c in made)
 
 
@@ -105,9 +106,25 @@ def _of_poses() -> list[tuple[str, Contribution]]:
         ),
         *(("repeat_std_deg", Contribution(f"{name} from pose to pose", "deg", None, d, each)) for name, d in stages),
         *(("tilt_std_deg", _common(f"level of the base about {axis}", "deg", _tilt(k))) for k, axis in enumerate("xy")),
-        *(("mount_std_deg", _common(f"mount about {axis}", "deg", _turn(k))) for k, axis in enumerate("xyz")),
+        *_of_the_mount(),
         ("offset_std_v", _common("offset of the converter", "V", of_step(_acting(output=_more), 1e-4))),
     ]
+
+
+def _of_rates() -> list[tuple[str, Contribution]]:
+    return [("rate_std", _common("speed of the stage", "1", _faster)), *_of_the_mount()]
+
+
+def _of_the_mount() -> list[tuple[str, Contribution]]:
+    return [("mount_std_deg", _common(f"mount about {axis}", "deg", _turn(k))) for k, axis in enumerate("xyz")]
+
+
+def _faster(problem: Problem, theta: Array) -> Array:
+    """With respect to the share by which the stage turns faster than it says."""
+    share = 1e-4
+    change = share * problem.table.column("rate_deg_s")
+    ahead, behind = (_shifted(problem, "rate_deg_s", by).residual(theta) for by in (change, -change))
+    return (ahead - behind) / (2 * share)
 
 
 def _of_any(table: Table) -> list[tuple[str, Contribution]]:
@@ -128,7 +145,7 @@ def _common(source: str, unit: str, derivative: Derivative) -> Contribution:
     return Contribution(source, unit, None, derivative, alike)
 
 
-def _shifted(problem: Problem, name: str, by: float) -> Problem:
+def _shifted(problem: Problem, name: str, by: float | Array) -> Problem:
     columns = {**problem.table.columns, name: problem.table.column(name) + by}
     return replace(problem, table=replace(problem.table, columns=MappingProxyType(columns)))
 

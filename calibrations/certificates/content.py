@@ -126,7 +126,10 @@ class Sample:
 
 @dataclass(frozen=True)
 class Figures:
-    """What a fit gives: results, errors, budget sources that nobody gave, trials of the simulation, remarks."""
+    """What a fit gives: results, errors, budget sources that nobody gave, trials of the simulation, remarks.
+
+    `correlations` has a row and a column for each of the results, in their order.
+    """
 
     model: str
     outcomes: tuple[Outcome, ...]
@@ -134,6 +137,7 @@ class Figures:
     not_given: tuple[str, ...]
     trials: int
     remarks: tuple[str, ...]
+    correlations: tuple[tuple[float, ...], ...]
 
 
 @dataclass(frozen=True)

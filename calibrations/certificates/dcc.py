@@ -103,6 +103,22 @@ def _measurement(c: Certificate) -> ET.Element:
     results.append(_outcomes("As left", "basic_measuredValue", c.figures.outcomes, c))
     if found := [(o, o.found[0]) for o in c.figures.outcomes if o.found is not None]:
         results.append(_as_found(found, c))
+    if len(c.figures.outcomes) > 1:
+        results.append(_correlations(c))
+    return result
+
+
+def _correlations(c: Certificate) -> ET.Element:
+    """A list for each result: its correlation coefficients with all of them, in the order of the results."""
+    result, data = _result("Correlation coefficients")
+    labels = " ".join(o.name for o in c.figures.outcomes)
+    for o, row in zip(c.figures.outcomes, c.figures.correlations, strict=True):
+        quantity = _in(data, "quantity")
+        _text(quantity, "name", o.name)
+        values = ET.SubElement(quantity, _si("realListXMLList"))
+        _si_in(values, "labelXMLList", labels)
+        _si_in(values, "valueXMLList", " ".join(f"{r:.6f}" for r in row))
+        _si_in(values, "unitXMLList", "\\one")
     return result
 
 

@@ -15,6 +15,7 @@ from calibrations.certificates.content import Error, Figures, Outcome, Simulated
 from calibrations.certificates.decision import Limit, decide
 from calibrations.certificates.monte_carlo import TRIALS, agrees, interval, simulate
 from calibrations.certificates.terms import name, term
+from calibrations.correlation import correlation
 from calibrations.errors import ModelError
 from calibrations.fit import Fit, cautiously, evaluate
 from calibrations.inputs import contributions
@@ -23,37 +24,51 @@ from calibrations.noise import rms
 from calibrations.pictures.view import mg, milli
 from calibrations.table import Array
 
-KINDS = ("poses", "positions")
+KINDS = ("poses", "positions", "rates")
 MISFIT = 1.05  # Birge ratio from which on it is told
 CERTAIN_K = 2.0  # coverage factor, where the degrees of freedom ask for no more
 
 
 def figures(found: Fit, before: Model | None, limits: Mapping[str, Limit], trials: int = TRIALS) -> Figures:
-    """All figures of a fit to poses or positions; `before` is the model in use until now, with values.
+    """All figures of a fit to poses, positions or rates; `before` is the model in use until now, with values.
 
     Raises ModelError for another kind of table, and where nothing is determined.
     """
-    if found.table.kind not in KINDS:
-        raise ModelError(
-            f"{found.table.source}: a certificate is drawn up for poses or positions, not for {found.table.kind}"
-        )
+    require_reference(found.table.source, found.table.kind)
     inputs = contributions(found.table)
     drawn = budget(found, inputs)
     trial = simulate(found, inputs, trials)
     weights = _weights(found)
     earlier = _values(before) if before is not None else {}
+    certified = [k for k, (_, e) in enumerate(_estimates(found.model)) if e.identified and e.std]
     outcomes = tuple(
         _outcome(k, each, e, drawn, trial[:, k], weights[k], found, earlier, limits)
         for k, (each, e) in enumerate(_estimates(found.model))
-        if e.identified and e.std
+        if k in certified
     )
     if not outcomes:
         raise ModelError(
             f"{found.table.source}: the data determine no parameter of {found.model.name}: nothing to certify"
         )
+    joint = correlation(found, drawn, inputs)[np.ix_(certified, certified)]
     return Figures(
-        found.model.name, outcomes, tuple(_errors(found, before)), drawn.not_given, trials, tuple(_remarks(found))
+        found.model.name,
+        outcomes,
+        tuple(_errors(found, before)),
+        drawn.not_given,
+        trials,
+        tuple(_remarks(found)),
+        tuple(map(tuple, joint.tolist())),
     )
+
+
+def require_reference(source: str, kind: str) -> None:
+    """Raises ModelError for a kind of data whose parameters could be traced to nothing: no reference is known."""
+    if kind not in KINDS:
+        raise ModelError(
+            f"{source}: a certificate is drawn up of poses, positions or rates, whose reference is known, and not "
+            f"of {kind}. Certify a sweep of the sensor (`rig run sweep`); `rig report` has what this one shows"
+        )
 
 
 def _estimates(model: Model) -> Iterator[tuple[Term, Estimate]]:

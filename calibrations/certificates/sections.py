@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from calibrations.certificates.content import Certificate, Outcome, Source
@@ -10,6 +11,7 @@ from calibrations.numerals import measured, minus, plain, unit
 
 MANY = 1e4  # degrees of freedom, told as no limit
 NEGLIGIBLE = 1e-3  # of the combined uncertainty
+WIDE = 10  # columns of a correlation matrix side by side
 HEAVIEST = 3  # poses that weigh most, named with a result
 METHOD = (
     "Terms and symbols as in IEEE Std 1293 (linear single-axis accelerometers) and IEEE Std 2700 (performance "
@@ -23,6 +25,10 @@ EXPANDED = (
 BUDGET = (
     "After the GUM (JCGM 100): type A from the noise of the data themselves, type B from what is stated of inputs "
     "that no data can show; effective degrees of freedom by Welch and Satterthwaite."
+)
+CORRELATED = (
+    "Results that follow from the same data are correlated: whoever computes something from several of them takes the "
+    "correlation coefficients into account (GUM 5.2.2)."
 )
 TRIALS = (
     "The propagation of distributions (GUM Supplement 1, JCGM 101) with {trials} trials is set beside the budget; "
@@ -193,10 +199,25 @@ def _uncertainty(c: Certificate) -> Section:
             else []
         ),
         TRIALS.format(trials=c.figures.trials),
+        *([CORRELATED] if len(c.figures.outcomes) > 1 else []),
     )
-    return Section(
-        "Uncertainty", words, (), (Table("Check by simulation", check, trials, (1, 2, 3, 4), False), *budgets)
-    )
+    checked = Table("Check by simulation", check, trials, (1, 2, 3, 4), False)
+    return Section("Uncertainty", words, (), (checked, *_correlations(c), *budgets))
+
+
+def _correlations(c: Certificate) -> Iterator[Table]:
+    """The lower triangles of the correlation matrix, as many columns at a time as a page is wide."""
+    names, r = [_name(o) for o in c.figures.outcomes], c.figures.correlations
+    for first in range(0, len(names) if len(names) > 1 else 0, WIDE):
+        columns = range(first, min(first + WIDE, len(names)))
+        head = ("", "quantity", *(f"{k + 1}" for k in columns))
+        rows = tuple(
+            (f"{i + 1}", names[i], *(minus(f"{r[i][k]:.2f}") if k <= i else "" for k in columns))
+            for i in range(first, len(names))
+        )
+        yield Table(
+            "Correlation coefficients" + (", continued" if first else ""), head, rows, (0, *range(2, 2 + len(columns)))
+        )
 
 
 def _traceability(c: Certificate) -> Section:

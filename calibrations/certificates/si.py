@@ -6,6 +6,7 @@ Source  D-SI metadata model (SmartCom), BIPM SI Brochure names.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 
 from calibrations.errors import DataError
@@ -19,6 +20,7 @@ SI: Mapping[str, tuple[float, Mapping[str, int]]] = {
     "h": (3600.0, {"second": 1}),
     "Hz": (1.0, {"hertz": 1}),
     "deg": (1.0, {"degree": 1}),
+    "deg/s": (1.0, {"degree": 1, "second": -1}),
     "m": (1.0, {"metre": 1}),
     "mg": (1e-3, {"metre": 1, "second": -2}),
     "g": (1.0, {"metre": 1, "second": -2}),
@@ -27,14 +29,15 @@ SI: Mapping[str, tuple[float, Mapping[str, int]]] = {
     "counts": (1.0, {}),
     "field": (1.0, {}),
 }
+PART = r"\([^)]*\)|[^/]+"  # of a unit; what is in brackets is one
 OF_GRAVITY = ("g", "mg")
 
 
 def in_si(unit: str, gravity_m_s2: float) -> tuple[float, str]:
     """The factor by which a value in `unit` is multiplied, and its D-SI unit. Raises DataError for an unknown one."""
     factor, powers = 1.0, dict[str, int]()
-    for place, part in enumerate((unit or "1").split("/")):
-        word, _, exponent = part.partition("^")
+    for place, part in enumerate(re.findall(PART, unit or "1")):
+        word, _, exponent = part.strip("()").partition("^")
         if word not in SI:
             raise DataError(f'the unit "{unit}" has no SI form here; convert the data to V, m/s^2, K, s or counts')
         sign = (int(exponent) if exponent else 1) * (-1 if place else 1)

@@ -28,6 +28,10 @@ TERMS: Mapping[str, str] = {
     "supply-sensitivity": "supply voltage sensitivity",
     "hysteresis": "hysteresis error",
     "dead-zone": "dead band",
+    "gyro-bias": "bias (zero-rate output)",
+    "gyro-scale-factor": "scale factor (sensitivity)",
+    "gyro-misalignment": "input axis misalignment",
+    "gyro-g-sensitivity": "acceleration-sensitive drift",
 }
 
 

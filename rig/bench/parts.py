@@ -102,6 +102,7 @@ class Uncertainty(Strict):
     repeat_std_deg: float | None = Field(default=None, ge=0)  # of a stage's angle, from pose to pose
     tilt_std_deg: float | None = Field(default=None, ge=0)  # of the base against the vertical
     mount_std_deg: float | None = Field(default=None, ge=0)  # of the sensor's edges against the table
+    rate_std: float | None = Field(default=None, ge=0)  # of a turning stage's speed, relative
     gravity_std_m_s2: float | None = Field(default=None, ge=0)
     gain_std: float | None = Field(default=None, ge=0)  # of the converter, relative
     offset_std_v: float | None = Field(default=None, ge=0)

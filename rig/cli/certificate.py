@@ -48,16 +48,20 @@ def command(
     is beyond its limit.
     """
     from calibrations.certificates.document import document
-    from calibrations.certificates.results import figures
+    from calibrations.certificates.results import figures, require_reference
     from calibrations.fit import fit
     from calibrations.model_file import read_model
     from rig.analysis.asked import asked
+    from rig.analysis.asked_still import is_still
     from rig.analysis.issue import Asked, issue, limits
     from rig.analysis.request import Request
     from rig.bench import read_bench
 
     paths = _paths(out)
+    if is_still(data):
+        require_reference(data, "still")
     table, given, effects = asked(Request(data, model, bench_file), note)
+    require_reference(table.source, table.kind)
     bench = read_bench(bench_file) if bench_file is not None else None
     earlier, of = given, Path(model).name
     if before is not None:

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from calibrations.budget import budget
 from calibrations.certificates.decision import decide
 from calibrations.certificates.monte_carlo import agrees, interval, simulate
 from calibrations.certificates.results import figures
 from calibrations.certificates.si import in_si
 from calibrations.certificates.terms import name, names, term
+from calibrations.correlation import correlation
 from calibrations.effect import catalogue
 from calibrations.errors import DataError, ModelError
 from calibrations.fit import fit
 from calibrations.inputs import contributions
 from calibrations.model_file import read_model
+from tests.calibrations import turned
 from tests.calibrations.certified import LIMITS, before, certificate, fitted, table
 
 BY_NAME = {o.name: o for o in certificate().figures.outcomes}
@@ -34,6 +39,46 @@ def test_the_budget_adds_up() -> None:
         assert (gain.kind, gain.std) == ("B", 1e-4)
         assert gain.contribution == pytest.approx(1e-4 * abs(o.value), rel=1e-3)  # all outputs larger by 1e-4
     assert "thermometer" in certificate().figures.not_given
+
+
+def test_correlations_are_those_of_the_propagation_of_distributions() -> None:
+    """Of what the gain does to all results, and of what noise does to each; 6000 trials scatter by 0.013 at most."""
+    trials = 6000
+    for given in (1e-4, 2e-6, 0.0):
+        found = fit(read_model("linear"), table(gain_std=given, tilt_std_deg=0.02))
+        inputs = contributions(found.table)
+        drawn = correlation(found, budget(found, inputs), inputs)
+        simulated = np.corrcoef(simulate(found, inputs, trials).T)
+        assert np.abs(drawn - simulated).max() < 4 / np.sqrt(trials)
+        assert np.diag(drawn) == pytest.approx(1)
+    assert np.array(certificate().figures.correlations) == pytest.approx(
+        correlation(fitted(), budget(fitted(), contributions(fitted().table)), contributions(fitted().table))
+    )
+
+
+def test_what_follows_from_two_results_is_as_certain_as_their_correlation_says() -> None:
+    """Zero-g offset, bias over scale factor: the gain, which both follow alike, does nothing to it (GUM 5.2.2)."""
+    found, (a, b) = fitted(), (BY_NAME["bias-x"], BY_NAME["scale-factor-x"])
+    i, k = (list(BY_NAME).index(o.name) for o in (a, b))
+    r = certificate().figures.correlations[i][k]
+    slopes = np.array([1 / b.value, -a.value / b.value**2]) * [a.std, b.std]
+    std = np.sqrt(slopes @ np.array([[1, r], [r, 1]]) @ slopes)
+    trial = simulate(found, contributions(found.table), 4000)
+    assert std == pytest.approx(np.std(trial[:, i] / trial[:, k]), rel=0.15)
+    assert std < 0.2 * np.linalg.norm(slopes)
+
+
+def test_a_gyroscope_is_certified_with_the_speed_of_its_stage() -> None:
+    turns = turned.gyroscope(4, noise=0.5)
+    turns = replace(turns, constants={"rate_std": 1e-3, "mount_std_deg": 0.1, "unit": "V"})
+    made = {o.name: o for o in figures(fit(read_model("gyroscope"), turns), None, {"gyro-bias-x": (2.0, 4.0)}).outcomes}
+    scale, bias = made["gyro-scale-factor-x"], made["gyro-bias-x"]
+    assert abs(scale.value - 16.0) < scale.expanded
+    assert next(s for s in scale.sources if s.name == "speed of the stage").contribution == pytest.approx(
+        0.016, rel=1e-3
+    )
+    assert next(s for s in bias.sources if s.name == "speed of the stage").contribution < 1e-3 * bias.std
+    assert (scale.term, bias.decision and bias.decision.statement) == ("scale factor (sensitivity)", "pass")
 
 
 def test_the_simulation_agrees_with_the_budget_where_the_model_is_straight() -> None:
@@ -111,7 +156,8 @@ def test_every_result_names_the_rows_behind_it() -> None:
     ("unit", "factor", "si"),
     [("V", 1.0, r"\volt"), ("V/g", 1 / 9.81, r"\volt\metre\tothe{-1}\second\tothe{2}"),
      ("V/g^2", 9.81**-2, r"\volt\metre\tothe{-2}\second\tothe{4}"), ("V/K", 1.0, r"\volt\kelvin\tothe{-1}"),
-     ("V/h", 1 / 3600, r"\volt\second\tothe{-1}"), ("1", 1.0, r"\one"), ("deg", 1.0, r"\degree"), ("", 1.0, r"\one")],
+     ("V/h", 1 / 3600, r"\volt\second\tothe{-1}"), ("1", 1.0, r"\one"), ("deg", 1.0, r"\degree"), ("", 1.0, r"\one"),
+     ("V/(deg/s)", 1.0, r"\volt\degree\tothe{-1}\second")],
 )  # fmt: skip
 def test_units_in_si(unit: str, factor: float, si: str) -> None:
     assert in_si(unit, 9.81) == (pytest.approx(factor), si)
@@ -120,7 +166,7 @@ def test_units_in_si(unit: str, factor: float, si: str) -> None:
 def test_what_cannot_be_certified_is_refused() -> None:
     with pytest.raises(DataError, match='the unit "furlong"'):
         in_si("furlong", 9.81)
-    rates = fit(read_model("linear"), table())
-    object.__setattr__(rates.problem.table, "kind", "rates")
-    with pytest.raises(ModelError, match="for poses or positions, not for rates"):
-        figures(rates, None, {})
+    shaken = fit(read_model("linear"), table())
+    object.__setattr__(shaken.problem.table, "kind", "motion")
+    with pytest.raises(ModelError, match="of poses, positions or rates.*and not of motion"):
+        figures(shaken, None, {})

@@ -20,6 +20,7 @@ import pytest
 import xmlschema
 
 from calibrations.certificates.dcc import dcc
+from calibrations.certificates.document import document
 from calibrations.certificates.html import html
 from calibrations.certificates.pdf import pdf
 from calibrations.certificates.sections import sections, verdict
@@ -69,6 +70,21 @@ def test_pydcc_reads_back_what_was_written(pydcc: Any, tmp_path: Path) -> None:
             pytest.approx(o.coverage, abs=1e-4),
             "0.95",
         )
+
+
+def test_correlations_are_in_every_form(pydcc: Any, tmp_path: Path) -> None:
+    c = certificate()
+    (tmp_path / "c.xml").write_text(dcc(c), encoding="utf-8")
+    read = pydcc(xml_file_name=str(tmp_path / "c.xml")).get_calibration_results("name")
+    rows = [found["realListXMLList"] for words, found in read if "Correlation" in words]
+    assert rows[0]["labelXMLList"].split() == ["bias-x", "bias-y", "scale-factor-x", "scale-factor-y"]
+    assert [[float(r) for r in row["valueXMLList"].split()] for row in rows] == [
+        pytest.approx(row, abs=1e-6) for row in c.figures.correlations
+    ]
+    page = html(c)
+    assert "Correlation coefficients" in page
+    assert f">{c.figures.correlations[1][0]:.2f}</td>" in page
+    assert document(c)["correlations"] == [list(row) for row in c.figures.correlations]
 
 
 def test_it_is_valid_by_the_schema_of_ptb() -> None:
