@@ -12,7 +12,7 @@ from calibrations.reports.words import capital, next_takes, next_words
 from rig.web.pages.model_own import Own
 from rig.web.pages.model_words import chances, formula
 from rig.web.parts import box, div, facts, failed, off_loop, waiting, words
-from rig.web.told import message
+from rig.web.told import for_page, message
 
 if TYPE_CHECKING:
     from rig.analysis.growing import Candidate, Diagnosis, Step
@@ -49,11 +49,11 @@ class Missing:
             hint = waiting(counted.told)
             bar = ui.linear_progress(0.0, show_value=False).props("aria-label='share of the round'")
 
-            def told() -> None:
+            def tell() -> None:
                 hint.set_text(counted.told)
                 bar.set_value(counted.share)
 
-            ui.timer(PROGRESS_S, told)
+            ui.timer(PROGRESS_S, tell)
             ui.button("Cancel", icon="close", on_click=self.page.cancel).props("dense flat")
             for _ in range(3):
                 ui.skeleton(height="58px").style("margin-top: 8px")
@@ -97,7 +97,7 @@ class Missing:
                 words("Nothing is missing: save the model, or see below what was tried.")
             elif result.residual_structure:
                 above = " What it may be, you can write above;" if self.own.box.visible else ""
-                words(f"Unexplained: {result.residual_structure}.{above} What was tried:")
+                words(for_page(f"Unexplained: {result.residual_structure}.{above} What was tried:"))
             else:
                 words("Nothing shows that an effect is missing; what was tried:")
 

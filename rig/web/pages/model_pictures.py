@@ -9,6 +9,7 @@ from nicegui import events, ui
 
 from calibrations.pictures.candidate import most_telling
 from calibrations.pictures.columns import Column
+from calibrations.pictures.view import rows_of
 from calibrations.pictures.waterfall import levels
 from rig.web.figures import motion
 from rig.web.figures.failure import failure
@@ -31,7 +32,7 @@ TITLES = {
     "measurement": "Measurement beside model",
     "residual": "What the model leaves",
     "failure": "Where it fails",
-    "waterfall": "The falling error; ◆ on poses that the fit did not see",
+    "waterfall": "The falling error",
 }
 FOLLOWED = "followed"  # the column that a candidate's curve follows
 POINTS = (
@@ -75,7 +76,9 @@ class Pictures:
     def _picture(self, name: str) -> None:
         with box("picture"):
             with div("title"):
-                words(TITLES[name])
+                title = words(TITLES[name])
+                if name == "waterfall":
+                    self.falling = title
                 if name == "residual":
                     self.considered = ui.button(icon="close", on_click=lambda: self.consider(None))
                     self.considered.props("flat dense size=sm icon-right=close").props(remove="icon")
@@ -93,6 +96,7 @@ class Pictures:
             self.selected = []
         self.fit, self.trail, self.step = fit, trail, None
         self.columns = choices(fit)
+        self.falling.set_text(f"{TITLES['waterfall']}; ◆ on {rows_of(fit.table)} that the fit did not see")
         x, colour = first_choices(list(self.columns))
         self._offer(fit.channels)
         self.unit.set_options(residual_units(fit), value=fit.table.kind == "positions" or bool(self.unit.value))
@@ -204,4 +208,4 @@ class Pictures:
         self.clear.set_visibility(bool(self.selected))
         self.leave.set_visibility(bool(self.selected) and self.leave_out is not None)
         self.told.set_text(shown.summary(self.selected) if self.selected else shown.thinned or
-                           "Draw a box in a picture to select poses in all of them.")  # fmt: skip
+                           f"Draw a box in a picture to select {rows_of(shown.fit.table)} in all of them.")  # fmt: skip

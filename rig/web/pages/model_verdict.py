@@ -8,6 +8,7 @@ from nicegui import ui
 
 from calibrations.reports.words import capital
 from rig.web.parts import box, div, words
+from rig.web.told import for_page
 
 if TYPE_CHECKING:
     from rig.analysis.growing import Diagnosis, Growing
@@ -45,7 +46,7 @@ class Verdict:
 
     def found(self, told: Words, result: Diagnosis) -> None:
         """The verdict."""
-        self.headline.set_text(_times(capital(told.verdict(result))))
+        self.headline.set_text(for_page(capital(told.verdict(result))))
         if caution := told.caution(result):
             self._tell(f"But {caution}. {self.detail.text}")
         self.box.classes(remove="good bad doubt", add=LOOKS[result.verdict])
@@ -57,9 +58,5 @@ class Verdict:
 
     def _tell(self, text: str) -> None:
         """A line; all of it when it is pointed at."""
-        self.detail.set_text(_times(text))
+        self.detail.set_text(for_page(text))
         self.whole.set_text(self.detail.text)
-
-
-def _times(text: str) -> str:
-    return text.replace(" x the noise", " × the noise").replace(" x that of", " × that of")

@@ -18,9 +18,11 @@ class OverTime:
     def __init__(self) -> None:
         self.run, self.last = "", -1
         self.courses: dict[str, Course] = {}
+        self.chosen = False  # a person has said of which kind
         with div("row-of"):
             self.kind = ui.select([], label="of", on_change=self.draw).props("dense options-dense")
             self.name = ui.select([], label="over time", on_change=self.draw).props("dense options-dense")
+        self.kind.on("update:model-value", self._choose)
         for select in (self.kind, self.name):
             select.style("min-width: 150px").set_visibility(False)
         self.place = div("")
@@ -29,7 +31,7 @@ class OverTime:
     async def follow(self, run: str) -> None:
         """Take in what is new of `run`."""
         if run != self.run:
-            self.run, self.last, self.courses, self.plot = run, -1, {}, None
+            self.run, self.last, self.courses, self.plot, self.chosen = run, -1, {}, None, False
             self.place.clear()
             self.kind.set_visibility(False)
             self.name.set_visibility(False)
@@ -44,18 +46,21 @@ class OverTime:
         self._offer()
         self.draw()
 
+    def _choose(self) -> None:
+        self.chosen = True
+
     def _offer(self) -> None:
-        """The kinds of poses and the quantities that there are; first those with most."""
+        """The kinds of poses and the quantities that there are; those with most until a person chooses."""
         kinds = {kind: kind or "poses" for kind in self.courses}
-        if list(kinds) != list(self.kind.options):
-            most = max(self.courses, key=lambda kind: len(self.courses[kind].parts))
-            value = self.kind.value if self.kind.value in kinds else most
+        most = max(self.courses, key=lambda kind: len(self.courses[kind].parts))
+        value = self.kind.value if self.chosen and self.kind.value in kinds else most
+        if (list(kinds), value) != (list(self.kind.options), self.kind.value):
             self.kind.set_options(kinds, value=value)
-            self.kind.set_visibility(len(kinds) > 1)
         names = self.courses[str(self.kind.value or "")].names
         if names != list(self.name.options):
             self.name.set_options(names, value=self.name.value if self.name.value in names else names[0])
-            self.name.set_visibility(True)
+        self.kind.set_visibility(len(kinds) > 1)
+        self.name.set_visibility(True)
 
     def draw(self) -> None:
         """The picture anew."""

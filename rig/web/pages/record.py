@@ -56,7 +56,7 @@ class Runs:
             self.table = ui.table(
                 rows=rows, columns=COLUMNS, row_key="name", selection="multiple", pagination=PAGE,
                 on_select=self._marked,
-            ).props("flat dense").on("rowClick", self._open)  # fmt: skip
+            ).props("flat dense wrap-cells").classes("runs").on("rowClick", self._open)  # fmt: skip
             self.table.bind_filter_from(search, "value")
         self.compare.disable()
 

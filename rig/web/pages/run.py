@@ -46,7 +46,7 @@ class Instruments:
 
     def __init__(self, bench: Bench) -> None:
         self.bench = bench
-        with box():
+        with box("stack"):
             words("Bench", "title")
             words(bench.name, "quiet small")
             for fault in expired(bench, datetime.now(UTC).date()):

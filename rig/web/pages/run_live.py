@@ -18,6 +18,7 @@ from rig.drawings import Attitude, page
 from rig.web.pages.over_time import OverTime
 from rig.web.parts import box, div, failed, off_loop, words
 from rig.web.strip import steer
+from rig.web.told import for_page
 
 LOOK_S = 0.4
 PHASES = {
@@ -143,7 +144,7 @@ class Live:
             if status.moving:
                 failed("Not at rest", "\n".join(status.moving))
             if status.error:
-                failed("Why it stands still" if status.phase == "paused" else "How it ended", status.error)
+                failed("Why it stands still" if status.phase == "paused" else "How it ended", _ended(status))
 
     def _ask(self, asked: Asked | None, here: bool) -> None:
         self.question.clear()
@@ -180,7 +181,7 @@ class Live:
         with self.values, ui.element("table").classes("plain-table"):
             for value in status.values:
                 with ui.element("tr"):
-                    for cell in (value["name"], value["shown"], _limits(value), value["remark"]):
+                    for cell in (value["name"], for_page(value["shown"]), _limits(value), for_page(value["remark"])):
                         with ui.element("td"):
                             words(cell)
                     with ui.element("td"):
@@ -192,8 +193,19 @@ class Live:
                 ui.html(_drawn(status.attitude), sanitize=False)
 
 
+def _ended(status: Status) -> str:
+    """Why; of a run that a person stopped on a page, what can be done on a page."""
+    if status.state == "stopped" and status.error.startswith("stopped by SIGTERM"):
+        return "Stopped by a person. Resume goes on where it was."
+    return status.error
+
+
 def _limits(value: Mapping[str, Any]) -> str:
-    return "" if value["limits"] is None else f"{value['limits'][0]:g} .. {value['limits'][1]:g}"
+    """The lowest and the highest that is allowed, in the value's own unit."""
+    if value["limits"] is None:
+        return ""
+    low, high = value["limits"]
+    return for_page(f"{low:g} to {high:g} {value['shown'].rpartition(' ')[2]}")
 
 
 def _drawn(attitude: Mapping[str, Any]) -> str:

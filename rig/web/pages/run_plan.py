@@ -18,12 +18,12 @@ from rig.planning.plan import Plan, plan
 from rig.planning.stretches import stretches
 from rig.room import free_bytes
 from rig.web.desk import Desk, lab_read
+from rig.web.pages.settings_words import label, written
 from rig.web.parts import box, div, facts, failed, off_loop, table, waiting, words
 from rig.web.told import message
 
 MOST_STRETCHES = 12
 FIRST = "sweep"
-UNITS = {"deg_s": "deg/s", "deg": "deg", "s": "s", "c": "°C", "hz": "Hz", "um": "µm"}  # ends of names, longest first
 
 
 class Planning:
@@ -72,7 +72,7 @@ class Planning:
         self.inputs: dict[str, Any] = {}
         with self.fields:
             for name, default in procedure.defaults.items():
-                field = _field(name, self.given.get(name, _written(default)), few.get(name, ()))
+                field = _field(name, self.given.get(name, written(default)), few.get(name, ()))
                 self.inputs[name] = field.on_value_change(self.replan)
         ui.timer(0.0, self.replan, once=True)
 
@@ -80,7 +80,7 @@ class Planning:
         """Those that are not as by default, as texts."""
         defaults = self.procedure.defaults
         texts = {name: str(field.value or "").strip() for name, field in self.inputs.items()}
-        return {name: text for name, text in texts.items() if text != _written(defaults[name])}
+        return {name: text for name, text in texts.items() if text != written(defaults[name])}
 
     async def replan(self) -> None:
         """What would be done now."""
@@ -146,29 +146,13 @@ def _show(found: Plan, bench: Bench) -> None:
 def _field(name: str, value: str, few: Sequence[str]) -> ui.select | ui.input:
     """One setting: a list where it takes one of a few texts."""
     if value in few:
-        return ui.select(list(few), label=_label(name), value=value).props("dense options-dense")
-    return ui.input(_label(name), value=value).props("dense debounce=300")
+        return ui.select(list(few), label=label(name), value=value).props("dense options-dense")
+    return ui.input(label(name), value=value).props("dense debounce=300")
 
 
 def _meaning(procedure: Procedure) -> str:
     """What the procedure says of its settings, by the names that they have on the page."""
     text = " ".join(inspect.cleandoc(procedure.function.__doc__ or "").split())
     for name in sorted(procedure.defaults, key=len, reverse=True):
-        text = text.replace(f"`{name}`", _label(name).partition(" (")[0]).replace(f"`{name}=", f"`{_label(name)} = ")
+        text = text.replace(f"`{name}`", label(name).partition(" (")[0]).replace(f"`{name}=", f"`{label(name)} = ")
     return text.replace("`", "")
-
-
-def _label(name: str) -> str:
-    """`step_deg` as `step (deg)`."""
-    unit = next((end for end in UNITS if name.endswith(f"_{end}")), "")
-    head = name.removesuffix(f"_{unit}").replace("_", " ")
-    return f"{head} ({UNITS[unit]})" if unit else head
-
-
-def _written(value: Any) -> str:
-    """A default as a text."""
-    if isinstance(value, (list, tuple)):
-        return ",".join(f"{part:g}" if isinstance(part, float) else str(part) for part in value)
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -19,6 +19,7 @@ from rig.web.desk import Desk
 from rig.web.frame import frame
 from rig.web.pages import left_out
 from rig.web.pages.over_time import OverTime
+from rig.web.pages.settings_words import label, written
 from rig.web.parts import box, div, facts, failed, off_loop, table, words
 from rig.web.told import message
 
@@ -38,6 +39,7 @@ def register(desk: Desk) -> None:
                     found, excluded = record.run(run), record.excluded(run)
             except Exception as error:
                 failed("No such run", message(error))
+                ui.link("All runs", "/record")
                 return
             OneRun(desk, found, excluded)
 
@@ -57,7 +59,7 @@ class OneRun:
                         words(line, "quiet small")
                 with box("stack"):
                     words("How it was made", "title")
-                    facts({name: str(value)[:SHOWN] for name, value in _made(run).items()})
+                    facts({name: value[:SHOWN] for name, value in _made(run).items() if value})
             with div("stack"):
                 with box("stack"):
                     words("Over time", "title")
@@ -143,7 +145,7 @@ class OneRun:
 
 def _results(run: Run) -> None:
     if not run.results:
-        words("It gave none." if run.state == "complete" else "It is not complete.", "quiet")
+        words("Its procedure gives none by itself." if run.state == "complete" else "It is not complete.", "quiet")
         return
     with ui.element("table").classes("plain-table"):
         for name, result in run.results.items():
@@ -158,10 +160,12 @@ def _results(run: Run) -> None:
                         words(result["verdict"], f"chip {LOOKS[result['verdict']]}")
 
 
-def _made(run: Run) -> dict[str, object]:
+def _made(run: Run) -> dict[str, str]:
     said = {role: " ".join(str(part) for part in each.values() if part) for role, each in run.identities.items()}
     why = {"message": run.message} if run.message else {}
-    return {"procedure": run.procedure, "bench or file": run.source, **why, **run.settings, **said, **run.constants}
+    settings = {label(name): written(value) for name, value in run.settings.items()}
+    known = {label(name): written(value) for name, value in run.constants.items()}
+    return {"procedure": run.procedure, "bench or file": run.source, **why, **settings, **said, **known}
 
 
 def _event(event: Event) -> tuple[str, str, str]:
