@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
+
 import numpy as np
 
 from calibrations.pictures.noise import COLOURS
@@ -24,7 +26,7 @@ def allan(found: ChannelFit, curve: Averaged, into: Scaled, candidate: ChannelFi
     tau_s = np.unique(np.round(steps)).astype(np.float64) / found.channel.rate_hz
     lines = [_line(tau_s, by * deviation(found, tau_s), "the model", MODEL, 1.6)]
     if len(found.effects) + len(found.lines) > 1:
-        lines += [_line(tau_s, by * np.sqrt(v), n, COLOURS.get(n, OTHER), 0.9) for n, v in parts(found, tau_s).items()]
+        lines += list(_parts(parts(found, tau_s), tau_s, by))
     if candidate is not None:
         lines.append(_line(tau_s, by * deviation(candidate, tau_s), "with the candidate", CANDIDATE, 2.6))
     label = f"Allan deviation ({into.unit})"
@@ -42,6 +44,16 @@ def ratio(curve: Averaged, axis: str) -> Figure:
     shapes = [{**band(0.0), "type": "line", "y0": 1.0, "y1": 1.0, "line": {"width": 1.4, "color": MODEL}}]
     more = {"xaxis": decades()["xaxis"], "yaxis": y, "shapes": shapes, "dragmode": "zoom"}
     return figure([dots], TIME, "measured / model", f"ratio {axis}", **more)
+
+
+def _parts(variances: Mapping[str, Array], tau_s: Array, by: float) -> Iterator[Trace]:
+    """Thin lines, each with its name where it is the largest share of the whole."""
+    whole = sum(variances.values(), np.zeros(len(tau_s)))
+    for name, variance in variances.items():
+        at, colour = int(np.argmax(variance / whole)), COLOURS.get(name, OTHER)
+        place = "top right" if at < len(tau_s) / 2 else "top left"
+        text = {"text": [name if k == at else "" for k in range(len(tau_s))], "textposition": place}
+        yield _line(tau_s, by * np.sqrt(variance), name, colour, 0.9) | {"mode": "lines+text", **text}
 
 
 def _measured(curve: Averaged, by: float) -> Trace:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rig.analysis.course import Course
-from rig.web.figures.style import MEASURED, UNSEEN, Figure, Trace, figure
+from rig.web.figures.style import CANDIDATE, MEASURED, Figure, Trace, figure
 
 LENGTHS = ((10800.0, 3600.0, "h"), (300.0, 60.0, "min"), (-1.0, 1.0, "s"))  # longer than, unit, its name
 BAND = {"line": {"width": 0}, "hoverinfo": "skip", "type": "scatter", "mode": "lines"}
@@ -16,7 +16,7 @@ def series(course: Course, name: str) -> Figure:
     length = t_s[-1] - t_s[0] if t_s else 0.0
     size, unit = in_time(length)
     at = [t / size for t in t_s]
-    colour = UNSEEN if name == "temperature" else MEASURED
+    colour = CANDIDATE if name == "temperature" else MEASURED
     label = "temperature (°C)" if name == "temperature" else f"{name} (V)"
     look: Trace = {"mode": "lines+markers" if len(at) < FEW else "lines", "line": {"width": 1.4, "color": colour}}
     told = f"%{{y:.6g}} at %{{x:.4g}} {unit}<extra></extra>"

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from calibrations.pictures.style import AMBER, BLUE, GREEN, QUIET, VERMILION
+from calibrations.pictures.style import AMBER, BLUE, QUIET, VERMILION
 
 Figure = dict[str, Any]
 Trace = dict[str, Any]
 
 MEASURED, MODEL, CANDIDATE = BLUE, QUIET, VERMILION
-GOOD, BAD, UNSEEN = GREEN, VERMILION, AMBER
+GOOD, UNSEEN = "#007a5a", AMBER  # green with white words on it
 FLOOR = "rgba(128,138,150,0.22)"
-EDGE = "rgba(110,120,130,0.55)"
+EDGE = "rgba(105,115,125,0.9)"  # tells pale and dark dots from white and dark paper
 VALUES = [[0.0, "#414487"], [0.25, "#2a788e"], [0.5, "#22a884"], [0.75, "#7ad151"], [1.0, "#e3c51a"]]  # viridis' middle
 SIGNED = [[0.0, "#00456b"], [0.3, BLUE], [0.5, "#ece8df"], [0.7, VERMILION], [1.0, "#7a3300"]]
 CONFIG = {
