@@ -29,4 +29,4 @@ def message(error: Exception) -> str:
 def for_page(text: str) -> str:
     """A sentence of the command line with the signs that a terminal may not have: −, ±, ×, °C."""
     signs = re.sub(r"(?<![\w.)\]-])-(?=\d)", "−", text.replace(" +- ", " ± "))
-    return re.sub(r"(?<=\d) x (?=the |that |its )", " × ", re.sub(r"(?<=\d) C\b", " °C", signs))
+    return re.sub(r"(?<=\d) x (?=the |that |its )", " × ", re.sub(r"(?<=\d) (deg)?C\b", " °C", signs))

@@ -21,6 +21,7 @@ import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
 
 SIZE = {"width": 1280, "height": 720}
+TABLET = {"width": 768, "height": 1024}
 PATIENCE_MS = 30_000
 TOO_LATE = "Resize must be passed a displayed plot"  # NiceGUI resizes a picture that was just taken away
 expect.set_options(timeout=PATIENCE_MS)
@@ -51,6 +52,11 @@ class Workbench:
     def shot(self, page: Page, name: str) -> None:
         """Keep a picture of the page."""
         page.screenshot(path=self.shots / f"{name}.png")
+
+    def fits(self, page: Page) -> None:
+        """Held upright, a tablet shows the whole width of the page."""
+        page.set_viewport_size(TABLET)
+        page.wait_for_function("document.documentElement.scrollWidth <= innerWidth")
 
     def _look(self, url: str) -> None:
         if not url.startswith((self.origin, self.origin.replace("http", "ws"), "data:", "blob:")):

@@ -60,6 +60,7 @@ def test_a_hidden_effect_is_found_added_saved_and_undone(workbench: Workbench, t
     model = read_model(workbench.home / "models" / "sensor-17.yaml")
     assert model.effects == ("bias", "scale-factor", "axis-misalignment")
     workbench.shot(page, "nothing-missing")
+    workbench.fits(page)
     page.close()
     page = looked_at(workbench, data, "Nothing is missing")  # opened again, it is as it was left
     page.get_by_role("button", name="Undo axis-misalignment").click()

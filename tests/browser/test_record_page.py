@@ -36,6 +36,7 @@ def test_runs_are_searched_and_one_is_opened_and_noted(workbench: Workbench, run
     page = workbench.visit("/record")
     expect(page.get_by_role("cell", name=runs[0])).to_be_visible()
     workbench.shot(page, "record")
+    workbench.fits(page)
     page.get_by_label("Search").fill(runs[2])
     expect(page.get_by_role("row")).to_have_count(2)
     page.get_by_role("cell", name=runs[2]).click()
@@ -64,6 +65,7 @@ def test_two_runs_are_compared(workbench: Workbench, runs: list[str]) -> None:
     page.keyboard.press("g")
     expect(label).to_have_text("second − first, y (mg)")
     workbench.shot(page, "compared")
+    workbench.fits(page)
     expect(page.locator(".chosen .title").first).to_have_text(runs[0])  # the older one
     page.get_by_role("button", name="Swap").click()
     expect(page.locator(".chosen .title").first).to_have_text(runs[1])

@@ -38,6 +38,7 @@ def test_a_newcomer_gets_from_the_empty_record_to_the_falling_error(workbench: W
     page.get_by_role("button", name="Start").click()
     phase(page, "running")
     expect(page.locator(".values").get_by_text("as usual").first).to_be_visible()
+    expect(page.get_by_role("cell", name="−20 to 85 °C")).to_be_visible()
     expect(page.get_by_role("button", name="Stop").first).to_be_visible()
     workbench.shot(page, "running")
     phase(page, "complete")
@@ -49,8 +50,11 @@ def test_a_newcomer_gets_from_the_empty_record_to_the_falling_error(workbench: W
 def test_a_run_is_paused_left_alone_opened_again_and_stopped(workbench: Workbench) -> None:
     page = started(workbench, NIGHT)
     phase(page, "running")
+    expect(page.locator(".live .q-select").first).to_contain_text("hold")  # what there is most of
+    expect(page.get_by_label("over time", exact=True)).to_be_visible()
     page.get_by_role("button", name="Pause").first.click()
     phase(page, "paused")
+    workbench.fits(page)
     page.close()
     page = workbench.visit("/record")  # the run is in the head of every page
     page.get_by_role("link", name="soak").first.click()
@@ -60,6 +64,7 @@ def test_a_run_is_paused_left_alone_opened_again_and_stopped(workbench: Workbenc
     phase(page, "running")
     page.get_by_role("button", name="Stop").first.click()
     phase(page, "stopped")
+    expect(page.get_by_text("Stopped by a person. Resume goes on where it was.")).to_be_visible()
     expect(page.get_by_role("button", name="Resume")).to_be_visible()
     expect(page.get_by_role("button", name="Stop")).to_have_count(0)
     with Record() as record:
