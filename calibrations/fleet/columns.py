@@ -125,11 +125,12 @@ def _derivatives(found: Fit, effect: Effect) -> Iterator[Group]:
 
 
 def _patterns(found: Fit) -> Iterator[Group]:
-    """Those that angles and the order of rows can show: they are the same for all sensors of a design."""
+    """Of poses those that angles and the order of rows can show: they are the same for all sensors of a design."""
     table = found.table
-    chosen = [name for name in (*ANGLES, *table.output_names) if name in table]
-    alone = Table.from_columns(table.kind, {name: table.column(name) for name in chosen})
-    return (Group("", k, each.columns) for k, each in enumerate(patterns(alone, found.channels)))
+    if table.kind == "poses":
+        chosen = [name for name in (*ANGLES, *table.output_names) if name in table]
+        table = Table.from_columns(table.kind, {name: table.column(name) for name in chosen})
+    return (Group("", k, each.columns) for k, each in enumerate(patterns(table, found.channels)))
 
 
 def _trials(found: Fit, groups: list[Group]) -> float:

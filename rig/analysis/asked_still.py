@@ -113,18 +113,22 @@ def _is_noise(model: Model | None) -> bool:
 
 
 def _has_channels_alone(path: Path) -> bool:
-    """Whether a table has times or a rate, outputs of a sensor, and nothing that says how it was held."""
-    stated, names = _beginning(path)
+    """No more of a file is read than its header, whatever it is."""
+    with path.open(encoding="utf-8", errors="replace") as file:
+        return channels_alone(file.read(LONGEST_BEGINNING))
+
+
+def channels_alone(beginning: str) -> bool:
+    """Whether the text of a table has times or a rate, outputs of a sensor, and nothing that says how it was held."""
+    stated, names = _beginning(beginning.splitlines())
     given = set(names)
     timed = "t_s" in given or "sample_rate_hz" in stated
     channels = given - set(BESIDE)
     return timed and bool(channels) and channels <= CHANNELS and not any(each <= given for each in TRIADS)
 
 
-def _beginning(path: Path) -> tuple[set[str], list[str]]:
-    """(constants above a table's header, names in the header). No more is read than they need, whatever the file is."""
-    with path.open(encoding="utf-8", errors="replace") as file:
-        lines = file.read(LONGEST_BEGINNING).splitlines()
+def _beginning(lines: list[str]) -> tuple[set[str], list[str]]:
+    """(constants above a table's header, names in the header)."""
     above = list(takewhile(lambda line: line.startswith("#"), lines))
     header = lines[len(above)] if len(lines) > len(above) else ""
     names = [name.strip().strip('"') for name in header.replace(";", ",").replace("\t", ",").split(",")]

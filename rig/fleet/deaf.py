@@ -19,5 +19,4 @@ class Deaf(WorkerPlugin):
 
     def setup(self, worker: Worker) -> None:  # noqa: ARG002 Dask calls it so
         hush()
-        logging.disable(logging.WARNING)  # the command has warned already
         signal.signal(signal.SIGINT, signal.SIG_IGN)

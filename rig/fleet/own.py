@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from calibrations.effect import Effect, catalogue
+from calibrations.effect import LOG, Effect, catalogue
 from rig.analysis.asked import effects_of as checked
 
 Own = tuple[tuple[str, str], ...]  # names and texts of Python files
@@ -33,4 +34,13 @@ def effects_of(own: Own) -> Mapping[str, Effect]:
     with TemporaryDirectory(prefix="effects-") as folder:
         for name, text in own:
             Path(folder, name).write_text(text, encoding="utf-8")
-        return catalogue(Path(folder))
+        LOG.addFilter(_silent)
+        try:
+            return catalogue(Path(folder))
+        finally:
+            LOG.removeFilter(_silent)
+
+
+def _silent(_: logging.LogRecord) -> bool:
+    """That files of one's own are run is said once, of the folder that one named."""
+    return False

@@ -23,6 +23,7 @@ from calibrations.reading.read_csv import parse_csv
 from calibrations.reports.words import joined
 from calibrations.table import Table
 from rig.analysis.asked import DEFAULTS, check_unit
+from rig.analysis.asked_still import LONGEST_BEGINNING, channels_alone
 from rig.analysis.data import averaged
 from rig.analysis.sensors import CALIBRATING
 from rig.errors import RigError
@@ -94,11 +95,7 @@ def model_of(asked: Question) -> Model:
 def _checked(table: Table, model: Model) -> Table:
     """The table, where a fleet may hold it against the model. Raises DataError, ModelError."""
     if table.kind not in CALIBRATING:
-        instead = "noise" if table.kind == "still" else "discover"
-        raise DataError(
-            f"{table.source}: is a table of {table.kind}, and fleets have {joined(list(CALIBRATING))}; leave it out, "
-            f"and ask for it alone: rig {instead} {table.source}"
-        )
+        raise DataError(_instead(table.source, table.kind))
     if not model.for_table(table).terms:
         raise ModelError(
             f"{table.source}: {model.name} is no model of {table.content}; make these sensors a fleet of their own, "
@@ -108,9 +105,19 @@ def _checked(table: Table, model: Model) -> Table:
     return table
 
 
+def _instead(source: str, kind: str) -> str:
+    command = "noise" if kind == "still" else "discover"
+    return (
+        f"{source}: is a table of {kind}, and fleets have {joined(list(CALIBRATING))}; leave it out, and ask for it "
+        f"alone: rig {command} {source}"
+    )
+
+
 def _read(task: Task) -> Table:
     """Raises DataError, RecordError."""
     if task.text is not None:
+        if channels_alone(task.text[:LONGEST_BEGINNING]):
+            raise DataError(_instead(task.data, "still"))
         return averaged(parse_csv(task.text, task.data), _nobody)
     from rig.record.measured import table_of
     from rig.record.store import Record
