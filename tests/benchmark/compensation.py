@@ -15,7 +15,14 @@ from tests.calibrations.compiled import build, written
 from tests.calibrations.fitted import LINEAR, PHYSICAL, model
 from tests.calibrations.test_compensation import EVERYTHING
 
-MODELS = {"linear": LINEAR, "physical": PHYSICAL, "every effect that bends": EVERYTHING}
+SLIPS = {"hysteresis": {"height": (0.003, 0.002), "reach": 0.1, "spread": 0.5, "pressing": 0.4}}
+MODELS = {
+    "linear": LINEAR,
+    "physical": PHYSICAL,
+    "every effect that bends": EVERYTHING,
+    "linear with hysteresis": LINEAR | SLIPS,
+    "physical with hysteresis": PHYSICAL | SLIPS,
+}
 SAMPLES, REPEATS = 1_000_000, 5
 TIMER = f"""#define _POSIX_C_SOURCE 199309L
 #include "sensor.h"
@@ -58,7 +65,9 @@ def _measured(values: Any, precision: str, compiler: str) -> dict[str, Any]:
     with TemporaryDirectory() as name:
         folder = Path(name)
         sources = [path for path in written(made, folder) if "self_test" not in path.name]
-        (folder / "timer.c").write_text(TIMER)
+        remembering = TIMER.replace("static sensor_input", "sensor_memory memory = {0};\n    static sensor_input")
+        remembering = remembering.replace("&in[i & 255])", "&in[i & 255], &memory)")
+        (folder / "timer.c").write_text(remembering if made.forward.memory else TIMER)
         timer = build(compiler, [*sources, folder / "timer.c"], folder / "timer")
         ns = float(subprocess.run([str(timer)], capture_output=True, text=True, check=True).stdout)
         return {"ns": round(ns, 1), "code_bytes": _code_bytes(compiler, folder), "steps": made.bound.steps,
