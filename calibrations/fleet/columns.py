@@ -1,11 +1,11 @@
 """What candidate effects and patterns could add to a residual, made once for all sensors that share a design.
 
 Derivatives of the residual cost more than all that is done with them, and at the same poses they are nearly the same
-for every sensor: an effect on pose or force goes with the range of the output, the others do not depend on the sensor
-to first order. So they are made for the first sensor of a design and scaled for the others. An effect that needs
-columns beside the angles (time, temperature), or constants of the table, is shared only by sensors for which these are
-the same. Only poses are a design: of positions and rates the outputs themselves tell how a sensor stood, and nothing is
-shared.
+for every sensor: an effect on pose or force goes with the range of the output, one of transduction does not depend on
+the sensor. So they are made for the first sensor of a design and scaled for the others; who came first hardly makes a
+difference. An effect that needs columns beside the angles (time, temperature), or constants of the table, is shared
+only by sensors for which these are the same, and one on the output by none. Only poses are a design: of positions and
+rates the outputs themselves tell how a sensor stood, and nothing is shared.
 
 An effect whose start is searched for in the data itself (`Effect.searched`) is left out: it would have to be refitted.
 """
@@ -24,6 +24,7 @@ from calibrations.problem import Problem
 from calibrations.search.candidates import askable
 from calibrations.search.patterns import patterns
 from calibrations.search.screen import Screen, Search
+from calibrations.search.structure import without_slow
 from calibrations.table import Array, Table
 
 ANGLES = ("alpha_deg", "beta_deg", "direction", "mount_deg", "flip")
@@ -80,6 +81,8 @@ class Shared:
         return Groups(tuple(groups), _once(self._trials, search, lambda: _trials(found, groups)))
 
     def _effect(self, found: Fit, effect: Effect) -> tuple[Group, ...]:
+        if effect.output is not None:
+            return tuple(_derivatives(found, effect))
         constants = np.array([float(constant(found.table)) for constant in effect.constants.values()])
         key = (effect.name, constants.tobytes(), *_key(found.table, effect.needs))
         return _once(self._groups, key, lambda: tuple(_derivatives(found, effect)))
@@ -134,5 +137,6 @@ def _patterns(found: Fit) -> Iterator[Group]:
 
 
 def _trials(found: Fit, groups: list[Group]) -> float:
-    screen = Screen(found)
+    """To how many independent tests the search amounts under white noise, whatever else the first sensor has."""
+    screen = Screen(without_slow(found))
     return Search(screen, [screen.basis(group.of(found.table)) for group in groups]).trials
