@@ -17,6 +17,7 @@ from calibrations.chain import backward
 from calibrations.fit import Fit, evaluate, fit
 from calibrations.model import Model
 from calibrations.noise import rms
+from calibrations.numerals import stretch
 from calibrations.search.candidates import SIGNIFICANT
 from calibrations.search.share import MATERIAL, MOST_NOISE
 from calibrations.table import MILLI, Array, Table
@@ -62,7 +63,7 @@ class Place:
         else:
             unit = WORDS[self.where][1]
             place = f"{self.where} {self.low:g} {unit}" if self.low == self.high else (
-                f"{self.where} {self.low:.6g} to {self.high:.6g} {unit}"
+                f"{self.where} {stretch(self.low, self.high)} {unit}"
             )  # fmt: skip
         mg = 1e3 * self.mean / self.scale
         own = f"{1e3 * self.mean:+.3g} mV" if self.unit == "V" else f"{self.mean:+.3g} {self.unit}"

@@ -44,6 +44,12 @@ def plain(value: float, digits: int = 3) -> str:
     return minus(f"{value / 10.0**power:.{digits - 1}f}") + times_ten_to(power)
 
 
+def stretch(low: float, high: float) -> str:
+    """Where something is, to a hundredth of its length: `22.32 to 23.13`, `30 to 150`."""
+    decimals = max(1, 1 - exponent(high - low)) if high > low else 6
+    return f"{round(low, decimals):.10g} to {round(high, decimals):.10g}"
+
+
 def chance(p: float) -> str:
     """A p-value or a probability: `0.02`, `7 × 10⁻¹¹`, `below 10⁻³⁰⁰`."""
     if p < 1e-300:

@@ -18,7 +18,7 @@ from calibrations.effect import catalogue
 from calibrations.experiment import Experiment
 from calibrations.model import Estimate, Model, Term
 from calibrations.model_file import read_model
-from calibrations.numerals import chance, measured, minus, plain, unit
+from calibrations.numerals import chance, measured, minus, plain, stretch, unit
 from calibrations.pictures.album import Picture
 from calibrations.pictures.view import pooled_mg
 from calibrations.reports.report import report
@@ -286,3 +286,17 @@ def test_plain_numbers_have_three_digits(value: float, shown: str) -> None:
 def test_chances_and_units() -> None:
     assert [chance(p) for p in (1.0, 0.0187, 9.7e-12, 0.0)] == ["1", "0.019", "1 × 10⁻¹¹", "below 10⁻³⁰⁰"]
     assert [unit(u) for u in ("V/g^2", "1", "degC", "V")] == ["V/g²", "", "°C", "V"]
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "shown"),
+    [
+        (22.3153, 23.1252, "22.32 to 23.13"),
+        (30.0, 150.0, "30 to 150"),
+        (0.4995, 12.4995, "0.5 to 12.5"),
+        (4.99981, 5.00012, "4.99981 to 5.00012"),
+        (3.0, 3.0, "3 to 3"),
+    ],
+)
+def test_a_stretch_has_a_hundredth_of_its_length(low: float, high: float, shown: str) -> None:
+    assert stretch(low, high) == shown
