@@ -86,7 +86,7 @@ def test_pages_read_the_lab_and_show_no_password(run: str, reader: str, tmp_path
 
 
 def test_a_password_in_the_words_of_a_command_is_refused(rig: Rig, reader: str) -> None:
-    for words in (("web", "--record", reader), ("runs", "--record", reader), ("push", "--to", reader)):
+    for words in (("runs", "--record", reader), ("push", "--to", reader), ("web", "--record", reader)):
         ended = rig(*words)
         assert (ended.status, ended.out) == (2, "")
         assert "everybody on this machine can read the words of a command" in ended.err
