@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import fields
 from functools import lru_cache
+from sys import intern
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,7 @@ def read_look(document: dict[str, Any]) -> Look:
     """The look that was written."""
     said = dict(document)
     stage = said.pop("stage")
-    scores = tuple(Score(**_arrays(score)) for score in said.pop("scores"))
+    scores = tuple(Score(**_arrays(score) | {"effect": intern(score["effect"])}) for score in said.pop("scores"))
     names = _one(tuple(tuple(name) for name in said.pop("names")))
     k = len(stage["names"])
     return Look(
