@@ -69,13 +69,17 @@ def whiten(columns: Array, gap_s: Array, white: Array, slow: Array, tau_s: Array
                 gain[p] += P[p, q]
             total += gain[p]
         scale = 1.0 / np.sqrt(total)
+        ahead = out[i]  # row by row, so that a step goes over all columns at once
+        ahead[:] = columns[i]
+        for p in range(m):
+            for j in range(k):
+                ahead[j] -= state[p, j]
+        for p in range(m):
+            share = gain[p] / total
+            for j in range(k):
+                state[p, j] += share * ahead[j]
         for j in range(k):
-            innovation = columns[i, j]
-            for p in range(m):
-                innovation -= state[p, j]
-            out[i, j] = innovation * scale
-            for p in range(m):
-                state[p, j] += gain[p] / total * innovation
+            ahead[j] *= scale
         for p in range(m):
             for q in range(m):
                 P[p, q] -= gain[p] * gain[q] / total
