@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -22,6 +23,8 @@ from calibrations.table import Array, Table
 from calibrations.turning import rate_deg_s
 
 Step = tuple[Effect, Values]
+
+NOTHING = np.zeros((1, 3))
 
 
 @dataclass(frozen=True)
@@ -35,6 +38,7 @@ class Pose:
     up: Array
 
 
+@lru_cache(maxsize=2)
 def nominal_pose(table: Table) -> Pose:
     """The pose that the stages report; level where a table of motion does not say."""
     return Pose(
@@ -59,16 +63,27 @@ def specific_force(pose: Pose) -> Array:
 
 def force(table: Table, steps: Sequence[Step]) -> Array:
     """Specific force along the sensing axes, g, shape (n, 3); of a gyroscope the angular rate, deg/s."""
+    return sensed(static_force(table, steps), table, steps)
+
+
+def static_force(table: Table, steps: Sequence[Step]) -> Array:
+    """The same along the reference axes."""
     if table.kind == "rates":
-        return sensed(rate_deg_s(table), table, steps)
-    pose = nominal_pose(table)
+        return rate_deg_s(table)
+    pose = nominal = nominal_pose(table)
     for effect, p in steps:
         if effect.pose is not None:
             pose = effect.pose(pose, table, p)
-    a = specific_force(pose)
+    a = _reported(table).copy() if pose is nominal else specific_force(pose)
     if table.kind == "motion":  # along the sensor's reference edge x, Ang V
         a[:, 0] += table.column("acceleration_m_s2") / table.gravity_m_s2
-    return sensed(a, table, steps)
+    return a
+
+
+@lru_cache(maxsize=2)
+def _reported(table: Table) -> Array:
+    """Static specific force at the poses that the stages report, g, shape (n, 3)."""
+    return specific_force(nominal_pose(table))
 
 
 def sensed(a: Array, table: Table, steps: Sequence[Step]) -> Array:
@@ -81,10 +96,19 @@ def sensed(a: Array, table: Table, steps: Sequence[Step]) -> Array:
 
 def respond(a: Array, table: Table, steps: Sequence[Step]) -> Array:
     """Output of all three axes to the specific force `a` along the sensing axes, shape (n, 3)."""
-    v = np.zeros_like(a)
-    for effect, p in steps:
-        if effect.transduction is not None:
-            v += effect.transduction(a, table, p)
+    return converted(added(a, table, steps), len(a), table, steps)
+
+
+def added(a: Array, table: Table, steps: Sequence[Step]) -> list[Array]:
+    """What each effect adds to the output of all three axes, shape (n, 3) each; zeros, (1, 3), where nothing."""
+    return [effect.transduction(a, table, p) if effect.transduction else NOTHING for effect, p in steps]
+
+
+def converted(parts: Sequence[Array], n: int, table: Table, steps: Sequence[Step]) -> Array:
+    """The sum of the parts as it is read out, shape (n, 3)."""
+    v = np.zeros((n, 3))
+    for part in parts:
+        v += part
     if table.kind == "motion":
         v = sampled(v, table)
     for effect, p in steps:

@@ -27,7 +27,7 @@ STRAIGHT = 1e-6  # of what is left: a step that foretells it better is a linear 
 SMALL_GAIN = 1e-6  # of a sum of squares whose unit is the noise
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Fit:
     """A model fitted to a table. `residual` has shape (channels, n), rows in order of time.
 

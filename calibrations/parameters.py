@@ -102,20 +102,27 @@ class Layout:
 
     def steps(self, theta: Array) -> list[Step]:
         """Effects with their named values, in the order of the signal chain."""
-        named: list[dict[str, Array]] = [
-            {name: np.asarray(value) for name, value in term.constants.items()} for term in self.model.terms
-        ]
-        for i, term in enumerate(self.model.terms):
-            named[i] |= {p.name: np.zeros(3 if p.per_axis else ()) for p in term.effect.parameters}
-        for value, slot in zip(theta, self.slots, strict=True):
-            values, name = named[slot.term], slot.parameter.name
-            if not slot.parameter.per_axis:
-                values[name] = np.asarray(value)
-            elif slot.axis:
-                values[name][AXES.index(slot.axis)] = value
+        return [(term.effect, self.values(i, theta)) for i, term in enumerate(self.model.terms)]
+
+    def values(self, i: int, theta: Array) -> dict[str, Array]:
+        """The named values of one of the model's terms."""
+        term = self.model.terms[i]
+        named = {name: np.asarray(value) for name, value in term.constants.items()}
+        named |= {p.name: np.zeros(3 if p.per_axis else ()) for p in term.effect.parameters}
+        for k in self._entries[i]:
+            name, axis = self.slots[k].parameter.name, self.slots[k].axis
+            if not self.slots[k].parameter.per_axis:
+                named[name] = np.asarray(theta[k])
+            elif axis:
+                named[name][AXES.index(axis)] = theta[k]
             else:
-                values[name] = np.full(3, value)
-        return [(term.effect, values) for term, values in zip(self.model.terms, named, strict=True)]
+                named[name] = np.full(3, theta[k])
+        return named
+
+    @cached_property
+    def _entries(self) -> list[list[int]]:
+        """The entries of each term."""
+        return [[k for k, slot in enumerate(self.slots) if slot.term == i] for i in range(len(self.model.terms))]
 
     def of_effect(self, name: str) -> NDArray[np.bool_]:
         """Mask of the entries that belong to one effect, shape (p,)."""

@@ -15,10 +15,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrations.chain import Step, backward, force, forward
+from calibrations.chain import Step, backward, forward
 from calibrations.errors import DataError, ModelError, TooFewRows
 from calibrations.model import Model
 from calibrations.motion.stretches import Stretches, stretches
+from calibrations.near import Near
 from calibrations.noise import Processes
 from calibrations.noise_estimation.mean_noise import norm_std, white_std
 from calibrations.noise_estimation.scatter import scatter
@@ -81,14 +82,14 @@ class Problem:
 
     def residual_by(self, steps: Sequence[Step]) -> Array:
         """As `residual`, of effects with their values: those of the model, and what else one wants to try."""
-        if isinstance(self.table, Stretches):
-            samples = self.table.samples
-            return self.table.parts(samples.outputs - forward(samples, steps))
-        if self.table.kind in KNOWN:
-            error = self.table.outputs - forward(self.table, steps)
-        else:
-            error = np.linalg.norm(backward(self.table, steps), axis=1)[:, None] - 1.0
-        return error.T * self._share(steps)
+        if self.table.kind == "positions":
+            return (np.linalg.norm(backward(self.table, steps), axis=1) - 1.0)[None] * self._share(steps)
+        samples = self.table.samples if isinstance(self.table, Stretches) else self.table
+        return self._reduced(samples.outputs - forward(samples, steps))
+
+    def _reduced(self, error: Array) -> Array:
+        """An error of each axis, shape (n, axes), by channel."""
+        return self.table.parts(error) if isinstance(self.table, Stretches) else error.T
 
     def _share(self, steps: Sequence[Step]) -> float:
         """What a residual is given in: the field's strength as the outputs show it, whatever the model makes of it.
@@ -131,29 +132,20 @@ class Problem:
 
         An entry of an effect that only adds to the output changes that effect's contribution and nothing else.
         """
-        terms = self.layout.model.terms
-        if self.rounds and not stairs:
-            return self._errors_beside_stairs
-        if self.table.kind not in KNOWN or any(term.effect.output for term in terms):
+        if self.table.kind == "positions":
             return lambda _, vector: self.residual(vector)
-        a = force(self.table, self.layout.steps(theta))
+        samples = self.table.samples if isinstance(self.table, Stretches) else self.table
+        steps = self.layout.steps(theta)
+        even = [i for i, (effect, _) in enumerate(steps) if stairs or not effect.rounds]
+        near, beside_stairs = Near(samples, steps), Near(samples, [steps[i] for i in even])
 
         def error(k: int, vector: Array) -> Array:
             term = self.layout.slots[k].term
-            effect = terms[term].effect
-            if effect.pose or effect.force or effect.transduction is None:
-                return self.residual(vector)
-            _, values = self.layout.steps(vector)[term]
-            added: Array = effect.transduction(a, self.table, values)
-            return -added[:, : len(self.channels)].T
+            values = self.layout.values(term, vector)
+            output = beside_stairs.output(even.index(term), values) if term in even else near.output(term, values)
+            return self._reduced(-output)
 
         return error
-
-    def _errors_beside_stairs(self, k: int, vector: Array) -> Array:
-        steps = self.layout.steps(vector)
-        if self.layout.model.terms[self.layout.slots[k].term].effect.rounds:
-            return self.residual_by(steps)
-        return self.residual_by([step for step in steps if not step[0].rounds])
 
     @cached_property
     def white(self) -> Array | None:

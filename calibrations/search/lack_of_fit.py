@@ -7,6 +7,7 @@ for noise, which does not. This is the pure error of a lack-of-fit test, with sm
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 
 import numpy as np
 from scipy.linalg import qr
@@ -19,6 +20,7 @@ DIRECTION_DEGREE = 3
 ROWS_PER_COLUMN = 5  # at least so many rows for each column
 
 
+@lru_cache(maxsize=8)
 def smooth_columns(table: Table) -> Array:
     """Spherical harmonics of the direction of gravity, as polynomials, and the same times direction, shape (n, k).
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -31,11 +32,17 @@ CLEARLY = 6.0  # of twice the log-likelihood beyond the price of parameters: odd
 
 @dataclass(frozen=True)
 class Settled:
-    """The final fit, the effects that it needs beyond the first model, and each as a candidate beside all others."""
+    """The final fit, and the effects that it needs beyond the first model."""
 
     end: Fit
     names: tuple[str, ...]
-    beside: Mapping[str, Candidate]
+    found: Mapping[str, tuple[Candidate, ...]]  # for each effect, all candidates once every other one is in the model
+
+    @cached_property
+    def beside(self) -> Mapping[str, Candidate]:
+        """Each effect of the model as a candidate, with its rivals."""
+        own = {name: c for name, others in self.found.items() for c in others if c.name == name}
+        return {name: with_rivals(c, self.found[name], _without(self.end, name)) for name, c in own.items()}
 
 
 def settled(path: Path, effects: Mapping[str, Effect]) -> Settled:
@@ -53,13 +60,7 @@ def settled(path: Path, effects: Mapping[str, Effect]) -> Settled:
             break
         further = grown(Path(after[0], (), ()), effects)
         end, names = further.end, (*after[1], *(step.taken.name for step in further.steps))
-    return Settled(end, names, _told_apart(end, found))
-
-
-def _told_apart(end: Fit, found: Mapping[str, tuple[Candidate, ...]]) -> Mapping[str, Candidate]:
-    """Each effect of the model as a candidate, with its rivals."""
-    own = {name: c for name, others in found.items() for c in others if c.name == name}
-    return {name: with_rivals(c, found[name], _without(end, name)) for name, c in own.items()}
+    return Settled(end, names, found)
 
 
 def _needed(present: Fit, names: tuple[str, ...], freed: set[str]) -> tuple[Fit, tuple[str, ...]]:
@@ -109,6 +110,7 @@ def _promising(found: tuple[Candidate, ...]) -> list[Candidate]:
     return [c for c in found[:TRIED] if c.gain > NEARLY * found[0].gain]
 
 
+@lru_cache(maxsize=16)
 def _without(end: Fit, name: str) -> Fit:
     return refit(end, end.model.without(name))
 
