@@ -34,6 +34,17 @@ def slip(a: Array, on_the_way: Array, pressed: Array, limits: Array) -> Array:
 
 
 @njit(cache=True)
+def play(values: Array, width: float) -> Array:
+    """What follows `values` (n,) behind a play of `width` to either side, rows in order of time, shape (n,)."""
+    held = values[0]
+    lagging = np.empty_like(values)
+    for i in range(len(values)):
+        held = min(max(held, values[i] - width), values[i] + width)
+        lagging[i] = held
+    return lagging
+
+
+@njit(cache=True)
 def whiten(columns: Array, gap_s: Array, white: Array, slow: Array, tau_s: Array) -> tuple[Array, float]:
     """Columns made white under white noise plus Gauss-Markov processes, and the log-determinant.
 

@@ -41,7 +41,7 @@ class Noise:
         """Whether the white noise is known from the samples."""
         return bool(self.white.any())
 
-    @property
+    @cached_property
     def fast(self) -> Array:
         """White noise and scatter of each mean, shape (channels, n)."""
         return np.asarray(np.hypot(self.white, self.scatter[:, None]))
@@ -56,7 +56,7 @@ class Noise:
         """The longest time constant of the slow noise, s."""
         return np.array([max(taus) for taus in self.taus_s])
 
-    @property
+    @cached_property
     def slow(self) -> Array:
         """Standard deviation of the slow noise that was estimated."""
         return self.ratio * rms(self.fast)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import product
 
 import numpy as np
@@ -140,6 +140,7 @@ def _from_data(model: Model, table: Table) -> dict[tuple[int, str, str], tuple[f
     return starts
 
 
+@lru_cache(maxsize=8)
 def _nominal(table: Table) -> float:
     """Output per unit of what is sensed, as the range of outputs has it."""
     if table.kind == "rates":

@@ -83,7 +83,8 @@ class Problem:
     def residual_by(self, steps: Sequence[Step]) -> Array:
         """As `residual`, of effects with their values: those of the model, and what else one wants to try."""
         if self.table.kind == "positions":
-            return (np.linalg.norm(backward(self.table, steps), axis=1) - 1.0)[None] * self._share(steps)
+            error: Array = np.linalg.norm(backward(self.table, steps), axis=1)[:, None] - 1.0
+            return error.T * self._share(steps)
         samples = self.table.samples if isinstance(self.table, Stretches) else self.table
         return self._reduced(samples.outputs - forward(samples, steps))
 

@@ -124,7 +124,7 @@ class Table:
         """The columns of outputs that an axis each was measured in."""
         return tuple(name for name in OUTPUTS.get(self.content, ()) if name in self)
 
-    @property
+    @cached_property
     def axes(self) -> tuple[str, ...]:
         """The sensing axes that were measured, of "x", "y", "z"."""
         return tuple(axis for axis, name in zip(AXES, OUTPUTS.get(self.content, ()), strict=False) if name in self)

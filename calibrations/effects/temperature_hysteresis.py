@@ -13,6 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from calibrations.effect import Parameter, Values
+from calibrations.kernels import play
 from calibrations.table import Array, Table
 
 KINDS = ("poses", "positions")
@@ -29,7 +30,7 @@ CONSTANTS = {"reference_c": lambda table: float(np.mean(table.column("temperatur
 
 
 def transduction(a: Array, table: Table, p: Values) -> Array:
-    return np.outer(behind(table.column("temperature_c"), float(p["play"])) - p["reference_c"], p["slope"])
+    return np.outer(play(table.column("temperature_c"), float(p["play"])) - p["reference_c"], p["slope"])
 
 
 def follow(a: Array, table: Table, p: Values, before: Sequence[Array]) -> tuple[Array, list[Array]]:
@@ -38,13 +39,3 @@ def follow(a: Array, table: Table, p: Values, before: Sequence[Array]) -> tuple[
     from_t0 = (table.column("temperature_c") - p["reference_c"])[:, None]
     lagging = np.minimum(np.maximum(held, from_t0 - p["play"]), from_t0 + p["play"])
     return lagging * p["slope"], [lagging]
-
-
-def behind(temperature_c: Array, play_k: float) -> Array:
-    """The temperature behind a play, rows in order of time, C, shape (n,)."""
-    lagging = np.empty_like(temperature_c)
-    held = temperature_c[0]
-    for k, c in enumerate(temperature_c):
-        held = min(max(held, c - play_k), c + play_k)
-        lagging[k] = held
-    return lagging

@@ -34,10 +34,13 @@ def nominal(table: Table, axis: int) -> Response:
 
 
 def filtered(v: Array, table: Table, response: Callable[[int], Response]) -> Array:
-    """Each column of `v`, shape (n, axes), through its own filter, record by record; other rows as they are."""
+    """Each column of `v`, shape (n, axes), through its own filter, record by record; other rows as they are.
+
+    Axes that were not measured are left as they are: nothing reads them.
+    """
     out = np.array(v)
     for record in records(table):
-        for k in range(v.shape[1]):
+        for k in range(min(v.shape[1], len(table.axes))):
             out[record.rows, k] = through(v[record.rows, k], record.rate_hz, response(k))
     return out
 

@@ -28,6 +28,7 @@ from calibrations.table import Array
 SIGNIFICANT = 0.003  # chance of naming anything at all where nothing is missing, over the whole search
 OFFSETS = {"bias", "hard-iron", "gyro-bias"}
 DRIFTING = {"t_s", "temperature_c"}  # what an effect goes by that lets an offset drift
+SAME = 3  # decimals of twice the log-likelihood: less is rounding, and the catalogue's order counts
 NOT_TOLD_APART = 6.0  # a loss of twice the log-likelihood below this: odds of less than 20 to 1
 
 
@@ -69,7 +70,7 @@ def candidates(before: Fit, effects: Mapping[str, Effect]) -> list[Candidate]:
     ]
     unseen = held_out_excess(before)
     found = _with_probabilities(found, before.residual.size, unseen)
-    found.sort(key=lambda c: (c.held_out_after < unseen, schwarz(c, before.residual.size)), reverse=True)
+    found.sort(key=lambda c: (c.held_out_after < unseen, round(schwarz(c, before.residual.size), SAME)), reverse=True)
     like = [_like(c, found, screen) for c in found]
     return [
         replace(c, indistinguishable_from=(*names, *_unlogged(c.effect, before, effects)))
