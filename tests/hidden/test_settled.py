@@ -53,7 +53,7 @@ def test_a_rival_is_judged_with_its_shape_fitted() -> None:
 
 def test_a_little_that_is_left_beside_a_cause_is_told_and_not_decided() -> None:
     """Beams that warm as two masses do, where the catalogue has one time constant."""
-    found = found_on("own/warming beams", 30, 6156)
+    found = found_on("own/warming beams", 30, 6158)
     assert (found.causes, found.verdict) == (("warm-up-scale",), "ambiguous")
     assert found.residual_structure is not None
     assert not found.undecided  # by another experiment
