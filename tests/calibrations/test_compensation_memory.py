@@ -97,6 +97,8 @@ def test_the_proof_holds_whatever_is_remembered() -> None:
     found = made.program.run({name: inputs[name] for name in (*made.program.inputs, *memory)})
     worst = max(np.abs(found[name] - at[name]).max() for name in ("ax", "ay"))
     assert worst < made.bound.within + 1e-14
+    half_held = invert(model({**LINEAR, **SLIPS})).bound.C  # friction may hold, 0.03 V/g, or slip, whatever was before
+    assert np.diag(half_held) == pytest.approx([1 / (1.01 + 0.03 / 2), 1 / (0.98 + 0.02 / 2)])
 
 
 def test_gravity_stands_in_for_an_axis_and_what_is_remembered_is_kept_once() -> None:
