@@ -9,7 +9,8 @@ from calibrations.kernels import whiten
 from calibrations.table import Array
 
 ROUNDS = 3  # in which levels settle
-RIDGE = 1e-13  # of the trace
+RIDGE = 1e-13  # of each diagonal element
+TINY = np.finfo(np.float64).tiny
 
 
 @njit(cache=True)
@@ -46,7 +47,6 @@ def profiled(grams: Array, rest: Array, free: int, least: float) -> tuple[Array,
         for _ in range(ROUNDS):
             own = gram / levels[g] ** 2
             normal = own[:p, :p] + rest[:p, :p]
-            normal += RIDGE * np.trace(normal) * np.eye(p)
             sides = np.hstack((own[:p, p:] + rest[:p, p:], own[:p, :p]))
             solved, logdets[g] = eliminated(normal, sides)
             theta = np.append(-solved[:, 0], 1.0)
@@ -58,10 +58,14 @@ def profiled(grams: Array, rest: Array, free: int, least: float) -> tuple[Array,
 
 @njit(cache=True)
 def eliminated(A: Array, B: Array) -> tuple[Array, float]:
-    """A^-1 B (p, k) and log |det A| of a positive definite A (p, p), which needs no pivots."""
+    """A^-1 B (p, k) and log |det A| of a positive definite A (p, p), which needs no pivots.
+
+    Rows and columns are brought to one size first: channels may differ in noise by as much as numbers can tell.
+    """
     p, k = B.shape
-    U, X = A.copy(), B.copy()
-    logdet = 0.0
+    size = np.sqrt(np.maximum(np.diag(A), TINY))
+    U, X = A / np.outer(size, size) + RIDGE * np.eye(p), B / size.reshape(p, 1)
+    logdet = 2 * np.sum(np.log(size))
     for i in range(p):
         logdet += np.log(abs(U[i, i]))
         for r in range(i + 1, p):
@@ -75,4 +79,4 @@ def eliminated(A: Array, B: Array) -> tuple[Array, float]:
             for r in range(i + 1, p):
                 X[i, j] -= U[i, r] * X[r, j]
             X[i, j] /= U[i, i]
-    return X, logdet
+    return X / size.reshape(p, 1), logdet

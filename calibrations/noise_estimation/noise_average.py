@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from calibrations.noise import BEYOND, Noise, rms
+from calibrations.noise import BEYOND, Noise
 from calibrations.noise_estimation.noise_fit import NO_SLOW, Point, Search, long_enough, scores
 from calibrations.search.identify import gain
 from calibrations.table import Array
@@ -21,7 +21,6 @@ RATIOS = (0.3, 0.7, 1.4, 2.8)  # slow noise over white and scatter
 LENGTHS = (0.03, 0.1, 0.33, 1.0, 2.0)  # of the record: time constants of one process
 PER_DECADE = 1.5  # processes of flicker
 LEAST_WEIGHT = 1e-4
-LEAST_STEP = 1e-9
 
 
 def widening(noise: Noise, residual: Array, jacobian: Array, typical: Array) -> Array:
@@ -56,10 +55,9 @@ def _mean(search: Search, turned: Array) -> Array:
     normal = [g.gram[k, :-1, :-1] / s**2 for g, k, s in zip(grams, best.picks, best.scale, strict=True)]
     together = _variance(sum(normal[1:], normal[0])[None], turned)[0]
     mean = together.copy()
-    least = np.maximum(rms(search.noise.white) / rms(search.noise.fast), LEAST_STEP)
     for c, g in enumerate(grams):
         rest = sum((n for d, n in enumerate(normal) if d != c), np.zeros_like(normal[0]))
-        score, scale = scores(g, np.pad(rest, (0, 1)), search.residual.shape[1], float(least[c]))
+        score, scale = scores(g, np.pad(rest, (0, 1)), search.residual.shape[1], float(search.least[c]))
         weight = np.exp(-(score - score.min()) / 2) * np.append(len(score) - 1, np.ones(len(score) - 1))
         weight /= weight.sum()
         some = weight > LEAST_WEIGHT

@@ -40,7 +40,7 @@ def estimate(start: Noise, residual: Array, jacobian: Array, smooth: Array) -> N
     found is turned into scatter, and the search repeated.
     """
     noise = start
-    rounding = 0.0 if start.known or not jacobian.size else EXACT * rms(jacobian.swapaxes(1, 2)).max(axis=1)
+    rounding = 0.0 if start.known else rounding_of(jacobian)
     for _ in range(ROUNDS):
         best = Search(noise, residual, (jacobian,), smooth, tried(noise)).best()
         variance = best.scale**2 * np.mean(noise.fast**2, axis=1) - np.mean(noise.white**2, axis=1)
@@ -49,6 +49,13 @@ def estimate(start: Noise, residual: Array, jacobian: Array, smooth: Array) -> N
         if np.all(np.abs(best.scale - 1) < 1e-2):
             break
     return noise
+
+
+def rounding_of(jacobian: Array) -> Array:
+    """What may be left of each channel by rounding alone, shape (channels,); 0 without parameters."""
+    if not jacobian.size:
+        return np.zeros(len(jacobian))
+    return np.asarray(EXACT * rms(jacobian.swapaxes(1, 2)).max(axis=1))
 
 
 def gains(noise: Noise, residual: Array, jacobian: Array, extras: Sequence[Array], smooth: Array) -> list[float]:
@@ -143,6 +150,13 @@ class Search:
         return kept[:, first.shape[1] :]
 
     @cached_property
+    def least(self) -> Array:
+        """The least level of each channel's noise, (channels,): what is known to be white, or rounding."""
+        known = rms(self.noise.white)
+        floor = known if self.noise.known else np.maximum(known, rounding_of(self.groups[0]))
+        return np.asarray(np.maximum(floor / rms(self.noise.fast), LEAST_STEP))
+
+    @cached_property
     def grams(self) -> list[Grams]:
         """Per channel, over the grid."""
         basis, _ = self.beside
@@ -173,23 +187,24 @@ class Search:
         chosen = np.flatnonzero([origin in (0, group) for origin in self.beside[1]])
         rank = len(chosen)
         grams = [g.of(chosen) for g in self.grams]
-        least = np.maximum(rms(self.noise.white) / rms(self.noise.fast), LEAST_STEP)
         free = n - self.smooth.shape[1]
         pick, scale = [0] * channels, np.ones(channels)
         for _ in range(4 if channels > 1 else 1):
             before = list(pick)
             for c in range(channels):
                 others = (grams[d].gram[pick[d]] / scale[d] ** 2 for d in range(channels) if d != c)
-                score, scales = scores(grams[c], sum(others, np.zeros((rank + 1, rank + 1))), free, float(least[c]))
+                rest = sum(others, np.zeros((rank + 1, rank + 1)))
+                score, scales = scores(grams[c], rest, free, float(self.least[c]))
                 pick[c] = self._choose(score)
                 scale[c] = scales[pick[c]]
             if pick == before:
                 break
         deviance = sum(float(grams[c].logdet[pick[c]] + 2 * n * np.log(scale[c])) for c in range(channels))
         total = sum((grams[c].gram[pick[c]] / scale[c] ** 2 for c in range(channels)), np.zeros((rank + 1, rank + 1)))
-        theta = np.linalg.lstsq(total[:-1, :-1], total[:-1, -1], rcond=1e-10)[0]
+        size = np.sqrt(np.maximum(np.diag(total)[:-1], np.finfo(float).tiny))  # channels may differ by many decades
+        theta = np.linalg.lstsq(total[:-1, :-1] / np.outer(size, size), total[:-1, -1] / size, rcond=1e-10)[0]
         ratio, taus_s = zip(*(self.grid[k] for k in pick), strict=True)
-        left = float(total[-1, -1] - total[:-1, -1] @ theta)
+        left = float(total[-1, -1] - total[:-1, -1] / size @ theta)
         return Best(np.array(ratio), taus_s, scale, deviance + left, tuple(pick))
 
 
