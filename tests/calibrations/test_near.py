@@ -1,0 +1,33 @@
+"""A chain in which one effect changes gives what the whole chain gives, worked out anew."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from calibrations.chain import forward
+from calibrations.effect import catalogue
+from calibrations.model_file import read_model
+from calibrations.near import Near
+from calibrations.problem import Problem
+from tests.calibrations import synthetic
+
+COLUMNS = synthetic.turns(inclinations_deg=(90, 30))
+AX, AY, _ = synthetic.components(COLUMNS)
+ROOM = {"temperature_c": 25 + np.sin(0.01 * COLUMNS["t_s"]), "supply_v": 5 + 1e-3 * np.cos(0.02 * COLUMNS["t_s"])}
+TABLE = synthetic.poses(COLUMNS | ROOM, 2.5 + AX, 2.5 + AY)
+EVERY = ("axis-misalignment", "stage-zero-offset", "dead-zone", "hysteresis", "temperature-hysteresis", "quantisation")
+
+
+@pytest.mark.parametrize("name", ["bias", "scale-factor", *EVERY])
+def test_one_effect_changes_as_in_the_whole_chain(name: str) -> None:
+    model = read_model("linear")
+    for each in EVERY:
+        model = model.with_effect(catalogue()[each])
+    problem = Problem.of(model, TABLE)
+    layout, theta = problem.layout, problem.layout.starts()[0] + problem.layout.typical / 10
+    near, changed = Near(problem.table, layout.steps(theta)), theta + 0.3 * layout.typical * layout.of_effect(name)
+    term = layout.model.effects.index(name)
+    found = near.output(term, layout.values(term, changed))
+    np.testing.assert_array_equal(found, forward(problem.table, layout.steps(changed)))
+    assert np.any(found != forward(problem.table, layout.steps(theta)))
