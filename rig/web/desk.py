@@ -68,7 +68,7 @@ def lab_read() -> str | None:
     return shown(lab_url(url, RECORD))
 
 
-def models(default: str, chosen: str = "") -> dict[str, str]:
+def models(chosen: str = "", default: str = "by kind of data") -> dict[str, str]:
     """The models to choose from, by name or file, with names for people; "" is that by default."""
     from calibrations.model_file import shipped_names
 

@@ -18,7 +18,6 @@ from rig.web.pages.compare_pictures import Pictures, of_both
 from rig.web.parts import box, div, failed, off_loop, table, waiting, words
 from rig.web.told import message
 
-BY_KIND = "by kind of data"
 HEAD = ("", "first ●", "second ◇", "second − first", "in its uncertainties")
 
 
@@ -69,9 +68,9 @@ def _head(first: str, second: str, model: str) -> None:
                 with div("row-of"):
                     words(f"{mark} {name}", f"k {name}")
                     ui.link(run, f"/record/{run.partition('/')[0]}").classes("title")
-        ui.select(
-            models(BY_KIND, model), label="Model", value=model, on_change=lambda e: to(first, second, e.value)
-        ).props("dense options-dense")
+        ui.select(models(model), label="Model", value=model, on_change=lambda e: to(first, second, e.value)).props(
+            "dense options-dense"
+        )
         ui.button("Swap", icon="swap_vert", on_click=lambda: to(second, first, model)).props("dense outline")
 
 

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from rig.analysis.growing import Growing
     from rig.web.pages.model_page import ModelPage
 
-BY_KIND = "by kind of data"
 MOST_BYTES = 200_000_000
 
 
@@ -33,7 +32,7 @@ class Choice:
                 new_value_mode="add-unique", on_change=lambda e: self._chose(e.value, page.model),
             ).classes("data").props("dense options-dense")  # fmt: skip
             self.model = ui.select(
-                models(BY_KIND, page.model),
+                models(page.model),
                 label="Model",
                 value=page.model,
                 on_change=lambda e: self._chose(page.data, e.value),
@@ -59,7 +58,7 @@ class Choice:
         data = self.page.data
         self.data.set_options({**_data(data)}, value=data)
         if not self.page.model:
-            self.model.set_options(models(f"{trail.model.name} (by default)"), value="")
+            self.model.set_options(models(default=f"{trail.model.name} (by default)"), value="")
         self.save.enable()
         self.report.enable()
 
