@@ -54,7 +54,10 @@ def test_a_file_that_may_not_be_read(refused: Callable[..., str], monkeypatch: p
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (("compare", "good.csv", "--model", "liner"), 'no shipped model and no file is called "liner"; did you mean "linear"?'),
+        (
+            ("compare", "good.csv", "--model", "liner"),
+            'no shipped model and no file is called "liner"; did you mean "linear"?',
+        ),
         (
             ("compare", "good.csv", "--model", "nowhere.yaml"),
             "nowhere.yaml: the model file cannot be read: No such file",
