@@ -1,4 +1,7 @@
-"""Compiled loops over rows, where each depends on the one before. Cached on disk by `make setup`."""
+"""Compiled loops over rows, where each depends on the one before. Cached on disk by `make setup`.
+
+All compiled loops of this house let other threads go on (nogil): a page stays alive while effects are tried.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ from numba import njit
 from calibrations.table import Array
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def slip(a: Array, on_the_way: Array, pressed: Array, limits: Array) -> Array:
     """Force held by elements of equal stiffness that stick and slip, at each row, shape (n, 3), 1 where all slip.
 
@@ -33,7 +36,7 @@ def slip(a: Array, on_the_way: Array, pressed: Array, limits: Array) -> Array:
     return state
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def play(values: Array, width: float) -> Array:
     """What follows `values` (n,) behind a play of `width` to either side, rows in order of time, shape (n,)."""
     held = values[0]
@@ -44,7 +47,7 @@ def play(values: Array, width: float) -> Array:
     return lagging
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def whiten(columns: Array, gap_s: Array, white: Array, slow: Array, tau_s: Array) -> tuple[Array, float]:
     """Columns made white under white noise plus Gauss-Markov processes, and the log-determinant.
 

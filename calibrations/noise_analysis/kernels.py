@@ -56,7 +56,7 @@ def empty_tree() -> Tree:
     )  # fmt: skip
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def absorb(tree: Tree, samples: Array, offset: float, third: bool) -> None:
     """Take in more samples, less `offset`, the same each time; `third`: with differences of the third order."""
     place = 0
@@ -72,14 +72,14 @@ def absorb(tree: Tree, samples: Array, offset: float, third: bool) -> None:
             level += 1
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def finish(tree: Tree, third: bool) -> None:
     """Measure what is left in the buffers; samples that fill no bin of a level are not used there."""
     for level in range(LEVELS - 1):
         _hand_up(tree, level, third)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _noted(tree: Tree, level: int, taken: int) -> None:
     """Count bins that were put into a buffer, and keep the very first."""
     have = tree.filled[level]
@@ -90,7 +90,7 @@ def _noted(tree: Tree, level: int, taken: int) -> None:
     tree.seen[level] += taken
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _hand_up(tree: Tree, level: int, third: bool) -> None:
     """Measure a level, give the next one its pairs, and keep the tail."""
     n, size = tree.filled[level], 2.0**level
@@ -114,7 +114,7 @@ def _hand_up(tree: Tree, level: int, third: bool) -> None:
     tree.paired[level] = kept - (n - first - 2 * pairs)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _measure_second(tree: Tree, level: int) -> None:
     """Add up the squares over all windows of two that end in a bin that is new, and the moments of new bins."""
     n, old = tree.filled[level], tree.measured[level]
@@ -128,7 +128,7 @@ def _measure_second(tree: Tree, level: int) -> None:
     _add_moments(b, old, tree.moments[level])
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _measure_third(tree: Tree, level: int) -> None:
     """The same for windows of three."""
     n, old = tree.filled[level], tree.measured[level]
@@ -142,7 +142,7 @@ def _measure_third(tree: Tree, level: int) -> None:
         tree.windows[level, f, MODIFIED] += max(0, n - 3 * k + 1 - first)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def running_sum(b: Array, mean: float) -> Array:
     """Of bins less their mean, shape (n + 1,) from 0."""
     phase = np.zeros(len(b) + 1)
@@ -153,7 +153,7 @@ def running_sum(b: Array, mean: float) -> Array:
     return phase
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def integrals(b: Array, p: Array, size: float) -> tuple[Array, Array]:
     """Running sums of bins less their mean, and of the phase over all samples, each shape (n + 1,) from 0."""
     n = len(b)
@@ -169,7 +169,7 @@ def integrals(b: Array, p: Array, size: float) -> tuple[Array, Array]:
     return phase, summed
 
 
-@njit(cache=True, fastmath={"reassoc", "contract"})
+@njit(cache=True, nogil=True, fastmath={"reassoc", "contract"})
 def second_order(x: Array, k: int, first: int) -> float:
     """Sum of (x[i + 2k] - 2 x[i + k] + x[i])^2 over i from `first`."""
     total, n = 0.0, max(0, len(x) - 2 * k - first)
@@ -180,7 +180,7 @@ def second_order(x: Array, k: int, first: int) -> float:
     return total
 
 
-@njit(cache=True, fastmath={"reassoc", "contract"})
+@njit(cache=True, nogil=True, fastmath={"reassoc", "contract"})
 def third_order(x: Array, k: int, first: int) -> float:
     """Sum of (x[i + 3k] - 3 x[i + 2k] + 3 x[i + k] - x[i])^2 over i from `first`."""
     total, n = 0.0, max(0, len(x) - 3 * k - first)
@@ -192,7 +192,7 @@ def third_order(x: Array, k: int, first: int) -> float:
     return total
 
 
-@njit(cache=True, fastmath={"reassoc", "contract"})
+@njit(cache=True, nogil=True, fastmath={"reassoc", "contract"})
 def _add_moments(z: Array, old: int, to: Array) -> None:
     """Sums over the bins from `old` on and their differences w, with their neighbours before."""
     a = b = c = d = e = 0.0
@@ -212,7 +212,7 @@ def _add_moments(z: Array, old: int, to: Array) -> None:
     to += np.array((a, b, c, d, e))
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def modified_squares(values: Array, m: int) -> tuple[float, int]:
     """Sum and number of squared differences of neighbouring means of the phase over `m` steps, at every step.
 
@@ -227,7 +227,7 @@ def modified_squares(values: Array, m: int) -> tuple[float, int]:
     return total, max(0, len(values) - 3 * m + 1)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def reflected_squares(b: Array, k: int) -> float:
     """Sum of squared differences of sums over `k` bins around each of the first k - 1 inner points.
 

@@ -19,13 +19,13 @@ NEAR, MOST, SWEEPS = 20, 100, 200
 CLOSE = 1e-9
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def log_likelihood(expected: Array, seen: Array, freedom: Array) -> float:
     """But for a constant."""
     return -0.5 * float(np.sum(freedom * (np.log(expected) + seen / expected)))
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def maximise(G: Array, seen: Array, freedom: Array, base: Array) -> tuple[Array, float]:
     """(theta, log L) of S = base + G theta; G (b, p) with p of 1 or more, all others (b,)."""
     p = G.shape[1]
@@ -57,7 +57,7 @@ def maximise(G: Array, seen: Array, freedom: Array, base: Array) -> tuple[Array,
     return theta, value
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _scored(G: Array, seen: Array, freedom: Array, base: Array, theta: Array) -> Array:
     """Where the weighted least squares without negative coefficients has its minimum: coordinate by coordinate."""
     p = len(theta)

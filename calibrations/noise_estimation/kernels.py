@@ -13,7 +13,7 @@ RIDGE = 1e-13  # of each diagonal element
 TINY = np.finfo(np.float64).tiny
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def products(
     columns: Array, gap_s: Array, white: Array, slow: Array, tau_s: Array, processes: Array
 ) -> tuple[Array, Array]:
@@ -30,7 +30,7 @@ def products(
     return found, logdets
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def profiled(grams: Array, rest: Array, free: int, least: float) -> tuple[Array, Array, Array, Array]:
     """Each noise's level, found in rounds beside `rest`, what that leaves of the sums of squares, log-determinants.
 
@@ -56,7 +56,7 @@ def profiled(grams: Array, rest: Array, free: int, least: float) -> tuple[Array,
     return levels, own_left, other_left, logdets
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def eliminated(A: Array, B: Array) -> tuple[Array, float]:
     """A^-1 B (p, k) and log |det A| of a positive definite A (p, p), which needs no pivots.
 

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 AHEAD = 3  # chunks on their way for each thread of a worker
 PATIENCE_S = 10  # for a scheduler to answer
+FEW = 10  # messages that Dask keeps of each connection: they hold the tables that were sent, and memory would grow
 
 LOST = "the scheduler is lost; what was done is in the record: give the same command again"
 
@@ -48,6 +49,7 @@ def crew(scheduler: str | None, workers: int | None) -> Iterator[Client]:
         "distributed.scheduler.allowed-failures": 0,
         "distributed.comm.timeouts.connect": f"{PATIENCE_S} s",
         "distributed.worker.profile.enabled": False,
+        "distributed.admin.low-level-log-length": FEW,
     }
     with dask.config.set(settings):
         if scheduler is not None:
