@@ -31,3 +31,14 @@ def test_one_effect_changes_as_in_the_whole_chain(name: str) -> None:
     found = near.output(term, layout.values(term, changed))
     np.testing.assert_array_equal(found, forward(problem.table, layout.steps(changed)))
     assert np.any(found != forward(problem.table, layout.steps(theta)))
+
+
+def test_what_only_adds_has_derivatives_to_the_last_digits() -> None:
+    problem = Problem.of(read_model("linear").with_effect(catalogue()["hysteresis"]), TABLE)
+    layout, theta = problem.layout, problem.layout.starts()[0]
+    near, term = Near(problem.table, layout.steps(theta)), layout.model.effects.index("hysteresis")
+    values = layout.values(term, theta)
+    more, less, whole = (
+        near.output(term, {**values, "height": values["height"] * factor}) for factor in (1 + 1e-4, 1 - 1e-4, 1.0)
+    )
+    np.testing.assert_allclose((more - less) / 2e-4, whole, rtol=0, atol=1e-11 * np.max(np.abs(whole)))
