@@ -52,14 +52,36 @@ def costs(model: Model, forward: Forward, program: Program, reach: float, unit: 
     a = specific_force(nominal_pose(table)) * (1.0 if unit != "deg/s" else reach)
     fates = {fate.effect: fate.how for fate in forward.fates}
     followed = [step for step in steps_of(model) if fates[step[0].name] == INVERTED]
-    memory = memory_at(table, sensed(a, table, followed), forward)
-    left = {name: _of_left_out(name, model, followed, table, a, forward, program, memory) for name in forward.left_out}
+    trial = _Trial(forward, program, table, a, memory_at(table, sensed(a, table, followed), forward))
     hidden = unit == "g" and len(forward.axes) == 2 and "az" in program.inputs
     return Cost(
-        left,
-        _of_gravity(followed, table, a, forward, program, memory) if hidden else None,
+        {name: _of_left_out(name, model, followed, trial) for name in forward.left_out},
+        _of_gravity(followed, trial) if hidden else None,
         _of_parameters(model, forward, followed, table, a),
     )
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """A sweep on which the program is tried: its specific force `a` (n, 3), and what is remembered at each row."""
+
+    forward: Forward
+    program: Program
+    table: Table
+    a: Array
+    memory: Mapping[str, Array]
+
+    def inputs(self, steps: Sequence[Step]) -> dict[str, Array]:
+        """Of the program, for a sensor of these steps."""
+        v = respond(sensed(self.a, self.table, steps), self.table, steps)
+        known = {f"v{axis}": v[:, k] for k, axis in enumerate("xyz")}
+        known |= {name: self.a[:, k] for k, name in enumerate(FORCES)}
+        columns = {name: known[name] if name in known else self.table.column(name) for name in self.program.inputs}
+        return columns | dict(self.memory)
+
+    def size(self, found: Mapping[str, Array]) -> Size:
+        """By how much what was found is wrong."""
+        return _size(np.column_stack([found[f"a{x}"] - self.a[:, "xyz".index(x)] for x in self.forward.axes]))
 
 
 def in_gravity(program: Program, inputs: Mapping[str, Array], side: Array) -> dict[str, Array]:
@@ -72,13 +94,6 @@ def in_gravity(program: Program, inputs: Mapping[str, Array], side: Array) -> di
         az = side * np.sqrt(np.maximum(0.0, 1 - found["ax"] ** 2 - found["ay"] ** 2))
         found = program.run({**inputs, "az": az})
     return found
-
-
-def inputs_of(table: Table, v: Array, a: Array, program: Program, memory: Mapping[str, Array]) -> dict[str, Array]:
-    """The program's inputs for outputs `v` and specific force `a`, both (n, 3), of a table's rows."""
-    known = {f"v{axis}": v[:, k] for k, axis in enumerate("xyz")}
-    known |= {name: a[:, k] for k, name in enumerate(FORCES)}
-    return {name: known[name] if name in known else table.column(name) for name in program.inputs} | dict(memory)
 
 
 def _sweep(model: Model, program: Program) -> Table:
@@ -102,44 +117,23 @@ def _sweep(model: Model, program: Program) -> Table:
     return Table.from_columns("poses", columns, source="a simulated sweep")
 
 
-def _errors(found: Mapping[str, Array], a: Array, forward: Forward) -> Array:
-    return np.column_stack([found[f"a{axis}"] - a[:, "xyz".index(axis)] for axis in forward.axes])
-
-
 def _size(errors: Array) -> Size:
     return Size(float(np.sqrt(np.mean(errors**2, axis=0)).max()), float(np.abs(errors).max()))
 
 
-def _of_left_out(
-    name: str,
-    model: Model,
-    followed: Sequence[Step],
-    table: Table,
-    a: Array,
-    forward: Forward,
-    program: Program,
-    memory: Mapping[str, Array],
-) -> Size | None:
+def _of_left_out(name: str, model: Model, followed: Sequence[Step], trial: _Trial) -> Size | None:
     """By the whole model with this effect, compensated without it."""
     steps = [s for s in steps_of(model) if s[0].name == name or any(s[0] is other[0] for other in followed)]
     try:
-        v = respond(sensed(a, table, steps), table, steps)
+        inputs = trial.inputs(steps)
     except CalibrationError:  # it needs what no sweep has, such as a motion
         return None
-    return _size(_errors(program.run(inputs_of(table, v, a, program, memory)), a, forward))
+    return trial.size(trial.program.run(inputs))
 
 
-def _of_gravity(
-    followed: Sequence[Step],
-    table: Table,
-    a: Array,
-    forward: Forward,
-    program: Program,
-    memory: Mapping[str, Array],
-) -> Size:
-    v = respond(sensed(a, table, followed), table, followed)
-    found = in_gravity(program, inputs_of(table, v, a, program, memory), np.where(a[:, 2] < 0, -1.0, 1.0))
-    return _size(_errors(found, a, forward))
+def _of_gravity(followed: Sequence[Step], trial: _Trial) -> Size:
+    side = np.where(trial.a[:, 2] < 0, -1.0, 1.0)
+    return trial.size(in_gravity(trial.program, trial.inputs(followed), side))
 
 
 def _of_parameters(model: Model, forward: Forward, followed: Sequence[Step], table: Table, a: Array) -> Size | None:
