@@ -90,3 +90,12 @@ def test_a_jitter_that_the_sensor_feels_is_no_scatter() -> None:
     (pattern,) = diagnose(beside(white(random) + 0.8 * supply, supply_v=supply), read_model("still")).search.patterns
     assert pattern.size == pytest.approx(0.8, abs=3 * pattern.std)
     assert pattern.std < 0.02
+
+
+def test_scatter_of_readings_that_are_held_is_taken_off_as_well() -> None:
+    random = np.random.default_rng(7)
+    warm = room(random)
+    read = np.repeat(warm[10::20] + 0.3 * random.standard_normal(SAMPLES // 20), 20)
+    (pattern,) = diagnose(beside(white(random) + 0.8 * warm, temperature_c=read), read_model("still")).search.patterns
+    assert pattern.size == pytest.approx(0.8, abs=3 * pattern.std)
+    assert pattern.std < 0.05
