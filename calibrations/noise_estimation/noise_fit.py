@@ -40,11 +40,10 @@ def estimate(start: Noise, residual: Array, jacobian: Array, smooth: Array) -> N
     found is turned into scatter, and the search repeated.
     """
     noise = start
-    rounding = 0.0 if start.known else rounding_of(jacobian)
     for _ in range(ROUNDS):
         best = Search(noise, residual, (jacobian,), smooth, tried(noise)).best()
         variance = best.scale**2 * np.mean(noise.fast**2, axis=1) - np.mean(noise.white**2, axis=1)
-        scatter = np.maximum(np.sqrt(np.maximum(variance, 0.0)), rounding)
+        scatter = np.sqrt(np.maximum(variance, 0.0))
         noise = replace(noise, scatter=scatter, ratio=best.ratio, taus_s=best.taus_s)
         if np.all(np.abs(best.scale - 1) < 1e-2):
             break

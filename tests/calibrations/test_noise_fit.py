@@ -150,3 +150,15 @@ def test_columns_that_the_model_already_has_gain_nothing() -> None:
     again = J @ rng.standard_normal((2, 2))
     assert gains(white_only(None, GAPS, 1), r, J, [again], NONE)[0] == 0.0
     assert gains(white_only(None, GAPS, 1), r, J, [J[:, :, :0]], NONE)[0] == 0.0
+
+
+def test_what_rounding_leaves_is_no_gain_and_no_noise() -> None:
+    """Of data without noise, what is left is rounding: no column may be sure of explaining it."""
+    shape = np.sin(np.arange(N))[None, :, None]
+    residual = 1e-15 * shape[:, :, 0] + 1e-17 * np.random.default_rng(3).standard_normal((1, N))
+    jacobian = np.full((1, N, 1), 2.5)
+    noise = estimate(white_only(None, GAPS, 1), residual, jacobian, NONE)
+    np.testing.assert_allclose(noise.fast, 2.5e-12)
+    assert gains(noise, residual, jacobian, [shape], NONE)[0] < NOT_TOLD_APART
+    known = white_only(np.full((1, N), 1e-17), GAPS, 1)  # who states the noise is believed
+    assert gains(known, residual, jacobian, [shape], NONE)[0] > 1e3
