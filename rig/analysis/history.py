@@ -6,15 +6,14 @@ of an imported table the constant `date` that the file carries (`# date: 2025-03
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from datetime import date, datetime, timedelta
 
 import numpy as np
 
 from calibrations.certificates.terms import name as result_name
 from calibrations.errors import CalibrationError, DataError
-from calibrations.evaluations.agreement import Agreement, agreement
 from calibrations.evaluations.control_chart import BASELINE, Chart, control_chart
 from calibrations.evaluations.control_chart import FEWEST as FEWEST_CHARTED
 from calibrations.evaluations.stability import FEWEST, Stability, stability
@@ -95,21 +94,43 @@ def history(
     model: Model,
     limits: Mapping[str, Limit],
     baseline: int = BASELINE,
+    tell: Callable[[str], None] = lambda _: None,
 ) -> History:
-    """The history of `sensor` by `model`. `limits` by result's name: a number is the greatest change since the last
-    calibration, a pair the lowest and highest value.
+    """The history of `sensor` by `model`, see `judged`; `tell` hears which run is calibrated.
 
     Raises RecordError where the record has no calibration of it, naming the nearest sensor.
     """
-    found, passed_over = _calibrations(record, sensor, model)
+    found: list[Calibration] = []
+    passed_over: dict[str, str] = {}
+    runs = _runs(record, sensor)
+    for k, (data, run) in enumerate(runs, 1):
+        tell(f"Calibrating {data}, {k} of {len(runs)}")
+        try:
+            found.append(_calibration(record, data, run, model))
+        except (CalibrationError, RecordError) as error:
+            passed_over[data] = str(error)
     if not found:
-        reasons = f" Its runs are none by this model: {next(iter(passed_over.values()))}" if passed_over else ""
-        known = sensors(record.runs())
-        nearest = "" if sensor in known else did_you_mean(sensor, known)
-        raise RecordError(f"no calibration of the sensor {sensor!r} in the record.{reasons}{nearest}")
-    names = dict.fromkeys(name for calibration in found for name in calibration.values)
-    quantities = tuple(_quantity(name, found, limits.get(name), baseline) for name in names)
-    return History(sensor, model.name, tuple(found), quantities, passed_over)
+        raise _none(record, sensor, passed_over)
+    return judged(History(sensor, model.name, tuple(found), (), passed_over), limits, baseline)
+
+
+def latest(record: Record, sensor: str, model: Model) -> Calibration:
+    """The last calibration of `sensor` alone: those before it are not fitted. Raises RecordError as `history`."""
+    passed_over: dict[str, str] = {}
+    for data, run in reversed(_runs(record, sensor)):
+        try:
+            return _calibration(record, data, run, model)
+        except (CalibrationError, RecordError) as error:
+            passed_over[data] = str(error)
+    raise _none(record, sensor, passed_over)
+
+
+def judged(life: History, limits: Mapping[str, Limit], baseline: int = BASELINE) -> History:
+    """The same calibrations by other limits, and charts of another baseline. `limits` by result's name: a number is the
+    greatest change since the last calibration, a pair the lowest and highest value."""
+    of = life.calibrations
+    names = dict.fromkeys(name for calibration in of for name in calibration.values)
+    return replace(life, quantities=tuple(_quantity(name, of, limits.get(name), baseline) for name in names))
 
 
 def closest(of: Sequence[Calibration], on: date) -> tuple[Calibration, float]:
@@ -131,57 +152,24 @@ def stale(found: History, calibration: Calibration, age_days: float) -> str | No
     return None
 
 
-def compare(a: Calibration, b: Calibration) -> dict[str, tuple[str, Agreement]]:
-    """Two calibrations, by the names that both have: unit and agreement. Raises DataError where there is none."""
-    return _compared(a.values, b.values, a.data, b.data)
+def _runs(record: Record, sensor: str) -> list[tuple[str, Run]]:
+    """The complete runs of a sensor in the order of time, each with its name as data, such as `RUN/a1`."""
+    complete = sorted((run for run in record.runs() if run.state == "complete"), key=_when)
+    of = [(members(run).get(sensor), run) for run in complete]
+    return [(f"{run.run}/{member}" if member else run.run, run) for member, run in of if member is not None]
 
 
-def compare_rigs(of: Sequence[Calibration], one: str, other: str) -> dict[str, tuple[str, Agreement]]:
-    """The means of all calibrations on two rigs. Raises RecordError for a rig that has none."""
-    return _compared(_means_on(one, of), _means_on(other, of), one, other)
+def _none(record: Record, sensor: str, passed_over: Mapping[str, str]) -> RecordError:
+    reasons = f" Its runs are none by this model: {next(iter(passed_over.values()))}" if passed_over else ""
+    known = sensors(record.runs())
+    nearest = "" if sensor in known else did_you_mean(sensor, known)
+    return RecordError(f"no calibration of the sensor {sensor!r} in the record.{reasons}{nearest}")
 
 
-def _means_on(rig: str, of: Sequence[Calibration]) -> dict[str, Value]:
-    mine = [each for each in of if each.rig == rig]
-    if not mine:
-        raise RecordError(f"no calibration on the rig {rig!r}.{did_you_mean(rig, {each.rig for each in of})}")
-    return {name: _mean([each.values[name] for each in mine if name in each.values]) for name in mine[-1].values}
-
-
-def _compared(a: Mapping[str, Value], b: Mapping[str, Value], one: str, other: str) -> dict[str, tuple[str, Agreement]]:
-    shared = [name for name in a if name in b and a[name].unit == b[name].unit]
-    if not shared:
-        raise DataError(f"{one} and {other} have no quantity in common; take a model that both determine")
-    return {n: (a[n].unit, agreement((a[n].value, a[n].std), (b[n].value, b[n].std))) for n in shared}
-
-
-def _mean(values: Sequence[Value]) -> Value:
-    """The mean; uncertain by the calibrations' own uncertainty, which they may share, and by what they scatter."""
-    x = np.array([each.value for each in values])
-    own = float(rms(np.array([each.std for each in values])))
-    scatter = float(x.std(ddof=1) / np.sqrt(len(x))) if len(x) > 1 else 0.0
-    return Value(float(x.mean()), max(own, scatter), values[0].unit)
-
-
-def _calibrations(record: Record, sensor: str, model: Model) -> tuple[list[Calibration], dict[str, str]]:
-    """In the order of time; and the sensor's runs that are none, with the reason."""
-    found, passed_over = [], {}
-    for run in record.runs():
-        batch = members(run)
-        if sensor not in batch or run.state != "complete":
-            continue
-        member = batch[sensor]
-        data = f"{run.run}/{member}" if member else run.run
-        try:
-            found.append(_calibration(Measured.named(record, data), model))
-        except (CalibrationError, RecordError) as error:
-            passed_over[data] = str(error)
-    return sorted(found, key=lambda each: each.at), passed_over
-
-
-def _calibration(measured: Measured, model: Model) -> Calibration:
+def _calibration(record: Record, data: str, run: Run, model: Model) -> Calibration:
     """Raises CalibrationError where the run does not determine the model."""
-    table = measured.table()
+    at = date_of(run)
+    table = Measured.named(record, data).table()
     found = fit(model, table)
     values = {
         result_name(term.effect, e.name, e.axis): Value(e.value, e.std, e.unit)
@@ -191,19 +179,26 @@ def _calibration(measured: Measured, model: Model) -> Calibration:
     }
     if len(values) < len(found.theta):
         raise DataError(f"{table.source}: does not determine every parameter of {model.name}")
-    run = measured.run
     expired = str(run.constants[EXPIRED]) if EXPIRED in run.constants else None
-    return Calibration(measured.name, _date(run), str(run.bench.get("name", "")) or "elsewhere", values, expired)
+    return Calibration(data, at, str(run.bench.get("name", "")) or "elsewhere", values, expired)
 
 
-def _date(run: Run) -> datetime:
-    """Raises DataError for a constant `date` that is none."""
+def date_of(run: Run) -> datetime:
+    """When the sensor was as the run found it. Raises DataError for a constant `date` that is none."""
     said = run.constants.get("date")
     try:
         at = datetime.fromisoformat(str(said)) if said is not None else datetime.fromisoformat(run.created)
     except ValueError:
         raise DataError(f"run {run.run}: its constant date is {said!r}; write it as 2025-03-01") from None
     return at if at.tzinfo else at.replace(hour=at.hour or 12, tzinfo=datetime.fromisoformat(run.created).tzinfo)
+
+
+def _when(run: Run) -> datetime:
+    """Its date; a run whose date is none is passed over later, which says so."""
+    try:
+        return date_of(run)
+    except DataError:
+        return datetime.fromisoformat(run.created)
 
 
 def _quantity(name: str, of: Sequence[Calibration], limit: Limit | None, baseline: int) -> Quantity:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import click
 
 from calibrations.evaluations.control_chart import BASELINE, FEWEST
-from rig.analysis.history import History, Limit, closest, compare, compare_rigs, history, stale
-from rig.cli.history_words import Compared, compared_lines, document, lines, near_lines
+from rig.analysis.history import History, closest, history, latest, stale
+from rig.analysis.history_compared import Compared, compare_days, compare_rigs, compare_sensors
+from rig.analysis.history_limits import changes, limits_of
+from rig.cli.history_words import compared_lines, document, lines, near_lines
 from rig.cli.output import bench_option, emit, json_option
 from rig.record import Record
 
@@ -55,65 +58,42 @@ def command(
     from rig.analysis.asked import effects_of
 
     read = read_model(model, effects_of(bench_file))
-    limits = _limits(bench_file, given)
+    said = changes(given)
     with Record.to_read() as record:
-        found = _only(history(record, sensor, read, limits, baseline), chosen)
-        other = history(record, beside, read, limits, baseline) if beside is not None else None
-    compared = _compared(found, other, between, rigs)
-    near = closest(found.calibrations, on.date()) if on is not None else None
+        found = _only(history(record, sensor, read, limits_of(bench_file) | said, baseline), chosen, said)
+        last = latest(record, beside, read) if beside is not None else None
+    compared = [] if beside is None or last is None else [compare_sensors(found, beside, last)]
+    compared += [compare_days(found, *(day.date() for day in between))] if between else []
+    compared += [compare_rigs(found.calibrations, *rigs)] if rigs else []
+    compared = [_of_chosen(each, found) for each in compared]
+    day = on.date() if on is not None else None
+    near = closest(found.calibrations, day) if day is not None else None
     why = stale(found, *near) if near is not None else None
     written = _draw(found, folder, form) if folder is not None else []
     if as_json:
         emit(document(found, near, why, compared))
     else:
-        told = [*lines(found), *near_lines(near, on, why), *compared_lines(compared)]
+        told = [*lines(found), *near_lines(near, day, why), *compared_lines(compared)]
         click.echo("\n".join([*told, *(f"written: {path}" for path in written)]))
-    return int(why is not None or any(not each.agrees for _, _, rows in compared for _, each in rows.values()))
+    return int(why is not None or not all(each.agree for each in compared))
 
 
-def _limits(bench_file: Path | None, given: Sequence[str]) -> dict[str, Limit]:
-    limits: dict[str, Limit] = {}
-    if bench_file is not None:
-        from rig.bench import read_bench
-
-        limits |= {k: v for k, v in read_bench(bench_file).result_limits.items() if isinstance(v, tuple)}
-    for text in given:
-        name, _, number = text.partition("=")
-        try:
-            limits[name] = abs(float(number))
-        except ValueError:
-            raise click.UsageError(f"--limit {text!r}: write NAME=CHANGE, as in bias-x=0.005") from None
-    return limits
-
-
-def _only(found: History, chosen: Sequence[str]) -> History:
-    """With the chosen quantities alone."""
-    from dataclasses import replace
-
+def _only(found: History, chosen: Sequence[str], limited: Iterable[str]) -> History:
+    """With the chosen quantities alone. Raises UsageError for one that is not there, chosen or limited."""
     from rig.nearest import did_you_mean
 
     known = [q.name for q in found.quantities]
-    for name in chosen:
+    for name in (*chosen, *limited):
         if name not in known:
             raise click.UsageError(f"no quantity {name!r} by the model {found.model}.{did_you_mean(name, known)}")
     kept = tuple(q for q in found.quantities if not chosen or q.name in chosen)
     return replace(found, quantities=kept)
 
 
-def _compared(
-    found: History, other: History | None, between: tuple[Any, Any] | None, rigs: tuple[str, str] | None
-) -> Compared:
-    made: Compared = []
-    if other is not None:
-        a, b = found.calibrations[-1], other.calibrations[-1]
-        made.append((f"{found.sensor}, {a.day}", f"{other.sensor}, {b.day}", compare(a, b)))
-    if between:
-        a, b = (closest(found.calibrations, day.date())[0] for day in between)
-        made.append((a.day, b.day, compare(a, b)))
-    if rigs:
-        made.append((*rigs, compare_rigs(found.calibrations, *rigs)))
+def _of_chosen(compared: Compared, found: History) -> Compared:
+    """The rows of the quantities that are shown."""
     names = {q.name for q in found.quantities}
-    return [(a, b, {name: row for name, row in rows.items() if name in names}) for a, b, rows in made]
+    return replace(compared, rows={name: row for name, row in compared.rows.items() if name in names})
 
 
 def _draw(found: History, folder: Path, form: str) -> list[Path]:

@@ -1,31 +1,33 @@
-"""What `rig history` says of a sensor's life, in words and as JSON."""
+"""What `rig history` prints of a sensor's life, as tables and as JSON; its sentences are also those of the page."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from datetime import date
 from typing import Any
 
 from calibrations.evaluations.agreement import Agreement
 from calibrations.evaluations.stability import YEAR_DAYS
 from calibrations.model import Estimate
 from rig.analysis.history import Calibration, History, Quantity
+from rig.analysis.history_compared import Compared
+from rig.analysis.history_words import agreements, but_stale, chart_verdict, near, next_due, summary
 from rig.cli.output import columns, note
 from rig.cli.words import with_uncertainty
 
-Compared = list[tuple[str, str, dict[str, tuple[str, Agreement]]]]  # one, other, and what they come to
-NO_LIMIT = "When the next calibration is due needs a limit: --limit bias-x=0.005, or limits.results of the bench file."
+Near = tuple[Calibration, float] | None  # the calibration closest to a day, and how many days older it is
 
 
 def lines(found: History) -> Iterator[str]:
     of = found.calibrations
-    yield f"{found.sensor}: {len(of)} calibrations from {of[0].day} to {of[-1].day}, by the model {found.model}"
+    yield summary(found)
     yield ""
     head = ("date", "data", "rig", *(q.name for q in found.quantities))
     yield columns(head, [_row(each, found.quantities) for each in of])
     yield ""
     yield columns(("quantity", "drift a year", "scatter", "chart", "allowed", "due"), map(_stability, found.quantities))
     yield ""
-    yield _next(found)
+    yield next_due(found, "--limit bias-x=0.005")
     yield from (f"{each.data}: {each.expired}." for each in of if each.expired)
     for data, why in found.passed_over.items():
         note(f"Passed over: {data}: {why}")
@@ -38,7 +40,7 @@ def _row(each: Calibration, quantities: Sequence[Quantity]) -> tuple[str, ...]:
 
 
 def _stability(q: Quantity) -> tuple[str, ...]:
-    line, verdict = q.line, "-" if q.chart is None else q.chart.verdict
+    line, verdict = q.line, chart_verdict(q) or "-"
     if line is None:
         return q.name, "-", "-", verdict, _allowed(q), "-"
     slope = Estimate("", "", YEAR_DAYS * line.slope, YEAR_DAYS * line.slope_std, q.unit)
@@ -50,43 +52,20 @@ def _allowed(q: Quantity) -> str:
     return "-" if q.allowed is None else f"{q.allowed[0]:.6g} .. {q.allowed[1]:.6g}"
 
 
-def _next(found: History) -> str:
-    if found.due is not None:
-        names = ", ".join(q.name for q in found.quantities if q.due == found.due)
-        return f"Next calibration due on {found.due}: {names} may then be beyond what is allowed."
-    if all(q.allowed is None for q in found.quantities):
-        return NO_LIMIT
-    if all(q.line is None for q in found.quantities):
-        return "When the next calibration is due shows from three calibrations on, at different times."
-    return "No calibration is due within ten years by the drift that these show."
-
-
-def near_lines(near: tuple[Calibration, float] | None, on: Any, why: str | None) -> Iterator[str]:
-    if near is None:
-        return
-    calibration, age_days = near
-    side = "before" if age_days >= 0 else "after"
-    yield f"Closest to {on.date()}: {calibration.data}, {calibration.day}, {abs(age_days):.0f} days {side}."
+def near_lines(closest: Near, on: date | None, why: str | None) -> Iterator[str]:
+    if closest is not None and on is not None:
+        yield near(*closest, on)
     if why is not None:
-        yield f"But it is stale: {why}."
+        yield but_stale(why)
 
 
-def compared_lines(compared: Compared) -> Iterator[str]:
-    for one, other, rows in compared:
-        yield f"\n{one} beside {other}"
-        yield columns(
-            ("quantity", one, other, "difference", "U", "unit", "E_n", ""),
-            [
-                (name, f"{each.a:.7g}", f"{each.b:.7g}", f"{each.difference:.2g}", f"{each.expanded:.2g}", unit,
-                 f"{each.e_n:.2f}", "agree" if each.agrees else "do not agree")
-                for name, (unit, each) in rows.items()
-            ],
-        )  # fmt: skip
+def compared_lines(compared: Sequence[Compared]) -> Iterator[str]:
+    for each in compared:
+        yield f"\n{each.one} beside {each.other}"
+        yield columns(*agreements(each))
 
 
-def document(
-    found: History, near: tuple[Calibration, float] | None, why: str | None, compared: Compared
-) -> dict[str, Any]:
+def document(found: History, closest: Near, why: str | None, compared: Sequence[Compared]) -> dict[str, Any]:
     return {
         "schema": "rig.history/1",
         "sensor": found.sensor,
@@ -99,9 +78,9 @@ def document(
         ],
         "quantities": [_of_quantity(q) for q in found.quantities],
         "passed_over": dict(found.passed_over),
-        "closest": None if near is None else {"data": near[0].data, "age_days": near[1], "stale": why},
+        "closest": None if closest is None else {"data": closest[0].data, "age_days": closest[1], "stale": why},
         "compared": [
-            {"one": one, "other": other, "quantities": _agreements(rows)} for one, other, rows in compared
+            {"one": each.one, "other": each.other, "quantities": _agreements(each.rows)} for each in compared
         ],
     }  # fmt: skip
 

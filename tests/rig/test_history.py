@@ -10,9 +10,11 @@ from typing import Any
 
 import pytest
 
+from calibrations.fit import fit
 from calibrations.model_file import read_model
 from calibrations.table import Table
-from rig.analysis.history import Calibration, Value, compare_rigs, history
+from rig.analysis.history import Calibration, Value, history, latest
+from rig.analysis.history_compared import compare_rigs
 from rig.errors import RecordError
 from rig.record import Record
 from tests.calibrations.synthetic import components, poses, turns
@@ -81,6 +83,14 @@ def test_sensors_and_dates_are_compared(rig: Rig, years: None) -> None:
     assert rig("history", "17", "--beside", "18", "--quantity", "bias-y").status == 0
 
 
+def test_of_the_other_sensor_the_last_calibration_alone_is_made(years: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    fitted: list[str] = []
+    monkeypatch.setattr("rig.analysis.history.fit", lambda model, table: fitted.append(table.source) or fit(model, table))
+    with Record() as record:
+        last = latest(record, "17", read_model("linear"))
+    assert (last.day, fitted) == ("2024-03-01", [last.data])
+
+
 def test_rigs_are_compared_by_all_calibrations_on_them() -> None:
     start = datetime(2025, 1, 1, tzinfo=UTC)
     of = [
@@ -89,7 +99,7 @@ def test_rigs_are_compared_by_all_calibrations_on_them() -> None:
         )
         for k in range(6)
     ]
-    ((unit, found),) = compare_rigs(of, "A", "B").values()
+    ((unit, found),) = compare_rigs(of, "A", "B").rows.values()
     assert (unit, found.difference, found.agrees) == ("V", pytest.approx(-0.001), False)
     assert found.expanded == pytest.approx(2 * 2**0.5 * 1e-4)  # each rig's own error may be the same every time
     with pytest.raises(RecordError, match="no calibration on the rig 'C'"):
@@ -143,6 +153,8 @@ def test_what_is_not_there_is_refused(refused: Callable[..., str], years: None) 
     assert "no quantity 'bias-z' by the model linear. Did you mean 'bias-" in refused(
         "history", "17", "--quantity", "bias-z"
     )
-    assert "write NAME=CHANGE, as in bias-x=0.005" in refused("history", "17", "--limit", "bias-x")
+    for text in ("bias-x", "bias-x=nan"):
+        assert "write NAME=CHANGE, as in bias-x=0.005" in refused("history", "17", "--limit", text)
+    assert "no quantity 'bias-w' by the model linear" in refused("history", "17", "--limit", "bias-w=0.1")
     calibrated("19", "last week", 2.5)
     assert "its constant date is 'last week'; write it as 2025-03-01" in refused("history", "19")
