@@ -10,7 +10,8 @@ from typing import Any
 
 import pytest
 
-from calibrations.fit import fit
+from calibrations.fit import Fit, fit
+from calibrations.model import Model
 from calibrations.model_file import read_model
 from calibrations.table import Table
 from rig.analysis.history import Calibration, Value, history, latest
@@ -85,7 +86,12 @@ def test_sensors_and_dates_are_compared(rig: Rig, years: None) -> None:
 
 def test_of_the_other_sensor_the_last_calibration_alone_is_made(years: None, monkeypatch: pytest.MonkeyPatch) -> None:
     fitted: list[str] = []
-    monkeypatch.setattr("rig.analysis.history.fit", lambda model, table: fitted.append(table.source) or fit(model, table))
+
+    def noted(model: Model, table: Table) -> Fit:
+        fitted.append(table.source)
+        return fit(model, table)
+
+    monkeypatch.setattr("rig.analysis.history.fit", noted)
     with Record() as record:
         last = latest(record, "17", read_model("linear"))
     assert (last.day, fitted) == ("2024-03-01", [last.data])
