@@ -18,8 +18,8 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+import scipy  # its room of interpolation is loaded where it is first entered
 from numpy.typing import ArrayLike
-from scipy.interpolate import PchipInterpolator
 
 from calibrations.errors import DataError
 from calibrations.reading.text_file import text_file
@@ -71,7 +71,7 @@ class ErrorTable:
         wanted = np.atleast_1d(np.asarray(set_deg, dtype=np.float64))
         angles, errors, stds = self._nodes
         at = self._joined(wanted % TURN_DEG, wanted)
-        true = PchipInterpolator(angles, angles + errors)(at)
+        true = scipy.interpolate.PchipInterpolator(angles, angles + errors)(at)
         return wanted + true - at, np.interp(at, angles, stds)
 
     def _joined(self, at: Array, named: Array) -> Array:

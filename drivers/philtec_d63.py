@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+import scipy  # its room of interpolation is loaded where it is first entered
 import yaml
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import PchipInterpolator
 
 from drivers.errors import SensorFault
 
@@ -73,7 +73,7 @@ class Curve:
         gaps, levels = points.T if side == "near" else points[::-1].T
         values = np.asarray(volts, dtype=np.float64)
         self._require_on_curve(values, side, levels[0], levels[-1])
-        return np.asarray(PchipInterpolator(levels, gaps)(values))
+        return np.asarray(scipy.interpolate.PchipInterpolator(levels, gaps)(values))
 
     def _side(self, side: Side) -> tuple[tuple[float, float], ...]:
         points: tuple[tuple[float, float], ...] = getattr(self, side) if side in ("near", "far") else ()

@@ -21,8 +21,8 @@ from calibrations.fit import Fit, cautiously, evaluate
 from calibrations.inputs import contributions
 from calibrations.model import Estimate, Model, Term
 from calibrations.noise import rms
-from calibrations.pictures.view import mg, milli
 from calibrations.table import Array
+from calibrations.units import mg, milli
 
 KINDS = ("poses", "positions", "rates")
 MISFIT = 1.05  # Birge ratio from which on it is told

@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+import scipy  # its signal room, large and seldom needed, is loaded where it is first entered
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
-from scipy.signal import butter, freqz
 
 from calibrations.table import Array
 
@@ -50,8 +50,8 @@ def delayed(by_s: float) -> Response:
 
 def butterworth(rate_hz: float, corner_hz: float = PAPER_CORNER_HZ, order: int = 2) -> Response:
     """A digital Butterworth low-pass, Ang V."""
-    b, a = butter(order, corner_hz, fs=rate_hz)
-    return lambda f: np.asarray(freqz(b, a, f, fs=rate_hz)[1])
+    b, a = scipy.signal.butter(order, corner_hz, fs=rate_hz)
+    return lambda f: np.asarray(scipy.signal.freqz(b, a, f, fs=rate_hz)[1])
 
 
 def corrected(response: Response, at_hz: float) -> Response:

@@ -10,7 +10,7 @@ from calibrations.compare import Comparison
 from calibrations.discover import Added, Discovery
 from calibrations.motion.evaluate import MotionResult
 from calibrations.pictures import candidate, failure, measurement, motion, residual, waterfall
-from calibrations.pictures.view import rows_of
+from calibrations.units import rows_of
 
 MOST_CURVES = 4
 POSES = (

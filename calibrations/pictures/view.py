@@ -23,13 +23,7 @@ from calibrations.pictures.style import BLUE, GREEN, INCLINATION, INK, MARKER, V
 from calibrations.table import MILLI, Array, Table
 
 MOST_KEYS = 16
-ROWS = {"motion": "stretches"}  # what the rows of a kind of table are called, where not as the kind
 KEYS_IN_A_ROW = 10
-
-
-def rows_of(table: Table) -> str:
-    """What its rows are called."""
-    return ROWS.get(table.kind, table.kind)
 
 
 @dataclass(frozen=True)
@@ -134,19 +128,3 @@ def label_residual(ax: Axes, fit: Fit, c: int, last: bool) -> None:
 def row_height(fit: Fit) -> float:
     """Inches for a channel's row of panels: a motion has many channels."""
     return 3.0 if fit.table.kind != "motion" else 2.0
-
-
-def milli(fit: Fit) -> str:
-    """The unit of `mg`: of what the sensor senses."""
-    return MILLI[fit.table.input_unit]
-
-
-def mg(values: Array, fit: Fit) -> Array:
-    """Values per channel, in the residual's unit, as mg; as thousandths of the field, or mdeg/s, of other sensors."""
-    return np.asarray(1e3 * values / scales(fit))
-
-
-def pooled_mg(fit: Fit) -> tuple[float, float]:
-    """Rms of the residual over all channels, and the noise floor, both in mg."""
-    error, floor = mg(fit.rmse, fit), mg(fit.noise.floor, fit)
-    return float(np.sqrt(np.mean(error**2))), float(np.sqrt(np.mean(floor**2)))

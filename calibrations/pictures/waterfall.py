@@ -15,8 +15,8 @@ from calibrations.discover import Added, Discovery
 from calibrations.fit import Fit
 from calibrations.numerals import plain
 from calibrations.pictures.style import AMBER, BAND, BLUE, GREEN, INK, QUIET, VERMILION, panels, styled
-from calibrations.pictures.view import milli, pooled_mg, rows_of
 from calibrations.search.held_out import held_out_excess
+from calibrations.units import milli, pooled_mg, rows_of
 
 LARGE_FALL = 8.0  # from first to last: beyond this the last bars would vanish on a linear scale
 BAR = 0.62

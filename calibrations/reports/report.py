@@ -20,7 +20,6 @@ from calibrations.model import Estimate, Model
 from calibrations.motion.evaluate import MotionResult
 from calibrations.numerals import chance, measured, minus, plain, unit
 from calibrations.pictures.album import Picture, album
-from calibrations.pictures.view import mg, milli, pooled_mg, rows_of
 from calibrations.reports import budget, general
 from calibrations.reports.motion import head, section
 from calibrations.reports.page import figure, page
@@ -37,6 +36,7 @@ from calibrations.reports.words import (
 )
 from calibrations.search.candidates import SIGNIFICANT, Candidate
 from calibrations.search.held_out import held_out_excess
+from calibrations.units import mg, milli, pooled_mg, rows_of
 
 EXPLAINED = 6  # candidates shown with formula and symptom, at most; the others in numbers only
 SHOWS = 1e-3  # share of the noise floor from which on a part of the noise is told

@@ -10,8 +10,8 @@ from calibrations.discover import Discovery
 from calibrations.experiment import Experiment
 from calibrations.fit import Fit
 from calibrations.numerals import plain
-from calibrations.pictures.view import milli, pooled_mg, rows_of
 from calibrations.search.held_out import held_out_excess
+from calibrations.units import milli, pooled_mg, rows_of
 
 MOST_NAMED = 3  # effects in the headline
 LONG_MIN = 120  # from here on, a duration is told in hours

@@ -11,8 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import gammaln
-from scipy.stats import norm
+from scipy.special import gammaln, ndtri
 
 from calibrations.fit import Fit
 from calibrations.noise import rms
@@ -106,7 +105,7 @@ def standing_out(residual: Array, noise: Array) -> NDArray[np.intp]:
     middle = np.median(residual, axis=1, keepdims=True)
     spread = 1.4826 * np.median(np.abs(residual - middle), axis=1, keepdims=True)
     spread = np.maximum(spread, noise[:, None])
-    most = norm.isf(SIGNIFICANT / 2 / residual.size)
+    most = -ndtri(SIGNIFICANT / 2 / residual.size)
     return np.flatnonzero(np.any(np.abs(residual - middle) > most * spread, axis=0))
 
 

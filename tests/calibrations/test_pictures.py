@@ -23,8 +23,9 @@ from calibrations.pictures.columns import telling_columns
 from calibrations.pictures.compact import compact
 from calibrations.pictures.inline import inline
 from calibrations.pictures.save import PictureError, png, save, save_all, svg
-from calibrations.pictures.view import groups, pooled_mg
+from calibrations.pictures.view import groups
 from calibrations.table import Array, Table
+from calibrations.units import pooled_mg
 from tests.calibrations.synthetic import components, poses, turns
 
 EFFECTS = {name: catalogue()[name] for name in ("temperature-bias", "quadratic-nonlinearity", "z-axis-bias")}

@@ -20,10 +20,10 @@ from calibrations.model import Estimate, Model, Term
 from calibrations.model_file import read_model
 from calibrations.numerals import chance, measured, minus, plain, stretch, unit
 from calibrations.pictures.album import Picture
-from calibrations.pictures.view import pooled_mg
 from calibrations.reports.report import report
 from calibrations.reports.words import headline, joined, next_takes, next_words, state, summary
 from calibrations.table import Table
+from calibrations.units import pooled_mg
 from tests.calibrations.test_pictures import EFFECTS, by_hand, hand_table, warm, warm_table
 
 EMPTY = {"meta", "br", "link", "hr", "img"}

@@ -21,13 +21,24 @@ from rig.errors import BenchError, InstrumentFailed, Stopped
 COMMANDS = Commands().list_commands(click.Context(group))
 
 
+def loaded(program: str) -> tuple[str, set[str]]:
+    """What statements print in a process of their own, and the modules that it has loaded by its end."""
+    whole = f"import sys\ntry: {program}\nfinally: print(*sys.modules, file=sys.stderr)"
+    ended = subprocess.run([sys.executable, "-c", whole], capture_output=True, text=True, timeout=30, check=True)
+    return ended.stdout, set(ended.stderr.split())
+
+
 def test_help_lists_every_command_and_imports_none() -> None:
-    program = (
-        "import sys\nfrom rig.cli import main\ntry: main(['--help'])\nfinally: print(*sys.modules, file=sys.stderr)"
-    )
-    ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=30, check=True)
-    assert all(f"  {name} " in ended.stdout for name in COMMANDS)
-    assert not {"numpy", "sqlalchemy", "rich", "yaml", "rig.cli.run"} & set(ended.stderr.split())
+    out, modules = loaded("from rig.cli import main; main(['--help'])")
+    assert all(f"  {name} " in out for name in COMMANDS)
+    assert not {"numpy", "sqlalchemy", "rich", "yaml", "rig.cli.run"} & modules
+
+
+def test_a_run_begins_without_what_only_reports_and_motions_need() -> None:
+    """These take as long to load as all the rest."""
+    _, modules = loaded("import rig.cli.run")
+    assert "rig.running.runner" in modules
+    assert not {"matplotlib", "scipy.signal", "scipy.stats", "scipy.interpolate"} & modules
 
 
 @pytest.mark.parametrize("name", COMMANDS)

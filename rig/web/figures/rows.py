@@ -14,8 +14,9 @@ from calibrations.fit import Fit
 from calibrations.noise import rms
 from calibrations.numerals import minus, plain
 from calibrations.pictures.columns import Column, columns, specific_force
-from calibrations.pictures.view import milli, shown_unit
+from calibrations.pictures.view import shown_unit
 from calibrations.table import Array, Table
+from calibrations.units import milli
 
 MOST = 4000  # rows that are drawn; more would make a page slow and a picture no clearer
 WORST = 400  # of them are those that the model misses most

@@ -9,8 +9,8 @@ from nicegui import events, ui
 
 from calibrations.pictures.candidate import most_telling
 from calibrations.pictures.columns import Column
-from calibrations.pictures.view import rows_of
 from calibrations.pictures.waterfall import levels
+from calibrations.units import rows_of
 from rig.web.figures import motion
 from rig.web.figures.failure import failure
 from rig.web.figures.measurement import measurement

@@ -9,7 +9,6 @@ from typing import Any, Protocol
 from calibrations import diagnose
 from calibrations.compare import Comparison
 from calibrations.numerals import chance, plain
-from calibrations.pictures.view import milli, pooled_mg, rows_of
 from calibrations.reports.verdict import headline
 from calibrations.search.candidates import SIGNIFICANT, Candidate
 from calibrations.search.held_out import held_out_excess
@@ -20,6 +19,7 @@ from calibrations.still.documents import mismatch
 from calibrations.still.held_out import held_out_excess as still_held_out
 from calibrations.still.words import headline as still_headline
 from calibrations.still.words import of_record
+from calibrations.units import milli, pooled_mg, rows_of
 from rig.analysis.growing import Candidate as AnyCandidate
 from rig.analysis.growing import Growing
 from rig.analysis.trail import Trail
