@@ -3,7 +3,9 @@
 No sensor feels that scatter, and it makes an output seem to follow the column less: the slope is attenuated. What it
 feels is put in place of what was read, as well as the column itself tells it: a level that wanders by itself, read with
 white scatter, whose best estimate (Wiener's) is diagonal in the cosine transform. The slope on that is not attenuated.
-Where the sensor feels the scatter too, it follows what was read more closely, and the likelihood says so.
+Where the sensor feels the scatter too, it follows what was read more closely, and the likelihood says so. How much is
+scatter is itself only as certain as the column's spectrum, and a slope no more certain than that; a level whose
+spectrum is no power of the frequency is taken for the nearest.
 
 Source  Carroll et al., Measurement Error in Nonlinear Models, chapter 4: regression calibration.
 """
@@ -23,18 +25,26 @@ from calibrations.table import Array
 LOG_RATIOS = (-12.0, 16.0)  # of the variances of scatter and of a level's steps, that are looked through
 FEWEST = 16  # ordinates from which a scatter can be told at all
 SLOPES = (0.5, 1.0, 1.5, 2.0)  # of a level's spectrum in powers of the frequency: 1 flickers, 2 walks
+NODES = ((-(3**0.5), 1 / 6), (0.0, 2 / 3), (3**0.5, 1 / 6))  # of a normal distribution, and weights (Gauss, Hermite)
+NEAR = 0.1  # of the logarithm of a ratio: a step in which the likelihood is a parabola
+FLAT = 2.0  # least curvature: a ratio is known to a factor of e, or its likelihood is no parabola
 
 
 @dataclass(frozen=True, eq=False)
 class Logged:
-    """Means (m,) of a column, over as many samples as the channel's, less their mean. `level`: without scatter."""
+    """Means (m,) of a column, over as many samples as the channel's, less their mean. `level`: without scatter.
+
+    `doubt`: the relative standard uncertainty of a slope on the level, by what is not known of the scatter.
+    """
 
     read: Array
     level: Array
+    doubt: float
 
     def part(self, which: slice) -> Logged:
         """Some of the record, which is a record of its own."""
-        return Logged(*(values[which] - values[which].mean() for values in (self.read, self.level)))
+        read, level = (values[which] - values[which].mean() for values in (self.read, self.level))
+        return Logged(read, level, self.doubt)
 
 
 def logged(blocks: Sequence[Array], n: int) -> Logged | None:
@@ -47,32 +57,62 @@ def logged(blocks: Sequence[Array], n: int) -> Logged | None:
     read = means.values()
     if sum(map(len, blocks)) != n or np.ptp(read) == 0:
         return None
-    return Logged(read, without_scatter(read, readings))
+    return Logged(read, *without_scatter(read, readings))
 
 
-def without_scatter(read: Array, readings: int) -> Array:
+def without_scatter(read: Array, readings: int) -> tuple[Array, float]:
     """The level beneath the scatter of a column's means (m,), of which each of so many `readings` holds until the next.
 
-    What is faster than the readings is left out: it tells nothing of their scatter.
+    Also the doubt of a slope on it. What is faster than the readings is left out: it tells nothing of their scatter.
     """
     m = len(read)
     k = np.arange(1, min(m, readings))
     if len(k) < FEWEST:
-        return read
+        return read, 0.0
     seen = dct(read, type=2, norm="ortho")[k]
     held, turn = max(1.0, m / readings), np.pi * k / (2 * m)
-    frequency = 2 * np.sin(turn)
     power = (seen * held * np.sin(turn) / np.sin(held * turn)) ** 2  # as if none had been held
-    _, share = min((_fitted(power, frequency**-slope) for slope in SLOPES), key=lambda each: each[0])
+    share, doubt = _share(power, 2 * np.sin(turn), seen**2)
     kept = np.zeros(m)
     kept[k] = seen * share
-    return np.asarray(idct(kept, type=2, norm="ortho"))
+    return np.asarray(idct(kept, type=2, norm="ortho")), doubt
 
 
-def _fitted(power: Array, level: Array) -> tuple[float, Array]:
-    """How unlikely a level of this spectrum is with the scatter that suits it, and its share of each ordinate; (k,)."""
-    found = minimize_scalar(_unlikely, bounds=LOG_RATIOS, args=(power, level), method="bounded")
-    return float(found.fun), np.asarray(level / (level + np.exp(found.x)))
+def _share(power: Array, frequency: Array, weight: Array) -> tuple[Array, float]:
+    """The level's share of each ordinate (k,), the mean over spectra by how likely they are.
+
+    Also by how much the slope of what follows the level would be off where another spectrum is true, relative and rms.
+    """
+    spectra = [_Spectrum.of(power, frequency**-slope) for slope in SLOPES]
+    likeliest = min(each.unlikely for each in spectra)
+    odds = [each.std * float(np.exp((likeliest - each.unlikely) / 2)) for each in spectra]  # by Laplace
+    chances = np.outer(odds, [chance for _, chance in NODES]).ravel()
+    shares = np.array([each.share(stds) for each in spectra for stds, _ in NODES])
+    share = np.average(shares, axis=0, weights=chances)
+    off = shares @ (share * weight) / (share**2 @ weight) - 1
+    return np.asarray(share), float(np.sqrt(np.average(off**2, weights=chances)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Spectrum:
+    """A level's spectrum (k,) with scatter beside it, at their likeliest ratio."""
+
+    level: Array
+    log_ratio: float  # of the variance of the scatter to that of the level's steps
+    std: float  # of the logarithm
+    unlikely: float  # twice the negative log-likelihood
+
+    @classmethod
+    def of(cls, power: Array, level: Array) -> _Spectrum:
+        """By the power that was seen (k,). Where nothing scatters the likelihood is flat, and so is the share."""
+        found = minimize_scalar(_unlikely, bounds=LOG_RATIOS, args=(power, level), method="bounded")
+        beside = sum(_unlikely(found.x + step, power, level) for step in (-NEAR, NEAR))
+        curvature = (beside - 2 * found.fun) / NEAR**2
+        return cls(level, float(found.x), float(np.sqrt(2 / max(curvature, FLAT))), float(found.fun))
+
+    def share(self, stds: float) -> Array:
+        """The level's share of each ordinate (k,), where the ratio is so many standard deviations higher."""
+        return np.asarray(self.level / (self.level + np.exp(self.log_ratio + stds * self.std)))
 
 
 def _unlikely(log_ratio: float, power: Array, level: Array) -> float:

@@ -39,7 +39,8 @@ class Pattern:
     """A part of one channel's means that is no noise: a `form` (m,), its amount, and how uncertain that is.
 
     `words` has a place for that amount. `gain`: twice the log-likelihood; `price`: of its search. `cause` is the logged
-    column that it follows; `rivals` are the other patterns that explain as much.
+    column that it follows; `rivals` are the other patterns that explain as much. `doubt`: how uncertain the form leaves
+    the amount, of the amount.
     """
 
     kind: str
@@ -51,6 +52,7 @@ class Pattern:
     gain: float
     price: float
     cause: str = ""
+    doubt: float = 0.0
     rivals: tuple[Pattern, ...] = ()
 
     @property
@@ -169,10 +171,11 @@ def _followed(channel: Channel, by: _Ordinates, unit: str) -> Iterator[Pattern]:
     """What follows a column, as it was read or without its scatter, at once or some time behind it."""
     price = AMPLITUDE + 2 * float(np.log(len(LAGS) * max(1, len(channel.logged))))  # both readings are much alike
     for name, column in channel.logged.items():
-        for values, (share, behind) in product((column.read, column.level), _lags(channel.length_s)):
+        readings = ((column.read, 0.0), (column.level, column.doubt))
+        for (values, doubt), (share, behind) in product(readings, _lags(channel.length_s)):
             form = values if share == 0 else _behind(values, share * len(values))
             text = f"{channel.axis} follows {name} by {{}} {unit}/{PER.get(name, name)}{behind}"
-            yield _matched(FOLLOWS, channel, text, form, by, price, name)
+            yield replace(_matched(FOLLOWS, channel, text, form, by, price, name), doubt=doubt)
 
 
 def _lags(length_s: float) -> Iterator[tuple[float, str]]:
@@ -194,4 +197,5 @@ def refitted(patterns: tuple[Pattern, ...], found: ChannelFit, whole: Channel) -
     forms = np.column_stack([by.coefficients(each.form) for each in patterns]) / np.sqrt(by.variance)[:, None]
     size, *_ = np.linalg.lstsq(forms, by.seen / np.sqrt(by.variance), rcond=None)
     std = np.sqrt(np.diag(np.linalg.pinv(forms.T @ forms)))
+    std = np.hypot(std, [each.doubt * a for each, a in zip(patterns, size, strict=True)])
     return tuple(replace(p, size=float(a), std=float(s)) for p, a, s in zip(patterns, size, std, strict=True))

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.fft import idct
 
 from calibrations.model_file import read_model
 from calibrations.still.diagnose import diagnose
 from calibrations.still.discover import Discovery, discover
+from calibrations.still.logged import without_scatter
 from calibrations.still.patterns import FOLLOWS, STEP
 from calibrations.still.record import Samples, Still, reduced
 from calibrations.table import Array
@@ -99,3 +101,24 @@ def test_scatter_of_readings_that_are_held_is_taken_off_as_well() -> None:
     (pattern,) = diagnose(beside(white(random) + 0.8 * warm, temperature_c=read), read_model("still")).search.patterns
     assert pattern.size == pytest.approx(0.8, abs=3 * pattern.std)
     assert pattern.std < 0.05
+    assert pattern.std > pattern.doubt * pattern.size > 0
+
+
+@pytest.mark.parametrize("scatter", [0.3, 1.0, 3.0])
+def test_a_slope_is_no_more_certain_than_what_is_scatter(scatter: float) -> None:
+    """A level that flickers, of 3,000 means, under more or less scatter: 40 of each."""
+    off, sure = np.array([_off(seed, scatter) for seed in range(40)]).T
+    assert 0.6 < np.sqrt(np.mean(off**2)) < 2.0
+    assert np.sqrt(np.mean(sure**2)) > 2.5
+
+
+def _off(seed: int, scatter: float, n: int = 3000) -> tuple[float, float]:
+    """A slope of 1 on what is left without scatter: its error by its uncertainty, with and without the doubt."""
+    random = np.random.default_rng(seed)
+    tones = random.standard_normal(n - 1) / np.sqrt(np.sin(np.pi * np.arange(1, n) / (2 * n)))
+    true = idct(np.concatenate([[0.0], tones]), norm="ortho")
+    read = true + scatter * true.std() * random.standard_normal(n)
+    level, doubt = without_scatter(read - read.mean(), n)
+    slope = true @ level / (level @ level)
+    std = np.std(true - slope * level) / np.linalg.norm(level)
+    return (slope - 1) / np.hypot(std, doubt * slope), (slope - 1) / std
