@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.fft import idct
@@ -101,7 +103,18 @@ def test_scatter_of_readings_that_are_held_is_taken_off_as_well() -> None:
     (pattern,) = diagnose(beside(white(random) + 0.8 * warm, temperature_c=read), read_model("still")).search.patterns
     assert pattern.size == pytest.approx(0.8, abs=3 * pattern.std)
     assert pattern.std < 0.05
-    assert pattern.std > pattern.doubt * pattern.size > 0
+
+
+def test_a_diagnosis_counts_the_doubt() -> None:
+    random = np.random.default_rng(4)
+    warm = room(random)
+    still = beside(white(random) + 0.8 * warm, temperature_c=warm + random.standard_normal(SAMPLES))
+    (channel,) = still.channels
+    doubted = {name: replace(column, doubt=0.5) for name, column in channel.logged.items()}
+    (pattern,) = diagnose(
+        replace(still, channels=(replace(channel, logged=doubted),)), read_model("still")
+    ).search.patterns
+    assert pattern.std == pytest.approx(0.5 * pattern.size, rel=0.01)
 
 
 @pytest.mark.parametrize("scatter", [0.3, 1.0, 3.0])
