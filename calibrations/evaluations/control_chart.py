@@ -67,11 +67,16 @@ class Chart:
         return np.flatnonzero(np.abs(self.ewma - self.centre) > self.ewma_reach).tolist()
 
     @property
+    def signals(self) -> list[int]:
+        """Numbers of the runs after the baseline that are beyond a limit."""
+        return sorted(k for k in {*self.jumps, *self.drifts} if k >= self.judged)
+
+    @property
     def verdict(self) -> str:
         """`in control` or `out of control` by all runs after the baseline; `baseline` while there is none to judge."""
         if self.judged >= len(self.values):
             return "baseline"
-        return "out of control" if any(k >= self.judged for k in self.jumps + self.drifts) else "in control"
+        return "out of control" if self.signals else "in control"
 
 
 def control_chart(values: Sequence[float], baseline: int = BASELINE, least_sigma: float = 0.0) -> Chart:

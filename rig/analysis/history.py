@@ -154,7 +154,7 @@ def stale(found: History, calibration: Calibration, age_days: float) -> str | No
 
 def _runs(record: Record, sensor: str) -> list[tuple[str, Run]]:
     """The complete runs of a sensor in the order of time, each with its name as data, such as `RUN/a1`."""
-    complete = sorted((run for run in record.runs() if run.state == "complete"), key=_when)
+    complete = sorted((run for run in record.runs() if run.state == "complete"), key=when)
     of = [(members(run).get(sensor), run) for run in complete]
     return [(f"{run.run}/{member}" if member else run.run, run) for member, run in of if member is not None]
 
@@ -193,7 +193,7 @@ def date_of(run: Run) -> datetime:
     return at if at.tzinfo else at.replace(hour=at.hour or 12, tzinfo=datetime.fromisoformat(run.created).tzinfo)
 
 
-def _when(run: Run) -> datetime:
+def when(run: Run) -> datetime:
     """Its date; a run whose date is none is passed over later, which says so."""
     try:
         return date_of(run)

@@ -18,11 +18,13 @@ from rig.nearest import did_you_mean
 
 @dataclass(frozen=True)
 class Compared:
-    """`one` and `other` for people; unit and agreement of every quantity that both have, by its name."""
+    """`one` and `other` for people; unit and agreement of every quantity that both have, by its name. `data`: the two
+    runs, None of means over several."""
 
     one: str
     other: str
     rows: Mapping[str, tuple[str, Agreement]]
+    data: tuple[str, str] | None = None
 
     @property
     def agree(self) -> bool:
@@ -33,13 +35,13 @@ class Compared:
 def compare_sensors(life: History, other: str, last: Calibration) -> Compared:
     """The last calibration of a life beside that of another sensor. Raises DataError, see `compare`."""
     mine = life.calibrations[-1]
-    return Compared(f"{life.sensor}, {mine.day}", f"{other}, {last.day}", compare(mine, last))
+    return Compared(f"{life.sensor}, {mine.day}", f"{other}, {last.day}", compare(mine, last), (mine.data, last.data))
 
 
 def compare_days(life: History, one: date, other: date) -> Compared:
     """The calibrations closest to two days. Raises DataError, see `compare`."""
     a, b = (closest(life.calibrations, day)[0] for day in (one, other))
-    return Compared(a.day, b.day, compare(a, b))
+    return Compared(a.day, b.day, compare(a, b), (a.data, b.data))
 
 
 def compare_rigs(of: Sequence[Calibration], one: str, other: str) -> Compared:

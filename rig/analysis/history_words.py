@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from datetime import date
 
 from calibrations.evaluations.agreement import Agreement
+from calibrations.evaluations.stability import Stability
 from rig.analysis.history import Calibration, History, Quantity
 from rig.analysis.history_compared import Compared
+
+Written = Callable[[float, int], str]
 
 
 def summary(life: History) -> str:
@@ -40,6 +44,11 @@ def but_stale(why: str) -> str:
     return f"But it is stale: {why}."
 
 
+def significance(line: Stability) -> str:
+    """What is to be said after a drift that may be none."""
+    return "" if line.drifts else ", not significant"
+
+
 def chart_verdict(q: Quantity) -> str:
     """Of its control charts; how far they are while their baseline is not complete; nothing where there is none."""
     if q.chart is None:
@@ -48,13 +57,13 @@ def chart_verdict(q: Quantity) -> str:
     return q.chart.verdict + progress
 
 
-def agreements(of: Compared) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Head and rows of a table: every quantity that both have."""
+def agreements(of: Compared, written: Written) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Head and rows of a table: every quantity that both have; `written` is how a number is to so many digits."""
     head = ("quantity", of.one, of.other, "difference", "U", "unit", "E_n", "")
-    return head, [_agreement(name, unit, each) for name, (unit, each) in of.rows.items()]
+    return head, [_agreement(name, unit, each, written) for name, (unit, each) in of.rows.items()]
 
 
-def _agreement(name: str, unit: str, each: Agreement) -> tuple[str, ...]:
+def _agreement(name: str, unit: str, each: Agreement, written: Written) -> tuple[str, ...]:
     verdict = "agree" if each.agrees else "do not agree"
-    values = (f"{each.a:.7g}", f"{each.b:.7g}", f"{each.difference:.2g}", f"{each.expanded:.2g}")
+    values = (written(each.a, 7), written(each.b, 7), written(each.difference, 2), written(each.expanded, 2))
     return name, *values, unit, f"{each.e_n:.2f}", verdict

@@ -25,8 +25,18 @@ def sensors(runs: Iterable[Run]) -> list[str]:
     return list(dict.fromkeys(each for run in runs for each in members(run)))
 
 
+def calibrating(runs: Iterable[Run]) -> dict[str, list[Run]]:
+    """The complete runs of each sensor that models may be fitted to."""
+    found: dict[str, list[Run]] = {}
+    for run in runs:
+        if run.state == "complete" and run.kind in CALIBRATING:
+            for sensor in members(run):
+                found.setdefault(sensor, []).append(run)
+    return found
+
+
 def lives(run: Run, runs: Iterable[Run]) -> dict[str, int]:
-    """How many complete runs that may be calibrations there are of each sensor of `run`, where more than one."""
-    of = [set(members(r)) for r in runs if r.state == "complete" and r.kind in CALIBRATING]
-    counts = {sensor: sum(sensor in each for each in of) for sensor in members(run)}
+    """How many calibrating runs there are of each sensor of `run`, where more than one."""
+    of = calibrating(runs)
+    counts = {sensor: len(of.get(sensor, ())) for sensor in members(run)}
     return {sensor: count for sensor, count in counts.items() if count > 1}

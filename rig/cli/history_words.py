@@ -11,7 +11,7 @@ from calibrations.evaluations.stability import YEAR_DAYS
 from calibrations.model import Estimate
 from rig.analysis.history import Calibration, History, Quantity
 from rig.analysis.history_compared import Compared
-from rig.analysis.history_words import agreements, but_stale, chart_verdict, near, next_due, summary
+from rig.analysis.history_words import agreements, but_stale, chart_verdict, near, next_due, significance, summary
 from rig.cli.output import columns, note
 from rig.cli.words import with_uncertainty
 
@@ -44,7 +44,7 @@ def _stability(q: Quantity) -> tuple[str, ...]:
     if line is None:
         return q.name, "-", "-", verdict, _allowed(q), "-"
     slope = Estimate("", "", YEAR_DAYS * line.slope, YEAR_DAYS * line.slope_std, q.unit)
-    drift = f"{with_uncertainty(slope)}{'' if line.drifts else ', not significant'}"
+    drift = f"{with_uncertainty(slope)}{significance(line)}"
     return q.name, drift, f"{line.scatter:.2g} {q.unit}", verdict, _allowed(q), str(q.due or "-")
 
 
@@ -62,7 +62,7 @@ def near_lines(closest: Near, on: date | None, why: str | None) -> Iterator[str]
 def compared_lines(compared: Sequence[Compared]) -> Iterator[str]:
     for each in compared:
         yield f"\n{each.one} beside {each.other}"
-        yield columns(*agreements(each))
+        yield columns(*agreements(each, lambda value, digits: f"{value:.{digits}g}"))
 
 
 def document(found: History, closest: Near, why: str | None, compared: Sequence[Compared]) -> dict[str, Any]:

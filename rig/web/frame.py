@@ -16,7 +16,7 @@ from rig.web.desk import Desk, lab_read
 from rig.web.strip import Strip
 
 STATIC = Path(__file__).parent / "static"
-WAYS = {"/": "Model", "/run": "Run", "/record": "Record"}
+WAYS = {"/": "Model", "/run": "Run", "/record": "Record", "/history": "History"}
 THEMES = {None: ("brightness_auto", "light or dark as the browser likes it"), False: ("light_mode", "light"),
           True: ("dark_mode", "dark")}  # fmt: skip
 NEXT = {None: False, False: True, True: None}

@@ -5,11 +5,16 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any, ParamSpec, TypeVar
 
 from nicegui import ui
 from nicegui.element import Element
 
+# A cell of a sorted table: it leads to the row's `to`, where there is one.
+LINKED = """<q-td :props="props">
+  <a v-if="props.row.to" :href="props.row.to" @click.stop>{{ props.value }}</a><span v-else>{{ props.value }}</span>
+</q-td>"""
 P = ParamSpec("P")
 R = TypeVar("R")
 
@@ -62,8 +67,16 @@ def facts(rows: Mapping[str, str]) -> None:
             words(value)
 
 
-def table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> None:
-    """A plain table of text."""
+@dataclass(frozen=True)
+class Link:
+    """A cell that leads somewhere."""
+
+    text: str
+    to: str
+
+
+def table(head: tuple[str, ...], rows: Sequence[tuple[str | Link, ...]]) -> None:
+    """A plain table of text and links."""
     with ui.element("table").classes("plain-table"):
         with ui.element("tr"):
             for name in head:
@@ -73,7 +86,7 @@ def table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> None:
             with ui.element("tr"):
                 for cell in row:
                     with ui.element("td"):
-                        words(cell)
+                        ui.link(cell.text, cell.to) if isinstance(cell, Link) else words(cell)
 
 
 def redraw(plot: ui.plotly, figure: dict[str, Any]) -> None:

@@ -18,19 +18,9 @@ from rig.analysis.history import Calibration, Value, history, latest
 from rig.analysis.history_compared import compare_rigs
 from rig.errors import RecordError
 from rig.record import Record
-from tests.calibrations.synthetic import components, poses, turns
+from tests.rig.lives import COLUMNS, calibrated
 
 Rig = Callable[..., Any]
-COLUMNS = turns((90, 30), step_deg=45.0)
-
-
-def calibrated(serial: str, day: str, bias: float, seed: int = 0) -> None:
-    """A run of one sensor, imported, with a date of its own."""
-    x, y, _ = components(COLUMNS)
-    made = poses(COLUMNS, bias + 1.001 * x, 2.45 + 0.98 * y, seed=seed)
-    constants = {"sensor": "ADXL203", "serial": serial, **({"date": day} if day else {})}
-    with Record() as record:
-        record.add_table(Table.from_columns("poses", made.columns, constants, "made"))
 
 
 @pytest.fixture

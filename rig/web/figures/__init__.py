@@ -11,6 +11,9 @@
     sensed        units of a still record: the output's own, or those of what is sensed
     waterfall     the error falling as effects are added, down to the noise floor
     series        values of a run over time, thinned
+    life          one quantity over a sensor's calibrations, its drift, what is allowed
+    chart         its control charts
+    prefixed      units for people, with the prefix by which numbers read best
 
 Those of a model show the same rows in the same order (`rows.Shown`), so that a selection in one holds in all. Colours
 of text and grid are the page's (`workbench.css`), which knows whether it is dark.

@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from calibrations.numerals import measured, unit
+from calibrations.numerals import measured
 from calibrations.pictures.columns import Column
 from calibrations.still.allan import Averaged
 from rig.analysis.both import Again
 from rig.analysis.side_by_side import DIFFERENT, Pair
 from rig.web.figures.averaging import TIME
+from rig.web.figures.prefixed import labelled, prefixed, spelt
 from rig.web.figures.rows import Shown
 from rig.web.figures.sensed import Scaled
 from rig.web.figures.style import CANDIDATE, MEASURED, MODEL, Figure, Trace, axis, band, decades, figure
@@ -20,8 +21,6 @@ from rig.web.figures.style import CANDIDATE, MEASURED, MODEL, Figure, Trace, axi
 FIRST: dict[str, Any] = {"color": MEASURED, "symbol": "circle", "size": 7}
 SECOND: dict[str, Any] = {"color": CANDIDATE, "symbol": "diamond-open", "size": 8, "line": {"width": 1.6}}
 DOUBTLESS: dict[str, Any] = {"color": CANDIDATE, "symbol": "diamond", "size": 10}
-PREFIXED = ("V", "g", "deg", "K", "h", "s")  # units that take a prefix
-PREFIXES = ((1.0, ""), (1e3, "m"), (1e6, "µ"), (1e9, "n"))
 BETWEEN = 2.2  # rows of room under each group: its axis
 ROW_PX, AXIS_PX = 26, 56
 
@@ -38,10 +37,11 @@ def differences(pairs: Sequence[Pair]) -> tuple[Figure, int]:
     top = 1.0
     for k, group in enumerate(groups.values(), 1):
         number, bottom = str(k) if k > 1 else "", top - len(group) / rows
-        factor, title = _named(unit_of(group[0]), max(abs(p.difference) + DIFFERENT * (p.std or 0.0) for p in group))
+        reach = max(abs(p.difference) + DIFFERENT * (p.std or 0.0) for p in group)
+        factor, unit = prefixed(unit_of(group[0]), reach)
         traces += _group(group, factor, number)
         line = {"zeroline": True, "zerolinecolor": MODEL, "zerolinewidth": 1.2}
-        axes[f"xaxis{number}"] = {**axis(title), "anchor": f"y{number}", **line}
+        axes[f"xaxis{number}"] = {**axis(labelled("difference", unit)), "anchor": f"y{number}", **line}
         names = {"domain": [max(bottom, 0.0), top], "anchor": f"x{number}", "autorange": "reversed", "showgrid": False}
         axes[f"yaxis{number}"] = {**axis(""), **names}
         top = bottom - BETWEEN / rows
@@ -98,7 +98,7 @@ def deviations(first: Averaged, second: Averaged, into: tuple[Scaled, Scaled]) -
 
 def unit_of(pair: Pair) -> str:
     """For people."""
-    return unit(pair.unit).replace("sqrt(Hz)", "√Hz").replace("sqrt(s)", "√s")
+    return spelt(pair.unit)
 
 
 def _group(group: Sequence[Pair], factor: float, number: str) -> list[Trace]:
@@ -113,14 +113,6 @@ def _group(group: Sequence[Pair], factor: float, number: str) -> list[Trace]:
                      "y": [pair.name for pair in pairs], "xaxis": f"x{number}", "yaxis": f"y{number}", "error_x": bars,
                      "marker": look, "text": told, "hovertemplate": "%{y}: %{text}<extra></extra>"})  # fmt: skip
     return made
-
-
-def _named(of: str, reach: float) -> tuple[float, str]:
-    """What differences of a unit are multiplied with, and the axis' title."""
-    if not of.startswith(PREFIXED):
-        return 1.0, f"difference ({of})" if of else "difference"
-    factor, prefix = next(((f, p) for f, p in PREFIXES if reach * f >= 1), PREFIXES[-1])
-    return factor, f"difference ({prefix}{of})"
 
 
 def _dots(shown: Shown, x: Column, look: dict[str, Any], name: str) -> Trace:

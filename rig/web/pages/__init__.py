@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from rig.web.desk import Desk
 from rig.web.frame import static_files
-from rig.web.pages import compare, model, record, run, run_record
+from rig.web.pages import compare, history, model, record, run, run_record
 
 
 def register(desk: Desk) -> None:
     """All pages, on one desk."""
     static_files()
-    for page in (model, run, record, run_record, compare):
+    for page in (model, run, record, run_record, compare, history):
         page.register(desk)

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
 from urllib.parse import urlencode
 
 from nicegui import events, ui
 
+from rig.analysis.sensors import calibrating, members
 from rig.record import Run
 from rig.web.desk import Desk, runs
 from rig.web.frame import frame
-from rig.web.parts import box, div, failed, state, words
+from rig.web.pages.history_asked import Asked
+from rig.web.parts import LINKED, box, div, failed, state, words
 from rig.web.told import message
 
 COLUMNS: list[dict[str, object]] = [
@@ -52,11 +55,13 @@ class Runs:
                 search = ui.input("Search: run, procedure, sensor, file").props("dense clearable").classes("grow")
                 self.hint = words("Mark two to compare them.", "quiet small")
                 self.compare = ui.button("Compare", icon="compare_arrows", on_click=self._compare)
-            rows = [row for run in found for row in _rows(run)]
+            known = calibrating(found)
+            rows = [row for run in found for row in _rows(run, known)]
             self.table = ui.table(
                 rows=rows, columns=COLUMNS, row_key="name", selection="multiple", pagination=PAGE,
                 on_select=self._marked,
             ).props("flat dense wrap-cells").classes("runs").on("rowClick", self._open)  # fmt: skip
+            self.table.add_slot("body-cell-sensor", LINKED)
             self.table.bind_filter_from(search, "value")
         self.compare.disable()
 
@@ -73,14 +78,21 @@ class Runs:
         ui.navigate.to(f"/record/{event.args[1]['name'].partition('/')[0]}")
 
 
-def _rows(run: Run) -> list[dict[str, str]]:
-    """A row for a run; of a batch, one for each sensor."""
+def _rows(run: Run, calibrated: Container[str]) -> list[dict[str, str]]:
+    """A row for a run; of a batch, one for each sensor. A sensor that was calibrated leads to its life."""
     about = {"procedure": run.procedure, "state": run.state, "extent": run.extent, "source": run.source}
     about["created"] = run.created[:19].replace("T", " ")
-    batch = run.bench.get("sensors", {})
-    if not batch:
-        return [{"name": run.run, "sensor": _named(run.constants), **about}]
-    return [{"name": f"{run.run}/{name}", "sensor": _named(batch[name]), **about} for name in batch]
+    of = {member: sensor for sensor, member in members(run).items()}
+    names = list(run.bench.get("sensors", {})) or [""]
+    return [
+        {
+            "name": f"{run.run}/{name}" if name else run.run,
+            "sensor": _named(run.bench["sensors"][name] if name else run.constants),
+            "to": Asked(of[name]).address if of.get(name) in calibrated else "",
+            **about,
+        }
+        for name in names
+    ]
 
 
 def _named(of: object) -> str:

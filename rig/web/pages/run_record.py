@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from urllib.parse import urlencode
@@ -12,12 +13,14 @@ from calibrations.numerals import bound, measured, unit
 from rig.analysis.next_steps import next_steps
 from rig.analysis.reported import reported
 from rig.analysis.request import Request
+from rig.analysis.sensors import lives
 from rig.errors import RecordError
 from rig.export import export
 from rig.record import Event, Record, Run
 from rig.web.desk import Desk
 from rig.web.frame import frame
 from rig.web.pages import left_out
+from rig.web.pages.history_asked import Asked
 from rig.web.pages.over_time import OverTime
 from rig.web.pages.settings_words import label, written
 from rig.web.parts import box, div, facts, failed, off_loop, table, words
@@ -37,17 +40,18 @@ def register(desk: Desk) -> None:
             try:
                 with Record.to_find(run) as record:
                     found, excluded = record.run(run), record.excluded(run)
+                    known = lives(found, record.runs())
             except Exception as error:
                 failed("No such run", message(error))
                 ui.link("All runs", "/record")
                 return
-            OneRun(desk, found, excluded)
+            OneRun(desk, found, excluded, known)
 
 
 class OneRun:
     """All that is known of it."""
 
-    def __init__(self, desk: Desk, run: Run, excluded: dict[int, str]) -> None:
+    def __init__(self, desk: Desk, run: Run, excluded: dict[int, str], known: Mapping[str, int]) -> None:
         self.desk, self.run = desk, run
         self._head()
         with div("two"):
@@ -57,6 +61,10 @@ class OneRun:
                     _results(run)
                     for line in next_steps(run, excluded):
                         words(line, "quiet small")
+                    for sensor, count in known.items():
+                        ui.link(f"{count} runs of the sensor {sensor}: its life", Asked(sensor).address).classes(
+                            "small"
+                        )
                 with box("stack"):
                     words("How it was made", "title")
                     facts({name: value[:SHOWN] for name, value in _made(run).items() if value})
