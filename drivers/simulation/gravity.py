@@ -73,8 +73,14 @@ def felt_g(up: Floats, mount: Floats, alpha_rad: float, beta_rad: float) -> tupl
     cb, sb = math.cos(beta_rad), math.sin(beta_rad)
     x, y, z = ca * up[0] + sa * up[2], up[1], ca * up[2] - sa * up[0]
     x, y = cb * x - sb * y, sb * x + cb * y
+    return across(mount, x, y, z)
+
+
+@kernel
+def across(turn: Floats, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """A vector in another frame, `turn` (3, 3) from its own. Numbers, since arrays would be made anew at every tick."""
     return (
-        mount[0, 0] * x + mount[0, 1] * y + mount[0, 2] * z,
-        mount[1, 0] * x + mount[1, 1] * y + mount[1, 2] * z,
-        mount[2, 0] * x + mount[2, 1] * y + mount[2, 2] * z,
+        turn[0, 0] * x + turn[0, 1] * y + turn[0, 2] * z,
+        turn[1, 0] * x + turn[1, 1] * y + turn[1, 2] * z,
+        turn[2, 0] * x + turn[2, 1] * y + turn[2, 2] * z,
     )

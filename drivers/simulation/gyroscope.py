@@ -17,6 +17,8 @@ from drivers.simulation.gravity import rotation
 from drivers.simulation.kernel import Floats, kernel
 from drivers.simulation.springs import STANDARD_GRAVITY_M_S2
 
+Vector = tuple[float, float, float]
+
 
 @dataclass(frozen=True)
 class Tines:
@@ -54,8 +56,8 @@ def die(sensor: Gyroscope) -> Floats:
 
 
 @kernel
-def read_v(sensor: Gyroscope, rate: Floats, load: Floats, warmer_k: float, volts: Floats) -> None:
-    """Fill `volts` (3,) at a rate (3,), deg/s, and a specific force (3,), g, both in the die's frame."""
+def read_v(sensor: Gyroscope, rate: Vector, load: Vector, warmer_k: float, volts: Floats) -> None:
+    """Fill `volts` (3,) at a rate, deg/s, and a specific force, g, both in the die's frame."""
     volts[0] = sensed_v(sensor.x, rate[0], load[1], warmer_k)
     volts[1] = sensed_v(sensor.y, rate[1], load[2], warmer_k)
     volts[2] = sensed_v(sensor.z, rate[2], load[0], warmer_k)

@@ -8,11 +8,9 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from drivers.simulation import gravity, gyroscope, magnetometer, stage
 from drivers.simulation.config import WorldConfig
-from drivers.simulation.kernel import Floats, kernel
+from drivers.simulation.kernel import kernel
 from drivers.simulation.state import State
 
 
@@ -23,20 +21,22 @@ def update(world: State, config: WorldConfig, t_ns: int, warmer_k: float) -> Non
     beta = stage.true_angle_rad(config.stages.beta, world.table_deg[1])
     fx, fy, fz = gravity.felt_g(world.field_ut, world.board, alpha, beta)
     magnetometer.read_v(config.magnetometer, world.plates, fx, fy, fz, warmer_k, world.field_v)
-    load = np.array(gravity.felt_g(world.up, world.board, alpha, beta))
-    rate = rate_deg_s(world, alpha, beta, t_ns)
-    gyroscope.read_v(config.gyroscope, world.die @ rate, world.die @ load, warmer_k, world.rate_v)
+    lx, ly, lz = gravity.felt_g(world.up, world.board, alpha, beta)
+    rx, ry, rz = rate_deg_s(world, alpha, beta, t_ns)
+    rate, load = gravity.across(world.die, rx, ry, rz), gravity.across(world.die, lx, ly, lz)
+    gyroscope.read_v(config.gyroscope, rate, load, warmer_k, world.rate_v)
 
 
 @kernel
-def rate_deg_s(world: State, alpha: float, beta: float, t_ns: int) -> Floats:
-    """Angular rate of the board in its own frame, deg/s, shape (3,), as the mean since the last step."""
-    rate = np.array(gravity.felt_g(world.earth_deg_s, world.board, alpha, beta))
+def rate_deg_s(world: State, alpha: float, beta: float, t_ns: int) -> tuple[float, float, float]:
+    """Angular rate of the board in its own frame, deg/s, as the mean since the last step."""
+    x, y, z = gravity.felt_g(world.earth_deg_s, world.board, alpha, beta)
     if t_ns > world.turned_ns:
         per_s = 1e9 / (t_ns - world.turned_ns)
         leaning = math.degrees(alpha - world.turned_rad[0]) * per_s
         turning = math.degrees(beta - world.turned_rad[1]) * per_s
         sb, cb = math.sin(beta), math.cos(beta)
-        rate -= world.board @ np.array([-leaning * sb, leaning * cb, turning])
+        own_x, own_y, own_z = gravity.across(world.board, -leaning * sb, leaning * cb, turning)
+        x, y, z = x - own_x, y - own_y, z - own_z
     world.turned_rad[0], world.turned_rad[1], world.turned_ns = alpha, beta, t_ns
-    return rate
+    return x, y, z
