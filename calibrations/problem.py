@@ -28,7 +28,14 @@ from calibrations.search.lack_of_fit import smooth_columns
 from calibrations.table import Array, Table
 
 STRENGTH = "field-strength"
+FITTED = ("poses", "positions", "motion", "rates")  # kinds of tables
 KNOWN = ("poses", "rates")  # kinds of tables whose rows have a known specific force or rate
+
+
+def check_kind(kind: str, source: str) -> None:
+    """Raises ModelError for tables to which no model is fitted; known before any sample of theirs is read."""
+    if kind not in FITTED:
+        raise ModelError(f"{source}: models are fitted to poses, positions, motion or rates, not to a table of {kind}")
 
 
 @dataclass(frozen=True)
@@ -42,11 +49,7 @@ class Problem:
     def of(model: Model, table: Table) -> Problem:
         """The problem. Raises ModelError and TooFewRows where there is none to solve."""
         table = stretches(table) if table.kind == "motion" else table.in_order()
-        if table.kind not in ("poses", "positions", "motion", "rates"):
-            raise ModelError(
-                f"{table.source}: models are fitted to poses, positions, motion or rates, not to a table of "
-                f"{table.kind}"
-            )
+        check_kind(table.kind, table.source)
         if table.kind == "positions":
             _check_positions(table)
         if table.kind == "rates":

@@ -20,6 +20,7 @@ from calibrations.evaluations.stability import FEWEST, Stability, stability
 from calibrations.fit import fit
 from calibrations.model import Model
 from calibrations.noise import rms
+from calibrations.problem import check_kind
 from rig.analysis.sensors import members, sensors
 from rig.bench.certificates import EXPIRED
 from rig.errors import RecordError
@@ -168,6 +169,7 @@ def _none(record: Record, sensor: str, passed_over: Mapping[str, str]) -> Record
 
 def _calibration(record: Record, data: str, run: Run, model: Model) -> Calibration:
     """Raises CalibrationError where the run does not determine the model."""
+    check_kind(run.kind, data)  # a night at rest is gigabytes of samples
     at = date_of(run)
     table = Measured.named(record, data).table()
     found = fit(model, table)

@@ -137,10 +137,14 @@ def test_what_is_no_calibration_is_passed_over_and_said(rig: Rig, years: None) -
         columns = {name: values[:2] for name, values in COLUMNS.items()} | {"vx_v": [1.0, 2.0]}
         short = Table.from_columns("poses", columns, {"serial": "17"}, "short")
         record.add_table(short)
+        rest = record.begin("noise-floor", {}, constants={"serial": "17"}, kind="still", bench={}, identities={},
+                            configuration="", source="")  # fmt: skip
+        record.set_state(rest, "complete", None, {})
         found = history(record, "17", read_model("linear"), {})
     assert len(found.calibrations) == 5
-    (why,) = found.passed_over.values()
+    why, unread = found.passed_over.values()
     assert "2 rows cannot determine" in why
+    assert unread == f"{rest}: models are fitted to poses, positions, motion or rates, not to a table of still"
     assert "Passed over: " in rig("history", "17").err
 
 

@@ -47,9 +47,8 @@ def life(q: Quantity) -> Figure:
     }
     traces = [*_drift(q, start, end, factor), *_allowed(q, start, end, factor), dots]
     x = {"type": "date", "range": _dates([start - 0.03 * (end - start), end + 0.03 * (end - start)])}
-    return figure(
-        traces, "", labelled(q.name, unit), f"life {q.name}", xaxis=x, dragmode="zoom", margin=MARGIN, **_due(q)
-    )
+    more = {"xaxis": x, "dragmode": "zoom", "margin": MARGIN, **_named(q, factor)}
+    return figure(traces, "", labelled(q.name, unit), f"life {q.name}", **more)
 
 
 def told(q: Quantity, each: Calibration, signals: bool) -> str:
@@ -90,30 +89,25 @@ def _drift(q: Quantity, start: float, end: float, factor: float) -> Iterator[Tra
 
 
 def _allowed(q: Quantity, start: float, end: float, factor: float) -> Iterator[Trace]:
-    """The limits, as broken lines that say which they are; their words stand inside."""
-    named = (("lowest allowed", "top right"), ("highest allowed", "bottom right"))
-    for bound, (word, place) in zip(q.allowed or (), named, strict=False):
-        yield {"type": "scatter", "mode": "lines+text", "x": _dates([start, end]), "y": [factor * bound] * 2,
-               "text": [word, ""], "textposition": place, "hoverinfo": "skip",
-               "line": {"color": CANDIDATE, "width": 1.4, "dash": "dash"}}  # fmt: skip
+    """The limits, as broken lines."""
+    for bound in q.allowed or ():
+        line = {"color": CANDIDATE, "width": 1.4, "dash": "dash"}
+        ends = {"x": _dates([start, end]), "y": [factor * bound] * 2}
+        yield {"type": "scatter", "mode": "lines", "line": line, "hoverinfo": "skip", **ends}
 
 
-def _due(q: Quantity) -> dict[str, object]:
-    """The day on which the next calibration is due."""
+def _named(q: Quantity, factor: float) -> dict[str, object]:
+    """The day on which the next calibration is due, as a line, and what the lines are, beside them."""
+    plain = {"showarrow": False, "xref": "paper", "x": 0.01, "xanchor": "left"}
+    places = (("lowest allowed", "bottom"), ("highest allowed", "top"))
+    names = [{**plain, "y": factor * bound, "yanchor": anchor, "text": text}
+             for bound, (text, anchor) in zip(q.allowed or (), places, strict=False)]  # fmt: skip
     if q.due is None:
-        return {}
-    ends = {"x0": str(q.due), "x1": str(q.due), "yref": "paper", "y0": 0, "y1": 1}
-    line = {"type": "line", "layer": "below", "line": {"color": CANDIDATE, "width": 1.6}, **ends}
-    name = {
-        "x": str(q.due),
-        "yref": "paper",
-        "y": 1,
-        "text": f"due {q.due}",
-        "showarrow": False,
-        "xanchor": "right",
-        "yanchor": "bottom",
-    }
-    return {"shapes": [line], "annotations": [name]}
+        return {"annotations": names}
+    at = {"type": "line", "layer": "below", "x0": str(q.due), "x1": str(q.due), "yref": "paper", "y0": 0, "y1": 1}
+    due = {"x": str(q.due), "yref": "paper", "y": 1, "xanchor": "right", "yanchor": "bottom", "showarrow": False}
+    names.append({**due, "text": f"due {q.due}"})
+    return {"annotations": names, "shapes": [{**at, "line": {"color": CANDIDATE, "width": 1.6}}]}
 
 
 def _dates(days: Sequence[float]) -> list[str]:
