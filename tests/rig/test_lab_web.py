@@ -74,8 +74,10 @@ def _cookie(host: str, query: str) -> str:
 def test_pages_read_the_lab_and_show_no_password(run: str, reader: str, tmp_path: Path) -> None:
     elsewhere = tmp_path / "elsewhere"
     with served(elsewhere, **{RECORD: reader}) as (process, page):
-        answers = [page(path) for path in ("/record", f"/record/{run}", "/run", f"/?data={run}")]
+        pages = ("/record", f"/record/{run}", "/history", "/history?sensor=ADXL203", "/run", f"/?data={run}")
+        answers = [page(path) for path in pages]
         assert all(run in answer for answer in answers[:2])
+        assert "/history?sensor=ADXL203" in answers[2]
         assert "reads postgresql://anna:***@127.0.0.1" in answers[0]
         line = Path(f"/proc/{process.pid}/cmdline").read_bytes()
         process.send_signal(signal.SIGTERM)
@@ -107,6 +109,15 @@ def visiting(path: str, visit: Callable[[User], Coroutine[Any, Any, None]]) -> N
                 Client.page_routes.clear()
 
     asyncio.run(simulated())
+
+
+def test_a_life_is_that_in_the_lab(run: str, reader: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(RECORD, reader)
+
+    async def visit(user: User) -> None:
+        await user.should_see(f"Its runs are none by this model: {run}", retries=200)  # noise alone: but it was read
+
+    visiting("/history?sensor=ADXL203", visit)
 
 
 def test_who_may_only_read_is_told_so_and_nothing_is_written(
