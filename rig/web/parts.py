@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Future
 from contextlib import contextmanager
+from contextvars import copy_context
 from dataclasses import dataclass
+from functools import partial
+from threading import Thread
 from typing import Any, ParamSpec, TypeVar
 
 from nicegui import ui
@@ -96,5 +100,19 @@ def redraw(plot: ui.plotly, figure: dict[str, Any]) -> None:
 
 
 async def off_loop(call: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
-    """What takes long, in a thread: the page stays alive."""
-    return await asyncio.to_thread(call, *args, **kwargs)
+    """What takes long, in a thread: the page stays alive. A server that is to end does not wait for it."""
+    future = Future[R]()
+    work = partial(copy_context().run, call, *args, **kwargs)
+    Thread(target=_settled, args=(future, work), name=call.__name__, daemon=True).start()
+    return await asyncio.wrap_future(future)
+
+
+def _settled(future: Future[R], work: Callable[[], R]) -> None:
+    """What came of the work, whatever it was; also where nobody waits for it any more."""
+    if future.set_running_or_notify_cancel():
+        try:
+            result = work()
+        except BaseException as error:
+            future.set_exception(error)
+        else:
+            future.set_result(result)

@@ -9,43 +9,21 @@ from typing import Any
 from urllib.parse import quote
 
 import pytest
-import yaml
 from playwright.sync_api import BrowserContext, Page, expect
 
 from calibrations.model_file import read_model
 from procedures.catalogue import find
 from procedures.settings import parse
-from rig.bench import DEFAULT, read_bench
+from rig.bench import read_bench
 from rig.cli.watch import Quiet
 from rig.record import Record
 from rig.running.runner import start
 from tests.browser.conftest import Workbench
+from tests.browser.held import held_up
 from tests.browser.measured import hidden, hundred_thousand, thousand, unexplained, wandering
 
 DOTS = "[aria-label='What the model leaves'] .points path"
 ALIVE_MS = 5000  # on a busy machine; else a tenth of that
-HELD_UP = '''"""held-up: nothing, after a while.
-
-    V += k (a_i - a_i)
-
-Symptom   none.
-Excited by  anything.
-Source    none.
-"""
-
-import time
-from pathlib import Path
-
-from calibrations.effect import Parameter
-
-PARAMETERS = (Parameter("square", "{{out}}/g^2", typical=0.02, doc="of the square"),)
-
-
-def transduction(a, table, p):
-    while not Path("{go}").exists():
-        time.sleep(0.01)
-    return a**2 * p["square"]
-'''
 BARS = "[aria-label^='The falling error'] .bars .point"
 
 
@@ -154,15 +132,6 @@ def test_a_search_is_told_cancelled_and_begun_again(
     page.get_by_role("button", name="Look for what is missing").click()
     expect(page.locator(".verdict .headline").first).to_contain_text("Nothing is missing")
     page.close()
-
-
-def held_up(folder: Path) -> Path:
-    """A bench with an effect of its own that no search gets past before the file "go" is there."""
-    (folder / "effects").mkdir()
-    (folder / "effects" / "held_up.py").write_text(HELD_UP.format(go=folder / "go"))
-    given = yaml.safe_load(DEFAULT.read_text()) | {"folders": {"effects": "effects"}}
-    (bench := folder / "bench.yaml").write_text(yaml.safe_dump(given))
-    return bench
 
 
 def test_selection_units_axes_and_poses(workbench: Workbench, tmp_path: Path) -> None:

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import json
+import os
 import socket
 import subprocess
 import sys
 import urllib.error
 import urllib.request
+from pathlib import Path
+from urllib.parse import quote
 
 import pytest
-from playwright.sync_api import Browser
+from playwright.sync_api import Browser, expect
 
 from tests.browser.conftest import Workbench
+from tests.browser.held import held_up
+from tests.browser.measured import thousand
 
 WEB = [sys.executable, "-m", "rig", "web", "--no-open"]
 
@@ -51,3 +56,21 @@ def test_a_wrong_token_is_refused_in_the_browser(browser: Browser, workbench: Wo
     assert answer.status == 401
     assert "Open the address that `rig web` printed" in page.inner_text("body")
     page.context.close()
+
+
+def test_a_server_that_is_to_end_waits_for_no_search(browser: Browser, tmp_path: Path) -> None:
+    words, home = (
+        [*WEB, "--json", "--bench", str(held_up(tmp_path))],
+        {**os.environ, "RIG_HOME": str(tmp_path / "home")},
+    )
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True, env=home) as server:
+        try:
+            assert server.stdout is not None
+            page = browser.new_context().new_page()
+            page.goto(f"{json.loads(server.stdout.readline())['url']}&data={quote(thousand(tmp_path))}")
+            expect(page.get_by_role("button", name="Cancel")).to_be_visible()
+            page.context.close()
+            server.terminate()
+            assert server.wait(20) == 0
+        finally:
+            server.kill()

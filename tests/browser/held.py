@@ -1,0 +1,39 @@
+"""A search that goes on for as long as a test wants."""
+
+from pathlib import Path
+
+import yaml
+
+from rig.bench import DEFAULT
+
+HELD_UP = '''"""held-up: a parabola that is long in coming.
+
+    V += k a_i^2
+
+Symptom   none.
+Excited by  anything.
+Source    none.
+"""
+
+import time
+from pathlib import Path
+
+from calibrations.effect import Parameter
+
+PARAMETERS = (Parameter("square", "{{out}}/g^2", typical=0.02, doc="of the square"),)
+
+
+def transduction(a, table, p):
+    while not Path("{go}").exists():
+        time.sleep(0.01)
+    return a**2 * p["square"]
+'''
+
+
+def held_up(folder: Path) -> Path:
+    """A bench with an effect of its own that no search gets past before the file "go" is there."""
+    (folder / "effects").mkdir()
+    (folder / "effects" / "held_up.py").write_text(HELD_UP.format(go=folder / "go"))
+    given = yaml.safe_load(DEFAULT.read_text()) | {"folders": {"effects": "effects"}}
+    (bench := folder / "bench.yaml").write_text(yaml.safe_dump(given))
+    return bench
