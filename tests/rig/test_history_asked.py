@@ -36,7 +36,7 @@ def test_what_is_as_by_default_is_not_in_the_address() -> None:
         ("baseline=1", "baseline=1: write how many calibrations set the charts, 2 at least"),
         ("baseline=%C2%B2", "baseline=²: write how many"),
         ("limit=bias-x", "write NAME=CHANGE, as in bias-x=0.005"),
-        ("at=monday", "at=monday: write the day as 2"),
+        ("at=monday", "'monday' is no day: write it as 2"),
     ],
 )
 def test_an_address_that_asks_nothing_that_can_be_answered(query: str, told: str) -> None:

@@ -22,7 +22,7 @@ ALONE_DAYS = 30.0  # around calibrations of one moment, which stretch no axis
 
 def life(q: Quantity) -> Figure:
     """Dots are calibrations with two standard uncertainties each way, those that a chart signals are diamonds; the
-    band is where 95 % of the values would be."""
+    band is the 95 % interval of the value then, without what a calibration is uncertain by."""
     values = [each.values[q.name] for each in q.of]
     factor, unit = prefixed(spelt(q.unit), max(abs(value.value) for value in values))
     days = [each.at.timestamp() / DAY_S for each in q.of]

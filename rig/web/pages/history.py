@@ -52,7 +52,7 @@ class Life:
         self.desk, self.asked, self.sensors, self.keys = desk, wanted, sensors, keys
         self.found: History | None = None
         self.limits: Mapping[str, Limit] = {}
-        self.under_way = ""
+        self.under_way = "Reading the record"
         self._head()
         self.body = div("stack")
         ui.timer(0.0, self.open, once=True)
@@ -85,9 +85,11 @@ class Life:
 
     async def open(self) -> None:
         """Calibrate every run of the sensor, off the loop."""
-        with self.body:
-            hint = waiting("Reading the record")
-            ui.timer(LOOK_S, lambda: hint.set_text(self.under_way or "Reading the record"))
+        with self.body, box("stack"):
+            hint = waiting(self.under_way)
+            ui.timer(LOOK_S, lambda: hint.set_text(self.under_way))
+            for height in ("230px", "180px"):
+                ui.skeleton(height=height)
         try:
             self.found = await off_loop(self._read)
         except Exception as error:

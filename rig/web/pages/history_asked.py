@@ -51,18 +51,19 @@ def asked(query: QueryParams) -> Asked:
         query.get("quantity", ""),
         changes(query.getlist("limit")),
         _baseline(query.get("baseline", str(BASELINE))),
-        _day(query.get("at", today())),
+        day(query.get("at", today())),
     )
+
+
+def day(text: str) -> date:
+    """A day as it is written. Raises RigError."""
+    try:
+        return date.fromisoformat(text)
+    except ValueError:
+        raise RigError(f"{text!r} is no day: write it as {today()}") from None
 
 
 def _baseline(text: str) -> int:
     if not text.isdecimal() or int(text) < FEWEST:
         raise RigError(f"baseline={text}: write how many calibrations set the charts, {FEWEST} at least")
     return int(text)
-
-
-def _day(text: str) -> date:
-    try:
-        return date.fromisoformat(text)
-    except ValueError:
-        raise RigError(f"at={text}: write the day as {today()}") from None

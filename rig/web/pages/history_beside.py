@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from datetime import date
 from urllib.parse import urlencode
 
 from nicegui import ui
@@ -13,6 +12,7 @@ from rig.analysis.history import Calibration, History
 from rig.analysis.history_compared import Compared, compare_days, compare_rigs, compare_sensors
 from rig.analysis.history_words import agreements
 from rig.web.figures.prefixed import spelt
+from rig.web.pages.history_asked import day
 from rig.web.parts import box, div, failed, off_loop, table, words
 from rig.web.told import message
 
@@ -78,7 +78,7 @@ class Beside:
             return compare_sensors(self.life, said[0], self.last_of(said[0]))
         if self.kind.value == RIGS:
             return compare_rigs(self.life.calibrations, said[0], said[1])
-        return compare_days(self.life, date.fromisoformat(said[0]), date.fromisoformat(said[1]))
+        return compare_days(self.life, day(said[0]), day(said[1]))
 
 
 def _show(found: Compared, model: str) -> None:

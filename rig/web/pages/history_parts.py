@@ -12,8 +12,9 @@ from calibrations.numerals import measured, minus, plain
 from rig.analysis.history import Calibration, History, Quantity, closest, stale
 from rig.analysis.history_words import but_stale, chart_verdict, near, next_due, significance, summary
 from rig.analysis.provenance import today
+from rig.errors import RigError
 from rig.web.figures.prefixed import spelt
-from rig.web.pages.history_asked import Asked
+from rig.web.pages.history_asked import Asked, day
 from rig.web.pages.history_pictures import model_of
 from rig.web.parts import Link, box, div, table, words
 from rig.web.told import for_page
@@ -57,8 +58,8 @@ class Closest:
     def day(self) -> date | None:
         """None while it is being written."""
         try:
-            return date.fromisoformat(str(self.input.value))
-        except ValueError:
+            return day(str(self.input.value))
+        except RigError:
             return None
 
     def focus(self) -> None:

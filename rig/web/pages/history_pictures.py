@@ -70,7 +70,7 @@ def _legend(q: Quantity) -> str:
     if q.line is None:
         signs.append("a drift shows from three calibrations on, at different times")
     else:
-        signs.append("line and band: the drift, and where 95 % of the values would be")
+        signs.append("line and band: the drift, and the 95 % interval of the value then")
     if q.allowed is not None:
         signs.append("broken lines: what is allowed")
     return f"{'; '.join(signs)}. A click on a point opens its model."
