@@ -8,6 +8,7 @@ one dwell's mean.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -57,14 +58,20 @@ def unexplained_rig(name: str, times_noise: float, seed: int) -> Table:
 def scaled(defect: Defect, config: WorldConfig, seed: int, target_v: float) -> WorldConfig:
     """`config` with the defect at the size at which its unexplained rms is `target_v`, within 1 %."""
     share = _y_share(seed)
-    clean, size = swept(config.changed(defect.settings(0.0, share)), seed, noise_free=True), 1.0
+    clean, size = _noise_free(config.changed(defect.settings(0.0, share)), seed), 1.0
     for _ in range(12):
         changed = config.changed(defect.settings(size, share))
-        rms = unexplained_rms_v(swept(changed, seed, noise_free=True), clean)
+        rms = unexplained_rms_v(_noise_free(changed, seed), clean)
         if abs(rms / target_v - 1) < 0.01:
             return changed
         size *= target_v / rms
     raise ValueError(f"no size of {defect.story!r} gives {target_v} V; the last gave {rms} V")
+
+
+@lru_cache(maxsize=16)
+def _noise_free(config: WorldConfig, seed: int) -> Table:
+    """Without the defect, and at its first size, a rig is the same whatever size is looked for."""
+    return swept(config, seed, noise_free=True)
 
 
 def unexplained_rms_v(table: Table, clean: Table) -> float:
