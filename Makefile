@@ -9,8 +9,9 @@ BIN := .venv/bin
 demo: setup
 	$(BIN)/rig demo --folder out/demo
 
+# Worksteal: neighbours in a file run in one process, which then works out only once what they share.
 test: setup lint
-	$(BIN)/pytest -n auto
+	$(BIN)/pytest -n auto --dist worksteal
 
 lint: setup
 	$(BIN)/ruff check .
