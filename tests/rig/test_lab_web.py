@@ -111,8 +111,9 @@ def visiting(path: str, visit: Callable[[User], Coroutine[Any, Any, None]]) -> N
     asyncio.run(simulated())
 
 
-def test_a_life_is_that_in_the_lab(run: str, reader: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_life_is_that_in_the_lab(run: str, reader: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(RECORD, reader)
+    monkeypatch.setenv("RIG_HOME", str(tmp_path / "elsewhere"))
 
     async def visit(user: User) -> None:
         await user.should_see(f"Its runs are none by this model: {run}", retries=200)  # noise alone: but it was read
