@@ -29,7 +29,7 @@ def standing(found: History, q: Quantity) -> None:
     overdue = found.due is not None and str(found.due) < today()
     good = found.due is not None and not out and not overdue
     with box(f"verdict {'bad' if out or overdue else 'good' if good else ''}").props("role=status aria-live=polite"):
-        with div("grow"):
+        with div("grow standing"):
             with div("row-of"):
                 words(for_page(next_due(found, LIMIT_IS_GIVEN)), "headline")
                 if overdue:
