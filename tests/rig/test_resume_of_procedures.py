@@ -2,15 +2,36 @@
 
 from __future__ import annotations
 
+import itertools
 import json
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
 import pytest
+from sqlalchemy import Engine, event
 
 from rig.record import Record
-from tests.rig.rigging import in_own_process, signal_at
 
 UNATTENDED = ("--dwell-s", "0.2", "--unattended", "--json")
+
+
+@contextmanager
+def sigterm_at(pose: int) -> Iterator[None]:
+    """The signal comes inside a transaction, as that pose is written."""
+    inserts = itertools.count(1)
+
+    def harm(connection: Any, cursor: Any, statement: str, *more: Any) -> None:
+        if statement.startswith("INSERT INTO poses ") and next(inserts) == pose:
+            signal.raise_signal(signal.SIGTERM)
+
+    event.listen(Engine, "before_cursor_execute", harm)
+    try:
+        yield
+    finally:
+        event.remove(Engine, "before_cursor_execute", harm)
 
 
 @pytest.mark.sockets
@@ -22,13 +43,14 @@ UNATTENDED = ("--dwell-s", "0.2", "--unattended", "--json")
         (("repeat", "--times", "2"), 21),
     ],
 )
-def test_it_goes_on_sample_for_sample(procedure: tuple[str, ...], at_pose: int) -> None:
-    whole = json.loads(in_own_process("run", *procedure, *UNATTENDED).stdout)["run"]
-    in_own_process("run", *procedure, *UNATTENDED, harm=signal_at("poses", at_pose, "SIGTERM"))
+def test_it_goes_on_sample_for_sample(procedure: tuple[str, ...], at_pose: int, rig: Callable[..., Any]) -> None:
+    whole = json.loads(rig("run", *procedure, *UNATTENDED).out)["run"]
+    with sigterm_at(at_pose):
+        assert rig("run", *procedure, *UNATTENDED).status == 4
     with Record() as record:
         stopped = record.runs()[0]
     assert (stopped.state, stopped.rows) == ("stopped", at_pose - 1)
-    in_own_process("resume", stopped.run, "--unattended", "--json")
+    rig("resume", stopped.run, "--unattended", "--json")
     with Record() as record:
         for a, b in zip(record.kept(whole), record.kept(stopped.run), strict=True):
             assert a.pose == b.pose
