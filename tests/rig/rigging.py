@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import itertools
+import signal
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
+
+from sqlalchemy import Engine, event
 
 from procedures.catalogue import find
 from procedures.questions import Question
@@ -86,3 +92,19 @@ def harm(connection, cursor, statement, *more):
     if statement.startswith("INSERT INTO {table} ") and next(inserts) == {number}:
         os.kill(os.getpid(), signal.{name})
 """
+
+
+@contextmanager
+def sigterm_at(pose: int) -> Iterator[None]:
+    """The signal comes inside a transaction, as that pose is written."""
+    inserts = itertools.count(1)
+
+    def harm(connection: Any, cursor: Any, statement: str, *more: Any) -> None:
+        if statement.startswith("INSERT INTO poses ") and next(inserts) == pose:
+            signal.raise_signal(signal.SIGTERM)
+
+    event.listen(Engine, "before_cursor_execute", harm)
+    try:
+        yield
+    finally:
+        event.remove(Engine, "before_cursor_execute", harm)

@@ -14,7 +14,7 @@ from rig.lease import lease
 from rig.record import Record
 from rig.record.measured import table_of
 from rig.running.runner import resume, start
-from tests.rig.rigging import POSES, Onlooker, in_own_process, signal_at, small_sweep
+from tests.rig.rigging import POSES, Onlooker, sigterm_at, small_sweep
 
 Rig = Callable[..., Any]
 pytestmark = pytest.mark.sockets
@@ -98,8 +98,9 @@ def _small() -> tuple[Any, ...]:
 
 
 def test_a_stopped_run_measures_the_pose_again(rig: Rig) -> None:
-    in_own_process("run", "sweep", "--step-deg", "90", "--dwell-s", "0.2", harm=signal_at("poses", 5, "SIGTERM"))
     with Record() as record:
+        with sigterm_at(5):
+            start(record, *_small())
         (stopped,) = record.runs()
         number = stopped.rows - 1
         text = rig("exclude", stopped.run, str(number), "--reason", "touched").out

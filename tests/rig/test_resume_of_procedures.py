@@ -2,36 +2,17 @@
 
 from __future__ import annotations
 
-import itertools
 import json
-import signal
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
-from sqlalchemy import Engine, event
 
 from rig.record import Record
+from tests.rig.rigging import sigterm_at
 
 UNATTENDED = ("--dwell-s", "0.2", "--unattended", "--json")
-
-
-@contextmanager
-def sigterm_at(pose: int) -> Iterator[None]:
-    """The signal comes inside a transaction, as that pose is written."""
-    inserts = itertools.count(1)
-
-    def harm(connection: Any, cursor: Any, statement: str, *more: Any) -> None:
-        if statement.startswith("INSERT INTO poses ") and next(inserts) == pose:
-            signal.raise_signal(signal.SIGTERM)
-
-    event.listen(Engine, "before_cursor_execute", harm)
-    try:
-        yield
-    finally:
-        event.remove(Engine, "before_cursor_execute", harm)
 
 
 @pytest.mark.sockets

@@ -45,7 +45,7 @@ def cold(tmp_path: Path) -> str:
 def test_a_night_reaches_its_steady_state_after_hours_and_is_told_on_one_page(
     rig: Rig, cold: str, tmp_path: Path
 ) -> None:
-    ended = rig("run", "soak", "--bench", cold, "--off-s", "36000", *NIGHT)
+    ended = rig("run", "soak", "--bench", cold, "--off-s", "36000", "--interval-s", "1800", *NIGHT)
     document = json.loads(ended.out)
     found = document["results"]
     assert set(found) <= set(names())
