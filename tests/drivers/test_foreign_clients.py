@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import minimalmodbus
+import numpy as np
 import pytest
 from pipython import GCSDevice, GCSError, datarectools, pitools
 from pipython.pidevice.interfaces.pisocket import PISocket
@@ -25,6 +26,7 @@ from drivers import (
     pi_e727_twin,
 )
 from drivers.clock import serve_forever
+from drivers.labjack_t7_stream import Calibration
 from drivers.links.server import Server
 from drivers.links.url import Url
 
@@ -88,6 +90,10 @@ def test_mbpoll_finds_an_absent_unit_silent(serve: Serve, small_world: Any) -> N
 @needs_mbpoll
 def test_mbpoll_reads_a_converter(serve: Serve, small_world: Any) -> None:
     settings = labjack_t7.Settings(channels={"supply": 5})
+    calibration = Calibration(3.2e-4, -3.2e-4, 33523.0, -10.6)
+    labjack_t7_twin.codes_of_volts(
+        np.zeros((1, 1)), [calibration]
+    )  # loads what is compiled: mbpoll waits for a second
     url = serve(labjack_t7_twin.serve(small_world, {"adc": (1, settings)}))
     assert mbpoll(url, "-a", "1", "-t", "4:hex", "-c", "2", "-r", "55100") == "0x0011 0x2233"
     assert mbpoll(url, "-a", "1", "-t", "4:float", "-B", "-r", "60000") == "7"
