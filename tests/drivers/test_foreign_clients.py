@@ -91,9 +91,7 @@ def test_mbpoll_finds_an_absent_unit_silent(serve: Serve, small_world: Any) -> N
 def test_mbpoll_reads_a_converter(serve: Serve, small_world: Any) -> None:
     settings = labjack_t7.Settings(channels={"supply": 5})
     calibration = Calibration(3.2e-4, -3.2e-4, 33523.0, -10.6)
-    labjack_t7_twin.codes_of_volts(
-        np.zeros((1, 1)), [calibration]
-    )  # loads what is compiled: mbpoll waits for a second
+    labjack_t7_twin.codes_of_volts(np.zeros((1, 1)), [calibration])  # loads what is compiled: mbpoll waits for a second
     url = serve(labjack_t7_twin.serve(small_world, {"adc": (1, settings)}))
     assert mbpoll(url, "-a", "1", "-t", "4:hex", "-c", "2", "-r", "55100") == "0x0011 0x2233"
     assert mbpoll(url, "-a", "1", "-t", "4:float", "-B", "-r", "60000") == "7"
