@@ -28,11 +28,9 @@ def too_small(table: Table, degree: int) -> str | None:
     found = worse(directions(table), degree)
     if found <= WORST:
         return None
-    times = f"{found:.0f} times worse" if found < 1e4 else "not at all"
-    return (
-        f"the orientations cover too little of the sphere: something in it would be known {times} than from as many "
-        f"orientations on all sides, and {WORST:g} times is the limit; {NEEDED[degree]}"
-    )
+    times = f"{found:.0f} times worse than from as many on all sides, and {WORST:g} times is the limit"
+    known = times if found < 1e4 else "not at all"
+    return f"the orientations cover too little of the sphere: something in it would be known {known}; {NEEDED[degree]}"
 
 
 def uncovered(table: Table) -> str | None:

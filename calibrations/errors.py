@@ -3,6 +3,7 @@
 CalibrationError
 ├── DataError            a table: its file, line and column
 │   ├── MissingColumn    a column that the question needs
+│   ├── MissingConstant  a number that the rows do not tell
 │   └── TooFewRows       fewer rows than parameters
 ├── ModelError           a model file: its key
 │   └── ExpressionError  an effect written as an expression: its column
@@ -25,6 +26,14 @@ class DataError(CalibrationError):
 
 class MissingColumn(DataError):
     """A column that is needed is not there."""
+
+
+class MissingConstant(DataError):
+    """A constant that is needed is not given; `likely` is the value that the file speaks for, None without one."""
+
+    def __init__(self, message: str, name: str, likely: float | None = None) -> None:
+        super().__init__(message)
+        self.name, self.likely = name, likely
 
 
 class TooFewRows(DataError):

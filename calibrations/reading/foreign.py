@@ -14,10 +14,11 @@ from pathlib import Path
 from calibrations.errors import DataError, MissingColumn, nearest
 from calibrations.reading.cells import cells
 from calibrations.reading.plausible import check_at_rest, doubts
-from calibrations.reading.proposal import command, proposed
+from calibrations.reading.proposal import command, missing
 from calibrations.reading.separated import Sheet, is_number, sheet
 from calibrations.reading.sessions import RATE, is_session, sample_rates
 from calibrations.reading.text_file import text_file
+from calibrations.reading.tried import advice
 from calibrations.reading.units import UNITS, Mapped, own_unit
 from calibrations.table import KINDS, NUMBERS, Array, Constant, Table, guess_kind
 
@@ -61,13 +62,30 @@ def take(
 ) -> Taken:
     """The table in a sheet. Raises DataError; MissingColumn holds the import that may be meant, ready to be copied."""
     chosen = mapping(laid, mapped)
-    kept = _kept(laid, chosen, bool(mapped))
+    try:
+        return _taken(laid, kind, chosen, constants or {})
+    except MissingColumn as error:
+        tail = advice(laid, kind, chosen, constants or {}, lambda *meant: _taken(laid, *_whole(laid, *meant)).table)
+        raise MissingColumn(f"{error}{tail}") from None
+
+
+def _whole(
+    laid: Sheet, kind: str, mapped: Sequence[Mapped], constants: Mapping[str, Constant]
+) -> tuple[str, list[Mapped], Mapping[str, Constant]]:
+    """What is given on the command line, with what the header adds to it."""
+    return kind, mapping(laid, mapped), constants
+
+
+def _taken(laid: Sheet, kind: str | None, chosen: Sequence[Mapped], constants: Mapping[str, Constant]) -> Taken:
+    """The table by a whole mapping. Raises DataError, MissingColumn without advice."""
+    kept = _kept(laid, chosen, bool(chosen))
     try:
         kind = kind or guess_kind([*(m.name for m in chosen), *kept])
     except MissingColumn as error:
         what = error if laid.named else "a header line with column names is missing"
-        raise MissingColumn(f"{laid.name}, line {laid.line}: {what}{proposed(laid, kind, chosen)}") from None
-    known = {**laid.constants, **(constants or {})} | _output_unit(chosen, kind, laid.name)
+        raise MissingColumn(f"{laid.name}, line {laid.line}: {what}") from None
+    known = {**laid.constants, **constants}
+    known |= _output_unit(chosen, kind, known.get("triad") == "m", laid.name)
     taken = {m.theirs for m in chosen}
     path = next((m.theirs for m in chosen if m.name == PATH), PATH)
     words = [name for name in laid.header if name not in taken and _is_text(laid, name)]
@@ -77,10 +95,7 @@ def take(
     labels = {k: texts[k] for k in kept if k in texts} | ({PATH: texts[path]} if path in texts else {})
     if is_session(kind, columns, labels.get(PATH)):
         columns[RATE] = sample_rates(columns, labels[PATH], known, laid.name)
-    try:
-        table = Table.from_columns(kind, columns, known, laid.name, labels)
-    except MissingColumn as error:
-        raise MissingColumn(f"{error}{proposed(laid, kind, chosen)}") from None
+    table = Table.from_columns(kind, columns, known, laid.name, labels)
     _check_units(table, laid, chosen)
     check_at_rest(table)
     return Taken(table, laid, tuple(chosen))
@@ -104,6 +119,8 @@ def needs_mapping(laid: Sheet, kind: str | None, mapped: Sequence[Mapped]) -> bo
     """Whether columns of a table of `kind`, or of any, are still without our name. Raises what `mapping` raises."""
     chosen = mapping(laid, mapped)
     names = {m.name for m in chosen} | set(_kept(laid, chosen, bool(mapped)))
+    if kind == "rates" and PATH in names:
+        return bool(missing(kind, laid, chosen))
     sets = KINDS[kind] if kind else [wanted for wanteds in KINDS.values() for wanted in wanteds if len(wanted) > 1]
     return not any(names.issuperset(wanted) for wanted in sets)
 
@@ -165,9 +182,11 @@ def _check_units(table: Table, laid: Sheet, chosen: Sequence[Mapped]) -> None:
     )
 
 
-def _output_unit(mapped: Sequence[Mapped], kind: str, source: str) -> dict[str, Constant]:
-    """The unit of the three axes, where one is given. Raises DataError where they differ."""
-    for axes in (RATES,) if kind == "rates" else TRIADS:
+def _output_unit(mapped: Sequence[Mapped], kind: str, field: bool, source: str) -> dict[str, Constant]:
+    """The unit of the three axes that are meant, where one is given: the magnetometer's where `field`, or where there
+    is no accelerometer. Raises DataError where they differ."""
+    accelerometer = any(m.name == "ax" for m in mapped)
+    for axes in (RATES,) if kind == "rates" else TRIADS[1:] if field else TRIADS[:1] if accelerometer else TRIADS:
         given = {m.name: UNITS[m.unit][0] for m in mapped if m.unit}
         units = {axis: given.get(axis, "") for axis in axes}
         if len(set(units.values())) > 1:

@@ -11,6 +11,7 @@ from collections.abc import Callable, Collection, Mapping
 import numpy as np
 
 from calibrations.errors import DataError
+from calibrations.reading.stills import sphere_centre
 from calibrations.reading.units import own_unit
 from calibrations.table import NUMBERS, Array, Table
 
@@ -23,6 +24,9 @@ ARC_MINUTE_DEG = 1 / 60
 ROUNDING_DEG = 1e-3
 MANY = 6  # values: that they all lie on whole arc minutes by chance has odds of one in millions
 STILL_G = (0.3, 3.0)  # a sensor at rest shows 1 g, its bias and scale factor within reason
+EARTH_UT = (20.0, 70.0)  # on the ground 22 to 67 uT (World Magnetic Model)
+UNLIKE = 0.3  # interquartile range of a magnitude over its median: scale factors of cheap sensors differ by tenths
+FLAT = 0.01  # mean square of directions along the axis that they have least of, 1/3 over the whole sphere
 Doubt = tuple[str, str]  # what speaks against the unit, and the unit that would fit, "" where none does
 
 
@@ -56,6 +60,24 @@ def gravity_unit(outputs: Array) -> str:
     size = float(np.median(np.linalg.norm(outputs, axis=1)))
     near = {"g": 1.0, "m/s2": 9.81, "mg": 1000.0}
     return next((unit for unit, one_g in near.items() if 0.8 < size / one_g < 1.25), "counts")
+
+
+def field_unit(outputs: Array) -> str:
+    """"uT" where outputs, shape (n, 3), have the magnitude of the earth's field, whatever the hard iron; else ""."""
+    size = float(np.median(np.linalg.norm(outputs - sphere_centre(outputs), axis=1)))
+    return "uT" if EARTH_UT[0] < size < EARTH_UT[1] else ""
+
+
+def seen_from_all_sides(outputs: Array) -> bool:
+    """Whether outputs, shape (n, 3), may be of a sensor that is turned in one field: distances from the centre of a
+    sphere nearly the same, and directions from it that are spread over it."""
+    away = outputs - sphere_centre(outputs)
+    size = np.linalg.norm(away, axis=1)
+    low, middle, high = np.quantile(size, [0.25, 0.5, 0.75])
+    if not middle > 0 or (high - low) / middle > UNLIKE:
+        return False
+    directions = away / np.maximum(size, np.finfo(float).tiny)[:, None]
+    return bool(np.linalg.eigvalsh(directions.T @ directions / len(outputs))[0] > FLAT)
 
 
 def _doubt(name: str, values: Array, stated: bool) -> Doubt | None:
@@ -111,9 +133,10 @@ DOUBTS: Mapping[str, Callable[[Array], Doubt | None]] = {
 
 
 def check_at_rest(table: Table) -> None:
-    """A sensor at rest shows the magnitude of gravity. Raises DataError; a table in counts is not asked."""
+    """An accelerometer at rest shows the magnitude of gravity. Raises DataError; a table in counts is not asked, nor
+    one of a magnetometer, whose unit is that of the field."""
     one_g = {"g": 1.0, "m/s2": table.gravity_m_s2}.get(table.unit)
-    if one_g is None or table.kind != "positions" or "ax" not in table:
+    if one_g is None or table.content != "positions":
         return
     size = float(np.median(np.linalg.norm(table.outputs, axis=1)))
     if STILL_G[0] <= size / one_g <= STILL_G[1]:

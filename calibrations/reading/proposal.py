@@ -1,7 +1,7 @@
 """What a file's columns probably are: from their names, the units that they state, and the range of their values.
 
 A proposal, for a person to confirm: `rig import` asks column by column at a terminal, and elsewhere the message about
-a missing column ends with the command to copy.
+a missing column ends with the command to copy (`tried.py`).
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from calibrations.reading.plausible import fitting_unit, gravity_unit
+from calibrations.reading.plausible import field_unit, fitting_unit, gravity_unit
 from calibrations.reading.separated import Sheet, is_number, number
 from calibrations.reading.units import UNITS, Mapped, name_and_unit, own_unit
 from calibrations.table import AXES, KINDS, NUMBERS, OUTPUTS, Array
@@ -55,6 +55,7 @@ WORDS: Mapping[str, Sequence[tuple[str, str]]] = {
         (r"^t(_?s)?$|time|elapsed|seconds", "t_s"),
     ),
 }
+SECTION = r"part|section|segment|phase|activity|label|step|^path$"  # of a session by hand, in a column of words
 SCATTERS = {"poses": "v{axis}_std_v", "positions": "a{axis}_std", "rates": "g{axis}_std"}
 
 
@@ -68,16 +69,25 @@ def propose(laid: Sheet, kind: str | None = None, mapped: Sequence[Mapped] = ())
     values = {name: numbers for name in left if len(numbers := values_of(laid, name))}
     guesses = by_names(laid, values, kind) if laid.named else by_values(values, kind)
     for name, ours in guesses:
-        if ours not in {m.name for m in found} and ours not in laid.header:
+        if ours not in {m.name for m in found} and ours not in laid.header and (ours != "n" or _counts(values[name])):
             found.append(Mapped(ours, name, _unit(laid, name, ours, values[name])))
+    if kind == "rates":
+        return _with_sections(found, laid)
     return _with_gravity(found, values) if kind == "positions" else _with_scatter(found)
 
 
+def likely_kinds(laid: Sheet, mapped: Iterable[Mapped] = ()) -> list[str]:
+    """The likeliest first; of a gyroscope's samples in named sections it may be that in none of them it was turned."""
+    kind = likely_kind(laid, mapped)
+    return ["rates", "positions"] if kind == "rates" and _section(laid) else [kind]
+
+
 def likely_kind(laid: Sheet, mapped: Iterable[Mapped] = ()) -> str:
-    """`rates` where there are a rate and a gyroscope's outputs, `poses` where there is an angle of a stage, `motion`
-    where there is a displacement, `positions` where there are three outputs; else `poses`."""
+    """`rates` where there are a gyroscope's outputs, and a rate or named sections; `poses` where there is an angle of
+    a stage, `motion` where there is a displacement, `positions` where there are three outputs; else `poses`."""
     names = {*(m.name for m in mapped), *laid.bare, *(_by_name(bare, "poses") for bare in laid.bare)}
-    if {"rate_deg_s", "gx"} <= {*names, *(_by_name(bare, "rates") for bare in laid.bare)}:
+    turned = {*names, *(_by_name(bare, "rates") for bare in laid.bare)}
+    if {"rate_deg_s", "gx"} <= turned or (_section(laid) and {"gx", "gy", "gz"} <= turned):
         return "rates"
     if {"alpha_deg", "beta_deg"} & names:
         return "poses"
@@ -92,6 +102,8 @@ def likely_kind(laid: Sheet, mapped: Iterable[Mapped] = ()) -> str:
 def missing(kind: str | None, laid: Sheet, mapped: Iterable[Mapped]) -> list[str]:
     """The columns that a table of this kind needs and that neither header nor mapping gives."""
     given = {m.name for m in mapped} | set(laid.bare)
+    if kind == "rates" and "path" in given:
+        given.add("rate_deg_s")  # the sections of a session tell it
     return [name for name in needed(kind, given) if name not in given]
 
 
@@ -112,24 +124,6 @@ def _shortest(laid: Sheet, theirs: str) -> str:
     """Their name without the unit in it, where that is enough."""
     bare = name_and_unit(theirs)[0]
     return bare if laid.bare.count(bare) == 1 else theirs
-
-
-def proposed(laid: Sheet, kind: str | None, mapped: Sequence[Mapped]) -> str:
-    """The tail of a message: the import that may be meant."""
-    found = propose(laid, kind, mapped)
-    kind = kind or likely_kind(laid, mapped)
-    lacking = missing(kind, laid, found)
-    if not found or len(lacking) == len(needed(kind, ())):
-        return "; --column gives one of yours the name, as in vx_v=Vout:mV"
-    line = command(laid, kind, [*found, *(Mapped(name, "YOURS") for name in lacking)])
-    fill = f" (put your column's name for YOURS: {_choice(laid, found)})" if lacking else ""
-    return f"\nGoing by names and values, this takes it{fill}:\n\n    {line}\n"
-
-
-def _choice(laid: Sheet, found: Iterable[Mapped]) -> str:
-    """The columns that are still free."""
-    free = [name for name in laid.header if name not in {m.theirs for m in found}]
-    return ", ".join(free) or "none is left"
 
 
 def by_names(laid: Sheet, values: Mapping[str, Array], kind: str) -> list[tuple[str, str]]:
@@ -205,6 +199,25 @@ def _unit(laid: Sheet, name: str, ours: str, values: Array) -> str:
     return fitting_unit(ours, values)
 
 
+def _counts(values: Array) -> bool:
+    """Whether numbers may count averaged samples: whole, 1 or more, and not the running number of a row."""
+    running = len(values) > 2 and bool(np.all(np.diff(values) == 1))
+    return bool(np.all(values >= 1) and np.all(values % 1 == 0)) and not running
+
+
+def _section(laid: Sheet) -> str:
+    """The column of words that names the section of every row; "" without one."""
+    words = [name for name in laid.header if laid.named and not len(values_of(laid, name))]
+    return next((name for name in words if re.search(SECTION, name.lower())), "")
+
+
+def _with_sections(found: list[Mapped], laid: Sheet) -> list[Mapped]:
+    """With the sections that tell the rates, where no column does."""
+    given, section = {m.name for m in found} | set(laid.bare), _section(laid)
+    lacks = section and not {"rate_deg_s", "path"} & given
+    return [Mapped("path", section), *found] if lacks else found
+
+
 def _with_scatter(found: list[Mapped]) -> list[Mapped]:
     """A standard deviation without a unit is in that of its output."""
     units = {m.name.replace("_v", "_std_v"): m.unit for m in found if m.name in OUTPUTS["poses"]}
@@ -212,9 +225,10 @@ def _with_scatter(found: list[Mapped]) -> list[Mapped]:
 
 
 def _with_gravity(found: list[Mapped], values: Mapping[str, Array]) -> list[Mapped]:
-    """Axes without a unit in the one that has 1 g for gravity, else in counts."""
-    axes = {m.name: m.theirs for m in found if m.name in OUTPUTS["positions"] and not m.unit and m.theirs in values}
-    if len(axes) < 3:
-        return found
-    unit = gravity_unit(np.column_stack([values[theirs] for theirs in axes.values()]))
-    return [replace(m, unit=unit) if m.name in axes else m for m in found]
+    """Axes without a unit in the one that has 1 g for gravity, else in counts; of a magnetometer in uT, if in any."""
+    for names, unit_of_all in ((OUTPUTS["positions"], gravity_unit), (OUTPUTS["fields"], field_unit)):
+        axes = {m.name: m.theirs for m in found if m.name in names and not m.unit and m.theirs in values}
+        if len(axes) == len(AXES):
+            unit = unit_of_all(np.column_stack([values[theirs] for theirs in axes.values()]))
+            found = [replace(m, unit=unit) if m.name in axes else m for m in found]
+    return found

@@ -14,13 +14,14 @@ from itertools import groupby
 
 import numpy as np
 
-from calibrations.errors import DataError
+from calibrations.errors import DataError, MissingConstant
 from calibrations.table import Array, Constant, Table
 
 OUTPUTS = ("gx", "gy", "gz")
 RATE = "rate_deg_s"
 FEWEST = 20  # samples of a section, at least, in the mean: fewer are no log
 APART = 0.2  # of the farthest section's distance from rest: a turn
+LEAST_TURN = 10.0  # times the scatter of samples at rest: a hand turns by far more
 
 
 def is_session(kind: str | None, columns: Mapping[str, Array], sections: Sequence[str] | None) -> bool:
@@ -36,6 +37,9 @@ def sample_rates(
     quiet = min(bounds, key=lambda bound: float(outputs[bound[0] : bound[1]].std(axis=0).sum()))
     means = np.array([outputs[a:b].mean(axis=0) for a, b in bounds])
     away = np.linalg.norm(means - means[bounds.index(quiet)], axis=1)
+    a, b = quiet
+    if away.max() <= LEAST_TURN * float(np.linalg.norm(outputs[a:b].std(axis=0))):
+        raise DataError(f"{source}: in no section was it turned: the means of gx, gy, gz are the same in all of them")
     rates = np.zeros(len(outputs))
     for (a, b), size in zip(bounds, away, strict=True):
         if size > APART * away.max():
@@ -73,9 +77,10 @@ def _bounds(sections: Sequence[str]) -> list[tuple[int, int]]:
 def _turn_deg(known: Mapping[str, Constant], source: str) -> float:
     turn = known.get("turn_deg")
     if not isinstance(turn, (int, float)) or not turn:
-        raise DataError(
+        raise MissingConstant(
             f"{source}: by how much the sensor was turned in each section is not known; give it as the constant "
-            "turn_deg, such as --constant turn_deg=360 (-360 where it went round the other way), or the rates"
+            "turn_deg, such as --constant turn_deg=360 (-360 where it went round the other way), or the rates",
+            "turn_deg",
         )
     return float(turn)
 
@@ -90,4 +95,6 @@ def _length_s(
         return (b - a) / float(rate_hz)
     if "t_s" in columns and b - a > 1 and columns["t_s"][b - 1] > columns["t_s"][a]:
         return float((columns["t_s"][b - 1] - columns["t_s"][a]) * (b - a) / (b - a - 1))
-    raise DataError(f"{source}: a log of turns needs the column t_s, or the constant sample_rate_hz")
+    raise MissingConstant(
+        f"{source}: a log of turns needs the column t_s, or the constant sample_rate_hz", "sample_rate_hz"
+    )

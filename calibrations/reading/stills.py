@@ -19,6 +19,7 @@ SHORTEST_S = 1.0
 TRIM_S = 0.2
 QUIET_QUANTILE = 0.05  # of the windows, taken as certainly still
 MOVING = 3.0  # times the quiet standard deviation
+TURNED = 3.0  # times the noise of a sample, at least, in what gravity on many sides scatters: it is hundreds
 SHAKEN = 10.0  # the same, reached when it is turned by hand; never reached in a log that never rests or only rests
 
 
@@ -35,6 +36,11 @@ def positions(log: Table, rate_hz: float) -> Table:
         found = "one still interval" if bounds else "no still intervals"
         needed = "a log of positions has many of 1 s or more, and the sensor is turned between them"
         raise DataError(f"{log.source}: found {found}; {needed}")
+    if _is_alike(samples, bounds):
+        raise DataError(
+            f"{log.source}: {', '.join(log.output_names)} are the same in all {len(bounds)} still intervals, to the "
+            "noise of a sample; an accelerometer that is turned between them shows gravity on another side in each"
+        )
     names = [name for name in log.columns if not name.endswith("_std")]
     columns: dict[str, list[float]] = {name: [] for name in names}
     columns |= {f"{name}_std": [] for name in (*log.output_names, "norm")} | {"n": []}
@@ -50,6 +56,13 @@ def positions(log: Table, rate_hz: float) -> Table:
         columns["t_s"] = [(first + last) / 2 / rate_hz for first, last in bounds]
     constants: Mapping[str, Constant] = {k: v for k, v in log.constants.items() if k != "filter_corner_hz"}
     return Table.from_columns("positions", columns, constants, log.source)
+
+
+def _is_alike(samples: Array, bounds: list[tuple[int, int]]) -> bool:
+    """Whether the means of still intervals differ no more than samples in one do, as a gyroscope's."""
+    means = np.array([samples[first:last].mean(axis=0) for first, last in bounds])
+    noise = np.median([np.linalg.norm(samples[first:last].std(axis=0)) for first, last in bounds])
+    return bool(np.linalg.norm(means.std(axis=0)) < TURNED * noise)
 
 
 def sphere_centre(means: Array) -> Array:

@@ -2,7 +2,8 @@
 
 With leverages h (the diagonal of the hat matrix of the whitened jacobian), the error on a row that the fit has not seen
 has a variance 1 / (1 - h) times that of noise. Where it is more than twice on average, unseen rows are predicted worse
-by the uncertainty of the parameters than by all noise, and the model cannot be called adequate on this data.
+by the uncertainty of the parameters than by all noise, and the model cannot be called adequate on this data. A leverage
+of 1 is another matter: a parameter has one row to itself, may be known well by it, and is checked by nothing.
 
 Source  leave-one-out prediction variance of linear least squares; Hoaglin and Welsch (1978), the hat matrix.
 """
@@ -10,20 +11,32 @@ Source  leave-one-out prediction variance of linear least squares; Hoaglin and W
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from calibrations.coverage import uncovered
 from calibrations.fit import Fit
+from calibrations.table import Array
 
 MOST_UNCERTAIN = 2.0  # variance on an unseen row over that of noise: parameters count for as much as noise
+ROUNDING = 1e-9  # of a leverage
 
 
 def unseen_variance(found: Fit) -> float:
     """Mean variance of the error on an unseen row over that of noise; 1 where parameters are known exactly."""
+    return _mean_variance(leverages(found))
+
+
+def leverages(found: Fit) -> Array:
+    """The diagonal of the hat matrix, shape (channels, n): 1 where the fit goes through a value, whatever it is."""
     jacobian = found.whitened[:, 1:]
     size = np.linalg.norm(jacobian, axis=0)
     columns = jacobian[:, size > 0] / size[size > 0]
     basis, singular, _ = np.linalg.svd(columns, full_matrices=False)
-    leverage = np.sum(basis[:, singular > 1e-8 * singular[0]] ** 2, axis=1) if singular.size else np.zeros(1)
+    kept = basis[:, singular > 1e-8 * singular[0]] if singular.size else basis[:, :0]
+    return np.asarray(np.sum(kept**2, axis=1)).reshape(found.residual.shape)
+
+
+def _mean_variance(leverage: Array) -> float:
     return float(np.mean(1 / np.maximum(1 - leverage, 1e-12)))
 
 
@@ -31,12 +44,27 @@ def undetermined(found: Fit) -> str | None:
     """Why a small residual is no proof on this data, in words; None where the data determine the model."""
     if why := uncovered(found.table):
         return why
-    variance = unseen_variance(found)
+    leverage = leverages(found)
+    variance, lone = _mean_variance(leverage), leverage > 1 - ROUNDING
     if variance <= MOST_UNCERTAIN:
         return None
+    if lone.any() and not lone.all() and _mean_variance(leverage[~lone]) <= MOST_UNCERTAIN:
+        return _unchecked(found, lone)
     rows = "positions" if found.table.kind == "positions" else "rows"
     times = f"{np.sqrt(variance):.1f}" if variance < 1e4 else "many"
     return (
         f"the {len(found.theta)} parameters are not identifiable from these {rows}: {found.table.n} of them, and an "
         f"unseen one is predicted {times} times worse than noise alone would make it; measure at more orientations"
+    )
+
+
+def _unchecked(found: Fit, lone: NDArray[np.bool_]) -> str:
+    """That some rows, `lone` in shape (channels, n), have parameters to themselves."""
+    rows = np.flatnonzero(lone.any(axis=0))
+    paths = found.table.labels.get("path")
+    which = [paths[k] for k in rows] if paths else [f"row {number}" for number in found.table.numbered(rows)]
+    return (
+        f"nothing checks all of the {len(found.theta)} parameters: {lone.sum()} of the {lone.size} measured values "
+        f"({', '.join(which)}) are each the only one that tells a parameter, and are met whatever they are; measure "
+        "the like of them again"
     )

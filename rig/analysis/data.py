@@ -8,12 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from calibrations.errors import DataError
-from calibrations.reading.directions import one_for_each_direction
 from calibrations.reading.duplicates import without_copies
-from calibrations.reading.dwells import is_pose_log, pose_means
+from calibrations.reading.logs import means
 from calibrations.reading.read_csv import read_csv
-from calibrations.reading.sessions import is_log, section_means
-from calibrations.reading.stills import is_raw_log, positions
 from calibrations.table import Table
 from rig.errors import RecordError, UnknownRun
 
@@ -25,7 +22,7 @@ def averaged(log: Table, tell: Callable[[str], None]) -> Table:
 
     Rows that are there twice count once. Raises DataError where nothing holds still.
     """
-    table = _means(log)
+    table = means(log)
     if table is not log:
         tell(f"{log.source} is a log of raw samples: {_taken(table)}, out of {log.n} samples, are taken.")
     table, copies = without_copies(table)
@@ -52,26 +49,6 @@ def _included(table: Table, tell: Callable[[str], None]) -> Table:
             f"{table.source}: every row is left out, by its column `{EXCLUDED}`; put 0 where a row is to count"
         )
     return table.rows(~out)
-
-
-def _means(log: Table) -> Table:
-    if is_pose_log(log):
-        return pose_means(log)
-    if is_raw_log(log) and log.content == "fields":
-        return one_for_each_direction(log)
-    if is_log(log):
-        return section_means(log)
-    return positions(log, _rate_hz(log)) if is_raw_log(log) else log
-
-
-def _rate_hz(log: Table) -> float:
-    """Samples a second. Raises DataError where the log does not say."""
-    by_time = "t_s" in log and np.ptp(log.time_s) > 0
-    rate_hz = (log.n - 1) / float(np.ptp(log.time_s)) if by_time else log.number("sample_rate_hz", 0.0)
-    if not rate_hz > 0:
-        needed = "the column t_s, or a line such as `# sample_rate_hz: 100` above its header"
-        raise DataError(f"{log.source}: a raw log needs {needed}")
-    return rate_hz
 
 
 def load(data: str, kind: str | None = None, tell: Callable[[str], None] = lambda _: None) -> Table:

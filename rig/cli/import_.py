@@ -40,6 +40,8 @@ def command(file: Path, kind: str | None, mapped: tuple[str, ...], given: tuple[
     table = averaged(taken.table, note)
     with Record.to_read() as record:
         run = record.add_table(table, taken.settings)
+    if table.content == "positions" and {"ax", "mx"} <= set(table.columns):
+        note("Its accelerometer is meant; with --constant triad=m its magnetometer is.")
     if as_json:
         names = [*table.columns, *table.labels]
         emit({"schema": "rig.import/1", "run": run, "kind": table.kind, "rows": table.n, "columns": names})

@@ -8,7 +8,7 @@ from dataclasses import replace
 import click
 
 from calibrations.errors import DataError, nearest
-from calibrations.reading.foreign import fitting
+from calibrations.reading.foreign import PATH, fitting
 from calibrations.reading.proposal import command, likely_kind, missing, propose, values_of
 from calibrations.reading.separated import Sheet
 from calibrations.reading.units import Mapped, unit_of
@@ -19,7 +19,7 @@ LEAVE = "-"
 CHOICES = {
     "poses": "alpha_deg beta_deg vx_v vy_v vz_v direction t_s temperature_c supply_v vx_std_v vy_std_v n flip",
     "positions": "ax ay az t_s temperature_c n; of a magnetometer mx my mz",
-    "rates": "rate_deg_s gx gy gz ax ay az axis_x axis_y axis_z t_s temperature_c n",
+    "rates": "rate_deg_s gx gy gz ax ay az axis_x axis_y axis_z t_s temperature_c n; of named sections path",
     "motion": "t_s vx_v vy_v displacement_m temperature_c supply_v",
 }
 
@@ -81,7 +81,7 @@ def _understood(
     if proposal is not None and unit_of(answer) and answer not in NUMBERS:
         return fitting(replace(proposal, unit=unit_of(answer)), source)
     name, colon, unit = answer.partition(":")
-    if name not in NUMBERS:
+    if name not in NUMBERS | {PATH}:
         raise DataError(f'"{name}" is none of our columns{nearest(name, " ".join(CHOICES.values()).split())}')
     if name in {m.name for m in before}:
         raise DataError(f"{name} is taken already")

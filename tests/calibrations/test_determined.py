@@ -10,7 +10,7 @@ from calibrations.fit import fit
 from calibrations.model import Model
 from calibrations.model_file import read_model
 from calibrations.reports.words import headline, summary
-from calibrations.search.determined import undetermined, unseen_variance
+from calibrations.search.determined import leverages, undetermined, unseen_variance
 from calibrations.table import Table
 from tests.calibrations.test_real_data import mikoff, suarez, xsens
 
@@ -47,6 +47,24 @@ def test_many_rows_determine_a_model_and_few_do_not() -> None:
     few = undetermined(fit(read_model("linear"), turned([0.0, 10.0, 20.0], 1)))
     assert few is not None
     assert "the 2 parameters are not identifiable from these rows: 3 of them" in few
+
+
+def test_a_parameter_that_one_row_alone_tells_is_known_and_unchecked() -> None:
+    """A session as of six rests and a turn about each edge: 27 values, of which three pass through the fit."""
+    rates, axes = np.array([*[0.0] * 6, 60.0, 50.0, 70.0]), np.tile(np.eye(3), (3, 1))
+    outputs = 16 * rates[:, None] * axes + np.random.default_rng(2).normal(0, 0.1, (9, 3)) + [2.0, -4.0, -3.0]
+    columns = {f"axis_{axis}": axes[:, k] for k, axis in enumerate("xyz")}
+    columns |= {f"g{axis}": outputs[:, k] for k, axis in enumerate("xyz")}
+    columns |= {f"g{axis}_std": np.full(9, 1.0) for axis in "xyz"}
+    table = Table.from_columns("rates", columns | {"rate_deg_s": rates, "n": np.full(9, 100.0)})
+    found = fit(read_model("gyroscope"), table)
+    told = undetermined(found)
+    assert told is not None
+    assert "nothing checks all of the 6 parameters: 3 of the 27 measured values (row 6, row 7, row 8)" in told
+    assert "not identifiable" not in told
+    assert leverages(found).sum() == pytest.approx(6)
+    again = undetermined(fit(read_model("gyroscope"), table.rows(np.array([*range(9), 6, 7, 8]))))
+    assert again is None
 
 
 def test_published_sets_of_many_positions_determine_nine_parameters() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from calibrations.compare import compare
-from calibrations.coverage import directions, harmonics, too_small, worse
+from calibrations.coverage import SOFT_IRON, directions, harmonics, too_small, worse
 from calibrations.diagnose import diagnose
 from calibrations.discover import discover
 from calibrations.effect import catalogue
@@ -102,6 +102,15 @@ def turn(n: int = 24) -> Array:
     x, y = 22.0 * np.cos(t), 18.0 * np.sin(t)
     noise = 0.01 * np.random.default_rng(0).standard_normal((3, n))
     return np.column_stack([c * x - s * y + 5.0, s * x + c * y - 3.0, np.full(n, 40.0)]) + noise.T
+
+
+def test_how_badly_few_orientations_show_it_is_a_sentence() -> None:
+    few = too_small(turned.magnetometer(turned.in_iron(5, seed=1)), SOFT_IRON)
+    assert "something in it would be known not at all; turn the sensor about three axes" in str(few)
+    cap = np.random.default_rng(3).normal([0.0, 0.0, 2.0], 0.5, (200, 3))
+    cap /= np.linalg.norm(cap, axis=1, keepdims=True)
+    some = too_small(turned.magnetometer(turned.in_iron(200, 1, directions=cap)), SOFT_IRON)
+    assert " times worse than from as many on all sides, and 10 times is the limit; turn" in str(some)
 
 
 def test_what_a_single_turn_cannot_show_is_said_and_not_fitted() -> None:
