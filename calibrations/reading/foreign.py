@@ -15,7 +15,7 @@ from calibrations.errors import DataError, MissingColumn, nearest
 from calibrations.reading.cells import cells
 from calibrations.reading.plausible import check_at_rest, doubts
 from calibrations.reading.proposal import command, missing
-from calibrations.reading.separated import Sheet, is_number, sheet
+from calibrations.reading.separated import Sheet, is_number, look_like_names, sheet
 from calibrations.reading.sessions import RATE, is_session, sample_rates
 from calibrations.reading.text_file import text_file
 from calibrations.reading.tried import advice
@@ -82,7 +82,7 @@ def _taken(laid: Sheet, kind: str | None, chosen: Sequence[Mapped], constants: M
     try:
         kind = kind or guess_kind([*(m.name for m in chosen), *kept])
     except MissingColumn as error:
-        what = error if laid.named else "a header line with column names is missing"
+        what = error if look_like_names(laid.header) else "a header line with column names is missing"
         raise MissingColumn(f"{laid.name}, line {laid.line}: {what}") from None
     known = {**laid.constants, **constants}
     known |= _output_unit(chosen, kind, known.get("triad") == "m", laid.name)

@@ -63,7 +63,7 @@ def gravity_unit(outputs: Array) -> str:
 
 
 def field_unit(outputs: Array) -> str:
-    """"uT" where outputs, shape (n, 3), have the magnitude of the earth's field, whatever the hard iron; else ""."""
+    """ "uT" where outputs, shape (n, 3), have the magnitude of the earth's field, whatever the hard iron; else ""."""
     size = float(np.median(np.linalg.norm(outputs - sphere_centre(outputs), axis=1)))
     return "uT" if EARTH_UT[0] < size < EARTH_UT[1] else ""
 

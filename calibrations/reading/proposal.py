@@ -200,8 +200,8 @@ def _unit(laid: Sheet, name: str, ours: str, values: Array) -> str:
 
 
 def _counts(values: Array) -> bool:
-    """Whether numbers may count averaged samples: whole, 1 or more, and not the running number of a row."""
-    running = len(values) > 2 and bool(np.all(np.diff(values) == 1))
+    """Whether numbers may count averaged samples: whole, 1 or more, and not a row's running number, over and over."""
+    running = len(values) > 2 and float(np.mean(np.diff(values) == 1)) > 0.5
     return bool(np.all(values >= 1) and np.all(values % 1 == 0)) and not running
 
 

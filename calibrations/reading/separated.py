@@ -22,6 +22,7 @@ from calibrations.table import Constant
 HEAD = 200  # lines that the layout is taken from
 BLANK = " \t\r\n\x1a"
 _COMMA = re.compile(r",(?=\d+([eE]|$))")
+NAME = re.compile(r"[^\W\d][\w .()\[\]/°%^*+-]{0,39}|")  # of a column: words and a unit, or nothing
 NO_UNIT = ("", "-", "1", "n/a")
 Row = tuple[int, list[str]]  # the number of a line, from 1, and its cells
 
@@ -86,6 +87,11 @@ def sheet(source: Source) -> Sheet:
     sample = tuple(tuple(cells[:columns]) for _, cells in below if len(cells) == width)
     if not sample:
         raise DataError(_another_width(source.name, *below[0], header))
+    if not any(is_number(cell) for cells in sample for cell in cells):
+        raise DataError(
+            f"{source.name}: holds no numbers in its first {len(sample)} rows; a table of measurements has a header "
+            "line with column names, and rows of numbers below it"
+        )
     return Sheet(
         source, separator, tuple(header[:columns]), tuple(units), named, width, line, below[0][0], sample, constants
     )
@@ -177,7 +183,7 @@ def _empty_behind(rows: Sequence[list[str]]) -> int:
 
 def _checked(header: list[str], where: str) -> list[str]:
     if "" in header:
-        raise DataError(f"{where}: a column has no name: {', '.join(header)}")
+        raise DataError(f"{where}: a column has no name{_names(header)}")
     if twice := next((name for name in header if header.count(name) > 1), None):
         raise DataError(f'{where}: the column "{twice}" occurs twice')
     return header
@@ -199,4 +205,14 @@ def _is_units(cells: Sequence[str]) -> bool:
 
 
 def _another_width(name: str, line: int, cells: Sequence[str], header: Sequence[str]) -> str:
-    return f"{name}, line {line}: {len(cells)} values for {len(header)} columns ({', '.join(header)})"
+    return f"{name}, line {line}: {len(cells)} values for {len(header)} columns{_names(header)}"
+
+
+def _names(header: Sequence[str]) -> str:
+    """The columns' names for a message; "" where they hardly are names: nothing of a file that is no table is told."""
+    return f" ({', '.join(header)})" if look_like_names(header) else ""
+
+
+def look_like_names(header: Iterable[str]) -> bool:
+    """Whether a header names columns, as far as letters tell."""
+    return all(NAME.fullmatch(name) for name in header)

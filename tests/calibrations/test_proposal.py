@@ -8,12 +8,13 @@ import shlex
 import numpy as np
 import pytest
 
-from calibrations.errors import MissingColumn
+from calibrations.errors import DataError, MissingColumn
 from calibrations.reading.foreign import needs_mapping, take
 from calibrations.reading.proposal import command, likely_kind, propose
 from calibrations.reading.separated import Sheet, sheet
 from calibrations.reading.text_file import text
 from calibrations.reading.units import Mapped, name_and_unit, unit_of
+from calibrations.table import Array
 
 
 def laid(content: str) -> Sheet:
@@ -156,3 +157,103 @@ def test_how_units_are_spelt() -> None:
     ]  # fmt: skip
     assert name_and_unit("Vx [mV]") == ("Vx", "mV")
     assert name_and_unit("Run (raw data)") == ("Run (raw data)", "")
+
+
+def advised(content: str, **constants: str | float) -> str:
+    """The message about a file that is not understood."""
+    with pytest.raises(MissingColumn) as error:
+        take(laid(content), None, (), constants)
+    return str(error.value)
+
+
+def session(turned: bool, *, sections: str = "part") -> str:
+    """Three rests and three turns about the edges, 40 samples each, with a running number that begins at 1, then 0."""
+    random, lines = np.random.default_rng(5), [f"{sections},samples,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z"]
+    for k in range(6):
+        gyr = np.eye(3)[k % 3] * 800.0 * (turned and k > 2) + [2.0, -5.0, 1.0]
+        for i, noise in enumerate(random.normal(0, 1.0, (40, 3))):
+            cells = [*(2048.0 * np.eye(3)[k % 3] + noise), *(gyr + noise)]
+            lines.append(f"s{k},{(k < 5) + i}," + ",".join(f"{cell:.0f}" for cell in cells))
+    return "\n".join(lines) + "\n"
+
+
+def test_a_session_in_named_sections_is_rates_and_its_counter_counts_nothing() -> None:
+    told = advised(session(turned=True))
+    assert "(put by how many degrees it was turned in each section for YOURS in turn_deg; the samples a second" in told
+    words = shlex.split(told.splitlines()[-1])
+    assert words[3:7] == ["--kind", "rates", "--column", "path=part"]
+    assert words[-4:] == ["--constant", "turn_deg=YOURS", "--constant", "sample_rate_hz=YOURS"]
+    assert not any("samples" in word for word in words[:-2])
+    columns = [Mapped.parse(word) for word in words[6:-4:2]]
+    rates = take(laid(session(turned=True)), "rates", columns, {"turn_deg": 360.0, "sample_rate_hz": 40.0}).table
+    assert np.unique(rates.column("rate_deg_s")).tolist() == [0.0, 360.0]
+    assert not needs_mapping(laid(session(turned=True)), "rates", columns)
+    assert "turn_deg=180 --constant sample_rate_hz=YOURS" in advised(session(turned=True), turn_deg=180.0)
+
+
+def test_sections_in_which_nothing_turns_are_positions() -> None:
+    told = advised(session(turned=False))
+    assert "--kind positions --column ax=acc_x:counts" in told
+    assert "this takes it:\n" in told
+
+
+@pytest.mark.parametrize(
+    ("values", "counted"),
+    [("1 2 3 4", False), ("0 500 500 500", False), ("4.5 4 4 4", False), ("500 500 499 500", True)],
+)
+def test_only_whole_numbers_that_do_not_run_count_samples(values: str, counted: bool) -> None:
+    rows = "".join(f"90;{30 * k};3500;{value}\n" for k, value in enumerate(values.split()))
+    assert ("n=samples" in proposed(f"alpha_deg;beta_deg;Vx;samples\n{rows}")) is counted
+
+
+def test_what_was_tried_in_vain_is_said_so() -> None:
+    rows = "".join(f"{9.8 * (k == 0)},{9.8 * (k == 1)},{9.8 * (k == 2)}\n" for k in range(3))
+    told = advised(f"accX,accY,accZ\n{rows}")
+    assert "was tried in vain: theirs.csv: 3 positions; no model has fewer than 4 parameters" in told
+    assert "this takes it" not in told
+
+
+def columns_of(values: Array) -> str:
+    return "".join(" ".join(f"{v:.5f}" for v in row) + "\n" for row in values)
+
+
+def test_columns_without_names_are_positions_only_where_they_show_one_magnitude_on_all_sides() -> None:
+    random = np.random.default_rng(8)
+    sides = random.normal(size=(30, 3))
+    sides /= np.linalg.norm(sides, axis=1, keepdims=True)
+    assert "--kind positions --column ax=1:m/s2" in advised(columns_of(9.8 * sides))
+    for others in (random.normal(size=(30, 3)), np.cumsum(np.abs(random.normal(size=(30, 3))), axis=0)):
+        told = advised(columns_of(others))
+        assert told.endswith("; --column gives one of them a name by its number, as in vx_v=2:mV")
+        assert "rig import" not in told
+
+
+def test_constants_that_are_given_stay_and_a_rate_by_another_name_is_taken() -> None:
+    random, rows = np.random.default_rng(2), []
+    for side in [*np.eye(3), *-np.eye(3)]:
+        rows.append(4096 * side + random.normal(0, 5, (150, 3)))
+        rows.append(4096 * random.normal(size=(50, 3)))
+    samples = "".join(f"{x:.0f},{y:.0f},{z:.0f}\n" for x, y, z in np.vstack(rows))
+    told = advised(f"Fs,50\naccX,accY,accZ\n{samples}", sensor="A 7")
+    assert told.endswith("--constant 'sensor=A 7' --constant sample_rate_hz=50\n")
+    assert "YOURS" not in told
+    assert "(put the samples a second for YOURS in sample_rate_hz)" in advised(f"accX,accY,accZ\n{samples}")
+
+
+@pytest.mark.parametrize("triad", ["a", "m"])
+def test_of_a_magnetometer_beside_an_accelerometer_each_is_asked_for_its_own_magnitude(triad: str) -> None:
+    random = np.random.default_rng(6)
+    sides = random.normal(size=(24, 3))
+    sides /= np.linalg.norm(sides, axis=1, keepdims=True)
+    rows = "".join(
+        ",".join(f"{v:.4f}" for v in (*row, *grav)) + "\n"
+        for row, grav in zip(45 * sides + [3.0, -2.0, 8.0], 9.81 * sides[::-1], strict=True)
+    )
+    content = f"mag_x,mag_y,mag_z,grav_x,grav_y,grav_z\n{rows}"
+    words = shlex.split(advised(content, triad=triad).splitlines()[-1])
+    assert words[-2:] == ["--constant", f"triad={triad}"]
+    taken = take(laid(content), "positions", [Mapped.parse(word) for word in words[6:-2:2]], {"triad": triad}).table
+    assert taken.unit == {"a": "m/s2", "m": "uT"}[triad]
+    heavy = [Mapped.parse(word.replace("grav", "mag")) for word in words[12:-2:2]]
+    with pytest.raises(DataError, match="ax, ay, az have the magnitude 4"):
+        take(laid(content), "positions", heavy, {})

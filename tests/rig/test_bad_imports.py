@@ -42,6 +42,10 @@ import pytest
             ("log.csv", "--constant", "sample_rate_hz=100"),
             "log.csv: found no still intervals; a log of positions has many of 1 s or more",
         ),
+        (
+            ("gyro.csv", "--constant", "sample_rate_hz=100"),
+            "gyro.csv: ax, ay, az are the same in all 5 still intervals, to the noise of a sample",
+        ),
     ],
 )
 def test_an_import_that_cannot_be(
@@ -51,4 +55,23 @@ def test_an_import_that_cannot_be(
     (work / "cut.csv.gz").write_bytes(gzip.compress(text.encode())[:100])
     noise = np.random.default_rng(0).standard_normal((1500, 3)).round(4).tolist()
     (work / "log.csv").write_text("ax,ay,az\n" + "".join(f"{x},{y},{z}\n" for x, y, z in noise))
+    turned = [[30 * v for v in row] if k % 300 > 200 else row for k, row in enumerate(noise)]
+    (work / "gyro.csv").write_text("ax,ay,az\n" + "".join(f"{x},{y},{z}\n" for x, y, z in turned))
     assert says in refused("import", *arguments)
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ("root:x:0:0:root:/root:/bin/sh\ndaemon:x:1:1:daemon:/:/bin/false\n", "holds no numbers in its first 1 rows"),
+        ("key = s3cret\nother = 7\n", "line 1: a header line with column names is missing"),
+        ("Its s3cret: a, b\n1\n2\n3,4\n5,6\n", "line 2: 1 values for 4 columns"),
+        ("daemon\t\t7/s3cret\nx\ty\t8\n", "line 1: a column has no name"),
+    ],
+)
+def test_what_is_no_table_is_not_quoted(refused: Callable[..., str], work: Path, content: str, said: str) -> None:
+    (work / "private.txt").write_text(content)
+    for command in ("import", "fit"):
+        told = refused(command, "private.txt")
+        assert said in told
+        assert not any(word in told for word in ("root:x", "daemon", "s3cret"))
