@@ -183,7 +183,7 @@ def _empty_behind(rows: Sequence[list[str]]) -> int:
 
 def _checked(header: list[str], where: str) -> list[str]:
     if "" in header:
-        raise DataError(f"{where}: a column has no name{_names(header)}")
+        raise DataError(f"{where}: a column has no name" + _names(header, ": {}"))
     if twice := next((name for name in header if header.count(name) > 1), None):
         raise DataError(f'{where}: the column "{twice}" occurs twice')
     return header
@@ -208,9 +208,9 @@ def _another_width(name: str, line: int, cells: Sequence[str], header: Sequence[
     return f"{name}, line {line}: {len(cells)} values for {len(header)} columns{_names(header)}"
 
 
-def _names(header: Sequence[str]) -> str:
+def _names(header: Sequence[str], told: str = " ({})") -> str:
     """The columns' names for a message; "" where they hardly are names: nothing of a file that is no table is told."""
-    return f" ({', '.join(header)})" if look_like_names(header) else ""
+    return told.format(", ".join(header)) if look_like_names(header) else ""
 
 
 def look_like_names(header: Iterable[str]) -> bool:

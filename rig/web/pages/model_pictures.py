@@ -71,7 +71,8 @@ class Pictures:
                 button.set_visibility(False)
 
     def _column(self, label: str) -> ui.select:
-        return ui.select({}, label=label, on_change=self.draw).props("dense options-dense").style("min-width: 150px")
+        picked = ui.select({}, label=label, on_change=self.draw).style("min-width: 150px")
+        return picked.props("dense options-dense stack-label")  # a label that floats up late lies over the value
 
     def _picture(self, name: str) -> None:
         with box("picture"):

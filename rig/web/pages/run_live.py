@@ -47,7 +47,7 @@ class Live:
                 self.to_record = ui.link("", "/record").classes("small grow")
                 self.buttons()
             self.now = words("", "quiet")
-            self.bar = ui.linear_progress(0.0, show_value=False).props("aria-label=progress")
+            self.bar = ui.linear_progress(0.0, show_value=False).props("aria-label=progress instant-feedback")
             self.count = words("", "small number")
             self.hint = words("", "quiet small")
             self.alarm = div("")
