@@ -5,9 +5,11 @@
     asked_times  the Allan deviation at times that are asked for
     freedom      degrees of freedom of a deviation, and its interval
     noise_type   the power of frequency that a spectrum follows, from neighbouring means
+    minimum      whether a deviation has a minimum, or only chance makes one
     outliers     single samples that are far from their neighbours
     stuck        a stretch of samples that are all the same
-    oddities     both in words
+    hidden       noise below the steps of a converter
+    oddities     all three in words
     reduction    all that is kept of a record, in one pass
     decimated    a record of any length as at most 2^17 means
     welch        the spectrum of what is faster than these

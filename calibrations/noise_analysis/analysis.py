@@ -11,6 +11,7 @@ import numpy as np
 
 from calibrations.noise_analysis.bands import Bands, fast_bands, slow_bands
 from calibrations.noise_analysis.expected import of_line, steps_of, weighted
+from calibrations.noise_analysis.hidden import Hidden
 from calibrations.noise_analysis.identify import (
     Mixture,
     Spectrum,
@@ -22,7 +23,7 @@ from calibrations.noise_analysis.identify import (
 )
 from calibrations.noise_analysis.lines import MOST, Line, fast_lines, without_line
 from calibrations.noise_analysis.octaves import KINDS, Curve
-from calibrations.noise_analysis.oddities import Oddity
+from calibrations.noise_analysis.oddities import Oddity, hidden_in
 from calibrations.noise_analysis.processes import GAUSS_MARKOV, LINEAR, SINUSOIDAL, Sampling
 from calibrations.noise_analysis.reduction import Reduction
 from calibrations.noise_analysis.welch import LENGTH, Segments
@@ -35,7 +36,8 @@ TO_BOUND = 1.96  # standard deviations
 @dataclass(frozen=True)
 class Coefficient:
     """One process: its most likely value, and the standard uncertainty of that. One that is not identified may as well
-    be 0, and is below `upper` with 95 %. A Gauss-Markov process has a time constant, a sinusoid a frequency.
+    be 0, and is below `upper` with 95 %, infinite where nothing is known of it. A Gauss-Markov process has a
+    time constant, a sinusoid a frequency.
     """
 
     value: float
@@ -86,7 +88,9 @@ class NoiseAnalysis:
         """Every process of the catalogue by its name."""
         known = estimates(self.spectrum, self.found)
         each = {name: self._linear(name, known) for name in LINEAR}
-        return each | {SINUSOIDAL: self._sinusoidal(), GAUSS_MARKOV: self._gauss_markov(known)}
+        each |= {SINUSOIDAL: self._sinusoidal(), GAUSS_MARKOV: self._gauss_markov(known)}
+        hidden = hidden_in(self.record.oddities)
+        return each if hidden is None else {name: _beneath(hidden, name, at) for name, at in each.items()}
 
     @property
     def misfit(self) -> float:
@@ -128,6 +132,14 @@ class NoiseAnalysis:
             return Coefficient(0.0, self.line_bound / TO_BOUND, self.unit, self.line_bound)
         line = self.lines[0]
         return Coefficient(line.amplitude, line.std, self.unit, None, None, line.frequency_hz)
+
+
+def _beneath(hidden: Hidden, name: str, seen: Coefficient) -> Coefficient:
+    """What is known of a process where noise is hidden below a converter's steps."""
+    if not hidden.hides(name):
+        return seen
+    upper = hidden.white_below if name == "white-noise" else np.inf
+    return Coefficient(0.0, upper / TO_BOUND, seen.unit, upper)
 
 
 def analyse(blocks: Iterable[Any], rate_hz: float, unit: str, source: str, corner_hz: float = np.inf) -> NoiseAnalysis:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
+import numpy as np
+
 from calibrations.noise_analysis.analysis import Coefficient, NoiseAnalysis
 from calibrations.noise_analysis.octaves import KINDS, Curve
 
@@ -48,4 +50,5 @@ def _curve(curve: Curve) -> dict[str, list[float]]:
 def _coefficient(each: Coefficient) -> dict[str, Any]:
     """Value, its uncertainty, unit and whether it was identified; beside them what only some have."""
     given = {name: value for name, value in asdict(each).items() if value is not None}
-    return {**given, "identified": each.identified}
+    unknown = {name: None for name in ("std", "upper") if np.isinf(given.get(name, 0.0))}
+    return {**given, **unknown, "identified": each.identified}

@@ -10,6 +10,7 @@ import numpy as np
 from calibrations.errors import DataError, TooFewRows
 from calibrations.noise_analysis.clipping import Ends
 from calibrations.noise_analysis.decimated import Means
+from calibrations.noise_analysis.hidden import Steps
 from calibrations.noise_analysis.octaves import Octaves
 from calibrations.noise_analysis.oddities import Oddity, oddities
 from calibrations.noise_analysis.outliers import Outliers
@@ -30,7 +31,7 @@ class Reduction:
     def __init__(self, rate_hz: float, corner_hz: float = np.inf, third_order: bool = True) -> None:
         self.rate_hz, self.corner_hz = rate_hz, corner_hz
         self.octaves, self.means, self.welch = Octaves(rate_hz, third_order), Means(), Welch(rate_hz)
-        self._ends, self._outliers, self._stuck = Ends(), Outliers(), Stuck()
+        self._ends, self._outliers, self._stuck, self._steps = Ends(), Outliers(), Stuck(), Steps()
 
     @property
     def n(self) -> int:
@@ -42,18 +43,21 @@ class Reduction:
 
         Raises DataError naming the sample that is no number, or where the channel is constant or clipped; TooFewRows.
         """
+        odd = self._ends, self._outliers, self._stuck, self._steps
         for block in blocks:
             samples = checked(np.asarray(block), self.n, source)
-            for each in (self.octaves, self.means, self.welch, self._ends, self._outliers, self._stuck):
+            for each in (self.octaves, self.means, self.welch, *odd):
                 each.add(samples)
             yield samples
         check_length(self.n, self.rate_hz, self.corner_hz, source)
         self._ends.check(source)
 
     def oddities(self) -> tuple[Oddity, ...]:
-        """Samples that are no noise."""
-        between = self.octaves.curve().deviation[0] ** 2
-        return oddities(self._outliers.found(), self._stuck.found(), self.n, self.rate_hz, float(between))
+        """Samples that are no noise, and noise that the samples do not show."""
+        curve = self.octaves.curve()
+        hidden = self._steps.hidden(curve, self.rate_hz, self.corner_hz)
+        between = float(curve.deviation[0] ** 2)
+        return oddities(self._outliers.found(), self._stuck.found(), hidden, self.n, self.rate_hz, between)
 
 
 def check_length(n: int, rate_hz: float, corner_hz: float, source: str) -> None:

@@ -14,6 +14,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from calibrations.experiment import Experiment
+from calibrations.noise_analysis.oddities import hidden_in
 from calibrations.search.share import MOST_LEFT
 from calibrations.still.experiment import again, behind_filter, of_pattern, separating
 from calibrations.still.filtered import OUTPUT_FILTER, corner_hz, filter_text
@@ -37,6 +38,8 @@ class Answer:
 def answer(found: Search, before: NoiseFit) -> Answer:
     """Of a search beside the fit of a model."""
     structure = structure_of(found)
+    if found.still.hidden:
+        return _told("unexplained", (), structure, found)  # what rounding makes of noise is no process
     if _disturbed(found):
         return _told("unexplained", tuple(found.gains), structure, found)
     if structure is not None and (not found.gains or _share_left(before, found.end) > MOST_LEFT):
@@ -67,13 +70,17 @@ def reason_of(found: Search, doubts: Mapping[str, tuple[str, ...]], structure: s
             said.append(f"this record cannot tell {name} from {' or '.join(processes)}")
         if (corner := corner_hz(found, name)) is not None:
             said.append(filter_text(name, corner))
-    if structure is not None:
+    if structure is not None and found.still.hidden:
+        said.append(structure)
+    elif structure is not None:
         said.append(f"there is something that no noise of the catalogue is: {structure}")
     return "; ".join(said) or None
 
 
 def next_of(found: Search, doubts: Mapping[str, tuple[str, ...]], structure: str | None) -> Experiment | None:
     """The experiment for the first doubt that one can settle."""
+    if any(hidden_in(channel.oddities) for channel in found.still.channels):
+        return None  # what is to be done about it is said, and no run does it
     if any(rival != OUTPUT_FILTER for rivals in doubts.values() for rival in rivals):
         return separating(found, tuple(doubts))
     shaken = (behind_filter(name, corner) for name in doubts if (corner := corner_hz(found, name)) is not None)

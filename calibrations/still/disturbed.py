@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from calibrations.effect import catalogue
 from calibrations.model_file import read_model
 from calibrations.noise_analysis.analysis import Coefficient, NoiseAnalysis, analysed
-from calibrations.noise_analysis.oddities import CONSTANT, WILD
+from calibrations.noise_analysis.oddities import COARSE, CONSTANT, WILD
 from calibrations.noise_analysis.processes import GAUSS_MARKOV
 from calibrations.still.channel_fit import ChannelFit
 from calibrations.still.fit import seen, with_effects
@@ -20,10 +20,12 @@ from calibrations.still.left import left_in
 from calibrations.still.patterns import Pattern, pattern_of
 from calibrations.still.record import Channel, Still, columns_beside
 from calibrations.still.search import search
+from calibrations.still.telegraph import TWO_LEVELS, telegraph_of
 from calibrations.table import Array
 
 MODEL = "still"
 FAR = 2.0  # standard deviations by which a coefficient changes, to be called spoilt
+EXPLAINS = (CONSTANT, COARSE)  # whatever the spectrum shows beside
 SPOILT = {WILD: ("white-noise", "quantisation-noise")}  # all others spoil whatever was identified
 
 
@@ -52,15 +54,17 @@ def disturbed(found: NoiseAnalysis, axis: str, logged: Mapping[str, Sequence[Arr
         axis, of.unit, of.rate_hz, of.corner_hz, of.n, of.means, of.size, of.segments, columns_beside(logged, of.n),
         of.oddities,
     )  # fmt: skip
-    patterns, rest = _patterns(found, channel)
+    two = telegraph_of(_fit(found, channel)) if len(found.found.power) > 1 else None
+    patterns, rest = ((), None) if two else _patterns(found, channel)
     named = _identified(found.coefficients)
     told = [
         Disturbance(each.kind, f"of {axis}, {each.text}", _of(named, SPOILT.get(each.kind, named)), each.matters)
         for each in of.oddities
     ]
     told += [Disturbance(each.kind, each.text, _spoilt(found, rest)) for each in patterns]
+    told += [Disturbance(TWO_LEVELS, two.text, (), False)] if two else []
     more = left_in([_fit(rest or found, channel)])
-    if more is not None and not any(each.kind == CONSTANT for each in of.oddities):
+    if more is not None and not any(each.kind in EXPLAINS for each in of.oddities):
         told.append(Disturbance(more.kind, more.text, named))
     return Disturbed(tuple(told), rest if patterns else None)
 

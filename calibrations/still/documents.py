@@ -19,6 +19,7 @@ from calibrations.still.disturbed import Disturbed
 from calibrations.still.fit import NoiseFit
 from calibrations.still.patterns import Pattern
 from calibrations.still.search import Search
+from calibrations.still.telegraph import TWO_LEVELS
 
 Document = dict[str, Any]
 
@@ -93,10 +94,12 @@ def discovery_document(result: Discovery, path: str | None) -> Document:
 
 
 def disturbances(found: Search) -> list[Document]:
-    """What no noise is: what was taken off the record, then odd samples."""
+    """What no noise is: what was taken off the record, then odd samples; between them, noise of two levels."""
     odd = [(each.axis, oddity) for each in found.still.channels for oddity in each.oddities]
+    two = [{"kind": TWO_LEVELS, "axis": t.axis, "text": t.text, "matters": False} for t in found.telegraphs]
     return [
         *map(_pattern, found.patterns),
+        *two,
         *({"kind": each.kind, "axis": axis, "text": each.text, "matters": each.matters} for axis, each in odd),
     ]
 

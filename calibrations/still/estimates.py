@@ -7,11 +7,13 @@ does not describe the spectrum. Those of a line are Rife and Boorstyn's.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from calibrations.effect import Effect
 from calibrations.model import Estimate
+from calibrations.noise_analysis.oddities import hidden_in
 from calibrations.noise_analysis.whittle import information
 from calibrations.still.channel_fit import ChannelFit, spectrum_of
 from calibrations.table import Array
@@ -23,7 +25,14 @@ SHOWN = 1.96  # standard deviations of its power that an effect has to be, to be
 
 def estimates(found: ChannelFit, effect: Effect, unit: str) -> Iterator[Estimate]:
     """Of one effect's parameters, in the order in which they are declared."""
-    yield from _of_lines(found, unit) if effect.lines is not None else _of_spectrum(found, effect, unit)
+    seen = _of_lines(found, unit) if effect.lines is not None else _of_spectrum(found, effect, unit)
+    hidden = hidden_in(found.channel.oddities)
+    if hidden is None or not hidden.hides(effect.name):
+        yield from seen
+        return
+    why = f"the noise is below the converter's step of {hidden.step:.4g} {unit}"
+    for each in seen:
+        yield replace(each, std=None, identified=False, why=why)
 
 
 def _of_spectrum(found: ChannelFit, effect: Effect, unit: str) -> Iterator[Estimate]:

@@ -22,7 +22,9 @@ def corner_hz(found: Search, name: str) -> float | None:
     """The corner that a low-pass would have, were it what makes the process `name`; None where that is no question."""
     if name != GAUSS_MARKOV:
         return None
-    corners = [_corner(each) for each in found.mixture.channels if not np.isfinite(each.channel.corner_hz)]
+    jumping = {telegraph.axis for telegraph in found.telegraphs}  # no filter makes two levels
+    free = (each for each in found.mixture.channels if not np.isfinite(each.channel.corner_hz))
+    corners = [_corner(each) for each in free if each.channel.axis not in jumping]
     return next((corner for corner in corners if corner is not None), None)
 
 

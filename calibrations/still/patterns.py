@@ -18,6 +18,7 @@ import numpy as np
 from scipy.fft import dct, dst
 from scipy.signal import lfilter
 
+from calibrations.noise_analysis.oddities import hidden_in
 from calibrations.search.candidates import NOT_TOLD_APART
 from calibrations.still.bands import means_without
 from calibrations.still.channel_fit import ChannelFit
@@ -90,7 +91,7 @@ def pattern_of(found: ChannelFit) -> Pattern | None:
     ]  # fmt: skip
     kinds = {(each.kind, each.cause) for each in every}
     best, *others = sorted((_best(every, *kind) for kind in kinds), key=lambda each: -each.worth)
-    if best.worth <= 0:
+    if best.worth <= 0 or hidden_in(found.channel.oddities) is not None:  # rounding makes steps and slopes of its own
         return None
     return replace(best, rivals=tuple(each for each in others if best.worth - each.worth < NOT_TOLD_APART))
 

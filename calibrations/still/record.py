@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from calibrations.noise_analysis.octaves import Curve
-from calibrations.noise_analysis.oddities import Oddity
+from calibrations.noise_analysis.oddities import Oddity, hidden_in
 from calibrations.noise_analysis.processes import Sampling
 from calibrations.noise_analysis.reduction import Reduction
 from calibrations.noise_analysis.welch import Segments
@@ -102,6 +102,12 @@ class Still:
     def length_s(self) -> float:
         """From the first sample to the last."""
         return self.channels[0].length_s
+
+    @property
+    def hidden(self) -> bool:
+        """Whether the noise of every channel is below its converter's step."""
+        each = [hidden_in(channel.oddities) for channel in self.channels]
+        return all(hidden is not None and hidden.all for hidden in each)
 
     @property
     def axes(self) -> tuple[str, ...]:

@@ -24,6 +24,7 @@ from calibrations.still.fit import NoiseFit, fit, fitted, lines_of, most_lines, 
 from calibrations.still.mixtures import Mixture, Mixtures, likelihood
 from calibrations.still.patterns import Pattern, pattern_of, refitted
 from calibrations.still.record import Channel, Still
+from calibrations.still.telegraph import Telegraph, telegraph_of
 
 NEARLY = 0.9  # of the longest time constant
 MOST_PATTERNS = 3  # of a channel
@@ -39,6 +40,7 @@ class Search:
     lines: tuple[Lines, ...]  # per channel
     patterns: tuple[Pattern, ...]
     mixtures: Mixtures
+    telegraphs: tuple[Telegraph, ...] = ()
 
     @property
     def mixture(self) -> Mixture:
@@ -133,6 +135,8 @@ def search(still: Still, model: Model, effects: Mapping[str, Effect]) -> Search:
     known = {name: effect for name, effect in effects.items() if "still" in effect.kinds}
     known |= {effect.name: effect for effect in given}
     found = _searched(still, model, known, given)
+    if found.mixture.effects:
+        found = replace(found, telegraphs=tuple(filter(None, map(telegraph_of, found.mixture.channels))))
     while len(found.patterns) < MOST_PATTERNS * len(still.channels):
         more = _with_patterns(found, given)
         if more is found:
@@ -148,27 +152,29 @@ def _together(whole: Still, found: Search, given: tuple[Effect, ...]) -> Search:
         own = tuple(pattern for pattern in found.patterns if pattern.axis == channel.axis)
         patterns += refitted(own, beside, channel) if own else ()
     left = _searched(without(whole, tuple(patterns)), found.model, found.effects, given)
-    return replace(left, patterns=tuple(patterns))
+    return replace(left, patterns=tuple(patterns), telegraphs=found.telegraphs)
 
 
 def _with_patterns(found: Search, given: tuple[Effect, ...]) -> Search:
     """With the patterns that stand out, taken off each channel where they make a process needless; or as it was."""
-    sure, likely = _patterns(found.mixture.channels), _patterns(found.mixtures.base)
-    tried = [
-        replace(
-            _searched(without(found.still, each), found.model, found.effects, given), patterns=found.patterns + each
-        )
-        for each in (sure, likely)
-        if each
-    ]
+    sure, likely = (_patterns(found, channels) for channels in (found.mixture.channels, found.mixtures.base))
+    tried = [_taken_off(found, each, given) for each in (sure, likely) if each]
     best = max(tried, key=_worth, default=found)
-    needless = len(best.gains) < len(found.gains) and _worth(best) > _worth(found)
-    return best if needless or any(pattern.certain for pattern in sure) else found
+    if _worth(best) <= _worth(found) or likelihood(best.mixtures.base) < likelihood(found.mixtures.base):
+        return found  # what the model explains less well without was a part of the noise
+    return best if len(best.gains) < len(found.gains) or any(pattern.certain for pattern in sure) else found
 
 
-def _patterns(channels: tuple[ChannelFit, ...]) -> tuple[Pattern, ...]:
-    """The pattern that stands out in each channel, where one does."""
-    return tuple(filter(None, map(pattern_of, channels)))
+def _taken_off(found: Search, patterns: tuple[Pattern, ...], given: tuple[Effect, ...]) -> Search:
+    """What is found without more patterns."""
+    rest = _searched(without(found.still, patterns), found.model, found.effects, given)
+    return replace(rest, patterns=found.patterns + patterns, telegraphs=found.telegraphs)
+
+
+def _patterns(found: Search, channels: tuple[ChannelFit, ...]) -> tuple[Pattern, ...]:
+    """The pattern that stands out in each channel, where one does. Between two levels there are steps enough."""
+    jumping = {telegraph.axis for telegraph in found.telegraphs}
+    return tuple(filter(None, (pattern_of(each) for each in channels if each.channel.axis not in jumping)))
 
 
 def without(still: Still, patterns: tuple[Pattern, ...]) -> Still:

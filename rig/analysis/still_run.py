@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrations.noise_analysis.hidden import hidden_step
 from calibrations.table import Array
 from procedures.noise_floor import STILL
 from procedures.soak import HOLD
@@ -16,7 +17,6 @@ from rig.errors import RecordError
 from rig.record.measured import Measured
 from rig.record.values import Kept
 
-FEW_CODES = 4  # of a converter: thousands of samples hold more where their noise is half a step
 UPRIGHT = 0.999  # g: a pose that is as good as along gravity
 
 
@@ -76,15 +76,12 @@ def _beside(kept: Kept) -> Iterator[tuple[str, list[Array]]]:
 
 
 def coarse(kept: Kept) -> dict[str, float]:
-    """The steps of the supply's readings, where a block holds so few of them that noise does not smooth them in means.
-
-    Source  Widrow and Kollar, Quantization Noise, on dither: no steps are left where noise is half a step or more.
-    """
+    """The steps of the supply's readings, where its noise does not smooth them in means."""
     channel = FOLLOWED[1].removesuffix("_v")
     if channel not in kept.samples.channels:
         return {}
-    codes = np.unique(kept.samples.volts[:, kept.samples.channels.index(channel)])
-    return {FOLLOWED[1]: float(np.diff(codes).min())} if 1 < len(codes) < FEW_CODES else {}
+    step = hidden_step(kept.samples.volts[:, kept.samples.channels.index(channel)])
+    return {} if step is None else {FOLLOWED[1]: step}
 
 
 def _note_upright(kept: Kept, volts: Array, into: Stream) -> None:

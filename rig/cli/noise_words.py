@@ -7,8 +7,12 @@ from collections.abc import Iterable
 import numpy as np
 
 from calibrations.noise_analysis.analysis import Coefficient, NoiseAnalysis
+from calibrations.noise_analysis.minimum import minimum_s
+from calibrations.noise_analysis.oddities import COARSE, hidden_in
 from calibrations.numerals import exponent
 from calibrations.still.disturbed import Disturbed
+from calibrations.still.telegraph import TWO_LEVELS
+from calibrations.still.words import sentence
 from rig.analysis.stream import Stream, repairs
 from rig.cli.output import columns
 from rig.numerals import duration
@@ -22,6 +26,7 @@ MEANS = {
     "sinusoidal-noise": "amplitude",
     "gauss-markov-noise": "standard deviation",
 }
+NOISE = (COARSE, TWO_LEVELS)  # what is told beside the coefficients, and is noise
 MISFIT = 1.3  # of the spectrum, beyond which the processes do not describe it
 Factor = tuple[float, str]
 
@@ -48,7 +53,9 @@ def remarks(samples: Stream, found: NoiseAnalysis, told: Disturbed) -> Iterable[
             f"Coefficients are those before the output's {samples.corner_hz:g} Hz low-pass, "
             f"from what is slower than {samples.corner_hz / 2:.3g} Hz."
         )
-    if doubtful := [name for name in found.found.power if not found.coefficients[name].identified]:
+    hidden = hidden_in(found.record.oddities)
+    unknown = [name for name in found.found.power if not found.coefficients[name].identified]
+    if doubtful := [name for name in unknown if hidden is None or not hidden.hides(name)]:
         yield f"There is slow noise; the record cannot tell of which kind ({', '.join(doubtful)}?): record for longer."
     if found.misfit > MISFIT and not told.disturbances:
         yield (
@@ -69,10 +76,13 @@ def _coefficients(samples: Stream, found: NoiseAnalysis) -> str:
 
 def _disturbances(found: NoiseAnalysis, told: Disturbed) -> Iterable[str]:
     """What is no noise, what it spoils, and what the coefficients are without it."""
-    if not told.disturbances:
+    for each in (each for each in told.disturbances if each.kind in NOISE):
+        yield f"{sentence(each.text)}\n"
+    others = [each for each in told.disturbances if each.kind not in NOISE]
+    if not others:
         return
     yield "There is something that is no noise:"
-    for each in told.disturbances:
+    for each in others:
         spoilt = f"; it spoils {' and '.join(each.spoils)}" if each.spoils else ""
         yield f"  {each.text}{spoilt if each.matters else '; too little to matter'}"
     if told.rest is not None:
@@ -93,6 +103,8 @@ def _detail(each: Coefficient) -> str:
 def _shown(each: Coefficient, factor: float, unit: str) -> str:
     """`12.34(56) uV/sqrt(Hz)`, or the bound that it stays below."""
     per = each.unit.removeprefix(_base(each.unit))
+    if each.upper is not None and np.isinf(each.upper):
+        return "not known"
     if each.upper is not None:
         scale, prefix = _prefixed(each.upper * factor, unit)
         return f"not identified, below {each.upper * factor * scale:.2g} {prefix}{unit}{per}"
@@ -137,11 +149,7 @@ def _allan(found: NoiseAnalysis) -> str:
         (f"{tau:.4g}", f"{d * scale:.4g}", f"{low * scale:.4g} .. {high * scale:.4g}", f"{m * scale:.4g}")
         for tau, d, low, high, m in zip(curve.tau_s, curve.deviation, curve.low, curve.high, modelled, strict=True)
     ]
-    lowest = int(np.argmin(curve.deviation))
-    end = (
-        f"\nLowest at {curve.tau_s[lowest]:.4g} s: averaging for longer does not help."
-        if lowest < len(rows) - 1
-        else ""
-    )
+    lowest_s = minimum_s(curve)
+    end = "" if lowest_s is None else f"\nLowest at {lowest_s:.4g} s: averaging for longer does not help."
     head = ("time (s)", f"Allan deviation ({prefix}{found.unit})", "95 % interval", "by these processes")
     return columns(head, rows) + end

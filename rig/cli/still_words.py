@@ -9,7 +9,7 @@ from calibrations.still.discover import Discovery
 from calibrations.still.documents import mismatch, why
 from calibrations.still.fit import NoiseFit
 from calibrations.still.held_out import held_out_excess
-from calibrations.still.words import doubt, headline, of_record
+from calibrations.still.words import doubt, headline, of_record, sentence, two_levels
 from rig.cli.output import columns
 from rig.cli.words import experiment, parameters, quantity
 
@@ -70,7 +70,14 @@ def diagnosed(result: Diagnosis, model: str, data: str, bench: str) -> str:
 
 def discovered(result: Discovery, data: str, out: str | None) -> str:
     """The falling error, the verdict, and the final model."""
-    lines = [of_record(result.start.still), "", _falling(result), *_beyond(result.end), "", _verdict(result)]
+    lines = [
+        of_record(result.start.still),
+        "",
+        _falling(result),
+        *_beyond(result.end),
+        "",
+        _verdict(result) + two_levels(result.search),
+    ]
     lines += experiment(result.next_experiment, data) if result.next_experiment else []
     lines += ["", parameters(result.end.model)]
     return "\n".join([*lines, *(["", f"written to {out}"] if out else [])])
@@ -91,6 +98,8 @@ def added(result: Discovery, data: str, out: str) -> str:
 def _verdict(result: Discovery) -> str:
     names = " and ".join(result.causes)
     missing = f"Missing {'was' if len(result.causes) == 1 else 'were'} {names}."
+    if result.start.still.hidden:
+        return f"Nothing is told. {sentence(result.residual_structure)}"
     if result.verdict == "unexplained":
         beside = f"Beside {names}, there" if names else "There"
         return f"Unexplained. {beside} is something that no mixture of noise is: {result.residual_structure}."

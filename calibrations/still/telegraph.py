@@ -1,0 +1,144 @@
+"""Noise that goes between two levels: random telegraph noise (burst noise, popcorn), of one trap of a charge.
+
+Its spectrum is that of a Gauss-Markov process, which has any level. Which of both it is, the samples themselves tell:
+the likeliest path of two levels (Viterbi's) is taken off, and what is left has to be so much more likely beside the
+same processes that it pays for the path, with a surplus. Surplus and path are twice the logarithm of a ratio of two
+likelihoods, which chance makes c with a probability of exp(-c / 2) at most (Markov's inequality).
+
+Source  Kirton and Uren, Adv. Phys. 38 (1989), on single traps; Viterbi, IEEE Trans. Inform. Theory 13 (1967).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.special import xlogy
+
+from calibrations.still.bands import means_without
+from calibrations.still.channel_fit import ChannelFit
+from calibrations.still.fit import seen, with_effects
+from calibrations.table import Array
+
+TWO_LEVELS = "two-levels"
+WIDTHS = (1, 8, 64, 512)  # means over which levels are looked for
+ROUNDS = 6  # of path and levels in turn
+FEWEST = 4  # times that it goes: each level is come back to, and a step is none
+SURPLUS = 14.0  # twice a logarithm: once in 1000 records at most
+Path = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Telegraph:
+    """One channel's two levels, `apart` in its unit; how often it goes, and how long it stays at each, s."""
+
+    axis: str
+    unit: str
+    apart: float
+    times: int
+    upper_s: float
+    lower_s: float
+
+    @property
+    def text(self) -> str:
+        """In words."""
+        return (
+            f"random telegraph noise (burst noise, popcorn): {self.axis} goes between two levels {self.apart:.3g} "
+            f"{self.unit} apart, {self.times} times, and stays at the upper one for {self.upper_s:.2g} s and at the "
+            f"lower for {self.lower_s:.2g} s on average; its spectrum is that of a Gauss-Markov process"
+        )
+
+
+def telegraph_of(found: ChannelFit) -> Telegraph | None:
+    """The two levels that a channel goes between; None where its processes do without."""
+    values = means_without(found.channel, found.lines)
+    paths = [each for width in WIDTHS if (each := _path(values, width)) is not None]
+    if not paths:
+        return None
+    best = min(paths, key=lambda path: _price(path) + _unlikely(values, path))
+    rest = replace(found.channel, means=values - _levels(values, best)[best])
+    left = with_effects(seen(rest, found.lines), found.effects)
+    if 2 * (left.log_likelihood - found.log_likelihood) < _price(best) + SURPLUS:
+        return None
+    return _told(found, values, best)
+
+
+def _told(found: ChannelFit, values: Array, path: Path) -> Telegraph:
+    channel, (low, high) = found.channel, _levels(values, path)
+    goes, upper = np.flatnonzero(np.diff(path)), int(path.sum())
+    stays = [np.count_nonzero(path[np.append(goes, -1)] == level) for level in (0, 1)]
+    step_s = channel.sampling.interval_s
+    return Telegraph(
+        channel.axis, channel.unit, float(high - low), len(goes),
+        upper * step_s / stays[1], (len(path) - upper) * step_s / stays[0],
+    )  # fmt: skip
+
+
+def _path(values: Array, width: int) -> Path | None:
+    """The likeliest path of two levels that stand out of means over so many values; None where it hardly goes."""
+    at = _halves(values[: len(values) // width * width].reshape(-1, width).mean(axis=1))
+    spread, goes = float(np.std(np.diff(values))) / 2**0.5, 1 / (16 * width)
+    if not spread > 0 or not len(at):
+        return None
+    path = np.zeros(0, dtype=np.int64)
+    for _ in range(ROUNDS):
+        path = viterbi((values - at.mean()) * (at[1] - at[0]) / spread**2, float(np.log(goes / (1 - goes))))
+        times = int(np.count_nonzero(np.diff(path)))
+        if times < FEWEST:
+            return None
+        at, goes = _levels(values, path), times / len(path)
+        spread = float(np.std(values - at[path]))
+    return path
+
+
+def _halves(means: Array) -> Array:
+    """Two levels (2,) in means: those of the nearer ones (two-means)."""
+    at = np.array([means.min(), means.max()])
+    for _ in range(ROUNDS):
+        upper = means > at.mean()
+        if upper.all() or not upper.any():
+            return at[:0]
+        at = np.array([means[~upper].mean(), means[upper].mean()])
+    return at
+
+
+def _levels(values: Array, path: Path) -> Array:
+    """Mean values at either level (2,)."""
+    return np.array([values[path == level].mean() for level in (0, 1)])
+
+
+def _price(path: Path) -> float:
+    """Twice the negative logarithm of a path's probability, as one that forgets how long it stayed."""
+    kinds = np.bincount(2 * path[:-1] + path[1:], minlength=4).reshape(2, 2)
+    return float(-2 * np.sum(xlogy(kinds, kinds / np.maximum(kinds.sum(axis=1, keepdims=True), 1))))
+
+
+def _unlikely(values: Array, path: Path) -> float:
+    """Twice the negative log-likelihood of values about a path in white noise, but for a constant."""
+    return float(len(values) * np.log(np.var(values - _levels(values, path)[path])))
+
+
+@njit(cache=True, nogil=True)
+def viterbi(upper: Array, goes: float) -> Path:
+    """The likeliest path of 0 and 1, shape (n,).
+
+    upper  (n,) the logarithm of how much more likely each value is at the upper level
+    goes   the logarithm of how much more likely it goes than stays, between two values
+    """
+    n = len(upper)
+    came = np.zeros((n, 2), dtype=np.int64)
+    lower_worth, upper_worth = 0.0, upper[0]
+    for i in range(1, n):
+        came[i, 0] = 1 if upper_worth + goes > lower_worth else 0
+        came[i, 1] = 0 if lower_worth + goes > upper_worth else 1
+        lower_worth, upper_worth = (
+            max(lower_worth, upper_worth + goes),
+            max(upper_worth, lower_worth + goes) + upper[i],
+        )
+    path = np.zeros(n, dtype=np.int64)
+    path[n - 1] = 1 if upper_worth > lower_worth else 0
+    for i in range(n - 1, 0, -1):
+        path[i - 1] = came[i, path[i]]
+    return path
