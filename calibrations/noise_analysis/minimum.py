@@ -23,4 +23,4 @@ def minimum_s(curve: Curve) -> float | None:
     ratio = (curve.deviation[longer] / curve.deviation[at]) ** 2
     chance = fdtrc(curve.edf[longer], curve.edf[at], ratio)
     pairs = len(curve.tau_s) * (len(curve.tau_s) - 1) / 2
-    return float(curve.tau_s[at]) if np.any(chance < CHANCE / pairs) else None
+    return float(curve.tau_s[at]) if np.any(pairs * chance < CHANCE) else None

@@ -2,8 +2,9 @@
 
 Its spectrum is that of a Gauss-Markov process, which has any level. Which of both it is, the samples themselves tell:
 the likeliest path of two levels (Viterbi's) is taken off, and what is left has to be so much more likely beside the
-same processes that it pays for the path, with a surplus. Surplus and path are twice the logarithm of a ratio of two
-likelihoods, which chance makes c with a probability of exp(-c / 2) at most (Markov's inequality).
+same processes that it pays for the path, with a surplus, and that one of these is needless. Path and surplus are twice
+the logarithm of a ratio of two likelihoods, which chance makes c with a probability of exp(-c / 2) at most (Markov's
+inequality).
 
 Source  Kirton and Uren, Adv. Phys. 38 (1989), on single traps; Viterbi, IEEE Trans. Inform. Theory 13 (1967).
 """
@@ -17,6 +18,7 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.special import xlogy
 
+from calibrations.noise_analysis.hidden import FASTEST
 from calibrations.still.bands import means_without
 from calibrations.still.channel_fit import ChannelFit
 from calibrations.still.fit import seen, with_effects
@@ -46,8 +48,8 @@ class Telegraph:
         """In words."""
         return (
             f"random telegraph noise (burst noise, popcorn): {self.axis} goes between two levels {self.apart:.3g} "
-            f"{self.unit} apart, {self.times} times, and stays at the upper one for {self.upper_s:.2g} s and at the "
-            f"lower for {self.lower_s:.2g} s on average; its spectrum is that of a Gauss-Markov process"
+            f"{self.unit} apart, {self.times} times, and stays at the upper one for {self.upper_s:.3g} s and at the "
+            f"lower for {self.lower_s:.3g} s on average; its spectrum is that of a Gauss-Markov process"
         )
 
 
@@ -60,9 +62,16 @@ def telegraph_of(found: ChannelFit) -> Telegraph | None:
     best = min(paths, key=lambda path: _price(path) + _unlikely(values, path))
     rest = replace(found.channel, means=values - _levels(values, best)[best])
     left = with_effects(seen(rest, found.lines), found.effects)
-    if 2 * (left.log_likelihood - found.log_likelihood) < _price(best) + SURPLUS:
+    if 2 * (left.log_likelihood - found.log_likelihood) < _price(best) + SURPLUS or not _needless(left):
         return None
     return _told(found, values, best)
+
+
+def _needless(left: ChannelFit) -> bool:
+    """Whether a slow process is not needed any more: of two levels, nothing of it is left."""
+    slow = [effect for effect in left.effects if effect.name not in FASTEST]
+    rest = ([other for other in left.effects if other is not effect] for effect in slow)
+    return any(2 * (left.log_likelihood - with_effects(left, each).log_likelihood) < SURPLUS for each in rest)
 
 
 def _told(found: ChannelFit, values: Array, path: Path) -> Telegraph:
@@ -72,7 +81,7 @@ def _told(found: ChannelFit, values: Array, path: Path) -> Telegraph:
     step_s = channel.sampling.interval_s
     return Telegraph(
         channel.axis, channel.unit, float(high - low), len(goes),
-        upper * step_s / stays[1], (len(path) - upper) * step_s / stays[0],
+        float(upper * step_s / stays[1]), float((len(path) - upper) * step_s / stays[0]),
     )  # fmt: skip
 
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from calibrations.errors import DataError
 from calibrations.table import Table
@@ -14,15 +15,16 @@ from rig.analysis.stream import AXIS, BESIDE, FOLLOWED, LATE, Stream, agreed, ch
 MOST_MISSING = 0.1  # of a record, in gaps that are closed up
 WHOLE = 0.1  # of a step, by which steps may be off whole numbers of them where single samples were lost
 FEW_GAPS = 0.01  # of all steps
+EVEN = "record anew, evenly and every sample (what is interpolated has less white noise than the sensor)"
 UNEVEN = 1e-3  # of a record, by which times may be off an even row: those of a computer that samples reach in bursts
 
 
 def of_table(table: Table, channel: str | None, rate_hz: float | None) -> Stream:
     if table.kind != "still" or "alpha_deg" in table:
         kind = "poses" if table.kind == "still" else table.kind
-        raise DataError(
-            f"{table.source}: a table of {kind}; noise needs single samples of a sensor at rest, a table of still"
-        )
+        raise _no_record(f"{table.source}: a table of {kind}")
+    if "n" in table and (many := float(np.median(table.column("n")))) > 1:
+        raise _no_record(f"{table.source}: a row is the mean of {many:.0f} samples by its column n, as of poses")
     channels = tuple(name for name in table.columns if name not in BESIDE)
     chosen = channel_of(channels, channel, table.source)
     stated = rate_hz or table.number("sample_rate_hz", 0.0)
@@ -36,6 +38,13 @@ def of_table(table: Table, channel: str | None, rate_hz: float | None) -> Stream
         logged={name: [table.column(name)] for name in _logged(table, chosen)},
     )  # fmt: skip
     return replace(found, closed=list(times.gaps), uneven_s=times.uneven_s) if times else found
+
+
+def _no_record(what: str) -> DataError:
+    """What is no still record, and what to do."""
+    return DataError(
+        f"{what}; noise needs single samples of a sensor at rest: take a table of still, or `rig run noise-floor`"
+    )
 
 
 def _logged(table: Table, channel: str) -> Iterator[str]:
@@ -74,15 +83,22 @@ def _times(table: Table) -> _Times | None:
     if 0 < lost.sum() < table.n and np.all(np.abs(step_s / typical - 1 - lost) < WHOLE):
         raise DataError(
             f"{table.source}: {lost.sum():.0f} samples are missing, here and there, the first after row {far[0] + 2}; "
-            f"interpolate them onto equal steps of {typical:.6g} s first"
+            f"{EVEN}, or analyse {_longest(far, table.n)} by themselves"
         )
     off_s = float(np.max(np.abs(t_s - np.linspace(t_s[0], t_s[-1], table.n))))
     if off_s > UNEVEN * length_s:
         raise DataError(
             f"{table.source}: row {far[0] + 2} comes {step_s[far[0]]:.3g} s after the one before, others after "
-            f"{typical:.3g} s; samples must be evenly spaced: interpolate them onto equal steps first"
+            f"{typical:.3g} s; samples must be evenly spaced: {EVEN}"
         )
     return _Times((table.n - 1) / length_s, (), off_s)
+
+
+def _longest(far: NDArray[np.intp], n: int) -> str:
+    """The longest stretch of n rows without a late one, counted from 1; `far` are the last rows before these."""
+    edges = np.array([-1, *far, n - 1])
+    k = int(np.argmax(np.diff(edges)))
+    return f"rows {edges[k] + 2} to {edges[k + 1] + 1}, the longest stretch without a loss,"
 
 
 def _check_gaps(gaps: Sequence[tuple[float, float]], length_s: float, source: str) -> None:

@@ -47,12 +47,14 @@ def command(
     from calibrations.still.disturbed import disturbed
     from calibrations.still.documents import disturbed_document
     from rig.analysis.still import stream
-    from rig.cli.noise_words import remarks, summary
+    from rig.cli.noise_words import remarks, summary, whole_samples
     from rig.record.store import Record
 
     with nullcontext() if Path(data).exists() or data.endswith(".npy") else Record.to_find(data) as record:
         samples = stream(record, data, channel, rate_hz)
         source = data if record is None else f"run {data}"
+        if samples.others:
+            source += f", channel {samples.channel} (--channel takes another: {', '.join(samples.others)})"
         if tau_s:
             whole = np.concatenate([np.asarray(block, dtype=float) for block in samples.blocks])
             samples = replace(samples, blocks=iter([whole]))
@@ -61,6 +63,7 @@ def command(
             found = replace(found, curves={**found.curves, KIND: curve_at(whole, found.rate_hz, tau_s, source)})
     told = disturbed(found, samples.channel, samples.logged)
     notes(remarks(samples, found, told))
+    notes(whole_samples(tau_s, found))
     if as_json:
         emit(noise_document(found) | disturbed_document(told))
     else:

@@ -64,6 +64,13 @@ def remarks(samples: Stream, found: NoiseAnalysis, told: Disturbed) -> Iterable[
         )
 
 
+def whole_samples(asked_s: Iterable[float], found: NoiseAnalysis) -> Iterable[str]:
+    """Which averaging times were asked for and are no whole numbers of samples."""
+    for asked, taken in zip(asked_s, found.allan.tau_s.tolist(), strict=False):
+        if not np.isclose(asked, taken):
+            yield f"An averaging time of {asked:g} s is no whole number of samples: {taken:g} s is taken."
+
+
 def _coefficients(samples: Stream, found: NoiseAnalysis) -> str:
     second = samples.sensed
     rows = []

@@ -219,7 +219,9 @@ def test_a_supply_is_coarse_where_noise_does_not_smooth_its_steps(noise_v: float
         (("still.npy", "--rate", "50", "--tau", "100"), "an averaging time of 100 s needs a record of 200 s or more"),
         (("still.npy", "--rate", "50", "--tau", "0.001"), "is below that of one sample, 0.02 s"),
         (("rate.csv",), "100 samples a second are stated, the column t_s has 50"),
-        (("uneven.csv",), "s; samples must be evenly spaced: interpolate them onto equal steps first"),
+        (("uneven.csv",), "s; samples must be evenly spaced: record anew, evenly"),
+        (("means.csv",), "a row is the mean of 500 samples by its column n, as of poses"),
+        (("one-constant.csv",), "channel vx_v (--channel takes another: vy_v): every sample is the same"),
         (("torn.csv",), "1 gaps, 200 s in all beside 119.98 s of samples; the longest, of 200 s, is at t = 19.98 s"),
         (("back.csv",), "row 501: the time does not go on"),
         (("constant.csv",), "every sample is the same"),
@@ -240,6 +242,8 @@ def test_bad_input_is_one_message(rig: Rig, folder: Path, words: tuple[str, ...]
     table(folder / "rate.csv", t_s, "# sample_rate_hz: 100\n", vx_v=samples())
     for name, times in {"uneven": late, "torn": torn, "back": back}.items():
         table(folder / f"{name}.csv", times, vx_v=samples())
+    table(folder / "means.csv", t_s, vx_v=samples(), n=np.full(6000, 500.0))
+    table(folder / "one-constant.csv", t_s, vx_v=np.full(6000, 2.5), vy_v=samples())
     table(folder / "constant.csv", t_s, vx_v=np.full(6000, 2.5))
     Path("poses.csv").write_text("alpha_deg,beta_deg,vx_v\n90,0,3.5\n90,180,1.5\n")
     ended = rig("noise", *words)
@@ -276,11 +280,39 @@ def test_times_that_are_asked_for(rig: Rig, folder: Path) -> None:
         assert again[name][0] == pytest.approx(octaves[name][3])
 
 
+def test_a_time_that_is_no_whole_number_of_samples_is_said_to_be_rounded(rig: Rig, folder: Path) -> None:
+    ended = rig("noise", "still.npy", "--rate", "50", "--tau", "0.05", "--tau", "0.1")
+    assert ended.status == 0
+    assert "An averaging time of 0.05 s is no whole number of samples: 0.04 s is taken." in ended.err
+    assert "of 0.1 s" not in ended.err
+
+
+def test_noise_below_the_converters_step_and_of_two_levels_is_said_first(rig: Rig, folder: Path) -> None:
+    random = np.random.default_rng(4)
+    np.save("coarse.npy", np.round(2.6 + 0.15 * random.standard_normal(6000)))
+    trap = np.where(np.cumsum(random.random(6000) < 0.01) % 2, 0.0, 0.4)
+    np.save("trap.npy", samples() + trap)
+    coarse = rig("noise", "coarse.npy", "--rate", "50")
+    assert "Of values, the noise is below the converter's step: the samples are at 2 values 1 apart" in coarse.out
+    assert "flicker-noise       not known" in coarse.out
+    assert "no noise:" not in coarse.out
+    assert "slow noise; the record cannot tell" not in coarse.err
+    said = document(rig("noise", "trap.npy", "--rate", "50", "--json"))
+    assert [each["kind"] for each in said["disturbances"]] == ["two-levels"]
+    shown = rig("noise", "trap.npy", "--rate", "50").out
+    assert "Random telegraph noise (burst noise, popcorn): values goes between two levels 0.4" in shown
+    assert "no noise:" not in shown
+    assert "averaging for longer does not help" not in rig("noise", "still.npy", "--rate", "50").out
+
+
 def test_single_samples_that_were_lost_are_no_jitter(rig: Rig, folder: Path) -> None:
     kept = np.random.default_rng(2).random(6000) > 0.03
     kept[[0, 1]] = True
+    kept[3000:3500] = True
     file = table(folder / "lost.csv", (np.arange(6000) / 50)[kept], vx_v=samples()[kept])
     ended = rig("noise", file)
     assert ended.status == 2
     assert f"{np.sum(~kept[: np.flatnonzero(kept)[-1]])} samples are missing, here and there" in ended.err
-    assert "interpolate them onto equal steps of 0.02 s first" in ended.err
+    lost = np.flatnonzero(~kept)
+    first = 3000 - np.count_nonzero(~kept[:3000]) - (2999 - lost[lost < 3000][-1])
+    assert f"or analyse rows {first + 1} to {first + lost[lost >= 3500][0] - lost[lost < 3000][-1] - 1}, " in ended.err
