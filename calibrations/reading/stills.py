@@ -34,7 +34,10 @@ def positions(log: Table, rate_hz: float) -> Table:
     bounds = still_intervals(samples, rate_hz)
     if len(bounds) < 2:
         found = "one still interval" if bounds else "no still intervals"
-        needed = "a log of positions has many of 1 s or more, and the sensor is turned between them"
+        needed = (
+            "a log of positions has many of 1 s or more, and the sensor is turned between them; "
+            "one that only rests is for `rig noise`"
+        )
         raise DataError(f"{log.source}: found {found}; {needed}")
     if _is_alike(samples, bounds):
         raise DataError(

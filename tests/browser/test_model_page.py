@@ -64,6 +64,11 @@ def test_a_hidden_effect_is_found_added_saved_and_undone(workbench: Workbench, t
     assert model.effects == ("bias", "scale-factor", "axis-misalignment")
     workbench.shot(page, "nothing-missing")
     workbench.fits(page)
+    sentence, figures = (page.locator(f".verdict > .{part}").bounding_box() for part in ("grow", "numbers"))
+    assert sentence is not None
+    assert figures is not None
+    assert sentence["y"] + sentence["height"] <= figures["y"]
+    assert sentence["width"] > 600
     page.close()
     page = looked_at(workbench, data, "Nothing is missing")  # opened again, it is as it was left
     page.get_by_role("button", name="Undo axis-misalignment").click()
@@ -183,9 +188,22 @@ def test_selected_poses_are_left_out_with_a_reason_and_taken_in_again(workbench:
     expect(page.get_by_role("button", name="Take in again")).to_have_count(len(out) - 1)
 
 
-def test_what_cannot_be_looked_at_says_what_to_do(workbench: Workbench) -> None:
+def test_what_cannot_be_looked_at_says_what_to_do_and_the_next_path_is_read(
+    workbench: Workbench, tmp_path: Path
+) -> None:
     page = workbench.visit("/?data=no-such-run")
     expect(page.get_by_role("alert")).to_contain_text("there is no such file, and no run 'no-such-run'")
+    private, table = tmp_path / "private.txt", tmp_path / "table.csv"
+    private.write_text("root:x:0\nme:y:1\n")
+    table.write_text("alpha_deg,beta_deg,vx_v\n" + "".join(f"90,{b},{2.5 + b % 7}\n" for b in range(0, 360, 30)))
+    for path, shown in ((private, "holds no numbers"), (table, "on 12 poses")):
+        page.get_by_label("Data: a run").click()
+        page.keyboard.press("ControlOrMeta+a")
+        page.keyboard.type(str(path))
+        page.keyboard.press("Enter")
+        expect(page.get_by_text(shown).first).to_be_visible()
+        expect(page.locator(".q-menu")).to_have_count(0)
+        expect(page.get_by_text("root:x")).to_have_count(0)
 
 
 @pytest.mark.parametrize(("make", "rows"), [(thousand, "on 1000 poses"), (hundred_thousand, "on 100 poses")])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 
@@ -42,6 +43,7 @@ def test_a_newcomer_gets_from_the_empty_record_to_the_falling_error(workbench: W
     expect(page.get_by_role("button", name="Stop")).to_have_count(2)  # at the run, and in the head of every page
     workbench.shot(page, "running")
     phase(page, "complete")
+    expect(page.locator(".live .q-linear-progress__model")).to_have_class(re.compile("without-transition"))
     page.get_by_role("button", name="See the model").click()
     page.get_by_role("button", name="Add axis-misalignment").click()
     expect(page.locator(BARS)).to_have_count(2)

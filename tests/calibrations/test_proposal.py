@@ -257,3 +257,9 @@ def test_of_a_magnetometer_beside_an_accelerometer_each_is_asked_for_its_own_mag
     heavy = [Mapped.parse(word.replace("grav", "mag")) for word in words[12:-2:2]]
     with pytest.raises(DataError, match="ax, ay, az have the magnitude 4"):
         take(laid(content), "positions", heavy, {})
+
+
+def test_a_field_is_not_asked_for_gravity_whatever_unit_the_file_states() -> None:
+    rows = "".join(f"{45 * (k == 0)},{45 * (k == 1)},{45 * (k == 2)},1,0,0\n" for k in range(3))
+    content = f"# unit: g\n# triad: m\nmx,my,mz,ax,ay,az\n{rows}"
+    assert take(laid(content), None).table.content == "fields"
