@@ -37,7 +37,7 @@ def oddities(
     found = []
     if wild.count:
         found.append(_wild(wild, n, rate_hz, variance))
-    if stuck is not None:
+    if stuck is not None and hidden is None:  # below a step, samples are the same for long
         start_s, length_s = stuck.start / rate_hz, stuck.length / rate_hz
         text = f"{stuck.length} samples from t = {start_s:.6g} s on are all the same, for {length_s:.4g} s"
         found.append(Oddity(CONSTANT, text, stuck.length / n > _uncertain(n)))

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from scipy.special import xlogy
 
 from calibrations.noise_analysis.hidden import FASTEST
+from calibrations.noise_analysis.oddities import hidden_in
 from calibrations.still.bands import means_without
 from calibrations.still.channel_fit import ChannelFit
 from calibrations.still.fit import seen, with_effects
@@ -28,6 +29,7 @@ TWO_LEVELS = "two-levels"
 WIDTHS = (1, 8, 64, 512)  # means over which levels are looked for
 ROUNDS = 6  # of path and levels in turn
 FEWEST = 4  # times that it goes: each level is come back to, and a step is none
+LEAST = 1e-6  # noise beside the levels, as a share of how far they are apart: rounding
 SURPLUS = 14.0  # twice a logarithm: once in 1000 records at most
 Path = NDArray[np.int64]
 
@@ -55,6 +57,8 @@ class Telegraph:
 
 def telegraph_of(found: ChannelFit) -> Telegraph | None:
     """The two levels that a channel goes between; None where its processes do without."""
+    if hidden_in(found.channel.oddities) is not None:
+        return None  # rounding makes levels of its own
     values = means_without(found.channel, found.lines)
     paths = [each for width in WIDTHS if (each := _path(values, width)) is not None]
     if not paths:
@@ -98,7 +102,7 @@ def _path(values: Array, width: int) -> Path | None:
         if times < FEWEST:
             return None
         at, goes = _levels(values, path), times / len(path)
-        spread = float(np.std(values - at[path]))
+        spread = max(float(np.std(values - at[path])), LEAST * float(at[1] - at[0]))
     return path
 
 
@@ -126,7 +130,8 @@ def _price(path: Path) -> float:
 
 def _unlikely(values: Array, path: Path) -> float:
     """Twice the negative log-likelihood of values about a path in white noise, but for a constant."""
-    return float(len(values) * np.log(np.var(values - _levels(values, path)[path])))
+    low, high = at = _levels(values, path)
+    return float(len(values) * np.log(np.var(values - at[path]) + (LEAST * (high - low)) ** 2))
 
 
 @njit(cache=True, nogil=True)

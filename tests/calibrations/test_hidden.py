@@ -32,8 +32,8 @@ def hidden(x: Array, rate_hz: float = RATE_HZ, corner_hz: float = np.inf, blocks
     return hidden_in(seen.oddities())
 
 
-def read(random: Random, steps: float, mean: float, n: int = N) -> Array:
-    """White noise of so many steps, as a converter reads it."""
+def read(random: Random, steps: float, mean: float | Array, n: int = N) -> Array:
+    """White noise of so many steps about a mean that may drift, (n,), as a converter reads it."""
     return np.asarray(np.round(mean + steps * random.standard_normal(n)) * STEP)
 
 
@@ -76,6 +76,8 @@ def test_noise_behind_a_low_pass_is_judged_by_what_reaches_the_converter() -> No
         return hidden(np.round(0.3 + steps * x / x.std()), 1000.0, corner_hz)
 
     assert behind(0.3, 15.0)
+    assert behind(0.8, np.inf)
+    assert not behind(0.8, 15.0)
     assert not behind(1.0, 15.0)
     assert not behind(1.0, np.inf)
 
@@ -94,7 +96,7 @@ def test_what_is_slow_is_told_where_only_the_fast_is_hidden() -> None:
 
 
 def test_nothing_is_stated_of_hidden_noise() -> None:
-    x = read(np.random.default_rng(3), 0.15, 0.5, 120_000)
+    x = read(np.random.default_rng(3), 0.15, np.linspace(0.1, 0.5, 120_000), 120_000)
     x[0] = 3 * STEP
     found = analyse([x], RATE_HZ, "V", "made")
     told = disturbed(found, "vx", {})
@@ -107,7 +109,9 @@ def test_nothing_is_stated_of_hidden_noise() -> None:
 
 
 def test_the_loop_says_so_and_asks_for_no_second_record() -> None:
-    record = reduced([Samples("x", [read(np.random.default_rng(4), 0.15, 0.1)], RATE_HZ, "V")], "made")
+    record = reduced(
+        [Samples("x", [read(np.random.default_rng(4), 0.15, np.linspace(0.1, 0.5, N))], RATE_HZ, "V")], "made"
+    )
     asked, found = diagnose(record, read_model("still")), discover(record, read_model("still"))
     said = diagnosis_document(asked, "still")
     assert (asked.verdict, asked.missing, asked.next_experiment) == ("unexplained", (), None)
@@ -117,6 +121,10 @@ def test_the_loop_says_so_and_asks_for_no_second_record() -> None:
     assert [each["kind"] for each in said["disturbances"]] == [COARSE]
     assert str(asked.residual_structure)[1:] in headline(asked)
     assert not any(e.identified for term in found.end.model.terms for e in term.estimates)
+
+
+def test_a_step_between_blocks_is_one() -> None:
+    assert hidden(np.repeat(np.arange(40) % 2, 500).astype(float), blocks=40) is not None
 
 
 def test_a_step_of_a_few_readings() -> None:

@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from calibrations.noise_analysis.minimum import minimum_s
-from calibrations.noise_analysis.octaves import octaves
+from calibrations.noise_analysis.octaves import Curve, octaves
 from calibrations.table import Array
 from tests.calibrations.hidden_noise import fractional, white
 
 N, RATE_HZ = 10_000, 10.0
 Made = Callable[[np.random.Generator], Array]
+
+
+def _turned(curve: Curve) -> Curve:
+    """The longest time first."""
+    turned = {name: getattr(curve, name)[::-1] for name in ("tau_s", "deviation", "low", "high", "edf")}
+    return replace(curve, alpha=curve.alpha[::-1], **turned)
 
 
 def told(make: Made, seeds: int) -> list[float]:
@@ -36,9 +43,12 @@ def test_the_minimum_between_white_noise_and_a_walk_is_found_where_it_is() -> No
 
 
 def test_the_order_of_times_that_were_asked_for_is_no_matter() -> None:
-    from dataclasses import replace
-
     x = white(np.random.default_rng(1), N) + 0.1 * np.cumsum(np.random.default_rng(2).standard_normal(N))
     curve = octaves([x], RATE_HZ)
-    back = replace(curve, **{k: getattr(curve, k)[::-1] for k in ("tau_s", "deviation", "low", "high", "edf")})
+    back = _turned(curve)
     assert minimum_s(back) == minimum_s(curve) is not None
+
+
+def test_shorter_times_are_no_longer_ones_in_whatever_order() -> None:
+    curve = octaves([white(np.random.default_rng(1), N)], RATE_HZ)
+    assert minimum_s(_turned(curve)) is None

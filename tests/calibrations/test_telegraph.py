@@ -41,6 +41,7 @@ OF_ANY_LEVEL: dict[str, tuple[Callable[[Random], Array], str]] = {
     "traps": (lambda r: 0.3 * white(r, N) + traps(r, N), SLOW[1]),
     "walk": (lambda r: 0.3 * white(r, N) + 0.02 * walk(r, N), SLOW[2]),
     "a step": (lambda r: white(r, N) + 0.3 * _relaxing(r, N, 100.0) + 3.0 * (np.arange(N) > 3000), SLOW[0]),
+    "a lone step": (lambda r: white(r, N) + 3.0 * (np.arange(N) > 3000), SLOW[2]),
     "two traps": (lambda r: white(r, N) + telegraph(r, N) + telegraph(r, N), SLOW[0]),
 }
 
@@ -89,6 +90,11 @@ def test_steps_of_a_process_that_jumps_are_taken_off_only_where_the_model_is_bet
         jumps = telegraph(random, N, 800.0) + telegraph(random, N, 800.0) + telegraph(random, N, 800.0)
         found = discover(still(0.2 * white(random, N) + jumps), read_model("still"))
         assert found.cleaned is None or found.cleaned.log_likelihood > found.start.log_likelihood
+
+
+def test_two_levels_without_any_noise_are_no_fault() -> None:
+    alternating = np.where(np.arange(N) % 2, 1.0, -1.0) * telegraph(np.random.default_rng(1), N, 300.0)
+    assert told(alternating, SLOW[0]) is None
 
 
 def test_beside_coefficients() -> None:
