@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from calibrations.effect import catalogue
 from calibrations.model_file import read_model
 from calibrations.noise_analysis.analysis import analyse
 from calibrations.noise_analysis.document import noise_document
@@ -15,10 +18,13 @@ from calibrations.still.diagnose import diagnose
 from calibrations.still.discover import discover
 from calibrations.still.disturbed import disturbed
 from calibrations.still.documents import diagnosis_document
+from calibrations.still.fit import fit_channel
+from calibrations.still.patterns import pattern_of
 from calibrations.still.record import Samples, reduced
+from calibrations.still.telegraph import telegraph_of
 from calibrations.still.words import headline
 from calibrations.table import Array
-from tests.calibrations.hidden_noise import RECORDS
+from tests.calibrations.hidden_noise import RECORDS, telegraph
 
 RATE_HZ, N = 100.0, 20_000
 STEP = 2e-3
@@ -121,6 +127,20 @@ def test_the_loop_says_so_and_asks_for_no_second_record() -> None:
     assert [each["kind"] for each in said["disturbances"]] == [COARSE]
     assert str(asked.residual_structure)[1:] in headline(asked)
     assert not any(e.identified for term in found.end.model.terms for e in term.estimates)
+
+
+def test_the_steps_of_rounding_are_no_steps_and_no_two_levels_of_the_sensor() -> None:
+    random = np.random.default_rng(6)
+    wave = 0.5 + 0.3 * telegraph(random, N, 300.0) + 0.3 * random.standard_normal(N)
+    record = reduced([Samples("x", [np.round(wave)], RATE_HZ, "V")], "made")
+    found = fit_channel(record.channels[0], [catalogue()[name] for name in ("white-noise", "gauss-markov-noise")])
+    bare = replace(found, channel=replace(found.channel, oddities=()))
+    assert (telegraph_of(found), telegraph_of(bare) is None) == (None, False)
+    ramp = np.round(np.linspace(0, 1, N) + 0.02 * random.standard_normal(N))
+    stepped = reduced([Samples("x", [ramp], RATE_HZ, "V")], "made")
+    white = fit_channel(stepped.channels[0], [catalogue()["white-noise"]])
+    plain = replace(white, channel=replace(white.channel, oddities=()))
+    assert (pattern_of(white), pattern_of(plain) is None) == (None, False)
 
 
 def test_a_step_between_blocks_is_one() -> None:
