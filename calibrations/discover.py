@@ -16,6 +16,7 @@ from calibrations.experiment import Experiment, separating
 from calibrations.fit import Fit, refit
 from calibrations.model import Model
 from calibrations.search.candidates import candidates
+from calibrations.search.common_floor import counted
 from calibrations.search.determined import undetermined
 from calibrations.search.held_out import held_out_excess
 from calibrations.search.outliers import caution, fit_without, told
@@ -26,7 +27,7 @@ from calibrations.search.rivals import with_rivals
 from calibrations.search.settle import Settled, cost, first_order, settled
 from calibrations.search.share import MATERIAL, MOST_LEFT, OF_FORM, share_left
 from calibrations.search.structure import structure_of
-from calibrations.table import Table
+from calibrations.table import Array, Table
 
 REFINEMENT = 0.02  # of the greatest cost: an effect that costs less to lose refines the form of another
 
@@ -38,6 +39,16 @@ class Added:
     name: str
     before: Fit
     after: Fit
+
+    @classmethod
+    def of(cls, effect: Effect, before: Fit) -> Added:
+        """The effect added to a fit; the errors of both are counted in one floor."""
+        after = refit(before, before.model.with_effect(effect))
+        return cls(effect.name, before, after).counted(after.noise.scatter)
+
+    def counted(self, floor: Array) -> Added:
+        """The same, errors counted in this floor (channels,) where a model's own is what it leaves."""
+        return Added(self.name, counted(self.before, floor), counted(self.after, floor))
 
     @cached_property
     def held_out_before(self) -> float:
@@ -87,13 +98,14 @@ def add(effect: Effect, model: Model, table: Table, effects: Mapping[str, Effect
     The verdict is on the model with the effect: `unexplained` where more than its form is left beyond noise.
     """
     before, outliers = fit_without(model, table)
+    before = counted(before, before.noise.floor)
     found = candidates(before, catalogue() if effects is None else effects)
     rivals = next((with_rivals(c, found, before).indistinguishable_from for c in found if c.name == effect.name), ())
-    step = Added(effect.name, before, refit(before, before.model.with_effect(effect)))
+    step = Added.of(effect, before)
     structure = structure_of(step.after)
     left = step.after.pooled_excess > MATERIAL and structure is not None
     return Discovery(
-        start=before,
+        start=step.before,
         steps=(step,),
         verdict=_verdict(before, step.after, left, bool(rivals)),
         causes=(effect.name,),

@@ -35,6 +35,7 @@ class Noise:
     ratio: Array
     taus_s: tuple[tuple[float, ...], ...]  # time constants, per channel: one, or several for flicker noise
     given: tuple[Processes, ...] = ()  # per channel, known beforehand; none where nothing is
+    reference: Array | None = None  # (channels,), what errors are counted in where the white noise is not known
 
     @property
     def known(self) -> bool:
@@ -48,8 +49,10 @@ class Noise:
 
     @property
     def floor(self) -> Array:
-        """The noise floor: the white noise of one mean, rms over rows; the scatter where that is not known."""
-        return rms(self.white) if self.known else self.scatter
+        """The noise floor: the white noise of one mean, rms over rows; the reference or scatter where not known."""
+        if self.known:
+            return rms(self.white)
+        return self.scatter if self.reference is None else self.reference
 
     @property
     def tau_s(self) -> Array:

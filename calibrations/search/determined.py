@@ -68,3 +68,14 @@ def _unchecked(found: Fit, lone: NDArray[np.bool_]) -> str:
         f"({', '.join(which)}) are each the only one that tells a parameter, and are met whatever they are; measure "
         "the like of them again"
     )
+
+
+def lets_go(before: Fit, after: Fit) -> bool:
+    """Whether a parameter that `before` knew is known no longer: of positions only, whose orientation is not known.
+
+    Effects that bend the output enough make one magnitude of anything: of a sphere without end, and of no other sense.
+    """
+    if after.table.kind != "positions":
+        return False
+    known = {(t.name, e.name, e.axis) for t in before.model.terms for e in t.estimates if e.identified}
+    return any((t.name, e.name, e.axis) in known and not e.identified for t in after.model.terms for e in t.estimates)

@@ -9,7 +9,10 @@ from functools import cached_property
 from calibrations.effect import Effect
 from calibrations.fit import Fit
 from calibrations.model import Model
+from calibrations.noise import rms
 from calibrations.search.candidates import SIGNIFICANT, Candidate, added, best_pair, candidates
+from calibrations.search.common_floor import counted, leaves_noise
+from calibrations.search.determined import lets_go
 from calibrations.search.held_out import held_out_excess
 from calibrations.search.outliers import fit_without
 from calibrations.search.rivals import with_rivals
@@ -70,7 +73,7 @@ def find_path(model: Model, table: Table, effects: Mapping[str, Effect], enough:
     Raises what `fit` raises.
     """
     start, outliers = fit_without(model, table)
-    return grown(Path(start, (), (), outliers), effects, enough)
+    return _recounted(grown(Path(counted(start, start.noise.floor), (), (), outliers), effects, enough))
 
 
 def grown(path: Path, effects: Mapping[str, Effect], enough: float = 0.0) -> Path:
@@ -83,10 +86,28 @@ def grown(path: Path, effects: Mapping[str, Effect], enough: float = 0.0) -> Pat
             break
         steps.append(step)
         present = step.after
-        if share_left(path.start, present) <= enough:
+        if not leaves_noise(present) and share_left(path.start, present) <= enough:
             break
         found = candidates(present, effects)
     return Path(path.start, tuple(steps), tuple(found), path.outliers)
+
+
+def _recounted(path: Path) -> Path:
+    """The path with all errors counted in what its end leaves, where that is taken for noise."""
+    if not leaves_noise(path.end):
+        return path
+    floor = path.end.noise.scatter
+    times = float(rms(path.end.noise.floor) / rms(floor))
+
+    def of(c: Candidate) -> Candidate:
+        return replace(c, excess_after=times * c.excess_after, held_out_after=times * c.held_out_after)
+
+    def step(s: Step) -> Step:
+        found = tuple(map(of, s.candidates))
+        taken = next(c for c, before in zip(found, s.candidates, strict=True) if before is s.taken)
+        return Step(counted(s.before, floor), counted(s.after, floor), found, taken)
+
+    return Path(counted(path.start, floor), tuple(map(step, path.steps)), tuple(map(of, path.left)), path.outliers)
 
 
 def _next(present: Fit, found: list[Candidate]) -> Step | None:
@@ -98,6 +119,8 @@ def _next(present: Fit, found: list[Candidate]) -> Step | None:
         if c.p_value >= SIGNIFICANT or _share(present, c.excess_after) < LEAST_SHARE / 2:
             continue
         step = _taken(present, found, c)
+        if lets_go(present, step.after):
+            continue
         if step.held_out_after < step.held_out_before and _share(present, step.after.pooled_excess) >= LEAST_SHARE:
             return step
     if present.table.kind == "poses" or present.pooled_excess <= MATERIAL:

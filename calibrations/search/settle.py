@@ -18,6 +18,7 @@ from calibrations.effect import Effect
 from calibrations.fit import Fit, refit
 from calibrations.noise_estimation.likelihood import likelihood
 from calibrations.search.candidates import SIGNIFICANT, Candidate, added, candidates
+from calibrations.search.determined import lets_go
 from calibrations.search.held_out import held_out_excess
 from calibrations.search.path import Path, grown
 from calibrations.search.rivals import with_rivals
@@ -65,9 +66,9 @@ def settled(path: Path, effects: Mapping[str, Effect]) -> Settled:
 
 def _needed(present: Fit, names: tuple[str, ...], freed: set[str]) -> tuple[Fit, tuple[str, ...]]:
     """Without those of the added effects that the model does as well without, the least first."""
-    while len([name for name in names if name not in freed]) > 1:
+    while len(names) > 1 and (new := [name for name in names if name not in freed]):
         of = cost if len(names) <= MOST_EXCHANGED else first_order
-        costs = {name: of(present, name) for name in names if name not in freed}
+        costs = {name: of(present, name) for name in new}
         name = min(costs, key=lambda n: costs[n][0] / max(costs[n][1], 1))
         smaller = _without(present, name)
         if chance(*costs[name]) < SIGNIFICANT and held_out_excess(smaller) > held_out_excess(present):
@@ -100,7 +101,7 @@ def _exchanged(
             others = tuple(c.name if other == name else other for other in names)
             if present - CLEARLY < likelihood(after) <= present + CLEARLY and c.name != name:
                 after, others = _needed(after, others, freed)
-            if likelihood(after) > present + CLEARLY:
+            if likelihood(after) > present + CLEARLY and not lets_go(end, after):
                 return after, others
     return None
 

@@ -11,8 +11,9 @@ from calibrations.discover import Added
 from calibrations.effect import Effect
 from calibrations.errors import ModelError
 from calibrations.expressions.effect import effect_for
-from calibrations.fit import Fit, refit
+from calibrations.fit import Fit
 from calibrations.model import Model
+from calibrations.search.common_floor import counted
 from calibrations.search.outliers import fit_without
 from calibrations.table import Table
 from rig.analysis.asked import asked
@@ -57,7 +58,7 @@ class Trail:
             raise ModelError(f"{effect.name} is in the model already")
         if (why := effect.excluded(table)) is not None:
             raise ModelError(f"{effect.name} {why}; {table.source} is a table of {table.kind}")
-        step = Added(effect.name, self.end, refit(self.end, model.with_effect(effect)))
+        step = Added.of(effect, self.end)
         if effect.expression:
             require_new(step.after, effect.name, model.name)
         return step
@@ -70,11 +71,14 @@ class Trail:
 
     def with_step(self, step: Added) -> Trail:
         """One step further."""
-        return replace(self, steps=(*self.steps, step))
+        floor = step.after.noise.floor
+        return replace(self, start=counted(self.start, floor), steps=(*(s.counted(floor) for s in self.steps), step))
 
     def undone(self) -> Trail:
         """One step back; the beginning stays as it is."""
-        return replace(self, steps=self.steps[:-1])
+        end = self.steps[-1].before if self.steps else self.start
+        floor = end.noise.scatter
+        return replace(self, start=counted(self.start, floor), steps=tuple(s.counted(floor) for s in self.steps[:-1]))
 
     def kept(self) -> Model:
         """The present model as a file keeps it, with where it comes from."""

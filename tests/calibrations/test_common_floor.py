@@ -1,0 +1,67 @@
+"""Where nothing but what a model leaves tells the noise, the models of one search are counted in one floor."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from calibrations.diagnose import diagnose
+from calibrations.discover import Discovery, add, discover
+from calibrations.effect import catalogue
+from calibrations.model_file import read_model
+from calibrations.table import Array, Table
+
+BENDING = ("bias", "scale-factor", "cross-axis-bias", "cubic-nonlinearity", "odd-quadratic-nonlinearity")
+OFFSET_UT = np.array([12.0, -7.0, 20.0])
+
+
+def upper(n: int, least: float, seed: int) -> Array:
+    """Directions (n, 3) whose z is above `least`."""
+    u = np.random.default_rng(seed).standard_normal((8 * n, 3))
+    u /= np.linalg.norm(u, axis=1)[:, None]
+    return u[u[:, 2] > least][:n]
+
+
+def magnetometer(seed: int = 3) -> Table:
+    """A hemisphere of directions, a magnet beside the sensor, and noise of 0.2 % that no column tells."""
+    m = 48.0 * upper(100, 0.0, seed) + OFFSET_UT + 0.1 * np.random.default_rng(seed).standard_normal((100, 3))
+    return Table.from_columns(
+        "positions", dict(zip(("mx", "my", "mz"), m.T, strict=True)), {"unit": "uT"}, "hemisphere"
+    )
+
+
+def accelerometer(seed: int) -> Table:
+    """Hardly more than a hemisphere, scale factors that differ, and noise of 5 mm/s2 that no column tells."""
+    noise = 5e-3 * np.random.default_rng(seed).standard_normal((63, 3))
+    a = 9.81 * (upper(63, -0.1, seed) * [1.02, 0.99, 1.01] + [0.1, -0.08, 0.15]) + noise
+    return Table.from_columns("positions", dict(zip(("ax", "ay", "az"), a.T, strict=True)), {"unit": "m/s2"}, "upper")
+
+
+def falls(found: Discovery) -> None:
+    """The error falls to its floor, step by step."""
+    errors = [found.start.pooled_excess, *(step.after.pooled_excess for step in found.steps)]
+    assert errors == sorted(errors, reverse=True)
+    assert errors[0] > 5
+    assert errors[-1] == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_magnet_is_found_though_no_column_tells_the_noise() -> None:
+    found = discover(magnetometer(), read_model("field"))
+    assert found.causes == ("hard-iron",)
+    falls(found)
+    offset = [e.value for e in found.end.model.terms[1].estimates]
+    np.testing.assert_allclose(offset, OFFSET_UT, atol=0.5)
+    said = diagnose(magnetometer(), read_model("field"))
+    assert said.verdict == "effect-missing"
+    assert said.held_out_before == pytest.approx(found.steps[0].held_out_before, rel=0.05)
+    assert said.candidates[0].held_out_after < 0.2 * said.held_out_before
+    falls(add(catalogue()["hard-iron"], read_model("field"), magnetometer()))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_no_effect_is_added_that_makes_a_magnitude_of_anything(seed: int) -> None:
+    found = discover(accelerometer(seed), read_model("common-scale"), {name: catalogue()[name] for name in BENDING})
+    assert (found.causes, found.refinements) == (("scale-factor",), ())
+    falls(found)
+    scales = next(term.estimates for term in found.end.model.terms if term.name == "scale-factor")
+    np.testing.assert_allclose([e.value / 9.81 for e in scales], [1.02, 0.99, 1.01], atol=0.01)
