@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from calibrations.diagnose import Diagnosis
+from calibrations.search.candidates import SIGNIFICANT
 from calibrations.search.share import MATERIAL
+
+DOUBTFUL = 0.05  # chance, over the whole search, below which a candidate is worth a second measurement
 
 
 def headline(result: Diagnosis) -> str:
@@ -11,7 +14,7 @@ def headline(result: Diagnosis) -> str:
     if result.verdict == "adequate":
         scatter = float(max(result.fit.noise.scatter / result.fit.noise.floor)) if result.fit.noise.known else 0.0
         rest = f" Scatter of {scatter:.1f} x the noise floor has no pattern." if scatter > 1 else ""
-        return f"nothing is missing; what is left is noise.{rest}"
+        return (_doubtful(result) or "nothing is missing; what is left is noise.") + rest
     if result.verdict == "unexplained":
         return f"nothing in the catalogue explains this. Left over: {result.residual_structure}."
     if not result.path.steps:
@@ -21,6 +24,17 @@ def headline(result: Diagnosis) -> str:
         rivals = " or ".join((best.name, *best.indistinguishable_from))
         return f"an effect is missing: {rivals}; this data cannot tell which."
     return f"an effect is missing: {best.name}.{_more(result)}"
+
+
+def _doubtful(result: Diagnosis) -> str | None:
+    """What chance alone would seldom show, though too often to name it; None where there is none."""
+    best = next(iter(result.candidates), None)
+    if best is None or best.p_value >= DOUBTFUL or best.held_out_after >= result.held_out_before:
+        return None
+    return (
+        f"nothing is shown to be missing, but {best.name} may be: chance alone shows as much in {best.p_value:.1%} of "
+        f"such searches, and an effect is named below {SIGNIFICANT:.1%}; measure once more to tell."
+    )
 
 
 def _more(result: Diagnosis) -> str:

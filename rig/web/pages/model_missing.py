@@ -94,7 +94,7 @@ class Missing:
         good = result.verdict == "adequate"
         with box("verdict good" if good else "verdict doubt"):
             if good:
-                words("Nothing is missing: save the model, or see below what was tried.")
+                words("Save the model, or see below what was tried.")
             elif result.residual_structure:
                 above = " What it may be, you can write above;" if self.own.box.visible else ""
                 words(for_page(f"Unexplained: {result.residual_structure}.{above} What was tried:"))
