@@ -32,8 +32,8 @@ def _doubtful(result: Diagnosis) -> str | None:
     if best is None or best.p_value >= DOUBTFUL or best.held_out_after >= result.held_out_before:
         return None
     return (
-        f"nothing is shown to be missing, but {best.name} may be: chance alone shows as much in {best.p_value:.1%} of "
-        f"such searches, and an effect is named below {SIGNIFICANT:.1%}; measure once more to tell."
+        f"nothing is missing beyond what chance may show, but {best.name} comes near: chance alone shows as much in "
+        f"{best.p_value:.1%} of such searches, and an effect is named below {SIGNIFICANT:.1%}; measure once more to tell."
     )
 
 

@@ -34,8 +34,8 @@ def test_what_chance_would_seldom_show_is_said(clean: Diagnosis) -> None:
     best = replace(clean.candidates[0], p_value=0.009, held_out_after=0.9 * clean.held_out_before)
     found = replace(clean, candidates=(best, *clean.candidates[1:]))
     assert headline(found) == (
-        f"nothing is shown to be missing, but {best.name} may be: chance alone shows as much in 0.9% of such searches, "
-        "and an effect is named below 0.3%; measure once more to tell."
+        f"nothing is missing beyond what chance may show, but {best.name} comes near: chance alone shows as much in "
+        "0.9% of such searches, and an effect is named below 0.3%; measure once more to tell."
     )
     unseen = replace(best, held_out_after=1.1 * clean.held_out_before)
     assert headline(replace(clean, candidates=(unseen,))) == headline(clean)
