@@ -31,6 +31,7 @@ from calibrations.search.identify import gain
 from calibrations.table import Array
 
 LEVEL = 0.95
+SLOW = "slow noise"
 CHUNK = 512  # columns whitened at a time
 MOST_TIMES = 400  # rows that the freedom of slow noise is worked out on
 
@@ -131,7 +132,7 @@ def _of_type_a(found: Fit, G: Array, seen: float) -> list[Line]:
     parts = [
         ("white noise of the dwells", white, float(rows)),
         ("scatter from row to row", share * scatter, float(rows)),
-        ("slow noise", share * slow, slow_freedom(noise)),
+        (SLOW, share * slow, slow_freedom(noise)),
         ("misfit of the model", share * misfit, float(rows)),
     ]
     return [

@@ -42,12 +42,16 @@ class Term:
 
 @dataclass(frozen=True)
 class Model:
-    """An ordered list of effects. `unit` is that of the output, "" before the first fit."""
+    """An ordered list of effects. `unit` is that of the output, "" before the first fit.
+
+    `covered`: lowest and highest value of each influence in the data that the values come from, as far as it is known.
+    """
 
     name: str
     terms: tuple[Term, ...]
     unit: str = ""
     provenance: Mapping[str, str | float] = field(default_factory=dict)
+    covered: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
     def effects(self) -> tuple[str, ...]:

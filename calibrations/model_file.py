@@ -49,6 +49,7 @@ class _File(_Strict):
     unit: str = ""
     effects: list[_Effect] = Field(min_length=1)
     provenance: dict[str, str | float] = {}
+    covered: dict[str, tuple[float, float]] = {}
 
 
 def shipped_names() -> tuple[str, ...]:
@@ -95,7 +96,7 @@ def parse_model(text: str, source: str, effects: Mapping[str, Effect] | None = N
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
         raise ModelError(f'{source}: the effect "{twice}" stands in the model twice')
-    return Model(content.name, terms, content.unit, content.provenance)
+    return Model(content.name, terms, content.unit, content.provenance, content.covered)
 
 
 def _fault(error: Any) -> str:
@@ -162,6 +163,8 @@ def dump_model(model: Model) -> str:
         "effects": [_dump_term(term) for term in model.terms],
         "provenance": dict(model.provenance),
     }
+    if model.covered:
+        content["covered"] = {name: list(span) for name, span in model.covered.items()}
     return yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=100)
 
 

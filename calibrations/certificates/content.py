@@ -66,12 +66,16 @@ class Source:
 
 @dataclass(frozen=True)
 class Simulated:
-    """The same result by the propagation of distributions: standard deviation, 95 % interval, and whether it agrees."""
+    """The same result by the propagation of distributions: standard deviation and 95 % interval.
+
+    `verdict` on the budget: confirmed, conservative (and `why`, where it is known), or widened to the simulation.
+    """
 
     std: float
     low: float
     high: float
-    agrees: bool
+    verdict: str
+    why: str = ""
 
 
 @dataclass(frozen=True)

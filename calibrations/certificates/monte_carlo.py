@@ -6,8 +6,9 @@ parameters are then estimated anew, by the fit's own weights and the whole nonli
 propagation does not: that the model bends over its uncertainty, and the shape of what comes out. Inputs enter the
 residual by first order.
 
-The budget agrees where its interval reaches as far as the simulated one on both sides, within half a unit of the
-first digit of the standard uncertainty; it may reach further, as it also counts how badly slow noise is known.
+The budget is confirmed where both ends of its interval come within half a unit of the first digit of the standard
+uncertainty of the simulated ones. It is conservative where it reaches further, as it may: it also counts how badly slow
+noise is known. Where the simulated interval reaches further, the budget's is widened to it.
 
 Source  JCGM 101:2008, 7 (trials), 7.7 (interval), 8.1 (comparison, one significant digit).
 """
@@ -29,6 +30,7 @@ TRIALS = 2000
 STEPS = 2  # of the estimate: the model is nearly straight over its uncertainty
 SEED = 101
 LEVEL = 0.95
+CONFIRMED, CONSERVATIVE, WIDENED = "confirmed", "conservative", "widened"
 
 
 def simulate(found: Fit, inputs: Sequence[Contribution], trials: int = TRIALS, seed: int = SEED) -> Array:
@@ -51,10 +53,17 @@ def interval(values: Array) -> tuple[Array, Array]:
     return low, high
 
 
-def agrees(value: float, expanded: float, std: float, low: float, high: float) -> bool:
-    """Whether an interval value +- expanded reaches as far as (low, high), within the tolerance of `std`'s digit."""
-    tolerance = 0.5 * 10.0 ** exponent(std) if std > 0 else 0.0
-    return value - expanded <= low + tolerance and value + expanded >= high - tolerance
+def tolerance(std: float) -> float:
+    """Half a unit of the first digit of a standard uncertainty."""
+    return 0.5 * 10.0 ** exponent(std) if std > 0 else 0.0
+
+
+def verdict(value: float, expanded: float, std: float, low: float, high: float) -> str:
+    """What the simulated interval (low, high) says of value +- expanded: one of the three."""
+    beyond = expanded - (value - low), expanded - (high - value)
+    if min(beyond) < -tolerance(std):
+        return WIDENED
+    return CONSERVATIVE if max(beyond) > tolerance(std) else CONFIRMED
 
 
 def _estimate(found: Fit, G: Array, disturbed: Array) -> Array:

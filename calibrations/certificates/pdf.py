@@ -20,7 +20,8 @@ QUIET = (97, 110, 124)
 INK = (31, 41, 51)
 LINE = (217, 222, 228)
 TITLE_AND_ROWS = 16  # mm: a title does not stand alone at the foot of a page
-LONGEST, ROOM = 34, 2  # letters of a cell, and what stands about it
+GAP = 3  # mm between a figure that stands to the right and the text of the next column
+LONGEST, ROOM = 34, 4  # letters of a cell, and what stands about it
 
 
 class _Page(FPDF):
@@ -98,8 +99,8 @@ def _table(page: FPDF, table: Table) -> None:
     page.set_draw_color(*LINE)
     aligned = tuple("RIGHT" if k in table.numbers else "LEFT" for k in range(len(table.head)))
     with page.table(
-        borders_layout=TableBordersLayout.HORIZONTAL_LINES, col_widths=_widths(table), line_height=3.2, padding=0.4,
-        text_align=aligned, headings_style=FontFace(emphasis=TextEmphasis.B),
+        borders_layout=TableBordersLayout.HORIZONTAL_LINES, col_widths=_widths(table), line_height=3.2,
+        padding=(0.4, GAP / 2), text_align=aligned, headings_style=FontFace(emphasis=TextEmphasis.B),
     ) as cells:  # fmt: skip
         for row in (table.head, *table.rows):
             cells.row(row)

@@ -10,10 +10,10 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from calibrations.budget import Budget, Line, budget, gains
+from calibrations.budget import SLOW, Budget, Line, budget, gains
 from calibrations.certificates.content import Error, Figures, Outcome, Simulated, Source
 from calibrations.certificates.decision import Limit, decide
-from calibrations.certificates.monte_carlo import TRIALS, agrees, interval, simulate
+from calibrations.certificates.monte_carlo import CONSERVATIVE, TRIALS, WIDENED, interval, simulate, tolerance, verdict
 from calibrations.certificates.terms import name, term
 from calibrations.correlation import correlation
 from calibrations.errors import ModelError
@@ -94,7 +94,9 @@ def _outcome(
 ) -> Outcome:
     std, coverage = float(drawn.combined[k]), max(CERTAIN_K, float(drawn.coverage[k]))
     low, high = (float(end) for end in interval(trial))
-    if not (same := agrees(e.value, coverage * std, std, low, high)):
+    said = verdict(e.value, coverage * std, std, low, high)
+    why = _why_further(k, coverage, std, float(trial.std()), drawn) if said == CONSERVATIVE else ""
+    if said == WIDENED:
         coverage = max(coverage, (e.value - low) / std, (high - e.value) / std)
     limit = limits.get(own := name(of.effect, e.name, e.axis))
     order = np.argsort(-weights)
@@ -111,11 +113,21 @@ def _outcome(
         coverage=coverage,
         freedom=float(drawn.freedom[k]),
         sources=tuple(_source(line, k) for line in drawn.given),
-        simulated=Simulated(float(trial.std()), low, high, same),
+        simulated=Simulated(float(trial.std()), low, high, said, why),
         found=earlier.get((of.name, e.name, e.axis)),
         decision=None if limit is None else decide(e.value, std, coverage * std, limit),
         weights=tuple((int(numbers[i]), float(weights[i])) for i in order),
     )
+
+
+def _why_further(k: int, coverage: float, std: float, simulated: float, drawn: Budget) -> str:
+    """By what a budget reaches further than the simulation, as far as it is known."""
+    slow = any(line.source == SLOW and line.std is not None and line.std[k] > 0 for line in drawn.given)
+    reasons = [
+        "slow noise is not well known" if slow and CERTAIN_K * (std - simulated) > tolerance(std) else "",
+        "few degrees of freedom" if (coverage - CERTAIN_K) * std > tolerance(std) else "",
+    ]
+    return ", ".join(filter(None, reasons))
 
 
 def _source(line: Line, k: int) -> Source:

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 from calibrations.certificates.content import Certificate, Outcome, Source
 from calibrations.certificates.decision import RULE, Decision
+from calibrations.certificates.monte_carlo import CONSERVATIVE, WIDENED
 from calibrations.numerals import measured, minus, plain, unit
 
 MANY = 1e4  # degrees of freedom, told as no limit
+END_SCATTER = 2.67  # of a normal's 97.5 % quantile, in its standard deviation, times the root of the trials
+ROUNDING = 1e-6  # of a number of degrees of freedom
 NEGLIGIBLE = 1e-3  # of the combined uncertainty
 WIDE = 10  # columns of a correlation matrix side by side
 HEAVIEST = 3  # poses that weigh most, named with a result
@@ -20,7 +24,8 @@ METHOD = (
 )
 EXPANDED = (
     "As left. U is the expanded uncertainty for a coverage probability of about 95 %: k = 2, or Student's factor "
-    "for the effective degrees of freedom where that is more. g is the local gravity."
+    "for the effective degrees of freedom, cut to a whole number, where that is more; where it says widened, k is what "
+    "takes U as far as the check by simulation goes. g is the local gravity."
 )
 BUDGET = (
     "After the GUM (JCGM 100): type A from the noise of the data themselves, type B from what is stated of inputs "
@@ -31,8 +36,11 @@ CORRELATED = (
     "correlation coefficients into account (GUM 5.2.2)."
 )
 TRIALS = (
-    "The propagation of distributions (GUM Supplement 1, JCGM 101) with {trials} trials is set beside the budget; "
-    "where its interval reaches further, by more than half a unit of u's first digit, it is taken."
+    "The propagation of distributions (GUM Supplement 1, JCGM 101) with {trials} trials is set beside the budget. "
+    "Confirmed: both ends of the intervals agree within half a unit of u's first digit. Conservative: the budget "
+    "reaches further, as u is made larger where slow noise is not well known, and k where degrees of freedom are few; "
+    "the simulation has neither. Widened: the simulation reaches further, and U is taken as far. By chance, the ends of "
+    "simulated intervals scatter by {scatter:.2f} u."
 )
 ROWS = (
     "Every figure follows from the rows below, each the mean of a block of samples in the record. The digest is the "
@@ -136,7 +144,7 @@ def _environment(c: Certificate) -> Section:
 def results_table(c: Certificate) -> Table:
     """The results as left: what a certificate is asked for first."""
     rows = tuple(
-        (_name(o), measured(o.value, o.expanded), unit(o.unit), f"{o.coverage:.2f}", _freedom(o.freedom),
+        (_name(o), measured(o.value, o.expanded), unit(o.unit), _coverage(o), _freedom(o.freedom),
          *(("–", "–") if o.decision is None else (_limits(o.decision), _statement(o.decision))))
         for o in c.figures.outcomes
     )  # fmt: skip
@@ -185,12 +193,12 @@ def _uncertainty(c: Certificate) -> Section:
         for o in c.figures.outcomes
     )
     trials = tuple(
-        (_name(o), plain(o.std, 2), plain(o.simulated.std, 2), measured(o.value, o.expanded),
+        (_name(o), plain(o.std, 2), plain(o.simulated.std, 2), plain(o.expanded, 2),
          f"{_like(o.simulated.low, o)} to {_like(o.simulated.high, o)}", unit(o.unit),
-         "confirmed" if o.simulated.agrees else "widened to the simulation")
+         _checked(o))
         for o in c.figures.outcomes
     )  # fmt: skip
-    check = ("quantity", "u by the budget", "u simulated", "value ± U", "95 % simulated", "unit", "budget")
+    check = ("quantity", "u by the budget", "u simulated", "U", "95 % simulated", "unit", "budget")
     words = (
         BUDGET,
         *(
@@ -198,7 +206,7 @@ def _uncertainty(c: Certificate) -> Section:
             if c.figures.not_given
             else []
         ),
-        TRIALS.format(trials=c.figures.trials),
+        TRIALS.format(trials=c.figures.trials, scatter=END_SCATTER / math.sqrt(c.figures.trials)),
         *([CORRELATED] if len(c.figures.outcomes) > 1 else []),
     )
     checked = Table("Check by simulation", check, trials, (1, 2, 3, 4), False)
@@ -251,8 +259,19 @@ def _name(o: Outcome) -> str:
     return f"{o.term}{f', {o.axis}' if o.axis else ''}"
 
 
+def _coverage(o: Outcome) -> str:
+    return f"{WIDENED}, {o.coverage:.2f}" if o.simulated.verdict == WIDENED else f"{o.coverage:.2f}"
+
+
+def _checked(o: Outcome) -> str:
+    if o.simulated.verdict == CONSERVATIVE and o.simulated.why:
+        return f"{CONSERVATIVE}: {o.simulated.why}"
+    return f"{WIDENED} to the simulation" if o.simulated.verdict == WIDENED else o.simulated.verdict
+
+
 def _freedom(freedom: float) -> str:
-    return f"{freedom:.0f}" if freedom < MANY else "∞"
+    """Cut to a whole number, as the coverage factor has it (GUM G.4.1)."""
+    return f"{math.floor(freedom + ROUNDING):d}" if freedom < MANY else "∞"
 
 
 def _like(value: float, o: Outcome) -> str:

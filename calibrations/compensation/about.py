@@ -8,7 +8,7 @@ from decimal import ROUND_CEILING, Context
 from textwrap import wrap
 
 from calibrations.compensation.cost import Size
-from calibrations.compensation.forward import INVERTED, LEFT_OUT, NOISE, OF_THE_RIG
+from calibrations.compensation.forward import FORCES, INVERTED, LEFT_OUT, NOISE, OF_THE_RIG
 from calibrations.compensation.inverse import Compensation
 from calibrations.model import Estimate
 from calibrations.numerals import as_written
@@ -152,19 +152,51 @@ def _effects(made: Compensation) -> Iterator[str]:
 
 
 def _size(size: Size, unit: str) -> str:
-    return f"{shown(size.rms, unit)} rms and {shown(size.most, unit)} at most in a simulated sweep"
+    return (
+        f"{shown(size.rms, unit)} rms and {shown(size.most, unit)} at most in a simulated sweep over the stated ranges"
+    )
+
+
+def covered(made: Compensation) -> str:
+    """What the data of the calibration covered beside the directions, and which stated ranges go further."""
+    known = made.model.covered
+    if not known:
+        return (
+            "The model file does not say at what temperature, supply or time it was calibrated. Wherever that was not, "
+            "the model is extrapolated."
+        )
+    said = ", ".join(f"{name} {_span(name, known[name], made)}" for name in known)
+    beyond = [
+        name for name, (low, high) in made.beside.items()
+        if name not in FORCES and (name not in known or low < known[name][0] or high > known[name][1])
+    ]  # fmt: skip
+    text = f"Covered by the data of the calibration: {said}; beyond, the model is extrapolated"
+    return f"{text}. The stated range goes beyond in {', '.join(beyond)}." if beyond else f"{text}."
+
+
+def uncertainty(made: Compensation) -> str:
+    """The standard uncertainty by those of the parameters: where they were found, and the greatest of all."""
+    found = made.costs.parameters
+    if found is None:
+        return "Uncertainty: the model file has none."
+    where = ", ".join(f"{name} {_span(name, span, made)}" for name, span in found.within.items())
+    at = ", ".join(f"{name} {value:.6g}" for name, value in found.at.items())
+    return (
+        "Standard uncertainty of the result by those of the parameters, taken as independent (a model file has no "
+        f"correlations): {shown(found.rms, made.unit)} rms, {shown(found.most, made.unit)} at most over the sphere of "
+        f"directions{f' with {where}' if where else ''}; {shown(found.largest, made.unit)} at most over the whole "
+        f"stated range{f', at {at}' if at else ''}. Noise and what the model misses are not in it."
+    )
+
+
+def _span(name: str, span: tuple[float, float], made: Compensation) -> str:
+    low, high = (f"{end:.6g}" for end in span)
+    return f"{low if low == high else f'{low} to {high}'} {unit_of_input(name, made)}"
 
 
 def _uncertainty(made: Compensation) -> Iterator[str]:
-    size = made.costs.parameters
-    if size is None:
-        yield "Uncertainty: the model file has none."
-        return
-    yield (
-        f"Standard uncertainty of the result by those of the parameters, taken as independent: "
-        f"{shown(size.rms, made.unit)} rms, {shown(size.most, made.unit)} at most over the sphere of directions; noise "
-        "and what the model misses are not in it."
-    )
+    yield uncertainty(made)
+    yield covered(made)
 
 
 def _parameters(made: Compensation) -> Iterator[str]:

@@ -2,7 +2,7 @@
 and the uncertainties of its parameters.
 
 The sweep holds the sensor in gravity alone, with every effect of the model but those of the rig, at angles approached
-from both sides while the temperature goes up and down.
+from both sides, while temperature, supply and what a user added go up and down over their stated ranges.
 """
 
 from __future__ import annotations
@@ -16,14 +16,13 @@ from calibrations.chain import Step, nominal_pose, respond, sensed, specific_for
 from calibrations.compensation.forward import FORCES, INVERTED, Forward, steps_of
 from calibrations.compensation.memory import memory_at
 from calibrations.compensation.program import Program
+from calibrations.compensation.uncertainty import Span, Uncertainty, uncertainty
 from calibrations.errors import CalibrationError
-from calibrations.model import Estimate, Model, Term
+from calibrations.model import Model
 from calibrations.table import Array, Table
 
 INCLINATIONS_DEG = (90, 30, 150, 60, 120, 10, 170)
 STEP_DEG = 15.0
-WARMER_K, MORE_SUPPLY = 20.0, 0.01  # either side of the model's own reference
-SHIFT = 1e-3  # of a standard uncertainty: steps of derivatives
 PASSES = 3  # by which the axis that is not measured is found in gravity
 
 
@@ -38,26 +37,28 @@ class Size:
 @dataclass(frozen=True)
 class Cost:
     """`left_out` by effect, None where a sweep does not show it; `out_of_gravity` of an axis found from the others;
-    `parameters` the standard uncertainty of what is sensed by those of the parameters, taken as independent.
+    `parameters` the standard uncertainty of what is sensed by those of the parameters.
     """
 
     left_out: Mapping[str, Size | None]
     out_of_gravity: Size | None
-    parameters: Size | None
+    parameters: Uncertainty | None
 
 
-def costs(model: Model, forward: Forward, program: Program, reach: float, unit: str) -> Cost:
-    """All costs of a compensation, in `unit`."""
-    table = _sweep(model, program)
+def costs(model: Model, forward: Forward, program: Program, reach: float, unit: str, spans: Mapping[str, Span]) -> Cost:
+    """All costs of a compensation, in `unit`; `spans` has the stated ranges of what is given beside the outputs."""
+    table = _sweep(model, spans)
     a = specific_force(nominal_pose(table)) * (1.0 if unit != "deg/s" else reach)
     fates = {fate.effect: fate.how for fate in forward.fates}
     followed = [step for step in steps_of(model) if fates[step[0].name] == INVERTED]
     trial = _Trial(forward, program, table, a, memory_at(table, sensed(a, table, followed), forward))
+    names = {effect.name for effect, _ in followed}
+    kept = replace(model, terms=tuple(term for term in model.terms if term.name in names))
     hidden = unit == "g" and len(forward.axes) == 2 and "az" in program.inputs
     return Cost(
         {name: _of_left_out(name, model, followed, trial) for name in forward.left_out},
         _of_gravity(followed, trial) if hidden else None,
-        _of_parameters(model, forward, followed, table, a),
+        uncertainty(kept, forward, table, a, {name: spans[name] for name in program.inputs if name in spans}, reach),
     )
 
 
@@ -96,8 +97,8 @@ def in_gravity(program: Program, inputs: Mapping[str, Array], side: Array) -> di
     return found
 
 
-def _sweep(model: Model, program: Program) -> Table:
-    """A table of poses: a turn each way at each inclination, 7 s a pose."""
+def _sweep(model: Model, spans: Mapping[str, Span]) -> Table:
+    """A table of poses: a turn each way at each inclination, 7 s a pose, all else but the time over its range."""
     up = np.arange(0.0, 360.0 + STEP_DEG / 2, STEP_DEG)
     alpha = np.repeat(np.array(INCLINATIONS_DEG, float), 2 * len(up))
     beta = np.tile(np.concatenate([up, up[::-1]]), len(INCLINATIONS_DEG))
@@ -109,11 +110,11 @@ def _sweep(model: Model, program: Program) -> Table:
         "beta_deg": beta,
         "direction": np.tile(np.repeat([1.0, -1.0], len(up)), len(INCLINATIONS_DEG)),
         "t_s": at.get("middle_s", 0.0) + 7.0 * (np.arange(n) - n / 2) + 3.5 * n * ("middle_s" not in at),
-        "temperature_c": at.get("reference_c", 25.0) + WARMER_K * wave,
-        "supply_v": at.get("reference_v", 5.0) * (1 + MORE_SUPPLY * wave),
         "vx_v": np.zeros(n),
     }
-    columns |= {name: wave for name in program.inputs if name not in columns and name[0] not in "va"}
+    columns |= {
+        name: (low + high) / 2 + (high - low) / 2 * wave for name, (low, high) in spans.items() if name not in columns
+    }
     return Table.from_columns("poses", columns, source="a simulated sweep")
 
 
@@ -134,34 +135,3 @@ def _of_left_out(name: str, model: Model, followed: Sequence[Step], trial: _Tria
 def _of_gravity(followed: Sequence[Step], trial: _Trial) -> Size:
     side = np.where(trial.a[:, 2] < 0, -1.0, 1.0)
     return trial.size(in_gravity(trial.program, trial.inputs(followed), side))
-
-
-def _of_parameters(model: Model, forward: Forward, followed: Sequence[Step], table: Table, a: Array) -> Size | None:
-    """u^2(a) = sum over parameters of (J^-1 dG/dp u(p))^2, with J = dG/da (GUM 5.1.2)."""
-    names = {step[0].name for step in followed}
-    kept = replace(model, terms=tuple(term for term in model.terms if term.name in names))
-    k = [("xyz").index(axis) for axis in forward.axes]
-
-    def output(of: Model, at: Array) -> Array:
-        steps = steps_of(of)
-        return respond(sensed(at, table, steps), table, steps)[:, k]
-
-    h = 1e-5
-    J = np.stack([(output(kept, a + h * e) - output(kept, a - h * e)) / (2 * h) for e in np.eye(3)[k]], axis=2)
-    inverse = np.linalg.inv(J)
-    variance, known = np.zeros((table.n, len(k))), False
-    for i, term in enumerate(kept.terms):
-        for j, e in enumerate(term.estimates):
-            if e.std and e.identified:
-                known = True
-                moved = output(_moved(kept, i, j, SHIFT * e.std), a) - output(_moved(kept, i, j, -SHIFT * e.std), a)
-                variance += np.einsum("nij,nj->ni", inverse, moved / (2 * SHIFT)) ** 2
-    return _size(np.sqrt(variance)) if known else None
-
-
-def _moved(model: Model, i: int, j: int, by: float) -> Model:
-    """The model with one estimate moved."""
-    term: Term = model.terms[i]
-    moved: Estimate = replace(term.estimates[j], value=term.estimates[j].value + by)
-    estimates = (*term.estimates[:j], moved, *term.estimates[j + 1 :])
-    return replace(model, terms=(*model.terms[:i], replace(term, estimates=estimates), *model.terms[i + 1 :]))

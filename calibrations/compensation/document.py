@@ -8,6 +8,7 @@ each name is 0 before the first sample; run `after` once with the outputs found,
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 from typing import Any
 
 from calibrations.compensation.about import Origin, lines, unit_of_input
@@ -64,7 +65,8 @@ def summary(made: Compensation, origin: Origin) -> dict[str, Any]:
             for f in made.forward.fates
         ],
         "out_of_gravity": _size(made.costs.out_of_gravity),
-        "uncertainty": _size(made.costs.parameters),
+        "uncertainty": None if made.costs.parameters is None else asdict(made.costs.parameters),
+        "covered": {name: list(span) for name, span in made.model.covered.items()},
         "parameters": parameters_document(made.model),
     }
 

@@ -26,6 +26,7 @@ from calibrations.model import Model, Term
 from calibrations.table import AXES, NUMBERS
 
 INVERTED, OF_THE_RIG, NOISE, LEFT_OUT = "inverted", "of the rig", "noise", "left out"
+NOTHING = "nothing: noise cannot be taken off"
 KNOWN = ("temperature_c", "supply_v", "t_s")  # what a product may know beside the outputs
 FORCES = ("ax", "ay", "az")
 
@@ -100,7 +101,7 @@ def at_run_time(effect: Effect) -> str:
         return f"inverted, sample after sample, with {effect.memory} numbers for each axis remembered between them"
     if effect.force or effect.transduction or effect.output:
         return "inverted"
-    return "dropped: it is the rig's" if effect.pose else "nothing: noise cannot be taken off"
+    return "dropped: it is the rig's" if effect.pose else NOTHING
 
 
 def forward_of(model: Model, without: Collection[str] = ()) -> Forward:

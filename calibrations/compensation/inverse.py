@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from calibrations.compensation.bound import Bound, bound
 from calibrations.compensation.cost import Cost, costs
-from calibrations.compensation.forward import FORCES, INVERTED, Forward, forward_of, input_unit
+from calibrations.compensation.forward import FORCES, INVERTED, NOTHING, Forward, at_run_time, forward_of, input_unit
 from calibrations.compensation.graph import names
 from calibrations.compensation.program import Program, program
 from calibrations.errors import ModelError
@@ -74,6 +74,10 @@ def invert(
     unknown = [name for name in without if name not in model.effects]
     if unknown:
         raise ModelError(f"{model.name}: has no effect {unknown[0]} to leave out; it has {', '.join(model.effects)}")
+    if all(at_run_time(term.effect) == NOTHING for term in model.terms):
+        raise ModelError(
+            f"{model.name}: is a model of noise alone, which has no inverse to write: give one of a sensor"
+        )
     unit = input_unit(model)
     within = within or Range.for_model(model)
     forward = forward_of(model, without)
@@ -82,7 +86,14 @@ def invert(
         raise ModelError(_why_not(model, within, without, precision, unit))
     made = program(forward, found)
     return Compensation(
-        model, forward, within, found, made, precision, unit, costs(model, forward, made, within.reach, unit)
+        model,
+        forward,
+        within,
+        found,
+        made,
+        precision,
+        unit,
+        costs(model, forward, made, within.reach, unit, within.beside),
     )
 
 

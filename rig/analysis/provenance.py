@@ -9,8 +9,11 @@ from importlib.metadata import version
 from calibrations.fit import Fit
 from calibrations.model import Model
 from calibrations.still.fit import NoiseFit
+from calibrations.table import NUMBERS, Table
 
 OF_THE_SENSOR = ("sensor", "serial", "gravity_m_s2")  # constants of the data that a model file keeps
+
+INFLUENCES = ("temperature_c", "supply_v", "t_s")  # that a product may know
 
 
 def program() -> str:
@@ -38,4 +41,12 @@ def with_provenance(found: Fit | NoiseFit, parent: Model) -> Model:
             "created": datetime.now(UTC).isoformat(timespec="seconds"),
             "excess": round(found.pooled_excess, 4),
         },
+        covered={} if isinstance(found, NoiseFit) else covered(found.model, found.table),
     )
+
+
+def covered(model: Model, table: Table) -> dict[str, tuple[float, float]]:
+    """Lowest and highest value of each influence that was measured: those of every sensor, and the model's own."""
+    own = {name for term in model.terms for name in term.effect.needs if name not in NUMBERS}
+    there = [name for name in (*INFLUENCES, *sorted(own)) if name in table and table.n]
+    return {name: (float(table.column(name).min()), float(table.column(name).max())) for name in there}

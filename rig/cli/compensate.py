@@ -143,7 +143,7 @@ def _folder(out: Path) -> None:
 
 def _told(made: Compensation) -> list[str]:
     """What it does and what it costs, for people."""
-    from calibrations.compensation.about import operations, shown, steps
+    from calibrations.compensation.about import covered, operations, shown, steps, uncertainty
     from calibrations.compensation.forward import LEFT_OUT
 
     bound, costs = made.bound, made.costs
@@ -162,4 +162,4 @@ def _told(made: Compensation) -> list[str]:
         lines.append(
             f"az is not measured; found from gravity it costs {shown(costs.out_of_gravity.most, made.unit)} at most."
         )
-    return lines
+    return [*lines, uncertainty(made), covered(made)]

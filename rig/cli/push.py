@@ -85,8 +85,8 @@ def _prepare(url: URL, as_json: bool) -> None:
     if as_json:
         emit({"schema": "rig.prepared/1", "to": shown(url), "before": before})
         return
-    how = f"of schema {before}, is up to date" if before else "is made"
-    click.echo(f"{shown(url)}: the record, {how}. Give each rig and each reader a role of its own:")
+    how = f"the record, of schema {before}, is up to date" if before else "the record is made"
+    click.echo(f"{shown(url)}: {how}. Give each rig and each reader a role of its own:")
     click.echo(f"  CREATE ROLE rig7 LOGIN PASSWORD '...' IN ROLE {WRITER};   -- pushes, reads")
     click.echo(f"  CREATE ROLE anna LOGIN PASSWORD '...' IN ROLE {READER};   -- reads")
 

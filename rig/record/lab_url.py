@@ -34,4 +34,4 @@ def shown(url: URL) -> str:
 
 def has_password(url: URL) -> bool:
     """Whether it holds one that would be kept wherever the URL is."""
-    return url.password is not None or any(name in url.query for name in SECRET)
+    return bool(url.password) or any(url.query.get(name) for name in SECRET)

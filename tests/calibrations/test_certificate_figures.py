@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calibrations.budget import budget
+from calibrations.budget import Budget, Line, budget
 from calibrations.certificates.decision import decide
-from calibrations.certificates.monte_carlo import agrees, interval, simulate
-from calibrations.certificates.results import figures
+from calibrations.certificates.monte_carlo import interval, simulate, verdict
+from calibrations.certificates.results import _why_further, figures
 from calibrations.certificates.si import in_si
 from calibrations.certificates.terms import name, names, term
 from calibrations.correlation import correlation
@@ -97,9 +97,20 @@ def test_the_simulation_scatters_as_repeated_calibrations_do() -> None:
 
 
 def test_agreement_is_within_half_a_unit_of_the_first_digit() -> None:
-    assert agrees(1.0, 0.02, 0.01, 0.975, 1.02)
-    assert not agrees(1.0, 0.02, 0.01, 0.974, 1.02)
-    assert agrees(1.0, 0.05, 0.01, 0.98, 1.02)  # it may reach further
+    assert verdict(1.0, 0.02, 0.01, 0.9751, 1.02) == "confirmed"
+    assert verdict(1.0, 0.02, 0.01, 0.974, 1.02) == "widened"
+    assert verdict(1.0, 0.02, 0.01, 0.98, 1.026) == "widened"
+    assert verdict(1.0, 0.02, 0.01, 0.986, 1.02) == "conservative"
+    assert verdict(1.0, 0.05, 0.01, 0.98, 1.02) == "conservative"
+
+
+def test_a_budget_that_reaches_further_says_why() -> None:
+    """Slow noise of which the rows say little: u allows for more of it than was found."""
+    drawn = Budget((Line("white noise", "A", "", None, None, np.array([1.0]), 50.0),
+                    Line("slow noise", "A", "", None, None, np.array([2.0]), 5.0)))  # fmt: skip
+    assert _why_further(0, 2.36, 2.24, 1.0, drawn) == "slow noise is not well known, few degrees of freedom"
+    assert _why_further(0, 2.36, 0.9, 0.9, drawn) == "few degrees of freedom"
+    assert _why_further(0, 2.0, 2.24, 1.0, Budget(drawn.lines[:1])) == ""
 
 
 def test_what_the_simulation_finds_wider_is_wider() -> None:
@@ -107,7 +118,7 @@ def test_what_the_simulation_finds_wider_is_wider() -> None:
     tight = figures(found, None, {}, trials=8)  # so few trials that intervals are off by chance
     for o in tight.outcomes:
         reach = max(o.value - o.simulated.low, o.simulated.high - o.value)
-        assert o.simulated.agrees or o.expanded == pytest.approx(reach)
+        assert o.simulated.verdict != "widened" or o.expanded == pytest.approx(reach)
 
 
 @pytest.mark.parametrize(

@@ -153,4 +153,31 @@ def test_sections_are_those_of_a_certificate() -> None:
     (results,) = next(s for s in sections(certificate()) if s.title == "Results").tables
     assert results.rows[0][1].startswith("2.50")
     check = next(s for s in sections(certificate()) if s.title == "Uncertainty").tables[0]
-    assert check.rows[0][-1] in ("confirmed", "widened to the simulation")
+    assert check.rows[0][-1] in ("confirmed", "conservative", "widened to the simulation")
+
+
+def test_a_widened_factor_and_a_conservative_budget_are_told_where_they_stand() -> None:
+    c = certificate()
+    (first, second, *others) = c.figures.outcomes
+    widened = replace(first, coverage=2.34, freedom=62.7, simulated=replace(first.simulated, verdict="widened"))
+    wary = replace(second, simulated=replace(second.simulated, verdict="conservative", why="few degrees of freedom"))
+    made = replace(c, figures=replace(c.figures, outcomes=(widened, wary, *others)))
+    tables = {table.title: table for section in sections(made) for table in section.tables}
+    assert tables["Results, as left"].rows[0][3:5] == ("widened, 2.34", "62")  # the factor is that of 62, not of 63
+    assert [row[-1] for row in tables["Check by simulation"].rows[:2]] == [
+        "widened to the simulation",
+        "conservative: few degrees of freedom",
+    ]
+
+
+def test_figures_in_the_pdf_do_not_run_into_the_next_column() -> None:
+    """The heading `highest`, to the right of its column, ends before `unit` begins: there is room between them."""
+    found: dict[str, float] = {}
+
+    def seen(text: str, _cm: object, tm: list[float], _font: object, size: float) -> None:
+        if text.strip() in ("highest", "unit"):
+            found.setdefault(text.strip(), tm[4])
+
+    page = pypdf.PdfReader(io.BytesIO(pdf(certificate()))).pages[0]
+    page.extract_text(visitor_text=seen)
+    assert found["unit"] - found["highest"] > 34  # points: the word itself is 27 wide

@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from calibrations.chain import respond, sensed
+from calibrations.compensation.about import covered, uncertainty
 from calibrations.compensation.forward import INVERTED, LEFT_OUT, NOISE, OF_THE_RIG, forward_of, steps_of
 from calibrations.compensation.inverse import Compensation, Range, invert
 from calibrations.effect import Effect, catalogue, read_effect
@@ -165,6 +166,58 @@ def test_uncertainties_reach_the_result() -> None:
     assert invert(model(LINEAR, std=None)).costs.parameters is None
 
 
+def test_an_uncertain_temperature_coefficient_tells_the_more_the_further_the_range_goes() -> None:
+    """As 3000 sensors scatter whose parameters were drawn: at the reference, and where it is greatest."""
+    fitted = model({**LINEAR, "temperature-bias": {"slope": (0.001, -0.002)}}, std=1e-4)
+    made = invert(fitted)
+    size = made.costs.parameters
+    assert size is not None
+    assert (size.within, size.at) == ({"temperature_c": (25.0, 25.0)}, {"temperature_c": 85.0})
+    assert size.largest == pytest.approx(scatter(made, 85.0, 1.5), rel=0.05)
+    assert size.most == pytest.approx(scatter(made, 25.0, 1.0), rel=0.05)
+    narrow = invert(fitted, Range.for_model(fitted, temperature_c=(22.0, 26.0))).costs.parameters
+    assert narrow is not None
+    assert narrow.largest < size.largest / 10
+    assert narrow.at == {"temperature_c": 22.0}
+
+
+def scatter(made: Compensation, temperature_c: float, a: float) -> float:
+    """Standard deviation of what the program makes of sensors whose parameters are drawn, worst axis."""
+    rng, n = np.random.default_rng(1), 3000
+    bias, scale, slope = (
+        np.array([[e.value for e in term.estimates]]) + 1e-4 * rng.standard_normal((n, 2)) for term in made.model.terms
+    )
+    v = bias + scale * a + slope * (temperature_c - 25.0)
+    found = made.program.run({"vx": v[:, 0], "vy": v[:, 1], "temperature_c": np.full(n, temperature_c)})
+    return max(float(np.std(found["ax"])), float(np.std(found["ay"])))
+
+
+def test_what_happens_soon_after_the_power_comes_on_is_not_missed() -> None:
+    warming = {"warm-up-bias": {"amplitude": (0.01, 0.02), "time_constant": 600.0}}
+    size = invert(replace(model({**LINEAR, **warming}, std=1e-4))).costs.parameters
+    assert size is not None
+    assert size.at["t_s"] < 3600
+
+
+def test_what_the_calibration_covered_is_where_its_uncertainty_is_told() -> None:
+    fitted = replace(model({**LINEAR, **THERMAL}), covered={"temperature_c": (10.0, 99.0), "supply_v": (5.0, 5.0)})
+    made = invert(fitted)
+    size = made.costs.parameters
+    assert size is not None
+    assert size.within == {"temperature_c": (10.0, 85.0)}
+    assert "temperature_c 10 to 99 C, supply_v 5 V; beyond, the model is extrapolated" in covered(made)
+    assert "goes beyond in temperature_c." in covered(made)
+    assert "does not say" in covered(invert(model(LINEAR)))
+    assert "temperature_c 10 to 85 C;" in uncertainty(made)
+
+
+def test_an_effect_left_out_costs_what_it_does_over_the_stated_range() -> None:
+    fitted = model({**LINEAR, "temperature-bias": {"slope": (0.001, -0.002)}})
+    size = invert(fitted, without=["temperature-bias"]).costs.left_out["temperature-bias"]
+    assert size is not None
+    assert size.most == pytest.approx(0.002 * 60 / 0.98, rel=0.01)
+
+
 def test_what_is_not_contractive_is_refused_with_the_way_out() -> None:
     fitted = model({**LINEAR, "dead-zone": {"width": (0.01, 0.02)}})
     with pytest.raises(ModelError, match=r"not contractive within \+-1.5 g.*--leave-out dead-zone"):
@@ -226,6 +279,11 @@ def test_an_effect_of_the_users_own_file(tmp_path: Path) -> None:
         if name == "good":
             assert error(made[name], fitted) < 1e-9
     assert made["bad"].forward.fates[-1].why == "its function uses np.round"
+
+
+def test_noise_has_no_inverse() -> None:
+    with pytest.raises(ModelError, match="by-hand: is a model of noise alone, which has no inverse to write"):
+        invert(model({"white-noise": {p.name: 0.1 for p in catalogue()["white-noise"].parameters}}))
 
 
 def test_a_model_without_values_is_refused() -> None:

@@ -39,7 +39,8 @@ def terms(draw: st.DrawFn, name: str) -> Term:
 def models(draw: st.DrawFn) -> Model:
     names = draw(st.lists(st.sampled_from(sorted(catalogue())), min_size=1, max_size=4, unique=True))
     provenance = draw(st.dictionaries(st.from_regex(r"[a-z]{3,8}", fullmatch=True), words | numbers, max_size=2))
-    return Model(draw(words), tuple(draw(terms(name)) for name in names), draw(words), provenance)
+    covered = draw(st.dictionaries(st.just("temperature_c"), st.tuples(numbers, numbers)))
+    return Model(draw(words), tuple(draw(terms(name)) for name in names), draw(words), provenance, covered)
 
 
 @given(models())

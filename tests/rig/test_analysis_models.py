@@ -75,6 +75,7 @@ def test_add_writes_a_new_model_and_leaves_the_old_one(rig: Rig, data: str, tmp_
     assert said["data_sha256"] == read_csv(data).digest
     assert said["program"].startswith("inertial-rig 0.")
     assert (said["rows"], said["parent"]) == (130, "linear")
+    assert written["covered"] == {"t_s": [read_csv(data).column("t_s").min(), read_csv(data).column("t_s").max()]}
 
 
 def test_a_fitted_model_is_evaluated_as_it_is(rig: Rig, data: str, tmp_path: Path) -> None:

@@ -31,6 +31,10 @@ def years() -> None:
     calibrated("18", "2024-03-02", 2.52, seed=9)
 
 
+def test_one_calibration_is_one(rig: Rig, years: None) -> None:
+    assert rig("history", "18").out.startswith("18: one calibration, 2024-03-02, by the model linear\n")
+
+
 def test_a_life_in_words(rig: Rig, years: None, tmp_path: Path) -> None:
     words = ("--limit", "bias-x=0.005", "--quantity", "bias-x", "--pictures", str(tmp_path / "life"))
     ended = rig("history", "17", *words)

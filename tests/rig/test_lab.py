@@ -17,7 +17,7 @@ from rig.cli.record_option import OPTION
 from rig.errors import RecordError
 from rig.home import LAB, RECORD
 from rig.record import Record
-from rig.record.lab_url import lab_url
+from rig.record.lab_url import has_password, lab_url
 from rig.record.push import push
 from rig.record.roles import prepare
 from rig.record.schema import SCHEMA
@@ -87,6 +87,12 @@ def denied(url: str, statement: str) -> str:
     with Record(lab_url(url)) as lab, pytest.raises(RecordError) as error:
         lab.engine.connect().exec_driver_sql(statement)
     return str(error.value)
+
+
+def test_an_empty_password_is_none() -> None:
+    assert not has_password(lab_url("postgresql://postgres:@lab.example/rigs"))
+    assert has_password(lab_url("postgresql://postgres:word@lab.example/rigs"))
+    assert has_password(lab_url("postgresql://postgres@lab.example/rigs?sslpassword=word"))
 
 
 @pytest.mark.usefixtures("work")
