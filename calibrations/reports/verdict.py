@@ -32,8 +32,9 @@ def _doubtful(result: Diagnosis) -> str | None:
     if best is None or best.p_value >= DOUBTFUL or best.held_out_after >= result.held_out_before:
         return None
     return (
-        f"nothing is missing beyond what chance may show, but {best.name} comes near: chance alone shows as much in "
-        f"{best.p_value:.1%} of such searches, and an effect is named below {SIGNIFICANT:.1%}; measure once more to tell."
+        f"nothing is missing beyond what chance may show, but {best.name} comes near: chance alone shows as much "
+        f"in {best.p_value:.1%} of such searches, and an effect is named below {SIGNIFICANT:.1%}; measure once more to "
+        "tell."
     )
 
 
