@@ -39,8 +39,8 @@ TRIALS = (
     "The propagation of distributions (GUM Supplement 1, JCGM 101) with {trials} trials is set beside the budget. "
     "Confirmed: both ends of the intervals agree within half a unit of u's first digit. Conservative: the budget "
     "reaches further, as u is made larger where slow noise is not well known, and k where degrees of freedom are few; "
-    "the simulation has neither. Widened: the simulation reaches further, and U is taken as far. By chance, the ends of "
-    "simulated intervals scatter by {scatter:.2f} u."
+    "the simulation has neither. Widened: the simulation reaches further, and U is taken as far. By chance, the ends "
+    "of simulated intervals scatter by {scatter:.2f} u."
 )
 ROWS = (
     "Every figure follows from the rows below, each the mean of a block of samples in the record. The digest is the "
