@@ -39,7 +39,7 @@ def uncovered(table: Table) -> str | None:
         return None
     for degree, what in ((HARD_IRON, "hard-iron and soft-iron"), (SOFT_IRON, "soft-iron")):
         if why := too_small(table, degree):
-            return f"{what} cannot be asked: {why}"
+            return f"{what} cannot be asked: {why}; until then every value is that of a sensor without it"
     return None
 
 

@@ -120,6 +120,7 @@ def test_what_a_single_turn_cannot_show_is_said_and_not_fitted() -> None:
     found = discover(table, FIELD)
     assert found.verdict == "ambiguous"
     assert "hard-iron and soft-iron cannot be asked" in str(found.caution)
+    assert str(found.caution).endswith("until then every value is that of a sensor without it")
 
 
 @pytest.mark.parametrize(("degrees", "hard", "soft"), [(180.0, True, True), (75.0, True, False), (20.0, False, False)])
