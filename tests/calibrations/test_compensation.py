@@ -163,6 +163,7 @@ def test_uncertainties_reach_the_result() -> None:
     size = invert(model(LINEAR, std=1e-3)).costs.parameters
     assert size is not None
     assert size.most == pytest.approx(1e-3 * np.sqrt(2) / 0.98, rel=0.02)  # bias and scale factor, at 1 g
+    assert size.largest == pytest.approx(1e-3 * np.sqrt(1 + 1.5**2) / 0.98, rel=0.001)  # at 1.5 g
     assert invert(model(LINEAR, std=None)).costs.parameters is None
 
 
@@ -194,9 +195,12 @@ def scatter(made: Compensation, temperature_c: float, a: float) -> float:
 
 def test_what_happens_soon_after_the_power_comes_on_is_not_missed() -> None:
     warming = {"warm-up-bias": {"amplitude": (0.01, 0.02), "time_constant": 600.0}}
-    size = invert(replace(model({**LINEAR, **warming}, std=1e-4))).costs.parameters
+    fitted = model({**LINEAR, **warming}, std=1e-4)
+    (*others, warm) = fitted.terms
+    known = tuple(replace(e, std=60.0 if e.name == "time_constant" else e.std) for e in warm.estimates)
+    size = invert(replace(fitted, terms=(*others, replace(warm, estimates=known)))).costs.parameters
     assert size is not None
-    assert size.at["t_s"] < 3600
+    assert 200 < size.at["t_s"] < 1800  # t exp(-t/600 s) is greatest at 600 s
 
 
 def test_what_the_calibration_covered_is_where_its_uncertainty_is_told() -> None:
