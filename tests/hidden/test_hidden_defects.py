@@ -14,7 +14,7 @@ from calibrations.model_file import read_model
 from calibrations.table import Table
 from tests.hidden import rigs
 
-# times the noise -> seeds. Chance counts at 3 times: at 10 no seed failed, not with thresholds of the search moved until
+# times the noise -> seeds. Chance counts at 3 times: at 10 no seed failed, not with thresholds of the search moved till
 # they hardly held (252 diagnoses), and at 30 there is less of it.
 SEEDS = {3: (1, 2, 3), 10: (1,), 30: (2,)}
 
