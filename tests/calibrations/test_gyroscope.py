@@ -53,7 +53,7 @@ def test_what_others_found_misaligned_is_found_by_name() -> None:
     found = discover(turned.ferraris(), GYROSCOPE)
     assert found.causes == ("gyro-misalignment",)
     assert found.start.pooled_excess > 50
-    assert "not identifiable" in str(found.caution)  # one turn about each edge, and none back
+    assert "nothing checks all of the 12 parameters" in str(found.caution)  # one turn about each edge, and none back
 
 
 @pytest.mark.parametrize(

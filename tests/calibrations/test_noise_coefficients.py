@@ -15,6 +15,7 @@ from calibrations.noise_analysis.analysis import NoiseAnalysis, analyse
 from calibrations.noise_analysis.bands import slow_bands
 from calibrations.noise_analysis.identify import Spectrum, bounded, estimates, mixture
 from calibrations.noise_analysis.lines import fast_lines
+from calibrations.noise_analysis.oddities import hidden_in
 from calibrations.noise_analysis.processes import Sampling
 from tests.calibrations import noises
 
@@ -221,7 +222,9 @@ def test_whatever_a_record_holds_all_numbers_are_finite(n: int, kind: str, seed:
     }[kind]  # fmt: skip
     found = analysed(made.astype(float))
     numbers = [v for each in found.coefficients.values() for v in (each.value, each.std, each.upper) if v is not None]
-    assert np.all(np.isfinite([*numbers, *found.allan.low, *found.allan.high]))
+    known = hidden_in(found.record.oddities) is None  # else what is not known at all has no bound
+    assert np.all(np.isfinite(numbers) if known else ~np.isnan(numbers))
+    assert np.all(np.isfinite([*found.allan.low, *found.allan.high]))
     assert min(numbers) >= 0
 
 
