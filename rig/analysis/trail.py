@@ -71,14 +71,17 @@ class Trail:
 
     def with_step(self, step: Added) -> Trail:
         """One step further."""
-        floor = step.after.noise.floor
-        return replace(self, start=counted(self.start, floor), steps=(*(s.counted(floor) for s in self.steps), step))
+        return self._with((*self.steps, step))
 
     def undone(self) -> Trail:
         """One step back; the beginning stays as it is."""
-        end = self.steps[-1].before if self.steps else self.start
+        return self._with(self.steps[:-1])
+
+    def _with(self, steps: tuple[Added, ...]) -> Trail:
+        """With these steps, all errors counted in one floor: what the last model leaves, where that is its noise."""
+        end = steps[-1].after if steps else self.start
         floor = end.noise.scatter
-        return replace(self, start=counted(self.start, floor), steps=tuple(s.counted(floor) for s in self.steps[:-1]))
+        return replace(self, start=counted(self.start, floor), steps=tuple(step.counted(floor) for step in steps))
 
     def kept(self) -> Model:
         """The present model as a file keeps it, with where it comes from."""

@@ -12,7 +12,7 @@ from calibrations.model_file import read_model
 from calibrations.still.diagnose import diagnose
 from calibrations.still.discover import Discovery, discover
 from calibrations.still.logged import without_scatter
-from calibrations.still.patterns import FOLLOWS, STEP
+from calibrations.still.patterns import FOLLOWS, STEP, Pattern
 from calibrations.still.record import Samples, Still, reduced
 from calibrations.table import Array
 from tests.calibrations.hidden_noise import FOLLOWING, RATE_HZ, SAMPLES, room, white
@@ -77,13 +77,19 @@ def test_a_column_that_is_constant_or_too_short_is_left_out() -> None:
     assert channel.logged == {}
 
 
+def followed(x: Array, **logged: Array) -> Pattern:
+    """What x is told to do: to follow the column by 0.8, as it does."""
+    (pattern,) = diagnose(beside(x, **logged), read_model("still")).search.patterns
+    assert pattern.size == pytest.approx(0.8, abs=3 * pattern.std)
+    return pattern
+
+
 @pytest.mark.parametrize("scatter", [0.0, 0.3, 1.0])
 def test_scatter_of_the_thermometer_does_not_hide_how_much_the_sensor_follows(scatter: float) -> None:
     random = np.random.default_rng(4)
     warm = room(random)
     read = warm + scatter * random.standard_normal(SAMPLES)
-    (pattern,) = diagnose(beside(white(random) + 0.8 * warm, temperature_c=read), read_model("still")).search.patterns
-    assert pattern.size == pytest.approx(0.8, abs=3 * pattern.std)
+    pattern = followed(white(random) + 0.8 * warm, temperature_c=read)
     assert pattern.std < 0.05
     assert "behind" not in pattern.plain
 
@@ -91,8 +97,7 @@ def test_scatter_of_the_thermometer_does_not_hide_how_much_the_sensor_follows(sc
 def test_a_jitter_that_the_sensor_feels_is_no_scatter() -> None:
     random = np.random.default_rng(5)
     supply = room(random) + 0.3 * random.standard_normal(SAMPLES)
-    (pattern,) = diagnose(beside(white(random) + 0.8 * supply, supply_v=supply), read_model("still")).search.patterns
-    assert pattern.size == pytest.approx(0.8, abs=3 * pattern.std)
+    pattern = followed(white(random) + 0.8 * supply, supply_v=supply)
     assert pattern.std < 0.02
 
 
@@ -100,8 +105,7 @@ def test_scatter_of_readings_that_are_held_is_taken_off_as_well() -> None:
     random = np.random.default_rng(7)
     warm = room(random)
     read = np.repeat(warm[10::20] + 0.3 * random.standard_normal(SAMPLES // 20), 20)
-    (pattern,) = diagnose(beside(white(random) + 0.8 * warm, temperature_c=read), read_model("still")).search.patterns
-    assert pattern.size == pytest.approx(0.8, abs=3 * pattern.std)
+    pattern = followed(white(random) + 0.8 * warm, temperature_c=read)
     assert pattern.std < 0.05
 
 

@@ -8,10 +8,12 @@ import pytest
 
 from calibrations.errors import ExpressionError, ModelError
 from calibrations.pictures.waterfall import levels
+from calibrations.reading.read_csv import write_csv
 from rig.analysis.request import Request
 from rig.analysis.trail import Trail, trail
 from rig.analysis.trail_still import still_trail
 from tests.browser.measured import hidden, wandering
+from tests.calibrations.test_common_floor import magnetometer
 
 
 @pytest.fixture
@@ -28,6 +30,15 @@ def test_an_effect_is_tried_added_and_undone(turned: Trail) -> None:
     assert grown.diagnosed().verdict == "adequate"
     assert grown.undone().end is turned.end
     assert turned.undone().end is turned.end
+
+
+def test_where_no_column_tells_the_noise_the_error_falls_and_rises_again(tmp_path: Path) -> None:
+    write_csv(magnetometer(), path := tmp_path / "hemisphere.csv")
+    begun = trail(Request(str(path), "field"))
+    grown = begun.with_step(begun.tried(begun.effects["hard-iron"]))
+    assert grown.start.pooled_excess == grown.steps[0].before.pooled_excess > 5
+    assert grown.end.pooled_excess == pytest.approx(1.0, abs=0.1)
+    assert grown.undone().end.pooled_excess == begun.end.pooled_excess == pytest.approx(1.0, abs=0.1)
 
 
 def test_what_says_nothing_new_is_refused(turned: Trail) -> None:
