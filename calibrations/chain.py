@@ -131,11 +131,19 @@ def backward(table: Table, steps: Sequence[Step], tolerance: float = 1e-12) -> A
     a = np.zeros((table.n, 3))
     for _ in range(20):
         error = table.outputs - output(a)
-        step = np.linalg.solve(_slope(output, a), error[:, :, None])[:, :, 0]
+        step = _solved(_slope(output, a), error)
         a = a + step
         if not np.max(np.abs(step)) > tolerance:
             break
     return a
+
+
+def _solved(slope: Array, error: Array) -> Array:
+    """Steps (n, 3) that take off errors (n, 3); none along what a row's slope (3, 3) does not show."""
+    try:
+        return np.asarray(np.linalg.solve(slope, error[:, :, None])[:, :, 0])
+    except np.linalg.LinAlgError:
+        return np.asarray((np.linalg.pinv(slope) @ error[:, :, None])[:, :, 0])
 
 
 def _slope(output: Callable[[Array], Array], a: Array, h: float = 1e-4) -> Array:

@@ -13,7 +13,6 @@ from dataclasses import replace
 from calibrations.fit import Fit
 from calibrations.noise_estimation.likelihood import twice_log_likelihood
 from calibrations.search.candidates import NOT_TOLD_APART, SIGNIFICANT, Candidate, added
-from calibrations.search.determined import lets_go
 from calibrations.search.share import MATERIAL, OF_FORM, share_left
 
 HALF = 0.5  # of the best one's gain: rivals with less of it have another shape altogether
@@ -50,8 +49,6 @@ def _near(c: Candidate, best: Candidate) -> bool:
 
 def _may_be(after: Fit, before: Fit, likeliest: float) -> bool:
     """`likeliest`: twice the log-likelihood with the effect whose rival this is."""
-    if lets_go(before, after):
-        return False
     if likeliest - twice_log_likelihood(after) < NOT_TOLD_APART:
         return True
     as_good = after.pooled_excess <= MATERIAL and share_left(before, after) <= OF_FORM

@@ -85,3 +85,10 @@ def test_the_other_axes() -> None:
     a = np.array([[1.0, 2.0, 3.0]])
     assert other_in_plane(a).tolist() == [[2.0, 1.0, 1.0]]
     assert out_of_plane(a).tolist() == [[3.0, 3.0, 2.0]]
+
+
+def test_outputs_that_no_force_explains_are_solved_as_far_as_they_show_one() -> None:
+    """A sensor whose axis z is dead: what it would sense along z stays at none."""
+    table = Table.from_columns("positions", {"ax": [0.5], "ay": [-0.2], "az": [0.1]}, {"unit": "m/s2"})
+    dead = [(catalogue()["scale-factor"], {"scale": np.array([1.0, 1.0, 0.0])})]
+    np.testing.assert_allclose(backward(table, dead), [[0.5, -0.2, 0.0]], atol=1e-9)
