@@ -1,22 +1,28 @@
-# make demo: the whole story on the simulated rig.   make test: everything CI checks.
+# make demo: the whole story on the simulated rig.   make test: what is checked before a commit, in minutes.
+# make test-all: the long statistics, kills, browser and fuzzing as well: everything that CI checks.
 # make audit: known weaknesses of the pinned dependencies; needs the network, so it is no part of make test.
 # Strict: an index that knows no weaknesses is no reason to find none.
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test setup bench lint audit clean
+.PHONY: demo test test-all setup bench lint audit clean
 
 demo: setup
 	$(BIN)/rig demo --folder out/demo
 
 # Worksteal: neighbours in a file run in one process, which then works out only once what they share.
 test: setup lint
-	$(BIN)/pytest -n auto --dist worksteal
+	$(BIN)/pytest -n auto --dist worksteal -m "not slow" --ignore tests/docs
 
+test-all: test
+	$(BIN)/pytest -n auto --dist worksteal -m slow
+
+# The documentation is checked here: its links, its generated pages, the dependencies' ranges.
 lint: setup
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache
+	$(BIN)/pytest -m "not slow" tests/docs
 
 bench: setup
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[bench]'

@@ -1,36 +1,35 @@
-"""Results as documents: plain mappings of the schemas that other people's programs read. JSON numbers, never NaN."""
+"""Results as documents: plain mappings of the schemas that other people's programs read. JSON numbers, never NaN.
+
+They are the same for every kind of data; `Dataset` adds the fields that one kind alone has.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from calibrations.compare import Comparison, axis_of
-from calibrations.design.expected import Expected
-from calibrations.diagnose import Diagnosis
-from calibrations.discover import Added, Discovery
-from calibrations.experiment import Experiment
-from calibrations.fit import Fit
+from calibrations.discovery.dataset import Dataset
+from calibrations.discovery.results import Candidate, Comparison, Diagnosis, Discovery, F, Step
 from calibrations.model import Model
-from calibrations.noise import rms
-from calibrations.search.candidates import Candidate
-from calibrations.table import Array
+from calibrations.plausibility import Finding
+
+if TYPE_CHECKING:
+    from calibrations.design.expected import Expected
+    from calibrations.design.experiment import Experiment
 
 Document = dict[str, Any]
 
 
-def fit_document(found: Fit, path: str | None) -> Document:
+def fit_document(data: Dataset[F], found: F, path: str | None) -> Document:
     """`rig.fit/1`."""
     return {
         "schema": "rig.fit/1",
-        "data": found.table.source,
+        "data": data.source,
         "parameters": parameters_document(found.model),
-        "n": found.table.n,
-        "rmse": _by_channel(found, found.rmse),
-        **_noise(found),
-        "excess": _by_channel(found, found.excess),
+        "n": data.n,
+        **data.errors_document(found),
+        **_rejected(data.rejection(found)),
         "model": path,
     }
 
@@ -53,78 +52,74 @@ def parameters_document(model: Model) -> list[Document]:
     ]
 
 
-def comparison_document(result: Comparison, model: str) -> Document:
+def comparison_document(result: Comparison[F], model: str) -> Document:
     """`rig.comparison/1`."""
-    found = result.fit
     return {
         "schema": "rig.comparison/1",
-        "data": found.table.source,
+        "data": result.data.source,
         "model": model,
-        "n": found.table.n,
-        "rmse": _by_channel(found, found.rmse),
-        **_noise(found),
-        "excess": _by_channel(found, found.excess),
-        "fails": places_document(result.fails),
+        "n": result.data.n,
+        **result.data.errors_document(result.fit),
+        **result.data.comparison_fields(result),
+        "fails": [
+            {"where": p.where, "from": p.low, "to": p.high, "axis": p.axis, "excess": p.excess, "text": p.text}
+            for p in result.fails
+        ],
+        **_rejected(result.rejection),
     }
 
 
-class Failing(Protocol):
-    """A place where a model fails, of poses or of a still record."""
-
-    @property
-    def where(self) -> str: ...
-    @property
-    def low(self) -> float: ...
-    @property
-    def high(self) -> float: ...
-    @property
-    def axis(self) -> str: ...
-    @property
-    def excess(self) -> float: ...
-    @property
-    def text(self) -> str: ...
+def _rejected(reason: Finding | None) -> Document:
+    """A verdict and its reason on data that cannot be used; both null where they can be."""
+    return {
+        "verdict": reason.verdict if reason else None,
+        "residual_structure": reason.text if reason else None,
+    }
 
 
-def places_document(fails: Iterable[Failing]) -> list[Document]:
-    """Where a model fails."""
-    return [
-        {"where": p.where, "from": p.low, "to": p.high, "axis": p.axis, "excess": p.excess, "text": p.text}
-        for p in fails
-    ]
-
-
-def diagnosis_document(result: Diagnosis, model: str) -> Document:
-    """`rig.diagnosis/1`."""
+def diagnosis_document(result: Diagnosis[F], model: str) -> Document:
+    """`rig.diagnosis/1`: the verdict is that of the given model."""
     return {
         "schema": "rig.diagnosis/1",
-        "data": result.fit.table.source,
+        "data": result.findings.data.source,
         "model": model,
-        "verdict": result.verdict,
+        "verdict": result.verdict.value,
+        "text": result.judgement.text,
+        "missing": list(result.missing),
+        "provisional": result.judgement.provisional,
         "candidates": [_candidate(c, result) for c in result.candidates],
-        "residual_structure": result.residual_structure,
-        "outliers": list(result.path.outliers),
-        "next_experiment": experiment_document(result.next_experiment),
+        **_in_doubt(result),
     }
 
 
-def discovery_document(result: Discovery, path: str | None) -> Document:
-    """`rig.discovery/1`."""
+def discovery_document(result: Discovery[F], path: str | None) -> Document:
+    """`rig.discovery/1`: the verdict is that of the final model."""
     return {
         "schema": "rig.discovery/1",
-        "data": result.start.table.source,
-        "verdict": result.verdict,
-        "steps": [added_document(step) for step in result.steps],
+        "data": result.findings.data.source,
+        "verdict": result.verdict.value,
+        "text": result.judgement.text,
+        "steps": [step_document(step, result.findings.data) for step in result.steps],
         "causes": list(result.causes),
         "refinements": list(result.refinements),
-        "alternatives": {name: list(names) for name, names in result.alternatives.items()},
-        "residual_structure": result.residual_structure,
-        "outliers": list(result.path.outliers),
-        "next_experiment": experiment_document(result.next_experiment),
+        **_in_doubt(result),
         "model": path,
     }
 
 
-def added_document(step: Added) -> Document:
+def _in_doubt(result: Diagnosis[F] | Discovery[F]) -> Document:
+    """What both answers say of everything that is not decided."""
+    return {
+        "alternatives": {name: list(names) for name, names in result.alternatives.items()},
+        "reason": result.reason,
+        "disturbances": [dict(each) for each in result.findings.disturbances],
+        "residual_structure": result.residual_structure,
+        "outliers": list(result.outliers),
+        "next_experiment": experiment_document(result.next_experiment),
+    }
+
+
+def step_document(step: Step[F], data: Dataset[F]) -> Document:
     """One step of a discovery."""
     return {
         "added": step.name,
@@ -132,32 +127,19 @@ def added_document(step: Added) -> Document:
         "excess_after": step.after.pooled_excess,
         "held_out_before": step.held_out_before,
         "held_out_after": step.held_out_after,
+        **data.step_fields(step),
     }
 
 
-def _noise(found: Fit) -> Document:
-    return {
-        "noise_floor": _by_channel(found, found.noise.floor),
-        "slow_noise": _by_channel(found, found.noise.slow),
-    }
-
-
-def _by_channel(found: Fit, values: Array) -> dict[str, float]:
-    """The parts of a motion are brought together by axis: their root mean square."""
-    by_axis: dict[str, list[float]] = {}
-    for channel, value in zip(found.channels, np.asarray(values), strict=True):
-        by_axis.setdefault(axis_of(channel), []).append(float(value))
-    return {axis: each[0] if len(each) == 1 else float(rms(np.array(each))) for axis, each in by_axis.items()}
-
-
-def _candidate(c: Candidate, result: Diagnosis) -> Document:
+def _candidate(c: Candidate, result: Diagnosis[F]) -> Document:
     return {
         "effect": c.name,
-        "axes": list(result.fit.table.axes),
+        "axes": list(result.findings.data.axes),
         "excess_before": result.excess_before,
         "excess_after": c.excess_after,
         "held_out_before": result.held_out_before,
         "held_out_after": c.held_out_after,
+        **result.findings.data.candidate_fields(c),
         "p_value": c.p_value,
         "probability": c.probability,
         "indistinguishable_from": list(c.indistinguishable_from),
@@ -165,14 +147,13 @@ def _candidate(c: Candidate, result: Diagnosis) -> Document:
     }
 
 
-def why(c: Candidate, result: Diagnosis) -> str:
-    """The candidate in words: what it is, what it would look like, and what adding it does here."""
-    fall = f"adding it lowers the error on unseen poses from {result.held_out_before:.3g} to {c.held_out_after:.3g}"
-    if c.held_out_after >= result.held_out_before:
-        fall = f"adding it does not lower the error on unseen poses ({result.held_out_before:.3g} x the noise floor)"
-    else:
-        fall += " x the noise floor"
-    return f"{c.effect.summary} Symptom: {c.effect.symptom} Here {fall}."
+def why(c: Candidate, result: Diagnosis[F]) -> str:
+    """The candidate in words: what it is, its symptom, and what adding it does to the held-out error."""
+    data, before = result.findings.data, result.held_out_before
+    fall = f"changes the error on {data.unseen} from {before:.3g} to {c.held_out_after:.3g} times {data.floor}"
+    if c.held_out_after >= before:
+        fall = f"does not lower the error on {data.unseen} ({before:.3g} times {data.floor})"
+    return f"{c.effect.summary} Symptom: {c.effect.symptom} Adding it {fall}."
 
 
 def experiment_document(e: Experiment | None) -> Document | None:

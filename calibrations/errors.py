@@ -4,10 +4,12 @@ CalibrationError
 ├── DataError            a table: its file, line and column
 │   ├── MissingColumn    a column that the question needs
 │   ├── MissingConstant  a number that the rows do not tell
-│   └── TooFewRows       fewer rows than parameters
+│   ├── TooFewRows       fewer rows than parameters
+│   └── UnusableData     an output that does not respond, two sensors in one table, exchanged channels
 ├── ModelError           a model file: its key
 │   └── ExpressionError  an effect written as an expression: its column
-└── UnknownName          a model or an effect that nobody here knows; names the nearest
+└── UnknownName          a model or an effect that does not exist; names the nearest
+    └── UnknownParameter a key that a model has no parameter for
 """
 
 from __future__ import annotations
@@ -40,6 +42,10 @@ class TooFewRows(DataError):
     """Fewer rows than the model has parameters."""
 
 
+class UnusableData(DataError):
+    """Outputs that cannot be those of the sensor as it is stated to be mounted: no result is handed over."""
+
+
 class ModelError(CalibrationError):
     """A model file cannot be read, or does not fit the data."""
 
@@ -50,6 +56,12 @@ class ExpressionError(ModelError):
 
 class UnknownName(CalibrationError):
     """A name that is not in its list."""
+
+
+class UnknownParameter(UnknownName, KeyError):
+    """A key, such as bias.x, for which a model has no parameter."""
+
+    __str__ = Exception.__str__  # KeyError puts the message into quotes
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

@@ -9,17 +9,25 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
 
+from calibrations.fitting.held_out import folds, held_out
+from calibrations.fitting.identifiability import RELATIVE_RANK, estimates
 from calibrations.model import Model
-from calibrations.noise import Noise, rms, white_only
-from calibrations.noise_estimation.noise_average import widening
-from calibrations.noise_estimation.noise_fit import estimate
+from calibrations.model.model import Parameters
+from calibrations.noise.means import Noise, rms, white_only
+from calibrations.noise.means_fit import estimate
+from calibrations.noise.means_uncertainty import widening
+from calibrations.presentation.result import Result
+from calibrations.presentation.text import columns, quantity
 from calibrations.problem import Problem
-from calibrations.search.identify import RELATIVE_RANK, estimates
 from calibrations.table import Array, Table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 ROUNDS = 2
 NEWTON_STEPS = 20
@@ -27,8 +35,8 @@ STRAIGHT = 1e-6  # of what is left: a step that foretells it better is a linear 
 SMALL_GAIN = 1e-6  # of a sum of squares whose unit is the noise
 
 
-@dataclass(frozen=True, eq=False)
-class Fit:
+@dataclass(frozen=True, eq=False, repr=False)
+class Fit(Result):
     """A model fitted to a table. `residual` has shape (channels, n), rows in order of time.
 
     `all_noise`: what standard uncertainties were taken from (`cautiously`); None where none were.
@@ -43,9 +51,50 @@ class Fit:
     all_noise: Noise | None = None
 
     @property
+    def params(self) -> Parameters:
+        """The estimates by key: `params["bias.x"].value`, `.std`, `.unit`, `.identified`."""
+        return self.model.params
+
+    def report(self) -> str:
+        """The parameters with their uncertainties, and the error of each channel beside the noise floor."""
+        unit, floor = self.problem.unit, "noise floor" if self.noise.known else "scatter (noise floor not known)"
+        errors = [
+            (name, quantity(self.rmse[c], unit), quantity(self.noise.floor[c], unit), f"{self.excess[c]:.2f}")
+            for c, name in enumerate(self.channels)
+        ]
+        head = f"{self.model.name}, fitted to {self.table.n} rows of {self.table.source or 'data without a name'}"
+        return f"{head}\n\n{self.params}\n\n{columns(('axis', 'rms error', floor, 'error / floor'), errors)}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """`rig.fit/1`."""
+        from calibrations.documents import fit_document
+        from calibrations.loop import dataset
+
+        return fit_document(dataset(self.table), self, None)
+
+    def records(self) -> list[dict[str, Any]]:
+        """A row a parameter."""
+        return [
+            {"parameter": key, "value": e.value, "std": e.std, "unit": e.unit, "identified": e.identified}
+            for key, e in self.params.items()
+        ]
+
+    def plot(self) -> Figure:
+        """The residual."""
+        from calibrations.presentation.charts.fit import residual_chart
+        from calibrations.presentation.static import draw
+
+        return draw(residual_chart(self))
+
+    @property
     def table(self) -> Table:
         """The table, rows in order of time."""
         return self.problem.table
+
+    @property
+    def measured(self) -> Table:
+        """The table, for provenance."""
+        return self.table
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -66,6 +115,32 @@ class Fit:
     def pooled_excess(self) -> float:
         """The excess over all channels together."""
         return float(np.sqrt(np.mean(self.excess**2)))
+
+    @cached_property
+    def held_out_excess(self) -> float:
+        """Pooled rms of the error on unseen rows over the noise floor."""
+        return self.held_out_with(np.zeros((*self.residual.shape, 0)))
+
+    def held_out_with(self, extra: Array) -> float:
+        """The same when columns (channels, n, k) join the fit."""
+        jacobian = np.concatenate([self.jacobian, extra], axis=2)
+        return held_out(self.residual, jacobian, self.noise, folds(self.table))
+
+    def share_left(self, start: Fit) -> float:
+        """Part of the excess variance of `start` that this fit does not explain."""
+        return max(self.pooled_excess**2 - 1, 0.0) / max(start.pooled_excess**2 - 1, 1e-9)
+
+    @property
+    def residual_is_noise(self) -> bool:
+        """Whether the residual itself is the only measure of noise: neither samples nor smooth columns give one."""
+        return not self.noise.known and not self.problem.smooth.size
+
+    def in_floor(self, floor: Array) -> Fit:
+        """The fit with its errors in the floor (channels,) of another model, where its own is its residual.
+
+        All models of a search share one floor; each would else be at a floor of its own, and no two comparable.
+        """
+        return replace(self, noise=replace(self.noise, reference=floor)) if self.residual_is_noise else self
 
     @cached_property
     def whitened(self) -> Array:

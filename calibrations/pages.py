@@ -11,13 +11,12 @@ from pathlib import Path
 
 import numpy as np
 
-from calibrations.compensation.forward import at_run_time
-from calibrations.effect import Effect, Parameter, catalogue
-from calibrations.pictures import signature, signature_noise
-from calibrations.pictures.compact import sparing
-from calibrations.pictures.save import svg
-from calibrations.pictures.shown import shown_value
-from calibrations.pictures.signature_noise import shown_noise
+from calibrations.compensation.forward import known_at_run_time
+from calibrations.effects import Effect, Parameter
+from calibrations.effects.catalogue import catalogue
+from calibrations.presentation.charts.signature import shown_value, signature_chart
+from calibrations.presentation.charts.signature_noise import noise_signature_chart, shown_noise
+from calibrations.presentation.static import sparing, svg
 
 ACTS_ON = {
     "pose": "the pose: where the stages and the vertical really are",
@@ -42,7 +41,7 @@ def page(effect: Effect) -> str:
         ("Confused with", effect.confused_with or "nothing in the catalogue"),
         ("Acts on", ACTS_ON[effect.acts_on] + "."),
         ("Needs", _needs(effect)),
-        ("At run time", f"{at_run_time(effect)}."),
+        ("At run time", f"{known_at_run_time(effect)}."),
         ("Source", effect.source),
     ]
     rows = "\n".join(_row(parameter) for parameter in effect.parameters)
@@ -76,8 +75,8 @@ def pages(effects: Mapping[str, Effect]) -> dict[str, str]:
 
 def drawing(effect: Effect) -> str:
     """The effect's picture as an SVG document; the same effect gives the same text."""
-    draw = signature_noise if _is_noise(effect) else signature
-    return sparing(svg(draw.picture(effect)).decode())
+    chart = noise_signature_chart(effect) if _is_noise(effect) else signature_chart(effect)
+    return sparing(svg(chart).decode())
 
 
 def _is_noise(effect: Effect) -> bool:

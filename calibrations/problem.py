@@ -15,16 +15,15 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrations.chain import Step, backward, forward
 from calibrations.errors import DataError, ModelError, TooFewRows
+from calibrations.fitting.smooth import smooth_columns
 from calibrations.model import Model
-from calibrations.motion.stretches import Stretches, stretches
-from calibrations.near import Near
-from calibrations.noise import Processes
-from calibrations.noise_estimation.mean_noise import norm_std, white_std
-from calibrations.noise_estimation.scatter import scatter
-from calibrations.parameters import Layout
-from calibrations.search.lack_of_fit import smooth_columns
+from calibrations.model.chain import Near, Step, backward, forward
+from calibrations.model.parameters import Layout
+from calibrations.motion.stretches import Stretches, make_stretches
+from calibrations.noise.mean_noise import norm_std, white_std
+from calibrations.noise.means import Processes
+from calibrations.noise.table_noise import scatter
 from calibrations.table import Array, Table
 
 STRENGTH = "field-strength"
@@ -48,7 +47,7 @@ class Problem:
     @staticmethod
     def of(model: Model, table: Table) -> Problem:
         """The problem. Raises ModelError and TooFewRows where there is none to solve."""
-        table = stretches(table) if table.kind == "motion" else table.in_order()
+        table = make_stretches(table) if table.kind == "motion" else table.in_order()
         check_kind(table.kind, table.source)
         if table.kind == "positions":
             _check_positions(table)
@@ -112,7 +111,7 @@ class Problem:
     def adds(self) -> bool:
         """Whether every effect only adds to the output: the model may then be linear in its parameters."""
         effects = [term.effect for term in self.layout.model.terms]
-        return self.table.kind in KNOWN and not any(e.pose or e.force or e.output for e in effects)
+        return self.table.kind in KNOWN and not any(e.places & {"pose", "force", "output"} for e in effects)
 
     def jacobian(self, theta: Array, of: NDArray[np.bool_] | None = None, stairs: bool = False) -> Array:
         """d residual / d theta by central differences, shape (channels, n, p); only the entries `of` where given.

@@ -52,6 +52,7 @@ NUMBERS = {name for sets in KINDS.values() for wanted in sets for name in wanted
 AXES = ("x", "y", "z")
 MILLI = {"g": "mg", "field": "‰ of the field", "deg/s": "mdeg/s"}  # thousandths of what is sensed
 STANDARD_GRAVITY = 9.80665
+GRAVITY_M_S2 = (9.76, 9.84)  # local gravity on Earth: from the highest mountain near the equator to the poles
 LARGEST = 1e30  # in any unit: what is measured is smaller, and its fourth power must still be a number
 
 
@@ -226,9 +227,28 @@ def _check_numbers(table: Table) -> None:
         if bad.any():
             row = int(np.argmax(bad))
             raise DataError(f'{table.source}: row {row + 1}, column "{name}" is {values[row]:g}; it must be {must}')
-    for name in ("filter_corner_hz", "sample_rate_hz", "gravity_m_s2"):
+    for name in ("filter_corner_hz", "sample_rate_hz"):
         if not table.number(name, 1.0) > 0:
             raise DataError(f'{table.source}: the constant "{name}" is {table.constants[name]}; it must be above 0')
+    if fault := gravity_fault(table.constants.get("gravity_m_s2", STANDARD_GRAVITY)):
+        raise DataError(f'{table.source}: the constant "gravity_m_s2" is {fault}')
+
+
+def gravity_fault(value: Constant) -> str | None:
+    """Why `value` is no local gravity on Earth, m/s^2, with the likely mistake; None where it is one."""
+    try:
+        gravity = float(value)
+    except ValueError:
+        point = str(value).replace(",", ".")
+        hint = f"; write {point}, with a decimal point" if str(value).count(",") == 1 else ""
+        return f"{value!r}, not a number{hint}"
+    low, high = GRAVITY_M_S2
+    if low <= gravity <= high:
+        return None
+    scales = {"g": STANDARD_GRAVITY, "cm/s^2": 1e-2, "mm/s^2": 1e-3}
+    likely = next((unit for unit, scale in scales.items() if low <= gravity * scale <= high), None)
+    hint = f"it looks like {likely}; " if likely else ""
+    return f"{gravity:g}, not the gravity of a place on Earth; {hint}give it in m/s^2, {low} to {high}"
 
 
 def _check_columns(table: Table) -> None:

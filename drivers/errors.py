@@ -24,12 +24,15 @@ Each says what happened, where (instrument and register), and what to do.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 
 class DriverError(Exception):
     """`what` happened, and the `remedy` as an instruction to a person."""
 
     def __init__(self, what: str, remedy: str) -> None:
-        super().__init__(f"{what}. {remedy}.")
+        remedy = remedy.strip().removesuffix(".")
+        super().__init__(f"{what}. {remedy}{'' if remedy.endswith('?') else '.'}")
         self.what = what
         self.remedy = remedy
 
@@ -112,3 +115,13 @@ class SensorFault(InstrumentError):
 
 class ClockStuck(DriverError):
     """Bytes in flight to or from a simulated instrument did not arrive within a bound in real time."""
+
+
+def did_you_mean(name: object, known: Iterable[str]) -> str:
+    """The end of a message about an unknown `name`, after a space: the most similar known name, else all of them."""
+    import difflib
+
+    choices = sorted(known)
+    if similar := difflib.get_close_matches(str(name), choices, n=1, cutoff=0.5):
+        return f" Did you mean {similar[0]!r}?"
+    return f" There are: {', '.join(choices)}." if choices else ""

@@ -1,1 +1,1 @@
-"""Procedures: one file each, a plain script over the session that it is given."""
+"""Procedures: one file each. A procedure is a plain script that calls the methods of a session."""

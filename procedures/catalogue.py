@@ -1,7 +1,7 @@
-"""Procedures found by name: the file `sweep.py` holds the function `sweep`. A user's folder comes first.
+"""The list of procedures: the file `sweep.py` holds the function `sweep`. A user's folder takes precedence.
 
-A file is a procedure when it defines a function of its own name. Nothing is registered, and listing
-procedures imports none of them.
+A file is a procedure when it defines a function with the name of the file. There is no registration. Listing the
+procedures does not import them.
 """
 
 from __future__ import annotations
@@ -16,18 +16,19 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from procedures.errors import ProcedureError, UnknownProcedure, nearest
+from drivers.errors import did_you_mean
+from procedures.errors import ProcedureError, UnknownProcedure
 
 SHIPPED = Path(__file__).parent
-LOG = logging.getLogger(__name__)  # what is not called off is printed to standard error
+LOG = logging.getLogger(__name__)  # without a handler, Python prints warnings to standard error
 
 
 @dataclass(frozen=True)
 class Procedure:
-    """A script that runs on a session. `summary` is one line, `doc` what it excites and is blind to.
+    """A script that runs on a session. `summary` is one line. `doc` names what it excites and what it is blind to.
 
-    `kind` is the table that its poses make (KIND of its file): poses where nothing else is said. An `adaptive` one
-    (ADAPTIVE) goes by what it has measured, so that its plan needs measurements too.
+    `kind` is the kind of table that its poses make: KIND of its file, `poses` by default. An `adaptive` procedure
+    (ADAPTIVE of its file) chooses poses by its measurements, so its plan needs simulated measurements.
     """
 
     name: str
@@ -40,18 +41,15 @@ class Procedure:
 
     @property
     def defaults(self) -> dict[str, Any]:
-        """Its settings: the keywords after the session, with their defaults."""
+        """The settings with their defaults: the keywords after the session."""
         parameters = list(inspect.signature(self.function).parameters.values())[1:]
         return {p.name: p.default for p in parameters}
 
 
 def paths(folder: Path | None = None) -> dict[str, Path]:
     """The file of every procedure, by name in alphabetical order."""
-    found: dict[str, Path] = {}
-    for place in (SHIPPED, folder):
-        files = place.glob("*.py") if place is not None else ()
-        found |= {name(path): path for path in files if _is_procedure(path)}
-    return dict(sorted(found.items()))
+    files = [file for place in (SHIPPED, folder) if place is not None for file in place.glob("*.py")]
+    return dict(sorted({name(file): file for file in files if _is_procedure(file)}.items()))
 
 
 def name(path: Path) -> str:
@@ -65,14 +63,14 @@ def summary(path: Path) -> str:
 
 
 def find(wanted: str, folder: Path | None = None) -> Procedure:
-    """The procedure `wanted`.
+    """The procedure with the name `wanted`.
 
-    Raises UnknownProcedure with the nearest name, ProcedureError for a file that cannot be loaded.
+    Raises UnknownProcedure with a suggestion, ProcedureError for a file that cannot be loaded.
     """
     known = paths(folder)
     path = known.get(wanted.replace("_", "-"))
     if path is None:
-        raise UnknownProcedure(f"no procedure {wanted!r}{nearest(wanted, known)}")
+        raise UnknownProcedure(f"no procedure {wanted!r}.{did_you_mean(wanted, known)}")
     module = _load(path)
     kind, adaptive = getattr(module, "KIND", "poses"), getattr(module, "ADAPTIVE", False)
     return Procedure(name(path), getattr(module, path.stem), summary(path), _doc(path), path, kind, adaptive)
@@ -95,11 +93,11 @@ def _load(path: Path) -> ModuleType:
         return importlib.import_module(f"procedures.{path.stem}")
     spec = importlib.util.spec_from_file_location(f"user_procedures.{path.stem}", path)
     if spec is None or spec.loader is None:
-        raise ProcedureError(f"{path}: is not a Python file")
-    LOG.warning("%s is run: the bench file names its folder for procedures", path)
+        raise ProcedureError(f"{path}: this is not a Python file; rename it to NAME.py")
+    LOG.warning("the program runs %s, because the bench file names its folder in folders.procedures", path)
     module = importlib.util.module_from_spec(spec)
     try:
         spec.loader.exec_module(module)
     except Exception as error:
-        raise ProcedureError(f"{path}: cannot be loaded: {type(error).__name__}: {error}") from error
+        raise ProcedureError(f"{path}: cannot load it: {type(error).__name__}: {error}; correct the file") from error
     return module

@@ -1,22 +1,19 @@
-"""What a procedure can refuse or stop for.
+"""Errors of procedures.
 
 ProcedureError
-├── UnknownProcedure    no file of this name; names the nearest
-├── SettingError        a setting that it does not have, of the wrong type, or out of range
-├── BadAnswer           an answer that a question does not accept
-├── NoAnswer            a question to a person that nobody is there to answer; the run stops and can be resumed
-├── Declined            a person said no; the run stops and can be resumed
-└── SafetyLimit         a limit of the bench was passed; the procedure stops
+├── UnknownProcedure    no procedure has this name; the message has a suggestion
+├── SettingError        an unknown setting, or a value with the wrong type or out of range
+├── BadAnswer           the question does not accept this answer
+├── NoAnswer            nobody is there to answer a question; the run stops and can be resumed
+├── Declined            a person answered no; the run stops and can be resumed
+└── SafetyLimit         a measured value is outside a limit of the bench; the procedure stops
 """
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Iterable
-
 
 class ProcedureError(Exception):
-    """The message says what, where and what to do."""
+    """The message says what is wrong, where, and what to do."""
 
 
 class UnknownProcedure(ProcedureError):
@@ -24,27 +21,20 @@ class UnknownProcedure(ProcedureError):
 
 
 class SettingError(ProcedureError):
-    """A setting that the procedure does not have, or a value that it cannot have."""
+    """The procedure does not have this setting, or the setting does not take this value."""
 
 
 class BadAnswer(ProcedureError):
-    """An answer that the question does not accept."""
+    """The question does not accept this answer."""
 
 
 class NoAnswer(ProcedureError):
-    """A question to a person that nobody is there to answer."""
+    """Nobody is there to answer a question."""
 
 
 class Declined(ProcedureError):
-    """A person said no to what the procedure needs."""
+    """A person answered no to a question that the procedure needs a yes to."""
 
 
 class SafetyLimit(ProcedureError):
-    """A measured value is outside the limits of the bench."""
-
-
-def nearest(name: str, known: Iterable[str]) -> str:
-    """The tail of a message about an unknown `name`: the nearest known one, else all there are."""
-    known = list(known)
-    close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
-    return f"; did you mean {close[0]!r}?" if close else f"; there are: {', '.join(known)}"
+    """A measured value is outside a limit of the bench."""

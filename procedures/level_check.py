@@ -1,8 +1,8 @@
-"""level-check: how far the table is from level, by the digital level or a typed reading.
+"""level-check: measure the tilt of the table with the level or typed readings.
 
 Excites   tilt of the base, zero offset of alpha.
-Blind to  turns about the vertical; the level's own offset, which the half turn takes out; on the table, which of base
-          and alpha is off: laid on the base, the level shows the base alone.
+Blind to  rotation about the vertical; the offset of the level, which the half turn removes. On the table it cannot
+          separate tilt of the base from zero offset of alpha; on the base the level shows the base alone.
 Source    Ang V: the level is read before every experiment; reversal, as for any spirit level.
 """
 
@@ -13,40 +13,50 @@ from typing import Literal
 from procedures.errors import SafetyLimit
 from procedures.session import Reading, Session
 
-HALF_TURN = (("front", 0.0), ("back", 180.0))  # of beta: the table's tilt turns its sign on the level, its offset not
+HALF_TURN = (("front", 0.0), ("back", 180.0))  # beta, deg: the tilt changes its sign, the level's offset does not
+FACE_UP = "Is the sensor mounted face up on the table? Can its cable turn freely?"
 LEVEL_RANGE_DEG = 45.0
 Place = Literal["table", "base"]
 
 
 def level_check(rig: Session, *, settle_s: float = 2.0, on: Place = "table") -> None:
-    """Read the level at beta = 0 and 180 deg with alpha at 0, and refuse to go on where the table is not level.
+    """Read the level at beta = 0 and 180 deg with alpha = 0. Raises SafetyLimit if the table is not level.
 
-    Other procedures begin with it where the bench has limits.level_deg. With `on="base"` a person lays the level on the
-    base beside the stages, reads it, turns it round by half a turn and reads it again. Raises SafetyLimit.
+    Other procedures begin with this check if the bench has limits.level_deg. With `on="base"` a person puts the level
+    on the base next to the stages, reads it, turns it by half a turn and reads it again.
     """
     if on == "base":
         _read_base(rig)
         return
-    again = all(_is_read(rig, side) for side, _ in HALF_TURN) and _refused(rig)  # the base was levelled since
+    repeated = all(_is_read(rig, side) for side, _ in HALF_TURN) and _is_tilted(rig)  # a person has levelled the base
     for side, beta_deg in HALF_TURN:
-        if again or not _is_read(rig, side):
+        if repeated or not _is_read(rig, side):
             _read(rig, side, beta_deg, settle_s)
-    if _refused(rig):
+    if _is_tilted(rig):
         x_deg, y_deg = tilt_deg(rig)
         raise SafetyLimit(
-            f"the table is tilted by {x_deg:.3f} deg along x and {y_deg:.3f} deg along y, more than "
-            f"limits.level_deg = {rig.limits.level_deg:g}; level the base and the zero of alpha, then resume the run"
+            f"level: the table is tilted by {x_deg:.3f} deg along x and {y_deg:.3f} deg along y, but "
+            f"limits.level_deg is {rig.limits.level_deg:g}; level the base, correct the zero of alpha, resume the run"
         )
 
 
-def levelled(rig: Session) -> None:
-    """The level check that other procedures begin with: once a run, and only where the bench has a limit for it."""
+def prepare(rig: Session, mounting: str = FACE_UP) -> None:
+    """Ask a person to confirm the mounting, then check the level. Every procedure begins with it.
+
+    The level check happens once in a run, and only if the bench has limits.level_deg.
+    """
+    rig.confirm("mounting", mounting, drawing="face-up")
+    check_level(rig)
+
+
+def check_level(rig: Session) -> None:
+    """The level check at the beginning of a run, if the bench has limits.level_deg."""
     if rig.limits.level_deg is not None:
         level_check(rig)
 
 
 def tilt_deg(rig: Session) -> tuple[float, float]:
-    """The table's tilt from both readings, deg, along x and y of the level at beta = 0."""
+    """Tilt of the table from both readings, deg, along x and y of the level at beta = 0."""
     front_x, front_y, back_x, back_y = (
         rig.reading(f"level-{side}-{axis}") or 0.0 for side, _ in HALF_TURN for axis in "xy"
     )
@@ -54,7 +64,7 @@ def tilt_deg(rig: Session) -> tuple[float, float]:
 
 
 def reversal(front_deg: float, back_deg: float) -> tuple[float, float]:
-    """(tilt, the level's own offset) from its readings before and after half a turn, deg."""
+    """(tilt, offset of the level) from the readings before and after half a turn, deg."""
     return (front_deg - back_deg) / 2, (front_deg + back_deg) / 2
 
 
@@ -62,48 +72,39 @@ def _is_read(rig: Session, side: str) -> bool:
     return rig.reading(f"level-{side}-y") is not None
 
 
-def _refused(rig: Session) -> bool:
-    """Whether the table, as it was read, is not level enough to go on."""
+def _is_tilted(rig: Session) -> bool:
+    """Whether the measured tilt is above the limit of the bench."""
     limit = rig.limits.level_deg
     return limit is not None and max(map(abs, tilt_deg(rig))) > limit
 
 
 def _read(rig: Session, side: str, beta_deg: float, settle_s: float) -> None:
-    """One reading of both axes: from the level, or typed where the bench has none."""
+    """Read both axes: from the level, or typed by a person if the bench has no level."""
     rig.alpha.move_to(0.0)
     rig.beta.move_to(beta_deg)
     rig.wait(settle_s)
     std_deg: float | None = None
     if rig.level is not None:
-        shown = rig.level.read()
-        x_deg, y_deg, std_deg = shown.x_deg, shown.y_deg, shown.std_deg
+        tilt = rig.level.read()
+        x_deg, y_deg, std_deg = tilt.x_deg, tilt.y_deg, tilt.std_deg
     else:
-        x_deg, y_deg = (_typed_deg(rig, f"level-{side}-{axis}", axis, beta_deg) for axis in "xy")
+        text = f"Read the level on the table (alpha 0, beta {beta_deg:g} deg). What does it show along"
+        x_deg, y_deg = (_ask_deg(rig, f"level-{side}-{axis}", f"{text} {axis}, in deg?") for axis in "xy")
     rig.keep_readings(
         Reading(f"level-{side}-x", x_deg, "deg", std_deg), Reading(f"level-{side}-y", y_deg, "deg", std_deg)
     )
 
 
 def _read_base(rig: Session) -> None:
-    """Both axes of the base, the level lying along the base and turned round; typed, as nothing moves it there."""
-    for side, turned_deg in HALF_TURN:
+    """Both axes of the base, before and after half a turn. A person types them, as no stage moves the level there."""
+    for side, turn_deg in HALF_TURN:
         if rig.reading(f"base-{side}-y") is not None:
             continue
-        where = f"The level on the base, turned by {turned_deg:g} deg from along the base's x"
+        text = f"Put the level on the base, turned by {turn_deg:g} deg from the base's x. What does it show along its"
         names = [f"base-{side}-{axis}" for axis in "xy"]
-        shown = [
-            rig.number(
-                name,
-                f"{where}: what does it show along its {name[-1]}, in deg?",
-                "deg",
-                -LEVEL_RANGE_DEG,
-                LEVEL_RANGE_DEG,
-            )
-            for name in names
-        ]
-        rig.keep_readings(*(Reading(name, value, "deg") for name, value in zip(names, shown, strict=True)))
+        values = [_ask_deg(rig, name, f"{text} {name[-1]}, in deg?") for name in names]
+        rig.keep_readings(*(Reading(name, value, "deg") for name, value in zip(names, values, strict=True)))
 
 
-def _typed_deg(rig: Session, name: str, axis: str, beta_deg: float) -> float:
-    text = f"What does the level on the table show along {axis}, in deg? (alpha 0, beta {beta_deg:g} deg)"
+def _ask_deg(rig: Session, name: str, text: str) -> float:
     return rig.number(name, text, "deg", -LEVEL_RANGE_DEG, LEVEL_RANGE_DEG)

@@ -1,7 +1,7 @@
-"""magnetometer-turn: level, beta once round, with each edge of a magnetometer upright.
+"""magnetometer-turn: full turns of a level magnetometer, with each of its axes vertical in turn.
 
-Excites   hard iron and soft iron that turn with the sensor, its offsets, scale factors and angles between its axes.
-Blind to  iron and magnets that stand with the rig: they are part of the field; the motors' fields at other angles.
+Excites   hard iron and soft iron that turn with the sensor; its offsets, scale factors and angles between its axes.
+Blind to  iron and magnets fixed to the rig, which are part of the field; the fields of the motors at other angles.
 Source    Book 17.5: a full horizontal turn; Renaudin, Afzal and Lachapelle (2010): the ellipsoid of all directions.
 """
 
@@ -11,14 +11,14 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from procedures.errors import SettingError
-from procedures.level_check import levelled
+from procedures.level_check import prepare
 from procedures.questions import EDGES
 from procedures.session import Pose, Session
 
 KIND = "positions"
 OUTPUTS = ("mx", "my", "mz")
 SIDES = ("up", "down")
-STEPS = 8  # a turn, at least: an ellipse has five parameters
+STEPS = 8  # minimum of poses in a turn: an ellipse has five parameters
 
 
 def magnetometer_turn(
@@ -30,29 +30,29 @@ def magnetometer_turn(
     dwell_s: float = 1.0,
     settle_s: float = 0.5,
 ) -> None:
-    """Hold the sensor at every `step_deg` of a full turn of beta at alpha = 0, on each of `mounts` edges.
+    """Hold the sensor at every `step_deg` of a full turn of beta at alpha = 0, on `mounts` of its three edges.
 
-    With `over` it is turned over and round once more on each, at alpha = 180. One mount (z up) not turned over shows a
-    horizontal turn alone: two of three components of hard iron. Three cover the sphere: turned over anywhere on earth,
-    else where the field dips by 50 deg at most. Leave `over` out where iron of the rig moves with alpha.
+    With `over`, alpha = 180 deg turns the sensor over, and beta makes a second turn. One mount (z up) without `over`
+    gives a horizontal turn only: two of the three components of hard iron. Three mounts cover the sphere: with `over`
+    everywhere on earth, without it where the dip of the field is 50 deg at most. Switch `over` off if iron of the rig
+    moves with alpha.
     """
     if not 0 < step_deg <= 360 / STEPS or dwell_s <= 0 or settle_s < 0:
         most = f"step_deg must be above 0 and at most {360 / STEPS:g}"
-        raise SettingError(f"magnetometer-turn: {most}, dwell_s above 0, settle_s not below")
+        raise SettingError(f"magnetometer-turn: {most}, dwell_s must be above 0, settle_s must be 0 or more")
     if mounts not in (1, 2, 3):
         raise SettingError(f"magnetometer-turn: mounts is {mounts}; give 1, 2 or 3")
     rig = replace(rig, adc=rig.adc.only(*OUTPUTS))
-    text = "Is the magnetometer mounted face up, and all that is magnetic and does not belong to the rig 2 m away?"
-    rig.confirm("mounting", text, drawing="face-up")
-    levelled(rig)
+    text = "Is the magnetometer mounted face up? Are all magnetic things that are not parts of the rig 2 m away?"
+    prepare(rig, text)
     sides = SIDES[: 1 + over]
     for pose in rig.missing(pose for up in EDGES[:mounts] for side in sides for pose in full_turn(up, side, step_deg)):
         rig.hold(pose, dwell_s, settle_s)
 
 
 def full_turn(up: str, side: str, step_deg: float) -> Iterator[Pose]:
-    """Once round with the edge `up` upward or downward: forth on one side, back on the other."""
-    alpha_deg, way = (0.0, 1) if side == "up" else (180.0, -1)
+    """A full turn with the edge `up` upward or downward: beta rises on the side "up" and falls on the side "down"."""
+    alpha_deg, direction = (0.0, 1) if side == "up" else (180.0, -1)
     count = round(360 / step_deg)
-    for k in range(count)[::way]:
-        yield Pose(alpha_deg, k * step_deg, way, f"{up} {side}", up=up)
+    for k in range(count)[::direction]:
+        yield Pose(alpha_deg, k * step_deg, direction, f"{up} {side}", up=up)

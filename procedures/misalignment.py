@@ -1,17 +1,18 @@
-"""misalignment: search for the greatest output of x and of y: where the axes point.
+"""misalignment: find the directions of the x and y axes from the maximum of each output.
 
 Excites   axis misalignment and non-orthogonality, scale factor, bias.
-Blind to  the zero of beta, which looks as a turn of the sensor about z; odd nonlinearity of higher order.
+Blind to  the zero offset of beta, which looks like a rotation of the sensor about z; odd nonlinearity of high order.
 Source    Ang IV; reversal, as for any level.
 
-The extreme is flat: 50 uV of noise at 1 V/g hide half a degree of it. So each is bracketed symmetrically by 90 deg to
-either side, where the output is steepest. Opposite loads have equal squares and products, so that even nonlinearity
-and cross-axis products drop out of their difference; narrower brackets would keep the products.
+The output is flat at its maximum: 50 uV of noise at 1 V/g hides half a degree. So the procedure measures 90 deg to
+each side of the maximum, where the slope of the output is greatest. Opposite loads have equal squares and products.
+Even nonlinearity and cross-axis products therefore cancel in the difference. A narrower bracket would keep the
+products.
 
-A round is 16 poses. Half a turn of beta is done up at alpha = 90 and down at -90, and alpha is searched with the
-sensor facing either way: errors of the stages' levels, gear play and hysteresis have other signs than the sensor's
-axes. Every pose is reached over the quarter turn before it, so that friction slips fully. In time the signs follow
-each other as + - - +, which takes out drift.
+A round has 16 poses. Beta rises through half a turn at alpha = 90 deg and falls through half a turn at -90 deg. Alpha
+is searched at two angles of beta, 180 deg apart. So tilt of the stages, gear play and hysteresis have other signs than
+the sensor's axes. The stage moves a quarter turn to every pose, so that friction slips fully. The signs follow each
+other in time as + - - +, which removes drift.
 """
 
 from __future__ import annotations
@@ -23,21 +24,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from procedures.errors import ProcedureError, SettingError
-from procedures.level_check import levelled
+from procedures.level_check import prepare
 from procedures.session import Dwell, Pose, Session
 
 ADAPTIVE = True
 COARSE = "coarse"
 TURN = "turn"  # of beta: brackets both axes
-AXES = {"x": 0.0, "y": 90.0}  # beta at which each is at its extreme, on a sensor that is not misaligned
+AXES = {"x": 0.0, "y": 90.0}  # beta, deg, at the maximum of an output without misalignment
 QUARTER_DEG = 90.0
-CENTRED_DEG = 1  # and half for rounding: a cubic term of 0.4 % then errs by 0.006 deg
-FEWEST_ROUNDS = 2  # below which nothing tells how well they agree
+CENTRED_DEG = 1  # plus half for rounding: a cubic term of 0.4 % then gives an error of 0.006 deg
+FEWEST_ROUNDS = 2  # one round has no scatter
 
 
 @dataclass(frozen=True)
 class Centre:
-    """What the brackets stand about, whole degrees: beta at the extreme of x, and alpha - 90 at those of x and y."""
+    """The centre of the brackets, whole degrees: beta at the maximum of x, and alpha - 90 at the maxima of x and y."""
 
     beta_deg: float = 0.0
     sag_deg: tuple[float, float] = (0.0, 0.0)
@@ -46,37 +47,36 @@ class Centre:
 def misalignment(
     rig: Session, *, target_deg: float = 0.005, dwell_s: float = 5.0, settle_s: float = 0.5, most_rounds: int = 12
 ) -> None:
-    """Bracket both extremes, centre the brackets, and repeat until the angles are known to `target_deg`.
+    """Bracket both maxima, centre the brackets, and repeat until the standard error of the angles is `target_deg`.
 
-    `target_deg` is the standard error by which rounds about one centre agree; after `most_rounds` the search ends
-    whether it is reached or not.
+    The standard error follows from the scatter of rounds about the same centre. The search ends after `most_rounds`
+    rounds in any case.
     """
     if min(target_deg, dwell_s, most_rounds) <= 0 or settle_s < 0:
-        raise SettingError("misalignment: target_deg, dwell_s and most_rounds must be above 0, settle_s not below")
-    rig.confirm("mounting", "Is the sensor mounted face up on the table, its cable free to turn?", drawing="face-up")
-    levelled(rig)
-    _measure(rig, coarse(), dwell_s, settle_s)
-    centre = centred(extremes(_of(rig, COARSE)))
-    found: list[NDArray[np.float64]] = []
+        raise SettingError("misalignment: target_deg, dwell_s, most_rounds must be above 0, settle_s must be 0 or more")
+    prepare(rig)
+    _measure(rig, coarse_poses(), dwell_s, settle_s)
+    centre = centre_of(extremes(_dwells(rig, COARSE)))
+    rounds: list[NDArray[np.float64]] = []
     for number in range(1, most_rounds + 1):
-        _measure(rig, around(centre, number), dwell_s, settle_s)
-        found.append(extremes(_of(rig, str(number))))
-        if is_off(centred(np.mean(found, axis=0)), centre):
-            centre, found = centred(found[-1]), []
-        elif standard_error_deg(found) <= target_deg:
+        _measure(rig, round_poses(centre, number), dwell_s, settle_s)
+        rounds.append(extremes(_dwells(rig, str(number))))
+        if is_off(centre_of(np.mean(rounds, axis=0)), centre):
+            centre, rounds = centre_of(rounds[-1]), []
+        elif standard_error_deg(rounds) <= target_deg:
             return
 
 
-def coarse() -> Iterator[Pose]:
-    """Six poses that say roughly where both axes point, whichever way the sensor lies."""
+def coarse_poses() -> Iterator[Pose]:
+    """Six poses that give the rough directions of both axes for any mounting."""
     for beta_deg in (0.0, 90.0, 180.0, 270.0):
         yield Pose(90.0, beta_deg, 1, COARSE)
     for alpha_deg in (180.0, 0.0):
         yield Pose(alpha_deg, 270.0, 0, COARSE)
 
 
-def around(centre: Centre, number: int) -> Iterator[Pose]:
-    """The poses of one round."""
+def round_poses(centre: Centre, number: int) -> Iterator[Pose]:
+    """The poses of one round about `centre`."""
     for alpha_deg, direction, betas_deg in ((90.0, 1, (0, 90, 180, 270)), (-90.0, -1, (90, 0, -90, -180))):
         for beta_deg in betas_deg:
             yield Pose(alpha_deg, centre.beta_deg + beta_deg, direction, f"{TURN} {number}")
@@ -89,38 +89,41 @@ def around(centre: Centre, number: int) -> Iterator[Pose]:
 
 
 def extremes(dwells: Sequence[Dwell]) -> NDArray[np.float64]:
-    """(beta - 0, alpha - 90) for x and (beta - 90, alpha - 90) for y at the greatest output, deg, shape (2, 2).
+    """(beta - 0, alpha - 90) for x and (beta - 90, alpha - 90) for y at the maximum of each output, deg, shape (2, 2).
 
-    A straight fit of the loads: in a round, all else is orthogonal to them. Raises ProcedureError without x and y.
+    A linear fit of the loads: in a round all other terms are orthogonal to them. Raises ProcedureError without x or y.
     """
-    found = []
+    angles = []
     for axis, axis_deg in AXES.items():
         rows = [d for d in dwells if d.pose.path.split()[0] in (COARSE, TURN, axis)]
         if any(f"v{axis}" not in d.means for d in rows):
-            raise ProcedureError(f"misalignment: the adc has no channel v{axis}; name it in the bench file's channels")
+            raise ProcedureError(f"misalignment: the adc has no channel v{axis}; add it to channels in the bench file")
         a, b = np.radians([(d.pose.alpha_deg, d.pose.beta_deg) for d in rows]).T
         loads = np.column_stack([np.ones(len(rows)), np.sin(a) * np.cos(b), np.sin(a) * np.sin(b), np.cos(a)])
         _, x, y, z = np.linalg.lstsq(loads, [d.means[f"v{axis}"] for d in rows], rcond=None)[0]
         beta_deg, sag_deg = np.degrees([np.arctan2(y, x), -np.arctan2(z, np.hypot(x, y))])
-        found.append((_wrapped(beta_deg - axis_deg), sag_deg))
-    return np.array(found)
+        angles.append((_wrap(beta_deg - axis_deg), sag_deg))
+    return np.array(angles)
 
 
-def centred(extreme: NDArray[np.float64]) -> Centre:
-    """The centre of brackets for these extremes; beta is shared by both axes."""
+def centre_of(extreme: NDArray[np.float64]) -> Centre:
+    """The centre of brackets for these maxima. Both axes share beta."""
     (beta_x, sag_x), (beta_y, sag_y) = extreme.tolist()
-    beta_deg = _wrapped(beta_x + _wrapped(beta_y - beta_x) / 2)
+    beta_deg = _wrap(beta_x + _wrap(beta_y - beta_x) / 2)
     return Centre(round(beta_deg), (round(sag_x), round(sag_y)))
 
 
 def is_off(new: Centre, old: Centre) -> bool:
-    """Whether brackets about `old` are too far from centred."""
+    """Whether `old` is too far from the `new` centre."""
     sags = [abs(a - b) for a, b in zip(new.sag_deg, old.sag_deg, strict=True)]
-    return max(abs(_wrapped(new.beta_deg - old.beta_deg)), *sags) > CENTRED_DEG
+    return max(abs(_wrap(new.beta_deg - old.beta_deg)), *sags) > CENTRED_DEG
 
 
 def standard_error_deg(rounds: Sequence[NDArray[np.float64]]) -> float:
-    """Of the mean over rounds, from their scatter, pooled over all four angles; infinite where it is not known."""
+    """Standard error of the mean of the rounds, deg, from their scatter pooled over all four angles.
+
+    Infinite for fewer than FEWEST_ROUNDS.
+    """
     if len(rounds) < FEWEST_ROUNDS:
         return float("inf")
     scatter = np.mean(np.var(rounds, axis=0, ddof=1))
@@ -134,7 +137,7 @@ def _measure(rig: Session, poses: Iterator[Pose], dwell_s: float, settle_s: floa
 
 
 def _approach(rig: Session, pose: Pose) -> None:
-    """Stand a quarter turn before `pose`: in beta for a turn of beta; at alpha = 90 for a search of alpha."""
+    """Move to a quarter turn before `pose`: in beta for a turn of beta, to alpha = 90 deg for a search of alpha."""
     if pose.direction:
         rig.alpha.move_to(pose.alpha_deg)
         rig.beta.move_to(pose.beta_deg - pose.direction * QUARTER_DEG)
@@ -143,11 +146,11 @@ def _approach(rig: Session, pose: Pose) -> None:
         rig.beta.move_to(pose.beta_deg)
 
 
-def _of(rig: Session, what: str) -> list[Dwell]:
-    """What the record holds of the coarse search, or of one round."""
-    return [dwell for dwell in rig.measured() if dwell.pose.path.split()[-1] == what]
+def _dwells(rig: Session, name: str) -> list[Dwell]:
+    """The dwells of the coarse search, or of the round with the number `name`."""
+    return [dwell for dwell in rig.measured() if dwell.pose.path.split()[-1] == name]
 
 
-def _wrapped(deg: float) -> float:
-    """Within half a turn of 0."""
+def _wrap(deg: float) -> float:
+    """The same angle from -180 to 180 deg."""
     return (deg + 180) % 360 - 180

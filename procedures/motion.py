@@ -1,12 +1,12 @@
-"""motion: shake the sensor along its x axis beside a displacement sensor.
+"""motion: shake the sensor along its x axis and measure the displacement at the same time.
 
-Excites   scale factor in motion, output filter, sampling delay; all that a model of the standing sensor misses.
-Blind to  motion along y and z, and frequencies other than the one that it is shaken with.
+Excites   scale factor in motion, output filter, sampling delay; errors that a model of the still sensor does not have.
+Blind to  motion along y and z; all frequencies other than the frequency of the motion.
 Source    Ang V, Fig. 12: alpha = 45, beta = 90 deg, 60 um peak to peak at 10 Hz along x, which is horizontal.
 
-A short sweep of the same sensor comes first, so that the models that are judged are its own, and of this hour. Before
-the sweep and before the motion a stage swings about its place, each time by less, as one demagnetises: friction forgets
-from where the sensor came, and its springs stand between the branches of their hysteresis.
+A short sweep of the same sensor comes first, so the models are fitted to this sensor and this hour. Before the sweep
+and before the motion a stage swings with falling amplitude, as in demagnetisation. This removes the history of
+friction: the springs come to rest between the branches of their hysteresis.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from contextlib import contextmanager
 from itertools import chain
 
 from procedures.errors import ProcedureError, SettingError
-from procedures.level_check import levelled
+from procedures.level_check import prepare
 from procedures.session import Pose, Session, Stage
 from procedures.sweep import turn
 
 KIND = "motion"
-SWEEP, STILL = "sweep", "still"  # paths of the poses begin with what they are for
+SWEEP, STILL = "sweep", "still"  # first words of the paths
 DISPLACEMENT = "d63"  # the converter's channel
 ALPHA_DEG, BETA_DEG = 45.0, 90.0
-INCLINATIONS_DEG, STEP_DEG = (90.0, 45.0, 135.0), 45.0  # enough for the physical model, as a measurement showed
-SWINGS_DEG = tuple(90 * 0.85**k for k in range(24))  # 60 deg, or steps of 0.7, leave 2 mm/s^2 of hysteresis: measured
-SHAKING_S = 1.0  # from the start of the motion on, until only the motion is left
+INCLINATIONS_DEG, STEP_DEG = (90.0, 45.0, 135.0), 45.0  # enough for the physical model: measured
+SWINGS_DEG = tuple(90 * 0.85**k for k in range(24))  # 60 deg, or a ratio of 0.7, leaves hysteresis of 2 mm/s^2
+SHAKING_S = 1.0  # from the start of the motion until the transient has decayed
 AXIS = "x"
 
 
@@ -42,104 +42,103 @@ def motion(
     dwell_s: float = 2.0,
     settle_s: float = 0.5,
 ) -> None:
-    """Sweep, then record the sensor still for `still_s` and shaken for `duration_s`, without a gap in either.
+    """Sweep, then record the sensor still for `still_s` and in motion for `duration_s`. The records have no gaps.
 
-    Shaken at several frequencies, one after the other, it also tells a corner of the output filter from a delay; the
-    models are judged at the first.
+    Several frequencies, one after the other, separate a corner of the output filter from a delay. The first frequency
+    is the one for the comparison of the models.
     """
-    widths_and_times = (peak_to_peak_um, *frequency_hz, duration_s, still_s, block_s, dwell_s)
-    if not frequency_hz or min(widths_and_times) <= 0 or settle_s < 0:
-        raise SettingError("motion: give a width, frequencies and times above 0, and a settle_s not below")
+    positive = (peak_to_peak_um, *frequency_hz, duration_s, still_s, block_s, dwell_s)
+    if not frequency_hz or min(positive) <= 0 or settle_s < 0:
+        raise SettingError("motion: amplitude, frequencies and times must be above 0, settle_s must be 0 or more")
     _require_displacement(rig)
-    rig.confirm(
-        "mounting",
-        "Is the sensor on the nano-positioner, face up and its x along the carriage's x, the tip of the displacement "
-        "sensor behind the carriage, and are both cables free to turn?",
-        drawing="face-up",
+    prepare(
+        rig,
+        "Is the sensor on the nano-positioner, face up, its x axis along the carriage's x? Is the tip of the "
+        "displacement sensor behind the carriage? Can both cables turn freely?",
     )
-    levelled(rig)
     calibration, still = list(sweep()), blocks(STILL, still_s, block_s)
-    shaken = {hz: blocks(f"{KIND} {hz:g} Hz", duration_s, block_s) for hz in frequency_hz}
-    left = list(rig.missing([*calibration, *still, *chain(*shaken.values())]))
-    _stand(rig, centre_um)
-    if calibration[0] in left:
-        _start_without_history(rig)
-    for pose in _of(left, calibration):
+    motions = {hz: blocks(f"{KIND} {hz:g} Hz", duration_s, block_s) for hz in frequency_hz}
+    missing = list(rig.missing([*calibration, *still, *chain(*motions.values())]))
+    _centre_carriage(rig, centre_um)
+    if calibration[0] in missing:
+        _remove_history(rig)
+    for pose in _only(missing, calibration):
         rig.hold(pose, dwell_s, settle_s)
-    _settle_between_branches(rig)
+    _remove_hysteresis(rig)
     rig.wait(settle_s)
-    if now := _of(left, still):
-        rig.host.doing(f"recording for {len(now) * block_s:g} s, still")
-        rig.keep_stretch(now, block_s)
-    for hz, poses in shaken.items():
-        if now := _of(left, poses):
-            with _shaking(rig, peak_to_peak_um, hz, centre_um):
-                rig.keep_stretch(now, block_s)
+    if todo := _only(missing, still):
+        rig.host.doing(f"recording the still sensor for {len(todo) * block_s:g} s")
+        rig.keep_stretch(todo, block_s)
+    for hz, poses in motions.items():
+        if todo := _only(missing, poses):
+            with _oscillation(rig, peak_to_peak_um, hz, centre_um):
+                rig.keep_stretch(todo, block_s)
 
 
 def sweep() -> Iterator[Pose]:
-    """The poses that the models are fitted to: full turns both ways at three inclinations."""
+    """The poses for the fit of the models: full turns of beta in both directions at three inclinations."""
     for alpha_deg in INCLINATIONS_DEG:
         yield from turn(alpha_deg, 0, 360, STEP_DEG, f"{SWEEP} A+ to B-")
         yield from turn(alpha_deg, 360, 0, STEP_DEG, f"{SWEEP} B+ to A-")
 
 
-def blocks(what: str, duration_s: float, block_s: float) -> list[Pose]:
-    """A record at the attitude of the motion, block by block."""
-    return [Pose(ALPHA_DEG, BETA_DEG, 0, f"{what} {k}") for k in range(max(1, round(duration_s / block_s)))]
+def blocks(path: str, duration_s: float, block_s: float) -> list[Pose]:
+    """The blocks of a record at the attitude of the motion."""
+    return [Pose(ALPHA_DEG, BETA_DEG, 0, f"{path} {k}") for k in range(max(1, round(duration_s / block_s)))]
 
 
-def _of(left: Sequence[Pose], part: Sequence[Pose]) -> list[Pose]:
-    """What is left of a part."""
-    return [pose for pose in left if pose in part]
+def _only(missing: Sequence[Pose], part: Sequence[Pose]) -> list[Pose]:
+    """The missing poses of one part of the run."""
+    return [pose for pose in missing if pose in part]
 
 
 def _require_displacement(rig: Session) -> None:
     """Raises ProcedureError before anything moves."""
     if DISPLACEMENT not in rig.adc.acquire(0.1).channels:
         raise ProcedureError(
-            f"motion: the adc has no channel {DISPLACEMENT} for the displacement sensor; name it in "
-            "the bench file's channels"
+            f"motion: the adc has no channel {DISPLACEMENT} for the displacement sensor; add it to channels in the "
+            "bench file"
         )
 
 
-def _stand(rig: Session, centre_um: float) -> None:
-    """Put the carriage to its centre, whatever an interrupted run left it doing."""
+def _centre_carriage(rig: Session, centre_um: float) -> None:
+    """Stop the carriage, which an interrupted run may have left in motion, and move it to its centre."""
     rig.host.doing(f"positioner to {centre_um:g} um")
     rig.positioner.stop()
     rig.positioner.servo(True)
     rig.positioner.move_to(AXIS, centre_um)
 
 
-def _start_without_history(rig: Session) -> None:
-    """Home, both axes swung alike: from here on, the way of the sensor is known."""
-    rig.host.doing("swinging alpha ever less, so that the sensor forgets where it was")
+def _remove_history(rig: Session) -> None:
+    """Swing both axes of the sensor at home: from here on the history of the sensor is known."""
+    rig.host.doing("swinging alpha with falling amplitude to remove hysteresis")
     rig.beta.move_to(45.0)
     _fade(rig.alpha, 0.0)
     rig.beta.move_to(0.0)
 
 
-def _settle_between_branches(rig: Session) -> None:
-    """At the attitude of the motion."""
-    rig.host.doing(f"swinging beta ever less about {BETA_DEG:g} deg, so that the sensor forgets from where it came")
+def _remove_hysteresis(rig: Session) -> None:
+    """Swing the sensor at the attitude of the motion."""
+    rig.host.doing(f"swinging beta about {BETA_DEG:g} deg with falling amplitude to remove hysteresis")
     rig.alpha.move_to(ALPHA_DEG)
     _fade(rig.beta, BETA_DEG)
 
 
-def _fade(stage: Stage, about_deg: float) -> None:
+def _fade(stage: Stage, centre_deg: float) -> None:
+    """Swing `stage` about an angle with falling amplitude."""
     for k, swing_deg in enumerate(SWINGS_DEG):
-        stage.move_to(round(about_deg + (swing_deg if k % 2 else -swing_deg), 1))
-    stage.move_to(about_deg)
+        stage.move_to(round(centre_deg + (swing_deg if k % 2 else -swing_deg), 1))
+    stage.move_to(centre_deg)
 
 
 @contextmanager
-def _shaking(rig: Session, peak_to_peak_um: float, frequency_hz: float, centre_um: float) -> Iterator[None]:
-    """Inside, the carriage swings; however it ends, it stands still afterwards."""
+def _oscillation(rig: Session, peak_to_peak_um: float, frequency_hz: float, centre_um: float) -> Iterator[None]:
+    """The carriage oscillates inside the context. It always stops at the end."""
     try:
-        really_hz = rig.positioner.oscillate(
+        actual_hz = rig.positioner.oscillate(
             AXIS, peak_to_peak_um=peak_to_peak_um, frequency_hz=frequency_hz, centre_um=centre_um
         )
-        rig.host.doing(f"shaking {AXIS} by {peak_to_peak_um:g} um peak to peak at {really_hz:.6g} Hz")
+        rig.host.doing(f"shaking {AXIS} by {peak_to_peak_um:g} um peak to peak at {actual_hz:.6g} Hz")
         rig.wait(SHAKING_S)
         yield
     finally:

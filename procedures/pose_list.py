@@ -1,9 +1,9 @@
-"""Poses written out one by one: the lines of a CSV file, whose columns are the fields of a pose.
+"""Lists of poses: the lines of a CSV file. Its columns are the fields of a pose.
 
     alpha_deg,beta_deg,direction,path,mount_deg,flip
 
-Angles and header are needed, the others may be left out. The lines are kept with a run as they are, so that it goes on
-with the same poses whatever became of the file.
+The header and the two angles are required, the other columns are optional. The record keeps the lines with the run, so
+a resumed run does not need the file.
 """
 
 from __future__ import annotations
@@ -14,37 +14,39 @@ from collections.abc import Iterable, Sequence
 from dataclasses import fields
 from typing import Any
 
-from procedures.errors import SettingError, nearest
+from drivers.errors import did_you_mean
+from procedures.errors import SettingError
 from procedures.session import Pose
 
-# A sensor on edge and a table that turns give no poses.
+# `up` and `rate_deg_s` belong to positions and rates, not to poses.
 NAMES = tuple(field.name for field in fields(Pose) if field.name not in ("up", "rate_deg_s"))
 
 
-def listed(lines: Sequence[str]) -> list[Pose]:
-    """The poses in order; blank lines and those that begin with # say nothing.
+def parse_poses(lines: Sequence[str]) -> list[Pose]:
+    """The poses in order. Blank lines and lines that begin with # are ignored.
 
-    Raises SettingError naming line and column.
+    Raises SettingError with line and column.
     """
-    said = [(number, line) for number, line in enumerate(lines, 1) if line.strip() and not line.startswith("#")]
-    rows = [(number, [cell.strip() for cell in row]) for number, line in said for row in csv.reader([line])]
+    numbered = [(number, line) for number, line in enumerate(lines, 1) if line.strip() and not line.startswith("#")]
+    rows = [(number, [cell.strip() for cell in row]) for number, line in numbered for row in csv.reader([line])]
     (first, head), *rest = rows or [(1, [])]
     for name in head:
         if name not in NAMES:
-            raise SettingError(f"pose_list, line {first}: no pose has a column {name!r}{nearest(name, NAMES)}")
+            raise SettingError(f"pose_list, line {first}: a pose has no column {name!r}.{did_you_mean(name, NAMES)}")
     if not {"alpha_deg", "beta_deg"} <= set(head) or not rest:
         raise SettingError("pose_list: give a header with alpha_deg and beta_deg, and at least one pose below it")
     return [_pose(number, head, row) for number, row in rest]
 
 
-def written(poses: Iterable[Pose]) -> tuple[str, ...]:
-    """The lines that give `poses` back."""
+def format_poses(poses: Iterable[Pose]) -> tuple[str, ...]:
+    """The lines from which `parse_poses` reads the same poses."""
     return (",".join(NAMES), *(",".join(_text(getattr(pose, name)) for name in NAMES) for pose in poses))
 
 
 def _pose(number: int, head: Sequence[str], row: Sequence[str]) -> Pose:
     if len(row) != len(head):
-        raise SettingError(f"pose_list, line {number}: {len(row)} values for {len(head)} columns ({', '.join(head)})")
+        names = ", ".join(head)
+        raise SettingError(f"pose_list, line {number}: {len(row)} values for {len(head)} columns; give {names}")
     values: dict[str, Any] = {name: _value(number, name, cell) for name, cell in zip(head, row, strict=True)}
     return Pose(**values)
 
@@ -59,7 +61,7 @@ def _value(number: int, name: str, cell: str) -> str | float | int:
         value = math.nan
     if not math.isfinite(value) or (allowed and value not in allowed):
         wanted = f"one of {', '.join(map(str, allowed))}" if allowed else "a number"
-        raise SettingError(f"pose_list, line {number}, {name}: is {cell!r}; it takes {wanted}")
+        raise SettingError(f"pose_list, line {number}, column {name}: the value is {cell!r}; give {wanted}")
     return int(value) if allowed else value
 
 

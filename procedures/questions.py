@@ -1,6 +1,6 @@
-"""Questions to a person, each of which accepts only what makes sense as its answer.
+"""Questions to a person. A question checks its answer.
 
-A question has a name, by which a file of answers or the record answers it, and a drawing where one helps.
+A file of answers and the record find the answer by the question's name. Some questions have a drawing.
 """
 
 from __future__ import annotations
@@ -8,16 +8,17 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from procedures.errors import BadAnswer, nearest
+from drivers.errors import did_you_mean
+from procedures.errors import BadAnswer
 
-EDGES = ("z", "x", "y")  # one stands along the table's normal, the next in turn lies along the table's x
+EDGES = ("z", "x", "y")  # if one axis is along the table's normal, the next one in this cycle is along the table's x
 
 
 @dataclass(frozen=True)
 class Question:
-    """`name` is its key in a file of answers; `drawing` names a picture of what is to be done, "" for none.
+    """`name` is the key in a file of answers. `drawing` is the name of a picture of the work, "" for none.
 
-    An answer is asked for once a run, unless `repeated`: the same may have to be done again.
+    A run asks a question once, unless it is `repeated`: then the work may be needed again.
     """
 
     name: str
@@ -27,20 +28,20 @@ class Question:
 
     @property
     def accepts(self) -> str:
-        """What an answer may be, for people."""
+        """The accepted answers, in words."""
         return "a text"
 
     def checked(self, answer: str) -> str:
-        """The answer as it is kept. Raises BadAnswer."""
+        """The answer in the form for the record. Raises BadAnswer."""
         return answer.strip()
 
     def _refused(self, answer: str) -> BadAnswer:
-        return BadAnswer(f"{self.name}: {answer!r} is no answer to {self.text!r}; it takes {self.accepts}")
+        return BadAnswer(f"{self.name}: {answer!r} does not answer {self.text!r}; answer with {self.accepts}")
 
 
 @dataclass(frozen=True)
 class Confirm(Question):
-    """Something that a person has done or seen: yes or no."""
+    """A confirmation by a person: yes or no."""
 
     @property
     def accepts(self) -> str:
@@ -55,9 +56,9 @@ class Confirm(Question):
 
 @dataclass(frozen=True)
 class Mounting(Confirm):
-    """The sensor is taken off and put back: turned by `mount_deg` about the table's normal, face down if `flip`.
+    """A new mounting of the sensor: turned by `mount_deg` about the table's normal, face down if `flip`.
 
-    `up` is the edge that stands along the normal: on edge, the next one in turn lies along the table's x.
+    `up` is the sensor's axis along the normal. If it is not z, the next axis of EDGES is along the table's x.
     """
 
     repeated: bool = True
@@ -67,7 +68,7 @@ class Mounting(Confirm):
 
     @staticmethod
     def of(mount_deg: float, flip: int, up: str = "z") -> Mounting:
-        """The question for one way of mounting it."""
+        """The question for one mounting."""
         side = "down" if flip else "up"
         if up != "z":
             along = EDGES[(EDGES.index(up) + 1) % 3]
@@ -81,7 +82,7 @@ class Mounting(Confirm):
 
 @dataclass(frozen=True)
 class Number(Question):
-    """A reading that a person types, in `unit`, from `low` to `high`."""
+    """A number that a person reads and types, in `unit`, from `low` to `high`."""
 
     unit: str = ""
     low: float = -math.inf
@@ -103,7 +104,7 @@ class Number(Question):
 
 @dataclass(frozen=True)
 class Dial(Number):
-    """What a person reads on `stage`, set to `expected` before, which yes or nothing stands for; None: only read."""
+    """The reading of the dial of `stage`. An empty answer or yes means `expected`; None: there is only a reading."""
 
     repeated: bool = True
     stage: str = ""
@@ -122,7 +123,7 @@ class Dial(Number):
 
 @dataclass(frozen=True)
 class PowerCycle(Confirm):
-    """The sensor is switched off by hand for `off_s` seconds, and on again."""
+    """A person switches the sensor off for `off_s` seconds, then on."""
 
     repeated: bool = True
     off_s: float = 0.0
@@ -130,7 +131,7 @@ class PowerCycle(Confirm):
 
 @dataclass(frozen=True)
 class Remount(Confirm):
-    """The sensor is taken off the table and put back the same way."""
+    """A person takes the sensor off the table and mounts it again in the same way."""
 
     repeated: bool = True
 
@@ -148,5 +149,5 @@ class Choice(Question):
     def checked(self, answer: str) -> str:
         word = answer.strip()
         if word not in self.choices:
-            raise BadAnswer(f"{self._refused(answer)}{nearest(word, self.choices)}")
+            raise BadAnswer(f"{self._refused(answer)}.{did_you_mean(word, self.choices)}")
         return word

@@ -1,11 +1,12 @@
-"""rate-turn: beta at constant rates both ways, and at rest, a gyroscope on each edge.
+"""rate-turn: turn a gyroscope at constant rates, and hold it at rest, on each edge.
 
 Excites   gyroscope: scale factor, bias, misalignment, sensitivity to specific force; nonlinearity over the rates.
-Blind to  bandwidth, and sensitivity to vibration; the earth's rotation is there, and is taken off where it is known.
+Blind to  bandwidth; sensitivity to vibration. The earth's rotation is subtracted if latitude and heading are known.
 Source    IEEE Std 1431 and 647, rate table tests; Ferraris, Grimaldi and Parvis (1995): six faces and a turn of each.
 
-A mean over a whole turn is free of what goes round once in it: the horizontal part of the earth's rotation, the gear's
-errors. At rest both headings are measured. Alpha at 180 deg turns the sensor over, so that three mounts are six faces.
+The mean over a full turn removes signals with the period of the turn: the horizontal part of the earth's rotation, the
+errors of the gear. At rest the sensor is measured at two opposite headings. Alpha = 180 deg turns the sensor over, so
+three mounts give six faces.
 """
 
 from __future__ import annotations
@@ -14,14 +15,14 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from procedures.errors import SettingError
-from procedures.level_check import levelled
+from procedures.level_check import prepare
 from procedures.questions import EDGES
 from procedures.session import Pose, Session
 
 KIND = "rates"
 OUTPUTS = ("gx", "gy", "gz")
-SIDES_DEG = (0.0, 180.0)  # of alpha: the edge up, and down
-HEADINGS_DEG = (0.0, 180.0)  # of beta
+SIDES_DEG = (0.0, 180.0)  # alpha: the axis points up, then down
+HEADINGS_DEG = (0.0, 180.0)  # beta
 
 
 def rate_turn(
@@ -33,18 +34,17 @@ def rate_turn(
     rest_s: float = 10.0,
     settle_s: float = 0.5,
 ) -> None:
-    """Turn beta by `turn_deg` at each rate, both ways, and rest, with the edge up and down; on each of `mounts` edges.
+    """Turn beta by `turn_deg` at each rate in both directions, and rest, with the axis up and down, on `mounts` edges.
 
-    On one mount (z up) only the axis z is turned about. `turn_deg` of less than a whole turn is for stages whose limits
-    allow none; the rates must leave room for run-up and braking.
+    One mount (z up) gives turns about z only. Give a `turn_deg` below 360 if the stage's limits do not allow a full
+    turn. The limits must leave room for acceleration and braking.
     """
     if not rates_deg_s or min(rates_deg_s) <= 0 or min(turn_deg, rest_s) <= 0 or settle_s < 0:
-        raise SettingError("rate-turn: rates_deg_s, turn_deg and rest_s must be above 0, settle_s not below")
+        raise SettingError("rate-turn: rates_deg_s, turn_deg and rest_s must be above 0, settle_s must be 0 or more")
     if mounts not in (1, 2, 3):
         raise SettingError(f"rate-turn: mounts is {mounts}; give 1, 2 or 3")
     rig = replace(rig, adc=rig.adc.only(*OUTPUTS))
-    rig.confirm("mounting", "Is the gyroscope mounted face up on the table, its cable free to turn?", drawing="face-up")
-    levelled(rig)
+    prepare(rig, "Is the gyroscope mounted face up on the table? Can its cable turn freely?")
     rates = [rig.beta.rate_deg_s(rate) for rate in rates_deg_s]
     for pose in rig.missing(pose for up in EDGES[:mounts] for pose in turns(up, rates, turn_deg)):
         if pose.rate_deg_s:
@@ -54,10 +54,11 @@ def rate_turn(
 
 
 def turns(up: str, rates_deg_s: list[float], turn_deg: float) -> Iterator[Pose]:
-    """At rest at two headings, turned both ways at every rate; the edge `up` upward, then downward."""
+    """Rests at two headings, then turns in both directions at every rate; the axis `up` upward, then downward."""
     for alpha_deg in SIDES_DEG:
         for beta_deg in HEADINGS_DEG:
             yield Pose(alpha_deg, beta_deg, 0, f"{up} at rest", up=up)
         for rate in rates_deg_s:
-            for way in (1, -1):
-                yield Pose(alpha_deg, -way * turn_deg / 2, way, f"{up} turning", up=up, rate_deg_s=way * rate)
+            for direction in (1, -1):
+                first_deg, rate_deg_s = -direction * turn_deg / 2, direction * rate
+                yield Pose(alpha_deg, first_deg, direction, f"{up} turning", up=up, rate_deg_s=rate_deg_s)

@@ -1,7 +1,7 @@
-"""repeat: the same tumble again and again: as it is, after a power cycle, after a remount.
+"""repeat: repeat the same tumble: without a change, after a power cycle, after a remount.
 
-Excites   what changes from one operation to the next: repeatability of bias and scale factor.
-Blind to  what stays the same, and whatever depends on the angle between the four positions.
+Excites   repeatability of bias and scale factor from one operation to the next.
+Blind to  constant errors; effects of angles between the four positions.
 Source    Ang VI, inconsistency between operations; IEEE 1293, repeatability.
 """
 
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from drivers.errors import LimitError
 from procedures.errors import SettingError
-from procedures.level_check import levelled
+from procedures.level_check import prepare
 from procedures.questions import PowerCycle, Remount
 from procedures.session import Session
 from procedures.tumbles import is_first, tumble
@@ -28,14 +28,15 @@ def repeat(
     dwell_s: float = 5.0,
     settle_s: float = 0.5,
 ) -> None:
-    """Tumble the sensor `times` times as it is, then as often after a power cycle, then after a remount.
+    """Tumble the sensor `times` times without a change, `times` times after a power cycle, `times` after a remount.
 
-    A power cycle is `off_s` without power and `warm_s` with it, by the bench's power line or else by hand.
+    A power cycle is `off_s` without power, then `warm_s` with power. The bench's power line switches it, or a person.
     """
     if times < 2 or min(off_s, warm_s, settle_s) < 0 or dwell_s <= 0:
-        raise SettingError("repeat: times must be 2 or more, off_s, warm_s and settle_s not below 0, dwell_s above")
-    rig.confirm("mounting", "Is the sensor mounted face up on the table, its cable free to turn?", drawing="face-up")
-    levelled(rig)
+        raise SettingError(
+            "repeat: times must be 2 or more, dwell_s must be above 0, off_s, warm_s and settle_s must be 0 or more"
+        )
+    prepare(rig)
     kinds = [AS_IS, *[POWER] * power, *[MOUNT] * mount]
     paths = [f"{kind} {k}" for kind in kinds for k in range(1, times + 1)]
     for pose in rig.missing(pose for path in paths for pose in tumble(path)):
@@ -50,9 +51,9 @@ def repeat(
 def _power_cycle(rig: Session, number: str, off_s: float, warm_s: float) -> None:
     try:
         rig.adc.power(False)
-    except LimitError:  # no line does it
-        text = f"Have you switched the sensor off for {off_s:g} s, and on again?"
-        rig.have_done(PowerCycle(f"power-cycle-{number}", text, off_s=off_s))
+    except LimitError:  # the bench has no power line
+        text = f"Switch the sensor off for {off_s:g} s, then on. Is it done?"
+        rig.request(PowerCycle(f"power-cycle-{number}", text, off_s=off_s))
     else:
         rig.wait(off_s)
         rig.adc.power(True)
@@ -60,7 +61,7 @@ def _power_cycle(rig: Session, number: str, off_s: float, warm_s: float) -> None
 
 
 def _remount(rig: Session, number: str) -> None:
-    """At alpha = 0, where the sensor lies flat."""
+    """Remount the sensor at alpha = 0, where the table is horizontal."""
     rig.alpha.move_to(0.0)
-    text = "Have you taken the sensor off the table, and mounted it again the same way, face up?"
-    rig.have_done(Remount(f"remount-{number}", text, drawing="face-up"))
+    text = "Take the sensor off the table and mount it again in the same way, face up. Is it done?"
+    rig.request(Remount(f"remount-{number}", text, drawing="face-up"))

@@ -1,6 +1,6 @@
-"""What a procedure is given: instruments by role, poses that are still missing, a way to keep and to ask.
+"""The session: the interface of a procedure to the instruments, the record and a person.
 
-The same `Session` carries a run and its plan: only the instruments and the host differ.
+A run and its plan use the same `Session` with different instruments and a different host.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from procedures.errors import Declined, SafetyLimit
 from procedures.questions import EDGES, Confirm, Mounting, Number, Question
 
 Read = TypeVar("Read")
-SHORTEST_APPROACH_DEG = 0.5  # a stage that is nearer to a pose has not come from its side
+SHORTEST_APPROACH_DEG = 0.5  # a shorter move does not take up the gear play
 
 
 @dataclass(frozen=True)
 class Pose:
-    """A position of the sensor to hold. Angles in deg; `direction` +1 while beta grows, -1 while it falls.
+    """A position of the sensor. Angles in deg; `direction` is +1 if beta rises to it, -1 if beta falls to it.
 
-    `mount_deg` is the sensor's turn about the table's normal, `flip` 1 when it is mounted face down. `up` is the edge
-    that stands along that normal, z but for a sensor on edge. Beta turns from `beta_deg` on at a `rate_deg_s` that is
-    not 0: then it is a turn that is kept, and no pose.
+    `mount_deg` is the rotation of the sensor about the table's normal. `flip` is 1 for a sensor mounted face down. `up`
+    is the sensor's axis along the normal: x or y for a sensor on edge. With a `rate_deg_s` other than 0 this is a turn
+    of beta at this rate, which begins at `beta_deg`.
     """
 
     alpha_deg: float
@@ -43,12 +43,12 @@ class Pose:
 
 @dataclass(frozen=True)
 class Limits:
-    """What stops a run, and what its results are judged by.
+    """The limits of a bench: a run stops at them, or its results are checked against them.
 
-    temperature_c   of the sensor
-    overrun_deg     how far beyond a pose its approach begins
-    level_deg       the greatest tilt of the table that a procedure begins with; None: it is not asked for
-    results         by name: the greatest magnitude of a result, or its (lowest, highest) value
+    temperature_c   lowest and highest temperature of the sensor
+    overrun_deg     distance of the point before a pose from which beta approaches it
+    level_deg       maximum tilt of the table at the beginning of a run; None: no check
+    results         by name: the maximum magnitude of a result, or its (lowest, highest) value
     """
 
     temperature_c: tuple[float, float] = (-20.0, 85.0)
@@ -59,7 +59,7 @@ class Limits:
 
 @dataclass(frozen=True)
 class Dwell:
-    """What was measured at a pose: of every channel the mean and the standard deviation of `n` samples, in V."""
+    """The measurement at a pose: mean and standard deviation of `n` samples for every channel, in V."""
 
     pose: Pose
     t_s: float
@@ -71,7 +71,7 @@ class Dwell:
 
 @dataclass(frozen=True)
 class Reading:
-    """One number that belongs to the run and to none of its poses, such as the table's tilt."""
+    """A number that belongs to the run, not to a pose, such as the tilt of the table."""
 
     name: str
     value: float
@@ -80,7 +80,7 @@ class Reading:
 
 
 class Samples(Protocol):
-    """A stretch of samples: `volts`, shape (n, channels), `start_s` on the clock."""
+    """A block of samples: `volts`, shape (n, channels); `start_s` is the clock's time of the first sample."""
 
     @property
     def volts(self) -> NDArray[np.float64]: ...
@@ -93,7 +93,7 @@ class Samples(Protocol):
 
 
 class Turn(Protocol):
-    """A turn at a constant rate that goes on; `require` is called every `beat_s`, and raises where it does not."""
+    """A turn at a constant rate, in progress. `require` must be called every `beat_s`; it raises if the turn stops."""
 
     @property
     def rate_deg_s(self) -> float: ...
@@ -111,28 +111,28 @@ class Stage(Protocol):
     def home(self) -> None: ...
     def referenced(self) -> bool: ...
     def stop(self) -> None: ...
-    def rate_deg_s(self, asked_deg_s: float) -> float:
-        """The rate nearest to the one asked for that it can turn at."""
+    def rate_deg_s(self, wanted_deg_s: float) -> float:
+        """The nearest rate that the stage can turn at."""
 
     def turning(self, rate_deg_s: float, first_deg: float, last_deg: float) -> AbstractContextManager[Turn]:
-        """At a constant rate from one angle to another: it has the rate when the body begins, and stands after it."""
+        """A turn from one angle to another. The stage has the rate when the body begins, and is at rest after it."""
 
 
 class Adc(Protocol):
-    """The converter that the sensor's outputs go to."""
+    """The converter of the sensor's outputs."""
 
     def acquire(self, duration_s: float) -> Samples: ...
     def acquire_with(self, duration_s: float, reading: Callable[[], Read]) -> tuple[Samples, Read]:
-        """The same, and what `reading` gives in the middle of it."""
+        """The samples, and the value of `reading` in the middle of the dwell."""
 
     def acquire_watched(self, duration_s: float, watch: Callable[[], object], every_s: float) -> Samples:
-        """The same; `watch` is called every so often, and at the end."""
+        """The samples; `watch` is called every `every_s`, and at the end."""
 
     def only(self, *outputs: str) -> Adc:
-        """The converter with the channels of these outputs alone; raises where one is not wired."""
+        """The converter with the channels of these outputs only. Raises if the bench has no such channel."""
 
     def stream(self, duration_s: float, block_s: float) -> Iterator[Samples]:
-        """The same without a gap between blocks of `block_s`."""
+        """The samples in blocks of `block_s`, without a gap between them."""
 
     def power(self, on: bool) -> None:
         """Switch the sensor's supply."""
@@ -142,7 +142,7 @@ class Oven(Protocol):
     """Oven and thermometer."""
 
     def temperature_c(self) -> float | None:
-        """Of the sensor, in C; None on a bench without a thermometer."""
+        """Temperature of the sensor, C; None on a bench without a thermometer."""
 
     def set_temperature(self, c: float) -> None: ...
     def run(self, on: bool) -> None: ...
@@ -160,7 +160,7 @@ class Tilt(Protocol):
 
 
 class Level(Protocol):
-    """The digital level that lies on the table of beta."""
+    """The digital level on the table of beta."""
 
     def read(self) -> Tilt: ...
 
@@ -172,7 +172,7 @@ class Positioner(Protocol):
     def move_to(self, axis: str, um: float) -> None: ...
     def position_um(self, axis: str) -> float: ...
     def oscillate(self, axis: str, *, peak_to_peak_um: float, frequency_hz: float, centre_um: float) -> float:
-        """Begin a sine; the frequency that it really has, Hz."""
+        """Begin a sine motion. Returns its actual frequency, Hz."""
 
     def stop(self) -> None: ...
 
@@ -185,51 +185,48 @@ class Clock(Protocol):
 
 
 class Host(Protocol):
-    """Who carries the procedure out: a run into the record, or a plan."""
+    """The run or the plan that executes the procedure."""
 
     def kept(self) -> Sequence[Pose]:
-        """The poses that the record already holds."""
+        """The poses in the record."""
 
     def expect(self, missing: int) -> None:
-        """So many poses are to come."""
+        """Report the number of poses that the procedure will add."""
 
     def measured(self) -> Sequence[Dwell]:
-        """What was measured at them, in the order of keeping."""
+        """The measurements in the record, in the order of the poses."""
 
     def readings(self) -> Sequence[Reading]:
-        """The readings that the record already holds."""
+        """The readings in the record."""
 
     def keep(self, pose: Pose, samples: Samples, temperature_c: float | None) -> None: ...
     def keep_readings(self, *readings: Reading) -> None:
-        """All of them or none: a run that goes on does not meet a half of what was read at once."""
+        """Store all of them in one transaction, so a resumed run does not find a part of them."""
 
     def ask(self, question: Question) -> str:
-        """A person's checked answer; an answer that the record holds is not asked for again.
-
-        Raises NoAnswer where nobody is there.
-        """
+        """The checked answer of a person, from the record if it is there. Raises NoAnswer if nobody can answer."""
 
     def doing(self, text: str) -> None:
-        """What happens now, for people."""
+        """Report the present step to the observer."""
 
 
 def never(dwells: Sequence[Dwell], oven_c: float) -> bool:  # noqa: ARG001
-    """A plan's answer to whether what was measured has come to rest: it is that of the longest run."""
+    """`steady` of a plan: False, so the plan shows the longest run."""
     return False
 
 
 @dataclass(frozen=True)
 class Session:
-    """The bench as a procedure sees it.
+    """The bench for a procedure.
 
-    `steady` judges whether bias and scale factor of dwells have come to rest, in an oven of so many C (0: in none).
+    `steady` decides whether bias and scale factor of the dwells are steady, in an oven at some C (0: no oven).
     """
 
     alpha: Stage
     beta: Stage
     adc: Adc
     oven: Oven
-    level: Level | None  # None: a person reads one and types
+    level: Level | None  # None: a person reads a level and types
     positioner: Positioner
     clock: Clock
     host: Host
@@ -237,40 +234,40 @@ class Session:
     steady: Callable[[Sequence[Dwell], float], bool] = never
 
     def missing(self, poses: Iterable[Pose]) -> Iterator[Pose]:
-        """Those of `poses` that the record does not hold yet, in order; a pose named twice is kept twice."""
+        """The `poses` that are not in the record yet, in order. A pose that occurs twice is measured twice."""
         kept = Counter(self.host.kept())
-        left = []
+        missing = []
         for pose in poses:
             if kept[pose] > 0:
                 kept[pose] -= 1
             else:
-                left.append(pose)
-        self.host.expect(len(left))
-        yield from left
+                missing.append(pose)
+        self.host.expect(len(missing))
+        yield from missing
 
     def move_to(self, pose: Pose) -> None:
-        """Turn both stages to `pose`; beta arrives from below for direction +1, from above for -1.
+        """Move both stages to `pose`; beta arrives from below for direction +1, from above for -1.
 
-        A person is asked where the sensor is mounted otherwise. Raises Declined, NoAnswer.
+        If the pose needs another mounting, a person remounts the sensor first. Raises Declined, NoAnswer.
         """
         self.mount(pose.mount_deg, pose.flip, pose.up)
         self.host.doing(f"moving to alpha {pose.alpha_deg:g}, beta {pose.beta_deg:g} deg")
         self.alpha.move_to(pose.alpha_deg)
-        way_deg = (pose.beta_deg - self.beta.angle_deg()) * pose.direction
-        if pose.direction and way_deg < SHORTEST_APPROACH_DEG:
+        approach_deg = (pose.beta_deg - self.beta.angle_deg()) * pose.direction
+        if pose.direction and approach_deg < SHORTEST_APPROACH_DEG:
             self.beta.move_to(pose.beta_deg - pose.direction * self.limits.overrun_deg)
         self.beta.move_to(pose.beta_deg)
         self.host.doing(f"holding alpha {pose.alpha_deg:g}, beta {pose.beta_deg:g} deg")
 
     def hold(self, pose: Pose, dwell_s: float, settle_s: float) -> None:
-        """Go to `pose`, let it settle, and keep `dwell_s` seconds of it, with the temperature in their middle."""
+        """Move to `pose`, wait `settle_s`, record `dwell_s` seconds, and the temperature in the middle of them."""
         self.move_to(pose)
         self.wait(settle_s)
         samples, temperature_c = self.adc.acquire_with(dwell_s, self.oven.temperature_c)
         self.keep(pose, samples=samples, temperature_c=temperature_c)
 
     def turn(self, pose: Pose, turn_deg: float) -> None:
-        """Turn beta at the pose's rate by `turn_deg` from its angle on, and keep the samples of it."""
+        """Turn beta by `turn_deg` from the pose's angle at the pose's rate, and record the samples of the turn."""
         self.mount(pose.mount_deg, pose.flip, pose.up)
         self.alpha.move_to(pose.alpha_deg)
         self.host.doing(f"turning beta at {pose.rate_deg_s:g} deg/s, alpha {pose.alpha_deg:g} deg")
@@ -280,69 +277,68 @@ class Session:
         self.keep(pose, samples=samples, temperature_c=self.oven.temperature_c())
 
     def mount(self, mount_deg: float, flip: int, up: str = "z") -> None:
-        """Have the sensor mounted so, at alpha = 0 where it lies flat; nothing where it is."""
+        """Ask a person for this mounting if it is a new one, at alpha = 0, where the table is horizontal."""
         wanted = {"mount": mount_deg, "flip": flip, "edge": EDGES.index(up)}
         if all((self.reading(name) or 0.0) == value for name, value in wanted.items()):
             return
         self.alpha.move_to(0.0)
         question = Mounting.of(mount_deg, flip, up)
         if self.host.ask(question) == "no":
-            raise Declined(f"{question.name}: the sensor is not mounted so; mount it, then resume the run")
+            raise Declined(f"{question.name}: the sensor does not have this mounting; mount it, then resume the run")
         units = {"mount": "deg"}
         self.keep_readings(*(Reading(name, value, units.get(name, "")) for name, value in wanted.items()))
 
     def keep(self, pose: Pose, *, samples: Samples, temperature_c: float | None = None) -> None:
-        """Put `pose` into the record. Raises SafetyLimit for a temperature outside the bench's limits."""
+        """Store `pose` in the record. Raises SafetyLimit for a temperature outside the limits of the bench."""
         self.check_temperature(temperature_c)
         self.host.keep(pose, samples, temperature_c)
 
     def check_temperature(self, temperature_c: float | None) -> None:
-        """Raises SafetyLimit for a sensor's temperature outside the bench's limits; an unknown one passes."""
+        """Raises SafetyLimit for a temperature of the sensor outside the limits; an unknown temperature passes."""
         low, high = self.limits.temperature_c
         if temperature_c is not None and not (math.isfinite(temperature_c) and low <= temperature_c <= high):
             raise SafetyLimit(
-                f"oven: the sensor is at {temperature_c:g} C, outside the bench's limits of {low:g} to {high:g} C; "
-                "let it come back, or change limits.temperature_c in the bench file"
+                f"oven: the sensor is at {temperature_c:g} C, outside the limits of {low:g} to {high:g} C; wait until "
+                "it is back inside them, or change limits.temperature_c in the bench file"
             )
 
     def keep_stretch(self, poses: Sequence[Pose], block_s: float) -> None:
-        """Put a record without gaps into the record: `block_s` seconds of it as each of `poses`, which stand still."""
-        stretch = self.adc.stream(len(poses) * block_s, block_s)
-        for pose, samples in zip(poses, stretch, strict=True):
+        """Record without gaps: `block_s` seconds for each of `poses`. The stages do not move."""
+        blocks = self.adc.stream(len(poses) * block_s, block_s)
+        for pose, samples in zip(poses, blocks, strict=True):
             self.keep(pose, samples=samples, temperature_c=self.oven.temperature_c())
 
     def measured(self) -> Sequence[Dwell]:
-        """All that the record holds of this run, in the order of keeping: what an adaptive procedure goes by."""
+        """All measurements of this run, in order. An adaptive procedure chooses its poses by them."""
         return self.host.measured()
 
     def reading(self, name: str) -> float | None:
-        """A reading of this run that the record holds."""
+        """The value of a reading of this run; None if it is not in the record."""
         return next((reading.value for reading in self.host.readings() if reading.name == name), None)
 
     def keep_readings(self, *readings: Reading) -> None:
-        """Put numbers that belong to the run and to no pose into the record: all that were read at once, at once."""
+        """Store numbers that belong to the run, not to a pose, in one transaction."""
         self.host.keep_readings(*readings)
 
     def confirm(self, name: str, text: str, drawing: str = "") -> None:
-        """A person confirms `text`; `name` is its key in a file of answers. Raises Declined, NoAnswer."""
-        self.have_done(Confirm(name, text, drawing))
+        """Ask a person to confirm `text`; `name` is the key in a file of answers. Raises Declined, NoAnswer."""
+        self.request(Confirm(name, text, drawing))
 
-    def have_done(self, question: Confirm) -> None:
-        """A person does what `question` says, and confirms it. Raises Declined, NoAnswer."""
+    def request(self, question: Confirm) -> None:
+        """Ask a person to do the work in `question` and to confirm it. Raises Declined, NoAnswer."""
         if self.host.ask(question) == "no":
-            asked = f'{question.name}: "{question.text}"'
-            raise Declined(f"{asked} was answered with no; put it right, then resume the run")
+            raise Declined(f'{question.name}: the answer to "{question.text}" is no; correct this, then resume the run')
 
     def number(self, name: str, text: str, unit: str, low: float, high: float) -> float:
-        """A number that a person reads off and types, anew each time. Raises NoAnswer."""
+        """Ask a person for a number, every time. Raises NoAnswer."""
         return float(self.host.ask(Number(name, text, unit=unit, low=low, high=high, repeated=True)))
 
     def wait(self, seconds: float) -> None:
-        """Let time pass."""
+        """Wait on the clock."""
         self.clock.sleep(seconds)
 
     def reference(self) -> None:
-        """Home every stage that does not know where it is."""
+        """Home every stage without a reference."""
         for name, stage in (("alpha", self.alpha), ("beta", self.beta)):
             if not stage.referenced():
                 self.host.doing(f"homing {name}")

@@ -1,7 +1,7 @@
-"""A procedure's settings from text: the keywords of its function, typed by their annotations.
+"""The settings of a procedure, read from text. They are the keywords of its function, with their annotated types.
 
-Types: float, int, bool, str, a `Literal` of texts, `tuple[float, ...]` written 90,30,150, and `tuple[str, ...]`, the
-lines of a file, which is named.
+Types: float, int, bool, str, a `Literal` of texts, `tuple[float, ...]` as 90,30,150, and `tuple[str, ...]`: the name of
+a file, whose lines are the value.
 """
 
 from __future__ import annotations
@@ -11,23 +11,24 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
+from drivers.errors import did_you_mean
 from procedures.catalogue import Procedure
-from procedures.errors import SettingError, nearest
+from procedures.errors import SettingError
 
 Value = Any
 YES_OR_NO = ("yes", "no")
 
 
 def parse(procedure: Procedure, given: Mapping[str, Value]) -> dict[str, Value]:
-    """All settings of `procedure`: `given` (texts, or values of a file) over its defaults.
+    """All settings of `procedure`: its defaults, replaced by `given` (texts, or values of a file).
 
-    Raises SettingError for a name that it does not have (naming the nearest), or a value of the wrong type.
+    Raises SettingError for an unknown name, with a suggestion, and for a value of the wrong type.
     """
     defaults = procedure.defaults
     types = get_type_hints(procedure.function)
     for name in given:
         if name not in defaults:
-            raise SettingError(f"{procedure.name} has no setting {name!r}{nearest(name, defaults)}")
+            raise SettingError(f"{procedure.name} has no setting {name!r}.{did_you_mean(name, defaults)}")
     return defaults | {
         name: _value(f"{procedure.name}: the setting {name}", types.get(name, str), value)
         for name, value in given.items()
@@ -35,7 +36,7 @@ def parse(procedure: Procedure, given: Mapping[str, Value]) -> dict[str, Value]:
 
 
 def choices(procedure: Procedure) -> dict[str, tuple[str, ...]]:
-    """The settings that take one of a few texts, and which."""
+    """The settings that have a list of allowed texts, with this list."""
     types = get_type_hints(procedure.function)
     few = {name: tuple(map(str, get_args(kind))) for name, kind in types.items() if get_origin(kind) is Literal}
     return few | {name: YES_OR_NO for name, kind in types.items() if kind is bool}
@@ -52,7 +53,7 @@ def _value(what: str, kind: Any, value: Value) -> Value:
     except (ValueError, TypeError):
         listed = f"one of {', '.join(map(str, choices))}"
         wanted = listed if choices else _WANTED.get(kind, "numbers such as 90,30")
-        raise SettingError(f"{what} is {value!r}; it takes {wanted}") from None
+        raise SettingError(f"{what} is {value!r}; give {wanted}") from None
 
 
 def _parts(what: str, kind: Any, value: Value) -> Sequence[Value]:
@@ -62,12 +63,12 @@ def _parts(what: str, kind: Any, value: Value) -> Sequence[Value]:
 
 
 def _lines(what: str, path: Path) -> list[str]:
-    """Those of a file. Raises SettingError for one that cannot be read."""
+    """The lines of a file. Raises SettingError for a file that cannot be read."""
     try:
         return path.read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:
-        why = error.strerror if isinstance(error, OSError) else "it is no text"
-        raise SettingError(f"{what}: the file {path} cannot be read: {why}") from None
+        why = error.strerror if isinstance(error, OSError) else "it is not a text file"
+        raise SettingError(f"{what}: cannot read the file {path}: {why}; give another file") from None
 
 
 def _scalar(kind: Any, value: Value) -> Value:

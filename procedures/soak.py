@@ -1,7 +1,7 @@
-"""soak: hours of warm-up held still; bias and scale factor from reversals.
+"""soak: hold the sensor still for hours from power-on, with a tumble at intervals.
 
-Excites   warm-up and other slow drift of bias and scale factor; noise of every time scale up to hours.
-Blind to  drift that is over before the second reversal; the room's temperature, which drifts like the sensor.
+Excites   warm-up and other slow drift of bias and scale factor; noise at all time scales up to hours.
+Blind to  drift that ends before the second tumble; a drift of the room's temperature, which looks like the sensor's.
 Source    Ang III.B, Fig. 10: twelve hours at constant ambient; IEEE 1293, four-point tumble.
 """
 
@@ -13,13 +13,13 @@ from itertools import groupby
 
 from drivers.errors import LimitError
 from procedures.errors import SettingError
-from procedures.level_check import levelled
+from procedures.level_check import prepare
 from procedures.session import Pose, Reading, Session
 from procedures.tumbles import is_first, tumble
 
-REVERSAL, HOLD = "reversal", "hold"  # each with its number is a path
-DOUBLINGS = 4  # of the interval from the first to the longest
-POWER_ON = "power-on"  # the clock's reading when the sensor was switched on
+REVERSAL, HOLD = "reversal", "hold"  # first words of the paths; a number follows
+DOUBLINGS = 4  # of the interval, from the first to the longest
+POWER_ON = "power-on"  # name of the reading: the clock's time when the sensor was switched on
 
 
 def soak(
@@ -34,20 +34,19 @@ def soak(
     oven_c: float = 0.0,
     until_steady: bool = False,
 ) -> None:
-    """Hold the sensor level for `duration_s`, with a tumble before, after, and every `interval_s` in between.
+    """Hold the sensor level for `duration_s`, with a tumble before, after, and every `interval_s`.
 
-    The hold is kept without gaps, `block_s` at a time; the tumbles' time comes on top. The first intervals are shorter
-    and double, as drift is quickest there. It begins cold, `off_s` without
-    power and then on, where the bench has a line that switches it (0: as it is). `oven_c` keeps it in the oven from
-    then on (0: none). `until_steady` ends it as soon as bias and scale factor have come to rest.
+    The hold is recorded without gaps in blocks of `block_s`. The tumbles take extra time. The first intervals are
+    shorter and double each time, because drift is fastest at the beginning. If the bench has a power line, the soak
+    begins cold: `off_s` without power, then power on (0: no power cycle). `oven_c` is the temperature of the oven
+    (0: no oven). `until_steady` ends the soak when bias and scale factor are steady.
     """
     if min(duration_s, dwell_s) <= 0 or not 0 < block_s <= interval_s or min(settle_s, off_s) < 0:
         raise SettingError(
-            "soak: duration_s, block_s and dwell_s must be above 0, settle_s and off_s not below, "
-            "and interval_s at least block_s"
+            "soak: duration_s, block_s and dwell_s must be above 0, settle_s and off_s must be 0 or more, "
+            "interval_s must be at least block_s"
         )
-    rig.confirm("mounting", "Is the sensor mounted face up on the table, its cable free to turn?", drawing="face-up")
-    levelled(rig)
+    prepare(rig)
     for path, group in groupby(rig.missing(schedule(duration_s, interval_s, block_s)), key=lambda pose: pose.path):
         poses = list(group)
         if until_steady and path.startswith(HOLD) and rig.steady(rig.measured(), oven_c):
@@ -67,22 +66,22 @@ def soak(
 
 
 def schedule(duration_s: float, interval_s: float, block_s: float) -> Iterator[Pose]:
-    """A tumble, a hold of many blocks, a tumble ... and a last tumble: blocks of one hold are alike.
+    """The poses: a tumble, a hold of many blocks, a tumble ... and a last tumble.
 
-    Level, both axes feel 0 g, so that the hold shows the drift of their bias between tumbles.
+    The sensor is level in the hold, so both axes feel 0 g: the hold shows the drift of the bias between tumbles.
     """
-    left, number = max(1, round(duration_s / block_s)), 0
+    remaining, number = max(1, round(duration_s / block_s)), 0
     longest = max(1, round(interval_s / block_s))
-    while left > 0:
-        blocks = min(left, longest, max(1, longest >> max(0, DOUBLINGS - number)))
+    while remaining > 0:
+        blocks = min(remaining, longest, max(1, longest >> max(0, DOUBLINGS - number)))
         yield from tumble(f"{REVERSAL} {number}")
         yield from [Pose(0.0, 0.0, 0, f"{HOLD} {number}")] * blocks
-        left, number = left - blocks, number + 1
+        remaining, number = remaining - blocks, number + 1
     yield from tumble(f"{REVERSAL} {number}")
 
 
 def _cold_start(rig: Session, off_s: float) -> None:
-    """Off for `off_s`, then on. Where no line of the bench does it, the sensor stays as it is."""
+    """Switch the sensor off for `off_s`, then on. Without a power line on the bench nothing happens."""
     with suppress(LimitError):
         rig.adc.power(False)
         rig.host.doing(f"cooling for {off_s:g} s without power")
@@ -92,7 +91,7 @@ def _cold_start(rig: Session, off_s: float) -> None:
 
 
 def _keep_on(rig: Session, off_s: float, oven_c: float) -> None:
-    """Sensor and oven on, told before every tumble and hold: a power cut may have switched them off."""
+    """Switch sensor and oven on. This is repeated before every tumble and hold: a power cut may switch them off."""
     if off_s:
         with suppress(LimitError):
             rig.adc.power(True)

@@ -1,8 +1,8 @@
-"""sweep: hold the sensor at a grid of stage angles, each way round.
+"""sweep: hold the sensor at a grid of stage angles, in both directions of beta.
 
-Excites   scale factor, bias, cross-axis, misalignment, hysteresis, stage errors.
-Blind to  ageing apart from temperature; the output filter.
-Source    Ang III.A; inclinations out of order, so that height does not follow time.
+Excites   scale factor, bias, cross-axis effects, misalignment, hysteresis, stage errors.
+Blind to  ageing, which it cannot separate from temperature; the output filter.
+Source    Ang III.A; the inclinations are out of order, so that inclination and time are not correlated.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ from dataclasses import replace
 from typing import Literal
 
 from procedures.errors import SettingError
-from procedures.level_check import levelled
-from procedures.pose_list import listed
+from procedures.level_check import check_level, prepare
+from procedures.pose_list import parse_poses
 from procedures.session import Pose, Session
 
 INCLINATIONS_DEG = (90.0, 30.0, 150.0, 60.0, 120.0, 45.0, 135.0)
-REFERENCE = Pose(90.0, 45.0, 1, "reference")  # both axes feel gravity, always approached from the same side
+REFERENCE = Pose(90.0, 45.0, 1, "reference")  # both axes feel gravity; beta always rises to it
 Paths = Literal["grid", "ang"]
 Face = Literal["up", "down", "both"]
 FLIPS = {"up": (0,), "down": (1,), "both": (0, 1)}
@@ -35,26 +35,26 @@ def sweep(
     face: Face = "up",
     pose_list: tuple[str, ...] = (),
 ) -> None:
-    """Record `dwell_s` seconds at every angle of the grid, clockwise then anticlockwise.
+    """Record `dwell_s` seconds at every angle of the grid, with beta rising, then falling.
 
-    `paths="ang"` adds every inclination's negative, and the half turns to each side at 90 deg. `reference_every` other
-    poses, one reference pose comes again, which tells drift from everything else; 0 for none. `face="both"`
-    has the sensor turned over half way: what is the sensor's own turns with it, and what is the stages' does not.
-    `pose_list`, a CSV file such as `rig plan sweep --optimal` writes, has all poses in order instead of a grid.
+    `paths="ang"` adds the negative of every inclination, and half turns to each side at 90 deg. `reference_every` is
+    the number of poses between two reference poses, which separate drift from the other effects; 0: none.
+    `face="both"`: a person turns the sensor over half way, which separates errors of the sensor from errors of the
+    stages. `pose_list` is a CSV file with all poses in order, instead of a grid; `rig plan sweep --optimal` writes one.
     """
     if dwell_s <= 0 or settle_s < 0:
-        raise SettingError(f"sweep: dwell_s is {dwell_s:g}, settle_s is {settle_s:g}: give times above 0")
+        raise SettingError(f"sweep: dwell_s is {dwell_s:g} and settle_s is {settle_s:g}; give times above 0")
     if reference_every < 0:
         raise SettingError(f"sweep: reference_every is {reference_every}; give a number of poses, or 0 for none")
     if pose_list and (reference_every or face != "up"):
-        raise SettingError("sweep: pose_list has all poses; reference_every and face are for a grid")
-    once = referenced(list(grid(inclinations_deg, step_deg, paths)), reference_every)
-    poses = listed(pose_list) if pose_list else [replace(pose, flip=flip) for flip in FLIPS[face] for pose in once]
-    if not poses[0].flip:
-        rig.confirm(
-            "mounting", "Is the sensor mounted face up on the table, its cable free to turn?", drawing="face-up"
-        )
-    levelled(rig)
+        raise SettingError("sweep: pose_list has all poses; use reference_every and face without pose_list only")
+    one_face = with_references(list(grid(inclinations_deg, step_deg, paths)), reference_every)
+    both_faces = [replace(pose, flip=flip) for flip in FLIPS[face] for pose in one_face]
+    poses = parse_poses(pose_list) if pose_list else both_faces
+    if poses[0].flip:
+        check_level(rig)
+    else:
+        prepare(rig)
     for pose in rig.missing(poses):
         rig.hold(pose, dwell_s, settle_s)
 
@@ -65,8 +65,8 @@ def grid(inclinations_deg: Sequence[float], step_deg: float, paths: Paths = "gri
         raise SettingError(f"sweep: step_deg is {step_deg:g}; give a step that divides 180 deg, such as 10")
     if not inclinations_deg:
         raise SettingError("sweep: inclinations_deg is empty; give at least one angle, such as 90")
-    both = [(alpha, -alpha) if paths == "ang" else (alpha,) for alpha in inclinations_deg]
-    for alpha in dict.fromkeys(float(alpha) for pair in both for alpha in pair):  # -0 is 0
+    signed = [(alpha, -alpha) if paths == "ang" else (alpha,) for alpha in inclinations_deg]
+    for alpha in dict.fromkeys(float(alpha) for pair in signed for alpha in pair):  # -0 is 0
         yield from turn(alpha, 0, 360, step_deg, "A+ to B-")
         yield from turn(alpha, 360, 0, step_deg, "B+ to A-")
         if paths == "ang" and alpha == 90:
@@ -75,8 +75,8 @@ def grid(inclinations_deg: Sequence[float], step_deg: float, paths: Paths = "gri
                 yield from turn(alpha, side, 0, step_deg, path)
 
 
-def referenced(poses: Sequence[Pose], every: int) -> list[Pose]:
-    """`poses` with the reference pose before the first, after every `every` of them, and after the last."""
+def with_references(poses: Sequence[Pose], every: int) -> list[Pose]:
+    """`poses` with a reference pose at the beginning, after every `every` poses, and at the end."""
     if not every:
         return list(poses)
     parts = [[REFERENCE, *poses[k : k + every]] for k in range(0, len(poses), every)]
@@ -84,7 +84,7 @@ def referenced(poses: Sequence[Pose], every: int) -> list[Pose]:
 
 
 def turn(alpha_deg: float, from_deg: float, to_deg: float, step_deg: float, path: str) -> Iterator[Pose]:
-    """Poses at one inclination from one angle of beta to another, both included."""
+    """Poses at one inclination from one angle of beta to another, with both ends."""
     direction = 1 if to_deg > from_deg else -1
     for k in range(round(abs(to_deg - from_deg) / step_deg) + 1):
         yield Pose(alpha_deg, from_deg + direction * k * step_deg, direction, path)

@@ -1,20 +1,20 @@
-"""temperature-cycle: a tumble at each temperature, the oven stepping up, then down.
+"""temperature-cycle: tumble the sensor at each temperature of an oven, in rising, then falling order.
 
 Excites   temperature effects on bias and scale factor, and their hysteresis.
-Blind to  ageing while one cycle lasts, which looks like hysteresis (two cycles tell them); the part of the loop that
-          an overshooting oven closes.
+Blind to  ageing during one cycle, which looks like hysteresis (two cycles separate them); hysteresis that an overshoot
+          of the oven removes.
 Source    IEEE 1293, temperature sensitivity; Book 17.3.12.
 """
 
 from __future__ import annotations
 
 from procedures.errors import SettingError
-from procedures.level_check import levelled
+from procedures.level_check import prepare
 from procedures.session import Session
 from procedures.tumbles import is_first, tumble
 
-SLICE_S = 60.0  # of a soak: how often the limits of temperature are looked at meanwhile
-DRIFTED_K = 3.0  # from the set point: an oven that stood still in an interruption
+SLICE_S = 60.0  # interval of the temperature checks in a soak
+DRIFTED_K = 3.0  # from the set point: the oven was off during an interruption
 
 
 def temperature_cycle(
@@ -26,16 +26,15 @@ def temperature_cycle(
     dwell_s: float = 5.0,
     settle_s: float = 0.5,
 ) -> None:
-    """Go through `temperatures_c` upwards and back, wait `soak_s` at each, then tumble the sensor.
+    """Step through `temperatures_c` in rising, then falling order. At each wait `soak_s`, then tumble the sensor.
 
-    The oven only heats: the lowest temperature must be above that of the powered sensor in the room. The oven is
-    switched off at the end, as it is when a run fails.
+    The oven cannot cool: the lowest temperature must be above the temperature of the powered sensor in the room. The
+    oven is switched off at the end, and when a run fails.
     """
     steps = staircase(temperatures_c, cycles)
     if min(soak_s, settle_s) < 0 or dwell_s <= 0:
-        raise SettingError("temperature-cycle: soak_s and settle_s must not be below 0, dwell_s must be above")
-    rig.confirm("mounting", "Is the sensor mounted face up on the table, its cable free to turn?", drawing="face-up")
-    levelled(rig)
+        raise SettingError("temperature-cycle: soak_s and settle_s must be 0 or more, dwell_s must be above 0")
+    prepare(rig)
     set_c = dict(steps)
     for pose in rig.missing(pose for path, _ in steps for pose in tumble(path)):
         _warm(rig, set_c[pose.path], soak_s, is_first(pose))
@@ -44,32 +43,33 @@ def temperature_cycle(
 
 
 def staircase(temperatures_c: tuple[float, ...], cycles: int) -> list[tuple[str, float]]:
-    """(path, set point) of every step: up, then down, of each cycle. Raises SettingError."""
+    """(path, set point in C) of every step: up, then down, in each cycle. Raises SettingError."""
     rising = sorted(set(temperatures_c))
     if len(rising) < 2:
-        given = f"{rising[0]:g} alone shows no slope" if rising else "there is none"
-        raise SettingError(f"temperature-cycle: temperatures_c must be at least two, such as 35,50,65; {given}")
+        raise SettingError("temperature-cycle: give at least two different temperatures_c, such as 35,50,65")
     if cycles < 1:
-        raise SettingError(f"temperature-cycle: cycles must be 1 or more, is {cycles}; two tell hysteresis from drift")
+        raise SettingError(
+            f"temperature-cycle: cycles is {cycles}; give 1 or more, 2 to separate hysteresis from drift"
+        )
     once = [*(("up", c) for c in rising), *(("down", c) for c in rising[-2::-1])]
-    return [(f"{way} {c:g} cycle {k}", c) for k in range(1, cycles + 1) for way, c in once]
+    return [(f"{branch} {c:g} cycle {k}", c) for k in range(1, cycles + 1) for branch, c in once]
 
 
 def _warm(rig: Session, set_c: float, soak_s: float, begins: bool) -> None:
-    """Have the oven at `set_c`; soak where a step begins, or where the oven has cooled in an interruption.
+    """Set the oven to `set_c`; soak at the beginning of a step, or if the oven has cooled during an interruption.
 
-    It is told before every pose, so that a run that goes on does as one that was not disturbed.
+    The oven gets its set point before every pose, so that a resumed run sends the same commands.
     """
     rig.oven.set_temperature(set_c)
     rig.oven.run(True)
-    shown_c = rig.oven.temperature_c()
-    if begins or shown_c is None or abs(shown_c - set_c) > DRIFTED_K:
+    actual_c = rig.oven.temperature_c()
+    if begins or actual_c is None or abs(actual_c - set_c) > DRIFTED_K:
         _soak(rig, soak_s)
 
 
 def _soak(rig: Session, soak_s: float) -> None:
-    left_s = soak_s
-    while left_s > 0:
-        rig.wait(min(SLICE_S, left_s))
+    remaining_s = soak_s
+    while remaining_s > 0:
+        rig.wait(min(SLICE_S, remaining_s))
         rig.check_temperature(rig.oven.temperature_c())
-        left_s -= SLICE_S
+        remaining_s -= SLICE_S

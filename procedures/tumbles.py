@@ -1,4 +1,4 @@
-"""A tumble test: the four positions in which each in-plane axis feels +1 g, 0 and -1 g, from both sides."""
+"""The tumble test: four positions at which the in-plane axes feel +1 g, 0 and -1 g, with beta rising and falling."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ QUARTERS_DEG = (0.0, 90.0, 180.0, 270.0)
 
 
 def tumble(path: str) -> Iterator[Pose]:
-    """Up and down again, so that what changes evenly in time is the same for every position."""
+    """The four positions with beta rising, then falling: a drift linear in time then has the same mean at each."""
     for beta_deg in QUARTERS_DEG:
         yield Pose(90.0, beta_deg, 1, path)
     for beta_deg in reversed(QUARTERS_DEG):
@@ -18,5 +18,5 @@ def tumble(path: str) -> Iterator[Pose]:
 
 
 def is_first(pose: Pose) -> bool:
-    """Whether `pose` begins a tumble: what shall come before one is done before it, and not again on the way."""
+    """Whether `pose` is the first of a tumble."""
     return (pose.beta_deg, pose.direction) == (QUARTERS_DEG[0], 1)

@@ -1,59 +1,59 @@
-"""What can go wrong in the application itself; each error carries the exit status that the contract gives it.
+"""Errors of the application, with the exit status of the command.
 
 RigError (2)             bad usage or bad input
-├── BenchError           the bench file: file, key and nearest key
-├── PlanError            a plan that cannot be made as asked
-├── RecordError          the record cannot be opened, or does not hold what is asked
-│   ├── UnknownRun       no run of this name; names the nearest
-│   └── LabAway          the lab's record cannot be reached, or not any more
-├── Busy                 another process works on this run, or with this instrument
-├── BeyondLimits         what is planned would pass a limit of the bench
-├── RunMismatch          the bench is not the one that the run was begun with
-├── ExportError          a format that is not there, or does not fit the run
-└── OutputError          a file cannot be written where it is wanted
-InstrumentFailed (3)     an instrument cannot be reached or fails; names role, address and remedy
-Stopped (4)              a person or a signal stopped the run, which `rig resume` finishes
+├── BenchError           a fault in the bench file: file, key, suggestion
+├── PlanError            the plan is not possible
+├── RecordError          the record cannot be opened, or does not have the data
+│   ├── UnknownRun       no run has this name; the message has a suggestion
+│   └── LabAway          there is no connection to the lab's record
+├── Busy                 another process uses this run or this instrument
+├── BeyondLimits         the plan exceeds a limit of the bench
+├── RunMismatch          the bench is not the bench of the run
+├── ExportError          the export format is unknown, or does not fit the run
+└── OutputError          a file cannot be written
+InstrumentFailed (3)     there is no connection to an instrument, or it fails; with role, address and remedy
+Stopped (4)              a person or a signal stopped the run; `rig resume` continues it
 """
 
 from __future__ import annotations
 
 
 class RigError(Exception):
-    """Bad usage or bad input; the message says what, where and what to do."""
+    """Bad usage or bad input. The message says what is wrong, where, and what to do."""
 
     exit_status = 2
 
 
 class BenchError(RigError):
-    """The bench file cannot be used as it is."""
+    """The bench file has a fault."""
 
 
 class PlanError(RigError):
-    """No plan can be made as asked."""
+    """The plan is not possible."""
 
 
 class RecordError(RigError):
-    """The record cannot be opened or does not hold what is asked."""
+    """The record cannot be opened, or does not have the data."""
 
 
 class UnknownRun(RecordError):
-    """No run of this name is in the record."""
+    """The record has no run with this name."""
 
 
 class LabAway(RecordError):
-    """The lab's record cannot be reached, or not any more."""
+    """There is no connection to the lab's record."""
 
 
 class Busy(RigError):
-    """Another process works on this run, or with this instrument."""
+    """Another process uses this run or this instrument."""
 
 
 class BeyondLimits(RigError):
-    """What is planned would pass a limit of the bench; a run of it would be refused or stopped."""
+    """The plan exceeds a limit of the bench, so a run would be refused or stopped."""
 
 
 class RunMismatch(RigError):
-    """The bench is not the one that the run was begun with."""
+    """The bench is not the bench of the run."""
 
 
 class ExportError(RigError):
@@ -61,17 +61,17 @@ class ExportError(RigError):
 
 
 class OutputError(RigError):
-    """A result cannot be written to this file."""
+    """A file cannot be written."""
 
 
 class InstrumentFailed(RigError):
-    """An instrument cannot be reached, or fails its check."""
+    """There is no connection to an instrument, or it fails its check."""
 
     exit_status = 3
 
 
 class Stopped(RigError):
-    """A person or a signal stopped the run; `by` is the signal's name: SIGINT is a person at the terminal."""
+    """A person or a signal stopped the run. `by` is the name of the signal: SIGINT is a person at the terminal."""
 
     exit_status = 4
 

@@ -1,26 +1,26 @@
-"""Runs in other formats.
+"""Export of runs in other formats.
 
-csv           the table that analysis takes, one row a pose
-event-model   documents as data-acquisition systems of large facilities exchange them: start, descriptor, events, stop;
-              one JSON object a line, {"name": .., "doc": ..}; raw samples stay in the record
+csv           the table for the analysis, one row for each pose
+event-model   the documents of the Bluesky event model: start, descriptor, events, stop; each line is one JSON object,
+              {"name": .., "doc": ..}; the samples stay in the record
 
-Parquet and HDF5 would each bring a large dependency for one table that every reader of them reads as CSV too.
+There is no Parquet and no HDF5: each needs a large dependency for one table, and their readers also read CSV.
 """
 
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Iterator
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 from uuid import NAMESPACE_URL, uuid5
 
-from calibrations.reading.read_csv import write_csv
+from calibrations.importing.foreign import write_csv
 from calibrations.table import Table
 from rig.analysis.data import load
 from rig.errors import ExportError
+from rig.files import require_out
 from rig.record import Record, Run
 from rig.record.measured import table_of
 
@@ -29,19 +29,16 @@ UNITS = {"deg": "deg", "v": "V", "s": "s", "c": "degC"}
 
 
 def export(data: str, kind: str, path: Path) -> int:
-    """Write `data` (a run or a file) to `path`, whole or not at all; the number of rows.
+    """Write `data` (a run or a file) to `path`, completely or not at all. Returns the number of rows.
 
-    Raises ExportError for a format that is not there, or that needs a run.
+    Raises ExportError for an unknown format, or a format that needs a run; OutputError without a folder.
     """
     if kind in ("parquet", "hdf5"):
-        raise ExportError(
-            f"{kind} is not written by this version; take --format csv, which every reader of {kind} reads"
-        )
-    if not path.parent.is_dir():
-        raise ExportError(f"{path}: there is no folder {path.parent}; make it, or name another file")
+        raise ExportError(f"this version does not write {kind}; use --format csv, which {kind} programs also read")
+    require_out(path)
     draft = path.with_name(f".{path.name}.part")
     rows = _write_events(data, draft) if kind == "event-model" else _write_csv(data, draft)
-    os.replace(draft, path)  # noqa: PTH105
+    draft.replace(path)
     return rows
 
 
@@ -53,7 +50,7 @@ def _write_csv(data: str, path: Path) -> int:
 
 def _write_events(data: str, path: Path) -> int:
     if Path(data).is_file():
-        raise ExportError(f"{data} is a file; event-model documents tell of a run of the record")
+        raise ExportError(f"{data} is a file; give the id of a run, because event-model documents describe a run")
     with Record.to_read() as record:
         run, table = record.run(data), table_of(record, data)
     lines = [json.dumps({"name": name, "doc": document}) for name, document in documents(run, table)]
@@ -62,7 +59,7 @@ def _write_events(data: str, path: Path) -> int:
 
 
 def documents(run: Run, table: Table) -> Iterator[tuple[str, dict[str, Any]]]:
-    """The run as event-model documents, (name, document). Their ids follow from the run's."""
+    """The run as event-model documents, (name, document). Their ids are derived from the id of the run."""
     start, descriptor = _uid(run.run, "start"), _uid(run.run, "descriptor")
     began = datetime.fromisoformat(run.created).timestamp()
     ended = datetime.fromisoformat(run.ended).timestamp() if run.ended else began

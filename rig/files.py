@@ -1,8 +1,9 @@
-"""Writing results: whole or not at all, and never over what they were made from."""
+"""Output files, the folder of the record, and free disk space."""
 
 from __future__ import annotations
 
 import os
+import shutil
 from contextlib import suppress
 from pathlib import Path
 
@@ -10,21 +11,42 @@ from rig.errors import OutputError
 
 
 def require_out(out: Path, *inputs: str | Path | None) -> None:
-    """A result needs a folder, and takes the place of nothing that it was made from."""
+    """Raises OutputError if the folder of `out` is missing, or if `out` is one of the input files."""
     if not out.parent.is_dir():
-        raise OutputError(f"{out}: there is no folder {out.parent}; make it, or name another file")
-    for given in inputs:
-        if given is not None and Path(given).exists() and out.exists() and out.samefile(given):
-            raise OutputError(f"{out}: would overwrite {given}, which this is made from; name another file")
+        raise OutputError(f"{out}: there is no folder {out.parent}; make it, or give another file")
+    for file in inputs:
+        if file is not None and Path(file).exists() and out.exists() and out.samefile(file):
+            raise OutputError(f"{out}: this would overwrite the input file {file}; give another file")
 
 
 def write_whole(out: Path, content: str | bytes) -> None:
-    """Write a file so that it appears whole or not at all. Raises OutputError."""
-    beside = out.with_name(f".{out.name}.{os.getpid()}")
+    """Write a file completely or not at all. Raises OutputError."""
+    draft = out.with_name(f".{out.name}.{os.getpid()}")
     try:
-        beside.write_bytes(content.encode() if isinstance(content, str) else content)
-        beside.replace(out)
+        draft.write_bytes(content.encode() if isinstance(content, str) else content)
+        draft.replace(out)
     except OSError as error:
         with suppress(OSError):
-            beside.unlink(missing_ok=True)
-        raise OutputError(f"{out}: cannot be written: {error.strerror}; name another file") from None
+            draft.unlink(missing_ok=True)
+        raise OutputError(f"{out}: cannot write the file: {error.strerror}; give another file") from None
+
+
+# The folder of the record is `RIG_HOME`, else the user's data folder.
+
+RECORD = "RIG_RECORD"  # URL of a lab's record, to read it instead of the rig's own
+LAB = "RIG_LAB"  # URL of the lab's record for `rig push`
+
+
+def home() -> Path:
+    """The folder of the record. The first write makes it."""
+    if named := os.environ.get("RIG_HOME"):
+        return Path(named).expanduser()
+    import platformdirs
+
+    return Path(platformdirs.user_data_dir("inertial-rig"))
+
+
+def free_bytes(folder: Path) -> int:
+    """Free bytes on the disk of `folder`, which need not exist yet."""
+    existing = next(place for place in (folder, *folder.resolve().parents) if place.exists())
+    return shutil.disk_usage(existing).free

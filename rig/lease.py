@@ -1,6 +1,6 @@
-"""Who works on a run or holds a wire: a lock on a file, which the kernel gives back however its holder ends.
+"""Locks of runs and wires: a lock on a file. The kernel releases it when the process ends.
 
-The file says who holds it, for whoever is refused: {"pid": 4711, "what": "run 20240502-...", "since": "14:03:22"}.
+The file names the process that holds the lock: {"pid": 4711, "what": "run 20240502-...", "since": "14:03:22"}.
 """
 
 from __future__ import annotations
@@ -18,22 +18,22 @@ from typing import Any
 from rig.errors import Busy
 
 FOLDER = "locks"
-ATTEMPTS, PAUSE_S = 20, 0.01  # who only looks whether it is held holds it for an instant
+ATTEMPTS, PAUSE_S = 20, 0.01  # `is_held` in another process holds the lock for an instant
 
 
 @contextmanager
 def lease(folder: Path, name: str, what: str) -> Iterator[None]:
-    """Hold `name`, for people `what`, among all processes that use `folder`. Raises Busy when another holds it."""
+    """Hold the lock `name` in `folder`; `what` names it for people. Raises Busy if another process holds it."""
     path = _path(folder, name)
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("a+", encoding="utf-8") as file:
-        if not _locked(file.fileno()):
-            raise Busy(f"{_who(path)} works on {what}; let it finish, or stop it with Ctrl-C")
+        if not _lock(file.fileno()):
+            raise Busy(f"{_describe_holder(path)} uses {what}; wait until it ends, or stop it with Ctrl-C")
         since = datetime.now().astimezone()
         file.truncate(0)
         json.dump({"pid": os.getpid(), "what": what, "since": f"{since:%Y-%m-%d %H:%M:%S}"}, file)
         file.flush()
-        yield  # the file stays: were it removed, two could hold a lock of its name
+        yield  # the file stays: without it two processes could hold locks with the same name
 
 
 def is_held(folder: Path, name: str) -> bool:
@@ -48,8 +48,8 @@ def is_held(folder: Path, name: str) -> bool:
     return False
 
 
-def _locked(fileno: int) -> bool:
-    """Whether the lock could be had."""
+def _lock(fileno: int) -> bool:
+    """Lock the file. Returns False if another process holds the lock."""
     for attempt in range(ATTEMPTS):
         with suppress(BlockingIOError):
             fcntl.flock(fileno, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -59,8 +59,8 @@ def _locked(fileno: int) -> bool:
     return False
 
 
-def _who(path: Path) -> str:
-    """The holder of a lock: its process, since when, and the run that it is at."""
+def _describe_holder(path: Path) -> str:
+    """The process that holds a lock, its start, and its run."""
     holder = _holder(path)
     if not holder:
         return "another process"
@@ -71,7 +71,7 @@ def _who(path: Path) -> str:
 
 
 def _holder(path: Path) -> dict[str, Any]:
-    """What a lock's file says of who held it last; nothing where it cannot be read."""
+    """The last holder according to the file; empty if the file cannot be read."""
     with suppress(OSError, ValueError):
         document = json.loads(path.read_text(encoding="utf-8"))
         if isinstance(document, dict) and {"pid", "what", "since"} <= document.keys():

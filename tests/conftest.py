@@ -19,6 +19,10 @@ hypothesis.settings.register_profile("steady", derandomize=True, deadline=None, 
 hypothesis.settings.load_profile("steady")
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--update-golden", action="store_true", help="write the transcripts of tests/golden anew")
+
+
 @pytest.fixture(autouse=True)
 def rig_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The record's folder; nothing is written outside the test's own."""

@@ -1,10 +1,10 @@
-"""What a sensor's user runs: a calibrated model turned round, from outputs to specific force, as source text.
+"""Compensation: a calibrated model inverted, from outputs to specific force, as source text for a user's product.
 
-graph, operations   arithmetic as a graph: what a product computes, and nothing else
-traced, forward     a model's effects as such a graph, from specific force to output
-interval, bound     what the graph can come to over a range, and how fast the way back closes in
-inverse             the way back: a fixed number of steps with a proven bound
-program             it as straight lines of code, and their count
-cost                what is left out costs, and what the parameters' uncertainties do
-c99, python, json   writers
+graph               arithmetic as a graph
+trace, forward      a model's effects as a graph, from specific force to output
+bound               interval arithmetic over the graph, and the proved contraction of the inverse
+inverse             the inverse: a fixed number of steps with a proved bound
+program             the inverse as lines of code, and its operations
+cost                errors due to effects left out, and uncertainty due to the parameters
+c99, python_source, document    writers
 """

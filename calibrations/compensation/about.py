@@ -1,4 +1,4 @@
-"""What every written compensation says of itself: where it comes from, units, range, bound, costs, uncertainties."""
+"""The description in each compensation: origin, units, range, bound, errors, uncertainties."""
 
 from __future__ import annotations
 
@@ -7,27 +7,27 @@ from dataclasses import dataclass
 from decimal import ROUND_CEILING, Context
 from textwrap import wrap
 
-from calibrations.compensation.cost import Size
+from calibrations.compensation.cost import ErrorSize
 from calibrations.compensation.forward import FORCES, INVERTED, LEFT_OUT, NOISE, OF_THE_RIG
 from calibrations.compensation.inverse import Compensation
 from calibrations.model import Estimate
-from calibrations.numerals import as_written
+from calibrations.presentation.text import as_written
 
 WIDTH = 112
 UPWARD = Context(prec=3, rounding=ROUND_CEILING)  # bounds are not rounded down
-IN = {
+UNIT_TEXT = {
     "g": "g, the local gravity of the calibration",
     "field": "shares of the field at the calibration",
     "deg/s": "deg/s",
 }
-SAID = {"data": "data", "data_sha256": "SHA-256 of the data", "created": "calibrated", "sensor": "sensor",
+PROVENANCE_TITLES = {"data": "data", "data_sha256": "SHA-256 of the data", "created": "calibrated", "sensor": "sensor",
         "serial": "serial number", "gravity_m_s2": "local gravity, m/s^2"}  # fmt: skip
 UNITS = {"temperature_c": "C", "supply_v": "V", "t_s": "s since the power came on"}
 
 
 @dataclass(frozen=True)
 class Origin:
-    """The model file by name and digest, the program that wrote the source, and when."""
+    """Name and digest of the model file, the program that wrote the source, and the date."""
 
     name: str
     model_file: str
@@ -36,29 +36,29 @@ class Origin:
     date: str
 
 
-def lines(made: Compensation, origin: Origin) -> list[str]:
-    """The head of a source file, wrapped; an empty line parts its sections."""
+def header_lines(made: Compensation, origin: Origin) -> list[str]:
+    """The head of a source file, wrapped; an empty line separates its sections."""
     sections = [_what(made, origin), _inputs(made), _how(made), _effects(made), _uncertainty(made), _parameters(made)]
     return [line for section in sections for line in [*(w for text in section for w in _wrapped(text)), ""]][:-1]
 
 
-def shown(value: float, unit: str) -> str:
-    """An error in the unit of what is sensed, or its thousandth for g."""
+def error_text(value: float, unit: str) -> str:
+    """An error in the unit of the sensed quantity; in mg for g."""
     return f"{1e3 * value:.2g} mg" if unit == "g" else f"{value:.2g} {unit}"
 
 
-def steps(made: Compensation) -> str:
+def steps_text(made: Compensation) -> str:
     """`7 steps`."""
     return f"{made.bound.steps} step{'s' if made.bound.steps > 1 else ''}"
 
 
-def upward(bound: float) -> str:
-    """A bound to three digits, never less than it is."""
+def round_up(bound: float) -> str:
+    """A bound to three digits, rounded up."""
     return f"{float(UPWARD.create_decimal(bound)):.3g}"
 
 
 def unit_of_input(name: str, made: Compensation) -> str:
-    """The unit of one of the program's inputs."""
+    """The unit of an input of the program."""
     if name[0] == "v" and name[1:] in made.forward.axes:
         return made.model.unit or "V"
     if name in ("ax", "ay", "az"):
@@ -66,7 +66,7 @@ def unit_of_input(name: str, made: Compensation) -> str:
     return UNITS.get(name, "as in the calibration")
 
 
-def operations(made: Compensation) -> str:
+def operations_text(made: Compensation) -> str:
     """`113 add, 102 multiply: 215 a sample`."""
     count: Mapping[str, int] = made.program.operations
     return f"{', '.join(f'{n} {kind}' for kind, n in count.items())}: {sum(count.values())} a sample"
@@ -82,9 +82,9 @@ def _wrapped(text: str) -> list[str]:
 def _what(made: Compensation, origin: Origin) -> Iterator[str]:
     model = made.model
     yield f"{origin.name}: from outputs to {_sensed(made)} along the reference axes, by the model {model.name}."
-    yield f"  in {IN[made.unit]}"
+    yield f"  in {UNIT_TEXT[made.unit]}"
     yield f"  model file  {origin.model_file}, SHA-256 {origin.sha256}"
-    for key, title in SAID.items():
+    for key, title in PROVENANCE_TITLES.items():
         if key in model.provenance:
             yield f"  {title}  {as_written(model.provenance[key])}"
     yield f"  written by {origin.program} on {origin.date}"
@@ -104,29 +104,29 @@ def _inputs(made: Compensation) -> Iterator[str]:
         yield f"  v{axis}  output of the {axis} axis, {unit_of_input(f'v{axis}', made)}"
     for name, (low, high) in made.beside.items():
         yield f"  {name}  {unit_of_input(name, made)}, from {low:g} to {high:g}{_of_axis(name, made)}"
-    yield f"Proved for +-{made.range.reach:g} {made.unit} on each axis; beyond these ranges nothing is."
+    yield f"Proved for +-{made.range.reach:g} {made.unit} on each axis; not beyond these ranges."
 
 
 def _of_axis(name: str, made: Compensation) -> str:
     if name not in ("ax", "ay", "az"):
         return ""
     if (size := made.costs.out_of_gravity) is None:
-        return "; this axis is not measured: give it by another sensor"
+        return "; this axis is not measured: use another sensor for it"
     return (
-        "; this axis is not measured. Give it by another sensor; or, where nothing but gravity acts, take the function "
-        f"for that, which finds it from the others and the side that is up. That costs {_size(size, made.unit)}"
+        "; this axis is not measured. Use another sensor for it; or, if only gravity acts, the function in_gravity, "
+        f"which computes it from the other axes and the side that is up, with an error of {_size(size, made.unit)}"
     )
 
 
 def _how(made: Compensation) -> Iterator[str]:
     bound = made.bound
-    left = f"q^{bound.steps} x {made.range.reach:g} {made.unit} = {upward(bound.within)} {made.unit}"
+    left = f"q^{bound.steps} x {made.range.reach:g} {made.unit} = {round_up(bound.within)} {made.unit}"
     yield (
-        f"Method: a <- a + C (v - G(a)), {steps(made)} from a = 0. Each step comes nearer by the factor "
-        f"q <= {upward(bound.q)}, proved over the whole range by interval arithmetic; what is left after the last is "
-        f"below {left}, rounding aside."
+        f"Method: a <- a + C (v - G(a)), {steps_text(made)} from a = 0. Each step reduces the error by the factor "
+        f"q <= {round_up(bound.q)}, proved over the whole range by interval arithmetic; the remaining error is "
+        f"below {left}, without rounding."
     )
-    yield f"Operations: {operations(made)}."
+    yield f"Operations: {operations_text(made)}."
 
 
 def _effects(made: Compensation) -> Iterator[str]:
@@ -137,32 +137,31 @@ def _effects(made: Compensation) -> Iterator[str]:
     if remembering := made.forward.remembering:
         yield (
             f"With a history: {', '.join(remembering)}. Give every sample, in order: {len(made.forward.memory)} "
-            "numbers are remembered from one to the next, 0 before the first. Until the way has turned round at both "
-            "ends of what the sensor comes through, the true history is not known."
+            "numbers are stored between samples, 0 before the first. The true history is unknown until the input "
+            "has turned round at both ends of its range."
         )
     if rigs := by_how.get(OF_THE_RIG):
-        yield f"Of the rig, not of the sensor, and dropped: {', '.join(rigs)}."
+        yield f"Effects of the rig, not compensated: {', '.join(rigs)}."
     if noise := by_how.get(NOISE):
-        yield f"Noise, which no inverse takes off: {', '.join(noise)}."
+        yield f"Noise, not compensated: {', '.join(noise)}."
     for fate in made.forward.fates:
         if fate.how == LEFT_OUT:
             size = made.costs.left_out[fate.effect]
-            cost = "what this costs is not computed: a sweep does not show it"
-            yield f"Left out: {fate.effect}, because {fate.why}; {f'costs {_size(size, made.unit)}' if size else cost}."
+            cost = "the error is not computed: a sweep does not excite it"
+            yield f"Left out: {fate.effect}, because {fate.why}; {f'error {_size(size, made.unit)}' if size else cost}."
 
 
-def _size(size: Size, unit: str) -> str:
-    return (
-        f"{shown(size.rms, unit)} rms and {shown(size.most, unit)} at most in a simulated sweep over the stated ranges"
-    )
+def _size(size: ErrorSize, unit: str) -> str:
+    rms, most = error_text(size.rms, unit), error_text(size.most, unit)
+    return f"{rms} rms and {most} at most in a simulated sweep over the stated ranges"
 
 
-def covered(made: Compensation) -> str:
-    """What the data of the calibration covered beside the directions, and which stated ranges go further."""
+def coverage_text(made: Compensation) -> str:
+    """The temperatures, supplies and times of the calibration data, and stated ranges beyond them."""
     known = made.model.covered
     if not known:
         return (
-            "The model file does not say at what temperature, supply or time it was calibrated. Wherever that was not, "
+            "The model file does not give the temperature, supply and time of its calibration. Outside of them "
             "the model is extrapolated."
         )
     said = ", ".join(f"{name} {_span(name, known[name], made)}" for name in known)
@@ -174,18 +173,19 @@ def covered(made: Compensation) -> str:
     return f"{text}. The stated range goes beyond in {', '.join(beyond)}." if beyond else f"{text}."
 
 
-def uncertainty(made: Compensation) -> str:
-    """The standard uncertainty by those of the parameters: where they were found, and the greatest of all."""
+def uncertainty_text(made: Compensation) -> str:
+    """The standard uncertainty due to the parameters, over the data's coverage and at its maximum."""
     found = made.costs.parameters
     if found is None:
         return "Uncertainty: the model file has none."
     where = ", ".join(f"{name} {_span(name, span, made)}" for name, span in found.within.items())
     at = ", ".join(f"{name} {value:.6g}" for name, value in found.at.items())
+    rms, most, largest = (error_text(value, made.unit) for value in (found.rms, found.most, found.largest))
     return (
-        "Standard uncertainty of the result by those of the parameters, taken as independent (a model file has no "
-        f"correlations): {shown(found.rms, made.unit)} rms, {shown(found.most, made.unit)} at most over the sphere of "
-        f"directions{f' with {where}' if where else ''}; {shown(found.largest, made.unit)} at most over the whole "
-        f"stated range{f', at {at}' if at else ''}. Noise and what the model misses are not in it."
+        "Standard uncertainty of the result from the parameters, taken as independent (a model file has no "
+        f"correlations): {rms} rms, {most} at most over the sphere of directions{f' with {where}' if where else ''}; "
+        f"{largest} at most over the whole stated range{f', at {at}' if at else ''}. "
+        "Noise and errors of the model are not included."
     )
 
 
@@ -195,8 +195,8 @@ def _span(name: str, span: tuple[float, float], made: Compensation) -> str:
 
 
 def _uncertainty(made: Compensation) -> Iterator[str]:
-    yield uncertainty(made)
-    yield covered(made)
+    yield uncertainty_text(made)
+    yield coverage_text(made)
 
 
 def _parameters(made: Compensation) -> Iterator[str]:

@@ -1,12 +1,12 @@
-"""How fast the way back closes in on the specific force, proved over the whole range.
+"""Contraction of the inverse, proved over the whole range by interval arithmetic.
 
-    a <- a + C (V - G(a)),   from a = 0        C: the inverse of dG/da at 0 g, in the middle of what else is given
+    a <- a + C (V - G(a)),   from a = 0        C: the inverse of dG/da at 0 g, in the middle of the other inputs
 
-G is the model from specific force to output. For each box of the range the slopes of this step, 1 - C G'(a), are
-bounded by interval arithmetic; the greatest row sum of their magnitudes is p on the range +-r itself. A true a within
-it is a fixed point, and the way from 0 to it lies within: the first step comes within p r of a. With q the same on the
-range made wider by p, no later step leaves that, and each comes nearer by the factor q < 1 (Banach): n steps leave less
-than q^n r, in the maximum norm. What is remembered from earlier samples may be anything.
+G is the model from specific force to output. For each box of the range, interval arithmetic bounds the slopes of this
+step, 1 - C G'(a); p is the greatest row sum of their magnitudes on the range +-r. A true a in it is a fixed point, and
+the first step from 0 ends within p r of a. q is the same on the range widened by p: no later step leaves that range,
+and
+each reduces the error by q < 1 (Banach). So n steps leave less than q^n r in the maximum norm, for any stored history.
 
 Source  Krawczyk, Computing 4 (1969); Moore, Kearfott and Cloud (2009), chapter 8.
 """
@@ -14,24 +14,235 @@ Source  Krawczyk, Computing 4 (1969); Moore, Kearfott and Cloud (2009), chapter 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from calibrations.compensation.graph import Node, names
-from calibrations.compensation.interval import Interval, over, point
+from calibrations.compensation.graph import OPERATIONS, Node, sort_nodes, variable_names
 from calibrations.table import Array
 
-PARTS, PARTS_OF_OTHERS, MOST_BOXES = 8, 4, 4_000
+# What a graph can come to over a range, and how steeply: interval arithmetic, rounded outwards.
+#
+# A value is a pair of arrays (low, high), one entry for each box of the range; its slopes are such pairs with a row
+# for each variable, by the rules of derivatives. Where a function has a corner both slopes are in the interval, so
+# that the mean value theorem holds (Clarke); where it jumps the slope is without bound.
+#
+# Source  Moore, Kearfott and Cloud, Introduction to Interval Analysis (2009), chapters 2, 5 and 6.
+
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Interval:
+    """Bounds, each of any one shape."""
+
+    low: Array
+    high: Array
+
+    def __add__(self, other: Interval) -> Interval:
+        return _outward(self.low + other.low, self.high + other.high)
+
+    def __neg__(self) -> Interval:
+        return Interval(-self.high, -self.low)
+
+    def __sub__(self, other: Interval) -> Interval:
+        return self + -other
+
+    def __mul__(self, other: Interval) -> Interval:
+        with np.errstate(invalid="ignore"):
+            each = [np.nan_to_num(x * y, nan=0.0, posinf=np.inf, neginf=-np.inf) for x in self.ends for y in other.ends]
+        return _outward(np.minimum.reduce(each), np.maximum.reduce(each))
+
+    def __truediv__(self, other: Interval) -> Interval:
+        with np.errstate(divide="ignore"):
+            inverse = _outward(1 / other.high, 1 / other.low)
+        across = (other.low <= 0) & (other.high >= 0)
+        endless = Interval(np.where(across, -np.inf, inverse.low), np.where(across, np.inf, inverse.high))
+        return self * endless
+
+    @property
+    def ends(self) -> tuple[Array, Array]:
+        return self.low, self.high
+
+    @property
+    def magnitude(self) -> Array:
+        """The greatest absolute value."""
+        return np.asarray(np.maximum(np.abs(self.low), np.abs(self.high)))
+
+    @property
+    def zero(self) -> Flags:
+        """Where the interval is exactly 0."""
+        return np.asarray((self.low == 0) & (self.high == 0))
+
+    def monotone(self, name: str) -> Interval:
+        """A function that only grows."""
+        with np.errstate(all="ignore"):
+            return _outward(*(np.asarray(OPERATIONS[name].apply(end)) for end in (self.low, self.high)))
+
+
+def point_interval(values: Array) -> Interval:
+    """Known numbers as intervals."""
+    return Interval(values, values)
+
+
+def evaluate_interval(
+    roots: Iterable[Node], ranges: Mapping[str, Interval], by: tuple[str, ...]
+) -> list[tuple[Interval, Interval]]:
+    """Each root's values, shape (boxes,), and its slopes by the variables `by`, shape (len(by), boxes)."""
+    roots = list(roots)
+    n = np.shape(next(iter(ranges.values())).low)
+    found: dict[Node, tuple[Interval, Interval]] = {}
+    for node in sort_nodes(roots):
+        if node.operation == "given":
+            own = np.array([float(name == node.name) for name in by]).reshape(-1, *(1 for _ in n))
+            found[node] = ranges[node.name], point_interval(np.broadcast_to(own, (len(by), *n)).copy())
+        elif node.constant:
+            found[node] = point_interval(np.full(n, node.value)), point_interval(np.zeros((len(by), *n)))
+        else:
+            found[node] = _applied(node.operation, *(found[inner] for inner in node.inner))
+    return [found[root] for root in roots]
+
+
+Pair = tuple[Interval, Interval]
+
+
+def _applied(name: str, *inner: Pair) -> Pair:
+    (x, dx), *more = inner
+    match name:
+        case "+":
+            ((y, dy),) = more
+            return x + y, dx + dy
+        case "-":
+            ((y, dy),) = more
+            return x - y, dx - dy
+        case "*":
+            ((y, dy),) = more
+            return (_squared(x) if inner[0] is inner[1] else x * y), dx * y + x * dy
+        case "/":
+            ((y, dy),) = more
+            ratio = x / y
+            return ratio, (dx - ratio * dy) / y
+        case "neg":
+            return -x, -dx
+        case "min" | "max":
+            return _extreme(name, (x, dx), more[0])
+        case "abs":
+            return _extreme("max", (x, dx), (-x, -dx))
+        case "where":
+            return _chosen((x, dx), *more)
+        case "exp":
+            value = x.monotone("exp")
+            return value, value * dx
+        case "log":
+            real = Interval(np.where(x.low > 0, x.low, np.nan), x.high)
+            return _known(real.monotone("log")), dx / x
+        case "sqrt":
+            real = Interval(np.where(x.low >= 0, x.low, np.nan), x.high)
+            value = _known(real.monotone("sqrt"))
+            return value, dx / (value + value)
+        case "sin":
+            return _wave(x), _wave(x, np.pi / 2) * dx
+        case "cos":
+            return _wave(x, np.pi / 2), -_wave(x) * dx
+    return _stepped(name, inner)
+
+
+def _outward(low: Array, high: Array) -> Interval:
+    """The interval widened by two units in the last place, for rounding."""
+    return Interval(_next(_next(low, -np.inf), -np.inf), _next(_next(high, np.inf), np.inf))
+
+
+def _next(value: Array, to: float) -> Array:
+    """The next number; an exact 0 stays 0, so that a product with 0 is 0."""
+    return np.where(value == 0, value, np.nextafter(value, to))
+
+
+def _squared(x: Interval) -> Interval:
+    ends = np.array([x.low**2, x.high**2])
+    return _outward(np.where((x.low <= 0) & (x.high >= 0), 0.0, ends.min(axis=0)), ends.max(axis=0))
+
+
+def _hull(x: Interval, y: Interval) -> Interval:
+    return Interval(np.minimum(x.low, y.low), np.maximum(x.high, y.high))
+
+
+def _picked(first: Flags, second: Flags, x: Interval, y: Interval) -> Interval:
+    """x where the first flag is sure, y where the second is, else their hull."""
+    both = _hull(x, y)
+    low = np.where(first, x.low, np.where(second, y.low, both.low))
+    return Interval(low, np.where(first, x.high, np.where(second, y.high, both.high)))
+
+
+def _extreme(name: str, first: Pair, second: Pair) -> Pair:
+    (x, dx), (y, dy) = first, second
+    if name == "min":
+        return (
+            Interval(np.minimum(x.low, y.low), np.minimum(x.high, y.high)),
+            _picked(x.high < y.low, y.high < x.low, dx, dy),
+        )
+    return (
+        Interval(np.maximum(x.low, y.low), np.maximum(x.high, y.high)),
+        _picked(x.low > y.high, y.low > x.high, dx, dy),
+    )
+
+
+def _chosen(condition: Pair, yes: Pair, no: Pair) -> Pair:
+    """A choice: slope of either branch; a jump where the condition follows the variables."""
+    c, dc = condition
+    surely, surely_not = (c.low > 0) | (c.high < 0), c.zero
+    value = _picked(surely, surely_not, yes[0], no[0])
+    slopes = _picked(surely, surely_not, yes[1], no[1])
+    jumps = ~(surely | surely_not) & ~dc.zero.all(axis=0)
+    return value, Interval(np.where(jumps, -np.inf, slopes.low), np.where(jumps, np.inf, slopes.high))
+
+
+def _stepped(name: str, inner: tuple[Pair, ...]) -> Pair:
+    """Comparisons and signs: flat, with a jump where the variables decide."""
+    (x, dx), (y, dy) = (
+        inner
+        if len(inner) == 2
+        else (inner[0], (point_interval(0 * inner[0][0].low), point_interval(0 * inner[0][1].low)))
+    )
+    apply = OPERATIONS[name].apply
+    ends = [np.asarray(apply(p, q) if len(inner) == 2 else apply(p), float) for p in x.ends for q in y.ends]
+    apart = (x.high < y.low) | (y.high < x.low)
+    least = -1.0 if name == "sign" else 0.0
+    low = np.where(apart, np.minimum.reduce(ends), least)
+    high = np.where(apart, np.maximum.reduce(ends), 1.0)
+    jumps = ~apart & ~(dx.zero & dy.zero).all(axis=0)
+    flat = np.zeros_like(dx.low)
+    return Interval(low, high), Interval(np.where(jumps, -np.inf, flat), np.where(jumps, np.inf, flat))
+
+
+def _wave(x: Interval, ahead: float = 0.0) -> Interval:
+    """The sine of x + ahead."""
+    low, high = x.low + ahead, x.high + ahead
+    ends = np.array([np.sin(low), np.sin(high)])
+    turns = {
+        k: np.floor((high - k * np.pi / 2) / (2 * np.pi)) >= np.ceil((low - k * np.pi / 2) / (2 * np.pi))
+        for k in (1, -1)
+    }
+    wide = _outward(ends.min(axis=0), ends.max(axis=0))
+    return Interval(np.where(turns[-1], -1.0, wide.low - 1e-15), np.where(turns[1], 1.0, wide.high + 1e-15))
+
+
+def _known(x: Interval) -> Interval:
+    """Unbounded where there is no number."""
+    none = np.isnan(x.low) | np.isnan(x.high)
+    return Interval(np.where(none, -np.inf, x.low), np.where(none, np.inf, x.high))
+
+
+BOXES_PER_AXIS, BOXES_PER_INPUT, MOST_BOXES = 8, 4, 4_000
 MOST_STEPS = 200
-ANYTHING = (-math.inf, math.inf)
-SMALL = 1e-12  # a factor below is that of a straight line, and one step is enough
+UNBOUNDED = (-math.inf, math.inf)
+SMALLEST_FACTOR = 1e-12  # below it the model is a straight line, and one step suffices
 
 
 @dataclass(frozen=True)
 class Bound:
-    """`q` is the factor by which each step comes nearer, `steps` how many leave less than `within`, both proved.
+    """`q`: proved error reduction of a step; `steps`: number of steps with a remaining error below `within`.
 
     `C` has shape (axes, axes), in g per unit of output.
     """
@@ -42,7 +253,7 @@ class Bound:
     within: float
 
 
-def bound(
+def prove_bound(
     outputs: Sequence[Node],
     sought: tuple[str, ...],
     reach: float,
@@ -50,12 +261,12 @@ def bound(
     want: float,
     memory: tuple[str, ...] = (),
 ) -> Bound | None:
-    """The bound for a true value of each of `sought` within +-`reach` and of `others` within their ranges.
+    """The bound for true values of `sought` within +-`reach` and of `others` within their ranges.
 
-    None where the steps cannot be shown to close in.
+    None where the contraction cannot be proved.
     """
-    others = {name: others[name] for name in names(outputs) if name not in {*sought, *memory}}
-    others |= dict.fromkeys(memory, ANYTHING)
+    others = {name: others[name] for name in variable_names(outputs) if name not in {*sought, *memory}}
+    others |= dict.fromkeys(memory, UNBOUNDED)
     slopes = _slopes_in_the_middle(outputs, sought, others)
     if not np.isfinite(slopes).all() or abs(np.linalg.det(slopes / (np.max(np.abs(slopes)) or 1.0))) < 1e-9:
         return None
@@ -64,7 +275,7 @@ def bound(
     q = _greatest(outputs, sought, (1 + first) * reach, others, C) if first < 1 else first
     if not q < 1:
         return None
-    steps = max(1, math.ceil(math.log(want / reach) / math.log(max(q, SMALL))))
+    steps = max(1, math.ceil(math.log(want / reach) / math.log(max(q, SMALLEST_FACTOR))))
     return Bound(C, q, steps, q**steps * reach) if steps <= MOST_STEPS else None
 
 
@@ -72,43 +283,43 @@ def _slopes_in_the_middle(
     outputs: Sequence[Node], sought: tuple[str, ...], others: Mapping[str, tuple[float, float]]
 ) -> Array:
     """d output / d a at 0 g, shape (axes, axes)."""
-    at = {name: point(np.zeros(1)) for name in sought}
+    at = {name: point_interval(np.zeros(1)) for name in sought}
     at |= {name: _middle(ends) for name, ends in others.items()}
-    found = over(outputs, at, sought)
+    found = evaluate_interval(outputs, at, sought)
     with np.errstate(invalid="ignore"):  # of a jump at 0: no number
         return np.array([(d.low[:, 0] + d.high[:, 0]) / 2 for _, d in found])
 
 
 def _middle(ends: tuple[float, float]) -> Interval:
-    """Of a range; of anything there is none."""
-    low, high = ends if ends == ANYTHING else (sum(ends) / 2, sum(ends) / 2)
+    """The middle of a range; an unbounded range stays unbounded."""
+    low, high = ends if ends == UNBOUNDED else (sum(ends) / 2, sum(ends) / 2)
     return Interval(np.array([low]), np.array([high]))
 
 
 def _greatest(
     outputs: Sequence[Node], sought: tuple[str, ...], reach: float, others: Mapping[str, tuple[float, float]], C: Array
 ) -> float:
-    """The greatest row sum of |1 - C G'| over the boxes that the range is cut into."""
+    """The greatest row sum of |1 - C G'| over the boxes of the range."""
     ranges = _boxes(dict.fromkeys(sought, (-reach, reach)), others)
-    slopes = [d for _, d in over(outputs, ranges, sought)]
+    slopes = [d for _, d in evaluate_interval(outputs, ranges, sought)]
     boxes = slopes[0].low.shape[1]
     worst = np.zeros(boxes)
     for i in range(len(sought)):
         row = np.zeros(boxes)
         for j in range(len(sought)):
-            entry = point(np.full(boxes, float(i == j)))
+            entry = point_interval(np.full(boxes, float(i == j)))
             for k, d in enumerate(slopes):
-                entry = entry - point(np.full(boxes, C[i, k])) * Interval(d.low[j], d.high[j])
+                entry = entry - point_interval(np.full(boxes, C[i, k])) * Interval(d.low[j], d.high[j])
             row += entry.magnitude
         worst = np.maximum(worst, row)
     return float(np.max(worst)) if np.isfinite(worst).all() else math.inf
 
 
 def _boxes(sought: Mapping[str, tuple[float, float]], others: Mapping[str, tuple[float, float]]) -> dict[str, Interval]:
-    """The range cut into boxes, every combination of parts of each variable that has ends."""
-    endless = [name for name, ends in others.items() if ends == ANYTHING]
+    """The range divided into boxes: every combination of parts of the bounded variables."""
+    endless = [name for name, ends in others.items() if ends == UNBOUNDED]
     others = {name: ends for name, ends in others.items() if name not in endless}
-    parts = [PARTS] * len(sought) + [PARTS_OF_OTHERS] * len(others)
+    parts = [BOXES_PER_AXIS] * len(sought) + [BOXES_PER_INPUT] * len(others)
     while math.prod(parts) > MOST_BOXES:
         parts = [max(1, n // 2) for n in parts]
     everything = {**sought, **others}

@@ -1,21 +1,21 @@
 """The compensation as C99: a header, a source, and a self-test. No allocation, one loop of fixed length.
 
-The only state is what a model with a history remembers from one sample to the next: a structure of the caller's.
+The only state is the history of a model with memory: a structure that the caller owns.
 """
 
 from __future__ import annotations
 
-from calibrations.compensation.about import Origin, lines, unit_of_input
+from calibrations.compensation.about import Origin, header_lines, unit_of_input
 from calibrations.compensation.cost import PASSES
+from calibrations.compensation.document import ReferenceVectors
+from calibrations.compensation.graph import OPERATIONS
 from calibrations.compensation.inverse import Compensation
-from calibrations.compensation.operations import OPERATIONS
 from calibrations.compensation.program import Line
-from calibrations.compensation.vectors import Vectors
 
 SUFFIX = {"double": "", "float": "f"}
 
 
-def files(made: Compensation, origin: Origin, checks: Vectors) -> dict[str, str]:
+def files(made: Compensation, origin: Origin, checks: ReferenceVectors) -> dict[str, str]:
     """The three files by name."""
     n = origin.name
     return {
@@ -27,7 +27,11 @@ def files(made: Compensation, origin: Origin, checks: Vectors) -> dict[str, str]
 
 def _header(made: Compensation, origin: Origin) -> str:
     n, program = origin.name, made.program
-    about = "\n".join(f" * {line}".rstrip() for line in lines(made, origin)).replace("*/", "* /").replace("/*", "/ *")
+    about = (
+        "\n".join(f" * {line}".rstrip() for line in header_lines(made, origin))
+        .replace("*/", "* /")
+        .replace("/*", "/ *")
+    )
     inputs = "\n".join(f"    {n}_real {name}; /* {unit_of_input(name, made)} */" for name in program.inputs)
     outputs = "\n".join(f"    {n}_real {name}; /* {made.unit} */" for name in program.sought)
     return f"""/*
@@ -103,7 +107,7 @@ typedef struct {{
 
 
 def _remembered(made: Compensation, n: str, f: str) -> str:
-    """What the next sample is given, from what was found."""
+    """The stored values for the next sample."""
     program = made.program
     if not program.remembered:
         return ""
@@ -116,7 +120,7 @@ def _remembered(made: Compensation, n: str, f: str) -> str:
 
 
 def _is_used(name: str, made: Compensation) -> bool:
-    """Whether what is remembered follows it: a compiler warns of what is not used."""
+    """Whether stored values depend on it: compilers warn of unused variables."""
     program = made.program
     return any(name in line.inner for line in program.after) or name in program.remembered.values()
 
@@ -156,7 +160,7 @@ def _in_gravity(made: Compensation, n: str, f: str) -> str:
 """
 
 
-def _self_test(made: Compensation, n: str, checks: Vectors) -> str:
+def _self_test(made: Compensation, n: str, checks: ReferenceVectors) -> str:
     f, program = SUFFIX[made.precision], made.program
     zeros = ", ".join(["0"] * len(program.remembered))
     memory, given = (f"    {n}_memory memory = {{{zeros}}};\n", ", &memory") if program.remembered else ("", "")

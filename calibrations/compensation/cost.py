@@ -7,19 +7,173 @@ from both sides, while temperature, supply and what a user added go up and down 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
-from calibrations.chain import Step, nominal_pose, respond, sensed, specific_force
 from calibrations.compensation.forward import FORCES, INVERTED, Forward, steps_of
-from calibrations.compensation.memory import memory_at
 from calibrations.compensation.program import Program
-from calibrations.compensation.uncertainty import Span, Uncertainty, uncertainty
 from calibrations.errors import CalibrationError
-from calibrations.model import Model
-from calibrations.table import Array, Table
+from calibrations.geometry.orientation import nominal_pose, specific_force
+from calibrations.geometry.stage_path import turning_points
+from calibrations.model import Estimate, Model, Term
+from calibrations.model.chain import Step, respond, sensed
+from calibrations.table import AXES, Array, Table
+
+# How uncertain the result of a compensation is by its parameters: where they were found, and over the whole range.
+#
+# A parameter that multiplies how far an input is from its reference, such as a temperature coefficient, makes the
+# result the less certain the further the input goes. So there are two figures: over the sphere of directions in
+# gravity, with inputs within what the data of the calibration covered; and the greatest over the stated range of
+# everything.
+
+PARAMETER_STEP = 1e-3  # of a standard uncertainty: steps of derivatives
+INPUT_LEVELS = 9  # of an input over its range, one after the other
+LOG_DECADES = 6  # decades towards the lower end: what happens soon after the power comes on is not missed
+REFERENCES = {"temperature_c": "reference_c", "supply_v": "reference_v"}  # constants of models
+
+Span = tuple[float, float]
+Inputs = Mapping[str, float]
+Stds = Callable[[Inputs], Array]
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """Of the worst axis: rms and greatest with inputs `within`, as calibrated; `largest` of all, at `at`."""
+
+    within: Mapping[str, Span]
+    rms: float
+    most: float
+    largest: float
+    at: Inputs
+
+
+def result_uncertainty(
+    model: Model, forward: Forward, table: Table, a: Array, beside: Mapping[str, Span], reach: float
+) -> Uncertainty | None:
+    """By the standard uncertainties of the parameters, taken as independent; None where there are none.
+
+    Over the specific force `a` (n, 3) of the rows of `table`, and that as far as `reach` goes on an axis; `beside` has
+    the stated range of each input beside the outputs. Source  GUM 5.1.2.
+    """
+    if not any(e.std and e.identified for term in model.terms for e in term.estimates):
+        return None
+    inputs = {name: span for name, span in beside.items() if name not in FORCES}
+    within = {name: _found_in(name, span, model) for name, span in inputs.items()}
+    far = reach * a / np.abs(a).max(axis=1, keepdims=True)
+    near = np.concatenate([_stds(model, forward, table, a, at) for at in _corners(within)])
+    at, largest = _largest(lambda place: _stds(model, forward, table, far, place), inputs)
+    rms = float(np.sqrt(np.mean(near**2, axis=0)).max())
+    return Uncertainty(within, rms, float(near.max()), max(largest, float(near.max())), at)
+
+
+def _found_in(name: str, stated: Span, model: Model) -> Span:
+    """Where an input was while the parameters were found, as far as that is within the stated range.
+
+    By what the model file says that the data covered, or its own reference; the whole range where neither is known.
+    """
+    at = {key: value for term in model.terms for key, value in term.constants.items()}
+    reference = at.get(REFERENCES.get(name, ""))
+    low, high = model.covered.get(name, stated if reference is None else (reference, reference))
+    return float(np.clip(low, *stated)), float(np.clip(high, *stated))
+
+
+def _corners(spans: Mapping[str, Span]) -> list[Inputs]:
+    """Lowest, middle and highest of every input with those of all others."""
+    levels = [dict.fromkeys((low, (low + high) / 2, high)) for low, high in spans.values()]
+    return [dict(zip(spans, values, strict=True)) for values in product(*levels)]
+
+
+def _largest(stds: Stds, spans: Mapping[str, Span]) -> tuple[Inputs, float]:
+    """Where the greatest is: at the worst corner, from where each input is tried over its range in turn."""
+
+    def most(place: Inputs) -> float:
+        return float(stds(place).max())
+
+    best = max(_corners(spans), key=most)
+    for name, (low, high) in spans.items():
+        soon = low + (high - low) * np.geomspace(10.0**-LOG_DECADES, 1, 3 * LOG_DECADES)
+        levels = [*np.linspace(low, high, INPUT_LEVELS).tolist(), *soon.tolist()]
+        best = max([best, *({**best, name: value} for value in levels)], key=most)
+    return best, most(best)
+
+
+def _stds(model: Model, forward: Forward, table: Table, a: Array, at: Inputs) -> Array:
+    """Standard uncertainties (n, axes) of what is sensed: u^2 = sum of (J^-1 dG/dp u(p))^2, with J = dG/da."""
+    here = replace(table, columns={**table.columns, **{name: np.full(table.n, value) for name, value in at.items()}})
+    k = ["xyz".index(axis) for axis in forward.axes]
+
+    def output(of: Model, force: Array) -> Array:
+        steps = steps_of(of)
+        return respond(sensed(force, here, steps), here, steps)[:, k]
+
+    h = 1e-5
+    J = np.stack([(output(model, a + h * e) - output(model, a - h * e)) / (2 * h) for e in np.eye(3)[k]], axis=2)
+    inverse, variance = np.linalg.inv(J), np.zeros((table.n, len(k)))
+    for up, down in _moved(model):
+        moved = (output(up, a) - output(down, a)) / (2 * PARAMETER_STEP)
+        variance += np.einsum("nij,nj->ni", inverse, moved) ** 2
+    return np.asarray(np.sqrt(variance))
+
+
+def _moved(model: Model) -> Sequence[tuple[Model, Model]]:
+    """The model with each known parameter moved a little, up and down."""
+    return [
+        (_with(model, i, j, PARAMETER_STEP * e.std), _with(model, i, j, -PARAMETER_STEP * e.std))
+        for i, term in enumerate(model.terms)
+        for j, e in enumerate(term.estimates)
+        if e.std and e.identified
+    ]
+
+
+def _with(model: Model, i: int, j: int, by: float) -> Model:
+    term: Term = model.terms[i]
+    moved: Estimate = replace(term.estimates[j], value=term.estimates[j].value + by)
+    estimates = (*term.estimates[:j], moved, *term.estimates[j + 1 :])
+    return replace(model, terms=(*model.terms[:i], replace(term, estimates=estimates), *model.terms[i + 1 :]))
+
+
+# The memory of a product at each row of a table, given the samples of the whole way to that row.
+#
+# Between poses the way is that of the stages, as the effects themselves have it (`calibrations.visits`); what is
+# sensed on it stands for what the product finds there, which is as close to it as at the poses.
+
+
+def memory_at(table: Table, a: Array, forward: Forward) -> dict[str, Array]:
+    """By its names, shape (n,), for what is sensed at the rows, `a` (n, 3); nothing where nothing is remembered.
+
+    Rows in order of time.
+    """
+    if not forward.memory:
+        return {}
+    steps = [step for step in steps_of(forward.model) if step[0].name in forward.remembering]
+    held = np.array(list(_along(table, a, steps)))  # (n, slots, 3)
+    columns = {f"m{slot}{axis}": held[:, slot, k] for slot in range(held.shape[1]) for k, axis in enumerate(AXES)}
+    return {name: columns[name] for name in forward.memory}
+
+
+def _along(table: Table, a: Array, steps: Sequence[Step]) -> Iterator[list[Array]]:
+    """What is remembered before each row, (3,) for every slot."""
+    held = [[np.zeros((1, 3))] * effect.memory for effect, _ in steps]
+    way = turning_points(table) if "alpha_deg" in table else np.empty((table.n, 0, 3))
+    for i in range(table.n):
+        row = table.rows(np.array([i]))
+        for here in way[i]:
+            held = _after(steps, here, row, held)
+        yield [slot[0] for each in held for slot in each]
+        held = _after(steps, a[i], row, held)
+
+
+def _after(steps: Sequence[Step], here: Array, row: Table, before: list[list[Array]]) -> list[list[Array]]:
+    """What each effect remembers after one sample more, of the specific force `here`, (3,)."""
+    return [
+        list(effect.follow(here[None], row, p, held)[1])
+        for (effect, p), held in zip(steps, before, strict=True)
+        if effect.memory
+    ]
+
 
 INCLINATIONS_DEG = (90, 30, 150, 60, 120, 10, 170)
 STEP_DEG = 15.0
@@ -27,7 +181,7 @@ PASSES = 3  # by which the axis that is not measured is found in gravity
 
 
 @dataclass(frozen=True)
-class Size:
+class ErrorSize:
     """An error's root mean square and greatest magnitude over the sweep, worst axis."""
 
     rms: float
@@ -40,12 +194,14 @@ class Cost:
     `parameters` the standard uncertainty of what is sensed by those of the parameters.
     """
 
-    left_out: Mapping[str, Size | None]
-    out_of_gravity: Size | None
+    left_out: Mapping[str, ErrorSize | None]
+    out_of_gravity: ErrorSize | None
     parameters: Uncertainty | None
 
 
-def costs(model: Model, forward: Forward, program: Program, reach: float, unit: str, spans: Mapping[str, Span]) -> Cost:
+def compensation_costs(
+    model: Model, forward: Forward, program: Program, reach: float, unit: str, spans: Mapping[str, Span]
+) -> Cost:
     """All costs of a compensation, in `unit`; `spans` has the stated ranges of what is given beside the outputs."""
     table = _sweep(model, spans)
     a = specific_force(nominal_pose(table)) * (1.0 if unit != "deg/s" else reach)
@@ -58,7 +214,9 @@ def costs(model: Model, forward: Forward, program: Program, reach: float, unit: 
     return Cost(
         {name: _of_left_out(name, model, followed, trial) for name in forward.left_out},
         _of_gravity(followed, trial) if hidden else None,
-        uncertainty(kept, forward, table, a, {name: spans[name] for name in program.inputs if name in spans}, reach),
+        result_uncertainty(
+            kept, forward, table, a, {name: spans[name] for name in program.inputs if name in spans}, reach
+        ),
     )
 
 
@@ -80,12 +238,12 @@ class _Trial:
         columns = {name: known[name] if name in known else self.table.column(name) for name in self.program.inputs}
         return columns | dict(self.memory)
 
-    def size(self, found: Mapping[str, Array]) -> Size:
+    def size(self, found: Mapping[str, Array]) -> ErrorSize:
         """By how much what was found is wrong."""
         return _size(np.column_stack([found[f"a{x}"] - self.a[:, "xyz".index(x)] for x in self.forward.axes]))
 
 
-def in_gravity(program: Program, inputs: Mapping[str, Array], side: Array) -> dict[str, Array]:
+def restore_axis_by_gravity(program: Program, inputs: Mapping[str, Array], side: Array) -> dict[str, Array]:
     """What the program finds where only gravity acts and z is not measured: |a| = 1, z on the `side` +1 or -1.
 
     Source  Ang (5)-(7), with the model in place of the linear estimate. Fixed passes, as the written sources do.
@@ -118,11 +276,11 @@ def _sweep(model: Model, spans: Mapping[str, Span]) -> Table:
     return Table.from_columns("poses", columns, source="a simulated sweep")
 
 
-def _size(errors: Array) -> Size:
-    return Size(float(np.sqrt(np.mean(errors**2, axis=0)).max()), float(np.abs(errors).max()))
+def _size(errors: Array) -> ErrorSize:
+    return ErrorSize(float(np.sqrt(np.mean(errors**2, axis=0)).max()), float(np.abs(errors).max()))
 
 
-def _of_left_out(name: str, model: Model, followed: Sequence[Step], trial: _Trial) -> Size | None:
+def _of_left_out(name: str, model: Model, followed: Sequence[Step], trial: _Trial) -> ErrorSize | None:
     """By the whole model with this effect, compensated without it."""
     steps = [s for s in steps_of(model) if s[0].name == name or any(s[0] is other[0] for other in followed)]
     try:
@@ -132,6 +290,6 @@ def _of_left_out(name: str, model: Model, followed: Sequence[Step], trial: _Tria
     return trial.size(trial.program.run(inputs))
 
 
-def _of_gravity(followed: Sequence[Step], trial: _Trial) -> Size:
+def _of_gravity(followed: Sequence[Step], trial: _Trial) -> ErrorSize:
     side = np.where(trial.a[:, 2] < 0, -1.0, 1.0)
-    return trial.size(in_gravity(trial.program, trial.inputs(followed), side))
+    return trial.size(restore_axis_by_gravity(trial.program, trial.inputs(followed), side))

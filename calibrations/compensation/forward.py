@@ -1,39 +1,55 @@
-"""A model's way from specific force to output, as a graph of each output; and what becomes of each of its effects.
+"""A model from specific force to output as a graph for each output, and the treatment of each effect.
 
-inverted    the effect acts on force, transduction or output, and its function can be written down; one that follows a
-            history does so by what it remembers from one sample to the next
-of the rig  it acts on the pose alone: the stages' errors are not the sensor's, and drop out
-noise       it has no value that could be taken off
-left out    it says itself why a product cannot follow it, its function cannot be written down, or it was asked for
+inverted    the effect acts on force, transduction or output and can be traced; an effect with a history stores its
+            state between samples
+of the rig  the effect acts on the pose alone: it belongs to the stages and is dropped
+noise       the effect has no value to subtract
+left out    the effect declares it, cannot be traced, or the user asked for it
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from keyword import iskeyword
 from typing import Any
 
 import numpy as np
 
-from calibrations.chain import Step
-from calibrations.compensation.graph import Node, given, names
-from calibrations.compensation.inputs import can_be_written
-from calibrations.compensation.traced import NotTraced, RunTime, Traced, nodes_traced
-from calibrations.compensation.written import added
-from calibrations.effect import Effect
+from calibrations.compensation.graph import Node, variable, variable_names
+from calibrations.compensation.trace import NotTraced, RunTime, Traced, as_traced, trace_expression
+from calibrations.effects import Effect, Values
 from calibrations.errors import ModelError
 from calibrations.model import Model, Term
+from calibrations.model.chain import Step
 from calibrations.table import AXES, NUMBERS
 
+# Names that an input may have in every output language: a user's column may have any name.
+
+IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+TAKEN = re.compile(
+    r"t\d+|in|out|step|math|memory|a[xyz]|v[xyz]|m\d+[xyz]"  # of the sources themselves
+    r"|auto|case|char|const|default|do|double|enum|extern|float|goto|inline|int|long|register|restrict|short|signed"
+    r"|sizeof|static|struct|switch|typedef|union|unsigned|void|volatile"  # of C
+    r"|abs|min|max|fabs|sqrt|exp|log|sin|cos"  # functions
+)
+
+
+def can_be_written(name: str) -> bool:
+    """Whether an input of that name is possible in every language."""
+    return bool(IDENTIFIER.fullmatch(name)) and not iskeyword(name) and not TAKEN.fullmatch(name)
+
+
 INVERTED, OF_THE_RIG, NOISE, LEFT_OUT = "inverted", "of the rig", "noise", "left out"
-NOTHING = "nothing: noise cannot be taken off"
-KNOWN = ("temperature_c", "supply_v", "t_s")  # what a product may know beside the outputs
+NOTHING = "nothing: noise cannot be compensated"
+KNOWN = ("temperature_c", "supply_v", "t_s")  # inputs that a product may have besides the outputs
 FORCES = ("ax", "ay", "az")
 
 
 @dataclass(frozen=True)
 class Fate:
-    """What becomes of an effect: one of the four, and why where it is left out."""
+    """The treatment of an effect, and the reason if it is left out."""
 
     effect: str
     how: str
@@ -42,9 +58,9 @@ class Fate:
 
 @dataclass(frozen=True)
 class Forward:
-    """Outputs of the measured `axes` as graphs of ax, ay, az (those along `axes` are sought) and of what is given.
+    """Outputs of the measured `axes` as graphs of ax, ay, az (`sought`: those along `axes`) and other inputs.
 
-    `memory`: what is remembered from one sample to the next, by name, as a graph of what it is after a sample.
+    `memory`: values stored between samples, by name, as graphs of their value after a sample.
     """
 
     model: Model
@@ -55,9 +71,9 @@ class Forward:
 
     @property
     def remembering(self) -> tuple[str, ...]:
-        """The effects that follow a history."""
+        """The effects with a history."""
         inverted = {fate.effect for fate in self.fates if fate.how == INVERTED}
-        return tuple(t.name for t in self.model.terms if t.effect.follow is not None and t.name in inverted)
+        return tuple(t.name for t in self.model.terms if t.effect.memory and t.name in inverted)
 
     @property
     def left_out(self) -> tuple[str, ...]:
@@ -65,7 +81,7 @@ class Forward:
 
     @property
     def sought(self) -> tuple[str, ...]:
-        """Names of what is sought, as the graphs have them."""
+        """Names of the sought quantities in the graphs."""
         return tuple(f"a{axis}" for axis in self.axes)
 
 
@@ -83,28 +99,28 @@ def measured_axes(model: Model) -> tuple[str, ...]:
 
 
 def steps_of(model: Model) -> list[Step]:
-    """Effects with the values that the model has, as the signal chain takes them."""
+    """Effects with the model's values, as the signal chain takes them."""
     return [(term.effect, _values(term)) for term in model.terms]
 
 
 def input_unit(model: Model) -> str:
-    """Unit of what is sensed: g, the field's strength, or deg/s."""
+    """Unit of the sensed quantity: g, the field's strength, or deg/s."""
     kinds = {kind for term in model.terms for kind in term.effect.kinds if len(term.effect.kinds) == 1}
     return {"fields": "field", "rates": "deg/s"}.get(next(iter(kinds), ""), "g") if len(kinds) == 1 else "g"
 
 
-def at_run_time(effect: Effect) -> str:
-    """What a compensation does about an effect, as far as its file tells."""
+def known_at_run_time(effect: Effect) -> str:
+    """The treatment of an effect in a compensation, from its declaration."""
     if effect.left_out:
         return f"left out: {effect.left_out}"
-    if effect.follow is not None:
-        return f"inverted, sample after sample, with {effect.memory} numbers for each axis remembered between them"
-    if effect.force or effect.transduction or effect.output:
+    if effect.memory:
+        return f"inverted sample by sample; {effect.memory} numbers per axis are stored between samples"
+    if effect.places & {"force", "transduction", "output"}:
         return "inverted"
-    return "dropped: it is the rig's" if effect.pose else NOTHING
+    return "dropped: it is the rig's" if "pose" in effect.places else NOTHING
 
 
-def forward_of(model: Model, without: Collection[str] = ()) -> Forward:
+def trace_model(model: Model, without: Collection[str] = ()) -> Forward:
     """The graphs of a fitted model; the effects in `without` are left out."""
     axes, steps = measured_axes(model), steps_of(model)
     own = {name for effect, _ in steps for name in effect.needs if name not in NUMBERS and can_be_written(name)}
@@ -116,11 +132,11 @@ def forward_of(model: Model, without: Collection[str] = ()) -> Forward:
     return Forward(model, axes, outputs, tuple(fates), _used(outputs, after))
 
 
-def _values(term: Term) -> dict[str, Any]:
+def _values(term: Term) -> Values:
     """Constants and parameters by name, a parameter per axis of shape (3,); 0 where there is none."""
     if missing := [name for name in term.effect.constants if name not in term.constants]:
         raise ModelError(f"{term.name}: the constant {missing[0]} is missing; `rig fit` writes it into the model file")
-    values: dict[str, Any] = {name: np.asarray(value) for name, value in term.constants.items()}
+    values = Values.of(term.constants)
     values |= {p.name: np.zeros(3 if p.per_axis else ()) for p in term.effect.parameters}
     for e in term.estimates:
         if not e.axis:
@@ -133,11 +149,11 @@ def _values(term: Term) -> dict[str, Any]:
 def _fate(step: Step, table: RunTime, without: Collection[str]) -> Fate:
     effect, _ = step
     if effect.name in without:
-        return Fate(effect.name, LEFT_OUT, "that was asked for")
+        return Fate(effect.name, LEFT_OUT, "the user asked for it")
     if effect.left_out:
         return Fate(effect.name, LEFT_OUT, effect.left_out)
-    if not (effect.force or effect.transduction or effect.output):
-        return Fate(effect.name, OF_THE_RIG if effect.pose else NOISE)
+    if not effect.places & {"force", "transduction", "output"}:
+        return Fate(effect.name, OF_THE_RIG if "pose" in effect.places else NOISE)
     try:
         _outputs([step], table)
     except NotTraced as error:
@@ -148,9 +164,9 @@ def _fate(step: Step, table: RunTime, without: Collection[str]) -> Fate:
 
 
 def _used(outputs: Sequence[Node], after: Mapping[str, Node]) -> dict[str, Node]:
-    """Of what is remembered, that which the outputs follow, be it by way of what is remembered later."""
+    """The stored values that the outputs use, directly or through other stored values."""
     found: dict[str, Node] = {}
-    while new := {name for name in names([*outputs, *found.values()]) if name in after} - found.keys():
+    while new := {name for name in variable_names([*outputs, *found.values()]) if name in after} - found.keys():
         found |= {name: after[name] for name in sorted(new)}
     return {name: found[name] for name in after if name in found}
 
@@ -158,25 +174,24 @@ def _used(outputs: Sequence[Node], after: Mapping[str, Node]) -> dict[str, Node]
 def _outputs(steps: Sequence[Step], runtime: RunTime) -> tuple[Traced, dict[str, Node]]:
     """Outputs of all three axes, shape (1, 3), and what is remembered after the sample, by name.
 
-    The signal chain of `calibrations.chain`, without its poses.
+    The signal chain of `calibrations.model.chain`, without its poses.
     """
     table: Any = runtime
-    a: Any = Traced([[given(name) for name in FORCES]])
+    a: Any = Traced([[variable(name) for name in FORCES]])
     for effect, p in steps:
-        if effect.force is not None:
-            a = effect.force(a, table, p)
-    v: Any = nodes_traced(np.zeros((1, 3)))
+        a = effect.force(a, table, p)
+    v: Any = as_traced(np.zeros((1, 3)))
     memory: dict[str, Node] = {}
     for effect, p in steps:
-        if effect.follow is not None:
+        if effect.memory:
             known = [[f"m{len(memory) // 3 + k}{axis}" for axis in AXES] for k in range(effect.memory)]
-            part, after = effect.follow(a, table, p, [Traced([[given(name) for name in row]]) for row in known])
+            before: Any = [Traced([[variable(name) for name in row]]) for row in known]
+            part, after = effect.follow(a, table, p, before)
             for row, each in zip(known, after, strict=True):
-                memory |= dict(zip(row, nodes_traced(each).nodes[0], strict=True))
+                memory |= dict(zip(row, as_traced(each).nodes[0], strict=True))
             v = v + part
-        elif effect.transduction is not None:
-            v = v + (added(effect, a, table, p) if effect.expression else effect.transduction(a, table, p))
+        elif "transduction" in effect.places:
+            v = v + (trace_expression(effect, a, table, p) if effect.expression else effect.transduction(a, table, p))
     for effect, p in steps:
-        if effect.output is not None:
-            v = effect.output(v, table, p)
-    return nodes_traced(v), memory
+        v = effect.output(v, table, p)
+    return as_traced(v), memory

@@ -1,25 +1,79 @@
-"""Arithmetic as a graph. Equal parts are one node, so that they are computed once; what is constant is folded.
+"""Arithmetic as a graph. Equal parts are one node, computed once; constants are folded.
 
-A node is made by `number`, `given` and `apply` alone. `given` is what is known or sought at run time, by name.
+Only `number`, `variable` and `apply_operation` make nodes. A variable gets its value at run time, by name.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
-from calibrations.compensation.operations import OPERATIONS
 from calibrations.table import Array
 
-MANY = 1 << 16  # nodes that are known again
+# Operations of a compensation: evaluation, text in C and Python, and class for the count of operations.
+
+
+@dataclass(frozen=True)
+class Operation:
+    """One operation. In `c` and `python`, {0}, {1}, ... are the operands and {f} is C's suffix.
+
+    `counts_as` is "add", "multiply", "divide", "compare" or "function".
+    """
+
+    apply: Callable[..., Any]
+    c: str
+    python: str
+    counts_as: str
+
+
+def _compared(sign: str, apply: Callable[..., Any]) -> Operation:
+    text = f"({{0}} {sign} {{1}} ? 1 : 0)"
+    return Operation(
+        lambda a, b: np.where(apply(a, b), 1.0, 0.0), text, f"(1.0 if {{0}} {sign} {{1}} else 0.0)", "compare"
+    )
+
+
+def _function(name: str, apply: Callable[..., Any]) -> Operation:
+    return Operation(apply, f"{name}{{f}}({{0}})", f"math.{name}({{0}})", "function")
+
+
+OPERATIONS: Mapping[str, Operation] = {
+    "+": Operation(np.add, "{0} + {1}", "{0} + {1}", "add"),
+    "-": Operation(np.subtract, "{0} - {1}", "{0} - {1}", "add"),
+    "*": Operation(np.multiply, "{0} * {1}", "{0} * {1}", "multiply"),
+    "/": Operation(np.divide, "{0} / {1}", "{0} / {1}", "divide"),
+    "neg": Operation(np.negative, "-{0}", "-{0}", "add"),
+    "abs": Operation(np.abs, "fabs{f}({0})", "abs({0})", "compare"),
+    "min": Operation(np.minimum, "({0} < {1} ? {0} : {1})", "min({0}, {1})", "compare"),
+    "max": Operation(np.maximum, "({0} > {1} ? {0} : {1})", "max({0}, {1})", "compare"),
+    "sign": Operation(np.sign, "(({0} > 0) - ({0} < 0))", "float(({0} > 0) - ({0} < 0))", "compare"),
+    "where": Operation(
+        lambda c, yes, no: np.where(np.asarray(c) != 0, yes, no),
+        "({0} != 0 ? {1} : {2})", "({1} if {0} != 0 else {2})", "compare",
+    ),
+    "sqrt": _function("sqrt", np.sqrt),
+    "exp": _function("exp", np.exp),
+    "log": _function("log", np.log),
+    "sin": _function("sin", np.sin),
+    "cos": _function("cos", np.cos),
+    "<": _compared("<", np.less),
+    "<=": _compared("<=", np.less_equal),
+    ">": _compared(">", np.greater),
+    ">=": _compared(">=", np.greater_equal),
+    "==": _compared("==", np.equal),
+    "!=": _compared("!=", np.not_equal),
+}  # fmt: skip
+
+MANY = 1 << 16  # nodes in the cache
 
 
 @dataclass(frozen=True, eq=False)
 class Node:
-    """A number, something given by `name`, or an operation on `inner`."""
+    """A number, a variable called `name`, or an operation on `inner`."""
 
     operation: str
     inner: tuple[Node, ...] = ()
@@ -38,16 +92,16 @@ def number(value: float) -> Node:
 
 
 @lru_cache(MANY)
-def given(name: str) -> Node:
-    """What has a name and no value yet."""
+def variable(name: str) -> Node:
+    """A variable by its name."""
     return Node("given", name=name)
 
 
 ZERO, ONE = number(0.0), number(1.0)
 
 
-def apply(operation: str, *inner: Node) -> Node:
-    """The operation on nodes, by the shortest way: what adds nothing is left away."""
+def apply_operation(operation: str, *inner: Node) -> Node:
+    """The operation on nodes, simplified where possible."""
     if all(node.constant for node in inner):
         with np.errstate(all="ignore"):
             return number(float(OPERATIONS[operation].apply(*(node.value for node in inner))))
@@ -57,15 +111,15 @@ def apply(operation: str, *inner: Node) -> Node:
 def power(base: Node, exponent: int) -> Node:
     """A whole power by repeated squares."""
     if exponent < 0:
-        return apply("/", ONE, power(base, -exponent))
+        return apply_operation("/", ONE, power(base, -exponent))
     if exponent < 2:
         return base if exponent else ONE
     half = power(base, exponent // 2)
-    return apply("*", apply("*", half, half), power(base, exponent % 2))
+    return apply_operation("*", apply_operation("*", half, half), power(base, exponent % 2))
 
 
-def ordered(roots: Iterable[Node]) -> list[Node]:
-    """Every node below the roots, each once, after what it is made of."""
+def sort_nodes(roots: Iterable[Node]) -> list[Node]:
+    """Every node below the roots once, after its operands."""
     found: dict[Node, None] = {}
     for root in roots:
         for node in _below(root, found):
@@ -73,15 +127,15 @@ def ordered(roots: Iterable[Node]) -> list[Node]:
     return list(found)
 
 
-def names(roots: Iterable[Node]) -> list[str]:
-    """What is given, by name, in order of appearance."""
-    return [node.name for node in ordered(roots) if node.operation == "given"]
+def variable_names(roots: Iterable[Node]) -> list[str]:
+    """Names of the variables, in order of appearance."""
+    return [node.name for node in sort_nodes(roots) if node.operation == "given"]
 
 
-def evaluate(roots: Iterable[Node], values: Mapping[str, Array]) -> list[Array]:
-    """The roots' values where what is given has `values`, of shapes that fit."""
+def evaluate_nodes(roots: Iterable[Node], values: Mapping[str, Array]) -> list[Array]:
+    """The roots' values for the variables' `values`, with broadcasting."""
     roots, found = list(roots), {}
-    for node in ordered(roots):
+    for node in sort_nodes(roots):
         if node.operation == "given":
             found[node] = np.asarray(values[node.name])
         elif node.constant:
@@ -104,20 +158,20 @@ def _made(operation: str, inner: tuple[Node, ...]) -> Node:
 
 
 def _shortened(operation: str, inner: tuple[Node, ...]) -> Node | None:
-    """What the operation comes to without being done; None where it has to be."""
+    """The simplified node; None where the operation is needed."""
     match operation, inner:
         case ("+", (left, right)) if right is ZERO:
             return left
         case ("+", (left, right)) if left is ZERO:
             return right
         case ("+", (left, Node(operation="neg", inner=(right,)))):
-            return apply("-", left, right)
+            return apply_operation("-", left, right)
         case ("-", (left, right)) if right is ZERO:
             return left
         case ("-", (left, right)) if left is ZERO:
-            return apply("neg", right)
+            return apply_operation("neg", right)
         case ("-", (left, Node(operation="neg", inner=(right,)))):
-            return apply("+", left, right)
+            return apply_operation("+", left, right)
         case ("*", (left, right)) if ZERO in (left, right):
             return ZERO
         case ("*", (left, right)) if right is ONE:

@@ -1,52 +1,75 @@
-"""A calibrated model turned round: a program from outputs to specific force, with what is proved and what it costs."""
+"""Inversion of a calibrated model: a program from outputs to specific force, its proved bound, and its errors."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any
 
-from calibrations.compensation.bound import Bound, bound
-from calibrations.compensation.cost import Cost, costs
-from calibrations.compensation.forward import FORCES, INVERTED, NOTHING, Forward, at_run_time, forward_of, input_unit
-from calibrations.compensation.graph import names
-from calibrations.compensation.program import Program, program
-from calibrations.errors import ModelError
+import numpy as np
+
+from calibrations.compensation.bound import Bound, prove_bound
+from calibrations.compensation.cost import Cost, compensation_costs, memory_at, restore_axis_by_gravity
+from calibrations.compensation.forward import (
+    FORCES,
+    INVERTED,
+    NOTHING,
+    OF_THE_RIG,
+    Forward,
+    input_unit,
+    known_at_run_time,
+    steps_of,
+    trace_model,
+)
+from calibrations.compensation.graph import variable_names
+from calibrations.compensation.program import Program, write_program
+from calibrations.errors import DataError, ModelError
+from calibrations.fit import fit
 from calibrations.model import Model
+from calibrations.model.chain import force, sensed
+from calibrations.model.file import read_model
+from calibrations.noise.means import rms
+from calibrations.presentation.text import plain
+from calibrations.table import AXES, Array, Table
 
-REACH = {"g": 1.5, "field": 1.5, "deg/s": 300.0}  # of what is sensed, to either side, where nothing else is said
-BESIDE = {"temperature_c": (-20.0, 85.0), "supply_v": (4.75, 5.25), "t_s": (0.0, 1e7)}  # C, V, s
-WITHIN = {"double": 1e-12, "float": 1e-7}  # of the reach: what is left when the steps end
+DEFAULT_REACH = {
+    "g": 1.5,
+    "field": 1.5,
+    "deg/s": 300.0,
+}  # default range of the sensed quantity, to either side
+DEFAULT_INPUTS = {"temperature_c": (-20.0, 85.0), "supply_v": (4.75, 5.25), "t_s": (0.0, 1e7)}  # C, V, s
+DEFAULT_TOLERANCE = {"double": 1e-12, "float": 1e-7}  # remaining error after the last step, as a share of the range
 
 
 @dataclass(frozen=True)
 class Range:
-    """For which values the bound is proved: `reach` to either side of 0 on every axis, and what is given beside."""
+    """The range of the proof: `reach` to either side of 0 on every axis, and the ranges of the other inputs."""
 
     reach: float
-    beside: Mapping[str, tuple[float, float]] = field(default_factory=lambda: dict(BESIDE))
+    beside: Mapping[str, tuple[float, float]] = field(default_factory=lambda: dict(DEFAULT_INPUTS))
 
     @staticmethod
     def for_model(model: Model, reach: float | None = None, **beside: tuple[float, float]) -> Range:
-        """What is usual for the model's kind of sensor, but where `reach` or a range by an input's name is given."""
+        """The default range for the model's kind of sensor, with the given `reach` and ranges by input name."""
         at = {name: value for term in model.terms for name, value in term.constants.items()}
         supply = {"supply_v": (0.95 * at["reference_v"], 1.05 * at["reference_v"])} if "reference_v" in at else {}
-        return Range(reach or REACH[input_unit(model)], BESIDE | supply | beside)
+        return Range(reach or DEFAULT_REACH[input_unit(model)], DEFAULT_INPUTS | supply | beside)
 
     def of(self, inputs: Collection[str]) -> dict[str, tuple[float, float]]:
-        """The range of each input beside the outputs; another axis' force goes as far as the sensor's own.
+        """The range of each input besides the outputs; another axis' force has the sensor's own range.
 
-        Raises ModelError for one whose range nobody said.
+        Raises ModelError for an input with unknown range.
         """
         known = dict.fromkeys(FORCES, (-self.reach, self.reach)) | dict(self.beside)
         for name in inputs:
             if name not in known:
-                raise ModelError(f"the model follows {name}, whose range is not known; give --input {name}=LOW:HIGH")
+                raise ModelError(f"the range of the input {name} is unknown; give --input {name}=LOW:HIGH")
         return {name: known[name] for name in inputs}
 
 
 @dataclass(frozen=True)
 class Compensation:
-    """Everything that the writers need. `costs` are in the unit of what is sensed."""
+    """The input of the writers. `costs` are in the unit of the sensed quantity."""
 
     model: Model
     forward: Forward
@@ -59,32 +82,30 @@ class Compensation:
 
     @property
     def beside(self) -> dict[str, tuple[float, float]]:
-        """The inputs beside the outputs, and their ranges."""
+        """The inputs besides the outputs, with their ranges."""
         return self.range.of(self.program.inputs[len(self.forward.axes) :])
 
 
-def invert(
+def invert_model(
     model: Model, within: Range | None = None, without: Collection[str] = (), precision: str = "double"
 ) -> Compensation:
-    """The compensation of a fitted model for the range `within`, the effects in `without` left out.
+    """The compensation of a fitted model for the range `within`, without the effects in `without`.
 
-    Raises ModelError for a model without values, and for one that cannot be shown to be invertible over the range,
-    naming the effect that stands in the way.
+    Raises ModelError for a model without values, and for one without a provable inverse over the range, with the effect
+    that prevents it.
     """
     unknown = [name for name in without if name not in model.effects]
     if unknown:
-        raise ModelError(f"{model.name}: has no effect {unknown[0]} to leave out; it has {', '.join(model.effects)}")
-    if all(at_run_time(term.effect) == NOTHING for term in model.terms):
-        raise ModelError(
-            f"{model.name}: is a model of noise alone, which has no inverse to write: give one of a sensor"
-        )
+        raise ModelError(f"{model.name}: the model has no effect {unknown[0]}; it has {', '.join(model.effects)}")
+    if all(known_at_run_time(term.effect) == NOTHING for term in model.terms):
+        raise ModelError(f"{model.name}: a model of noise alone has no inverse; give the model of a sensor")
     unit = input_unit(model)
     within = within or Range.for_model(model)
-    forward = forward_of(model, without)
+    forward = trace_model(model, without)
     found = _bound(forward, within, precision)
     if found is None:
         raise ModelError(_why_not(model, within, without, precision, unit))
-    made = program(forward, found)
+    made = write_program(forward, found)
     return Compensation(
         model,
         forward,
@@ -93,24 +114,101 @@ def invert(
         made,
         precision,
         unit,
-        costs(model, forward, made, within.reach, unit, within.beside),
+        compensation_costs(model, forward, made, within.reach, unit, within.beside),
     )
 
 
 def _bound(forward: Forward, within: Range, precision: str) -> Bound | None:
-    others = within.of([name for name in names(forward.outputs) if name not in {*forward.sought, *forward.memory}])
-    want = WITHIN[precision] * within.reach
-    return bound(forward.outputs, forward.sought, within.reach, others, want, tuple(forward.memory))
+    others = within.of(
+        [name for name in variable_names(forward.outputs) if name not in {*forward.sought, *forward.memory}]
+    )
+    want = DEFAULT_TOLERANCE[precision] * within.reach
+    return prove_bound(forward.outputs, forward.sought, within.reach, others, want, tuple(forward.memory))
 
 
 def _why_not(model: Model, within: Range, without: Collection[str], precision: str, unit: str) -> str:
-    """Which single effect stands in the way of an inverse, where it is one."""
-    inverted = [fate.effect for fate in forward_of(model, without).fates if fate.how == INVERTED]
-    guilty = [n for n in inverted if _bound(forward_of(model, [*without, n]), within, precision) is not None]
+    """The message for a model without a provable inverse; it names a single effect that prevents it."""
+    inverted = [fate.effect for fate in trace_model(model, without).fates if fate.how == INVERTED]
+    guilty = [n for n in inverted if _bound(trace_model(model, [*without, n]), within, precision) is not None]
     said = (
-        f"{model.name}: the way back is not contractive within +-{within.reach:g} {unit}: no number of steps can be "
-        "proved to be enough"
+        f"{model.name}: the inverse is not contractive within +-{within.reach:g} {unit}: no number of steps is "
+        "provably sufficient"
     )
     if guilty:
-        return f"{said}. Without {guilty[-1]} it is: --leave-out {guilty[-1]} leaves it out, and says what that costs"
-    return f"{said}; take a smaller --range, or leave out what bends the output most with --leave-out EFFECT"
+        return f"{said}. It is without {guilty[-1]}: use --leave-out {guilty[-1]}, which reports the error due to it"
+    return f"{said}; take a smaller --range, or leave out the most nonlinear effect with --leave-out EFFECT"
+
+
+# Errors of a compensation on unseen poses, compared with the data sheet's linear model fitted to the same poses
+# (Ang Fig. 12, at rest).
+#
+# The true value is the specific force at the poses, with the pose effects of the model, which belong to the stages.
+
+LINEAR_MODEL = "linear"
+
+
+@dataclass(frozen=True)
+class Residual:
+    """Errors of the specific force in mm/s^2, shape (n, axes), rows in order of time."""
+
+    table: Table
+    axes: tuple[str, ...]
+    linear: Array
+    compensated: Array
+
+    @property
+    def rmse(self) -> Mapping[str, tuple[float, float]]:
+        """By axis: linear, compensated, mm/s^2."""
+        each = zip(self.axes, rms(self.linear.T), rms(self.compensated.T), strict=True)
+        return {axis: (float(a), float(b)) for axis, a, b in each}
+
+    def lines(self) -> list[str]:
+        """For people."""
+        return [
+            f"{axis}: rms error {plain(before)} mm/s² by the linear model, {plain(after)} mm/s² compensated, "
+            f"{100 * (1 - after / before):.1f} % less, on {self.table.n} poses of {self.table.source}"
+            for axis, (before, after) in self.rmse.items()
+        ]
+
+    def document(self) -> dict[str, Any]:
+        """As JSON."""
+        rmse = {axis: {"linear": before, "compensated": after} for axis, (before, after) in self.rmse.items()}
+        return {"data": self.table.source, "n": self.table.n, "unit": "mm/s^2", "rmse": rmse}
+
+
+def compensated_residual(made: Compensation, table: Table) -> Residual:
+    """Errors on a table of poses. Raises DataError for another kind, MissingColumn for a missing input."""
+    if table.kind != "poses" or made.unit != "g":
+        raise DataError(
+            f"{table.source}: a compensation is compared with poses of an accelerometer, not with {table.kind}"
+        )
+    table = table.in_order()
+    rigs = {fate.effect for fate in made.forward.fates if fate.how == OF_THE_RIG}
+    a = force(table, [step for step in steps_of(made.model) if step[0].name in rigs])
+    found = _compensated(made, table, a)
+    axes = tuple(axis for axis in made.forward.axes if axis in table.axes)
+    true = np.column_stack([a[:, AXES.index(axis)] for axis in axes])
+    linear = fit(read_model(LINEAR_MODEL), replace(table, source=LINEAR_MODEL)).model
+    values = {(e.name, e.axis): e.value for term in linear.terms for e in term.estimates}
+    by_hand = [
+        (table.outputs[:, table.axes.index(axis)] - values["bias", axis]) / values["scale", axis] for axis in axes
+    ]
+    unit = 1e3 * table.gravity_m_s2
+    return Residual(
+        table,
+        axes,
+        unit * (np.column_stack(by_hand) - true),
+        unit * (np.column_stack([found[f"a{axis}"] for axis in axes]) - true),
+    )
+
+
+def _compensated(made: Compensation, table: Table, a: Array) -> dict[str, Array]:
+    """The program's output; an axis without measurement follows from gravity and the side that is up."""
+    program = made.program
+    inputs = {
+        name: table.column(f"{name}_v" if name[0] == "v" else name) for name in program.inputs if name not in FORCES
+    }
+    memory = memory_at(table, sensed(a, table, steps_of(made.model)), made.forward)
+    if made.costs.out_of_gravity is not None:
+        return restore_axis_by_gravity(program, inputs | memory, np.where(a[:, 2] < 0, -1.0, 1.0))
+    return program.run(inputs | memory | {name: a[:, k] for k, name in enumerate(FORCES) if name in program.inputs})

@@ -1,7 +1,7 @@
-"""The way back as straight lines of code: what stands before the loop, what the loop repeats, and their count.
+"""The inverse as lines of code: before the loop, in the loop, after the loop; and the count of operations.
 
-What does not follow the sought values is computed once, before the loop. What is remembered for the next sample is
-computed after it, from what was found. Every line has a name of its own.
+Lines that do not depend on the sought values are computed once, before the loop. Values stored for the next sample are
+computed after it. Every line has a unique name.
 """
 
 from __future__ import annotations
@@ -14,14 +14,13 @@ import numpy as np
 
 from calibrations.compensation.bound import Bound
 from calibrations.compensation.forward import Forward
-from calibrations.compensation.graph import Node, apply, given, number, ordered
-from calibrations.compensation.operations import OPERATIONS
+from calibrations.compensation.graph import OPERATIONS, Node, apply_operation, number, sort_nodes, variable
 from calibrations.table import Array
 
 
 @dataclass(frozen=True)
 class Line:
-    """`name` = operation of `inner`, which are names of lines before it, of inputs, or numbers."""
+    """`name` = operation of `inner`: names of earlier lines or inputs, or numbers."""
 
     name: str
     operation: str
@@ -30,9 +29,9 @@ class Line:
 
 @dataclass(frozen=True)
 class Program:
-    """`inputs` and, sought from 0 on, `sought`: run `before` once, and `steps` times `loop`, which ends in `next`.
+    """Start `sought` at 0; run `before` once, then `loop` `steps` times, each time setting `sought` to `next`.
 
-    Then run `after` once: `remembered`, by name, is what the next sample is given.
+    Then run `after` once: `remembered` gives the stored values of the next sample.
     """
 
     inputs: tuple[str, ...]
@@ -46,7 +45,7 @@ class Program:
 
     @property
     def operations(self) -> Mapping[str, int]:
-        """How many operations of each kind one sample takes."""
+        """Number of operations of each kind per sample."""
         once, again = (
             Counter(OPERATIONS[line.operation].counts_as for line in lines)
             for lines in (self.before + self.after, self.loop)
@@ -54,10 +53,7 @@ class Program:
         return {kind: once[kind] + self.steps * again[kind] for kind in sorted({*once, *again})}
 
     def run(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
-        """What is sought and what is remembered, for inputs of any one shape: as it stands, for tests and pictures.
-
-        What was remembered before is among the inputs; 0 where it is not.
-        """
+        """The sought and the stored values, for inputs of one shape; stored inputs are 0 by default."""
         values: dict[str, Array] = {name: np.asarray(inputs[name], float) for name in self.inputs}
         values |= {name: np.asarray(inputs.get(name, 0.0), float) for name in self.remembered}
         _do(self.before, values)
@@ -70,21 +66,21 @@ class Program:
         return {name: values[name] for name in self.sought} | after
 
 
-def program(forward: Forward, bound: Bound) -> Program:
+def write_program(forward: Forward, bound: Bound) -> Program:
     """The steps a <- a + C (V - G(a)) as a program."""
     outputs = tuple(f"v{axis}" for axis in forward.axes)
     nexts, later = _next(forward, bound, outputs), list(forward.memory.values())
-    nodes = ordered([*nexts, *later])
+    nodes = sort_nodes([*nexts, *later])
     moving = _following(nodes, set(forward.sought))
     known = {*forward.sought, *outputs, *forward.memory}
     used = [node.name for node in nodes if node.operation == "given" and node.name not in known]
     named = _Names()
-    in_loop = [node for node in ordered(nexts) if node in moving]
+    in_loop = [node for node in sort_nodes(nexts) if node in moving]
     before = [named.line(node) for node in nodes if node not in moving and node.inner]
     loop = [named.line(node) for node in in_loop if node.inner]
     next_ = tuple(named.word(node) for node in nexts)
     named.forget(in_loop)  # they follow what is sought, which is found only now
-    after = [named.line(node) for node in ordered(later) if node in moving and node.inner]
+    after = [named.line(node) for node in sort_nodes(later) if node in moving and node.inner]
     return Program(
         inputs=(*outputs, *used),
         sought=forward.sought,
@@ -98,7 +94,7 @@ def program(forward: Forward, bound: Bound) -> Program:
 
 
 class _Names:
-    """Nodes by the names of the lines that compute them."""
+    """Names of the lines that compute nodes."""
 
     def __init__(self) -> None:
         self._of: dict[Node, str] = {}
@@ -112,28 +108,28 @@ class _Names:
         return Line(self._of[node], node.operation, inner)
 
     def word(self, node: Node) -> str | float:
-        """How later lines write it."""
+        """The node in later lines."""
         return node.value if node.constant else node.name or self._of[node]
 
     def forget(self, nodes: Sequence[Node]) -> None:
-        """They are to be computed anew."""
+        """Compute these nodes again."""
         for node in nodes:
             self._of.pop(node, None)
 
 
 def _next(forward: Forward, bound: Bound, outputs: tuple[str, ...]) -> list[Node]:
-    errors = [apply("-", given(name), G) for name, G in zip(outputs, forward.outputs, strict=True)]
+    errors = [apply_operation("-", variable(name), G) for name, G in zip(outputs, forward.outputs, strict=True)]
     nexts = []
     for name, row in zip(forward.sought, bound.C, strict=True):
-        moved = given(name)
+        moved = variable(name)
         for share, error in zip(row, errors, strict=True):
-            moved = apply("+", moved, apply("*", number(float(share)), error))
+            moved = apply_operation("+", moved, apply_operation("*", number(float(share)), error))
         nexts.append(moved)
     return nexts
 
 
 def _following(nodes: list[Node], sought: set[str]) -> set[Node]:
-    """The nodes that follow what is sought."""
+    """The nodes that depend on the sought values."""
     found: set[Node] = set()
     for node in nodes:
         if node.name in sought or any(inner in found for inner in node.inner):

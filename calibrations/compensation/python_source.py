@@ -1,19 +1,19 @@
-"""The compensation as one Python file, which needs nothing but Python itself."""
+"""The compensation as one Python file without dependencies."""
 
 from __future__ import annotations
 
-from calibrations.compensation.about import Origin, lines
+from calibrations.compensation.about import Origin, header_lines
 from calibrations.compensation.cost import PASSES
+from calibrations.compensation.document import ReferenceVectors
+from calibrations.compensation.graph import OPERATIONS
 from calibrations.compensation.inverse import Compensation
-from calibrations.compensation.operations import OPERATIONS
 from calibrations.compensation.program import Line
-from calibrations.compensation.vectors import Vectors
 
 
-def files(made: Compensation, origin: Origin, checks: Vectors) -> dict[str, str]:
+def files(made: Compensation, origin: Origin, checks: ReferenceVectors) -> dict[str, str]:
     """The file by its name."""
     program = made.program
-    about = "\n".join(f"# {line}".rstrip() for line in lines(made, origin))
+    about = "\n".join(f"# {line}".rstrip() for line in header_lines(made, origin))
     before = "".join(_line(line, "    ") for line in program.before)
     loop = "".join(_line(line, "        ") for line in program.loop)
     sought = ", ".join(program.sought)
@@ -75,7 +75,7 @@ def _recalled(made: Compensation) -> str:
 
 
 def _remembered(made: Compensation) -> str:
-    """What the next sample is given, from what was found."""
+    """The stored values for the next sample."""
     program = made.program
     if not _memory(made):
         return ""

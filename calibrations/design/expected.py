@@ -11,22 +11,29 @@ Source  Atkinson and Fedorov, Biometrika 62 (1975), 57-70; Dette, Melas and Guch
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import least_squares
 from scipy.special import ndtr
 
-from calibrations.design.information import noise_on
+from calibrations.criteria import INSEPARABLE
+from calibrations.design.optimal_design import noise_on_rows
+from calibrations.errors import DataError, MissingColumn
 from calibrations.fit import Fit
+from calibrations.geometry.orientation import nominal_pose, specific_force
 from calibrations.joined import joined
+from calibrations.model import Model
+from calibrations.model.chain import forward
+from calibrations.model.parameters import Layout
+from calibrations.noise.means import white_only
 from calibrations.problem import Problem
-from calibrations.search.candidates import NOT_TOLD_APART
-from calibrations.table import Array, Table
+from calibrations.table import AXES, OUTPUTS, Array, Constant, Table
 
-CERTAIN = 0.95  # probability of telling two explanations apart with which an experiment is worth its time
+CERTAIN_PROBABILITY = 0.95  # probability of telling two explanations apart with which an experiment is worth its time
 NAMED = 20.0  # a gain of two parameters that has a chance of 0.003 on noise, in a search worth some 60 trials
-ROUNDS, CLOSE = 12, 1e-2  # evaluations, and the relative change of lambda at which they end
+ROUNDS, CLOSE_GAIN = 12, 1e-2  # evaluations, and the relative change of lambda at which they end
 
 
 @dataclass(frozen=True)
@@ -48,27 +55,27 @@ class Expected:
     @property
     def probability(self) -> float:
         """Of telling them apart, all data together."""
-        return told_apart(self.together)
+        return pairs_separated(self.together)
 
     @property
     def probability_alone(self) -> float:
         """Of finding that something is missing, and telling what, by its own data."""
-        return min(told_apart(self.alone), _beyond(self.visible, NAMED))
+        return min(pairs_separated(self.alone), _beyond(self.visible, NAMED))
 
 
-def expected(best: Fit, rival: Fit, table: Table) -> Expected:
+def expected_gain(best: Fit, rival: Fit, table: Table) -> Expected:
     """What the foreseen `table` will tell of two explanations of the data at hand, whichever of them is right.
 
     Both are fits to the same data. Of the two cases, the best right and the rival right, the worse one counts. Times
     of `table` come after those of the data.
     """
-    ways = [one_way(best, rival, table), one_way(rival, best, table)]
+    ways = [vary_one_way(best, rival, table), vary_one_way(rival, best, table)]
     return Expected(min(w.alone for w in ways), min(w.together for w in ways))
 
 
-def told_apart(noncentrality: float) -> float:
+def pairs_separated(noncentrality: float) -> float:
     """Probability that the likelihood ratio will be beyond the odds at which two explanations are told apart."""
-    return _beyond(noncentrality, NOT_TOLD_APART)
+    return _beyond(noncentrality, INSEPARABLE)
 
 
 def _beyond(noncentrality: float, threshold: float) -> float:
@@ -78,13 +85,13 @@ def _beyond(noncentrality: float, threshold: float) -> float:
     return float(ndtr((noncentrality - threshold) / (2 * np.sqrt(noncentrality))))
 
 
-def one_way(right: Fit, wrong: Fit, table: Table) -> Expected:
+def vary_one_way(right: Fit, wrong: Fit, table: Table) -> Expected:
     """As `expected`, where `right` is: predictions come from both fits' own history, the noise from that of `right`."""
     whole = joined([right.table, table])
     known, new = np.arange(whole.n) < right.table.n, np.arange(whole.n) >= right.table.n
     truth = Problem(whole, right.problem.layout).residual(right.theta)
     mistaken = Problem(whole, wrong.problem.layout)
-    noise = noise_on(right.noise, Problem(table, right.problem.layout))
+    noise = noise_on_rows(right.noise, Problem(table, right.problem.layout))
 
     def white(columns: Array) -> tuple[Array, Array]:
         """Rows of the data at hand, and of the new; both (channels, n, k) -> (rows, k)."""
@@ -98,7 +105,122 @@ def one_way(right: Fit, wrong: Fit, table: Table) -> Expected:
             return np.concatenate(white(mistaken.jacobian(theta))[parts])
 
         size, bounds = mistaken.layout.typical, mistaken.layout.bounds
-        found = least_squares(distance, wrong.theta, slope, bounds, x_scale=size, ftol=CLOSE, max_nfev=ROUNDS)
+        found = least_squares(distance, wrong.theta, slope, bounds, x_scale=size, ftol=CLOSE_GAIN, max_nfev=ROUNDS)
         return 2 * float(found.cost)
 
     return Expected(least(slice(1, None)), least(slice(None)))
+
+
+# A model taken to be true before any data: what a plan is made for.
+#
+# Values are the model's own; where it has none, those that a sensor typically has. The noise is white, that of Ang's
+# sensor. For effects that only add their share to the output neither changes which poses are best; for others (a dead
+# zone, hysteresis) the best poses are those for these values (local optimality: Chernoff, 1953).
+
+SAMPLE_STD_V = 3.1e-3 / 4  # Ang V: peak to peak is four times rms
+CALM_SPREAD = {
+    "reference_c": ("temperature_c", 25.0),
+    "reference_v": ("supply_v", 5.0),
+}  # constants of effects; held there
+
+
+def assume_sensor(
+    model: Model, columns: Mapping[str, Array], constants: Mapping[str, Constant], axes: Sequence[str] = AXES[:2]
+) -> Fit:
+    """`model` on the poses of `columns` (alpha_deg, beta_deg, ..., each of shape (n,)), as if it had been fitted there.
+
+    Its residual is 0. Temperature and supply do not change. Raises ModelError and TooFewRows as a fit does.
+    """
+    table = _sensed(model, columns, constants, axes)
+    problem = Problem.of(model, table)
+    theta = _values(problem.layout)
+    noise = white_only(problem.white, problem.gap_s, len(problem.channels))
+    nothing = np.zeros((len(problem.channels), table.n))
+    return Fit(problem.layout.model, problem, theta, noise, nothing, problem.jacobian(theta))
+
+
+def _sensed(
+    model: Model, columns: Mapping[str, Array], constants: Mapping[str, Constant], axes: Sequence[str]
+) -> Table:
+    """A table of the poses, with outputs of 1 V/g."""
+    n = len(columns["alpha_deg"])
+    known = {name: value for term in model.terms for name, value in term.constants.items()}
+    calm = {column: np.full(n, known.get(name, usual)) for name, (column, usual) in CALM_SPREAD.items()}
+    noise = {f"v{axis}_std_v": np.full(n, SAMPLE_STD_V) for axis in axes}
+    flat = {f"v{axis}_v": np.zeros(n) for axis in axes}
+    table = Table.from_columns("poses", {"n": np.ones(n)} | calm | dict(columns) | noise | flat, constants, "a plan")
+    a = specific_force(nominal_pose(table))
+    outputs = {f"v{axis}_v": a[:, AXES.index(axis)] for axis in axes}
+    return Table.from_columns("poses", {**table.columns, **outputs}, constants, "a plan")
+
+
+def _values(layout: Layout) -> Array:
+    """The model's own values; of a parameter without one what it starts from, and its typical size where that is 0."""
+    start = layout.starts()[0]
+    free = layout.known() is None
+    unset = [free and (s.term, s.parameter.name, s.axis) not in layout.from_data for s in layout.slots]
+    return np.where((start == 0) & unset, layout.typical, start)
+
+
+# The table that planned poses would give, before anything is measured: what a design of experiments is judged on.
+#
+# Outputs are those of the fitted model, without noise. Noise enters as a table has it, by the standard deviation of
+# single samples and how many are averaged, both as in the data of the fit, so that a longer dwell counts for what it
+# is.
+
+PLANNED = ("t_s", "direction")  # a plan's own: no mean of other data stands for them
+
+
+def predict_data(like: Fit, columns: Mapping[str, Array]) -> Table:
+    """The table of poses that planned `columns` would give a sensor such as that of `like`.
+
+    `columns`, each of shape (n,): alpha_deg and beta_deg, and what else is planned of direction, flip, mount_deg, t_s,
+    temperature_c, ...; `n` samples a mean, or `dwell_s` at the data's sample rate, else as many as the data's. Columns
+    that the model's effects need and nobody plans, such as temperature_c, are held at their mean in the data.
+    Constants (filter corner, gravity, approach) are the data's.
+
+    Raises DataError for a fit to another kind of table, and for `dwell_s` where no sample rate is known; MissingColumn
+    for a time or a direction that the model needs.
+    """
+    data = like.table
+    if data.kind != "poses":
+        raise DataError(f"{data.source}: a fit to {data.kind} foresees no poses; fit the model to poses")
+    names = OUTPUTS["poses"][: len(data.axes)]
+    given = {name: np.asarray(values, dtype=np.float64) for name, values in columns.items() if name != "dwell_s"}
+    rows = len(given["alpha_deg"])
+    held = {name: np.full(rows, np.mean(data.column(name))) for name in _needed(like) if name not in given}
+    made = held | _noise(like, columns, rows) | given | {name: np.zeros(rows) for name in names}
+    table = Table.from_columns("poses", made, data.constants, f"a plan like {data.source}")
+    _check_planned(like, table)
+    outputs = forward(table, like.problem.layout.steps(like.theta))
+    return replace(table, columns={**table.columns, **dict(zip(names, outputs.T, strict=True))})
+
+
+def _needed(like: Fit) -> set[str]:
+    """Columns of the data that the model's effects read, and that a plan need not know."""
+    return {name for term in like.model.terms for name in term.effect.needs} - set(PLANNED)
+
+
+def _check_planned(like: Fit, table: Table) -> None:
+    for term in like.model.terms:
+        if why := term.effect.excluded(table):
+            raise MissingColumn(f"{table.source}: {term.name} {why}; plan it")
+
+
+def _noise(like: Fit, columns: Mapping[str, Array], rows: int) -> dict[str, Array]:
+    """Standard deviation of samples, and how many a mean is of; nothing where the data does not tell."""
+    data = like.table
+    usual = {name: float(np.median(data.column(name))) for name in _std_names(data)}
+    if "n" in data and "n" not in columns:
+        usual["n"] = float(np.median(data.column("n")))
+    noise = {name: np.full(rows, value) for name, value in usual.items()}
+    if "dwell_s" not in columns:
+        return noise
+    rate_hz = data.number("sample_rate_hz", 0.0)
+    if not rate_hz:
+        raise DataError(f"{data.source}: no sample rate is known; plan `n`, or give `# sample_rate_hz: 1000`")
+    return noise | {"n": np.maximum(np.round(np.asarray(columns["dwell_s"]) * rate_hz), 1.0)}
+
+
+def _std_names(data: Table) -> list[str]:
+    return [name for axis in data.axes if (name := f"v{axis}_std_v") in data]

@@ -1,27 +1,85 @@
-"""Which poses tell most about a model: D- and I-optimal designs, by exchange of one pose after another.
+"""How much planned poses would tell about a model's parameters: Fisher's information, to first order.
 
-    D   the greatest det M: the smallest volume of the parameters' joint uncertainty
-    I   the least mean variance of what the model predicts over a range of poses: tr(M^-1 W)
+    M = J' Sigma^-1 J        J the model's derivatives at the fitted values, Sigma the noise foreseen
 
-M is the information of the chosen poses, W the mean of J' J over the range. A pose is taken out and the best of all
-candidates put in its place until no exchange helps, from several random beginnings: the optimum of each is local.
+Rows of Sigma^(-1/2) J of independent data stand one below the other: the information of both is their sum.
 
-Some of the chosen are then measured again, so that the noise is known from the data themselves (pure error) and a lack
-of fit can be told from it; and poses far from all of them are added that no fit sees.
-
-Source  Fedorov, Theory of Optimal Experiments (1972), exchange; Atkinson, Donev and Tobias, Optimum Experimental
-        Designs, with SAS (2007), ch. 10 to 12; Kennard and Stone, Technometrics 11 (1969), 137-148, poses far from all.
+Source  Fedorov, Theory of Optimal Experiments (1972); Atkinson, Donev and Tobias, Optimum Experimental Designs, with
+        SAS (2007), ch. 9 to 11; Pronzato, Automatica 44 (2008), 303-325, on effects that are not linear.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrations.table import Array
+from calibrations.fit import Fit
+from calibrations.fitting.identifiability import RELATIVE_RANK, UNDETERMINED
+from calibrations.noise.means import Noise, rms
+from calibrations.problem import Problem
+from calibrations.table import Array, Table
+
+
+def information(fit: Fit, table: Table) -> Array:
+    """Derivatives of the model at the fitted values on another `table`, made white, shape (axes * n, parameters).
+
+    A block of rows for each axis, in order of time; a row is in units of its own noise, a column in 1 over the
+    parameter's unit. White noise is that of the table's means, scatter that of the fit. Slow noise too is as the fit
+    found it: correlated over the table's own times or, where it has none, added as if each row had its own.
+    """
+    problem = Problem(table.rows(table.order), fit.problem.layout)
+    return np.asarray(_noise(fit, problem).whiten(problem.jacobian(fit.theta)))
+
+
+def covariance_of(rows: Array) -> Array:
+    """Covariance of the parameters that `rows` (rows, parameters) determine, shape (parameters, parameters).
+
+    Infinite on the diagonal for a parameter that they leave undetermined.
+    """
+    p = rows.shape[1]
+    size = np.linalg.norm(rows, axis=0)
+    scale = np.where(size > 0, size, 1.0)
+    _, s, Vt = np.linalg.svd(np.vstack([rows / scale, np.zeros((p, p))]), full_matrices=False)
+    good = s > RELATIVE_RANK * s[0]
+    root = Vt[good].T / s[good] / scale[:, None]
+    covariance = root @ root.T
+    free = np.sum(Vt[~good] ** 2, axis=0) > UNDETERMINED
+    covariance[free, free] = np.inf
+    return np.asarray(covariance)
+
+
+def noise_on_rows(noise: Noise, problem: Problem) -> Noise:
+    """The noise found on some rows, on those of another problem: white as their means have it, the rest as found."""
+    white = np.zeros((len(problem.channels), problem.table.n)) if problem.white is None else problem.white
+    there = replace(noise, white=white, gap_s=problem.gap_s)
+    return replace(there, ratio=noise.slow / rms(there.fast))
+
+
+def _noise(fit: Fit, problem: Problem) -> Noise:
+    """The fit's noise on the rows of another problem; with times, it flickers on as for the fit's own uncertainties."""
+    found = fit.noise.prolonged() if "t_s" in problem.table else fit.noise
+    if "t_s" not in problem.table:
+        found = replace(found, scatter=np.hypot(found.scatter, found.slow), ratio=0 * found.ratio)
+    return noise_on_rows(found, problem)
+
+
+# Which poses tell most about a model: D- and I-optimal designs, by exchange of one pose after another.
+#
+#     D   the greatest det M: the smallest volume of the parameters' joint uncertainty
+#     I   the least mean variance of what the model predicts over a range of poses: tr(M^-1 W)
+#
+# M is the information of the chosen poses, W the mean of J' J over the range. A pose is taken out and the best of all
+# candidates put in its place until no exchange helps, from several random beginnings: the optimum of each is local.
+#
+# Some of the chosen are then measured again, so that the noise is known from the data themselves (pure error) and a
+# lack of fit can be told from it; and poses far from all of them are added that no fit sees.
+#
+# Source  Fedorov, Theory of Optimal Experiments (1972), exchange; Atkinson, Donev and Tobias, Optimum Experimental
+#         Designs, with SAS (2007), ch. 10 to 12; Kennard and Stone, Technometrics 11 (1969), 137-148, poses far from
+#         all.
 
 Chosen = NDArray[np.intp]  # numbers of candidates; one that is measured twice is there twice
 
@@ -72,13 +130,13 @@ class IOptimal:
         return float(np.sum(covariance * self.weight))
 
 
-def scaled(rows: Array) -> Array:
+def scale_rows(rows: Array) -> Array:
     """Each parameter in the unit in which the candidates' mean information is 1; `rows` is (candidates, axes, p)."""
     size = np.sqrt(np.mean(np.sum(rows**2, axis=1), axis=0))
     return rows / np.where(size > 0, size, 1.0)
 
 
-def exchanged(rows: Array, poses: int, criterion: Criterion, seed: int = 0) -> Chosen:
+def exchange_design(rows: Array, poses: int, criterion: Criterion, seed: int = 0) -> Chosen:
     """The best design of so many `poses` among the scaled `rows` (candidates, axes, p), shape (poses,).
 
     The same arguments give the same design.
@@ -88,7 +146,7 @@ def exchanged(rows: Array, poses: int, criterion: Criterion, seed: int = 0) -> C
     return min(designs, key=lambda chosen: criterion.loss(_covariance(rows[chosen])))
 
 
-def again(rows: Array, chosen: Chosen, more: int, criterion: Criterion) -> Chosen:
+def choose_repeats(rows: Array, chosen: Chosen, more: int, criterion: Criterion) -> Chosen:
     """Which of `chosen` to measure once more, each at most once: those that help most, one after another; (more,)."""
     left, taken = [int(k) for k in np.unique(chosen)], list[int]()
     for _ in range(min(more, len(left))):
@@ -97,7 +155,7 @@ def again(rows: Array, chosen: Chosen, more: int, criterion: Criterion) -> Chose
     return np.array(taken, dtype=np.intp)
 
 
-def farthest(places: Array, chosen: Chosen, count: int) -> Chosen:
+def farthest_poses(places: Array, chosen: Chosen, count: int) -> Chosen:
     """The `places` (candidates, k) that are farthest from all `chosen` and from each other, one by one; (count,)."""
     nearest = np.min(np.linalg.norm(places[:, None] - places[None, np.unique(chosen)], axis=2), axis=1)
     taken: list[int] = []

@@ -1,11 +1,10 @@
-"""In which order to visit poses: short ways, and nothing that follows time looking like something of the poses.
+"""The order of poses: short moves, and no parameter that a drift in time can imitate.
 
-Both are counted in seconds of rig time. The way costs its moves. A drift that nobody knows, a parabola in time on each
-output, takes information away from parameters that changed with time; that costs the dwell which would regain it for
-the parameter that lost most.
+Both count in seconds of rig time. Moves cost their duration. An unknown drift, a parabola in time on each output, takes
+information from parameters that changed with time; it costs the dwell that would restore the worst parameter.
 
-The order is improved from the nearest-neighbour way by turning stretches of it round and by putting poses elsewhere,
-with a slowly falling chance to accept what is worse (simulated annealing).
+The nearest-neighbour order is improved by reversing stretches and by moving poses, with a slowly falling chance to
+accept a worse order (simulated annealing).
 
 Source  Tack and Vandebroek, J. Statistical Planning and Inference 98 (2001), 293-310, on orders that resist a trend at
         low cost; Lin and Kernighan, Operations Research 21 (1973), 498-516, on exchanges along a way.
@@ -19,7 +18,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrations.search.identify import RELATIVE_RANK
+from calibrations.fitting.identifiability import RELATIVE_RANK
 from calibrations.table import Array
 
 PROPOSALS = 250  # for each pose
@@ -94,7 +93,7 @@ class Tour:
         return np.asarray(np.linalg.qr(np.vander(u, max(DEGREES) + 1, increasing=True))[0][:, list(DEGREES)])
 
 
-def ordered(tour: Tour, seed: int = 0) -> Order:
+def order_tour(tour: Tour, seed: int = 0) -> Order:
     """An order of low cost, shape (n,). The same tour gives the same order."""
     rng = np.random.default_rng(seed)
     present = best = _nearest_neighbours(tour)

@@ -1,1 +1,8 @@
-"""The catalogue: one physical effect a file, found by name. See `calibrations.effect` for their form."""
+"""The catalogue of physical effects: one effect a file in `signal` and `noise`, found by name.
+
+What the file of an effect imports: `from calibrations.effects import Effect, Parameter, Values`.
+"""
+
+from calibrations.effects.effect import HOOKS, KINDS, Constant, Effect, Parameter, Values
+
+__all__ = ["HOOKS", "KINDS", "Constant", "Effect", "Parameter", "Values"]

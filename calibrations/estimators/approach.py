@@ -28,19 +28,24 @@ from itertools import product
 
 import numpy as np
 
-from calibrations.estimators.kalman import Belief, corrected, predicted
+from calibrations.estimators.kalman import Belief, correct, predict
 from calibrations.table import Array
 
 LEVEL, OFFSET, REST, LN_TAU, SLOW, WALK, ROOM = 0, 1, 2, 4, 6, 11, 12  # places in a state: REST, LN_TAU, ROOM: two
 SIZE = 14
-CELL = np.array([0.4, 0.8])  # of a logarithm of a time constant, the slower and the faster one
-TAUS_S = np.exp(np.arange(np.log(150.0), np.log(100e3), CELL[0]))
-FAST_S = np.exp(np.arange(np.log(60.0), np.log(1300.0), CELL[1]))
-APART = 3.0  # nearer than this factor, two time constants are one to any noise
-USUAL_S, USUALLY = 5400.0, 0.8  # of a slow time constant beforehand: its median, and the std of its logarithm
-COUNTS = (0.3, 0.4, 0.3)  # probability beforehand of no exponential, one, two
+TAU_STEP = np.array([0.4, 0.8])  # of a logarithm of a time constant, the slower and the faster one
+TAUS_S = np.exp(np.arange(np.log(150.0), np.log(100e3), TAU_STEP[0]))
+FAST_S = np.exp(np.arange(np.log(60.0), np.log(1300.0), TAU_STEP[1]))
+LEAST_TAU_RATIO = 3.0  # nearer than this factor, two time constants are one to any noise
+USUAL_S, USUAL_LN_SPREAD = 5400.0, 0.8  # of a slow time constant beforehand: its median, and the std of its logarithm
+APPROACH_PRIOR = (0.3, 0.4, 0.3)  # probability beforehand of no exponential, one, two
 SLOW_S = np.array([120.0, 800.0, 5e3, 3e4, 1.8e5])  # time constants of slow noise
-RMS = ((0.5, 0.45), (1.5, 0.3), (3.5, 0.17), (8.0, 0.08))  # of a slow process, in units, and probability beforehand
+SLOW_RMS = (
+    (0.5, 0.45),
+    (1.5, 0.3),
+    (3.5, 0.17),
+    (8.0, 0.08),
+)  # of a slow process, in units, and probability beforehand
 SHAPES = (
     (1.0, (1.0, 1.0, 1.0, 1.0, 1.0), 0.0, 0.45),  # flicker
     (0.2, (0.5, 1.0, 2.0, 4.0, 4.0), 0.0, 0.15),  # the slower the larger
@@ -51,11 +56,11 @@ SHAPES = (
 )
 """Of slow noise: how large its processes are beside each other, with what is over within a value first; random walk per
 root of an hour; probability beforehand."""
-NONE = 0.3  # probability beforehand of no slow process
-UNLIKELY = 1e-5  # a filter of less weight is let go
+NO_SLOW_NOISE = 0.3  # probability beforehand of no slow process
+LEAST_WEIGHT = 1e-5  # a filter of less weight is let go
 HOUR_S = 3600.0
 DAY_S, LASTING_S = 24 * HOUR_S, 48 * HOUR_S  # the room's cycle, and how long it keeps its phase
-ROOMS = ((0.0015, 0.55), (0.005, 0.35), (0.02, 0.1))  # rms of its swing over `most`, and probability beforehand
+ROOM_SWINGS = ((0.0015, 0.55), (0.005, 0.35), (0.02, 0.1))  # rms of its swing over `most`, and probability beforehand
 SPREAD = 0.015  # of `most`: further exponentials that heat's way through a board adds, rms of each when it begins
 SPREAD_S = 1e4  # the slowest of them: what is slower is no part of warming up
 
@@ -113,7 +118,7 @@ class Bank:
         mean[:, REST:LN_TAU] *= kept
         mean[:, SLOW:WALK] *= slow
         mean[:, ROOM:] = mean[:, ROOM:] @ step[0, ROOM:, ROOM:].T
-        return replace(self, t_s=t_s, belief=Belief(mean, predicted(self.belief, step, noise).covariance))
+        return replace(self, t_s=t_s, belief=Belief(mean, predict(self.belief, step, noise).covariance))
 
     def after(self, t_s: float, value: float, std: float, *, offset: bool = False) -> Bank:
         """One more value of white standard error `std`; with an `offset`, it is shifted by a constant of its own."""
@@ -122,7 +127,7 @@ class Bank:
         matrix[0, OFFSET] = float(offset)
         ahead = self.at(t_s)
         noise = (std**2 + self.scatter**2)[:, None, None]
-        done = corrected(ahead.belief, np.array([value]), matrix, noise)
+        done = correct(ahead.belief, np.array([value]), matrix, noise)
         weighed = replace(ahead, belief=done.belief, log_weight=self.log_weight + done.log_likelihood)
         return weighed._pruned(self.nis + float(weighed.weight @ done.nis))
 
@@ -137,15 +142,15 @@ class Bank:
         return np.asarray(self.belief.mean[chosen, :SLOW] + away[:, :, 0])
 
     def _pruned(self, nis: float) -> Bank:
-        likely = self.weight > UNLIKELY
+        likely = self.weight > LEAST_WEIGHT
         belief = Belief(self.belief.mean[likely], self.belief.covariance[likely])
         mine = {name: getattr(self, name)[likely] for name in ("slow", "scatter", "walk", "room", "log_weight")}
         return replace(self, belief=belief, nis=nis, count=self.count + 1, **mine)
 
 
-def bank(t_s: float, value: float, most: float) -> Bank:
+def make_bank(t_s: float, value: float, most: float) -> Bank:
     """Before anything is measured: the first `value`, at `t_s`, is near; a drift is seldom much beyond `most`."""
-    kinds = product(_approaches(), _noises(), ROOMS)
+    kinds = product(_approaches(), _noises(), ROOM_SWINGS)
     members = [(tau, (*noise, room * most), p * q * w) for (tau, p), (noise, q), (room, w) in kinds]
     taus_s, noise = np.array([m[0] for m in members]), np.array([m[1] for m in members])
     scatter, slow, walk, room = noise[:, 0], noise[:, 1:-2], noise[:, -2], noise[:, -1]
@@ -154,7 +159,7 @@ def bank(t_s: float, value: float, most: float) -> Bank:
     mean[:, LN_TAU:SLOW] = np.log(np.where(taus_s > 0, taus_s, 1.0))
     begins = (SLOW_S < SPREAD_S) * (SPREAD * most) ** 2
     variances = np.column_stack([
-        np.full((len(members), 2), (3 * most) ** 2), (taus_s > 0) * most**2, (taus_s > 0) * (CELL / 2) ** 2,
+        np.full((len(members), 2), (3 * most) ** 2), (taus_s > 0) * most**2, (taus_s > 0) * (TAU_STEP / 2) ** 2,
         slow**2 + begins, np.zeros(len(members)), room**2, room**2,
     ])  # fmt: skip
     covariance[:, range(SIZE), range(SIZE)] = variances
@@ -170,12 +175,12 @@ def _swung(gap_s: float) -> tuple[Array, float]:
 
 def _approaches() -> list[tuple[tuple[float, float], float]]:
     """Slow and fast time constant, s, 0 where there is none; and their probability beforehand."""
-    pairs = [(s, f) for s, f in product(TAUS_S.tolist(), FAST_S.tolist()) if s > APART * f]
+    pairs = [(s, f) for s, f in product(TAUS_S.tolist(), FAST_S.tolist()) if s > LEAST_TAU_RATIO * f]
     kinds = [(0.0, 0.0)], [(s, 0.0) for s in TAUS_S.tolist()], pairs
     found: list[tuple[tuple[float, float], float]] = []
-    for kind, probability in zip(kinds, COUNTS, strict=True):
+    for kind, probability in zip(kinds, APPROACH_PRIOR, strict=True):
         slow = np.array([max(s, 1.0) for s, _ in kind])
-        usual = np.exp(-((np.log(slow / USUAL_S) / USUALLY) ** 2) / 2)
+        usual = np.exp(-((np.log(slow / USUAL_S) / USUAL_LN_SPREAD) ** 2) / 2)
         found += zip(kind, (probability * usual / usual.sum()).tolist(), strict=True)
     return found
 
@@ -183,8 +188,8 @@ def _approaches() -> list[tuple[tuple[float, float], float]]:
 def _noises() -> list[tuple[tuple[float, ...], float]]:
     """Scatter, rms of each slow process, and the random walk; and their probability beforehand."""
     none = np.zeros(1 + len(SLOW_S))
-    quiet = [((*none, walk), NONE * p) for walk, p in ((0.0, 0.95), (3.0, 0.05))]
+    quiet = [((*none, walk), NO_SLOW_NOISE * p) for walk, p in ((0.0, 0.95), (3.0, 0.05))]
     return quiet + [
-        ((rms * scatter, *(rms * np.array(shape)), walk), (1 - NONE) * p * q)
-        for (rms, q), (scatter, shape, walk, p) in product(RMS, SHAPES)
+        ((rms * scatter, *(rms * np.array(shape)), walk), (1 - NO_SLOW_NOISE) * p * q)
+        for (rms, q), (scatter, shape, walk, p) in product(SLOW_RMS, SHAPES)
     ]

@@ -46,13 +46,13 @@ class Correction:
         return np.asarray(-(self.nis + np.linalg.slogdet(2 * np.pi * self.innovation_covariance)[1]) / 2)
 
 
-def predicted(belief: Belief, transition: Array, noise: Array) -> Belief:
+def predict(belief: Belief, transition: Array, noise: Array) -> Belief:
     """One step on: A `transition`, Q `noise`, both (..., n, n)."""
     covariance = transition @ belief.covariance @ _turned(transition) + noise
     return Belief((transition @ belief.mean[..., None])[..., 0], (covariance + _turned(covariance)) / 2)
 
 
-def corrected(belief: Belief, measured: Array, matrix: Array, noise: Array) -> Correction:
+def correct(belief: Belief, measured: Array, matrix: Array, noise: Array) -> Correction:
     """After `measured` (..., m) = H x + v: H `matrix` (..., m, n), R `noise` (..., m, m)."""
     innovation = measured - (matrix @ belief.mean[..., None])[..., 0]
     cross = belief.covariance @ _turned(matrix)

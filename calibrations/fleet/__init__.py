@@ -1,1 +1,1 @@
-"""Many sensors at once: what a batch has in common, what its rigs add, and what each sensor gains from its siblings."""
+"""Many sensors: common effects of a batch, errors of its rigs, and pooling of sensors with their siblings."""

@@ -13,22 +13,23 @@ gain is the batch's, a parameter costing log(rows) in each sensor, or log(sensor
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Container, Sequence
-from dataclasses import dataclass, replace
+from collections import Counter, defaultdict
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.special import bdtrc, chdtrc, fdtrc
 
-from calibrations.fleet.look import Look, Score
-from calibrations.search.candidates import NOT_TOLD_APART, SIGNIFICANT
+from calibrations.criteria import INSEPARABLE, SIGNIFICANT
+from calibrations.fleet.look import Score, Screening
+from calibrations.fleet.rigs import RigError
 from calibrations.table import Array
 
-FEWEST = 4  # sensors that make a batch
-MOST_OF_ONE = 2.0  # times the length of the median score: what one sensor may say
-WORTH = 2.0  # fall of the sum of squares for each parameter that is worth having it (Mallows' C_p)
-MOST = 0.5  # of the sensors that gain from an effect of their batch
-RANK = 1e-9  # eigenvalue of a covariance of scores, over the greatest: less is rounding
+FEWEST_SENSORS = 4  # sensors that make a batch
+MOST_SCORE_LENGTH = 2.0  # times the length of the median score: what one sensor may say
+LEAST_GAIN = 2.0  # fall of the sum of squares for each parameter that is worth having it (Mallows' C_p)
+LEAST_GAINING_SHARE = 0.5  # of the sensors that gain from an effect of their batch
+SMALLEST_EIGENVALUE = 1e-9  # eigenvalue of a covariance of scores, over the greatest: less is rounding
 
 
 @dataclass(frozen=True)
@@ -48,18 +49,18 @@ class BatchEffect:
     rivals: tuple[str, ...] = ()
 
 
-def batch_effects(looks: Sequence[Look], of_stage: Container[str] = ()) -> list[BatchEffect]:
+def find_batch_effects(looks: Sequence[Screening], of_stage: Container[str] = ()) -> list[BatchEffect]:
     """The significant effects of a batch beside the model of `looks`, best first; none in a batch of too few.
 
     Effects `of_stage` are of the rig, which every sensor finds as it is: they are asked for in common only.
     """
-    if len(looks) < FEWEST:
+    if len(looks) < FEWEST_SENSORS:
         return []
     tried: dict[tuple[str, int, int], list[tuple[Score, int]]] = defaultdict(list)
     for look in looks:
         for score in look.scores:
             tried[score.effect, score.start, len(score.score)].append((score, look.rows))
-    asked = [of for of in tried.values() if len(of) >= max(FEWEST, len(looks) / 2)]
+    asked = [of for of in tried.values() if len(of) >= max(FEWEST_SENSORS, len(looks) / 2)]
     found = [_judged(of, 2 * len(asked), of[0][0].effect not in of_stage) for of in asked]
     found = sorted((each for each in found if each.p_value < SIGNIFICANT), key=lambda e: e.gain, reverse=True)
     best: dict[str, BatchEffect] = {}
@@ -69,7 +70,7 @@ def batch_effects(looks: Sequence[Look], of_stage: Container[str] = ()) -> list[
 
 
 def _with_rivals(each: BatchEffect, found: list[BatchEffect]) -> BatchEffect:
-    rivals = tuple(o.effect for o in found if o is not each and o.gain > each.gain - NOT_TOLD_APART)
+    rivals = tuple(o.effect for o in found if o is not each and o.gain > each.gain - INSEPARABLE)
     return replace(each, rivals=rivals)
 
 
@@ -97,7 +98,7 @@ def _common(scores: list[Score], rank: int) -> tuple[float, float]:
     u, weights = _bounded(scores)
     n, total = len(u), u.sum(axis=0)
     values, vectors = np.linalg.eigh(u.T @ u)
-    kept = values > RANK * values[-1]
+    kept = values > SMALLEST_EIGENVALUE * values[-1]
     rank = min(rank, int(kept.sum()))
     if not rank or n <= rank + 1:
         return 1.0, 0.0
@@ -112,14 +113,77 @@ def _common(scores: list[Score], rank: int) -> tuple[float, float]:
 def _bounded(scores: list[Score]) -> tuple[Array, Array]:
     """Scores (n, k), none longer than MOST_OF_ONE times the median, and the factors (n,) that make them so."""
     length = np.sqrt([s.statistic for s in scores])
-    weights = np.minimum(1.0, MOST_OF_ONE * np.median(length) / np.maximum(length, 1e-300))
+    weights = np.minimum(1.0, MOST_SCORE_LENGTH * np.median(length) / np.maximum(length, 1e-300))
     return np.array([s.score for s in scores]) * weights[:, None], weights
 
 
 def _own(statistics: Array, ranks: Array) -> float:
     """Chance that noise makes as many sensors gain from the effect; 1 where they are fewer than MOST."""
-    n, gaining = len(statistics), int(np.sum(statistics > WORTH * ranks))
-    if gaining < MOST * n:
+    n, gaining = len(statistics), int(np.sum(statistics > LEAST_GAIN * ranks))
+    if gaining < LEAST_GAINING_SHARE * n:
         return 1.0
-    each = float(np.max(chdtrc(ranks, WORTH * ranks)))
+    each = float(np.max(chdtrc(ranks, LEAST_GAIN * ranks)))
     return float(bdtrc(gaining - 1, n, each))
+
+
+# What a fleet turned out to be: batches with what they miss, rigs with their errors, sensors with their verdicts.
+
+WITH_BATCH, FULL_SEARCH = "beside its batch", "in full"
+
+
+@dataclass(frozen=True)
+class SensorVerdict:
+    """One sensor: `effects` that the first model misses on it, those of its batch and its own; how it was judged.
+
+    `fault`: why it could not be read or fitted. `rivals` of an effect cannot be told from it.
+    """
+
+    sensor: str
+    batch: str
+    rig: str
+    data: str
+    verdict: str
+    effects: tuple[str, ...] = ()
+    own: tuple[str, ...] = ()
+    excess: float | None = None
+    judged: str = WITH_BATCH
+    rivals: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    remark: str | None = None
+
+    @property
+    def needs_a_person(self) -> bool:
+        """Whether it is unlike its siblings or could not be judged; what a whole batch misses is no sensor's matter."""
+        return self.verdict in ("failed", "unexplained", "no-response") or bool(self.own or self.remark)
+
+
+@dataclass(frozen=True)
+class BatchVerdict:
+    """One batch: the effects that its sensors share, in the order added, and of how many sensors the rest is."""
+
+    batch: str
+    sensors: int
+    effects: tuple[BatchEffect, ...]
+    shares: Mapping[str, float]  # effect -> share of the batch's sensors that have it, as a batch or by themselves
+
+
+@dataclass(frozen=True)
+class Population:
+    """The whole fleet. `unconnected`: groups of rigs that no batch connects, and whose errors cannot be compared."""
+
+    sensors: tuple[SensorVerdict, ...]
+    batches: tuple[BatchVerdict, ...]
+    rigs: tuple[RigError, ...]
+    unconnected: tuple[tuple[str, ...], ...]
+
+    @property
+    def verdicts(self) -> Counter[str]:
+        """How many sensors have each verdict."""
+        return Counter(each.verdict for each in self.sensors)
+
+
+def batch_verdict(batch: str, effects: tuple[BatchEffect, ...], sensors: tuple[SensorVerdict, ...]) -> BatchVerdict:
+    """The summary of a batch from its sensors'."""
+    judged = [each for each in sensors if each.verdict != "failed"]
+    counts = Counter(name for each in judged for name in each.effects)
+    shares = {name: count / len(judged) for name, count in counts.most_common()}
+    return BatchVerdict(batch, len(sensors), effects, shares)

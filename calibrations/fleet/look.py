@@ -1,32 +1,163 @@
-"""A look at one sensor: the model fitted, and how much each effect and each pattern could take off what is left.
+"""What candidate effects and patterns could add to a residual, made once for all sensors that share a design.
 
-All candidates are judged at once from one Gram matrix: columns made white under the sensor's own noise and freed of the
-model (Frisch, Waugh and Lovell), as `calibrations/search/screen.py` does one by one. Where the noise has a slow part,
-the candidates are also weighed against it (`noise_fit.gains`), as a diagnosis does. What is kept is small: scores and
-information add up over sensors.
+Derivatives of the residual cost more than all that is done with them, and at the same poses they are nearly the same
+for every sensor: an effect on pose or force goes with the range of the output, one of transduction does not depend on
+the sensor. So they are made for the first sensor of a design and scaled for the others; who came first hardly makes a
+difference. An effect that needs columns beside the angles (time, temperature), or constants of the table, is shared
+only by sensors for which these are the same, and one on the output by none. Only poses are a design: of positions and
+rates the outputs themselves tell how a sensor stood, and nothing is shared.
+
+An effect whose start is searched for in the data itself (`Effect.searched`) is left out: it would have to be refitted.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TypeVar
 
 import numpy as np
 from scipy.special import chdtrc, fdtrc
 
-from calibrations.effect import Effect
+from calibrations.discovery.candidates import askable
+from calibrations.discovery.outliers import fit_without
+from calibrations.discovery.patterns import patterns
+from calibrations.discovery.significance import SMALLEST, Screen, Search, of_search
+from calibrations.discovery.structure import without_slow
+from calibrations.effects import Effect
 from calibrations.fit import Fit, cautiously
-from calibrations.fleet.columns import Group, Groups, Shared
+from calibrations.fitting.identifiability import covariance
 from calibrations.model import Model
-from calibrations.noise_estimation.noise_fit import gains
-from calibrations.search.identify import covariance
-from calibrations.search.outliers import fit_without
-from calibrations.search.screen import SMALLEST, Screen, of_search
-from calibrations.search.structure import without_slow
+from calibrations.noise.means_fit import gains
+from calibrations.problem import Problem
 from calibrations.table import Array, Table
 
-LEAST = 1e-10  # eigenvalue of a Gram matrix of columns of length 1: less is rounding
+ANGLES = ("alpha_deg", "beta_deg", "direction", "mount_deg", "flip")
+Key = tuple[str | bytes, ...]
+MOST_CACHED = 300
+
+V = TypeVar("V")
+
+
+@dataclass(frozen=True)
+class Group:
+    """Columns (channels, n, k) that belong together: one effect at one of its starts, or one pattern.
+
+    `scaled`: they go with the range of the output, and are given per unit of it.
+    """
+
+    effect: str  # "" for a pattern
+    start: int
+    columns: Array
+    scaled: bool = False
+
+    def of(self, table: Table) -> Array:
+        """The columns for a sensor that was measured on the same design."""
+        return self.columns * _ranges(table, len(self.columns)) if self.scaled else self.columns
+
+
+@dataclass(frozen=True)
+class SearchGroups:
+    """All that is searched together on one design. `trials`: to how many independent tests the search amounts."""
+
+    all: tuple[Group, ...]
+    trials: float
+
+
+class SharedDesigns:
+    """The columns of the designs met lately, of `effects` beside one model."""
+
+    def __init__(self, effects: Mapping[str, Effect]) -> None:
+        self.effects = effects
+        self._asked: dict[Key, tuple[Effect, ...]] = {}
+        self._groups: dict[Key, tuple[Group, ...]] = {}
+        self._trials: dict[Key, float] = {}
+
+    def of(self, found: Fit) -> SearchGroups:
+        """Those for a fitted table."""
+        table = found.table
+        design = _key(table, ())
+        can: Key = (*table.columns, *design)
+        asked = _once(self._asked, can, lambda: _asked(found, self.effects))
+        groups = [group for effect in asked for group in self._effect(found, effect)]
+        shapes: tuple[Group, ...] = _once(self._groups, design, lambda: tuple(_patterns(found)))
+        groups += shapes
+        search: Key = (*(effect.name for effect in asked), *design)
+        return SearchGroups(tuple(groups), _once(self._trials, search, lambda: _trials(found, groups)))
+
+    def _effect(self, found: Fit, effect: Effect) -> tuple[Group, ...]:
+        if "output" in effect.places:
+            return tuple(_derivatives(found, effect))
+        constants = np.array([float(constant(found.table)) for constant in effect.constants.values()])
+        key = (effect.name, constants.tobytes(), *_key(found.table, effect.needs))
+        return _once(self._groups, key, lambda: tuple(_derivatives(found, effect)))
+
+
+def _once(made: dict[Key, V], key: Key, make: Callable[[], V]) -> V:
+    """What was made for a key, or is now; where there are MOST of them all are forgotten, so that memory stays flat."""
+    value = made.get(key)
+    if value is None:
+        value = make()
+        if len(made) >= MOST_CACHED:
+            made.clear()
+        made[key] = value
+    return value
+
+
+def _asked(found: Fit, effects: Mapping[str, Effect]) -> tuple[Effect, ...]:
+    return tuple(effect for effect in askable(found, effects) if effect.searched(found.table) <= 1)
+
+
+def _key(table: Table, needs: tuple[str, ...]) -> Key:
+    """What columns at rows in order of time are a function of."""
+    design = ANGLES if table.kind == "poses" else table.columns
+    names = [name for name in dict.fromkeys((*design, *needs)) if name in table]
+    return tuple(part for name in names for part in (name, table.column(name).tobytes()))
+
+
+def _ranges(table: Table, channels: int) -> Array:
+    """The range of each channel's output, (channels, 1, 1); 1 where the residual is none of an output."""
+    ranges = np.asarray(np.ptp(table.outputs, axis=0))
+    return (ranges if len(ranges) == channels else np.ones(channels))[:, None, None]
+
+
+def _derivatives(found: Fit, effect: Effect) -> Iterator[Group]:
+    """Of the residual with respect to the effect's parameters, from each of its starts."""
+    problem = Problem.of(found.model.with_effect(effect), found.table)
+    mine = problem.layout.of_effect(effect.name)
+    scaled = bool(effect.places & {"pose", "force"})
+    for start, theta in enumerate(problem.layout.starts()):
+        columns = problem.jacobian(theta, mine)
+        if np.any(columns):
+            yield Group(effect.name, start, columns / _ranges(found.table, len(columns)) if scaled else columns, scaled)
+
+
+def _patterns(found: Fit) -> Iterator[Group]:
+    """Of poses those that angles and the order of rows can show: they are the same for all sensors of a design."""
+    table = found.table
+    if table.kind == "poses":
+        chosen = [name for name in (*ANGLES, *table.output_names) if name in table]
+        table = Table.from_columns(table.kind, {name: table.column(name) for name in chosen})
+    return (Group("", k, each.columns) for k, each in enumerate(patterns(table, found.channels)))
+
+
+def _trials(found: Fit, groups: list[Group]) -> float:
+    """To how many independent tests the search amounts under white noise, whatever else the first sensor has."""
+    screen = Screen(without_slow(found))
+    return Search(screen, [screen.basis(group.of(found.table)) for group in groups]).trials
+
+
+# A look at one sensor: the model fitted, and how much each effect and each pattern could take off what is left.
+#
+# All candidates are judged at once from one Gram matrix: columns made white under the sensor's own noise and freed of
+# the
+# model (Frisch, Waugh and Lovell), as `discovery/significance.py` does one by one. Where the noise has a slow part,
+# the candidates are also weighed against it (`noise_fit.gains`), as a diagnosis does. What is kept is small: scores
+# and
+# information add up over sensors.
+
+LEAST_RANK = 1e-10  # eigenvalue of a Gram matrix of columns of length 1: less is rounding
 
 LIKELY = 0.05  # chance, if all that is slow were an effect's, below which it is weighed against slow noise
 
@@ -49,7 +180,7 @@ class Score:
 
 
 @dataclass(frozen=True)
-class Stage:
+class StageScore:
     """Score (k,) and information (k, k) of the parameters of the effects on the pose, all together; their names."""
 
     names: tuple[tuple[str, str, str], ...]  # effect, parameter, unit
@@ -57,11 +188,11 @@ class Stage:
     information: Array
 
 
-NOWHERE = Stage((), np.zeros(0), np.zeros((0, 0)))  # of a sensor on no stage
+NOWHERE = StageScore((), np.zeros(0), np.zeros((0, 0)))  # of a sensor on no stage
 
 
 @dataclass(frozen=True)
-class Look:
+class Screening:
     """What is kept of one sensor. `information` (p, p) is the inverse covariance of the parameters `theta` (p,), with
     all that their standard uncertainties are widened by; `typical` what a sensor may show.
 
@@ -79,17 +210,17 @@ class Look:
     chance: float
     outliers: tuple[int, ...]
     scores: tuple[Score, ...]
-    stage: Stage
+    stage: StageScore
 
 
-def look(table: Table, model: Model, shared: Shared) -> Look:
+def screen_sensor(table: Table, model: Model, shared: SharedDesigns) -> Screening:
     """Fit `model` to `table` and weigh what `shared` holds for its design. Raises what `fit` raises."""
     found, outliers = fit_without(model, table)
     groups = shared.of(found)
     columns = [group.of(found.table) for group in groups.all]
     screen = Screen(found)
     scores, chance, gram, along = _weighed(screen, groups, columns)
-    return Look(
+    return Screening(
         unit=table.unit,
         names=tuple((found.model.terms[s.term].name, s.parameter.name, s.axis, _unit(found, s.parameter.unit))
                     for s in found.problem.layout.slots),
@@ -120,7 +251,9 @@ def information(found: Fit) -> Array:
     return np.asarray((white.T @ white) / np.outer(wider, wider))
 
 
-def _weighed(screen: Screen, groups: Groups, columns: list[Array]) -> tuple[tuple[Score, ...], float, Array, Array]:
+def _weighed(
+    screen: Screen, groups: SearchGroups, columns: list[Array]
+) -> tuple[tuple[Score, ...], float, Array, Array]:
     """The effects' scores, the chance of the best of all, and Gram matrix and score of all columns freed."""
     found = screen.fit
     white = found.noise.whiten(np.concatenate(columns, axis=2))
@@ -152,11 +285,11 @@ def statistics_of(grams: list[Array], scores: list[Array]) -> tuple[Array, Array
     scale = np.where(size > 0, 1 / np.where(size > 0, size, 1.0), 0.0)
     values, vectors = np.linalg.eigh(padded * scale[:, :, None] * scale[:, None, :])
     along = np.einsum("gkj,gk->gj", vectors, sides * scale)
-    kept = values > LEAST
+    kept = values > LEAST_RANK
     return np.sum(np.where(kept, along**2 / np.where(kept, values, 1.0), 0.0), axis=1), kept.sum(axis=1)
 
 
-def _beside_slow_noise(found: Fit, groups: Groups, columns: list[Array], ranks: Array) -> Array:
+def _beside_slow_noise(found: Fit, groups: SearchGroups, columns: list[Array], ranks: Array) -> Array:
     """How often noise alone gains as much as each effect where the noise is fitted anew beside it.
 
     1 for patterns, where no slow noise was found, so that there is nothing to weigh an effect against, and for effects
@@ -185,7 +318,7 @@ def _without_slow(found: Fit, columns: list[Array]) -> Array:
     return np.asarray(chdtrc(ranks, falls / level))
 
 
-def _stage(groups: Groups, effects: Mapping[str, Effect], gram: Array, along: Array) -> Stage:
+def _stage(groups: SearchGroups, effects: Mapping[str, Effect], gram: Array, along: Array) -> StageScore:
     """The effects on the pose that are not in the model, from their first start."""
     names: list[tuple[str, str, str]] = []
     places: list[int] = []
@@ -195,8 +328,8 @@ def _stage(groups: Groups, effects: Mapping[str, Effect], gram: Array, along: Ar
             names += [(group.effect, p.name, p.unit) for p in effects[group.effect].parameters]
             places += range(at, at + group.columns.shape[2])
         at += group.columns.shape[2]
-    return Stage(tuple(names), along[places], gram[np.ix_(places, places)])
+    return StageScore(tuple(names), along[places], gram[np.ix_(places, places)])
 
 
 def _of_stage(group: Group, effects: Mapping[str, Effect]) -> bool:
-    return bool(group.effect) and group.start == 0 and effects[group.effect].pose is not None
+    return bool(group.effect) and group.start == 0 and "pose" in effects[group.effect].places

@@ -1,36 +1,70 @@
-"""Errors of rigs, found from the sensors that they measured: what all sensors of one rig share is the rig's.
+"""A table with its stage's errors taken out: where the sensor truly stood, as far as the fleet knows it.
 
-One sensor cannot tell its own misalignment from its stage's zero offset. Over a fleet, parameter j of an effect on the
-pose, as sensor i of batch b on rig r shows it, is
-
-    y_i = beta_b + rho_r + e_i        var e_i = tau^2 + v_i
-
-with tau^2 what sensors of one batch differ by on one rig (Paule and Mandel), whatever of the sensor looks like it: the
-sensors are taken to have come to the rigs by chance. rho is tested by F (Knapp and Hartung, 2003). The strongest effect
-is taken, its rigs' values taken off, and the search goes on.
-
-What this cannot tell: an error that all rigs share from one of the sensors' design; a rig's from a batch's where each
-batch was on one rig. Values are therefore told from the median of the rigs that batches connect.
+The direction of gravity is all that an orientation is to a still sensor, so any error of pose, a tilted base too, is a
+change of alpha and beta.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.special import fdtrc, stdtr
 
-from calibrations.fleet.look import Stage
-from calibrations.search.candidates import SIGNIFICANT
-from calibrations.table import Array
+from calibrations.criteria import SIGNIFICANT
+from calibrations.effects import Effect, Values
+from calibrations.fleet.look import StageScore
+from calibrations.geometry.orientation import nominal_pose, specific_force
+from calibrations.table import Array, Table
 
-FAR = 5.0  # robust standard deviations off the others of its batch and rig: a sensor that tells nothing of the rig
+StageErrors = Mapping[str, Mapping[str, float]]  # effect -> parameter -> value
+
+
+def correct_stage_errors(table: Table, errors: StageErrors, effects: Mapping[str, Effect]) -> Table:
+    """`table` at the poses that its stages truly took, given the parameters of effects on the pose; any other as is."""
+    if not errors or table.kind != "poses":
+        return table
+    table = table.in_order()
+    pose = nominal_pose(table)
+    for name, values in errors.items():
+        effect = effects[name]
+        given = Values.of({p.name: values.get(p.name, 0.0) for p in effect.parameters})
+        pose = effect.pose(pose, table, given)
+    down = specific_force(replace(pose, mount=np.zeros(table.n), flip=np.zeros(table.n)))
+    columns = dict(table.columns)
+    columns["alpha_deg"] = np.degrees(np.arctan2(np.hypot(down[:, 0], down[:, 1]), down[:, 2]))
+    columns["beta_deg"] = np.degrees(np.arctan2(down[:, 1], down[:, 0]))
+    return replace(table, columns=MappingProxyType(columns))
+
+
+# Errors of rigs, found from the sensors that they measured: what all sensors of one rig share is the rig's.
+#
+# One sensor cannot tell its own misalignment from its stage's zero offset. Over a fleet, parameter j of an effect on
+# the
+# pose, as sensor i of batch b on rig r shows it, is
+#
+#     y_i = beta_b + rho_r + e_i        var e_i = tau^2 + v_i
+#
+# with tau^2 what sensors of one batch differ by on one rig (Paule and Mandel), whatever of the sensor looks like it:
+# the
+# sensors are taken to have come to the rigs by chance. rho is tested by F (Knapp and Hartung, 2003). The strongest
+# effect
+# is taken, its rigs' values taken off, and the search goes on.
+#
+# What this cannot tell: an error that all rigs share from one of the sensors' design; a rig's from a batch's where
+# each
+# batch was on one rig. StageErrors are therefore told from the median of the rigs that batches connect.
+
+FAR_SPREADS = (
+    5.0  # robust standard deviations off the others of its batch and rig: a sensor that tells nothing of the rig
+)
 TO_STD = 1.4826
 DETERMINED = 1e-8  # share of an information matrix: less is not known
-FEWEST = 3  # sensors beyond what is estimated
+FEWEST_SENSORS_PER_RIG = 3  # sensors beyond what is estimated
 
 
 @dataclass(frozen=True)
@@ -39,7 +73,7 @@ class Measured:
 
     batch: str
     rig: str
-    stage: Stage
+    stage: StageScore
 
 
 @dataclass(frozen=True)
@@ -72,7 +106,7 @@ class _Found:
         return self.errors[0].p_value if self.errors else 1.0
 
 
-def rig_errors(fleet: Sequence[Measured]) -> list[RigError]:
+def find_rig_errors(fleet: Sequence[Measured]) -> list[RigError]:
     """The errors of rigs that the fleet shows, effect by effect in the order found; none where no two are connected."""
     names = next((each.stage.names for each in fleet if each.stage.names), ())
     fleet = [each for each in fleet if each.stage.names == names]
@@ -93,7 +127,7 @@ def rig_errors(fleet: Sequence[Measured]) -> list[RigError]:
     return errors
 
 
-def unconnected(fleet: Sequence[Measured]) -> list[tuple[str, ...]]:
+def unconnected_rigs(fleet: Sequence[Measured]) -> list[tuple[str, ...]]:
     """Groups of rigs between which no batch connects; one group where all can be compared."""
     groups: list[set[str]] = []
     for batch in dict.fromkeys(each.batch for each in fleet):
@@ -153,7 +187,7 @@ def _parameter(sensors: Sequence[Measured], y: Array, v: Array, name: tuple[str,
     both = np.hstack([of_batch, np.array([[each.rig == rig for rig in rigs] for each in sensors], dtype=float)])
     more = int(np.linalg.matrix_rank(both)) - len(batches)
     free = len(y) - len(batches) - more
-    if more <= 0 or free < FEWEST:
+    if more <= 0 or free < FEWEST_SENSORS_PER_RIG:
         return []
     total = v + _between(both, y, v, free)
     left, theta, cov = _least_squares(both, y, total)
@@ -161,7 +195,7 @@ def _parameter(sensors: Sequence[Measured], y: Array, v: Array, name: tuple[str,
     f = (_least_squares(of_batch, y, total)[0] - left) / more / scale
     p_value = float(fdtrc(more, free, max(f, 0.0)))
     errors = []
-    for group in unconnected(sensors):
+    for group in unconnected_rigs(sensors):
         places = [len(batches) + rigs.index(rig) for rig in group]
         middle = _middle(theta[places])
         for k, rig in enumerate(group if len(group) > 1 else ()):
@@ -191,7 +225,7 @@ def _far(sensors: Sequence[Measured], y: Array, v: Array) -> NDArray[np.bool_]:
         places.setdefault((each.batch, each.rig), []).append(k)
     for chosen in map(np.array, places.values()):
         off = np.abs(y[chosen] - np.median(y[chosen]))
-        far[chosen] = off > FAR * np.sqrt((TO_STD * np.median(off)) ** 2 + v[chosen])
+        far[chosen] = off > FAR_SPREADS * np.sqrt((TO_STD * np.median(off)) ** 2 + v[chosen])
     return far
 
 

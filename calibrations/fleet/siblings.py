@@ -1,13 +1,13 @@
-"""One quantity of many siblings: its mean and spread in the batch, and what each one's own value is in their light.
+"""Partial pooling: the parameters of each sensor in a batch, estimated together with its siblings.
 
-    y_i ~ N(theta_i, v_i)        theta_i ~ N(mu, tau^2)        flat in mu and in tau
+    theta_i ~ N(mu, diag(tau^2))        data of sensor i: theta_hat_i with information A_i (p, p)
 
-The posterior is exact but for a sum over a grid of tau: given tau, all is normal, and the weight of each tau follows
-from the data. So intervals hold what mu and tau are uncertain by, also in a batch of a few sensors or of equal ones
-(tau near 0), where an estimate of tau put in its place would make them too short. A value that is unlike all others is
-set apart: it neither moves its siblings nor is moved by them.
+Parameters vary independently over the batch, but the estimates of one sensor are correlated, strongly so with few
+poses. One parameter is treated at a time: the others of each sensor are integrated over their batch distribution, which
+leaves y_i and v_i for `fit_siblings`. This repeats until the spreads converge. A parameter that a sensor's poses do not
+determine gets the batch's prediction.
 
-Source  Gelman et al., Bayesian Data Analysis (3rd ed.), 5.4-5.5, (5.20)-(5.21); Efron and Morris (1975).
+Where sensors differ by much more than the uncertainty of a fit (tau >> std), pooling changes nothing.
 """
 
 from __future__ import annotations
@@ -21,11 +21,24 @@ from scipy.special import ndtr, stdtr
 
 from calibrations.table import Array
 
-FEWEST = 3  # siblings that tell a spread: with fewer the posterior of tau is none
+# One quantity of many siblings: its mean and spread in the batch, and what each one's own value is in their light.
+#
+#     y_i ~ N(theta_i, v_i)        theta_i ~ N(mu, tau^2)        flat in mu and in tau
+#
+# The posterior is exact but for a sum over a grid of tau: given tau, all is normal, and the weight of each tau
+# follows
+# from the data. So intervals hold what mu and tau are uncertain by, also in a batch of a few sensors or of equal ones
+# (tau near 0), where an estimate of tau put in its place would make them too short. A value that is unlike all others
+# is
+# set apart: it neither moves its siblings nor is moved by them.
+#
+# Source  Gelman et al., Bayesian Data Analysis (3rd ed.), 5.4-5.5, (5.20)-(5.21); Efron and Morris (1975).
+
+FEWEST_SIBLINGS = 3  # siblings that tell a spread: with fewer the posterior of tau is none
 GRID = 80
 HALVINGS = 40
-APART = 0.01  # chance of setting any value of a batch apart where all are alike
-SUSPECT = 3.0  # robust standard deviations off the median: looked at again without each other
+LEAST_OUTLIER_GAIN = 0.01  # chance of setting any value of a batch apart where all are alike
+MOST_USUAL = 3.0  # robust standard deviations off the median: looked at again without each other
 TO_STD = 1.4826  # median of absolute deviations to standard deviation
 
 
@@ -42,8 +55,8 @@ class Siblings:
 
     @property
     def pooled(self) -> bool:
-        """Whether there are enough to learn from."""
-        return int(np.sum(~self.apart)) >= FEWEST
+        """Whether there are enough sensors to pool."""
+        return int(np.sum(~self.apart)) >= FEWEST_SIBLINGS
 
     @cached_property
     def _means(self) -> tuple[Array, Array]:
@@ -52,7 +65,7 @@ class Siblings:
 
     @property
     def mean(self) -> float:
-        """Of mu."""
+        """The mean of mu."""
         return float(self.weight @ self._means[0])
 
     @property
@@ -109,7 +122,7 @@ class Siblings:
         return np.asarray((low + high) / 2)
 
 
-def siblings(y: Array, v: Array) -> Siblings:
+def fit_siblings(y: Array, v: Array) -> Siblings:
     """The posterior of values `y` with variances `v`, (n,), those that are unlike all others set apart."""
     apart = _suspects(y, v)
     if apart.any():
@@ -117,7 +130,7 @@ def siblings(y: Array, v: Array) -> Siblings:
         variance = alike.variance + alike.mean_std**2 + v
         off = np.abs(y - alike.mean) / np.sqrt(variance)
         freedom = max(int(np.sum(~apart)) - 1, 1)
-        apart &= 2 * stdtr(freedom, -off) * len(y) < APART
+        apart &= 2 * stdtr(freedom, -off) * len(y) < LEAST_OUTLIER_GAIN
     return _posterior(y, v, apart)
 
 
@@ -125,13 +138,13 @@ def _suspects(y: Array, v: Array) -> NDArray[np.bool_]:
     """Values far from the median; none where fewer than FEWEST would be left."""
     middle = float(np.median(y))
     spread = TO_STD * float(np.median(np.abs(y - middle)))
-    out = np.abs(y - middle) > SUSPECT * np.sqrt(spread**2 + v)
-    return out if int(np.sum(~out)) >= FEWEST else np.zeros(len(y), dtype=bool)
+    out = np.abs(y - middle) > MOST_USUAL * np.sqrt(spread**2 + v)
+    return out if int(np.sum(~out)) >= FEWEST_SIBLINGS else np.zeros(len(y), dtype=bool)
 
 
 def _posterior(y: Array, v: Array, apart: NDArray[np.bool_]) -> Siblings:
     own, noise = y[~apart], v[~apart]
-    if len(own) < FEWEST:
+    if len(own) < FEWEST_SIBLINGS:
         return Siblings(y, v, apart, np.zeros(1), np.ones(1))
     at = (np.arange(GRID) + 0.5) / GRID
     scale = float(np.std(own)) + np.sqrt(float(np.median(noise))) / 4
@@ -149,3 +162,77 @@ def _means(y: Array, v: Array, tau: Array) -> tuple[Array, Array]:
     weight = 1 / (v + tau[:, None] ** 2)
     total = weight.sum(axis=1)
     return np.asarray(weight @ y / total), np.asarray(1 / total)
+
+
+SWEEPS = 6
+SETTLED = 0.01  # relative change of the spreads
+NOTHING = 1e-10  # information, in typical sizes, of a parameter that nothing is known of
+WIDE = 1e4  # spread, in typical sizes, before anything is known
+
+
+@dataclass(frozen=True)
+class Pooled:
+    """For each parameter its siblings; `scale` (p,) is what their values are given in.
+
+    `alone` (n, p): standard uncertainties without siblings; inf where the sensor's own data do not tell.
+    """
+
+    parameters: tuple[Siblings, ...]
+    scale: Array
+    alone: Array
+
+    @property
+    def values(self) -> Array:
+        """(n, p)."""
+        return np.column_stack([each.values for each in self.parameters]) * self.scale
+
+    @property
+    def stds(self) -> Array:
+        """(n, p)."""
+        return np.column_stack([each.stds for each in self.parameters]) * self.scale
+
+    def intervals(self, coverage: float = 0.95) -> tuple[Array, Array]:
+        """Lowest and highest values, (n, p) each."""
+        ends = np.array([each.interval(coverage) for each in self.parameters])  # (p, 2, n)
+        return np.asarray(ends[:, 0].T * self.scale), np.asarray(ends[:, 1].T * self.scale)
+
+    @property
+    def apart(self) -> Array:
+        """(n, p): whether a sensor's parameter is unlike those of all siblings, and stands alone."""
+        return np.column_stack([each.apart for each in self.parameters])
+
+
+def pool_siblings(theta: Array, information: Array, typical: Array) -> Pooled:
+    """Pool estimates `theta` (n, p) with `information` (n, p, p); `typical` (p,) magnitudes."""
+    known = information * np.outer(typical, typical) + NOTHING * np.eye(len(typical))
+    said = np.einsum("nij,nj->ni", known, theta / typical)
+    prior, mean = np.full(theta.shape, WIDE**-2.0), np.zeros(theta.shape)
+    found: list[Siblings] = []
+    for _ in range(SWEEPS):
+        before = prior.copy()
+        found = []
+        for k in range(theta.shape[1]):
+            found.append(fit_siblings(*_alone(known, said, prior, mean, k)))
+            mean[:, k], prior[:, k] = _foretold(found[-1])
+        if np.all(np.abs(prior / before - 1) < SETTLED):
+            break
+    own = np.linalg.inv(known)
+    std = np.sqrt(np.diagonal(own, axis1=1, axis2=2))
+    return Pooled(tuple(found), typical, np.where(std < WIDE, std, np.inf) * typical)
+
+
+def _alone(known: Array, said: Array, prior: Array, mean: Array, k: int) -> tuple[Array, Array]:
+    """Parameter k and its variance for each sensor, (n,), by its own data and what is foretold of its other ones."""
+    others = prior.copy()
+    others[:, k] = 0.0
+    total = known + others[:, :, None] * np.eye(known.shape[1])
+    inverse = np.linalg.inv(total)[:, k]
+    return np.einsum("nj,nj->n", inverse, said + others * mean), np.asarray(inverse[:, k])
+
+
+def _foretold(found: Siblings) -> tuple[Array | float, Array | float]:
+    """What the batch says of each sensor before its own data: mean and inverse variance; nothing of those apart."""
+    if not found.pooled:
+        return 0.0, WIDE**-2.0
+    precision = 1 / (found.variance + found.mean_std**2)
+    return np.where(found.apart, 0.0, found.mean), np.where(found.apart, WIDE**-2.0, precision)

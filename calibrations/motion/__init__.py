@@ -1,1 +1,1 @@
-"""Motion: a sensor shaken beside a displacement sensor; reference acceleration, evaluation, and rows for the fit."""
+"""Motion: a sensor with a displacement sensor; reference acceleration, evaluation, rows for the fit."""

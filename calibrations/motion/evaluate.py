@@ -1,39 +1,113 @@
-"""Both models beside the displacement sensor, as in the paper's Fig. 12.
+"""Linear and physical model against the displacement sensor's acceleration, as in the paper's Fig. 12.
 
-The sensor's output is freed of the output filter and of the sampling's skew and brought into the paper's band (a
-second-order Butterworth low-pass at 20 Hz, freed of its delay and attenuation at the motion's frequency); each model
-makes acceleration of it. The reference goes through the same low-pass, so that both sides have the same band.
+Output filter and sampling skew are removed from the sensor's output, which is then low-passed to the paper's band (a
+second-order Butterworth at 20 Hz, corrected for its delay and attenuation at the motion's frequency). Each model
+converts it to acceleration. The reference passes the same low-pass, so that both have the same band.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from calibrations.errors import DataError
-from calibrations.model import Model
-from calibrations.motion.output import NOMINAL_CORNER_HZ
-from calibrations.motion.records import Record, records
-from calibrations.motion.reference import Bias, Reference, bias_of, biases, paper_reference, reference
-from calibrations.motion.sensor import measured, undone
+from calibrations.effects.catalogue import catalogue
+from calibrations.errors import DataError, ModelError
+from calibrations.fit import fit
+from calibrations.model import Estimate, Model
+from calibrations.model.chain import force, respond, sensed
+from calibrations.model.file import read_model
+from calibrations.model.parameters import Layout
+from calibrations.motion.reference import (
+    Bias,
+    Reference,
+    filter_bias,
+    paper_reference,
+    reference_acceleration,
+    reference_biases,
+)
 from calibrations.motion.spectrum import (
+    NOMINAL_CORNER_HZ,
     PAPER_CORNER_HZ,
+    Record,
     Response,
+    apply_response,
     butterworth,
-    corrected,
+    corner_hz,
+    correct_at,
+    delay,
+    find_records,
     first_order,
     periodogram,
-    through,
+    skew_s,
 )
-from calibrations.noise import rms
+from calibrations.noise.means import rms
 from calibrations.table import Array, Table
+
+# Acceleration from the sensor's output: the output filter undone, and a model solved backwards.
+#
+# Noise grows with frequency when a low-pass is undone; the band that follows keeps it finite.
+
+
+def acceleration(table: Table, model: Model) -> Array:
+    """Acceleration along x, m/s^2, shape (n,), that instantaneous outputs mean under a model: gravity taken off.
+
+    Axes that were not measured feel what the attitude gives them. Raises ModelError for a model without values.
+    """
+    still = replace(table, kind="poses")  # each sample by itself
+    model = model.for_table(still)
+    layout = Layout.of(model, still)
+    theta = layout.known()
+    if theta is None:
+        raise ModelError(f"the model {model.name} has no values yet; fit it to a sweep of the same sensor first")
+    steps = layout.steps(theta)
+    poses = [step for step in steps if "pose" in step[0].places]
+    gravity = force(still, poses)
+    a, axes = gravity.copy(), len(table.axes)
+    for _ in range(20):
+        error = table.outputs - respond(sensed(a, still, steps), still, steps)[:, :axes]
+        slope = _slope(lambda b: respond(sensed(b, still, steps), still, steps)[:, :axes], a, axes)
+        change = np.linalg.solve(slope, error[:, :, None])[:, :, 0]
+        a[:, :axes] += change
+        if not np.max(np.abs(change)) > 1e-12:
+            break
+    return np.asarray((a - gravity)[:, 0] * table.gravity_m_s2)
+
+
+def _slope(output: Callable[[Array], Array], a: Array, axes: int, h: float = 1e-4) -> Array:
+    """d output / d a over the measured axes, shape (n, axes, axes)."""
+    return np.stack([(output(a + h * e) - output(a - h * e)) / (2 * h) for e in np.eye(3)[:axes]], axis=2)
+
+
+def measured_acceleration(part: Table, record: Record, model: Model, band: Response) -> Array:
+    """Acceleration in mm/s^2 by the sensor under a model, in the band."""
+    columns = dict(part.columns)
+    for k, axis in enumerate(part.axes):
+        response = inverse_response(part, model, k, band)
+        columns[f"v{axis}_v"] = apply_response(part.outputs[:, k], record.rate_hz, response)
+    return 1e3 * acceleration(Table(part.kind, columns, part.constants, part.source), model)
+
+
+def inverse_response(table: Table, model: Model, axis: int, band: Response) -> Response:
+    """From samples to the transducer's output in the band: the output filter and the skew undone.
+
+    A corner and a delay that the model holds take the place of the nominal ones.
+    """
+    values = {
+        term.name: {e.axis: e.value for e in term.estimates} for term in model.terms if term.effect.kinds == ("motion",)
+    }
+    name = table.axes[axis]
+    corner = corner_hz(table) + values.get("output-filter", {}).get(name, 0.0)
+    late = values.get("sampling-delay", {}).get(name, 0.0) - skew_s(table, axis)
+    low_pass, undelayed = first_order(corner), delay(-late)
+    return lambda f: np.asarray(band(f) * undelayed(f) / low_pass(f))
+
 
 BAND = "the band of both, Butterworth at 20 Hz"
 EDGE_S = 5 / PAPER_CORNER_HZ  # left out at each end of a record
-BLOCKS = 20  # left out in turn, for uncertainties
+JACKKNIFE_BLOCKS = 20  # left out in turn, for uncertainties
 
 
 @dataclass(frozen=True)
@@ -83,22 +157,26 @@ class MotionResult:
         }
 
 
-def evaluate(table: Table, linear: Model, physical: Model, still: Table | None = None) -> MotionResult:
-    """Both models, with the values that they have, on the longest record of a table of motion.
+def evaluate_motion(table: Table, linear: Model, physical: Model, still: Table | None = None) -> MotionResult:
+    """Both models, with their values, on the longest record of a table of motion.
 
-    The noise limit is that of the `still` record of the same sensor, else of what the physical model leaves beside the
-    motion's lines. Raises ModelError for a model without values, DataError where nothing moves.
+    The noise limit comes from the `still` record of the same sensor, or else from the physical model's residual
+    outside of
+    the motion's lines. Raises ModelError for a model without values, DataError where nothing moves.
     """
-    record = max(records(table), key=lambda r: r.end - r.first)
+    record = max(find_records(table), key=lambda r: r.end - r.first)
     part = table.rows(np.arange(record.first, record.end))
     times_s = record.times_s(table.time_s)
-    found = reference(times_s, part.column("displacement_m"), record.rate_hz)
+    found = reference_acceleration(times_s, part.column("displacement_m"), record.rate_hz)
     if not found.moves:
         raise DataError(f"{table.source}: the displacement holds no motion that stands out of its noise")
-    band = corrected(butterworth(record.rate_hz), found.at_hz)
-    true = 1e3 * through(found.acceleration_m_s2, record.rate_hz, band)
+    band = correct_at(butterworth(record.rate_hz), found.at_hz)
+    true = 1e3 * apply_response(found.acceleration_m_s2, record.rate_hz, band)
     paper = 1e3 * paper_reference(part.column("displacement_m"), record.rate_hz, found.at_hz)
-    errors = {name: measured(part, record, m, band) - true for name, m in (("linear", linear), ("physical", physical))}
+    errors = {
+        name: measured_acceleration(part, record, m, band) - true
+        for name, m in (("linear", linear), ("physical", physical))
+    }
     if np.dot(errors["physical"] + true, true - true.mean()) < 0:
         raise DataError(
             f'{table.source}: the column "displacement_m" falls where the sensor\'s acceleration along x rises; '
@@ -106,7 +184,7 @@ def evaluate(table: Table, linear: Model, physical: Model, still: Table | None =
         )
     edge = int(np.ceil(EDGE_S * record.rate_hz))
     inner = slice(edge, len(true) - edge)
-    blocks = [np.array_split(errors[name][inner], BLOCKS) for name in ("linear", "physical")]
+    blocks = [np.array_split(errors[name][inner], JACKKNIFE_BLOCKS) for name in ("linear", "physical")]
     low, high = _jackknife(blocks[:1], _rmse), _jackknife(blocks[1:], _rmse)
     amplitude, std = found.amplitude
     return MotionResult(
@@ -121,7 +199,7 @@ def evaluate(table: Table, linear: Model, physical: Model, still: Table | None =
         noise_limit=_noise_limit(part, record, physical, band, found, still),
         amplitude=Quantity(1e3 * amplitude, 1e3 * std, "mm/s^2"),
         frequency=Quantity(found.at_hz, found.lines[0].frequency_std_hz if found.lines else 0.0, "Hz"),
-        biases=(*biases(found), bias_of(BAND, band, found.at_hz, record.rate_hz, EDGE_S)),
+        biases=(*reference_biases(found), filter_bias(BAND, band, found.at_hz, record.rate_hz, EDGE_S)),
     )
 
 
@@ -141,13 +219,13 @@ def _noise_limit(
 ) -> Quantity:
     """Rms that the sensor's noise alone leaves in the band, mm/s^2."""
     source = part if still is None else still
-    where = record if still is None else max(records(still), key=lambda r: r.end - r.first)
+    where = record if still is None else max(find_records(still), key=lambda r: r.end - r.first)
     x = source.column("vx_v")[where.rows]
     if still is None:
-        x = x - _follows(x, record, found)
+        x = x - _motion_part(x, record, found)
     f, density = periodogram(x, where.rate_hz)
     above = f > 1.5 * record.rate_hz / part.n  # slower than the record is its mean
-    size = np.abs(undone(part, model, 0, band)(f)) * 1e3 * part.gravity_m_s2 / _per_g(model)
+    size = np.abs(inverse_response(part, model, 0, band)(f)) * 1e3 * part.gravity_m_s2 / _per_g(model)
     power = density[above] * size[above] ** 2 * f[1]
     limit = max(float(np.sqrt(power.sum())), np.finfo(float).tiny)  # a converter may see no noise at all
     # a line of a spectrum is known to its own size; Hann's window makes neighbours alike: 1.5 lines in one
@@ -160,11 +238,48 @@ def _per_g(model: Model) -> float:
     return abs(values.get("x", values.get("", 1.0)))
 
 
-def _follows(x: Array, record: Record, found: Reference) -> Array:
-    """What of an output follows the motion, whatever its size and delay."""
-    seen = through(found.acceleration_m_s2, record.rate_hz, first_order(NOMINAL_CORNER_HZ))
+def _motion_part(x: Array, record: Record, found: Reference) -> Array:
+    """The part of an output that follows the motion, with any size and delay."""
+    seen = apply_response(found.acceleration_m_s2, record.rate_hz, first_order(NOMINAL_CORNER_HZ))
     columns = [np.ones(len(x)), seen, np.gradient(seen)]
     t = np.arange(len(x)) / record.rate_hz
     columns += [wave(2 * np.pi * line.frequency_hz * t) for line in found.lines for wave in (np.cos, np.sin)]
     each = np.column_stack(columns) / np.linalg.norm(columns, axis=1)
     return np.asarray(each @ np.linalg.lstsq(each, x, rcond=1e-9)[0])
+
+
+# The two models that the paper judges by motion, fitted to a sweep of the same sensor.
+#
+# linear     the manufacturer's, Ang (1)-(3): bias and scale factor of each axis from +1 g and -1 g
+# physical   the shipped physical model, fitted jointly; with hysteresis where the sweep goes both ways, as the loop
+# would
+#            otherwise be taken for squares and products. A motion is met between its branches, where it adds nothing.
+
+UPRIGHT_DEG = {"x": (0.0, 180.0), "y": (90.0, 270.0)}  # beta at +1 g and at -1 g, with alpha at 90 deg
+
+
+def linear_from_turns(sweep: Table) -> Model:
+    """Ang (1)-(3). Raises DataError where an axis was not held at both +1 g and -1 g."""
+    ends = {axis: [_mean(sweep, axis, beta_deg) for beta_deg in UPRIGHT_DEG[axis]] for axis in sweep.axes}
+    values = {
+        "bias": [Estimate("bias", axis, (up + down) / 2, None, "V") for axis, (up, down) in ends.items()],
+        "scale-factor": [Estimate("scale", axis, (up - down) / 2, None, "V/g") for axis, (up, down) in ends.items()],
+    }
+    model = read_model("linear")
+    terms = tuple(replace(term, estimates=tuple(values[term.name])) for term in model.terms)
+    return replace(model, terms=terms, unit=sweep.unit)
+
+
+def fit_physical(sweep: Table) -> Model:
+    """The physical model of this sweep. Raises TooFewRows, DataError."""
+    both = "direction" in sweep and np.ptp(sweep.column("direction")) > 0
+    model = read_model("physical")
+    return fit(replace(model.with_effect(catalogue()["hysteresis"]), name=model.name) if both else model, sweep).model
+
+
+def _mean(sweep: Table, axis: str, beta_deg: float) -> float:
+    """Mean output of an axis at alpha = 90 deg and this beta, V."""
+    at: Array = (sweep.column("alpha_deg") == 90) & (np.mod(sweep.column("beta_deg"), 360) == beta_deg)
+    if not at.any():
+        raise DataError(f"{sweep.source}: no pose at alpha = 90, beta = {beta_deg:g} deg, which axis {axis} needs")
+    return float(sweep.column(f"v{axis}_v")[at].mean())

@@ -13,19 +13,223 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import cho_solve_banded, cholesky_banded
+from scipy.optimize import minimize_scalar
 
-from calibrations.motion.sine import Sine, sines
-from calibrations.motion.smoother import Smoothed, smooth
+from calibrations.errors import DataError
 from calibrations.motion.spectrum import (
     PAPER_CORNER_HZ,
     Complex,
     Response,
+    apply_response,
     butterworth,
-    corrected,
+    correct_at,
     periodogram,
-    through,
 )
 from calibrations.table import Array
+
+# Sine approximation: the sine that fits a record best, with standard uncertainties.
+#
+#     x(t) = offset + amplitude cos(2 pi f t + phase)
+#
+# Three parameters with the frequency given, four with the frequency fitted too: ISO 16063-11, IEEE Std 1057.
+# Uncertainties follow from the density of the residual beside the line, so that they hold for correlated noise as
+# well; for white noise they are the Cramer-Rao bound.
+
+NEIGHBOURS = 100  # lines on each side that the density is taken from
+OWN_LINES = 3  # beside the frequency, that the fitted sine has taken up
+ROUNDS = 12
+MOST_SINES = 8
+PROMINENT = 8.0  # times log(lines) the density around it: noise alone shows no such line
+LOWEST_LINE = 4  # periods in the record below which a line is drift
+
+
+@dataclass(frozen=True)
+class Sine:
+    """A sine with standard uncertainties. `density` is the one-sided density of the residual beside it."""
+
+    frequency_hz: float
+    amplitude: float
+    phase_rad: float
+    offset: float
+    frequency_std_hz: float
+    amplitude_std: float
+    phase_std_rad: float
+    offset_std: float
+    density: float
+
+    def at(self, t_s: Array) -> Array:
+        """The sine without its offset."""
+        return np.asarray(self.amplitude * np.cos(2 * np.pi * self.frequency_hz * t_s + self.phase_rad))
+
+
+def fit_three_parameter(t_s: Array, x: Array, frequency_hz: float) -> Sine:
+    """The best sine of a given frequency. Raises DataError for fewer than 8 samples."""
+    return _fitted(t_s, x, frequency_hz, free=False)
+
+
+def fit_four_parameter(t_s: Array, x: Array, frequency_hz: float | None = None) -> Sine:
+    """The best sine, its frequency fitted from `frequency_hz` or the strongest line on. Raises DataError."""
+    return _fitted(t_s, x, strongest_line(t_s, x)[0] if frequency_hz is None else frequency_hz, free=True)
+
+
+def find_sines(t_s: Array, x: Array) -> tuple[Sine, ...]:
+    """The lines that stand out of a record, the most prominent first, each fitted beside the others."""
+    found: list[Sine] = []
+    left = x
+    while len(found) < MOST_SINES:
+        frequency, prominence = strongest_line(t_s, left)
+        again = any(abs(s.frequency_hz - frequency) < 1 / np.ptp(t_s) for s in found)
+        if again or prominence < PROMINENT * np.log(len(x)):
+            break
+        found.append(fit_four_parameter(t_s, left, frequency))
+        found = _refit_each(t_s, x, found)
+        left = x - sum((s.at(t_s) for s in found), np.zeros(len(x)))
+    return tuple(found)
+
+
+def strongest_line(t_s: Array, x: Array) -> tuple[float, float]:
+    """Frequency of the strongest line above drift, and its power over the median of its neighbours."""
+    if len(x) < 8:
+        raise DataError(f"{len(x)} samples are too few for a sine; it takes 8")
+    f, power = periodogram(x, (len(t_s) - 1) / float(np.ptp(t_s)))
+    first = min(LOWEST_LINE, len(f) - 2)
+    k = first + int(np.argmax(power[first:-1]))
+    around = np.median(power[max(first, k - NEIGHBOURS) : k + NEIGHBOURS]) or np.finfo(float).tiny
+    low, here, high = np.log(np.maximum(power[k - 1 : k + 2], np.finfo(float).tiny))
+    curvature = low - 2 * here + high
+    shift = (low - high) / (2 * curvature) if curvature < 0 else 0.0
+    return float(f[k] + shift * f[1]), float(power[k] / around)
+
+
+def _refit_each(t_s: Array, x: Array, found: list[Sine]) -> list[Sine]:
+    """Each line fitted anew to what the others leave; twice is enough for lines that a record resolves."""
+    for _ in range(2 if len(found) > 1 else 0):
+        for k, sine in enumerate(found):
+            others = sum((s.at(t_s) for j, s in enumerate(found) if j != k), np.zeros(len(x)))
+            found[k] = fit_four_parameter(t_s, x - others, sine.frequency_hz)
+    return found
+
+
+def _fitted(t_s: Array, x: Array, frequency_hz: float, free: bool) -> Sine:
+    if len(x) < 8:
+        raise DataError(f"{len(x)} samples are too few for a sine; it takes 8")
+    middle, rate_hz = float(t_s.mean()), (len(t_s) - 1) / float(np.ptp(t_s))
+    t, turn = t_s - middle, 2 * np.pi * frequency_hz
+    for _ in range(ROUNDS):
+        columns = np.column_stack([np.cos(turn * t), np.sin(turn * t), np.ones(len(t))])
+        a, b, offset = np.linalg.lstsq(columns, x, rcond=None)[0]
+        slope = t * (b * columns[:, 0] - a * columns[:, 1])  # d x / d turn
+        residual = x - columns @ (a, b, offset)
+        if not free:
+            break
+        columns = np.column_stack([columns, slope])
+        step = float(np.linalg.lstsq(columns, residual, rcond=None)[0][3])
+        turn += float(np.clip(step, -1 / np.ptp(t), 1 / np.ptp(t)))
+        if abs(step) * np.ptp(t) < 1e-10:
+            break
+    density = _density_beside(residual, rate_hz, turn / (2 * np.pi))
+    cov = np.linalg.inv(columns.T @ columns) * density * rate_hz / 2
+    return _as_sine(a, b, offset, turn, cov, middle, density)
+
+
+def _as_sine(a: float, b: float, offset: float, turn: float, cov: Array, middle: float, density: float) -> Sine:
+    """From x = offset + a cos(turn (t - middle)) + b sin(turn (t - middle)) to amplitude and phase at t = 0."""
+    amplitude = float(np.hypot(a, b))
+    along, across = np.array([a, b]) / amplitude, np.array([b, -a]) / amplitude**2
+    late = np.zeros(len(cov))
+    late[:2] = across
+    if len(cov) == 4:
+        late[3] = -middle
+    return Sine(
+        frequency_hz=turn / (2 * np.pi),
+        amplitude=amplitude,
+        phase_rad=float((np.arctan2(-b, a) - turn * middle + np.pi) % (2 * np.pi) - np.pi),
+        offset=float(offset),
+        frequency_std_hz=float(np.sqrt(cov[3, 3])) / (2 * np.pi) if len(cov) == 4 else 0.0,
+        amplitude_std=float(np.sqrt(along @ cov[:2, :2] @ along)),
+        phase_std_rad=float(np.sqrt(late @ cov @ late)),
+        offset_std=float(np.sqrt(cov[2, 2])),
+        density=density,
+    )
+
+
+def _density_beside(residual: Array, rate_hz: float, frequency_hz: float) -> float:
+    """One-sided density of the residual around a frequency, the lines that the sine took up left out."""
+    f, power = periodogram(residual, rate_hz)
+    k = round(frequency_hz / f[1])
+    lines = np.arange(max(1, k - NEIGHBOURS), min(len(f) - 1, k + NEIGHBOURS + 1))
+    lines = lines[np.abs(lines - k) >= OWN_LINES]
+    return float(np.mean(power[lines])) if len(lines) else float(np.mean(residual**2) * 2 / rate_hz)
+
+
+# Smoothing of motion that is no sine: the Kalman smoother of an integrated random walk, its noise fitted.
+#
+#     x_k = s_k + e_k        D^3 s = w        e of variance r, w of variance q white
+#
+# The smoothed s solves (I + (r / q) D^3' D^3) s = x, a banded system: it equals the forward and backward passes of
+# Rauch, Tung and Striebel with a diffuse start, and is a discrete smoothing spline of fifth degree (Wahba, 1990); r /
+# q is that of greatest restricted likelihood.
+
+ORDER = 3  # so that acceleration still has a derivative of finite variance
+LOG_RANGE = (float(np.log(1e-3)), float(np.log(1e12)))  # of r / q: noise far below the motion; rounding beyond
+
+
+@dataclass(frozen=True)
+class Smoothed:
+    """A smoothed record, r / q, and the standard deviation of what was taken for noise."""
+
+    values: Array
+    ratio: float
+    noise_std: float
+
+    def response(self, f: Array, rate_hz: float) -> Complex:
+        """What the smoother does to a sine, away from the ends: no phase, 1 / (1 + r / q (2 sin(pi f / rate))^6)."""
+        return np.asarray(1 / (1 + self.ratio * (2 * np.sin(np.pi * f / rate_hz)) ** (2 * ORDER)), dtype=complex)
+
+    def corner_hz(self, rate_hz: float) -> float:
+        """Where half of the amplitude is left."""
+        return float(rate_hz / np.pi * np.arcsin(min(1.0, self.ratio ** (-1 / (2 * ORDER)) / 2)))
+
+    def edge_s(self, rate_hz: float) -> float:
+        """How far from the ends fewer samples are averaged: one period at the corner."""
+        return 1 / self.corner_hz(rate_hz)
+
+
+def smooth(x: Array) -> Smoothed:
+    """`x`, shape (n,), smoothed."""
+    penalty = _penalty(len(x))
+
+    def deviance(log_ratio: float) -> float:
+        return _solved(x, penalty, float(np.exp(log_ratio)))[2]
+
+    found = minimize_scalar(deviance, bounds=LOG_RANGE, method="bounded", options={"xatol": 0.05})
+    ratio = float(np.exp(found.x))
+    values, noise_std, _ = _solved(x, penalty, ratio)
+    return Smoothed(values, ratio, noise_std)
+
+
+def _solved(x: Array, penalty: Array, ratio: float) -> tuple[Array, float, float]:
+    """(smoothed, noise, -2 log restricted likelihood up to a constant)."""
+    bands = ratio * penalty
+    bands[-1] += 1.0
+    factor = cholesky_banded(bands)
+    values = cho_solve_banded((factor, False), x)
+    free = len(x) - ORDER
+    variance = max(float(x @ (x - values)) / free, np.finfo(float).tiny)
+    deviance = free * (np.log(variance) - np.log(ratio)) + 2 * float(np.sum(np.log(factor[-1])))
+    return values, float(np.sqrt(variance)), deviance
+
+
+def _penalty(n: int) -> Array:
+    """D^3' D^3 as upper bands, shape (ORDER + 1, n)."""
+    weights = np.array([-1.0, 3.0, -3.0, 1.0])
+    bands = np.zeros((ORDER + 1, n))
+    for i in range(ORDER + 1):
+        for j in range(i, ORDER + 1):
+            bands[ORDER - (j - i), j : n - ORDER + j] += weights[i] * weights[j]
+    return bands
+
 
 HIGHEST_HZ = 30.0  # of a line that is motion, or so many times the strongest's: above it is the probe's hum
 HIGHEST = 1.5
@@ -98,25 +302,25 @@ class Bias:
         )
 
 
-def reference(t_s: Array, displacement_m: Array, rate_hz: float) -> Reference:
+def reference_acceleration(t_s: Array, displacement_m: Array, rate_hz: float) -> Reference:
     """The acceleration by sines and smoother. Shapes (n,)."""
-    found = sines(t_s, displacement_m)
+    found = find_sines(t_s, displacement_m)
     left = displacement_m - sum((line.at(t_s) for line in found), np.zeros(len(t_s)))
     rest = smooth(left - left.mean())
     most = max(HIGHEST_HZ, HIGHEST * max(found, key=lambda line: line.amplitude).frequency_hz) if found else 0.0
-    lines = sorted((line for line in found if line.frequency_hz <= most), key=strength, reverse=True)
+    lines = sorted((line for line in found if line.frequency_hz <= most), key=line_prominence, reverse=True)
     moving = sum((-((2 * np.pi * s.frequency_hz) ** 2) * s.at(t_s) for s in lines), np.zeros(len(t_s)))
     return Reference(moving + second_derivative(rest.values, rate_hz, STENCIL), tuple(lines), rest, rate_hz)
 
 
-def strength(line: Sine) -> float:
+def line_prominence(line: Sine) -> float:
     """What a line's acceleration grows with."""
     return line.frequency_hz**2 * line.amplitude
 
 
 def paper_reference(displacement_m: Array, rate_hz: float, frequency_hz: float) -> Array:
     """The acceleration as in Ang V, m/s^2, shape (n,)."""
-    low_passed = through(displacement_m, rate_hz, corrected(butterworth(rate_hz), frequency_hz))
+    low_passed = apply_response(displacement_m, rate_hz, correct_at(butterworth(rate_hz), frequency_hz))
     return second_derivative(low_passed, rate_hz, np.array([1.0, -2.0, 1.0]))
 
 
@@ -127,14 +331,14 @@ def second_derivative(x: Array, rate_hz: float, stencil: Array) -> Array:
     return np.pad(inner, reach, mode="edge")
 
 
-def biases(found: Reference) -> tuple[Bias, ...]:
+def reference_biases(found: Reference) -> tuple[Bias, ...]:
     """What each step to a reference does by itself: the paper's filter and the sines at the motion's frequency, the
     smoother at a quarter of its corner. An amplitude is never negative: noise makes it longer, by half its variance.
     """
     at_hz, rate_hz, periods = found.at_hz, found.rate_hz, 1 / found.duration_s
 
     def paper(f: Array) -> Complex:
-        return np.asarray(corrected(butterworth(rate_hz), at_hz)(f) * _differences(f, rate_hz, (-2.0, 2.0)))
+        return np.asarray(correct_at(butterworth(rate_hz), at_hz)(f) * _differences(f, rate_hz, (-2.0, 2.0)))
 
     def smoother(f: Array) -> Complex:
         return np.asarray(found.rest.response(f, rate_hz) * _differences(f, rate_hz, (-2.5, 16 / 6, -1 / 6)))
@@ -142,13 +346,13 @@ def biases(found: Reference) -> tuple[Bias, ...]:
     quarter, edge_s = found.rest.corner_hz(rate_hz) / 4, found.rest.edge_s(rate_hz)
     longer = [(line.amplitude_std / line.amplitude) ** 2 / 2 for line in found.lines[:1]]
     return (
-        bias_of("Butterworth low-pass, two differences", paper, at_hz, rate_hz, 4 / PAPER_CORNER_HZ),
+        filter_bias("Butterworth low-pass, two differences", paper, at_hz, rate_hz, 4 / PAPER_CORNER_HZ),
         *(Bias("sine approximation", at_hz, share, 0.0, (at_hz - periods, at_hz + periods), 0.0) for share in longer),
-        bias_of("Kalman smoother of the rest", smoother, quarter, rate_hz, edge_s),
+        filter_bias("Kalman smoother of the rest", smoother, quarter, rate_hz, edge_s),
     )
 
 
-def bias_of(name: str, response: Response, at_hz: float, rate_hz: float, edge_s: float) -> Bias:
+def filter_bias(name: str, response: Response, at_hz: float, rate_hz: float, edge_s: float) -> Bias:
     """The bias of a filter given by its response relative to the true one."""
     there = complex(response(np.array([at_hz]))[0])
     f = np.linspace(at_hz / 100, rate_hz / 2, 20001)

@@ -1,19 +1,93 @@
-"""Linear filters on evenly sampled records, and the density of noise.
+"""What stands between the transducer and a sample: the output filter at its nominal corner, and the sampling's skew.
 
-A filter is given by its frequency response, analog or digital, and applied in the frequency domain: what is
-band-limited below half the sampling rate goes through it exactly, an inverse or a delay by part of a sample as well.
+The converter takes the channels of one scan in turn: the sensor's axes `skew_x_s`, `skew_y_s`, `skew_z_s` after the
+displacement (constants of the table, 0 where not given).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 import scipy  # its signal room, large and seldom needed, is loaded where it is first entered
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
-from calibrations.table import Array
+from calibrations.errors import DataError, TooFewRows
+from calibrations.table import AXES, Array, Table
+
+# A table of motion as records: stretches of evenly spaced samples at one attitude, without a gap.
+
+LONGEST_GAP_STEPS = 1.5  # times the usual step of time
+MOST_UNEVEN = 0.75  # of a step: rounded times are less, a lost sample is more
+SHORTEST_S = 2.0
+SAME_RATE = ("alpha_deg", "beta_deg", "mount_deg", "flip", "record")  # throughout a record
+
+
+@dataclass(frozen=True)
+class Record:
+    """Rows `first` to `end` (not included), at `rate_hz`."""
+
+    first: int
+    end: int
+    rate_hz: float
+
+    @property
+    def rows(self) -> slice:
+        """The rows."""
+        return slice(self.first, self.end)
+
+    def times_s(self, t: Array) -> Array:
+        """The rows' times, evenly spaced: those of the table `t` may be rounded."""
+        return np.asarray(t[self.first] + np.arange(self.end - self.first) / self.rate_hz)
+
+
+@lru_cache(maxsize=8)
+def find_records(table: Table) -> tuple[Record, ...]:
+    """The records of at least 2 s, rows in order of time.
+
+    Raises DataError for samples that are not evenly spaced, TooFewRows where no record is long enough.
+    """
+    t = table.column("t_s")
+    if np.any(np.diff(t) < 0):
+        row = int(np.argmax(np.diff(t) < 0)) + 2
+        raise DataError(f'{table.source}: row {row}, column "t_s" falls; samples stand in order of time')
+    if table.n < 2 or not t[-1] > t[0]:
+        raise TooFewRows(f"{table.source}: {table.n} samples at one time are no record of a motion")
+    step = float(np.median(np.diff(t))) or float(t[-1] - t[0]) / (table.n - 1)
+    cut = np.diff(t) > LONGEST_GAP_STEPS * step
+    for name in SAME_RATE:
+        cut |= np.diff(table.optional(name, 0.0)) != 0
+    edges = np.concatenate([[0], np.flatnonzero(cut) + 1, [table.n]])
+    long = [(int(a), int(b)) for a, b in pairwise(edges) if (b - a) * step >= SHORTEST_S - step / 2]
+    if not long:
+        raise TooFewRows(
+            f"{table.source}: no record lasts {SHORTEST_S:g} s at one attitude without a gap; record the motion longer"
+        )
+    return tuple(_checked(table, t, a, b) for a, b in long)
+
+
+def _checked(table: Table, t: Array, first: int, end: int) -> Record:
+    part = t[first:end]
+    rate_hz = (len(part) - 1) / float(part[-1] - part[0])
+    late = np.abs(part - part[0] - np.arange(len(part)) / rate_hz)
+    if late.max() > MOST_UNEVEN / rate_hz:
+        row = first + int(np.argmax(late)) + 1
+        raise DataError(
+            f'{table.source}: row {row}, column "t_s" is {late.max() * rate_hz:.2g} of a step off; a motion is sampled '
+            "evenly, at the converter's own pace"
+        )
+    return Record(first, end, rate_hz)
+
+
+# Linear filters on evenly sampled records, and the density of noise.
+#
+# A filter is given by its frequency response, analog or digital, and applied in the frequency domain: what is
+# band-limited below half the sampling rate goes through it exactly, an inverse or a delay by part of a sample as
+# well.
 
 Complex = NDArray[np.complex128]
 Response = Callable[[Array], Complex]
@@ -22,7 +96,7 @@ PAPER_CORNER_HZ = 20.0  # of the second-order Butterworth low-pass, Ang V
 MARGIN_S = 1.0  # the record is continued by this on both sides, so that its ends do not meet
 
 
-def through(x: Array, rate_hz: float, response: Response) -> Array:
+def apply_response(x: Array, rate_hz: float, response: Response) -> Array:
     """`x`, shape (n, ...), through a filter. Ends are continued by odd reflection that fades to the mean."""
     n, mean = len(x), x.mean(axis=0).reshape(-1)
     flat = x.reshape(n, -1) - mean
@@ -43,7 +117,7 @@ def first_order(corner_hz: float) -> Response:
     return lambda f: np.asarray(1 / (1 + 1j * f / corner_hz))
 
 
-def delayed(by_s: float) -> Response:
+def delay(by_s: float) -> Response:
     """A delay."""
     return lambda f: np.asarray(np.exp(-2j * np.pi * f * by_s))
 
@@ -54,7 +128,7 @@ def butterworth(rate_hz: float, corner_hz: float = PAPER_CORNER_HZ, order: int =
     return lambda f: np.asarray(scipy.signal.freqz(b, a, f, fs=rate_hz)[1])
 
 
-def corrected(response: Response, at_hz: float) -> Response:
+def correct_at(response: Response, at_hz: float) -> Response:
     """A low-pass freed of its attenuation and delay at one frequency, as Ang V corrects its filter.
 
     The mean passes as it is: corrected like the motion, an offset would grow.
@@ -74,3 +148,39 @@ def periodogram(x: Array, rate_hz: float) -> tuple[Array, Array]:
 def band_rms(density: Array, f: Array, response: Response) -> float:
     """Rms of noise of this one-sided density behind a filter."""
     return float(np.sqrt(np.trapezoid(density * np.abs(response(f)) ** 2, f)))
+
+
+NOMINAL_CORNER_HZ = 15.07  # 32 kOhm and 0.33 uF, Ang V, where the table does not say
+
+
+def corner_hz(table: Table) -> float:
+    """The output filter's nominal corner."""
+    return table.number("filter_corner_hz", NOMINAL_CORNER_HZ)
+
+
+def skew_s(table: Table, axis: int) -> float:
+    """By how much this axis is sampled later than the displacement."""
+    return table.number(f"skew_{AXES[axis]}_s", 0.0)
+
+
+def nominal_response(table: Table, axis: int) -> Response:
+    """From the transducer's output to the samples of one axis. A sample taken later shows what is later: an advance."""
+    low_pass, advance = first_order(corner_hz(table)), delay(-skew_s(table, axis))
+    return lambda f: np.asarray(low_pass(f) * advance(f))
+
+
+def filter_output(v: Array, table: Table, response: Callable[[int], Response]) -> Array:
+    """Each column of `v`, shape (n, axes), through its own filter, record by record; other rows as they are.
+
+    Axes that were not measured are left as they are: nothing reads them.
+    """
+    out = np.array(v)
+    for record in find_records(table):
+        for k in range(min(v.shape[1], len(table.axes))):
+            out[record.rows, k] = apply_response(v[record.rows, k], record.rate_hz, response(k))
+    return out
+
+
+def sample_output(v: Array, table: Table) -> Array:
+    """The transducer's output, shape (n, axes), as it is sampled behind the nominal output filter."""
+    return filter_output(v, table, lambda k: nominal_response(table, k))

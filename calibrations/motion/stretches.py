@@ -1,11 +1,7 @@
-"""A record of motion as rows that a model can be fitted to: what each stretch of it holds of the motion.
+"""The lines of a motion, as templates of what they make of the output, and the noise beside them.
 
-Ten thousand samples behind an output filter are far from independent, and most of their band holds noise alone. So a
-record is cut into some thirty stretches, each a whole number of periods, and each stretch is reduced to its mean and to
-its parts in phase and in quadrature with each line of the motion, as a lock-in amplifier does. These parts are a
-channel each, and their rows are independent.
-
-    weights . samples = rows            the model's prediction is reduced by the same weights as the measurement
+The white noise of a line is the density of the output beside it, freed of all that follows the motion: a noise model
+without parameters (Pintelon and Schoukens, System Identification: A Frequency Domain Approach, 2012).
 """
 
 from __future__ import annotations
@@ -19,18 +15,109 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from calibrations.errors import TooFewRows
-from calibrations.motion.lines import Line, lines_of, noise_density
-from calibrations.motion.output import sampled
-from calibrations.motion.records import Record, records
-from calibrations.motion.reference import Reference, reference, strength
+from calibrations.motion.reference import Reference, line_prominence, reference_acceleration
+from calibrations.motion.spectrum import Record, corner_hz, find_records, first_order, periodogram, sample_output
 from calibrations.table import Array, Table
 
+BESIDE_HZ = 8.0  # of a line, on each side: where its noise is taken from
+OWN_LINES = 3  # of a record's spectrum, on each side of a line: the motion's own
+LEAST_LINE = (
+    6.0  # times the median: not of this noise; what lies below has 0.934 of the mean (exponential distribution)
+)
+
+
+@dataclass(frozen=True)
+class Line:
+    """What one line makes of the output, amplitude 1, and its derivative; shape (samples,) each."""
+
+    name: str
+    at_hz: float
+    in_phase: Array
+    in_quadrature: Array
+
+
+def residual_lines(samples: Table, made: Sequence[Reference], expected: Array, length_s: float) -> tuple[Line, ...]:
+    """The lines that a stretch of this length resolves, strongest first, and what they leave of the motion."""
+    found: list[Line] = []
+    left = expected.copy()
+    for f in _frequencies(made, length_s):
+        in_phase, in_quadrature = np.zeros(samples.n), np.zeros(samples.n)
+        for record in find_records(samples):
+            turn = 2 * np.pi * f * samples.time_s[record.rows]
+            waves = np.column_stack([np.cos(turn), np.sin(turn), np.ones(len(turn))])
+            c, s, _ = np.linalg.lstsq(waves, left[record.rows], rcond=None)[0]
+            left[record.rows] -= waves[:, :2] @ (c, s)
+            c, s = np.array([c, s]) / np.hypot(c, s)
+            in_phase[record.rows] = waves[:, :2] @ (c, s)
+            in_quadrature[record.rows] = waves[:, :2] @ (s, -c)
+        found.append(Line(f"at {f:.4g} Hz", f, in_phase, in_quadrature))
+    return (*found, _rest(samples, left, bool(found)))
+
+
+def _frequencies(made: Sequence[Reference], length_s: float) -> list[float]:
+    lines = [line for each in made for line in each.lines]
+    chosen: list[float] = []
+    for line in sorted(lines, key=line_prominence, reverse=True):
+        if all(abs(line.frequency_hz - f) * length_s > 0.9 for f in (0.0, *chosen)):
+            chosen.append(line.frequency_hz)
+    return chosen
+
+
+def _rest(samples: Table, left: Array, beside: bool) -> Line:
+    """Motion that is no line: its own form, and its derivative; noise as at the middle of its spectrum."""
+    slope, middle = np.zeros(samples.n), []
+    for record in find_records(samples):
+        slope[record.rows] = np.gradient(left[record.rows])
+        f, power = periodogram(left[record.rows], record.rate_hz)
+        middle.append(float(np.sum(f * power) / max(float(np.sum(power)), np.finfo(float).tiny)))
+    return Line("with the rest of the motion" if beside else "with the motion", float(np.mean(middle)), left, -slope)
+
+
+def noise_density(samples: Table, lines: Sequence[Line], axis: int) -> Array:
+    """One-sided density of one axis beside 0 Hz and beside each line, shape (1 + lines,)."""
+    low_pass = first_order(corner_hz(samples))
+    pieces = [_spectrum(samples, lines, axis, record.rows, record.rate_hz) for record in find_records(samples)]
+    f = np.concatenate([piece[0] for piece in pieces])
+    density = np.concatenate([piece[1] for piece in pieces]) / np.abs(low_pass(f)) ** 2
+
+    def beside(at_hz: float) -> float:
+        near = density[np.abs(f - at_hz) < BESIDE_HZ]
+        inlying = near[near < LEAST_LINE * np.median(near)]
+        return float(np.mean(inlying) / 0.934 * np.abs(low_pass(np.array([at_hz]))[0]) ** 2)
+
+    return np.array([beside(at_hz) for at_hz in (0.0, *(line.at_hz for line in lines))])
+
+
+def _spectrum(samples: Table, lines: Sequence[Line], axis: int, rows: slice, rate_hz: float) -> tuple[Array, Array]:
+    """(frequency, density) of what does not follow the motion, without the lines' own neighbourhood and drift."""
+    v = samples.outputs[rows, axis]
+    columns = [np.ones(len(v)), np.linspace(-1, 1, len(v))]
+    columns += [t[rows] for line in lines for t in (line.in_phase, line.in_quadrature)]
+    follows = np.column_stack([c for c in columns if np.any(c)])
+    size = np.linalg.norm(follows, axis=0)
+    f, density = periodogram(v - follows / size @ np.linalg.lstsq(follows / size, v, rcond=None)[0], rate_hz)
+    own = np.zeros(len(f), dtype=bool)
+    for at_hz in (0.0, *(line.at_hz for line in lines)):
+        own |= np.abs(f - at_hz) < OWN_LINES * f[1]
+    own[-1] = True  # half the sampling rate has another distribution
+    return f[~own], density[~own]
+
+
+# A record of motion as rows that a model can be fitted to: what each stretch of it holds of the motion.
+#
+# Ten thousand samples behind an output filter are far from independent, and most of their band holds noise alone. So
+# a record is cut into some thirty stretches, each a whole number of periods, and each stretch is reduced to its mean
+# and to its parts in phase and in quadrature with each line of the motion, as a lock-in amplifier does. These parts
+# are a channel each, and their rows are independent.
+#
+#     weights . samples = rows            the model's prediction is reduced by the same weights as the measurement
+
 STRETCHES = 30  # of all records together; slow noise wants 20
-FEWEST = 6
+FEWEST_STRETCHES = 6
 EDGE_S = 0.25  # left out at each end of a record: filters settle
 SAMPLES_A_PERIOD = 10  # of the fastest line, after averaging
 SLOWEST_RATE_HZ = 100.0
-FAINT = 1.0  # times the noise of a row: weaker in every stretch, a line tells nothing
+LEAST_WEIGHT = 1.0  # times the noise of a row: weaker in every stretch, a line tells nothing
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -60,20 +147,23 @@ class Stretches(Table):
 
 
 @lru_cache(maxsize=8)
-def stretches(table: Table) -> Stretches:
+def make_stretches(table: Table) -> Stretches:
     """The record's rows for a fit. Raises DataError, TooFewRows."""
     if isinstance(table, Stretches):
         return table
-    found = records(table)
-    made = [reference(r.times_s(table.time_s), table.column("displacement_m")[r.rows], r.rate_hz) for r in found]
+    found = find_records(table)
+    made = [
+        reference_acceleration(r.times_s(table.time_s), table.column("displacement_m")[r.rows], r.rate_hz)
+        for r in found
+    ]
     samples = _averaged(table, found, made)
     expected = _expected(samples)
     slope = _slope(samples, expected)
     length_s = _length_s(found, made)
     cuts = list(_cuts(samples, length_s))
-    if len(cuts) < FEWEST:
+    if len(cuts) < FEWEST_STRETCHES:
         raise TooFewRows(f"{table.source}: the record holds only {len(cuts)} stretches of motion; record it longer")
-    lines = _shown(samples, lines_of(samples, made, expected, length_s), cuts, slope * expected)
+    lines = _shown(samples, residual_lines(samples, made, expected, length_s), cuts, slope * expected)
     return _rows(table, samples, lines, cuts, slope)
 
 
@@ -81,7 +171,7 @@ def _shown(samples: Table, lines: tuple[Line, ...], cuts: list[tuple[int, int]],
     """The lines that stand out of a row's noise in one stretch at least; the strongest in any case."""
     there = np.abs((_weights(lines, cuts, samples.n) @ expected).reshape(-1, len(cuts)))
     white = _white(samples, lines, cuts)[: len(there)]
-    seen = np.any(there > FAINT * white, axis=1)
+    seen = np.any(there > LEAST_WEIGHT * white, axis=1)
     return tuple(line for k, line in enumerate(lines) if k == 0 or seen[2 * k + 1])
 
 
@@ -125,13 +215,13 @@ def _averaged(table: Table, found: Sequence[Record], made: Sequence[Reference]) 
 def _expected(samples: Table) -> Array:
     """The motion's specific force behind x's nominal output filter, g, shape (samples,)."""
     a = samples.column("acceleration_m_s2") / samples.gravity_m_s2
-    return sampled(a[:, None], samples)[:, 0]
+    return sample_output(a[:, None], samples)[:, 0]
 
 
 def _slope(samples: Table, expected: Array) -> float:
     """Output of x per g of the motion, beside each record's mean."""
     v, h = samples.outputs[:, 0].copy(), expected.copy()
-    for record in records(samples):
+    for record in find_records(samples):
         v[record.rows] -= v[record.rows].mean()
         h[record.rows] -= h[record.rows].mean()
     return float(h @ v / max(float(h @ h), np.finfo(float).tiny)) or 1.0
@@ -143,13 +233,13 @@ def _length_s(found: Sequence[Record], made: Sequence[Reference]) -> float:
     lines = [line for each in made for line in each.lines]
     if not lines:
         return wanted
-    at_hz = max(lines, key=strength).frequency_hz
+    at_hz = max(lines, key=line_prominence).frequency_hz
     return max(1, round(wanted * at_hz)) / at_hz
 
 
 def _cuts(samples: Table, length_s: float) -> Iterator[tuple[int, int]]:
     """First row and end of each stretch."""
-    for record in records(samples):
+    for record in find_records(samples):
         edge = EDGE_S * record.rate_hz
         count = int((record.end - record.first - 2 * edge) / (length_s * record.rate_hz) + 1e-6)
         at = record.first + np.round(edge + np.arange(count + 1) * length_s * record.rate_hz).astype(int)
@@ -173,7 +263,7 @@ def _weights(lines: Sequence[Line], cuts: list[tuple[int, int]], n: int) -> csr_
 
 def _white(samples: Table, lines: Sequence[Line], cuts: list[tuple[int, int]]) -> Array:
     """Standard deviation of each part by white noise, shape (channels, rows): the density beside its line."""
-    rate_hz = records(samples)[0].rate_hz
+    rate_hz = find_records(samples)[0].rate_hz
     lengths = np.array([b - a for a, b in cuts])
     density = np.array([noise_density(samples, lines, axis) for axis in range(len(samples.axes))])
     share = np.append(1.0, np.full(2 * len(lines), 2.0))[None, :, None] / lengths

@@ -8,14 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrations.fit import Fit, fit
-from calibrations.still import fit as still_fit
-from calibrations.still.fit import NoiseFit
+from calibrations.discovery.results import FittedModel
+from calibrations.fit import Fit
 from calibrations.table import Array, Table
-from rig.analysis.asked import asked
-from rig.analysis.asked_still import asked_still
-from rig.analysis.request import Request
 from rig.errors import RecordError
+from rig.services.load import loaded
+from rig.services.request import Request
 
 POSE = ("alpha_deg", "beta_deg", "direction", "mount_deg", "flip")  # what a pose is, as far as it is known
 SAME_DECIMALS = 2  # of a degree: nearer, gravity along an axis differs by 0.2 mg at most
@@ -35,19 +33,18 @@ class Again:
     floor: Array
 
 
-def both(first: Request, second: Request, tell: Callable[[str], None]) -> tuple[Fit, Fit] | tuple[NoiseFit, NoiseFit]:
-    """One model fitted to both: the one that is asked for, or that of their kind. Raises RecordError where they are of
-    two kinds, and what `asked`, `asked_still` and `fit` raise."""
-    still, other_still = asked_still(first, tell), asked_still(second, tell)
-    if still is not None and other_still is not None:
-        return still_fit.fit(still.model, still.still), still_fit.fit(still.model, other_still.still)
-    if still is not None or other_still is not None:
-        names = (first.data, second.data) if still is not None else (second.data, first.data)
-        raise _unlike(names, "a still record", "none")
-    (table, model, _), (other, _, _) = asked(first, tell), asked(second, tell)
-    if table.content != other.content:
-        raise _unlike((first.data, second.data), f"of {table.content}", f"of {other.content}")
-    return fit(model, table), fit(model, other)
+def both(first: Request, second: Request, tell: Callable[[str], None]) -> tuple[FittedModel, FittedModel]:
+    """One model fitted to both: that of the first request, or of its kind of data.
+
+    Raises RecordError where they are of two kinds, and what `loaded` and `fit` raise.
+    """
+    one, other = loaded(first, tell), loaded(second, tell)
+    if one.data.content != other.data.content:
+        raise RecordError(
+            f"{first.data} is of {one.data.content}, {second.data} of {other.data.content}: no model describes both; "
+            "mark two of one kind in the record"
+        )
+    return one.data.fit(one.model), other.data.fit(one.model)
 
 
 def again(first: Fit, second: Fit) -> Again | None:
@@ -72,9 +69,3 @@ def _visits(table: Table) -> dict[tuple[float, ...], int]:
         seen[pose] = seen.get(pose, 0) + 1
         found[*pose, float(seen[pose])] = row
     return found
-
-
-def _unlike(names: tuple[str, str], one: str, other: str) -> RecordError:
-    return RecordError(
-        f"{names[0]} is {one}, {names[1]} is {other}: no model describes both; mark two of one kind in the record"
-    )

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from calibrations.evaluations.control_chart import BASELINE, FEWEST, Chart, control_chart
+from calibrations.analyses.control_chart import BASELINE_RUNS, FEWEST_RUNS, Chart, control_chart
+from drivers.errors import did_you_mean
 from rig.errors import RecordError, UnknownRun
-from rig.nearest import did_you_mean
 from rig.record import Run
 
 PROCEDURE = "check-standard"
@@ -31,7 +31,7 @@ class Controlled:
 
 
 def controlled(
-    runs: Iterable[Run], sensor: str | None = None, baseline: int = BASELINE, since: str | None = None
+    runs: Iterable[Run], sensor: str | None = None, baseline: int = BASELINE_RUNS, since: str | None = None
 ) -> list[Controlled]:
     """The charts of `runs` (newest first, as the record gives them), of one `sensor` or of all; from run `since` on.
 
@@ -46,10 +46,10 @@ def controlled(
     if not chosen:
         raise RecordError("no check-standard run is complete yet; `rig run check-standard` makes one")
     of = {key: [p for p in points if (p.sensor, p.quantity) == key] for key in chosen}
-    charted = {key: mine for key, mine in of.items() if len(mine) >= FEWEST}
+    charted = {key: mine for key, mine in of.items() if len(mine) >= FEWEST_RUNS}
     if not charted:
         names = ", ".join(dict.fromkeys(sensor for sensor, _ in chosen))
-        raise RecordError(f"{names}: {FEWEST} check-standard runs at least make a chart; there is one so far")
+        raise RecordError(f"{names}: {FEWEST_RUNS} check-standard runs at least make a chart; there is one so far")
     return [_controlled(*key, mine, baseline) for key, mine in charted.items()]
 
 

@@ -8,13 +8,14 @@ from pathlib import Path
 import numpy as np
 
 from calibrations.errors import DataError
-from calibrations.reading.duplicates import without_copies
-from calibrations.reading.logs import means
-from calibrations.reading.read_csv import read_csv
+from calibrations.importing.foreign import drop_duplicate_rows, read_csv
+from calibrations.importing.raw_logs import average_raw_log
 from calibrations.table import Table
 from rig.errors import RecordError, UnknownRun
 
 EXCLUDED = "excluded"
+FOLLOWED = ("temperature_c", "supply_v")  # columns that an output may follow
+BESIDE = ("t_s", *FOLLOWED, "n", "direction", "path")  # columns that are not channels
 
 
 def averaged(log: Table, tell: Callable[[str], None]) -> Table:
@@ -22,10 +23,10 @@ def averaged(log: Table, tell: Callable[[str], None]) -> Table:
 
     Rows that are there twice count once. Raises DataError where nothing holds still.
     """
-    table = means(log)
+    table = average_raw_log(log)
     if table is not log:
         tell(f"{log.source} is a log of raw samples: {_taken(table)}, out of {log.n} samples, are taken.")
-    table, copies = without_copies(table)
+    table, copies = drop_duplicate_rows(table)
     if copies is not None:
         tell(copies)
     return _included(table, tell)

@@ -12,19 +12,19 @@ from datetime import date, datetime, timedelta
 
 import numpy as np
 
-from calibrations.certificates.terms import name as result_name
+from calibrations.analyses.control_chart import BASELINE_RUNS, Chart, control_chart
+from calibrations.analyses.control_chart import FEWEST_RUNS as FEWEST_CHARTED
+from calibrations.analyses.stability import FEWEST_CALIBRATIONS, Stability, fit_stability
 from calibrations.errors import CalibrationError, DataError
-from calibrations.evaluations.control_chart import BASELINE, Chart, control_chart
-from calibrations.evaluations.control_chart import FEWEST as FEWEST_CHARTED
-from calibrations.evaluations.stability import FEWEST, Stability, stability
 from calibrations.fit import fit
 from calibrations.model import Model
-from calibrations.noise import rms
+from calibrations.noise.means import rms
+from calibrations.presentation.certificate.terms import name as result_name
 from calibrations.problem import check_kind
+from drivers.errors import did_you_mean
 from rig.analysis.sensors import members, sensors
 from rig.bench.certificates import EXPIRED
 from rig.errors import RecordError
-from rig.nearest import did_you_mean
 from rig.record import Record, Run
 from rig.record.measured import Measured
 
@@ -94,7 +94,7 @@ def history(
     sensor: str,
     model: Model,
     limits: Mapping[str, Limit],
-    baseline: int = BASELINE,
+    baseline: int = BASELINE_RUNS,
     tell: Callable[[str], None] = lambda _: None,
 ) -> History:
     """The history of `sensor` by `model`, see `judged`; `tell` hears which run is calibrated.
@@ -126,7 +126,7 @@ def latest(record: Record, sensor: str, model: Model) -> Calibration:
     raise _none(record, sensor, passed_over)
 
 
-def judged(life: History, limits: Mapping[str, Limit], baseline: int = BASELINE) -> History:
+def judged(life: History, limits: Mapping[str, Limit], baseline: int = BASELINE_RUNS) -> History:
     """The same calibrations by other limits, and charts of another baseline. `limits` by result's name: a number is the
     greatest change since the last calibration, a pair the lowest and highest value."""
     of = life.calibrations
@@ -209,7 +209,7 @@ def _quantity(name: str, of: Sequence[Calibration], limit: Limit | None, baselin
     numbers, stds = [each.value for each in values], [each.std for each in values]
     days = [each.at.timestamp() / 86400 for each in mine]
     chart = control_chart(numbers, baseline, float(rms(np.array(stds)))) if len(mine) >= FEWEST_CHARTED else None
-    line = stability(days, numbers, stds) if len(mine) >= FEWEST and np.ptp(days) > 0 else None
+    line = fit_stability(days, numbers, stds) if len(mine) >= FEWEST_CALIBRATIONS and np.ptp(days) > 0 else None
     allowed = None
     if limit is not None:
         allowed = limit if isinstance(limit, tuple) else (numbers[-1] - limit, numbers[-1] + limit)

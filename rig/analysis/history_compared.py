@@ -8,12 +8,12 @@ from datetime import date
 
 import numpy as np
 
+from calibrations.analyses.stability import Agreement, compare_values
 from calibrations.errors import DataError
-from calibrations.evaluations.agreement import Agreement, agreement
-from calibrations.noise import rms
+from calibrations.noise.means import rms
+from drivers.errors import did_you_mean
 from rig.analysis.history import Calibration, History, Value, closest
 from rig.errors import RecordError
-from rig.nearest import did_you_mean
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ def _compared(a: Mapping[str, Value], b: Mapping[str, Value], one: str, other: s
     shared = [name for name in a if name in b and a[name].unit == b[name].unit]
     if not shared:
         raise DataError(f"{one} and {other} have no quantity in common; take a model that both determine")
-    return {n: (a[n].unit, agreement((a[n].value, a[n].std), (b[n].value, b[n].std))) for n in shared}
+    return {n: (a[n].unit, compare_values((a[n].value, a[n].std), (b[n].value, b[n].std))) for n in shared}
 
 
 def _mean(values: Sequence[Value]) -> Value:

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from datetime import date
 
-from calibrations.evaluations.agreement import Agreement
-from calibrations.evaluations.stability import Stability
+from calibrations.analyses.stability import Agreement, Stability
 from rig.analysis.history import Calibration, History, Quantity
 from rig.analysis.history_compared import Compared
 

@@ -13,7 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from calibrations.certificates.content import (
+from calibrations.fit import Fit
+from calibrations.model.file import dump_model
+from calibrations.presentation.certificate.content import (
     UNSTATED,
     Certificate,
     Condition,
@@ -22,17 +24,15 @@ from calibrations.certificates.content import (
     Laboratory,
     Sample,
 )
-from calibrations.fit import Fit
-from calibrations.model_file import dump_model
-from calibrations.numerals import as_written
+from calibrations.presentation.text import as_written
 from calibrations.table import Table
-from rig.analysis.provenance import program, today
 from rig.bench import Bench
 from rig.bench.certificates import EXPIRED, certificates
 from rig.errors import UnknownRun
 from rig.record import Record, Run
-from rig.record.digest import digest_of
+from rig.record.codec import digest_of
 from rig.record.measured import Measured
+from rig.services.provenance import program, today
 
 # condition's column -> name and unit
 CONDITIONS = {"temperature_c": ("temperature", "C"), "supply_v": ("supply voltage", "V")}

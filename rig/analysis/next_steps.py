@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from calibrations.reports.words import joined
+from calibrations.presentation.text import joined
 from rig.record import Run
 
 # By the name of a result that is beyond its limit: what to look at. The first that fits counts.

@@ -9,7 +9,7 @@ from rig.record import Record
 from rig.record.measured import Measured
 
 if TYPE_CHECKING:
-    from calibrations.pictures.album import Picture
+    from calibrations.presentation.chart import Picture
 
 Page = tuple[list["Picture"], Callable[[], str]]
 
@@ -24,8 +24,8 @@ def night_of(data: str, date: str, program: str) -> Page | None:
     with Record.to_read() as record:
         if data.partition("/")[0] not in {run.run for run in record.runs() if run.procedure == "soak"}:
             return None
-        from calibrations.pictures.soak import soak_album
-        from calibrations.reports.soak import soak_report
+        from calibrations.presentation.charts.soak import soak_album
+        from calibrations.presentation.report.soak import soak_report
         from rig.results.soak import foreseen_of, night
 
         measured = Measured.named(record, data)

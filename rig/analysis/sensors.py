@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from calibrations.numerals import as_written
+from calibrations.presentation.text import as_written
 from rig.record import Run
 from rig.record.measured import sensors_of
 

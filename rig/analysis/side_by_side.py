@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from math import hypot
 from typing import Any
 
+from calibrations.discovery.results import FittedModel
 from calibrations.model import Estimate
-from rig.analysis.growing import Fitted
 from rig.record import Run
 
 DIFFERENT = 2.0  # standard uncertainties
@@ -60,7 +60,7 @@ def results_of(first: Run, second: Run, sensors: tuple[str, str] = ("", "")) -> 
     ]
 
 
-def parameters_of(first: Fitted, second: Fitted) -> list[Pair]:
+def parameters_of(first: FittedModel, second: FittedModel) -> list[Pair]:
     """The parameters of one model that was fitted to both."""
     other = dict(_estimates(second))
     return [
@@ -77,7 +77,7 @@ def _own(results: Mapping[str, Any], sensor: str) -> Mapping[str, Any]:
     return {name.rpartition("/")[2]: each for name, each in results.items() if name.startswith(f"{sensor}/")}
 
 
-def _estimates(fit: Fitted) -> Iterator[tuple[str, Estimate]]:
+def _estimates(fit: FittedModel) -> Iterator[tuple[str, Estimate]]:
     for term in fit.model.terms:
         for each in term.estimates:
             yield " ".join(dict.fromkeys(filter(None, (term.name, each.name, each.axis)))), each

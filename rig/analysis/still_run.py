@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrations.noise_analysis.hidden import hidden_step
+from calibrations.noise.samples import hidden_step
 from calibrations.table import Array
 from procedures.noise_floor import STILL
 from procedures.soak import HOLD
-from rig.analysis.stream import FOLLOWED, LATE, Stream, agreed, channel_of
+from rig.analysis.data import FOLLOWED
+from rig.analysis.stream import LATE, Stream, agreed, channel_of
 from rig.errors import RecordError
 from rig.record.measured import Measured
 from rig.record.values import Kept

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from calibrations.errors import DataError
 from calibrations.table import Table
-from rig.analysis.stream import AXIS, BESIDE, FOLLOWED, LATE, Stream, agreed, channel_of
+from rig.analysis.data import BESIDE, FOLLOWED
+from rig.analysis.stream import AXIS, LATE, Stream, agreed, channel_of
 
 MOST_MISSING = 0.1  # of a record, in gaps that are closed up
 WHOLE = 0.1  # of a step, by which steps may be off whole numbers of them where single samples were lost

@@ -1,4 +1,4 @@
-"""Samples of a sensor at rest as a stream, whatever they come from, and what was done to them before any analysis."""
+"""Samples of a sensor at rest as a stream, from a table, an array or a run."""
 
 from __future__ import annotations
 
@@ -11,11 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrations.errors import DataError, nearest
-from calibrations.still.record import Sensed
+from calibrations.noise.record import Sensed
 from calibrations.table import STANDARD_GRAVITY, Array
 
-FOLLOWED = ("temperature_c", "supply_v")  # columns beside the samples that an output may follow
-BESIDE = ("t_s", *FOLLOWED, "n", "direction", "path")  # columns that are no channels
 LATE = 0.5  # sampling intervals by which a sample may be off before that is a gap
 DISAGREE = 0.01  # of two rates
 AXIS = re.compile(r"(v|a|g|m|)([xyz])(|_v)")  # of a channel, by its name
@@ -65,7 +63,7 @@ class Stream:
 
 
 def repairs(samples: Stream, n: int) -> Iterable[str]:
-    """What was done to the samples before anything was computed."""
+    """How the samples were changed before the analysis, and what limits them."""
     if samples.closed:
         missing = sum(length for _, length in samples.closed)
         gaps = "a gap is" if len(samples.closed) == 1 else f"{len(samples.closed)} gaps are"
@@ -75,13 +73,13 @@ def repairs(samples: Stream, n: int) -> Iterable[str]:
         )
     if samples.uneven_s:
         yield (
-            f"Times are uneven, as where samples reach a computer in bursts, and off by {samples.uneven_s:.2g} s at "
-            f"most; the samples are taken to be even, {samples.rate_hz:.6g} a second."
+            f"Times are uneven by up to {samples.uneven_s:.2g} s, as if samples reached the computer in bursts; "
+            f"the analysis assumes {samples.rate_hz:.6g} evenly spaced samples a second."
         )
     for name, step in samples.coarse.items():
         yield (
-            f"{name} was read in steps of {1e3 * step:.3g} mV, with less noise than that: its means are off by parts "
-            "of a step, and how much an output follows it is known less well than is said."
+            f"{name} was read in steps of {1e3 * step:.3g} mV, larger than its noise: its means are wrong by part of a "
+            "step, and the slope of an output that follows it is less certain than stated."
         )
 
 

@@ -1,14 +1,12 @@
-"""The bench file: which instrument plays which role, where it is, and what must not be exceeded.
+"""The bench file: the instrument in each role, its address, and the limits.
 
-An instrument whose url is `simulated` is served in this process by the twin of its driver, in the world that the file
-describes; `simulated:ADDRESS` says where it listens.
+If the url of an instrument is `simulated`, the twin of its driver is served in this process, in the simulated world of
+the file. `simulated:ADDRESS` gives the address of the twin.
 
-parts.py   its parts: instruments, sensors, displacement sensor, certificates, folders
-bench.py   the whole
-file.py    reading it, with the files that it names
-check.py   what its parts must be to each other
-values.py  values that cannot be
-faults.py  what is wrong with it, in words
+parts.py  the parts: instruments, sensors, displacement sensor, certificates, folders
+bench.py  the whole bench
+file.py   reads the file, with the files that it names
+check.py  checks values and the relations between the parts
 """
 
 from rig.bench.bench import Bench

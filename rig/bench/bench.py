@@ -1,4 +1,4 @@
-"""The bench as a whole: a checked bench file, and what follows from it."""
+"""The bench: a checked bench file, and the values derived from it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pydantic import Field
 from procedures.session import Limits
 from rig.bench.parts import Certificate, Displacement, Folders, Instrument, Lab, Laboratory, Sensor, Strict, Uncertainty
 
-SENSOR = "^[A-Za-z0-9_-]+$"  # name of a batch's sensor: part of channels and of RUN/SENSOR
+SENSOR = "^[A-Za-z0-9_-]+$"  # name of a sensor of a batch: a part of channel names and of RUN/SENSOR
 
 
 class Bench(Strict):
@@ -28,18 +28,18 @@ class Bench(Strict):
     uncertainty: Uncertainty = Uncertainty()
     laboratory: Laboratory = Laboratory()
     lab: Lab | None = None
-    certificates: dict[str, Certificate] = Field(default_factory=dict)  # of what plays no role, such as a hand level
+    certificates: dict[str, Certificate] = Field(default_factory=dict)  # of things without a role, such as a hand level
     world: dict[str, Any] = Field(default_factory=dict)
     folders: Folders = Folders()
 
     @property
     def simulated(self) -> bool:
-        """Whether every instrument is a twin; then time is simulated too."""
+        """Whether every instrument is a twin; then time is simulated as well."""
         return all(instrument.simulated for instrument in self.instruments.values())
 
     @property
     def first_sensor(self) -> str | None:
-        """The one of a batch that adaptive procedures go by; None where there is no batch."""
+        """The sensor of a batch that adaptive procedures use; None without a batch."""
         return next(iter(self.sensors), None)
 
     @property
@@ -50,29 +50,29 @@ class Bench(Strict):
 
     @property
     def wired(self) -> Mapping[str, int]:
-        """All inputs of the converter by name, those on request too."""
+        """All inputs of the converter by name, with those on request."""
         adc = self.instruments.get("adc")
         return adc.typed_settings().wired if adc else {}
 
     @property
     def constants(self) -> dict[str, str | float]:
-        """What every table says of the sensor (those of a batch are named apart), of the way and of the inputs."""
+        """The constants of every table: sensor (not for a batch), approach and uncertainties."""
         sensor = {} if self.sensors else self.sensor.constants
         return {**sensor, "approach_deg": self.limits.overrun_deg, **self.uncertainty.model_dump(exclude_none=True)}
 
     @property
     def result_limits(self) -> Mapping[str, float | tuple[float, float]]:
-        """What results are judged by: those of the file, and the limit that the level check has anyway."""
+        """The limits of results: those of the file, and limits.level_deg for the level check."""
         level_deg = self.limits.level_deg
         level = {} if level_deg is None else {"level-x": level_deg, "level-y": level_deg}
         return {**level, **self.limits.results}
 
     def document(self) -> dict[str, Any]:
-        """The whole configuration as JSON; `Bench.model_validate` reads it back."""
+        """The whole configuration as JSON; `Bench.model_validate` reads it."""
         return self.model_dump(mode="json")
 
     def configuration(self, procedure: str, settings: Mapping[str, Any]) -> str:
-        """Hash of all that a run depends on: procedure, settings, bench. Faults are not: they can be repaired."""
+        """Hash of procedure, settings and bench, without the faults of twins, which can be repaired."""
         bench = self.model_dump(
             mode="json", exclude={"instruments": {"__all__": {"faults"}}, "laboratory": True, "lab": True}
         )

@@ -1,7 +1,7 @@
-"""Calibration certificates of a bench's instruments, and which of them are no longer good on a day.
+"""Calibration certificates of the instruments, and which of them have expired.
 
-A run that begins with an expired one is marked: with an event, and with the constant `expired`, which goes with its
-table into every export and report. The run itself is not refused: what it measured may still be needed.
+A run that begins with an expired certificate gets an event, and the constant `expired` of its table, which every export
+and report shows. The run is not refused, because its data may still be needed.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ EXPIRED = "expired"
 
 
 def certificates(bench: Bench) -> dict[str, Certificate]:
-    """Every certificate of the bench file: of instruments by role, of other things by the name given there."""
+    """Every certificate of the bench file: of an instrument by its role, of another thing by its name."""
     own = {role: part.certificate for role, part in bench.instruments.items() if part.certificate is not None}
     return {**own, **bench.certificates}
 
 
 def expired(bench: Bench, on: date) -> list[str]:
-    """A sentence for each certificate that was due before the day `on`."""
+    """A sentence for each certificate that expired before the day `on`."""
     return [
         f"{name}'s certificate {certificate.number} expired on {certificate.due}"
         for name, certificate in certificates(bench).items()

@@ -1,41 +1,98 @@
-"""What the parts of a bench must be to each other, to their drivers and to the simulated world."""
+"""Checks of a bench file: values, and the relations between its parts, their drivers and the simulated world."""
 
 from __future__ import annotations
 
 import dataclasses
 import importlib
+import inspect
+import itertools
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 
-from drivers.errors import LinkRefused
-from drivers.links.person import PERSON
-from drivers.links.url import Url
-from drivers.links.wire_faults import kinds_of
-from drivers.simulation.batch import with_own
-from drivers.simulation.config import WorldConfig
-from drivers.simulation.errors import SimulationError
+from calibrations.table import gravity_fault
+from drivers.errors import LinkRefused, did_you_mean
+from drivers.manual_stage.person import PERSON
+from drivers.transport.address import Url
+from drivers.transport.faults import Fault
+from drivers.transport.wire_faults import kinds_of
+from drivers.world.batch import with_own
+from drivers.world.config import WorldConfig
+from drivers.world.errors import SimulationError
+from procedures.session import Limits
 from rig.bench.bench import Bench
-from rig.bench.faults import fault_of
-from rig.bench.parts import D63, ROLES, Instrument
+from rig.bench.parts import D63, ROLES, Certificate, Displacement, Folders, Instrument, Lab, Sensor, Uncertainty
 from rig.errors import BenchError, RecordError
-from rig.nearest import did_you_mean
+
+UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
+
+
+def describe_error(error: ValidationError, model: type[BaseModel]) -> str:
+    """The first fault with its key. A misspelt key comes before the missing key that it stands for."""
+    faults = error.errors()
+    fault = min(faults, key=lambda fault: fault["type"] not in UNKNOWN)
+    where = [str(part) for part in fault["loc"] if "[" not in str(part)]  # the type of a union is not a key
+    if where[0] == "lab":  # a URL may hold a password
+        fault = {**fault, "input": "..."}
+    return f"key {'.'.join(where)}: {describe_fault(fault, _keys(model, where[:-1]))}"
+
+
+def describe_fault(fault: Any, keys: list[str]) -> str:
+    """One fault of a value; `keys` are the known keys at its place."""
+    if fault["type"] in UNKNOWN:
+        return f"no such key.{did_you_mean(str(fault['loc'][-1]), keys)}"
+    if fault["type"] == "missing":
+        return "this key is missing; `rig check --example` prints a complete bench file"
+    why = fault["msg"].removeprefix("Value error, ")  # the message of our own validator
+    comma = fault["type"] == "float_parsing" and str(fault["input"]).count(",") == 1
+    hint = f"; write {str(fault['input']).replace(',', '.')}, with a decimal point" if comma else ""
+    return f"{why}; the value is {fault['input']!r}{hint}"
+
+
+def _keys(model: Any, where: list[str]) -> list[str]:
+    """The known keys at a place of the file."""
+    parts: dict[str, Any] = {"limits": Limits, "d63": Displacement, "uncertainty": Uncertainty, "lab": Lab}
+    parts |= {"instruments": Instrument, "sensor": Sensor, "folders": Folders}
+    part = parts.get(where[0], model) if where else model
+    if where and (where[0] == "certificates" or where[-1] == "certificate"):
+        part = Certificate
+    if "faults" in where:
+        part = Fault
+    if dataclasses.is_dataclass(part):
+        return [field.name for field in dataclasses.fields(part)]
+    return list(part.model_fields)
 
 
 def check(bench: Bench, path: Path) -> None:
     """Raises BenchError with file, key and what to do."""
     for role, instrument in bench.instruments.items():
         _check_instrument(role, instrument, path)
+    check_lines(bench, f"{path}, key instruments")
     _check_worlds(bench, path)
     _check_batch(bench, path)
     _check_d63(bench, path)
     _check_lab(bench, path)
 
 
+def check_lines(bench: Bench, where: str) -> None:
+    """Raises BenchError for two roles on one unit of one line: each would execute the commands of the other.
+
+    `where` begins the message. Stages that a person turns share the person.
+    """
+    claims = [claim for role, instrument in bench.instruments.items() for claim in _claims(role, instrument)]
+    for one, other in itertools.combinations(claims, 2):
+        if one.line == other.line and (fault := _conflict(one, other)):
+            raise BenchError(f"{where}.{other.key}: {fault}")
+
+
 def drivers() -> list[str]:
-    """The names of all drivers: the modules that have a `connect`."""
+    """The names of all drivers: the folders that have a `driver.py`."""
     folder = Path(importlib.import_module("drivers").__file__ or "").parent
-    return sorted(p.stem for p in folder.glob("*.py") if "\ndef connect(" in p.read_text(encoding="utf-8"))
+    return sorted(path.parent.name for path in folder.glob("*/driver.py"))
 
 
 def _check_instrument(role: str, instrument: Instrument, path: Path) -> None:
@@ -48,29 +105,80 @@ def _check_instrument(role: str, instrument: Instrument, path: Path) -> None:
     try:
         instrument.typed_settings()
     except ValidationError as error:
-        kind = importlib.import_module(f"drivers.{instrument.driver}").Settings
+        kind = importlib.import_module(f"drivers.{instrument.driver}.driver").Settings
         fault = error.errors()[0]
         where = ".".join(str(part) for part in fault["loc"])
         names = [field.name for field in dataclasses.fields(kind)]
-        raise BenchError(f"{key}.{where}: {fault_of(fault, names)}") from None
+        raise BenchError(f"{key}.{where}: {describe_fault(fault, names)}") from None
     _check_faults(f"{key}.faults", instrument)
 
 
+@dataclass(frozen=True)
+class _Claim:
+    """A key that gives a role a line; `unit` is None if the instrument has no unit number."""
+
+    key: str
+    url: str
+    line: str
+    unit: int | None
+
+    @property
+    def role(self) -> str:
+        return self.key.partition(".")[0]
+
+
+def _claims(role: str, instrument: Instrument) -> list[_Claim]:
+    """The lines of an instrument. Twins of one driver with the same address share a line."""
+    module = importlib.import_module(f"drivers.{instrument.driver}.driver")
+    unit = instrument.unit if "links.unit(" in inspect.getsource(module.connect) else None
+    if instrument.simulated:
+        line = f"{instrument.driver} {instrument.listen or ''}"
+        return [] if unit is None else [_Claim(f"{role}.unit", instrument.url, line, unit)]
+    own = [] if instrument.url == PERSON else [_Claim(f"{role}.unit", instrument.url, "", unit)]
+    if instrument.stream_url is not None:
+        own.append(_Claim(f"{role}.stream_url", instrument.stream_url, "", None))
+    return [replace(claim, line=Url.parse(claim.url).line) for claim in own]
+
+
+def _conflict(one: _Claim, other: _Claim) -> str | None:
+    """Why two roles cannot share a line, and what to do; None if they can."""
+    at = one.url if one.url == other.url else f"{one.url} (also written {other.url})"
+    if one.unit is None or other.unit is None:
+        alone = one if one.unit is None else other
+        return (
+            f"{one.role} and {other.role} are both at {at}, but {alone.key.removesuffix('.unit')} "
+            "has no unit number and cannot share a line; give each its own address"
+        )
+    if one.unit == other.unit:
+        return (
+            f"{one.role} and {other.role} are both unit {one.unit} at {at}, so both execute the same commands; set "
+            "another unit number at one instrument and write it here as `unit` (default: 1)"
+        )
+    if one.url != other.url:
+        return f"{one.role} and {other.role} are on one line, {at}; write the same address for both"
+    return None
+
+
 def _check_addresses(key: str, instrument: Instrument) -> None:
-    """Raises BenchError for what is the address of no wire; a simulated instrument and a person have none."""
+    """Raises BenchError for a wrong address. A simulated instrument and a person have no address.
+
+    Modbus over serial line has units 1 to 247; unit 0 is a broadcast.
+    """
     own = None if instrument.simulated or instrument.url == PERSON else instrument.url
     for name, url in (("url", own), ("stream_url", instrument.stream_url)):
         try:
             _ = url and Url.parse(url)
         except LinkRefused as refused:
             raise BenchError(f"{key}.{name}: {refused}") from None
+    if own is not None and Url.parse(own).rtu and not 1 <= instrument.unit <= 247:
+        raise BenchError(f"{key}.unit: unit {instrument.unit} is not possible on a serial line; give 1 to 247")
 
 
 def _check_lab(bench: Bench, path: Path) -> None:
-    """Raises BenchError for what is no URL of a lab's record, and for a password: the bench is kept with every run."""
+    """Raises BenchError for a wrong URL of the lab's record, and for a password: every run keeps the bench."""
     if bench.lab is None:
         return
-    from rig.record.lab_url import has_password, lab_url  # only a rig with a lab needs SQL to read its bench
+    from rig.record.lab import has_password, lab_url  # slow to import, and only a rig with a lab needs it
 
     key = f"{path}, key lab.url"
     try:
@@ -78,13 +186,15 @@ def _check_lab(bench: Bench, path: Path) -> None:
     except RecordError as error:
         raise BenchError(str(error)) from None
     if has_password(url):
-        raise BenchError(f"{key}: has a password, which every run would keep; leave it to ~/.pgpass or PGPASSWORD")
+        raise BenchError(
+            f"{key}: the URL has a password, and every run would store it; put it into ~/.pgpass or PGPASSWORD"
+        )
 
 
 def _check_faults(key: str, instrument: Instrument) -> None:
-    """Raises BenchError for a fault that the twin cannot have, and for those of a real instrument."""
+    """Raises BenchError for an unknown fault of a twin, and for faults of a real instrument."""
     if instrument.faults and not instrument.simulated:
-        raise BenchError(f"{key}: a real instrument has its own; remove them, or write `url: simulated`")
+        raise BenchError(f"{key}: only a simulated instrument takes faults; remove them, or write `url: simulated`")
     for k, fault in enumerate(instrument.faults):
         if fault.what not in (kinds := kinds_of(instrument.driver)):
             raise BenchError(f"{key}.{k}.what: no fault {fault.what!r}.{did_you_mean(fault.what, kinds)}")
@@ -104,11 +214,11 @@ def _check_worlds(bench: Bench, path: Path) -> None:
 
 
 def _check_batch(bench: Bench, path: Path) -> None:
-    """Raises BenchError where sensors and channels do not fit together."""
+    """Raises BenchError if sensors and channels do not match."""
     if bench.sensors and "sensor" in bench.model_fields_set:
-        raise BenchError(f"{path}, key sensor: there is a batch in `sensors` too; leave one of them")
+        raise BenchError(f"{path}, key sensor: the file also has a batch in `sensors`; remove one of the two keys")
     if bench.sensor.world:
-        raise BenchError(f"{path}, key sensor.world: only sensors of a batch differ from the bench's `world`; move it")
+        raise BenchError(f"{path}, key sensor.world: only a sensor of a batch has its own world; move it to `world`")
     if "adc" not in bench.instruments:
         return
     named = {name.partition(".")[0] for name in bench.channels if "." in name}
@@ -117,12 +227,78 @@ def _check_batch(bench: Bench, path: Path) -> None:
         raise BenchError(f"{key}: no sensor {name!r} in `sensors`.{did_you_mean(name, bench.sensors)}")
     for name in bench.sensors:
         if f"{name}.vx" not in bench.channels:
-            raise BenchError(f"{path}, key sensors.{name}: no channel {name}.vx of the adc carries its output")
+            raise BenchError(f"{path}, key sensors.{name}: the adc has no channel {name}.vx; add it to channels")
 
 
 def _check_d63(bench: Bench, path: Path) -> None:
-    """What a run would find out when all is measured. Raises BenchError."""
+    """Raises BenchError for a displacement sensor without a curve."""
     if D63 in bench.channels and bench.d63 is None:
-        raise BenchError(f"{path}, key d63: is missing: the channel {D63} needs its calibration curve")
+        raise BenchError(f"{path}, key d63: this key is missing; the channel {D63} needs its calibration curve")
     if bench.d63 and not getattr(bench.d63.curve, bench.d63.side):
-        raise BenchError(f"{path}, key d63.side: the curve has no {bench.d63.side} side")
+        raise BenchError(f"{path}, key d63.side: the curve has no {bench.d63.side} side; give the other side")
+
+
+# Impossible values, and limits of unknown results.
+
+KeyFault = tuple[str, str]  # key; fault and remedy
+
+
+def check_values(bench: Bench, path: Path) -> None:
+    """Raises BenchError with file, key and what to do."""
+    for key, fault in _faults(bench):
+        raise BenchError(f"{path}, key {key}: {fault}")
+
+
+def _faults(bench: Bench) -> Iterator[KeyFault]:
+    yield from _of_sensor("sensor", bench.sensor)
+    for name, sensor in bench.sensors.items():
+        yield from _of_sensor(f"sensors.{name}", sensor)
+    yield from _of_channels(bench)
+    yield from _of_limits(bench)
+    yield from _of_result_limits(bench)
+
+
+def _of_sensor(key: str, sensor: Sensor) -> Iterator[KeyFault]:
+    if fault := gravity_fault(sensor.gravity_m_s2):
+        yield f"{key}.gravity_m_s2", f"is {fault}"
+    corner_hz = sensor.filter_corner_hz
+    if corner_hz is not None and not 0 < corner_hz < math.inf:
+        yield f"{key}.filter_corner_hz", f"the corner is {corner_hz:g} Hz; give one above 0, or remove the key"
+
+
+def _of_channels(bench: Bench) -> Iterator[KeyFault]:
+    seen: dict[int, str] = {}
+    for name, number in bench.wired.items():
+        if (other := seen.setdefault(number, name)) != name:
+            yield "instruments.adc.settings.channels", f"{other} and {name} are both input {number}; give each its own"
+
+
+def _of_limits(bench: Bench) -> Iterator[KeyFault]:
+    limits = bench.limits
+    if not limits.temperature_c[0] < limits.temperature_c[1]:
+        yield "limits.temperature_c", f"{_pair(limits.temperature_c)} is not a range; give the lowest, then the highest"
+    if not 0 <= limits.overrun_deg < math.inf:
+        yield "limits.overrun_deg", f"the distance is {limits.overrun_deg:g} deg; give 0 or more"
+    if limits.level_deg is not None and not limits.level_deg > 0:
+        fault = f"the limit is {limits.level_deg:g} deg; give a tilt above 0, or remove the key to switch the check off"
+        yield "limits.level_deg", fault
+
+
+def _of_result_limits(bench: Bench) -> Iterator[KeyFault]:
+    """A misspelt limit has no effect, so it is a fault. Results of the user's own procedures are not known here."""
+    for name, limit in bench.limits.results.items():
+        if isinstance(limit, tuple) and not limit[0] <= limit[1]:
+            yield f"limits.results.{name}", f"{_pair(limit)} is not a range; give the lowest, then the highest"
+        if not isinstance(limit, tuple) and not limit >= 0:
+            yield f"limits.results.{name}", f"the limit is {limit:g}; give 0 or more, or a range [lowest, highest]"
+    if bench.limits.results and bench.folders.procedures is None:
+        from rig.results.evaluate import names  # it imports the bench
+
+        known = names()
+        for name in bench.limits.results:
+            if name not in known:
+                yield f"limits.results.{name}", f"no procedure has such a result.{did_you_mean(name, known)}"
+
+
+def _pair(values: tuple[float, float]) -> str:
+    return f"[{values[0]:g}, {values[1]:g}]"

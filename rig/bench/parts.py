@@ -1,4 +1,4 @@
-"""The parts of a bench file, typed: its keys are these and no others."""
+"""The parts of a bench file. Other keys are refused."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, create_model, field_validator
 
-from calibrations.error_table import Point
-from drivers.links.address import Address
-from drivers.links.faults import Fault
+from calibrations.geometry.error_table import Point
 from drivers.philtec_d63 import SIMULATED as SIMULATED_CURVE
 from drivers.philtec_d63 import Curve
+from drivers.transport.address import Address
+from drivers.transport.faults import Fault
 
 SIMULATED = "simulated"
 D63 = "d63"  # the displacement sensor's channel
@@ -22,13 +22,13 @@ TURNING = ("alpha", "beta")
 
 
 class Strict(BaseModel):
-    """A part of the file: its keys are these and no others."""
+    """A part of the file. Other keys are refused."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 class Certificate(Strict):
-    """A calibration certificate, good until the end of the day `due`."""
+    """A calibration certificate, valid until the end of the day `due`."""
 
     model_config = ConfigDict(coerce_numbers_to_str=True)
 
@@ -37,10 +37,10 @@ class Certificate(Strict):
 
 
 class Instrument(Strict):
-    """One instrument: a driver's name, an address, and settings that the driver declares.
+    """One instrument: the name of its driver, its address, and the driver's settings.
 
-    `error_table` is a stage's own, as points or as a CSV file beside the bench file; `read_bench` leaves the points.
-    `faults` are what goes wrong with a simulated one.
+    `error_table` of a stage: points, or a CSV file in the folder of the bench file, which `read_bench` replaces by the
+    points. `faults`: faults of a simulated instrument.
     """
 
     driver: str
@@ -58,7 +58,7 @@ class Instrument(Strict):
 
     @property
     def listen(self) -> str | None:
-        """Where its twin listens, if the file says so."""
+        """The address of its twin, if the file gives one."""
         return self.url.partition(":")[2] or None
 
     @property
@@ -67,13 +67,13 @@ class Instrument(Strict):
 
     def typed_settings(self) -> Any:
         """The driver's frozen Settings. Raises ValidationError."""
-        kind = importlib.import_module(f"drivers.{self.driver}").Settings
+        kind = importlib.import_module(f"drivers.{self.driver}.driver").Settings
         checker = create_model("Checked", settings=(kind, ...), __config__=ConfigDict(extra="forbid"))
         return checker(settings=self.settings).settings  # type: ignore[attr-defined]
 
 
 class Sensor(Strict):
-    """A sensor under test; these become constants of its tables, apart from what its simulated twin has of its own."""
+    """A sensor under test. Its keys become constants of its tables, except `world`, the settings of its twin."""
 
     name: str = "sensor"
     serial: str = ""
@@ -88,13 +88,13 @@ class Sensor(Strict):
 
     @property
     def constants(self) -> dict[str, str | float]:
-        """What every table of this sensor says of it."""
-        said = self.model_dump(exclude_none=True, exclude={"world"})
-        return {"sensor": said.pop("name"), **{key: value for key, value in said.items() if value != ""}}
+        """The constants of every table of this sensor."""
+        values = self.model_dump(exclude_none=True, exclude={"world"})
+        return {"sensor": values.pop("name"), **{key: value for key, value in values.items() if value != ""}}
 
 
 class Uncertainty(Strict):
-    """Standard uncertainties of what no fit can know, for the budget (`calibrations/inputs.py`); None: not given.
+    """Standard uncertainties of inputs that are not fitted, for the budget (`fitting/inputs.py`); None: not given.
 
     The converter's are those of its specification or certificate, as the range is used: a limit over sqrt(3).
     """
@@ -110,7 +110,7 @@ class Uncertainty(Strict):
 
 
 class Laboratory(Strict):
-    """Who signs certificates; `country` is its ISO 3166 code of two letters, `customer` who asked for them."""
+    """The laboratory that signs certificates. `country` is the ISO 3166 code of two letters."""
 
     name: str = "not stated"
     person: str = "not stated"
@@ -124,17 +124,17 @@ class Laboratory(Strict):
 
 
 class Lab(Strict):
-    """Where `rig push` brings runs: a PostgreSQL database, without a password; `push` it after every run."""
+    """The PostgreSQL database for `rig push`, without a password; `push`: push after every run."""
 
     url: str
     push: bool = False
 
 
 class Displacement(Strict):
-    """The D63 behind the channel `d63`: its calibration curve, which side of the optical peak it works on, and
-    whether the gap grows (1) or closes (-1) as the carriage moves towards the sensor's +x.
+    """The displacement sensor D63 on the channel `d63`: its calibration curve, the side of the optical peak, and the
+    direction: 1 if the gap grows when the carriage moves towards the sensor's +x, -1 if it closes.
 
-    `curve` is a YAML file beside the bench file, `simulated`, or the curve itself, which `read_bench` leaves.
+    `curve` is a YAML file in the folder of the bench file, `simulated`, or the curve. `read_bench` gives the curve.
     """
 
     curve: Curve

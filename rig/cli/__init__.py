@@ -21,6 +21,19 @@ from rig.cli.failure import exit_status
 from rig.cli.record_option import with_record
 
 FOLDER = Path(__file__).parent
+# The sections of `rig --help`. A command that is in none of them is listed under "Other".
+GROUPS = {
+    "Start": ("demo", "web"),
+    "Measure": (
+        "check", "procedures", "plan", "run", "resume", "runs", "show", "import", "exclude", "draw", "simulate",
+    ),
+    "Find what is missing": (
+        "compare", "fit", "diagnose", "add", "discover", "noise", "report", "effects", "models",
+    ),
+    "Hand over": ("certificate", "compensate", "export", "push"),
+    "Look after": ("control", "history", "doctor"),
+    "Many sensors": ("fleet",),
+}  # fmt: skip
 
 
 class Commands(click.Group):
@@ -39,15 +52,20 @@ class Commands(click.Group):
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         if not args[0].startswith("-") and self.get_command(ctx, args[0]) is None:
-            from rig.nearest import did_you_mean
+            from drivers.errors import did_you_mean
 
             known = self.list_commands(ctx)
             raise click.UsageError(f"no command {args[0]!r}.{did_you_mean(args[0], known)}", ctx)
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        with formatter.section("Commands"):
-            formatter.write_dl([(name, _short_help(_path(name))) for name in self.list_commands(ctx)])
+        names = self.list_commands(ctx)
+        grouped = {name for group in GROUPS.values() for name in group}
+        width = max(map(len, names))
+        for title, group in {**GROUPS, "Other": tuple(name for name in names if name not in grouped)}.items():
+            if group:
+                with formatter.section(title):
+                    formatter.write_dl([(name.ljust(width), _short_help(_path(name))) for name in group])
 
 
 def _path(name: str) -> Path:

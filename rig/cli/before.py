@@ -13,13 +13,12 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
+from calibrations.presentation.text import duration, size
 from procedures.catalogue import Procedure
 from rig.bench import Bench
 from rig.bench.certificates import expired
 from rig.drawings import Attitude, drawing_of, sketch
-from rig.numerals import duration, size
-from rig.planning.plan import Plan
-from rig.planning.stretches import stretches
+from rig.planning.plan import Plan, stretches
 
 FACTS = re.compile(r"^(Excites|Blind to)\s+(.*(?:\n\s+.*)*)", re.MULTILINE)
 MOST_STRETCHES = 6

@@ -7,14 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from calibrations.evaluations.horizontal_turn import by_hand, ellipse, hard_iron
-from calibrations.evaluations.six_faces import Faces, faces
+from calibrations.analyses.magnetometer_turn import correct_by_extremes, estimate_hard_iron, fit_ellipse
+from calibrations.analyses.tumble import Faces, estimate_faces
 from calibrations.fit import Fit
-from calibrations.general import General, general
-from calibrations.model import Estimate
+from calibrations.fitting.matrices import CalibrationMatrices, calibration_matrices
+from calibrations.presentation.text import columns, concise
 from calibrations.table import Array, Table
-from rig.cli.output import columns
-from rig.cli.words import with_uncertainty
 
 EQUATION = "G_c = M (S G_r + b)"
 FLAT = 0.2  # of the range of the other two outputs, by that of z: then it was a horizontal turn
@@ -22,7 +20,7 @@ FLAT = 0.2  # of the range of the other two outputs, by that of z: then it was a
 
 def lines(found: Fit) -> Iterator[str]:
     """For people; nothing for fewer axes than three."""
-    made = general(found)
+    made = calibration_matrices(found)
     if made is not None:
         beyond = f"; {', '.join(made.beyond)} not in it" if made.beyond else ""
         yield f"General calibration, {EQUATION}, from {found.table.unit} to {made.unit} (Book 17.3){beyond}:"
@@ -36,7 +34,7 @@ def lines(found: Fit) -> Iterator[str]:
 
 def document(found: Fit) -> dict[str, Any]:
     """The keys `calibration` and `by_hand` of a fit's document; an uncertainty that is not determined is null."""
-    made, extremes = general(found), _by_hand(found.table)
+    made, extremes = calibration_matrices(found), _by_hand(found.table)
     if (held := _held(found.table)) is not None:
         extremes |= {"accelerometer": {"bias": held.bias.tolist(), "scale_per_g": held.scale.tolist()}}
     if made is None:
@@ -50,7 +48,7 @@ def document(found: Fit) -> dict[str, Any]:
     return {"calibration": {"equation": EQUATION, "unit": units, **parts, "beyond": list(made.beyond)}} | extremes
 
 
-def _rows(made: General) -> Iterator[tuple[str, ...]]:
+def _rows(made: CalibrationMatrices) -> Iterator[tuple[str, ...]]:
     for k, axis in enumerate("xyz"):
         turned = (_told(value, std) for value, std in zip(made.M[k], made.M_std[k], strict=True))
         yield axis, *turned, _told(made.S[k], made.S_std[k]), _told(made.b[k], made.b_std[k])
@@ -58,7 +56,7 @@ def _rows(made: General) -> Iterator[tuple[str, ...]]:
 
 def _told(value: float, std: float) -> str:
     known = None if np.isnan(std) else float(std)
-    return with_uncertainty(Estimate("", "", float(value), known, "")).strip()
+    return concise(float(value), known)
 
 
 def _nullable(std: Array) -> Any:
@@ -70,22 +68,22 @@ def _held(table: Table) -> Faces | None:
     if table.kind != "rates" or not all(f"a{axis}" in table for axis in "xyz"):
         return None
     still = table.column("rate_deg_s") == 0
-    return faces(np.column_stack([table.column(f"a{axis}")[still] for axis in "xyz"])) if still.any() else None
+    return estimate_faces(np.column_stack([table.column(f"a{axis}")[still] for axis in "xyz"])) if still.any() else None
 
 
 def _by_hand(table: Table) -> dict[str, Any]:
     """The Book's hard iron and, of a horizontal turn, soft iron, and what they leave of the magnitude."""
     if table.content != "fields":
         return {}
-    middle = hard_iron(table.outputs)
+    middle = estimate_hard_iron(table.outputs)
     told: dict[str, Any] = {"hard_iron": middle.tolist()}
     left = table.outputs - middle
     if np.ptp(table.outputs[:, 2]) < FLAT * np.ptp(table.outputs[:, :2]):
-        found = ellipse(left[:, :2])
+        found = fit_ellipse(left[:, :2])
         angle = float(np.degrees(found.angle_rad))
         told["hard_iron"][2] = None  # the middle of z is the field that stands upright, too
         told["soft_iron"] = {"greatest": found.greatest, "least": found.least, "angle_deg": angle}
-        left = by_hand(table.outputs)[:, :2]
+        left = correct_by_extremes(table.outputs)[:, :2]
     size = np.linalg.norm(left, axis=1)
     return {"by_hand": told | {"unit": table.unit, "left_per_mille": float(1e3 * size.std() / size.mean())}}
 

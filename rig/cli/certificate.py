@@ -11,7 +11,7 @@ from rig.cli.output import bench_option, emit, json_option, note
 from rig.errors import OutputError
 
 if TYPE_CHECKING:
-    from calibrations.certificates.content import Certificate
+    from calibrations.presentation.certificate.content import Certificate
 
 FORMS = (".html", ".pdf", ".xml")
 
@@ -45,22 +45,21 @@ def command(
     """Draw up a calibration certificate of DATA: results, uncertainties and their budgets, as found and as left.
 
     Limits of the bench file (limits.results, such as bias-x) are judged by guarded acceptance. Exit status 1: a result
-    is beyond its limit.
+    is beyond its limit, or the data cannot be used and no certificate is written.
     """
-    from calibrations.certificates.document import document
-    from calibrations.certificates.results import figures, require_reference
     from calibrations.fit import fit
-    from calibrations.model_file import read_model
-    from rig.analysis.asked import asked
-    from rig.analysis.asked_still import is_still
+    from calibrations.model.file import read_model
+    from calibrations.presentation.certificate.content import document
+    from calibrations.presentation.certificate.results import figures, require_reference
     from rig.analysis.issue import Asked, issue, limits
-    from rig.analysis.request import Request
     from rig.bench import read_bench
+    from rig.services.load import is_still, loaded_table
+    from rig.services.request import Request
 
     paths = _paths(out)
     if is_still(data):
         require_reference(data, "still")
-    table, given, effects = asked(Request(data, model, bench_file), note)
+    table, given, effects = loaded_table(Request(data, model, bench_file), note)
     require_reference(table.source, table.kind)
     bench = read_bench(bench_file) if bench_file is not None else None
     earlier, of = given, Path(model).name
@@ -93,12 +92,12 @@ def _paths(out: Path) -> list[Path]:
 
 def _write(path: Path, made: Certificate) -> None:
     """One form of the certificate; its writer is imported only here."""
-    from calibrations.certificates.dcc import dcc
-    from calibrations.certificates.html import html
+    from calibrations.presentation.certificate.dcc import dcc
+    from calibrations.presentation.certificate.pages import html
     from rig.files import write_whole
 
     if path.suffix == ".pdf":
-        from calibrations.certificates.pdf import pdf
+        from calibrations.presentation.certificate.pages import pdf
 
         write_whole(path, pdf(made))
     else:
@@ -106,8 +105,8 @@ def _write(path: Path, made: Certificate) -> None:
 
 
 def _told(made: Certificate) -> list[str]:
-    from calibrations.certificates.sections import results_table, verdict
-    from rig.cli.output import columns
+    from calibrations.presentation.certificate.sections import results_table, verdict
+    from calibrations.presentation.text import columns
 
     table = results_table(made)
     told = verdict(made)

@@ -8,11 +8,12 @@ from pathlib import Path
 
 import click
 
+from calibrations.presentation.text import columns
 from drivers.instrument import Check, Identity
 from rig.bench import DEFAULT, read_bench
 from rig.bench.certificates import EXPIRED, certificates, expired
-from rig.cli.output import bench_option, columns, emit, json_option, notes
-from rig.connected.instruments import checked
+from rig.cli.output import bench_option, emit, json_option, notes
+from rig.instruments.instruments import checked
 
 NOT_MET, FAILED = 1, 3
 

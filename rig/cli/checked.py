@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from typing import Any
 
-from calibrations.search.unseen import Check
+from calibrations.discovery.check_poses import Check
 
 
 def lines(check: Check | None, data: str) -> Iterator[str]:

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 from click import wrap_text
 
-from rig.cli.output import columns
-from rig.numerals import duration
+from calibrations.presentation.text import columns, duration
 from rig.planning.optimal import AGAIN, CHECK, DESIGN, Optimal, most_relative, relative
 from rig.planning.sweep_range import Judged
 

@@ -10,7 +10,7 @@ from rig.cli.output import check_option, emit, model_option, notes
 from rig.cli.request import request_options
 
 if TYPE_CHECKING:
-    from rig.analysis.request import Request
+    from rig.services.request import Request
 
 
 @click.command("compare")
@@ -20,29 +20,31 @@ if TYPE_CHECKING:
 @request_options
 def command(request: Request, check: bool, as_json: bool) -> int:
     """Set a model beside DATA (a file or a run) and say where it fails. A model without values is fitted first."""
-    from calibrations.compare import compare
+    from calibrations.discovery.verdict import Verdict
     from calibrations.documents import comparison_document
-    from calibrations.search.determined import undetermined
-    from calibrations.search.outliers import kept
     from rig.cli.asked import asked
-    from rig.cli.still import of_still, told_compare
-    from rig.cli.words import errors, warning
+    from rig.cli.words import table, warning
 
-    if (still := of_still(request)) is not None:
-        return told_compare(still, request, check, as_json)
-    table, start, _ = asked(request)
-    result = compare(table, start)
-    caution, outliers = undetermined(result.fit), kept(result.fit)
+    question = asked(request)
+    result = question.data.compare(question.model)
+    name, cautions = request.model or question.model.name, question.data.cautions(result.fit)
     if as_json:
-        emit(comparison_document(result, request.model or start.name))
-        notes([*warning(caution), *warning(outliers)])
+        emit(comparison_document(result, name))
+        notes(warning(cautions))
     else:
-        click.echo(f"{start.name} beside {table.n} rows of {table.source}\n\n{errors(result.fit)}\n")
-        if result.adequate:
-            click.echo("\n".join(["The model fails nowhere: what is left is noise.", *warning(caution)]))
+        data = question.data
+        click.echo(f"{question.model.name} on {data.description}\n\n{table(data.error_table(result.fit))}\n")
+        if (more := data.comparison_table(result)) is not None:
+            click.echo(f"{table(more)}\n")
+        if result.rejection is not None:
+            click.echo(f"This data cannot be used: {result.rejection.verdict}: {result.rejection.text}.")
+        elif result.adequate:
+            click.echo(data.complete)
         else:
             click.echo("It fails, worst first:\n" + "\n".join(f"  {place.text}" for place in result.fails))
-            click.echo(f"\nWhich effect is missing: rig diagnose {request.data} --model {request.model or start.name}")
-        for line in warning(outliers):
+            click.echo(f"\nWhich effect is missing: rig diagnose {request.data} --model {name}")
+        for line in filter(None, (data.note, *warning(cautions))):
             click.echo(f"\n{line}")
-    return 1 if check and (not result.adequate or caution) else 0
+    silent = result.rejection is not None and result.rejection.verdict == Verdict.NO_RESPONSE
+    undetermined = question.data.undetermined(result.fit) is not None
+    return int(silent or (check and (not result.adequate or undetermined)))

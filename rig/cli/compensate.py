@@ -56,33 +56,33 @@ def command(
     Every effect that can be inverted at run time is; of the others the source says what leaving them out costs. The
     number of steps is fixed, and proved to be enough over the whole range.
     """
-    from calibrations.compensation.document import summary
-    from calibrations.compensation.inverse import invert
-    from calibrations.compensation.residual import residual
-    from calibrations.compensation.vectors import vectors
-    from calibrations.model_file import dump_model, read_model
-    from rig.analysis.asked import effects_of
-    from rig.analysis.provenance import program, today
+    from calibrations.compensation.document import make_vectors, summary
+    from calibrations.compensation.inverse import compensated_residual, invert_model
+    from calibrations.model.file import dump_model, read_model
     from rig.files import write_whole
+    from rig.services.load import check_unit, effects_of
+    from rig.services.provenance import program, today
 
     if picture is not None and data is None:
         raise click.UsageError("--picture draws what --data shows: give --data DATA")
     effects = effects_of(bench_file)
     found = read_model(model, effects)
-    made = invert(found, _range(found, reach, given), without, precision)
+    made = invert_model(found, _range(found, reach, given), without, precision)
     origin = _origin(model, name, dump_model(found), program(), today())
-    files = _writer(language)(made, origin, vectors(made))
+    files = _writer(language)(made, origin, make_vectors(made))
     beside = None
     if data is not None:
         from rig.analysis.data import load
 
-        beside = residual(made, load(data, tell=note))
+        table = load(data, tell=note)
+        check_unit(found, table.unit, table.source)
+        beside = compensated_residual(made, table)
     _folder(out)
     for file, text in files.items():
         write_whole(out / file, text)
     if picture is not None and beside is not None:
-        from calibrations.pictures.compensation import compensated
-        from calibrations.pictures.save import save
+        from calibrations.presentation.charts.motion import compensated
+        from calibrations.presentation.static import save
 
         save(compensated(beside), picture)
     paths = [*(str(out / file) for file in files), *([str(picture)] if picture else [])]
@@ -143,23 +143,24 @@ def _folder(out: Path) -> None:
 
 def _told(made: Compensation) -> list[str]:
     """What it does and what it costs, for people."""
-    from calibrations.compensation.about import covered, operations, shown, steps, uncertainty
+    from calibrations.compensation.about import coverage_text, error_text, operations_text, steps_text, uncertainty_text
     from calibrations.compensation.forward import LEFT_OUT
 
     bound, costs = made.bound, made.costs
-    method = f"{steps(made)}, {operations(made)}; each comes nearer by {bound.q:.2g} at least"
+    method = f"{steps_text(made)}, {operations_text(made)}; each comes nearer by {bound.q:.2g} at least"
     lines = [f"{made.model.name}: {method}, proved within +-{made.range.reach:g} {made.unit}."]
     for fate in made.forward.fates:
         if fate.how == LEFT_OUT:
             size = costs.left_out[fate.effect]
             cost = (
-                f"costs {shown(size.rms, made.unit)} rms, {shown(size.most, made.unit)} at most"
+                f"costs {error_text(size.rms, made.unit)} rms, {error_text(size.most, made.unit)} at most"
                 if size
                 else "cost not known"
             )
             lines.append(f"Left out: {fate.effect}: {fate.why}; {cost}.")
     if costs.out_of_gravity is not None:
         lines.append(
-            f"az is not measured; found from gravity it costs {shown(costs.out_of_gravity.most, made.unit)} at most."
+            "az is not measured; found from gravity it costs "
+            f"{error_text(costs.out_of_gravity.most, made.unit)} at most."
         )
-    return [*lines, uncertainty(made), covered(made)]
+    return [*lines, uncertainty_text(made), coverage_text(made)]

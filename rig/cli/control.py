@@ -7,11 +7,10 @@ from typing import Any
 
 import click
 
-from calibrations.evaluations.control_chart import BASELINE, FEWEST
-from calibrations.model import Estimate
+from calibrations.analyses.control_chart import BASELINE_RUNS, FEWEST_RUNS
+from calibrations.presentation.text import columns, concise
 from rig.analysis.control import Controlled, controlled
-from rig.cli.output import columns, emit, json_option
-from rig.cli.words import with_uncertainty
+from rig.cli.output import emit, json_option
 from rig.record import Record
 
 OUT = "out of control"
@@ -20,7 +19,11 @@ OUT = "out of control"
 @click.command("control")
 @click.argument("sensor", required=False)
 @click.option(
-    "--baseline", type=click.IntRange(min=FEWEST), default=BASELINE, show_default=True, help="Runs that set the limits."
+    "--baseline",
+    type=click.IntRange(min=FEWEST_RUNS),
+    default=BASELINE_RUNS,
+    show_default=True,
+    help="Runs that set the limits.",
 )
 @click.option("--since", metavar="RUN", help="Begin with this run, such as the first one after a repair.")
 @click.option("--pictures", "folder", type=click.Path(file_okay=False, path_type=Path), help="Write the charts here.")
@@ -52,10 +55,10 @@ def _verdict(found: list[Controlled]) -> str:
 
 def _row(each: Controlled) -> tuple[str, ...]:
     chart = each.chart
-    last = Estimate(each.quantity, "", float(chart.values[-1]), chart.sigma, each.unit)
+    last = concise(float(chart.values[-1]), chart.sigma, each.unit)
     progress = f"{len(chart.values)} of {chart.judged}" if chart.verdict == "baseline" else str(len(chart.values))
     centre, sigma = f"{chart.centre:.7g} {each.unit}", f"{chart.sigma:.2g} {each.unit}"
-    return each.sensor, each.quantity, progress, centre, sigma, with_uncertainty(last), chart.verdict
+    return each.sensor, each.quantity, progress, centre, sigma, last, chart.verdict
 
 
 def _signals(each: Controlled) -> list[str]:
@@ -92,8 +95,8 @@ def _document(each: Controlled) -> dict[str, Any]:
 
 def _write(found: list[Controlled], folder: Path, form: str) -> list[Path]:
     """One picture for each sensor."""
-    from calibrations.pictures.control_chart import control_charts
-    from calibrations.pictures.save import save_all
+    from calibrations.presentation.charts.history import control_charts
+    from calibrations.presentation.static import save_all
 
     figures = {}
     for sensor in dict.fromkeys(each.sensor for each in found):

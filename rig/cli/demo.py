@@ -20,23 +20,23 @@ from rig.cli.output import emit, json_option, note
 @json_option
 def command(folder: Path, as_json: bool) -> None:
     """Sweep a simulated sensor, find what its linear model misses, add it, and watch the error fall."""
-    from calibrations.compare import compare
-    from calibrations.discover import discover
     from calibrations.documents import discovery_document
-    from calibrations.model_file import read_model
-    from calibrations.pictures.album import album
-    from calibrations.reports.report import report
+    from calibrations.loop import compare, discover
+    from calibrations.model.file import read_model
+    from calibrations.presentation.charts.discovery import album
+    from calibrations.presentation.report.report import report
     from procedures.catalogue import find
     from procedures.settings import parse
     from rig.analysis.data import load
-    from rig.analysis.provenance import program, today
     from rig.bench import read_bench
     from rig.cli.asked import write_model
     from rig.cli.watch import watching
-    from rig.cli.words import discovery, errors
+    from rig.cli.words import discovery
+    from rig.cli.words import table as shown
     from rig.files import write_whole
     from rig.record import Record
-    from rig.running.runner import start
+    from rig.runs.runner import start
+    from rig.services.provenance import program, today
 
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -54,7 +54,8 @@ def command(folder: Path, as_json: bool) -> None:
 
     note("2  Compare: the manufacturer's linear model beside the measurement.")
     beside = compare(table, linear)
-    note(f"\n{errors(beside.fit)}\n\n" + "\n".join(f"   {place.text}" for place in beside.fails[:3]) + "\n")
+    places = "\n".join(f"   {place.text}" for place in beside.fails[:3])
+    note(f"\n{shown(beside.data.error_table(beside.fit))}\n\n{places}\n")
 
     note("3  Diagnose and add, until nothing is missing.\n")
     found = discover(table, linear)

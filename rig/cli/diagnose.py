@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from rig.cli.output import check_option, columns, emit, model_option, note, notes
+from rig.cli.output import check_option, emit, model_option, notes
 from rig.cli.request import request_options
 
 if TYPE_CHECKING:
-    from calibrations.diagnose import Diagnosis
-    from rig.analysis.request import Request
+    from calibrations.discovery.results import Diagnosis
+    from rig.services.request import Request
 
 SHOWN = 6
 
@@ -23,55 +23,42 @@ SHOWN = 6
 @request_options
 def command(request: Request, check: bool, as_json: bool) -> int:
     """Find the physical effect that a model misses on DATA (a file or a run)."""
-    from calibrations.diagnose import diagnose
+    from calibrations.discovery.verdict import Verdict
     from calibrations.documents import diagnosis_document
-    from rig.cli.asked import asked, tell_blind
+    from rig.cli.asked import asked, note_untestable
     from rig.cli.own_effect import own_effect, told
-    from rig.cli.still import of_still, told_diagnose
-    from rig.cli.words import warning
-    from rig.planning.foresight import with_next
+    from rig.cli.words import planned, warning
 
-    if (still := of_still(request)) is not None:
-        return told_diagnose(still, request, check, as_json)
-    table, start, effects = asked(request)
-    result = with_next(diagnose(table, start, effects), request.data, effects, request.bench_file, note)
-    tell_blind(result.fit, effects)
-    name = request.model or start.name
+    question = asked(request)
+    result = question.data.diagnose(question.model, question.effects)
+    result = planned(result, request, question.effects)
+    note_untestable(question.data, result.fit, question.effects)
+    name = request.model or question.model.name
     if as_json:
         own = own_effect(result.pattern, name, request)
         emit(diagnosis_document(result, name) | {"own_effect": own})
-        notes(warning(result.caution))
+        notes(warning([result.caution]))
     else:
-        click.echo("\n".join([_told(result, name, request), *told(result.pattern, name, request)]))
-    return 1 if check and result.verdict != "adequate" else 0
+        click.echo("\n".join([_text(result, name, request), *told(result.pattern, name, request)]))
+    return int(result.verdict is Verdict.NO_RESPONSE or (check and result.verdict is not Verdict.ADEQUATE))
 
 
-def _told(result: Diagnosis, model: str, request: Request) -> str:
+def _text(result: Diagnosis[Any], model: str, request: Request) -> str:
     from calibrations.documents import why
-    from calibrations.reports.verdict import headline
-    from rig.cli.words import experiment
+    from rig.cli.words import experiment, table
 
-    lines = [f"{model} on {result.fit.table.n} rows of {result.fit.table.source}: {headline(result)}", ""]
-    rows = [
-        (
-            c.name,
-            f"{result.held_out_before:.3g} -> {c.held_out_after:.3g}",
-            f"{c.p_value:.1g}",
-            f"{c.probability:.3f}",
-            ", ".join(c.indistinguishable_from) or "-",
-        )
-        for c in result.candidates[:SHOWN]
-    ]
-    if rows:
-        probability = "if it is one of these" if result.verdict == "unexplained" else "probability"
-        head = ("candidate", "error on unseen poses / floor", "p-value", probability, "not told apart from")
-        lines += [columns(head, rows), ""]
-    if result.verdict in ("effect-missing", "ambiguous") and result.path.steps:
+    data = result.findings.data
+    lines = [f"{model} on {data.description}", "", result.judgement.text, ""]
+    if shown := result.candidates[:SHOWN]:
+        lines += [table(data.candidate_table(result, shown)), ""]
+    if result.missing:
         best = result.candidates[0]
         lines += [f"{best.name}: {why(best, result)}", "", f"    {best.effect.formula.splitlines()[0]}", ""]
         lines.append(
             f"Add it: rig add {best.name} --model {model} --data {request.data} --out model.yaml{request.bench_words}"
         )
+    if data.note:
+        lines += ["", data.note]
     if result.next_experiment:
         lines += experiment(result.next_experiment, request.data)
     return "\n".join(lines).rstrip()

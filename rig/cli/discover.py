@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from rig.cli.output import check_option, emit, model_option, note, notes
+from rig.cli.output import check_option, emit, model_option, note, notes, watch_options
 from rig.cli.request import request_options
-from rig.cli.watch import watch_options
 
 if TYPE_CHECKING:
-    from rig.analysis.request import Request
+    from calibrations.discovery.dataset import Dataset
+    from rig.services.load import Loaded
+    from rig.services.request import Request
 
 
 @click.command("discover")
@@ -48,38 +49,39 @@ def command(
         return discover_live(request, out, minutes, unattended, answers, check, as_json)
     if not several:
         raise click.UsageError("name DATA (a file or a run), or --live to measure it")
-    from rig.cli.still import of_still, told_discover
-
-    if (still := of_still(request, out)) is not None:
-        if len(several) > 1:
-            raise click.UsageError("still records are judged one at a time; name one")
-        return told_discover(still, request, out, check, as_json)
     return _discover(request, several, out, check, as_json)
 
 
 def _discover(request: Request, several: tuple[str, ...], out: Path | None, check: bool, as_json: bool) -> int:
-    from calibrations.discover import discover
+    from calibrations.discovery.verdict import Verdict
     from calibrations.documents import discovery_document
-    from rig.analysis.asked import with_known_noise
-    from rig.analysis.several import load_all
     from rig.cli.asked import asked, write_model
     from rig.cli.own_effect import own_effect, told
-    from rig.cli.words import discovery, parameters, warning
-    from rig.planning.foresight import with_next
+    from rig.cli.words import discovery, parameters, planned, warning
 
-    table, start, effects = asked(request, out)
-    table = with_known_noise(load_all(several, note), request.noise, effects) if len(several) > 1 else table
-    result = with_next(discover(table, start, effects), request.data, effects, request.bench_file, note)
-    if out is not None:
-        write_model(result.end, start, out)
-    reached = str(out) if out else request.model or start.name
+    question = asked(request, out)
+    data = question.data if len(several) == 1 else _together(several, request, question)
+    result = planned(data.discover(question.model, question.effects), request, question.effects)
+    written = write_model(result.end, question.model, out)
+    reached = str(written) if written else request.model or question.model.name
     own = (result.pattern if len(several) == 1 else None, reached, request)
     if as_json:
-        emit(discovery_document(result, str(out) if out else None) | {"own_effect": own_effect(*own)})
-        notes(warning(result.caution))
+        emit(discovery_document(result, str(written) if written else None) | {"own_effect": own_effect(*own)})
+        notes(warning([result.caution]))
     else:
         lines = "\n".join([discovery(result), *told(*own)])
-        click.echo(f"{table.n} rows of {table.source}\n\n{lines}\n\n{parameters(result.end.model)}")
-        if out is not None:
-            click.echo(f"\nwritten to {out}")
-    return 1 if check and result.verdict != "adequate" else 0
+        click.echo(f"{data.description}\n\n{lines}\n\n{parameters(result.end.model)}")
+        if written is not None:
+            click.echo(f"\nwritten to {written}")
+    return int(result.verdict is Verdict.NO_RESPONSE or (check and result.verdict is not Verdict.ADEQUATE))
+
+
+def _together(several: tuple[str, ...], request: Request, question: Loaded) -> Dataset[Any]:
+    """Several data as one table."""
+    from calibrations.discovery.rows import Rows
+    from rig.analysis.several import load_all
+    from rig.services.load import with_known_noise
+
+    if question.data.form != "rows":
+        raise click.UsageError("still records are judged one at a time; name one")
+    return Rows(with_known_noise(load_all(several, note), request.noise, question.effects))

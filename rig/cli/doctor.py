@@ -11,11 +11,12 @@ from typing import Any
 
 import click
 
+from calibrations.presentation.text import columns
 from rig.bench import read_bench
-from rig.cli.output import bench_option, columns, emit, json_option
+from rig.cli.output import bench_option, emit, json_option
 from rig.errors import OutputError, RecordError
-from rig.health import Finding, findings, last_run, listed, versions, without_secrets
-from rig.home import home
+from rig.files import home
+from rig.health import Finding, findings, last_run, list_runs, versions, without_secrets
 from rig.record.recover import recover
 
 
@@ -43,10 +44,10 @@ def command(out: Path | None, run: str | None, folder: Path | None, bench_file: 
     parts = _parts(found, run, bench_file)
     _write(archive, parts)
     if as_json:
-        checks = {each.what: {"ok": each.ok, "said": each.said} for each in found}
+        checks = {each.what: {"ok": each.ok, "said": each.detail} for each in found}
         emit({"schema": "rig.doctor/1", "checks": checks, "archive": str(archive), "files": sorted(parts)})
     else:
-        rows = [(each.what, "ok" if each.ok else "WRONG", each.said) for each in found]
+        rows = [(each.what, "ok" if each.ok else "WRONG", each.detail) for each in found]
         click.echo(columns(("check", "", ""), rows))
         click.echo(f"\n{archive}: {', '.join(sorted(parts))}. It has no samples; look into it before you send it.")
     return int(not all(each.ok for each in found))
@@ -55,7 +56,7 @@ def command(out: Path | None, run: str | None, folder: Path | None, bench_file: 
 def _parts(found: list[Finding], run: str | None, bench_file: Path | None) -> Mapping[str, Any]:
     """The archive's files, as JSON documents by name."""
     parts: dict[str, Any] = {"versions.json": versions(), "checks.json": [vars(each) for each in found]}
-    parts["runs.json"] = listed()
+    parts["runs.json"] = list_runs()
     try:
         parts["run.json"] = last_run(run)
     except RecordError as error:

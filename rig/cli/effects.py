@@ -6,7 +6,8 @@ from pathlib import Path
 
 import click
 
-from rig.cli.output import bench_option, columns, emit, json_option
+from calibrations.presentation.text import columns
+from rig.cli.output import bench_option, emit, json_option
 
 
 @click.command("effects")
@@ -15,9 +16,10 @@ from rig.cli.output import bench_option, columns, emit, json_option
 @json_option
 def command(effect: str | None, bench_file: Path | None, as_json: bool) -> None:
     """List the catalogue of physical effects, or show one EFFECT in full."""
-    from calibrations.compensation.forward import at_run_time
-    from calibrations.effect import Effect, find
-    from rig.analysis.asked import effects_of
+    from calibrations.compensation.forward import known_at_run_time
+    from calibrations.effects import Effect
+    from calibrations.effects.catalogue import find
+    from rig.services.load import effects_of
 
     known = effects_of(bench_file)
 
@@ -45,7 +47,7 @@ def command(effect: str | None, bench_file: Path | None, as_json: bool) -> None:
         e = shown[0]
         click.echo(f"{e.name}: {e.summary}\n\n    " + e.formula.replace("\n", "\n    ") + "\n")
         parts = (("Symptom", e.symptom), ("Excited by", e.excited_by), ("Confused with", e.confused_with))
-        more = (("At run time", at_run_time(e)), ("Source", e.source))
+        more = (("At run time", known_at_run_time(e)), ("Source", e.source))
         click.echo("\n".join(f"{title}: {text}" for title, text in (*parts, *more) if text))
     else:
         click.echo(columns(("effect", "acts on", "what happens"), [(e.name, e.acts_on, e.summary) for e in shown]))

@@ -18,6 +18,7 @@ import click
 # error's bases counts; an error with an `exit_status` of its own needs no line here.
 STATUS = {
     "calibrations.errors.CalibrationError": 2,
+    "calibrations.errors.UnusableData": 1,
     "procedures.errors.SafetyLimit": 4,
     "procedures.errors.Declined": 4,
     "procedures.errors.NoAnswer": 4,

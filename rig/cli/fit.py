@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -11,7 +12,9 @@ from rig.cli.output import check_option, emit, model_option, notes
 from rig.cli.request import request_options
 
 if TYPE_CHECKING:
-    from rig.analysis.request import Request
+    from calibrations.discovery.dataset import Dataset
+    from calibrations.model import Model
+    from rig.services.request import Request
 
 
 @click.command("fit")
@@ -22,37 +25,58 @@ if TYPE_CHECKING:
 @request_options
 def command(request: Request, out: Path | None, check: bool, as_json: bool) -> int:
     """Estimate the parameters of a model from DATA (a file or a run), with standard uncertainties."""
-    from calibrations.compare import compare
+    from calibrations.discovery.verdict import Verdict
     from calibrations.documents import fit_document
-    from calibrations.fit import fit
-    from calibrations.reports.budget import document as in_parts
-    from calibrations.search.determined import undetermined
-    from calibrations.search.outliers import kept
-    from calibrations.search.unseen import unseen
-    from rig.cli import calibrated
-    from rig.cli.asked import asked, tell_blind, write_model
-    from rig.cli.checked import document, lines
-    from rig.cli.still import of_still, told_fit
-    from rig.cli.words import errors, paper, parameters, warning
+    from rig.cli.asked import asked, note_untestable, write_model
+    from rig.cli.words import parameters, table, warning
 
-    if (still := of_still(request, out)) is not None:
-        return told_fit(still, out, check, as_json)
-    table, start, effects = asked(request, out)
-    found = fit(start, table)
-    if out is not None:
-        write_model(found, start, out)
-    tell_blind(found, effects)
-    caution, checked = undetermined(found), unseen(start, table)
+    question = asked(request, out)
+    data = question.data
+    found = data.fit(question.model)
+    written, reason = write_model(found, question.model, out), data.rejection(found)
+    note_untestable(data, found, question.effects)
+    cautions, further = data.cautions(found), _further(data, question.model, found)
     if as_json:
-        more = document(checked) | calibrated.document(found) | {"budget": in_parts(found)}
-        emit(fit_document(found, str(out) if out else None) | more)
-        notes([*warning(caution), *warning(kept(found))])
+        emit(fit_document(data, found, str(written) if written else None) | further.document)
+        notes(warning(cautions))
     else:
-        click.echo(f"{found.model.name} fitted to {table.n} rows of {table.source}\n\n{parameters(found.model)}\n")
-        told = [*calibrated.lines(found), *warning(caution), *warning(kept(found)), *lines(checked, request.data)]
-        click.echo("\n".join([errors(found), *(f"\n{line}" for line in told)]))
-        if "cross-axis-bias" in start.effects and table.kind == "poses":
-            click.echo(f"\n{paper(table)}")
-        if out is not None:
-            click.echo(f"\nwritten to {out}")
-    return 1 if check and (caution or not compare(table, found.model).adequate) else 0
+        remarks = [*further.lines, *warning(cautions)]
+        if reason is not None:
+            remarks = [f"This data cannot be used: {reason.verdict}: {reason.text}."]
+        click.echo(f"{found.model.name} fitted to {data.description}\n\n{parameters(found.model)}\n")
+        click.echo("\n".join([table(data.error_table(found)), *(f"\n{line}" for line in remarks)]))
+        if further.paper:
+            click.echo(f"\n{further.paper}")
+        if written is not None:
+            click.echo(f"\nwritten to {written}")
+    if reason is not None and reason.verdict == Verdict.NO_RESPONSE:
+        return 1
+    unsure = data.undetermined(found) is not None
+    return int(check and (unsure or not data.compare(found.model).adequate))
+
+
+@dataclass(frozen=True)
+class _Further:
+    """What a fit of rows says beyond its parameters: check poses, calibration matrices, uncertainty budget."""
+
+    document: dict[str, Any]
+    lines: tuple[str, ...] = ()
+    paper: str = ""
+
+
+def _further(data: Dataset[Any], model: Model, found: Any) -> _Further:
+    if data.form != "rows":
+        return _Further({})
+    from calibrations.discovery.check_poses import unseen
+    from calibrations.presentation.report.parameters import budget_document as in_parts
+    from rig.cli import calibrated
+    from rig.cli.checked import document, lines
+    from rig.cli.words import paper
+
+    checked = unseen(model, found.table)
+    stepwise = "cross-axis-bias" in model.effects and found.table.kind == "poses"
+    return _Further(
+        document(checked) | calibrated.document(found) | {"budget": in_parts(found)},
+        (*calibrated.lines(found), *lines(checked, data.source)),
+        paper(found.table) if stepwise else "",
+    )

@@ -12,8 +12,8 @@ import click
 from rig.cli.output import bench_option, emit, json_option, note
 
 if TYPE_CHECKING:
-    from rig.fleet.asked import Fleet
     from rig.fleet.members import Member
+    from rig.fleet.questions import Fleet
 
 
 @click.group("fleet")
@@ -55,13 +55,13 @@ def discover(
     out: Path | None,
 ) -> None:
     """Find what the sensors of SOURCES miss: effects of batches, errors of rigs, and sensors unlike their siblings."""
-    from calibrations.model_file import dump_model, read_model
+    from calibrations.model.file import dump_model, read_model
     from rig.cli.fleet_words import population
     from rig.files import require_out, write_whole
+    from rig.fleet.calibrate import write_guide
     from rig.fleet.discover import discover_fleet
     from rig.fleet.documents import population_document
-    from rig.fleet.guide import write_guide
-    from rig.fleet.own import effects_of, own_files
+    from rig.fleet.own_effects import effects_of, own_files
     from rig.fleet.worker import Question
 
     own = own_files(bench_file)
@@ -72,7 +72,7 @@ def discover(
         found = discover_fleet(fleet, members, start)
     written = write_guide(found, start, out) if out is not None else []
     if report is not None:
-        from rig.fleet.reported import population_page
+        from rig.fleet.documents import population_page
 
         write_whole(report, population_page(found, model))
         written.append(report)
@@ -97,13 +97,12 @@ def calibrate(
     out: Path | None,
 ) -> None:
     """Calibrate the sensors of SOURCES, each in the light of its batch, with intervals that hold 95 %."""
-    from calibrations.model_file import dump_model
+    from calibrations.model.file import dump_model
     from rig.cli.fleet_words import calibration
     from rig.files import require_out, write_whole
-    from rig.fleet.calibrate import calibrate_fleet, models
+    from rig.fleet.calibrate import calibrate_fleet, made_folder, models, read_guide, safe
     from rig.fleet.documents import calibration_document
-    from rig.fleet.guide import made_folder, read_guide, safe
-    from rig.fleet.own import own_files
+    from rig.fleet.own_effects import own_files
 
     if report is not None:
         require_out(report, *sources)
@@ -116,7 +115,7 @@ def calibrate(
             written.append(made_folder(Path(out or "")) / f"{safe(sensor)}.yaml")
             write_whole(written[-1], dump_model(of))
     if report is not None:
-        from rig.fleet.reported import calibration_page
+        from rig.fleet.documents import calibration_page
 
         write_whole(report, calibration_page(found, model))
         written.append(report)
@@ -130,9 +129,9 @@ def calibrate(
 @contextmanager
 def _fleet(sources: Sequence[str], scheduler: str | None, workers: int | None) -> Iterator[tuple[Fleet, list[Member]]]:
     """The workers and the sensors; how far it is goes to standard error, in steps of a tenth."""
-    from rig.fleet.asked import Fleet
     from rig.fleet.crew import crew
     from rig.fleet.members import fleet_of
+    from rig.fleet.questions import Fleet
     from rig.record import Record
 
     members = fleet_of(sources)

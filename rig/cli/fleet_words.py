@@ -4,17 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from calibrations.fleet.batch import BatchEffect
-from calibrations.fleet.population import Population, SensorVerdict
-from calibrations.model import Estimate
-from calibrations.numerals import percent
-from calibrations.reports.words import joined
-from rig.cli.output import columns
-from rig.cli.words import with_uncertainty
+from calibrations.fleet.batch import BatchEffect, Population, SensorVerdict
+from calibrations.presentation.text import columns, concise, joined, percent
 from rig.fleet.calibrate import Calibrated, Calibration
 
 MOST_SENSORS = 20
-VERDICTS = ("adequate", "effect-missing", "ambiguous", "unexplained", "failed")
+VERDICTS = ("adequate", "effect-missing", "ambiguous", "unexplained", "no-response", "failed")
 
 
 def population(found: Population, model: str) -> Iterator[str]:
@@ -53,7 +48,7 @@ def _rigs(found: Population) -> Iterator[str]:
             (
                 e.rig,
                 e.effect,
-                with_uncertainty(Estimate(e.parameter, "", e.value, e.std, e.unit)),
+                concise(e.value, e.std, e.unit),
                 e.parameter,
                 e.sensors,
             )
@@ -101,7 +96,7 @@ def _batch(batch: Calibrated) -> Iterator[str]:
     for (effect, name, axis, unit), each, size, gain in zip(
         batch.names, batch.pooled.parameters, batch.pooled.scale, _gains(batch), strict=True
     ):
-        mean = with_uncertainty(Estimate(name, axis, each.mean * size, each.mean_std * size, unit))
+        mean = concise(each.mean * size, each.mean_std * size, unit)
         apart = [m.sensor for m, alone in zip(batch.members, each.apart, strict=True) if alone]
         rows.append((effect, name, axis or "-", mean, f"{each.spread * size:.2g} {unit}", f"{gain:.2f}", _named(apart)))
     yield columns(("effect", "parameter", "axis", "mean", "spread", "std / alone", "unlike the others"), rows)

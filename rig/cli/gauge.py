@@ -6,7 +6,7 @@ import math
 
 from rich.text import Text
 
-from rig.running.seen import nearness
+from rig.runs.observer import nearness
 
 WIDTH = 15  # characters, the ends included
 STYLES = {"": "green", "near its limit": "yellow", "beyond its limit": "bold red"}

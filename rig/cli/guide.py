@@ -22,13 +22,11 @@ from rig.bench import Bench
 from rig.cli.before import before, drawn, mounting
 from rig.cli.screen import screen
 from rig.drawings import Attitude, drawing_of, page
-from rig.files import write_whole
-from rig.home import home
+from rig.files import free_bytes, home, write_whole
 from rig.planning.plan import Plan
 from rig.record import Kept
-from rig.room import free_bytes
-from rig.running.runner import Outcome, Wish
-from rig.running.seen import Sight
+from rig.runs.observer import Sight
+from rig.runs.runner import Outcome, Wish
 
 BEGIN = Choice("begin", "Begin?", choices=("go", "cancel"))
 GO_ON = Choice("interrupted", "What now?", choices=("resume", "repeat", "end"))

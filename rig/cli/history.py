@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from calibrations.evaluations.control_chart import BASELINE, FEWEST
+from calibrations.analyses.control_chart import BASELINE_RUNS, FEWEST_RUNS
 from rig.analysis.history import History, closest, history, latest, stale
 from rig.analysis.history_compared import Compared, compare_days, compare_rigs, compare_sensors
 from rig.analysis.history_limits import changes, limits_of
@@ -25,7 +25,9 @@ DAY = click.DateTime(["%Y-%m-%d"])
 @click.option("--model", default="linear", show_default=True, help="By which every run is calibrated.")
 @click.option("--quantity", "chosen", multiple=True, metavar="NAME", help="Only this one; again for more.")
 @click.option("--limit", "given", multiple=True, metavar="NAME=CHANGE", help="Greatest change from the last one.")
-@click.option("--baseline", type=click.IntRange(min=FEWEST), default=BASELINE, help="Calibrations that set the charts.")
+@click.option(
+    "--baseline", type=click.IntRange(min=FEWEST_RUNS), default=BASELINE_RUNS, help="Calibrations that set the charts."
+)
 @click.option("--at", "on", type=DAY, help="The calibration closest to this day, and whether it is stale.")
 @click.option("--between", nargs=2, type=DAY, help="Compare the calibrations closest to two days.")
 @click.option("--beside", help="Compare with another sensor's last calibration.")
@@ -54,8 +56,8 @@ def command(
     The next calibration is due when what the drift may come to leaves its limit: of the bench file (limits.results), or
     --limit. Exit status 1: stale at --at, or a comparison that does not agree.
     """
-    from calibrations.model_file import read_model
-    from rig.analysis.asked import effects_of
+    from calibrations.model.file import read_model
+    from rig.services.load import effects_of
 
     read = read_model(model, effects_of(bench_file))
     said = changes(given)
@@ -80,7 +82,7 @@ def command(
 
 def _only(found: History, chosen: Sequence[str], limited: Iterable[str]) -> History:
     """With the chosen quantities alone. Raises UsageError for one that is not there, chosen or limited."""
-    from rig.nearest import did_you_mean
+    from drivers.errors import did_you_mean
 
     known = [q.name for q in found.quantities]
     for name in (*chosen, *limited):
@@ -98,18 +100,11 @@ def _of_chosen(compared: Compared, found: History) -> Compared:
 
 def _draw(found: History, folder: Path, form: str) -> list[Path]:
     """Its life, and a control chart of each quantity."""
-    from calibrations.pictures.control_chart import control_charts
-    from calibrations.pictures.history import Shown, life
-    from calibrations.pictures.save import save_all
+    from calibrations.presentation.charts.history import control_charts, lives
+    from calibrations.presentation.static import save_all
+    from rig.analysis.charts import life_of
 
-    shown = {}
-    for q in found.quantities:
-        values = [each.values[q.name] for each in q.of]
-        days = [each.at.timestamp() / 86400 for each in q.of]
-        due = None if q.due is None or q.line is None or q.allowed is None else q.line.due_days(*q.allowed)
-        numbers, expanded = [v.value for v in values], [2 * v.std for v in values]
-        shown[q.name] = Shown(days, numbers, expanded, q.unit, q.line, q.allowed, due)
-    figures = {"life": life(shown)}
+    figures = {"life": lives([life_of(q) for q in found.quantities])}
     charts = {q.name: q.chart for q in found.quantities if q.chart is not None}
     if charts:
         figures["charts"] = control_charts(charts, {q.name: q.unit for q in found.quantities})

@@ -6,14 +6,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from datetime import date
 from typing import Any
 
-from calibrations.evaluations.agreement import Agreement
-from calibrations.evaluations.stability import YEAR_DAYS
-from calibrations.model import Estimate
+from calibrations.analyses.stability import YEAR_DAYS, Agreement
+from calibrations.presentation.text import columns, concise
 from rig.analysis.history import Calibration, History, Quantity
 from rig.analysis.history_compared import Compared
 from rig.analysis.history_words import agreements, but_stale, chart_verdict, near, next_due, significance, summary
-from rig.cli.output import columns, note
-from rig.cli.words import with_uncertainty
+from rig.cli.output import note
 
 Near = tuple[Calibration, float] | None  # the calibration closest to a day, and how many days older it is
 
@@ -35,7 +33,7 @@ def lines(found: History) -> Iterator[str]:
 
 def _row(each: Calibration, quantities: Sequence[Quantity]) -> tuple[str, ...]:
     values = (each.values.get(q.name) for q in quantities)
-    shown = ("-" if v is None else with_uncertainty(Estimate("", "", v.value, v.std, v.unit)) for v in values)
+    shown = ("-" if v is None else concise(v.value, v.std, v.unit) for v in values)
     return each.day, each.data, each.rig, *shown
 
 
@@ -43,8 +41,7 @@ def _stability(q: Quantity) -> tuple[str, ...]:
     line, verdict = q.line, chart_verdict(q) or "-"
     if line is None:
         return q.name, "-", "-", verdict, _allowed(q), "-"
-    slope = Estimate("", "", YEAR_DAYS * line.slope, YEAR_DAYS * line.slope_std, q.unit)
-    drift = f"{with_uncertainty(slope)}{significance(line)}"
+    drift = f"{concise(YEAR_DAYS * line.slope, YEAR_DAYS * line.slope_std, q.unit)}{significance(line)}"
     return q.name, drift, f"{line.scatter:.2g} {q.unit}", verdict, _allowed(q), str(q.due or "-")
 
 

@@ -24,19 +24,23 @@ def command(file: Path, kind: str | None, mapped: tuple[str, ...], given: tuple[
     A column is named by the file's header, or by its number from 1 where there is none. At a terminal the program
     proposes what is not given, and asks.
     """
-    from calibrations.reading.foreign import needs_mapping, take
-    from calibrations.reading.separated import sheet
-    from calibrations.reading.text_file import text_file
-    from calibrations.reading.units import Mapped
+    from calibrations.importing.files import open_text_file
+    from calibrations.importing.foreign import import_sheet, needs_mapping
+    from calibrations.importing.sheet import read_sheet
+    from calibrations.importing.units import ColumnMapping
     from rig.analysis.data import averaged
     from rig.record import Record
 
-    laid, columns, constants = sheet(text_file(file)), [Mapped.parse(m) for m in mapped], _constants(given)
+    laid, columns, constants = (
+        read_sheet(open_text_file(file)),
+        [ColumnMapping.parse(m) for m in mapped],
+        _constants(given),
+    )
     if sys.stdin.isatty() and sys.stderr.isatty() and needs_mapping(laid, kind, columns):
         from rig.cli.mapping import ask_mapping
 
         kind, columns = ask_mapping(laid, kind, columns, given)
-    taken = take(laid, kind, columns, constants)
+    taken = import_sheet(laid, kind, columns, constants)
     table = averaged(taken.table, note)
     with Record.to_read() as record:
         run = record.add_table(table, taken.settings)

@@ -8,16 +8,16 @@ from typing import Any
 
 import click
 
-from calibrations.discover import Discovery
+from calibrations.design.experiment import Experiment
+from calibrations.discovery.results import Discovery
+from calibrations.discovery.verdict import Verdict
 from calibrations.documents import discovery_document
-from calibrations.experiment import Experiment
-from calibrations.model_file import read_model
-from calibrations.reports.words import joined
+from calibrations.fit import Fit
+from calibrations.model.file import read_model
+from calibrations.presentation.text import duration, joined
 from calibrations.table import Table
 from procedures.catalogue import find
 from procedures.settings import parse
-from rig.analysis.asked import effects_of
-from rig.analysis.request import Request
 from rig.analysis.several import begun, joined_runs
 from rig.bench import Bench, read_bench
 from rig.cli.asked import write_model
@@ -25,11 +25,12 @@ from rig.cli.output import emit, note, notes
 from rig.cli.watch import watching
 from rig.cli.words import discovery, parameters, warning
 from rig.files import require_out
-from rig.numerals import duration
 from rig.record import Record
 from rig.record.measured import Measured
-from rig.running.live import FIRST, STANDARD, Live, Measurement, stands
-from rig.running.runner import start
+from rig.runs.live import FIRST, STANDARD, Live, Measurement, stands
+from rig.runs.runner import start
+from rig.services.load import effects_of
+from rig.services.request import Request
 
 
 @dataclass
@@ -102,14 +103,13 @@ def discover_live(
             taken.stopped()
             raise
     found = done[-1].found
-    if out is not None:
-        write_model(found.end, given, out)
+    written = write_model(found.end, given, out)
     if as_json:
-        emit(document(done, standard_s, out))
-        notes(warning(found.caution))
+        emit(document(done, standard_s, written))
+        notes(warning([found.caution]))
     else:
-        click.echo(_end(done, live, standard_s, out))
-    return 1 if check and found.verdict != "adequate" else 0
+        click.echo(_end(done, live, standard_s, written))
+    return int(found.verdict is Verdict.NO_RESPONSE or (check and found.verdict is not Verdict.ADEQUATE))
 
 
 def told(done: list[Measurement], time_s: float) -> str:
@@ -122,14 +122,9 @@ def told(done: list[Measurement], time_s: float) -> str:
     return "\n".join(lines)
 
 
-def learned(found: Discovery) -> str:
+def learned(found: Discovery[Fit]) -> str:
     """The verdict so far, in a line."""
-    if found.verdict == "unexplained" and not found.causes:
-        return f"Unexplained: {found.residual_structure}."
-    if not found.causes:
-        return "Nothing is missing so far."
-    rivals = {name: " or ".join((name, *found.alternatives.get(name, ()))) for name in found.causes}
-    return f"Missing: {joined(rivals.values())}."
+    return found.judgement.text
 
 
 def ending(done: list[Measurement], time_s: float) -> str:

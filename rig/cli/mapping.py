@@ -8,10 +8,10 @@ from dataclasses import replace
 import click
 
 from calibrations.errors import DataError, nearest
-from calibrations.reading.foreign import PATH, fitting
-from calibrations.reading.proposal import command, likely_kind, missing, propose, values_of
-from calibrations.reading.separated import Sheet
-from calibrations.reading.units import Mapped, unit_of
+from calibrations.importing.foreign import PATH, check_unit
+from calibrations.importing.proposal import import_command, likely_kind, missing_columns, propose_mapping, sample_values
+from calibrations.importing.sheet import Sheet
+from calibrations.importing.units import ColumnMapping, parse_unit
 from calibrations.table import NUMBERS
 from rig.cli.output import note
 
@@ -25,8 +25,8 @@ CHOICES = {
 
 
 def ask_mapping(
-    laid: Sheet, kind: str | None, mapped: Sequence[Mapped], constants: Sequence[str]
-) -> tuple[str, list[Mapped]]:
+    laid: Sheet, kind: str | None, mapped: Sequence[ColumnMapping], constants: Sequence[str]
+) -> tuple[str, list[ColumnMapping]]:
     """The kind of table and the whole mapping, as the person confirms it; the command that repeats it is printed.
 
     Raises click.Abort where the person gives up.
@@ -41,17 +41,17 @@ def ask_mapping(
     )
     note("with a unit where it is another (vx_v:mV), or a unit alone (mV).\n")
     whole = _columns(laid, kind, mapped)
-    while lacking := missing(kind, laid, whole):
+    while lacking := missing_columns(kind, laid, whole):
         note(f"\nA table of {kind} needs {', '.join(lacking)} too. Once more:\n")
         whole = _columns(laid, kind, mapped)
-    note(f"\nThe same again, without questions:\n    {command(laid, kind, whole, constants)}\n")
+    note(f"\nThe same again, without questions:\n    {import_command(laid, kind, whole, constants)}\n")
     return kind, whole
 
 
-def _columns(laid: Sheet, kind: str, mapped: Sequence[Mapped]) -> list[Mapped]:
+def _columns(laid: Sheet, kind: str, mapped: Sequence[ColumnMapping]) -> list[ColumnMapping]:
     """One question for each column that has no name of ours."""
     whole = list(mapped)
-    proposals = {m.theirs: m for m in propose(laid, kind, mapped)}
+    proposals = {m.theirs: m for m in propose_mapping(laid, kind, mapped)}
     open_ones = [t for t, bare in zip(laid.header, laid.bare, strict=True) if bare not in NUMBERS]
     for theirs in open_ones:
         if theirs not in {m.theirs for m in mapped} and (m := _column(laid, theirs, proposals.get(theirs), whole)):
@@ -59,9 +59,11 @@ def _columns(laid: Sheet, kind: str, mapped: Sequence[Mapped]) -> list[Mapped]:
     return whole
 
 
-def _column(laid: Sheet, theirs: str, proposal: Mapped | None, before: Sequence[Mapped]) -> Mapped | None:
+def _column(
+    laid: Sheet, theirs: str, proposal: ColumnMapping | None, before: Sequence[ColumnMapping]
+) -> ColumnMapping | None:
     """What a person calls one column; asked until it can be."""
-    values = values_of(laid, theirs)
+    values = sample_values(laid, theirs)
     shown = f"{values.min():g} .. {values.max():g}" if len(values) else f'"{laid.sample[0][laid.header.index(theirs)]}"'
     default = proposal.text.partition("=")[0] + (f":{proposal.unit}" if proposal.unit else "") if proposal else LEAVE
     while True:
@@ -73,18 +75,18 @@ def _column(laid: Sheet, theirs: str, proposal: Mapped | None, before: Sequence[
 
 
 def _understood(
-    answer: str, theirs: str, proposal: Mapped | None, before: Sequence[Mapped], source: str
-) -> Mapped | None:
+    answer: str, theirs: str, proposal: ColumnMapping | None, before: Sequence[ColumnMapping], source: str
+) -> ColumnMapping | None:
     """The column that `answer` means, None for none. Raises DataError."""
     if answer == LEAVE:
         return None
-    if proposal is not None and unit_of(answer) and answer not in NUMBERS:
-        return fitting(replace(proposal, unit=unit_of(answer)), source)
+    if proposal is not None and parse_unit(answer) and answer not in NUMBERS:
+        return check_unit(replace(proposal, unit=parse_unit(answer)), source)
     name, colon, unit = answer.partition(":")
     if name not in NUMBERS | {PATH}:
         raise DataError(f'"{name}" is none of our columns{nearest(name, " ".join(CHOICES.values()).split())}')
     if name in {m.name for m in before}:
         raise DataError(f"{name} is taken already")
-    if colon and not unit_of(unit):
+    if colon and not parse_unit(unit):
         raise DataError(f'"{unit}" is no unit that is known here')
-    return fitting(Mapped(name, theirs, unit_of(unit)), source)
+    return check_unit(ColumnMapping(name, theirs, parse_unit(unit)), source)

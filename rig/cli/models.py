@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import click
 
-from rig.cli.output import columns, emit, json_option
+from calibrations.presentation.text import columns
+from rig.cli.output import emit, json_option
 
 
 @click.command("models")
 @json_option
 def command(as_json: bool) -> None:
     """List the shipped models and their effects."""
-    from calibrations.model_file import read_model, shipped_names
+    from calibrations.model.file import read_model, shipped_names
 
     models = [read_model(name) for name in shipped_names()]
     if as_json:

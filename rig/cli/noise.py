@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from contextlib import nullcontext
-from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from rig.cli.output import Positive, emit, json_option, notes
+from rig.cli.output import Positive, emit, json_option, note, notes
+
+if TYPE_CHECKING:
+    from calibrations.noise.record import Still
 
 
 @click.command("noise")
 @click.argument("data")
-@click.option("--channel", help="Of several channels: vx, vy ... Default: the first.")
+@click.option("--channel", help="Of several channels: vx, vy ... Default: all axes of the first sensor.")
 @click.option("--rate", "rate_hz", type=Positive(), help="Samples a second, for an array.")
 @click.option(
     "--tau",
@@ -37,40 +39,43 @@ def command(
     """Show how the noise of DATA averages, and which processes it is made of.
 
     DATA is a table of kind still, an array of samples (.npy, with --rate), or a run with a still record: noise-floor or
-    soak. It is read once, and never held in memory as a whole, unless times are asked for with --tau.
+    soak. It is read once and is not held in memory, except for averaging times given with --tau. Disturbances that are
+    not noise (a step, an output that follows a logged column) are removed first, as `rig diagnose` does.
     """
+    from calibrations.noise.analysis import analyse, noise_document
+    from rig.cli.noise_words import remarks, rounded_times, summary
+
+    analysis = analyse(_record(data, channel, rate_hz, tau_s))
+    notes(remarks(analysis))
+    notes(rounded_times(tau_s, analysis))
+    if as_json:
+        emit(noise_document(analysis))
+    else:
+        click.echo(summary(analysis))
+    if folder is not None:
+        from calibrations.presentation.charts.noise import noise_album
+        from calibrations.presentation.static import save_all
+
+        written = save_all({picture.name: picture.chart for picture in noise_album(analysis)}, folder, form)
+        notes(f"written: {path}" for path in written)
+
+
+def _record(data: str, channel: str | None, rate_hz: float | None, tau_s: tuple[float, ...]) -> Still:
+    """The still record; with Allan deviations at the given averaging times, if there are some."""
+    from dataclasses import replace
+
     import numpy as np
 
-    from calibrations.noise_analysis.analysis import analyse
-    from calibrations.noise_analysis.asked_times import KIND, curve_at
-    from calibrations.noise_analysis.document import noise_document
-    from calibrations.still.disturbed import disturbed
-    from calibrations.still.documents import disturbed_document
-    from rig.analysis.still import stream
-    from rig.cli.noise_words import remarks, summary, whole_samples
-    from rig.record.store import Record
+    from calibrations.noise.deviations import OVERLAPPING, curve_at
+    from rig.services.load import still_of
+    from rig.services.request import Request
 
-    with nullcontext() if Path(data).exists() or data.endswith(".npy") else Record.to_find(data) as record:
-        samples = stream(record, data, channel, rate_hz)
-        source = data if record is None else f"run {data}"
-        if samples.others:
-            source += f", channel {samples.channel} (--channel takes another: {', '.join(samples.others)})"
-        if tau_s:
-            whole = np.concatenate([np.asarray(block, dtype=float) for block in samples.blocks])
-            samples = replace(samples, blocks=iter([whole]))
-        found = analyse(samples.blocks, samples.rate_hz, samples.unit, source, samples.corner_hz)
-        if tau_s:
-            found = replace(found, curves={**found.curves, KIND: curve_at(whole, found.rate_hz, tau_s, source)})
-    told = disturbed(found, samples.channel, samples.logged)
-    notes(remarks(samples, found, told))
-    notes(whole_samples(tau_s, found))
-    if as_json:
-        emit(noise_document(found) | disturbed_document(told))
-    else:
-        click.echo(summary(samples, found, told))
-    if folder is not None:
-        from calibrations.pictures.noise import noise_album
-        from calibrations.pictures.save import save_all
-
-        written = save_all({picture.name: picture.figure for picture in noise_album(found)}, folder, form)
-        notes(f"written: {path}" for path in written)
+    blocks: dict[str, list[Any]] | None = {} if tau_s else None
+    still = still_of(Request(data, channel=channel, rate_hz=rate_hz), note, every_deviation=True, keep=blocks)
+    if blocks is None:
+        return still
+    curves = {}
+    for axis, kept in blocks.items():
+        values = np.concatenate([np.asarray(block, dtype=float) for block in kept])
+        curves[axis] = {**still.deviations[axis], OVERLAPPING: curve_at(values, still.rate_hz, tau_s, still.source)}
+    return replace(still, deviations=curves)

@@ -6,16 +6,13 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from calibrations.noise_analysis.analysis import Coefficient, NoiseAnalysis
-from calibrations.noise_analysis.minimum import minimum_s
-from calibrations.noise_analysis.oddities import COARSE, hidden_in
-from calibrations.numerals import exponent
-from calibrations.still.disturbed import Disturbed
-from calibrations.still.telegraph import TWO_LEVELS
-from calibrations.still.words import sentence
-from rig.analysis.stream import Stream, repairs
-from rig.cli.output import columns
-from rig.numerals import duration
+from calibrations.noise.analysis import ChannelNoise, Coefficient, NoiseAnalysis
+from calibrations.noise.deviations import minimum_s
+from calibrations.noise.record import Sensed
+from calibrations.noise.samples import COARSE
+from calibrations.noise.telegraph import TWO_LEVELS
+from calibrations.noise.words import sentence
+from calibrations.presentation.text import columns, duration, exponent
 
 PREFIXES = ((1.0, ""), (1e3, "m"), (1e6, "u"), (1e9, "n"), (1e12, "p"))
 MEANS = {
@@ -26,107 +23,95 @@ MEANS = {
     "sinusoidal-noise": "amplitude",
     "gauss-markov-noise": "standard deviation",
 }
-NOISE = (COARSE, TWO_LEVELS)  # what is told beside the coefficients, and is noise
-MISFIT = 1.3  # of the spectrum, beyond which the processes do not describe it
+NOISE = (COARSE, TWO_LEVELS)  # noise that the coefficients alone do not describe
 Factor = tuple[float, str]
 
 
-def summary(samples: Stream, found: NoiseAnalysis, told: Disturbed) -> str:
-    """All that there is to say, for a terminal."""
-    length_s = found.n / found.rate_hz
-    head = (
-        f"{samples.source}, {samples.channel}: {found.n} samples at {found.rate_hz:g} Hz, {duration(length_s)}\n"
-        if length_s >= 1
-        else f"{samples.source}, {samples.channel}: {found.n} samples at {found.rate_hz:g} Hz\n"
-    )
-    said = [head, _coefficients(samples, found), "", *_disturbances(found, told)]
-    return "\n".join([*said, _density(samples, found), "", _allan(found)])
+def summary(analysis: NoiseAnalysis) -> str:
+    """The whole analysis, for a terminal."""
+    record = analysis.record
+    length = f", {duration(record.length_s)}" if record.length_s >= 1 else ""
+    parts = [f"{record.source}: {record.n} samples at {record.rate_hz:g} Hz{length}\n", *_disturbances(analysis)]
+    for axis, noise in analysis.channels.items():
+        sensed = record.sensed.get(axis)
+        parts += [f"Noise of {axis}\n", _coefficients(noise, sensed), ""]
+        parts += [_density(noise, sensed), "", _allan(noise), ""]
+    return "\n".join(parts).rstrip()
 
 
-def remarks(samples: Stream, found: NoiseAnalysis, told: Disturbed) -> Iterable[str]:
-    """What was done to the data, and what to be careful about."""
-    if samples.others:
-        yield f"Channel {samples.channel}; --channel takes another: {', '.join(samples.others)}."
-    yield from repairs(samples, found.n)
-    if np.isfinite(samples.corner_hz):
-        yield (
-            f"Coefficients are those before the output's {samples.corner_hz:g} Hz low-pass, "
-            f"from what is slower than {samples.corner_hz / 2:.3g} Hz."
-        )
-    hidden = hidden_in(found.record.oddities)
-    unknown = [name for name in found.found.power if not found.coefficients[name].identified]
-    if doubtful := [name for name in unknown if hidden is None or not hidden.hides(name)]:
-        yield f"There is slow noise; the record cannot tell of which kind ({', '.join(doubtful)}?): record for longer."
-    if found.misfit > MISFIT and not told.disturbances:
-        yield (
-            f"The spectrum is {found.misfit:.2g} times as far from these processes as chance leaves it: there is "
-            "something else (a filter, a resonance, a disturbance); look at the pictures (--pictures FOLDER)."
-        )
+def remarks(analysis: NoiseAnalysis) -> Iterable[str]:
+    """Warnings about the coefficients."""
+    for name, rivals in analysis.search.rivals.items():
+        if rivals:
+            yield f"The record cannot separate {name} from {' or '.join(rivals)}: record for longer."
 
 
-def whole_samples(asked_s: Iterable[float], found: NoiseAnalysis) -> Iterable[str]:
-    """Which averaging times were asked for and are no whole numbers of samples."""
-    for asked, taken in zip(asked_s, found.allan.tau_s.tolist(), strict=False):
-        if not np.isclose(asked, taken):
-            yield f"An averaging time of {asked:g} s is no whole number of samples: {taken:g} s is taken."
+def rounded_times(tau_s: Iterable[float], analysis: NoiseAnalysis) -> Iterable[str]:
+    """Which of the given averaging times are not whole numbers of samples."""
+    taken_s = next(iter(analysis.channels.values())).allan.tau_s.tolist()
+    for given, taken in zip(tau_s, taken_s, strict=False):
+        if not np.isclose(given, taken):
+            yield f"An averaging time of {given:g} s is not a whole number of samples: {taken:g} s is used."
 
 
-def _coefficients(samples: Stream, found: NoiseAnalysis) -> str:
-    second = samples.sensed
+def _coefficients(noise: ChannelNoise, sensed: Sensed | None) -> str:
     rows = []
-    for name, each in found.coefficients.items():
-        beside = () if second is None else (_shown(each, second.factor, second.unit),)
-        rows.append((name, _shown(each, 1.0, found.unit), *beside, MEANS[name] + _detail(each)))
-    head = ("process", "coefficient", *(() if second is None else ("or",)), "")
-    return columns(head, rows)
+    for name, coefficient in noise.coefficients.items():
+        second = () if sensed is None else (_shown(coefficient, sensed.factor, sensed.unit, noise.unit),)
+        meaning = MEANS.get(name, "") + _detail(coefficient)
+        rows.append((name, _shown(coefficient, 1.0, noise.unit, noise.unit), *second, meaning))
+    return columns(("process", "coefficient", *(() if sensed is None else ("or",)), ""), rows)
 
 
-def _disturbances(found: NoiseAnalysis, told: Disturbed) -> Iterable[str]:
-    """What is no noise, what it spoils, and what the coefficients are without it."""
-    for each in (each for each in told.disturbances if each.kind in NOISE):
-        yield f"{sentence(each.text)}\n"
-    others = [each for each in told.disturbances if each.kind not in NOISE]
+def _disturbances(analysis: NoiseAnalysis) -> Iterable[str]:
+    """What is not a noise process, and the coefficients that it spoils."""
+    for each in analysis.disturbances:
+        if each.kind in NOISE:
+            yield f"{sentence(each.text)}\n"
+    others = [each for each in analysis.disturbances if each.kind not in NOISE]
     if not others:
         return
-    yield "There is something that is no noise:"
+    yield "Disturbances that are not noise:"
     for each in others:
-        spoilt = f"; it spoils {' and '.join(each.spoils)}" if each.spoils else ""
-        yield f"  {each.text}{spoilt if each.matters else '; too little to matter'}"
-    if told.rest is not None:
-        changed = {name for each in told.disturbances for name in each.spoils}
-        yield "Without what could be taken off:"
-        for name in (name for name in found.coefficients if name in changed):
-            each_left = told.rest.coefficients[name]
-            yield f"  {name}: {_shown(each_left, 1.0, found.unit)}{_detail(each_left)}"
+        effect = " and ".join(analysis.spoils(each))
+        removed = ", removed before the fit" if each.pattern is not None else ""
+        spoils = f"; it spoils {effect}" if effect else ""
+        yield f"  {each.text}{removed}{spoils}{'' if each.matters else '; too small to matter'}"
+    yield ""
+    if analysis.uncleaned is None:
+        return
+    yield "With these disturbances in the record, the fit would give:"
+    for axis, noise in analysis.uncleaned.items():
+        spoilt = {name for each in others if each.axis == axis for name in analysis.spoils(each)}
+        for name, coefficient in noise.coefficients.items():
+            if name in spoilt:
+                shown = _shown(coefficient, 1.0, noise.unit, noise.unit)
+                yield f"  {axis}: {name} {shown}{_detail(coefficient)}"
     yield ""
 
 
-def _detail(each: Coefficient) -> str:
-    if each.frequency_hz is not None:
-        return f", {each.frequency_hz:.6g} Hz"
-    return f", time constant {each.time_constant_s:.3g} s" if each.time_constant_s and each.identified else ""
+def _detail(coefficient: Coefficient) -> str:
+    if coefficient.frequency_hz is not None:
+        return f", {coefficient.frequency_hz:.6g} Hz"
+    if coefficient.alternatives:
+        return f"; this or {' or '.join(coefficient.alternatives)}"
+    time_s = coefficient.time_constant_s
+    return f", time constant {time_s:.3g} s" if time_s and coefficient.identified else ""
 
 
-def _shown(each: Coefficient, factor: float, unit: str) -> str:
-    """`12.34(56) uV/sqrt(Hz)`, or the bound that it stays below."""
-    per = each.unit.removeprefix(_base(each.unit))
-    if each.upper is not None and np.isinf(each.upper):
+def _shown(coefficient: Coefficient, factor: float, unit: str, base: str) -> str:
+    """`12.34(56) uV/sqrt(Hz)`, or the upper bound. `base` is the unit of the channel, `unit` that of the result."""
+    per = coefficient.unit.removeprefix(base)
+    if coefficient.upper is not None and np.isinf(coefficient.upper):
         return "not known"
-    if each.upper is not None:
-        scale, prefix = _prefixed(each.upper * factor, unit)
-        return f"not identified, below {each.upper * factor * scale:.2g} {prefix}{unit}{per}"
-    value, std = each.value * factor, each.std * factor
+    if coefficient.upper is not None:
+        scale, prefix = _prefixed(coefficient.upper * factor, unit)
+        return f"not identified, below {coefficient.upper * factor * scale:.2g} {prefix}{unit}{per}"
+    value, std = coefficient.value * factor, coefficient.std * factor
     scale, prefix = _prefixed(value, unit)
     digits = min(9, max(0, 1 - exponent(float(f"{std * scale:.1e}"))))
     last = round(std * scale * 10**digits)
     return f"{value * scale:.{digits}f}({last}) {prefix}{unit}{per}"
-
-
-def _base(unit: str) -> str:
-    for per in ("/sqrt(Hz)", "/sqrt(s)", "*s"):
-        if unit.endswith(per):
-            return unit.removesuffix(per)
-    return unit
 
 
 def _prefixed(value: float, unit: str) -> Factor:
@@ -136,27 +121,30 @@ def _prefixed(value: float, unit: str) -> Factor:
     return next(((f, p) for f, p in PREFIXES if abs(value) * f >= 1), (1.0, ""))
 
 
-def _density(samples: Stream, found: NoiseAnalysis) -> str:
+def _density(noise: ChannelNoise, sensed: Sensed | None) -> str:
     """White noise as data sheets give it: one-sided, and so sqrt(2) times the coefficient of the Allan deviation."""
-    white = found.coefficients["white-noise"]
+    white = noise.coefficients["white-noise"]
     if not white.identified:
         return "No white noise was identified."
     scaled = Coefficient(white.value * np.sqrt(2), white.std * np.sqrt(2), white.unit)
-    shown = [_shown(scaled, 1.0, found.unit)]
-    if (second := samples.sensed) is not None:
-        shown.append(_shown(scaled, second.factor, second.unit))
+    shown = [_shown(scaled, 1.0, noise.unit, noise.unit)]
+    if sensed is not None:
+        shown.append(_shown(scaled, sensed.factor, sensed.unit, noise.unit))
     return f"Noise density as in data sheets (one-sided): {' or '.join(shown)}."
 
 
-def _allan(found: NoiseAnalysis) -> str:
-    curve = found.allan
-    modelled = found.modelled(curve.tau_s)
-    scale, prefix = _prefixed(float(curve.deviation.max()), found.unit)
-    rows = [
-        (f"{tau:.4g}", f"{d * scale:.4g}", f"{low * scale:.4g} .. {high * scale:.4g}", f"{m * scale:.4g}")
-        for tau, d, low, high, m in zip(curve.tau_s, curve.deviation, curve.low, curve.high, modelled, strict=True)
-    ]
+def _allan(noise: ChannelNoise) -> str:
+    curve, cleaned = noise.allan, noise.cleaned_allan
+    scale, prefix = _prefixed(float(curve.deviation.max()), noise.unit)
+    values = [f"{each * scale:.4g}" for each in curve.deviation.tolist()]
+    bounds = [f"{low * scale:.4g} .. {high * scale:.4g}" for low, high in zip(curve.low, curve.high, strict=True)]
+    table = [[f"{tau:.4g}" for tau in curve.tau_s.tolist()], values, bounds]
+    head = ["time (s)", f"Allan deviation ({prefix}{noise.unit})", "95 % interval"]
+    if noise.search.patterns and np.array_equal(cleaned.tau_s, curve.tau_s):
+        head.append("without disturbances")
+        table.append([f"{each * scale:.4g}" for each in cleaned.deviation.tolist()])
+    head.append("by these processes")
+    table.append([f"{each * scale:.4g}" for each in noise.modelled(curve.tau_s).tolist()])
     lowest_s = minimum_s(curve)
     end = "" if lowest_s is None else f"\nLowest at {lowest_s:.4g} s: averaging for longer does not help."
-    head = ("time (s)", f"Allan deviation ({prefix}{found.unit})", "95 % interval", "by these processes")
-    return columns(head, rows) + end
+    return columns(head, list(zip(*table, strict=True))) + end

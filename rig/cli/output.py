@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,13 @@ bench_option = click.option(
     type=click.Path(dir_okay=False, path_type=Path),
     help="The bench file; without it the simulated rig.",
 )
+
+
+def watch_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """--unattended and --answers."""
+    function = click.option("--unattended", is_flag=True, help="Ask nobody, show only the end.")(function)
+    path = click.Path(dir_okay=False, path_type=Path)
+    return click.option("--answers", type=path, help="A YAML file that answers the questions to a person.")(function)
 
 
 class Positive(click.FloatRange):
@@ -52,11 +59,3 @@ def notes(lines: Iterable[str]) -> None:
     """Several remarks, or none."""
     for line in lines:
         note(line)
-
-
-def columns(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """A table of text, columns aligned to the left and two spaces apart."""
-    cells = [tuple(head), *[tuple(str(cell) for cell in row) for row in rows]]
-    widths = [max(len(row[i]) for row in cells) for i in range(len(head))]
-    lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) for row in cells]
-    return "\n".join(line.rstrip() for line in lines)

@@ -6,8 +6,8 @@ import shlex
 from pathlib import Path
 from typing import Any
 
-from calibrations.search.patterns import Pattern
-from rig.analysis.request import Request
+from calibrations.discovery.patterns import Pattern
+from rig.services.request import Request
 
 
 def own_effect(pattern: Pattern | None, model: str, request: Request) -> dict[str, Any] | None:

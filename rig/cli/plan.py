@@ -10,18 +10,17 @@ from typing import Any
 
 import click
 
+from calibrations.presentation.text import duration, size
 from drivers.errors import LimitError
 from procedures.catalogue import Procedure, find
 from procedures.errors import SafetyLimit
-from procedures.pose_list import written
+from procedures.pose_list import format_poses
 from procedures.settings import parse
 from rig.bench import Bench, read_bench
 from rig.cli.output import bench_option, emit, json_option, model_option
 from rig.cli.settings import PASS_ON, read_settings, settings_arguments
 from rig.errors import BeyondLimits
-from rig.numerals import duration, size
-from rig.planning.plan import Plan, plan
-from rig.planning.stretches import Stretch, stretches
+from rig.planning.plan import Plan, Stretch, plan, stretches
 
 FEW_STEPS = 120  # that are read through rather than summed up
 HEAD, TAIL = 14, 4  # stretches of a long plan that are shown
@@ -101,8 +100,8 @@ class Asked:
 
 def _optimal(bench: Bench, procedure: Procedure, settings: Mapping[str, Any], asked: Asked) -> None:
     """Choose poses for a model, and print them beside the standard sweep. Raises UsageError for what is no sweep."""
-    from calibrations.effect import catalogue
-    from calibrations.model_file import read_model
+    from calibrations.effects.catalogue import catalogue
+    from calibrations.model.file import read_model
     from rig.cli.chosen import document, lines
     from rig.planning.optimal import optimal as chosen
 
@@ -122,7 +121,7 @@ def _optimal(bench: Bench, procedure: Procedure, settings: Mapping[str, Any], as
 def _write_poses(out: Path, planned: Plan) -> None:
     from rig.files import write_whole
 
-    write_whole(out, "\n".join([*written(held.pose for held in planned.held), ""]))
+    write_whole(out, "\n".join([*format_poses(held.pose for held in planned.held), ""]))
 
 
 def _steps(planned: Plan) -> list[str]:

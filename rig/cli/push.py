@@ -11,12 +11,10 @@ from sqlalchemy import URL
 from rig.bench import read_bench
 from rig.cli.output import bench_option, emit, json_option, note
 from rig.cli.record_option import require_no_password
-from rig.home import LAB
+from rig.files import LAB
 from rig.record import Record
-from rig.record.lab_url import lab_url, shown
-from rig.record.push import Pushed, push, unsent
-from rig.record.roles import READER, WRITER, prepare
-from rig.record.verify import verify
+from rig.record.lab import READER, WRITER, lab_url, prepare, shown
+from rig.record.push import Pushed, push, unsent, verify
 
 
 def _given(context: click.Context, _: click.Parameter, url: str | None) -> str | None:

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 import click
 
 from rig.errors import RecordError
-from rig.home import RECORD
+from rig.files import RECORD
 
 TAKE_IT = frozenset(
     {"add", "calibrate", "certificate", "compare", "compensate", "control", "diagnose", "discover", "exclude"}
@@ -39,7 +39,7 @@ def _chosen(context: click.Context, _: click.Parameter, url: str | None) -> None
 
 def require_no_password(url: str, instead: str) -> None:
     """Raises RecordError for a URL with a password: everybody on the machine can read how a command was called."""
-    from rig.record.lab_url import has_password, lab_url  # who names no lab needs no driver
+    from rig.record.lab import has_password, lab_url  # who names no lab needs no driver
 
     if has_password(lab_url(url)):
         raise RecordError(

@@ -11,7 +11,7 @@ from rig.cli.output import emit, model_option, note
 from rig.cli.request import request_options
 
 if TYPE_CHECKING:
-    from rig.analysis.request import Request
+    from rig.services.request import Request
 
 
 @click.command("report")
@@ -29,16 +29,16 @@ def command(request: Request, out: Path | None, folder: Path | None, form: str, 
     """
     if out is None and folder is None:
         raise click.UsageError("nothing to write: give --out FILE.html, --pictures FOLDER, or both")
-    from calibrations.pictures.save import save_all
-    from rig.analysis.reported import reported
+    from calibrations.presentation.static import save_all
     from rig.cli.asked import require_place
     from rig.files import write_whole
+    from rig.services.report import reported
 
     require_place(request, out)
     pictures, page = reported(request, note)
     if out is not None:
         write_whole(out, page())
-    written = save_all({picture.name: picture.figure for picture in pictures}, folder, form) if folder else []
+    written = save_all({picture.name: picture.chart for picture in pictures}, folder, form) if folder else []
     if as_json:
         emit({"schema": "rig.report/1", "out": str(out) if out else None, "pictures": [str(p) for p in written]})
     else:

@@ -9,8 +9,8 @@ from typing import Any
 
 import click
 
-from rig.analysis.request import Request
 from rig.cli.output import Positive, bench_option, json_option
+from rig.services.request import Request
 
 OPTIONS = (
     bench_option,

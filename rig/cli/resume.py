@@ -8,11 +8,11 @@ import click
 
 from procedures.catalogue import find
 from rig.bench import Bench, read_bench
-from rig.cli.output import bench_option, json_option, note
-from rig.cli.watch import tell, trace_option, watch_options, watching
+from rig.cli.output import bench_option, json_option, note, watch_options
+from rig.cli.watch import tell, trace_option, watching
 from rig.record import Record
-from rig.record.catch_up import push_after
-from rig.running.runner import Outcome, resume
+from rig.record.push import push_after
+from rig.runs.runner import Outcome, resume
 
 
 @click.command("resume")

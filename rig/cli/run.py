@@ -9,12 +9,12 @@ import click
 from procedures.catalogue import find
 from procedures.settings import parse
 from rig.bench import read_bench
-from rig.cli.output import bench_option, json_option, note
+from rig.cli.output import bench_option, json_option, note, watch_options
 from rig.cli.settings import PASS_ON, read_settings, settings_arguments
-from rig.cli.watch import tell, trace_option, watch_options, watching
+from rig.cli.watch import tell, trace_option, watching
 from rig.record import Record
-from rig.record.catch_up import push_after
-from rig.running.runner import start
+from rig.record.push import push_after
+from rig.runs.runner import start
 
 
 @click.command("run", context_settings=PASS_ON)

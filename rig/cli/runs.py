@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import click
 
-from rig.cli.output import columns, emit, json_option
+from calibrations.presentation.text import columns
+from rig.cli.output import emit, json_option
 from rig.record import Record, Run
 
 

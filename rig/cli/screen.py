@@ -10,9 +10,9 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
+from calibrations.presentation.text import duration
 from rig.cli.gauge import STYLES, gauge
-from rig.numerals import duration
-from rig.running.seen import Seen, Value, values
+from rig.runs.observer import Seen, Value, values
 
 Row = tuple[RenderableType, ...]
 

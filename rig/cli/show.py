@@ -8,15 +8,15 @@ from typing import Any
 import click
 
 from calibrations.errors import CalibrationError
+from calibrations.presentation.text import columns, duration
 from rig.analysis.next_steps import next_steps
 from rig.analysis.sensors import lives
 from rig.bench.certificates import EXPIRED
-from rig.cli.output import columns, emit, json_option
+from rig.cli.output import emit, json_option
 from rig.cli.verdicts import lines as results
 from rig.errors import RecordError
-from rig.numerals import duration
 from rig.record import Event, Kept, Line, Record, Run
-from rig.record.digest import digest_of
+from rig.record.codec import digest_of
 from rig.record.measured import Measured, sensors_of
 
 TURNS = ("begun", "error", "stopped", "complete")  # of a run's log: its beginnings and its ends

@@ -12,14 +12,15 @@ from types import FrameType
 
 import click
 
+from calibrations.presentation.text import columns
 from drivers.clock import WallClock, serve_forever
-from drivers.links import Address
-from drivers.links.person import PERSON
-from drivers.links.server import Server
+from drivers.manual_stage.person import PERSON
+from drivers.transport import Address
+from drivers.transport.server import Server
 from rig.bench import Bench, read_bench
-from rig.cli.output import bench_option, columns, json_option, note
-from rig.connected.wiring import serve, world_of
+from rig.cli.output import bench_option, json_option, note
 from rig.errors import BenchError
+from rig.instruments.wiring import serve, world_of
 
 
 @click.command("simulate")

@@ -6,10 +6,7 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from calibrations.model import Estimate
-from calibrations.numerals import bound
-from rig.cli.output import columns
-from rig.cli.words import with_uncertainty
+from calibrations.presentation.text import bound, columns, concise
 
 SPREADS = re.compile("tolerance|wander")  # uncertainties themselves: two digits
 
@@ -25,7 +22,7 @@ def lines(results: Mapping[str, Any]) -> list[str]:
 def _value(name: str, result: Mapping[str, Any]) -> str:
     if SPREADS.search(name):
         return f"{result['value']:.2g} {result['unit']}"
-    return with_uncertainty(Estimate(name, "", result["value"], result["std"], result["unit"]))
+    return concise(result["value"], result["std"], result["unit"])
 
 
 def _limit(value: float, limit: Any) -> str:

@@ -3,38 +3,30 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import click
 
-from calibrations.reading.yaml_file import load_yaml
+from calibrations.importing.files import load_yaml
 from procedures.catalogue import Procedure
 from procedures.errors import BadAnswer, NoAnswer
 from procedures.questions import Question
 from procedures.session import Reading
 from rig.analysis.next_steps import next_steps
-from rig.apart.beside import Beside
 from rig.bench import Bench
 from rig.bench.certificates import EXPIRED
 from rig.cli.output import emit, note, notes
 from rig.cli.verdicts import lines as results
 from rig.planning.plan import Plan
 from rig.record import Kept, Record
-from rig.running.runner import Outcome, Watch, Wish
-from rig.running.so_far import SoFar
-from rig.running.soak_forecast import SoakWatch, soak_watch
+from rig.runs.background.control import Beside
+from rig.runs.progress import SoFar
+from rig.runs.runner import Outcome, Watch, Wish
+from rig.runs.soak_forecast import SoakWatch, soak_watch
 
 trace_option = click.option("--trace", is_flag=True, help="Log every message to and from instruments.")
-
-
-def watch_options(function: Callable[..., Any]) -> Callable[..., Any]:
-    """--unattended and --answers."""
-    function = click.option("--unattended", is_flag=True, help="Ask nobody, show only the end.")(function)
-    path = click.Path(dir_okay=False, path_type=Path)
-    return click.option("--answers", type=path, help="A YAML file that answers the questions to a person.")(function)
 
 
 class Quiet:

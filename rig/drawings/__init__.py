@@ -6,8 +6,7 @@ sketch      the table of beta in a terminal, as braille
 named       which drawing belongs to a question
 """
 
-from rig.drawings.attitude import Attitude
-from rig.drawings.named import drawing_of
+from rig.drawings.attitude import Attitude, drawing_of
 from rig.drawings.page import page
 from rig.drawings.sketch import sketch
 

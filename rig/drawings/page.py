@@ -6,10 +6,8 @@ from collections.abc import Iterator
 
 from rig.drawings import svg
 from rig.drawings.attitude import Attitude
-from rig.drawings.force_view import force_view
-from rig.drawings.front_view import front_view
 from rig.drawings.rig_view import rig_view
-from rig.drawings.table_view import table_view
+from rig.drawings.views import force_view, front_view, table_view
 
 WIDTH, HEIGHT = 960, 640
 

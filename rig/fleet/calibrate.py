@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
+import json
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
-from calibrations.fleet.corrected import Values
-from calibrations.fleet.look import NOWHERE, Look
-from calibrations.fleet.pooling import Pooled, pooled
+from calibrations.errors import ModelError
+from calibrations.fleet.batch import BatchVerdict, Population
+from calibrations.fleet.look import NOWHERE, Screening
+from calibrations.fleet.rigs import StageErrors
+from calibrations.fleet.siblings import Pooled, pool_siblings
 from calibrations.model import Estimate, Model
-from rig.analysis.provenance import program
-from rig.fleet.asked import Fleet
-from rig.fleet.discover import stands_out
+from calibrations.model.file import dump_model, read_model
+from rig.errors import OutputError
+from rig.files import write_whole
+from rig.fleet.discover import errors_of, stands_out
 from rig.fleet.members import Member
-from rig.fleet.own import Own
-from rig.fleet.worker import Question, model_of
-from rig.fleet.written import read_look
+from rig.fleet.own_effects import Own, effects_of
+from rig.fleet.questions import Fleet
+from rig.fleet.worker import Question, model_of, read_look
+from rig.services.provenance import program
 
 Names = tuple[tuple[str, str, str, str], ...]
 
@@ -33,7 +39,7 @@ class Guide:
 
     models: Mapping[str, str]
     otherwise: str
-    errors: Mapping[str, Values]
+    errors: Mapping[str, StageErrors]
     own: Own = ()
 
     def question(self, member: Member) -> Question:
@@ -49,7 +55,7 @@ class Calibrated:
     batch: str
     names: Names
     members: tuple[Member, ...]
-    looks: tuple[Look, ...]
+    looks: tuple[Screening, ...]
     pooled: Pooled
     question: Question
 
@@ -71,7 +77,7 @@ class Calibration:
 def calibrate_fleet(fleet: Fleet, members: Sequence[Member], guide: Guide) -> Calibration:
     """Fit and pool."""
     faults = {member: member.fault for member in members if member.fault}
-    looks: dict[Member, Look] = {}
+    looks: dict[Member, Screening] = {}
     for member, said in fleet.ask([(m, guide.question(m)) for m in members if m not in faults]):
         if "fault" in said:
             faults[member] = said["fault"]
@@ -85,9 +91,9 @@ def calibrate_fleet(fleet: Fleet, members: Sequence[Member], guide: Guide) -> Ca
     return Calibration(tuple(batches), faults)
 
 
-def _batch(batch: str, names: Names, of: list[Member], looks: Mapping[Member, Look], guide: Guide) -> Calibrated:
+def _batch(batch: str, names: Names, of: list[Member], looks: Mapping[Member, Screening], guide: Guide) -> Calibrated:
     mine = tuple(looks[member] for member in of)
-    together = pooled(
+    together = pool_siblings(
         np.array([look.theta for look in mine]),
         np.array([look.information for look in mine]),
         np.median([look.typical for look in mine], axis=0),
@@ -123,3 +129,62 @@ def _with(base: Model, names: Names, values: object, stds: object, said: Mapping
         estimates[effect].append(Estimate(name, axis, float(value), float(std), unit))
     terms = tuple(replace(term, estimates=tuple(estimates[term.name])) for term in base.terms if estimates[term.name])
     return replace(base, terms=terms, provenance={**said, "program": program()})
+
+
+# What a discovery hands to a calibration: a folder with a model for each batch, and the errors of the rigs.
+
+RIGS = "rigs.json"
+SCHEMA = "rig.fleet-rigs/1"
+OTHERWISE = "other.yaml"  # for sensors of no batch
+
+
+def write_guide(found: Population, start: Question, folder: Path) -> list[Path]:
+    """A model file for each batch, and the rigs' errors. Raises OutputError."""
+    made_folder(folder)
+    texts = {f"{safe(each.batch)}.yaml": _guide_model(start, each) for each in found.batches}
+    rigs = {error.rig: errors_of(found.rigs, error.rig) for error in found.rigs}
+    texts[RIGS] = json.dumps({"schema": SCHEMA, "rigs": {rig: of for rig, of in rigs.items() if of}}, indent=1) + "\n"
+    for name, text in texts.items():
+        write_whole(folder / name, text)
+    return [folder / name for name in texts]
+
+
+def read_guide(given: str, batches: set[str], own: Own = ()) -> Guide:
+    """The guide in a folder, or one model for all by its name or file. Raises ModelError, UnknownName."""
+    folder, effects = Path(given), effects_of(own)
+    if not folder.is_dir():
+        return Guide({}, dump_model(read_model(given, effects)), {}, own)
+    texts = {batch: dump_model(read_model(folder / f"{safe(batch)}.yaml", effects)) for batch in batches}
+    return Guide(texts, "", _rigs(folder / RIGS), own)
+
+
+def made_folder(folder: Path) -> Path:
+    """The folder, made where it is not there. Raises OutputError."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot be made: {error.strerror}; name another folder") from None
+    return folder
+
+
+def safe(name: str) -> str:
+    """A name as that of a file."""
+    return "".join(c if c.isalnum() or c in "-_." else "_" for c in name).lstrip(".") or Path(OTHERWISE).stem
+
+
+def _guide_model(start: Question, batch: BatchVerdict) -> str:
+    return dump_model(model_of(replace(start, effects=tuple(each.effect for each in batch.effects))))
+
+
+def _rigs(path: Path) -> Mapping[str, StageErrors]:
+    if not path.is_file():
+        return {}
+    try:
+        said = json.loads(path.read_text(encoding="utf-8"))
+        if said["schema"] != SCHEMA:
+            raise ModelError(
+                f"{path}: its schema is {said['schema']!r}, not {SCHEMA}; write it by `rig fleet discover`"
+            )
+        return dict(said["rigs"])
+    except (ValueError, KeyError, TypeError) as error:
+        raise ModelError(f"{path}: is no list of rigs' errors ({error}); write it by `rig fleet discover`") from None

@@ -7,9 +7,13 @@ is found, and no other is blamed for it.
 
 from __future__ import annotations
 
+import logging
+import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, TypeVar
+
+from distributed import Worker, WorkerPlugin
 
 from rig.errors import RigError
 
@@ -41,7 +45,6 @@ def crew(scheduler: str | None, workers: int | None) -> Iterator[Client]:
         import dask
         from distributed import Client, LocalCluster
 
-        from rig.fleet.deaf import Deaf, hush
     except ImportError:
         raise FleetError("fleets need Dask; install it with: pip install 'inertial-rig[fleet]'") from None
     hush()
@@ -109,3 +112,20 @@ def answered(
                 yield [task], None
     except (CancelledError, OSError):
         raise FleetError(LOST) from None
+
+
+# Local workers do not hear Ctrl-C, which a terminal sends to them too, and say nothing: the command does both.
+
+
+def hush() -> None:
+    """No line of Dask's own: what a person should know is said by us, once."""
+    for name in [name for name in logging.root.manager.loggerDict if name.startswith("distributed")]:
+        logging.getLogger(name).setLevel(logging.CRITICAL)
+
+
+class Deaf(WorkerPlugin):
+    """Every worker process of a local cluster has this, also one that takes a dead one's place."""
+
+    def setup(self, worker: Worker) -> None:  # noqa: ARG002 Dask calls it so
+        hush()
+        signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -15,19 +15,26 @@ from typing import Any
 import numpy as np
 from scipy.special import chdtrc
 
-from calibrations.fleet.batch import BatchEffect, batch_effects
-from calibrations.fleet.corrected import Values
-from calibrations.fleet.look import NOWHERE, Look
-from calibrations.fleet.population import BESIDE, IN_FULL, Population, SensorVerdict, batch_verdict
-from calibrations.fleet.rigs import Measured, RigError, rig_errors, unconnected
-from rig.fleet.asked import Fleet
+from calibrations.discovery.verdict import Judgement, decide
+from calibrations.fleet.batch import (
+    FULL_SEARCH,
+    WITH_BATCH,
+    BatchEffect,
+    Population,
+    SensorVerdict,
+    batch_verdict,
+    find_batch_effects,
+)
+from calibrations.fleet.look import NOWHERE, Screening
+from calibrations.fleet.rigs import Measured, RigError, StageErrors, find_rig_errors, unconnected_rigs
 from rig.fleet.members import Member
-from rig.fleet.own import effects_of
-from rig.fleet.worker import Question
-from rig.fleet.written import read_look
+from rig.fleet.own_effects import effects_of
+from rig.fleet.questions import Fleet
+from rig.fleet.worker import Question, read_look
 
 STANDS_OUT = 0.05  # chance, over the whole search, below which a sensor is diagnosed in full
 MOST_ROUNDS = 6
+JUDGED = ("left", "share_left", "spoilt", "unresponsive", "undetermined")  # facts of a diagnosis behind its verdict
 FEWEST = 4  # sensors that tell how noisy their batch is
 
 Batches = Mapping[str, Sequence[Member]]
@@ -74,7 +81,7 @@ def discover_fleet(fleet: Fleet, members: Sequence[Member], start: Question) -> 
     return _population(stand, _diagnosed(fleet, stand, batches), members)
 
 
-def errors_of(errors: Iterable[RigError], rig: str) -> Values:
+def errors_of(errors: Iterable[RigError], rig: str) -> StageErrors:
     """What a rig's stages are off by: effect -> parameter -> value."""
     values: dict[str, dict[str, float]] = defaultdict(dict)
     for error in errors:
@@ -90,12 +97,12 @@ def _rigs(fleet: Fleet, stand: Stand, batches: Batches) -> Stand:
     faults = dict(stand.faults)
     stages = {member: look.stage for member, look in _looks(fleet, stand, batches, faults) if look}
     measured = [Measured(m.batch, m.rig, stages[m]) for of in batches.values() for m in of if m in stages]
-    return replace(stand, faults=faults, errors=tuple(rig_errors(measured)))
+    return replace(stand, faults=faults, errors=tuple(find_rig_errors(measured)))
 
 
 def _looks(
     fleet: Fleet, stand: Stand, batches: Batches, faults: dict[Member, str]
-) -> Iterator[tuple[Member, Look | None]]:
+) -> Iterator[tuple[Member, Screening | None]]:
     """Every sensor with its look, batch by batch; where there is none, why is added to `faults`."""
     asked = [(m, stand.question("look", m)) for of in batches.values() for m in of if m not in faults]
     for member, said in fleet.ask(asked):
@@ -117,10 +124,10 @@ def _grown(fleet: Fleet, stand: Stand, batches: Batches) -> Stand:
 
 def _judged(fleet: Fleet, stand: Stand, batches: Batches) -> tuple[Stand, dict[str, list[BatchEffect]]]:
     """The sensors of the batches seen, and what each batch misses; a batch is judged when its last sensor is in."""
-    stage = {name for name, effect in effects_of(stand.start.own).items() if effect.pose is not None}
+    stage = {name for name, effect in effects_of(stand.start.own).items() if "pose" in effect.places}
     faults, seen = dict(stand.faults), dict(stand.seen)
     waiting = {batch: sum(m not in faults for m in of) for batch, of in batches.items()}
-    looks: dict[str, dict[Member, Look]] = defaultdict(dict)
+    looks: dict[str, dict[Member, Screening]] = defaultdict(dict)
     found = {}
     for member, look in _looks(fleet, stand, batches, faults):
         batch = member.batch
@@ -130,7 +137,7 @@ def _judged(fleet: Fleet, stand: Stand, batches: Batches) -> tuple[Stand, dict[s
         waiting[batch] -= 1
         if not waiting[batch]:
             mine = looks.pop(batch, {})
-            found[batch] = batch_effects([mine[m] for m in batches[batch] if m in mine], stage)
+            found[batch] = find_batch_effects([mine[m] for m in batches[batch] if m in mine], stage)
     return replace(stand, faults=faults, seen=seen), found
 
 
@@ -170,7 +177,7 @@ def _diagnosed(fleet: Fleet, stand: Stand, batches: Batches) -> dict[Member, Any
     return dict(fleet.ask([(m, stand.question("diagnosis", m)) for m in out]))
 
 
-def stands_out(look: Look | Seen, batch: Sequence[float]) -> bool:
+def stands_out(look: Screening | Seen, batch: Sequence[float]) -> bool:
     """Whether noise alone would hardly leave so much: a pattern, a pose, or more than its batch leaves (`excess`)."""
     usual = max(1.0, float(np.median(batch))) if len(batch) >= FEWEST else 1.0
     noisy = chdtrc(look.free, look.free * (look.excess / usual) ** 2) < STANDS_OUT
@@ -183,7 +190,7 @@ def _population(stand: Stand, diagnosed: Mapping[Member, Any], members: Sequence
     for batch in dict.fromkeys(member.batch for member in members):
         mine = tuple(each for each in sensors if each.batch == batch)
         batches.append(batch_verdict(batch, stand.effects.get(batch, ()), mine))
-    apart = unconnected([Measured(m.batch, m.rig, NOWHERE) for m, seen in stand.seen.items() if seen.on_stages])
+    apart = unconnected_rigs([Measured(m.batch, m.rig, NOWHERE) for m, seen in stand.seen.items() if seen.on_stages])
     return Population(sensors, tuple(batches), stand.errors, tuple(apart))
 
 
@@ -194,13 +201,15 @@ def _verdict(member: Member, stand: Stand, diagnosis: Any | None) -> SensorVerdi
     fault = stand.faults.get(member) or (diagnosis or {}).get("fault")
     if fault:
         return SensorVerdict(*of, "failed", remark=fault)
-    if diagnosis is None:
-        verdict = "adequate" if not names else "ambiguous" if rivals else "effect-missing"
-        return SensorVerdict(*of, verdict, names, (), stand.seen[member].excess, BESIDE, rivals)
-    own = tuple(diagnosis["effects"])
-    rivals |= {name: tuple(others) for name, others in diagnosis["rivals"].items()}
-    verdict = diagnosis["verdict"]
-    if verdict == "adequate" and names:
-        verdict = "ambiguous" if rivals else "effect-missing"
-    remark = "; ".join(filter(None, (diagnosis["left"], diagnosis["caution"]))) or None
-    return SensorVerdict(*of, verdict, (*names, *own), own, diagnosis["excess"], IN_FULL, rivals, remark)
+    facts = diagnosis or {"effects": (), "rivals": {}, "excess": stand.seen[member].excess}
+    own = tuple(facts["effects"])
+    rivals |= {name: tuple(others) for name, others in facts["rivals"].items()}
+    judgement = Judgement(
+        model=stand.start.model,
+        missing=(*names, *own),
+        alternatives=rivals,
+        **{name: facts[name] for name in JUDGED if name in facts},
+    )
+    remark = "; ".join(filter(None, (facts.get("left"), facts.get("caution")))) or None
+    scope = FULL_SEARCH if diagnosis else WITH_BATCH
+    return SensorVerdict(*of, decide(judgement).value, judgement.missing, own, facts["excess"], scope, rivals, remark)

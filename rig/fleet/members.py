@@ -19,8 +19,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from calibrations.errors import DataError
-from calibrations.numerals import as_written
-from calibrations.reading.text_file import text_file
+from calibrations.importing.files import open_text_file
+from calibrations.presentation.text import as_written
 from calibrations.table import NUMBERS
 from rig.analysis.sensors import CALIBRATING, members
 from rig.errors import RigError, UnknownRun
@@ -69,7 +69,7 @@ def fleet_of(sources: Iterable[str]) -> list[Member]:
 
 def content(member: Member) -> str:
     """The text of a member's file. Raises DataError."""
-    with text_file(Path(member.data)).lines() as lines:
+    with open_text_file(Path(member.data)).lines() as lines:
         return "".join(lines)
 
 
@@ -92,7 +92,7 @@ def _is_index(path: Path) -> bool:
 
 def _head(path: Path) -> list[str]:
     try:
-        with text_file(path).lines() as lines:
+        with open_text_file(path).lines() as lines:
             first = next((line for line in lines if not line.startswith("#") and line.strip()), "")
     except DataError:
         return []
@@ -101,7 +101,7 @@ def _head(path: Path) -> list[str]:
 
 def _of_index(path: Path) -> Iterator[Member]:
     """Raises RigError for a column that an index has not, and for a row that names no data."""
-    with text_file(path).lines() as lines:
+    with open_text_file(path).lines() as lines:
         rows = list(csv.DictReader(io.StringIO("".join(line for line in lines if not line.startswith("#")))))
     for number, row in enumerate(rows, 2):
         said = {

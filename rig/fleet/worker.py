@@ -6,29 +6,78 @@ into the record.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
 from functools import lru_cache
 from pathlib import Path
+from sys import intern
 from typing import Any, Literal
 
-from calibrations.diagnose import Diagnosis, diagnose
+import numpy as np
+
+from calibrations.discovery.results import Diagnosis
+from calibrations.discovery.rows import DEFAULT_MODELS
 from calibrations.errors import CalibrationError, DataError, ModelError
-from calibrations.fleet.columns import Shared
-from calibrations.fleet.corrected import Values, corrected
-from calibrations.fleet.look import look
+from calibrations.fit import Fit
+from calibrations.fleet.look import Score, Screening, SharedDesigns, StageScore, screen_sensor
+from calibrations.fleet.rigs import StageErrors, correct_stage_errors
+from calibrations.importing.foreign import parse_csv
+from calibrations.loop import diagnose
 from calibrations.model import Model
-from calibrations.model_file import parse_model
-from calibrations.reading.read_csv import parse_csv
-from calibrations.reports.words import joined
+from calibrations.model.file import parse_model
+from calibrations.presentation.text import joined
 from calibrations.table import Table
-from rig.analysis.asked import DEFAULTS, check_unit
-from rig.analysis.asked_still import LONGEST_BEGINNING, channels_alone
 from rig.analysis.data import averaged
 from rig.analysis.sensors import CALIBRATING
 from rig.errors import RigError
-from rig.fleet.own import Own, effects_of
-from rig.fleet.written import write_look
+from rig.fleet.own_effects import Own, effects_of
+from rig.services.load import LONGEST_BEGINNING, channels_alone, check_unit
+
+# A look as a document of plain values, and back.
+
+
+def write_look(look: Screening) -> dict[str, Any]:
+    """Numbers to their last bit."""
+    return {
+        **_plain(look),
+        "scores": [_plain(score) for score in look.scores],
+        "stage": _plain(look.stage),
+    }
+
+
+def read_look(document: dict[str, Any]) -> Screening:
+    """The look that was written."""
+    said = dict(document)
+    stage = said.pop("stage")
+    scores = tuple(Score(**_arrays(score) | {"effect": intern(score["effect"])}) for score in said.pop("scores"))
+    names = _one(tuple(tuple(name) for name in said.pop("names")))
+    k = len(stage["names"])
+    return Screening(
+        **_arrays(said) | {"outliers": tuple(said["outliers"])},
+        names=names,
+        scores=scores,
+        stage=StageScore(
+            _one(tuple(tuple(name) for name in stage["names"])),
+            np.array(stage["score"], dtype=float),
+            np.array(stage["information"], dtype=float).reshape(k, k),
+        ),
+    )
+
+
+@lru_cache(maxsize=1000)
+def _one(names: tuple[Any, ...]) -> tuple[Any, ...]:
+    """The same object for the same names, which all sensors of a batch have."""
+    return names
+
+
+def _plain(value: Any) -> dict[str, Any]:
+    each = {field.name: getattr(value, field.name) for field in fields(value)}
+    return {name: item.tolist() if isinstance(item, np.ndarray) else item for name, item in each.items()}
+
+
+def _arrays(document: dict[str, Any]) -> dict[str, Any]:
+    return {name: np.array(item, dtype=float) if isinstance(item, list) else item for name, item in document.items()}
+
 
 Answer = dict[str, Any]
 
@@ -40,7 +89,7 @@ class Question:
     what: Literal["look", "diagnosis"]
     model: str
     effects: tuple[str, ...] = ()  # of its batch, beside the model
-    errors: Values = field(default_factory=dict)  # of its rig
+    errors: StageErrors = field(default_factory=dict)  # of its rig
     own: Own = ()  # the user's effects
 
 
@@ -67,10 +116,10 @@ def _answered(task: Task) -> Answer:
     asked = task.question
     try:
         model, columns = _beside(asked.model, asked.effects, asked.own)
-        table = corrected(_checked(_read(task), model), asked.errors, columns.effects)
+        table = correct_stage_errors(_checked(_read(task), model), asked.errors, columns.effects)
         if asked.what == "look":
-            return write_look(look(table, model, columns))
-        return _told(diagnose(table, model, columns.effects))
+            return write_look(screen_sensor(table, model, columns))
+        return _diagnosis_answer(diagnose(table, model, columns.effects))
     except (CalibrationError, RigError) as error:
         return {"fault": str(error)}
     except Exception as error:  # one sensor never stops a fleet
@@ -78,9 +127,9 @@ def _answered(task: Task) -> Answer:
 
 
 @lru_cache(maxsize=8)
-def _beside(model: str, effects: tuple[str, ...], own: Own) -> tuple[Model, Shared]:
+def _beside(model: str, effects: tuple[str, ...], own: Own) -> tuple[Model, SharedDesigns]:
     """The model, and the columns that the sensors of this worker share beside it."""
-    return model_of(Question("look", model, effects, own=own)), Shared(effects_of(own))
+    return model_of(Question("look", model, effects, own=own)), SharedDesigns(effects_of(own))
 
 
 def model_of(asked: Question) -> Model:
@@ -99,7 +148,7 @@ def _checked(table: Table, model: Model) -> Table:
     if not model.for_table(table).terms:
         raise ModelError(
             f"{table.source}: {model.name} is no model of {table.content}; make these sensors a fleet of their own, "
-            f"with --model {DEFAULTS[table.content]}"
+            f"with --model {DEFAULT_MODELS[table.content]}"
         )
     check_unit(model, table.unit, table.source)
     return table
@@ -130,16 +179,17 @@ def _nobody(_: str) -> None:
     """What would be said to a person of one sensor is not said of thousands."""
 
 
-def _told(found: Diagnosis) -> Answer:
-    steps = found.path.steps if found.verdict in ("effect-missing", "ambiguous") else ()
-    rivals: Mapping[str, tuple[str, ...]] = (
-        {found.candidates[0].name: found.candidates[0].indistinguishable_from} if steps else {}
-    )
+def _diagnosis_answer(found: Diagnosis[Fit]) -> Answer:
+    """The facts of the sensor's own judgement; the fleet adds the effects of the batch before it decides."""
+    facts = found.judgement
     return {
-        "verdict": found.verdict,
-        "effects": [step.taken.name for step in steps],
-        "rivals": {name: list(others) for name, others in rivals.items() if others},
-        "excess": found.path.end.pooled_excess,
-        "left": found.residual_structure,
+        "effects": list(facts.missing),
+        "rivals": {name: list(others) for name, others in facts.alternatives.items()},
+        "excess": found.findings.end.pooled_excess,
+        "left": facts.left,
+        "share_left": facts.share_left,
+        "spoilt": facts.spoilt,
+        "unresponsive": facts.unresponsive,
+        "undetermined": facts.undetermined,
         "caution": found.caution,
     }

@@ -3,18 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from pathlib import Path
-from typing import TypeVar
 
-from calibrations.effect import Effect
-from calibrations.still.diagnose import Diagnosis
-from calibrations.still.discover import Discovery
+from calibrations.effects import Effect
 from rig.bench import read_bench
-from rig.planning.next_experiment import Answer, as_told, proposed
+from rig.planning.next_experiment import Answer, proposed
 from rig.record import Record
-
-NoiseAnswer = TypeVar("NoiseAnswer", Diagnosis, Discovery)
 
 
 def with_next(
@@ -33,12 +27,6 @@ def with_next(
             "name that bench's file with --bench."
         )
     return proposed(result, effects, bench, bench_file)
-
-
-def with_noise_next(result: NoiseAnswer, bench_file: Path | None) -> NoiseAnswer:
-    """The answer on a still record with its next experiment as a command of the bench."""
-    e = result.next_experiment
-    return result if e is None else replace(result, next_experiment=as_told(e, read_bench(bench_file), bench_file))
 
 
 def _measured_on(data: str) -> str | None:

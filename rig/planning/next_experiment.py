@@ -12,15 +12,20 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
-from calibrations.design.expected import CERTAIN, Expected, expected, one_way, told_apart
-from calibrations.design.foreseen import foreseen
-from calibrations.diagnose import Diagnosis
-from calibrations.discover import Discovery
-from calibrations.effect import Effect
+from calibrations.design.expected import (
+    CERTAIN_PROBABILITY,
+    Expected,
+    expected_gain,
+    pairs_separated,
+    predict_data,
+    vary_one_way,
+)
+from calibrations.design.experiment import MENU, Experiment
+from calibrations.discovery.results import Diagnosis, Discovery
+from calibrations.effects import Effect
 from calibrations.errors import CalibrationError
-from calibrations.experiment import MENU, Experiment
 from calibrations.fit import Fit, refit
 from drivers.errors import LimitError
 from procedures.catalogue import find
@@ -29,11 +34,11 @@ from procedures.settings import parse
 from rig.bench import Bench
 from rig.errors import BenchError
 from rig.planning.plan import Plan, plan
-from rig.planning.planned_columns import columns
+from rig.planning.sweep_range import columns
 
 ALONE, TOGETHER = "probability_alone", "probability"  # of Expected
 LEAST = 1.0  # of lambda, to be called information
-Answer = TypeVar("Answer", Diagnosis, Discovery)
+Answer = TypeVar("Answer", Diagnosis[Any], Discovery[Any])
 
 
 @dataclass(frozen=True)
@@ -60,13 +65,11 @@ def proposed(result: Answer, effects: Mapping[str, Effect], bench: Bench, bench_
     e = result.next_experiment
     if e is None:
         return result
-    best = result.end if isinstance(result, Discovery) else result.path.steps[0].after
-    frees = {a for a, _ in e.separates} & set(
-        result.path.start.model.effects
-    )  # a value for each axis, and adds nothing
-    if best.table.kind != "poses" or frees:
+    found = result.findings
+    frees = {a for a, _ in e.separates} & set(found.origin.model.effects)  # a value for each axis, and adds nothing
+    if not found.data.foreseeable or frees or not e.separates:
         return replace(result, next_experiment=as_told(e, bench, bench_file))
-    return replace(result, next_experiment=chosen(Dispute.of(best, e.separates, effects), e, bench, bench_file))
+    return replace(result, next_experiment=chosen(Dispute.of(found.end, e.separates, effects), e, bench, bench_file))
 
 
 def possible(experiments: Iterable[Experiment], bench: Bench, within_s: float) -> Iterator[Experiment]:
@@ -125,7 +128,7 @@ def chosen(
 def best_of(experiments: Sequence[Experiment], judged: Sequence[str]) -> Experiment | None:
     """The shortest that is certain to separate most pairs; else the one that tells most per minute."""
     for probability in judged:
-        enough = [e for e in experiments if getattr(e.expected, probability) >= CERTAIN]
+        enough = [e for e in experiments if getattr(e.expected, probability) >= CERTAIN_PROBABILITY]
         if enough:
             return min(enough, key=lambda e: (-len(e.separates), e.duration_s or 0.0))
     telling = [e for e in experiments if _per_minute(e) > 0]
@@ -148,12 +151,12 @@ def _foreseen(dispute: Dispute, e: Experiment, bench: Bench, bench_file: Path | 
         planned_columns = columns(planned, dispute.best.table)
         if dispute.of_temperature and "temperature_c" not in planned_columns:
             return None
-        table = foreseen(dispute.best, planned_columns)
-        each = {pair: expected(dispute.best, rival, table) for pair, rival in dispute.rivals.items()}
+        table = predict_data(dispute.best, planned_columns)
+        each = {pair: expected_gain(dispute.best, rival, table) for pair, rival in dispute.rivals.items()}
     except (LimitError, ProcedureError, BenchError, CalibrationError):
         return None
-    told = {pair: each[pair] for pair in each if told_apart(each[pair].together) >= CERTAIN} or each
-    shown = [one_way(found, dispute.nothing, table).alone for found in (dispute.best, *dispute.rivals.values())]
+    told = {pair: each[pair] for pair in each if pairs_separated(each[pair].together) >= CERTAIN_PROBABILITY} or each
+    shown = [vary_one_way(found, dispute.nothing, table).alone for found in (dispute.best, *dispute.rivals.values())]
     worst = Expected(min(x.alone for x in told.values()), min(x.together for x in told.values()), min(shown))
     return replace(e, separates=tuple(told), expected=worst)
 

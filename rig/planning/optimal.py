@@ -12,18 +12,25 @@ from typing import Any
 
 import numpy as np
 
-from calibrations.design.optimal_design import Criterion, DOptimal, IOptimal, again, exchanged, farthest
-from calibrations.design.run_order import Tour, ordered
+from calibrations.design.optimal_design import (
+    Criterion,
+    DOptimal,
+    IOptimal,
+    choose_repeats,
+    exchange_design,
+    farthest_poses,
+)
+from calibrations.design.run_order import Tour, order_tour
+from calibrations.discovery.check_poses import MARK
 from calibrations.model import Model
-from calibrations.search.unseen import MARK
 from calibrations.table import Array
 from procedures.catalogue import Procedure
-from procedures.pose_list import written
+from procedures.pose_list import format_poses
 from procedures.session import Pose
 from rig.bench import Bench
 from rig.errors import PlanError
+from rig.planning.planned import from_home_s, moves_s
 from rig.planning.sweep_range import Judged, Range
-from rig.planning.travel import from_home_s, moves_s
 
 MOST_POSES = 60
 ONE_IN = 10  # poses is measured again, and as many are kept out of the fit
@@ -114,7 +121,7 @@ def optimal(
     chosen, rows = _chosen(over, CRITERIA[criterion](over.white), poses)
     between_s = moves_s(bench, chosen) + APART_S * _same(chosen)
     tour = Tour(from_home_s(bench, chosen), between_s, rows, _dwell_s(over, chosen))
-    order = ordered(tour)
+    order = order_tour(tour)
     short = over.judged(_listing(settings, [chosen[k] for k in order]))
     equal, all_equal = (_as_good(over, short, ratio) for ratio in (relative, most_relative))
     return Optimal(over, criterion, short, equal, all_equal, tour.drift_loss(order))
@@ -123,10 +130,10 @@ def optimal(
 def _chosen(over: Range, criterion: Criterion, poses: int) -> tuple[list[Pose], Array]:
     """Poses with their paths, and their information: 0 for those that no fit sees, (poses, axes, p)."""
     aside = max(FEWEST, round(poses / ONE_IN))
-    design = exchanged(over.white, poses - 2 * aside, criterion)
-    more = again(over.white, design, aside, criterion)
+    design = exchange_design(over.white, poses - 2 * aside, criterion)
+    more = choose_repeats(over.white, design, aside, criterion)
     fitted = np.concatenate([design, more])
-    checks = farthest(over.places, fitted, poses - len(fitted))
+    checks = farthest_poses(over.places, fitted, poses - len(fitted))
     paths = [DESIGN] * len(design) + [AGAIN] * len(more) + [CHECK] * len(checks)
     numbers = np.concatenate([fitted, checks])
     rows = np.concatenate([over.white[fitted], 0 * over.white[checks]])
@@ -149,7 +156,7 @@ def _dwell_s(over: Range, chosen: Sequence[Pose]) -> float:
 
 def _listing(settings: Mapping[str, Any], poses: Sequence[Pose]) -> dict[str, Any]:
     """Settings of a sweep over these poses."""
-    return {**settings, "face": "up", "reference_every": 0, "pose_list": written(poses)}
+    return {**settings, "face": "up", "reference_every": 0, "pose_list": format_poses(poses)}
 
 
 def _as_good(over: Range, short: Judged, ratio: Callable[[Judged, Judged], float]) -> Judged:

@@ -6,15 +6,18 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any, Protocol
 
 import numpy as np
 
+from calibrations.table import Array
 from drivers.errors import LimitError
-from drivers.labjack_t7 import Settings as AdcSettings
-from drivers.omega_cn7500 import Settings as OvenSettings
+from drivers.labjack_t7.driver import Settings as AdcSettings
+from drivers.omega_cn7500.driver import Settings as OvenSettings
 from procedures.questions import Choice, Number, Question
-from procedures.session import Dwell, Pose, Reading, Samples
+from procedures.session import SHORTEST_APPROACH_DEG, Dwell, Pose, Reading, Samples
+from rig.bench import Bench
 from rig.record.values import Block
 
 LEVEL_S = 1.0  # a reading of the level
@@ -292,3 +295,45 @@ class PlanHost:
 
     def doing(self, text: str) -> None:
         """Its steps say what it does."""
+
+
+# How long the stages take from one pose to another, as a session moves them: alpha first, then beta from its side.
+
+REMOUNT_S = 900.0  # a person turns the sensor over, and it takes its temperature again: as seldom as possible
+HOME = Pose(0.0, 0.0)
+
+
+def moves_s(bench: Bench, poses: Sequence[Pose]) -> Array:
+    """From each of `poses` to each, shape (n, n)."""
+    moves = _Moves.of(bench)
+    return np.array([[moves.seconds(a, b) for b in poses] for a in poses])
+
+
+def from_home_s(bench: Bench, poses: Sequence[Pose]) -> Array:
+    """From where both stages stand at 0 with the sensor face up, shape (n,)."""
+    moves = _Moves.of(bench)
+    return np.array([moves.seconds(HOME, pose) for pose in poses])
+
+
+@dataclass(frozen=True)
+class _Moves:
+    """Seconds that each stage needs for a distance, and how far an approach begins beyond a pose."""
+
+    alpha_s: Callable[[float], float]
+    beta_s: Callable[[float], float]
+    overrun_deg: float
+
+    @staticmethod
+    def of(bench: Bench) -> _Moves:
+        alpha, beta = (bench.instruments[role].typed_settings().move_s for role in ("alpha", "beta"))
+        return _Moves(cache(alpha), cache(beta), bench.limits.overrun_deg)
+
+    def seconds(self, start: Pose, end: Pose) -> float:
+        """Of all moves from one pose to another, and of a remount."""
+        way_deg = end.beta_deg - start.beta_deg
+        beta_deg = [abs(way_deg)]
+        if end.direction and way_deg * end.direction < SHORTEST_APPROACH_DEG:
+            beta_deg = [abs(way_deg - end.direction * self.overrun_deg), self.overrun_deg]
+        moves = [(self.alpha_s, abs(end.alpha_deg - start.alpha_deg)), *((self.beta_s, deg) for deg in beta_deg)]
+        remount_s = REMOUNT_S * ((end.mount_deg, end.flip) != (start.mount_deg, start.flip))
+        return remount_s + sum(move_s(deg) + EXCHANGE_S for move_s, deg in moves if deg)

@@ -1,9 +1,4 @@
-"""The range of a sweep for a model: candidates for its poses, and what a fit to the poses of a plan will know.
-
-The range is that of a sweep: its inclinations and what lies between them, its turn of beta, both directions, the faces
-that it has. A plan is judged by the standard error of each parameter as what it does to the output where it does most:
-only so can volts be set beside degrees. The greatest of them is the worst standard error.
-"""
+"""The columns of poses that are only planned: angles, mounting, time, and the temperature where an oven makes it."""
 
 from __future__ import annotations
 
@@ -16,20 +11,64 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrations.chain import nominal_pose, specific_force
-from calibrations.design.assumed import assumed
-from calibrations.design.foreseen import foreseen
-from calibrations.design.information import covariance_of, information
-from calibrations.design.optimal_design import scaled
+from calibrations.design.expected import assume_sensor, predict_data
+from calibrations.design.optimal_design import covariance_of, information, scale_rows
+from calibrations.discovery.check_poses import MARK
 from calibrations.fit import Fit
+from calibrations.geometry.orientation import nominal_pose, specific_force
 from calibrations.model import Model
 from calibrations.problem import Problem
-from calibrations.search.unseen import MARK
 from calibrations.table import AXES, Array, Table
 from procedures.catalogue import Procedure
 from procedures.session import Pose
 from rig.bench import Bench
 from rig.planning.plan import Plan, plan
+
+PAUSE_S = 60.0  # from the end of the data to the beginning of the next run, at least
+OVEN_S = 1200.0  # in which an oven with what is in it comes near to its set point
+
+
+def columns(planned: Plan, data: Table) -> dict[str, Array]:
+    """The columns of a planned run's poses: angles, side, mounting, time after `data`, temperature, length."""
+    poses = [held.pose for held in planned.held]
+    names = ("alpha_deg", "beta_deg", "direction", "mount_deg", "flip")
+    made = {name: np.array([getattr(pose, name) for pose in poses], dtype=float) for name in names}
+    dwell_s = np.array([_dwell_s(planned.settings, pose.path) for pose in poses])
+    since_s = np.array([held.start_s for held in planned.held]) + dwell_s / 2
+    made["t_s"] = float(data.time_s.max()) + PAUSE_S + since_s
+    if "temperature_c" in data and {"oven_c", "temperatures_c"} & {k for k, v in planned.settings.items() if v}:
+        last_c = float(data.column("temperature_c")[data.order[-1]])
+        made["temperature_c"] = _temperature_c(planned, last_c, since_s)
+    return made | ({"dwell_s": dwell_s} if "sample_rate_hz" in data.constants else {})
+
+
+def _dwell_s(settings: Mapping[str, Any], path: str) -> float:
+    """How long a pose is recorded: blocks of a hold, else dwells."""
+    return float(settings["block_s" if path.startswith("hold") and "block_s" in settings else "dwell_s"])
+
+
+def _temperature_c(planned: Plan, last_c: float, since_s: Array) -> Array:
+    """The sensor's temperature, from what it was last on its way to what the oven is set to (of first order)."""
+    now_c, at_s, course = last_c, 0.0, []
+    for held, t_s in zip(planned.held, since_s, strict=True):
+        now_c += (_oven_c(planned.settings, held.pose.path) - now_c) * -np.expm1(-(t_s - at_s) / OVEN_S)
+        at_s = t_s
+        course.append(now_c)
+    return np.array(course)
+
+
+def _oven_c(settings: Mapping[str, Any], path: str) -> float:
+    """The set point at a pose: that of a soak, or of the step of a cycle, which its path names."""
+    return float(settings["oven_c"] if "oven_c" in settings else path.split()[1])
+
+
+# The range of a sweep for a model: candidates for its poses, and what a fit to the poses of a plan will know.
+#
+# The range is that of a sweep: its inclinations and what lies between them, its turn of beta, both directions, the
+# faces
+# that it has. A plan is judged by the standard error of each parameter as what it does to the output where it does
+# most:
+# only so can volts be set beside degrees. The greatest of them is the worst standard error.
 
 GRID_DEG = 15.0
 SIDE = 0.2  # how far the two directions of one pose count as apart, beside distances of gravity in g
@@ -77,7 +116,7 @@ class Range:
         """The model as if it had been fitted to the sweep."""
         rate_hz = self.bench.instruments["adc"].typed_settings().rate_hz
         constants = self.bench.constants | {"sample_rate_hz": rate_hz}
-        return assumed(self.model, _columns(self._plan), constants, self.axes)
+        return assume_sensor(self.model, _columns(self._plan), constants, self.axes)
 
     @cached_property
     def axes(self) -> tuple[str, ...]:
@@ -94,7 +133,7 @@ class Range:
     def white(self) -> Array:
         """Information of the candidates, scaled, shape (candidates, axes, p)."""
         rows = information(self.fit, self._foreseen)
-        return scaled(rows.reshape(len(self.axes), len(self.candidates), -1).transpose(1, 0, 2))
+        return scale_rows(rows.reshape(len(self.axes), len(self.candidates), -1).transpose(1, 0, 2))
 
     @property
     def places(self) -> Array:
@@ -106,7 +145,7 @@ class Range:
         """The sweep with other settings; check poses tell its fit nothing. Raises what a plan raises."""
         planned = plan(self.bench, self.sweep, settings)
         seen = replace(planned, held=tuple(held for held in planned.held if not held.pose.path.startswith(MARK)))
-        rows = information(self.fit, foreseen(self.fit, _columns(seen)))
+        rows = information(self.fit, predict_data(self.fit, _columns(seen)))
         std = np.sqrt(np.diag(covariance_of(rows)))
         unknown = np.full(len(std), np.inf)
         return Judged(planned, np.multiply(std, self._full_scale, where=np.isfinite(std), out=unknown))
@@ -126,7 +165,7 @@ class Range:
         columns = _of_poses(self.candidates)
         if any("t_s" in term.effect.needs for term in self.fit.model.terms):
             columns["t_s"] = np.full(len(self.candidates), self._plan.duration_s / 2)
-        return foreseen(self.fit, columns)
+        return predict_data(self.fit, columns)
 
     @cached_property
     def _full_scale(self) -> Array:

@@ -1,9 +1,8 @@
-"""Sample blocks as bytes, without loss and small.
+"""Lossless compression of sample blocks.
 
-A converter has few distinct outputs, so each channel is kept as its distinct values in order and, for every
-sample, the number of its value: one byte where 256 values are enough, two up to 65536. What is left is noise, in
-which zlib would look for repeats in vain: it looks for runs only, which is quicker and no larger. A channel with more
-distinct values is kept as it is.
+A converter has few distinct outputs. So each channel is stored as its sorted distinct values and, for every sample, the
+number of its value: one byte for up to 256 values, two for up to 65536. The numbers are noise, so zlib searches only
+for runs, which is faster and gives the same size. A channel with more distinct values is stored as it is.
 
 Before compression, little-endian: u32 samples n, u32 channels; then for each channel
     u32 distinct values k | k x f64 values | n x u8 or u16 numbers        (k = 0: n x f64 samples)
@@ -11,14 +10,17 @@ Before compression, little-endian: u32 samples n, u32 channels; then for each ch
 
 from __future__ import annotations
 
+import hashlib
 import struct
 import zlib
 
 import numpy as np
 from numpy.typing import NDArray
 
+from procedures.session import Samples
+
 CODEC = "palette-zlib/1"
-MOST_BYTES = 1 << 30  # of a block before compression: a hundred times the longest that is kept
+MOST_BYTES = 1 << 30  # of a block before compression: a hundred times the longest recorded block
 _HEAD = struct.Struct("<II")
 _COUNT = struct.Struct("<I")
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)  # 2^64 / golden ratio: spreads neighbours over the table
@@ -33,10 +35,7 @@ def encode(samples: NDArray[np.float64]) -> bytes:
 
 
 def decode(data: bytes) -> NDArray[np.float64]:
-    """The samples that `encode` was given, bit for bit, shape (n, channels).
-
-    Raises ValueError on damage, which costs no more memory than MOST_BYTES.
-    """
+    """The samples, bit for bit, shape (n, channels). Raises ValueError for damaged data; uses at most MOST_BYTES."""
     try:
         return _decode(_inflated(data))
     except (zlib.error, struct.error, IndexError, ValueError) as error:
@@ -47,7 +46,7 @@ def _inflated(data: bytes) -> bytes:
     inflater = zlib.decompressobj()
     raw = inflater.decompress(data, MOST_BYTES)
     if not inflater.eof:
-        raise ValueError(f"its end is missing, or it is longer than {MOST_BYTES} bytes")
+        raise ValueError(f"the end is missing, or the block is longer than {MOST_BYTES} bytes")
     return raw
 
 
@@ -74,8 +73,8 @@ def _encode_channel(values: NDArray[np.float64]) -> bytes:
 def _distinct(values: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.integer]]:
     """The distinct values in order, and the number of each sample's value.
 
-    A few values mostly fall on different places of a table, found by multiplicative hashing (Knuth, volume 3, 6.4):
-    that takes a tenth of the time of sorting. Where two fall on one place, sorting it is.
+    Multiplicative hashing (Knuth, volume 3, 6.4) puts few values mostly at different places of a table, in a tenth of
+    the time of sorting. If two values share a place, the values are sorted.
     """
     places = ((values.view("<u8") * _GOLDEN) >> np.uint64(48)).astype(np.intp)
     table, used = np.empty(1 << 16, np.int64), np.zeros(1 << 16, bool)
@@ -99,5 +98,15 @@ def _decode_channel(raw: bytes, offset: int, n: int) -> tuple[NDArray[np.float64
 
 
 def _number(k: int) -> str:
-    """The type of a value's number where there are `k` values."""
+    """The type of the numbers for `k` values."""
     return "<u1" if k <= 1 << 8 else "<u2"
+
+
+def digest_of(samples: Samples) -> str:
+    """SHA-256 of the channel names, joined by commas, and of the samples as little-endian float64, in rows.
+
+    It does not depend on the compression.
+    """
+    h = hashlib.sha256(",".join(samples.channels).encode())
+    h.update(np.ascontiguousarray(samples.volts, "<f8").tobytes())
+    return h.hexdigest()

@@ -1,10 +1,11 @@
-"""What a run holds, as digests that are equal in every record that holds the same, and as rows to copy.
+"""The content of a run: digests that are equal in all records with the same content, and rows to copy.
 
-digest   SHA-256 of all of it: of the run, and of every row that belongs to it, in their order
-head     of what changes once a run is complete, its results and events (each exclusion is one): quick, samples unread
+digest   SHA-256 of the run and of all its rows in order
+head     SHA-256 of the parts that can change after the end of a run: results and events (an exclusion is an event). It
+         is fast, because it does not read the samples.
 
-Of bytes (samples, columns) the database gives their own SHA-256, so that they are counted where they are. A run's name
-is no part of it, nor are numbers that a database gives; nor the state of a simulated bench, which only resuming needs.
+The database computes the SHA-256 of bytes (samples, columns). The digest does not contain the name of the run, numbers
+given by a database, and the state of a simulated bench, which only a resume needs.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from sqlalchemy import ColumnElement, Connection, LargeBinary, Row, Select, Tabl
 from rig.errors import UnknownRun
 from rig.record.schema import blocks, columns, dwells, events, log, poses, readings, runs
 
-# Each with the column that orders it. After a run is complete nothing but events is added to any of them.
+# Each table with the column of its order. After the end of a run only events are added.
 ORDER = {
     poses: poses.c.number,
     blocks: blocks.c.number,
@@ -29,12 +30,12 @@ ORDER = {
     log: log.c.line,
     events: events.c.event,
 }
-GIVEN = (events.c.event, log.c.line)  # by the database
-MADE = ("run", "procedure", "created", "configuration", "source", "identities")  # of a run as it was begun
+GIVEN = (events.c.event, log.c.line)  # numbers given by the database
+MADE = ("run", "procedure", "created", "configuration", "source", "identities")  # set at the begin of a run
 
 
 def digest(at: Connection, run: str) -> str:
-    """Of all that is held of `run`."""
+    """SHA-256 of the content of `run`."""
     sha = hashlib.sha256(_line(run_row(at, run)))
     for table in ORDER:
         sha.update(table.name.encode())
@@ -44,14 +45,14 @@ def digest(at: Connection, run: str) -> str:
 
 
 def head(at: Connection, run: str) -> str:
-    """Of what can change of a complete run. A pose that is left out is told by its event."""
+    """SHA-256 of the parts of a complete run that can change. An event stands for an excluded pose."""
     sha = hashlib.sha256(_line(run_row(at, run)))
     sha.update(_line(at.execute(rows_of(events, run)).all()))
     return sha.hexdigest()
 
 
 def run_row(at: Connection, run: str) -> Row[Any]:
-    """The run itself, without its names. Raises UnknownRun."""
+    """The row of the run, without its names. Raises UnknownRun."""
     chosen = [column for column in runs.c if column not in (runs.c.run, runs.c.uid)]
     row = at.execute(select(*chosen).where(runs.c.run == run)).one_or_none()
     if row is None:
@@ -60,15 +61,15 @@ def run_row(at: Connection, run: str) -> Row[Any]:
 
 
 def uid_of(at: Connection, run: str) -> str:
-    """What names a run in every record; of a run of an older program, made of how it was begun."""
+    """The identifier of a run in every record. For a run of an older program it is derived from its begin."""
     row = at.execute(select(runs).where(runs.c.run == run)).one()._mapping
     return row["uid"] or hashlib.sha256(_line([row[name] for name in MADE])).hexdigest()[:32]
 
 
 def rows_of(table: Table, run: str, counted: bool = False) -> Select[Any]:
-    """The rows of a run in their order, few at a time, without what belongs to one record alone.
+    """The rows of a run in order, without the columns that belong to one record only.
 
-    With `counted`, bytes are told by their SHA-256.
+    With `counted`, bytes are replaced by their SHA-256.
     """
     kept: Iterable[ColumnElement[Any]] = (column for column in table.c if column not in (*GIVEN, table.c.run))
     if counted:
@@ -78,7 +79,7 @@ def rows_of(table: Table, run: str, counted: bool = False) -> Select[Any]:
 
 
 def count(at: Connection, run: str) -> dict[Table, int]:
-    """How many rows of each table belong to a run."""
+    """The number of rows of a run in each table."""
     counts = [select(func.count()).where(table.c.run == run).scalar_subquery() for table in ORDER]
     return dict(zip(ORDER, at.execute(select(*counts)).one(), strict=True))
 

@@ -1,7 +1,7 @@
-"""Opening the record's file: one SQLite database that a kill cannot tear.
+"""Opens the record's file: one SQLite database that survives a kill.
 
-Write-ahead log and synchronous=FULL: what a transaction has returned from is on the disk. Where the disk, its folder
-or the file itself fails, now or later, that is a RecordError which says so.
+With the write-ahead log and synchronous=FULL a committed transaction is on the disk. A failure of the disk, the folder
+or the file is a RecordError, now or later.
 """
 
 from __future__ import annotations
@@ -13,28 +13,27 @@ from pathlib import Path
 from sqlalchemy import Connection, Engine, ExceptionContext, create_engine, event, text
 
 from rig.errors import RecordError
-from rig.record.dialects import give_sha256
-from rig.record.schema import MIGRATIONS, SCHEMA, metadata
+from rig.record.schema import MIGRATIONS, SCHEMA, give_sha256, metadata
 
-RECOVER = "move it away, or `rig doctor --recover FOLDER` copies what can still be read"
-FAILURES = {  # primary code of SQLite: what has happened, and what to do
-    sqlite3.SQLITE_FULL: "cannot be written: the disk is full; free some space, then go on with `rig resume`",
-    sqlite3.SQLITE_READONLY: "cannot be written: it is read-only; make file and folder writable, or name another "
-    "folder in RIG_HOME",
-    sqlite3.SQLITE_IOERR: "cannot be read or written: the file system fails; look at the disk or the network share, "
-    "then go on with `rig resume`",
+RECOVER = "move it to another folder, or copy its readable rows with `rig doctor --recover FOLDER`"
+FAILURES = {  # primary code of SQLite: fault and remedy
+    sqlite3.SQLITE_FULL: "cannot be written: the disk is full; free some space, then continue with `rig resume`",
+    sqlite3.SQLITE_READONLY: "cannot be written: it is read-only; make file and folder writable, or set RIG_HOME to "
+    "another folder",
+    sqlite3.SQLITE_IOERR: "cannot be read or written: the file system fails; check the disk or the network share, "
+    "then continue with `rig resume`",
     sqlite3.SQLITE_CANTOPEN: "cannot be opened; check RIG_HOME and the permissions of the folder",
-    sqlite3.SQLITE_BUSY: "another process has been writing to it for long; let that finish, then try again",
+    sqlite3.SQLITE_BUSY: "another process is writing to it; wait until it ends, then try again",
     sqlite3.SQLITE_CORRUPT: f"the record is damaged; {RECOVER}",
-    sqlite3.SQLITE_NOTADB: "the record is damaged, or no record at all; " + RECOVER,
+    sqlite3.SQLITE_NOTADB: f"the record is damaged, or the file is not a record; {RECOVER}",
 }
 
 
 def open_file(path: Path) -> Engine:
-    """The file's engine; its tables are made where there are none, and brought up to date where they are older.
+    """The engine of the file. Missing tables are made, old tables are migrated.
 
-    In a folder that this user may not write, it is opened for reading alone. Raises RecordError where it cannot be
-    opened, is damaged, or was written by a newer program; what is done with the engine later raises it too.
+    In a folder without write permission the file is opened read-only. Raises RecordError if the file cannot be opened,
+    is damaged, or belongs to a newer program. Later use of the engine raises it as well.
     """
     engine = create_engine(f"sqlite:///{path}", creator=lambda: _connected(path))
     event.listen(engine, "connect", lambda connection, _: give_sha256(connection))
@@ -43,20 +42,20 @@ def open_file(path: Path) -> Engine:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise RecordError(f"{path}: the record cannot be opened: {error.strerror}; check RIG_HOME") from None
+        raise RecordError(f"{path}: cannot open the record: {error.strerror}; check RIG_HOME") from None
     _make_tables(engine, path)
     return engine
 
 
 def _connected(path: Path) -> sqlite3.Connection:
-    """A new connection: a busy file is waited for, a commit reaches the disk."""
+    """A new connection. It waits for a busy file, and a commit reaches the disk."""
     if path.exists() and not os.access(path.parent, os.W_OK):
         return sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro&immutable=1", uri=True, check_same_thread=False)
     connection = sqlite3.connect(path, check_same_thread=False)
     try:
         _prepare(connection)
-    except (UnicodeDecodeError, sqlite3.OperationalError) as error:  # SQLite quotes what it cannot read
-        if getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR) == sqlite3.SQLITE_ERROR:  # at no fault of ours
+    except (UnicodeDecodeError, sqlite3.OperationalError) as error:  # SQLite quotes unreadable bytes
+        if getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR) == sqlite3.SQLITE_ERROR:  # the file is at fault
             raise RecordError(f"{path}: {FAILURES[sqlite3.SQLITE_CORRUPT]} ({error})") from None
         raise
     return connection
@@ -68,17 +67,17 @@ def _prepare(connection: sqlite3.Connection) -> None:
 
 
 def _require_there(connection: Connection, path: Path) -> None:
-    """SQLite writes on into a file that was removed, and nobody would ever read it. Raises RecordError."""
+    """Raises RecordError for a removed or exchanged file: SQLite would continue to write into the old one."""
     try:
         inode = path.stat().st_ino
     except OSError as error:
-        raise RecordError(f"{path}: is not there any more ({error.strerror}); look where its folder is") from None
+        raise RecordError(f"{path}: the record has disappeared ({error.strerror}); put its folder back") from None
     if connection.info.setdefault("inode", inode) != inode:
-        raise RecordError(f"{path}: is another file than before; let nobody exchange it while a command runs")
+        raise RecordError(f"{path}: the record was exchanged during this command; run the command again")
 
 
 def _tell(context: ExceptionContext, path: Path) -> None:
-    """Raises RecordError for what the file or its disk is to blame for."""
+    """Raises RecordError for a fault of the file or its disk."""
     error = context.original_exception
     if isinstance(error, UnicodeDecodeError):
         raise RecordError(f"{path}: {FAILURES[sqlite3.SQLITE_CORRUPT]}") from None
@@ -91,7 +90,7 @@ def _tell(context: ExceptionContext, path: Path) -> None:
 def _make_tables(engine: Engine, path: Path) -> None:
     with engine.begin() as to:
         if _version(to, path) < SCHEMA:
-            to.exec_driver_sql("BEGIN IMMEDIATE")  # two processes may come to a new file at once: one makes its tables
+            to.exec_driver_sql("BEGIN IMMEDIATE")  # of two processes at a new file only one makes the tables
             version = _version(to, path)
             metadata.create_all(to)
             for statement in (each for old in range(version or SCHEMA, SCHEMA) for each in MIGRATIONS[old]):
@@ -100,11 +99,11 @@ def _make_tables(engine: Engine, path: Path) -> None:
 
 
 def _version(to: Connection, path: Path) -> int:
-    """Of the file's tables; 0 where there are none. Raises RecordError for those of a newer program."""
+    """Schema of the tables; 0 without tables. Raises RecordError for tables of a newer program."""
     version = int(to.execute(text("PRAGMA user_version")).scalar_one())
     if version > SCHEMA:
         raise RecordError(
-            f"{path}: written by a newer version of this program (schema {version}, this one knows {SCHEMA}); "
-            "update the program, or name another folder in RIG_HOME"
+            f"{path}: the record is of a newer version of this program (schema {version}, this one knows {SCHEMA}); "
+            "get the new version, or set RIG_HOME to another folder"
         )
     return version

@@ -1,34 +1,105 @@
-"""What a run measured of one sensor: its poses and readings, and the table that analysis takes.
+"""The measurements of one sensor in a run: poses, readings, and the table for the analysis.
 
-The outputs of a batch's sensor are channels such as `a1.vx`; of one sensor they are plainly `vx`. Channels without a
-sensor's name belong to all.
+The outputs of a sensor of a batch are channels such as `a1.vx`; without a batch they are `vx`. Channels without the
+name of a sensor belong to all sensors.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from calibrations.table import Table
-from procedures.session import Reading
+import numpy as np
+
+from calibrations.table import Array, Table
+from drivers.errors import did_you_mean
+from procedures.questions import EDGES
+from procedures.session import Pose, Reading
 from procedures.soak import POWER_ON
 from rig.bench import Sensor
 from rig.errors import RecordError, UnknownRun
-from rig.nearest import did_you_mean
-from rig.record import displacement
-from rig.record.raw import samples_table
+from rig.record import tables
 from rig.record.store import Record
-from rig.record.tables import poses_table
-from rig.record.turned import positions_table, rates_table
+from rig.record.tables import MOST_BLOCKS, inflations, poses_table, samples_table
 from rig.record.values import Block, Kept, Run
 
-# Tables of which a row is a pose or a turn; of the others it is a sample.
+# The table of a magnetometer or a gyroscope.
+#
+# positions   a magnetometer: a row is the mean at one position; its attitude is not used; the field must be constant
+# rates       a gyroscope: a row is the mean of one turn or rest; the rate of the stage is positive by the right hand
+#             about the axis along the table's normal, so it is negative while beta rises
+#
+# Further columns of rates, from stages and mount: the axis of the turn in the sensor's frame (axis_x .. axis_z) and the
+# specific force in g (ax .. az).
+
+FIELD, RATE = ("mx", "my", "mz"), ("gx", "gy", "gz")
+NOT_OF_THESE = ("filter_corner_hz", "approach_deg")  # constants of poses only
+
+
+def positions_table(run: Run, poses: Iterable[Kept]) -> Table:
+    """A row for each position of a magnetometer. Raises RecordError without one."""
+    return _table(run, list(poses), FIELD, {})
+
+
+def rates_table(run: Run, poses: Iterable[Kept]) -> Table:
+    """A row for each turn or rest of a gyroscope. Raises RecordError without one."""
+    kept = list(poses)
+    normal = np.array([sensor_from_table(each.pose)[:, 2] for each in kept]).reshape(-1, 3)
+    force = np.array([specific_force_g(each.pose) for each in kept]).reshape(-1, 3)
+    columns = {"rate_deg_s": np.array([-each.pose.rate_deg_s for each in kept]) + 0.0}
+    columns |= {f"axis_{axis}": normal[:, k] for k, axis in enumerate("xyz")}
+    columns |= {f"a{axis}": force[:, k] for k, axis in enumerate("xyz")}
+    return _table(run, kept, RATE, columns)
+
+
+def sensor_from_table(pose: Pose) -> Array:
+    """The rotation of the mount, shape (3, 3): about the table's normal, face down, on edge."""
+    c, s = np.cos(np.radians(pose.mount_deg)), np.sin(np.radians(pose.mount_deg))
+    face = np.diag([1.0, -1.0, -1.0]) if pose.flip else np.eye(3)
+    edge = np.roll(np.eye(3), EDGES.index(pose.up), axis=0)
+    return np.asarray(edge @ face @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]))
+
+
+def sensor_from_base(pose: Pose) -> Array:
+    """The attitude of the sensor, shape (3, 3): both stages, then the mount."""
+    ca, sa = np.cos(np.radians(pose.alpha_deg)), np.sin(np.radians(pose.alpha_deg))
+    cb, sb = np.cos(np.radians(pose.beta_deg)), np.sin(np.radians(pose.beta_deg))
+    leaning = np.array([[ca, 0, sa], [0, 1, 0], [-sa, 0, ca]])
+    return np.asarray(sensor_from_table(pose) @ np.array([[cb, -sb, 0], [sb, cb, 0], [0, 0, 1]]) @ leaning)
+
+
+def specific_force_g(pose: Pose) -> Array:
+    """Specific force in the sensor's frame, g, shape (3,). In a turn it is the mean, along the table's normal."""
+    felt = sensor_from_base(pose)[:, 2]
+    along = sensor_from_table(pose)[:, 2]
+    return np.round(along * (along @ felt) if pose.rate_deg_s else felt, 12) + 0.0
+
+
+def _table(run: Run, kept: Sequence[Kept], outputs: Sequence[str], more: Mapping[str, Array]) -> Table:
+    if not kept:
+        raise RecordError(f"run {run.run} has no pose yet; `rig resume` continues it")
+    rows = [each.dwell for each in kept]
+    columns = dict(more) | {"t_s": np.array([each.t_s for each in kept])}
+    if all(each.temperature_c is not None for each in kept):
+        columns["temperature_c"] = np.array([each.temperature_c for each in kept], dtype=float)
+    columns |= {name: np.array([row.means[name] for row in rows]) for name in outputs}
+    columns |= {f"{name}_std": np.array([row.stds[name] for row in rows]) for name in outputs}
+    columns |= {"n": np.array([float(row.n) for row in rows])}
+    blocks = [each.samples for each in kept[:: 1 + len(kept) // MOST_BLOCKS]]
+    known = {name: value for name, value in run.constants.items() if name not in NOT_OF_THESE}
+    constants = {**known, "unit": "V", "sample_rate_hz": blocks[0].rate_hz, **inflations(blocks, outputs)}
+    labels = {"path": tuple(each.pose.path for each in kept)}
+    table = Table.from_columns(run.kind, columns, constants, run.run, labels)
+    return replace(table, numbers=np.array([each.number for each in kept]))
+
+
+# Tables with a row for each pose or turn; the others have a row for each sample.
 MADE = {"poses": poses_table, "positions": positions_table, "rates": rates_table}
 
 
 @dataclass(frozen=True)
 class Measured:
-    """A run as analysis sees it. `sensor` is one of the run's batch, None where it has only one."""
+    """A run for the analysis. `sensor` is one sensor of the batch, None without a batch."""
 
     record: Record
     run: Run
@@ -36,53 +107,53 @@ class Measured:
 
     @classmethod
     def named(cls, record: Record, name: str) -> Measured:
-        """`RUN`, or `RUN/SENSOR` of a batch. Raises UnknownRun; RecordError where none of a batch is named."""
+        """`RUN`, or `RUN/SENSOR` of a batch. Raises UnknownRun; RecordError for a batch without a sensor."""
         run_id, slash, sensor = name.partition("/")
         run = record.run(run_id)
         known = sensors_of(run)
         if slash and sensor not in known:
-            listed = did_you_mean(sensor, known) if known else " It has one sensor: leave out the slash."
+            listed = did_you_mean(sensor, known) if known else f" It has one sensor; write {run_id}."
             raise UnknownRun(f"run {run_id} has no sensor {sensor!r}.{listed}")
         if known and not slash:
             listed = ", ".join(known)
-            raise RecordError(f"run {run_id} holds the sensors {listed}; name one, such as {run_id}/{known[0]}")
+            raise RecordError(f"run {run_id} has the sensors {listed}; choose one, such as {run_id}/{known[0]}")
         return cls(record, run, sensor or None)
 
     def kept(self) -> Iterator[Kept]:
-        """Every pose that is not excluded, in order, with the sensor's own channels and the common ones."""
+        """Every pose without an exclusion, in order, with the channels of the sensor and the common ones."""
         return (of_sensor(kept, self.sensor) for kept in self.record.kept(self.run.run) if kept.excluded is None)
 
     def readings(self) -> Sequence[Reading]:
-        """Numbers that belong to the run."""
+        """The readings of the run."""
         return self.record.readings(self.run.run)
 
     @property
     def constants(self) -> Mapping[str, str | float]:
-        """What is known of the sensor, beside what holds for the bench."""
-        shaken = displacement.constants(self.run, self.sensor) if self.run.kind == "motion" else {}
+        """The constants of the bench and of the sensor."""
+        motion = tables.constants(self.run, self.sensor) if self.run.kind == "motion" else {}
         if self.sensor is None:
-            return {**self.run.constants, **shaken}
+            return {**self.run.constants, **motion}
         sensor = Sensor.model_validate(self.run.bench["sensors"][self.sensor])
-        return {**self.run.constants, **sensor.constants, **shaken}
+        return {**self.run.constants, **sensor.constants, **motion}
 
     def table(self) -> Table:
-        """A row for each pose or, in a run of another kind, for each sample. Raises RecordError where there is none."""
+        """A row for each pose or, in a run of another kind, for each sample. Raises RecordError without a row."""
         numbers, labels = self.record.columns(self.run.run)
         if numbers:
             return Table.from_columns(self.run.kind, numbers, self.run.constants, self.run.run, labels)
         return self.part(self.run.kind)
 
     def part(self, kind: str, path: str = "") -> Table:
-        """A table of another kind out of the run: of `poses` whose path begins with `path`. Raises RecordError."""
+        """A table of `kind` from the poses whose path begins with `path`. Raises RecordError."""
         run = replace(self.run, run=self.name, constants=self.constants, kind=kind)
         on_s = self.power_on_s()
         poses = (replace(kept, t_s=kept.t_s - on_s) for kept in self.kept() if kept.pose.path.startswith(path))
         return MADE.get(kind, samples_table)(run, poses)
 
     def power_on_s(self) -> float:
-        """When the run itself switched the sensor on, on its clock: 0 where it did not.
+        """The time on the run's clock when the run switched the sensor on; 0 if it did not.
 
-        The reading is the bench's, and was taken before the first pose by the same process.
+        The reading is on the clock of the bench, and the same process took it before the first pose.
         """
         read_s = next((reading.value for reading in self.readings() if reading.name == POWER_ON), None)
         first = next(self.record.kept(self.run.run), None)
@@ -98,17 +169,17 @@ class Measured:
 
 
 def table_of(record: Record, name: str) -> Table:
-    """The table of a run, measured or imported: see `Measured`."""
+    """The table of a measured or imported run, see `Measured`."""
     return Measured.named(record, name).table()
 
 
 def sensors_of(run: Run) -> list[str]:
-    """The sensors of the run's batch, in order; none where it has one."""
+    """The sensors of the batch, in order; empty without a batch."""
     return list(run.bench.get("sensors", {}))
 
 
 def of_sensor(kept: Kept, sensor: str | None) -> Kept:
-    """A pose with the channels of one sensor under their plain names, and the common ones."""
+    """A pose with the channels of one sensor, without its name in them, and the common channels."""
     if sensor is None:
         return kept
     samples = kept.samples

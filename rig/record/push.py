@@ -1,33 +1,53 @@
-"""Pushing: finished runs of a rig's record into the lab's, each whole or not yet to be seen, and never twice.
+"""Pushes finished runs into the lab's record, and verifies them there.
 
-A run is known by its uid. Its rows go over in batches of about MOST_BYTES, each a transaction that first locks the
-run's arrival and counts what is there; so whoever comes next, after a cut or at the same time, goes on where the last
-committed batch ended. The last transaction computes the digest of all that is there, in the lab, and only where it is
-that of the rig's own record is the run shown.
+A run is pushed completely, exactly once, and is not visible before it is complete. Its rows are sent in batches of
+about MOST_BYTES. Each batch is a transaction that locks the run's row in `arrivals` and counts the rows in the lab. So
+another push, after an interruption or at the same time, continues after the last committed batch. The last transaction
+computes the digest of all rows in the lab. The run becomes visible if it is equal to the digest of the rig's record.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 from sqlalchemy import Connection, Table, insert, select, update
 
+from rig.bench import Lab
 from rig.errors import RecordError
 from rig.record.content import count, digest, head, rows_of, run_row, uid_of
-from rig.record.dialects import is_new
-from rig.record.schema import arrivals, poses, runs
+from rig.record.schema import arrivals, is_new, poses, runs
 from rig.record.store import Record, now
+from rig.record.values import Run
 
-MOST_BYTES = 4 << 20  # of a batch: what a cut costs, and what is in memory
-ROW_BYTES = 200  # of a row beside its texts and samples, about
+
+def push_after(record: Record, run: Run, lab: Lab | None, tell: Callable[[str], None]) -> None:
+    """After a complete `run`, push all finished runs that are not in the lab. `tell` gets a message for each.
+
+    A failure of the lab does not affect the run.
+    """
+    if lab is None or not lab.push or run.state != "complete":
+        return
+    from rig.record.lab import lab_url  # only a rig with a lab needs the database driver
+
+    try:
+        with Record(lab_url(lab.url)) as there:
+            for each in unsent(record, there):
+                push(record, there, each)
+                tell(f"{each}: pushed to {there.where}")
+    except RecordError as error:
+        tell(f"not pushed: {error}")
+
+
+MOST_BYTES = 4 << 20  # of a batch: lost by an interruption, and held in memory
+ROW_BYTES = 200  # of a row without its texts and samples, about
 FINISHED = "complete"
 
 
 @dataclass(frozen=True)
 class Pushed:
-    """A run of the rig, and what it is called in the lab: its own name, but where another rig's run has that."""
+    """A run of the rig, and its name in the lab, which is different if a run of another rig has its name."""
 
     run: str
     name: str
@@ -37,7 +57,7 @@ class Pushed:
 
 @dataclass(frozen=True)
 class _Parcel:
-    """A finished run as it is here: its row without names, and its digests."""
+    """A finished run of the rig: its row without names, and its digests."""
 
     run: str
     uid: str
@@ -47,9 +67,9 @@ class _Parcel:
 
 
 def unsent(own: Record, lab: Record, named: Sequence[str] = ()) -> list[str]:
-    """The finished runs that the lab does not have as they are here, oldest first; of those that are named, if any.
+    """The finished runs that are missing or different in the lab, oldest first; only the `named` ones, if any.
 
-    Raises UnknownRun, RecordError for a named run that is not finished, LabAway.
+    Raises UnknownRun, RecordError for an unfinished named run, LabAway.
     """
     finished = named or [run.run for run in reversed(own.runs()) if run.state == FINISHED]
     for run in named:
@@ -62,9 +82,9 @@ def unsent(own: Record, lab: Record, named: Sequence[str] = ()) -> list[str]:
 
 
 def push(own: Record, lab: Record, run: str) -> Pushed:
-    """Bring a finished run over, or what of it is not there yet. Raises LabAway, and then the next push goes on.
+    """Push the missing rows of a finished run. Raises LabAway; then the next push continues.
 
-    Raises RecordError where the lab's copy was changed in the lab, which stays as it is.
+    Raises RecordError if the copy in the lab was changed there. The copy stays unchanged.
     """
     _require_finished(own, run)
     with own.engine.connect() as at:
@@ -78,11 +98,11 @@ def push(own: Record, lab: Record, run: str) -> Pushed:
 
 def _require_finished(own: Record, run: str) -> None:
     if (state := own.run(run).state) != FINISHED:
-        raise RecordError(f"run {run} is {state}: only complete runs are pushed; `rig resume {run}` goes on with it")
+        raise RecordError(f"run {run} is {state}, and only complete runs are pushed; `rig resume {run}` continues it")
 
 
 def _step(at: Connection, to: Connection, parcel: _Parcel) -> Pushed | None:
-    """The next batch, out of the rig's record `at` into the lab's `to`; None while more is to come."""
+    """Push the next batch from the rig's record `at` to the lab's `to`. Returns None if there are more."""
     name, arrived = _arrival(to, parcel)
     if arrived == parcel.head:
         return Pushed(parcel.run, name, "there", parcel.digest)
@@ -93,37 +113,37 @@ def _step(at: Connection, to: Connection, parcel: _Parcel) -> Pushed | None:
 
 
 def _arrival(to: Connection, parcel: _Parcel) -> tuple[str, str | None]:
-    """The run's name in the lab, and the head with which it has arrived; locked until the transaction ends."""
+    """The name of the run in the lab, and its head there; locked until the end of the transaction."""
     mine = select(arrivals.c.run, arrivals.c.head).where(arrivals.c.uid == parcel.uid).with_for_update()
-    for name in (parcel.run, f"{parcel.run}-{parcel.uid[:8]}"):  # the second where another rig's run has the first
+    for name in (parcel.run, f"{parcel.run}-{parcel.uid[:8]}"):  # the second if a run of another rig has the first
         if (row := to.execute(mine).one_or_none()) is not None:
             return row.run, row.head
         values = {**parcel.row, "run": name, "uid": parcel.uid}
         if is_new(to, runs, values):
             to.execute(insert(arrivals), {"uid": parcel.uid, "run": name, "at": now()})
             return name, None
-    raise RecordError(f"run {parcel.run}: the lab has two other runs of that name")
+    raise RecordError(f"run {parcel.run}: the lab has two other runs with this name; ask the owner of the lab's record")
 
 
 def _filled(at: Connection, to: Connection, run: str, name: str) -> bool:
-    """Add a batch of rows to those that are there; whether that were all."""
-    left = MOST_BYTES
-    for table, there in count(to, name).items():
-        rows, size = _next(at, table, run, there, left)
+    """Add a batch of rows. Returns whether all rows are in the lab."""
+    remaining = MOST_BYTES
+    for table, present in count(to, name).items():
+        rows, size = _next(at, table, run, present, remaining)
         if rows:
             to.execute(insert(table), [{**row, "run": name} for row in rows])
-        left -= size
-        if left <= 0:
+        remaining -= size
+        if remaining <= 0:
             return False
     return True
 
 
-def _next(at: Connection, table: Table, run: str, there: int, most: int) -> tuple[list[Mapping[str, Any]], int]:
-    """Rows of a run after the first `there`, as many as it takes to come to `most` bytes; and how many these are."""
+def _next(at: Connection, table: Table, run: str, present: int, most: int) -> tuple[list[Mapping[str, Any]], int]:
+    """Rows of a run after the first `present`, up to about `most` bytes; and their size in bytes."""
     rows: list[Mapping[str, Any]] = []
     size = 0
-    with at.execute(rows_of(table, run).offset(there)) as found:
-        for row in found.mappings():
+    with at.execute(rows_of(table, run).offset(present)) as result:
+        for row in result.mappings():
             rows.append(dict(row))
             size += ROW_BYTES + sum(len(value) for value in row.values() if isinstance(value, str | bytes))
             if size >= most:
@@ -132,7 +152,7 @@ def _next(at: Connection, table: Table, run: str, there: int, most: int) -> tupl
 
 
 def _seal(at: Connection, to: Connection, parcel: _Parcel, name: str) -> None:
-    """What may have changed since the run was first pushed; then the proof that all is there, and the run is shown."""
+    """Update the parts that can change, compare the digests, and make the run visible."""
     to.execute(update(runs).where(runs.c.run == name).values(dict(parcel.row)))
     excluded = poses.c.excluded.is_not(None)
     to.execute(update(poses).where(poses.c.run == name, excluded).values(excluded=None))
@@ -141,8 +161,26 @@ def _seal(at: Connection, to: Connection, parcel: _Parcel, name: str) -> None:
         to.execute(update(poses).where(one).values(excluded=row.excluded))
     if digest(to, name) != parcel.digest:
         raise RecordError(
-            f"run {parcel.run}: what the lab would hold is not what this rig holds, so nothing was replaced; it was "
-            "changed in the lab, or here meanwhile: then push it again"
+            f"run {parcel.run}: the copy in the lab is different from the run of this rig, so nothing was replaced; if "
+            "the run has just changed here, push it again; else the copy was changed in the lab"
         )
     sealed = {"head": parcel.head, "digest": parcel.digest, "at": now()}
     to.execute(update(arrivals).where(arrivals.c.uid == parcel.uid).values(sealed))
+
+
+@dataclass(frozen=True)
+class Verified:
+    """Names of runs in the lab. Readers do not see those on their way; the next push of the rig continues them."""
+
+    sound: tuple[str, ...]
+    on_their_way: tuple[str, ...]
+    changed: tuple[str, ...]
+
+
+def verify(lab: Record) -> Verified:
+    """Compute the digest of every pushed run again, and compare it with the digest at its arrival. Raises LabAway."""
+    with lab.engine.connect() as at:
+        rows = at.execute(select(arrivals.c.run, arrivals.c.digest).order_by(arrivals.c.run)).all()
+        found = {row.run: digest(at, row.run) == row.digest for row in rows if row.digest is not None}
+    sound, changed = (tuple(run for run, is_sound in found.items() if is_sound is wanted) for wanted in (True, False))
+    return Verified(sound, tuple(row.run for row in rows if row.digest is None), changed)

@@ -1,7 +1,7 @@
-"""A damaged record: every row that can still be read, copied into a new one, and what is lost, told.
+"""Recovery of a damaged record: copies every readable row into a new record, and reports the losses.
 
-SQLite keeps rows in pages, so damage at one place loses some rows of one table. Each table is read from both of its
-ends to the damage; a pose without its samples is left behind with them.
+SQLite stores rows in pages, so damage at one place loses some rows of one table. Each table is read from both ends up
+to the damage. A pose without its samples is not copied.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from rig.record.file import open_file
 from rig.record.schema import metadata
 
 FILE = "record.db"
-UNREADABLE = (sqlite3.Error, UnicodeDecodeError)  # of its own messages, which quote what it cannot read
+UNREADABLE = (sqlite3.Error, UnicodeDecodeError)  # the second: SQLite quotes unreadable bytes in its messages
 
 
 @dataclass(frozen=True)
 class Recovered:
-    """Rows that were copied, by table; tables with rows that could not be read; poses whose samples are spoilt."""
+    """The number of copied rows by table, the tables with unreadable rows, and the poses with damaged samples."""
 
     rows: Mapping[str, int]
     damaged: tuple[str, ...]
@@ -31,13 +31,13 @@ class Recovered:
 
 
 def recover(source: Path, folder: Path) -> Recovered:
-    """Copy what can be read of the record in the file `source` into a new record in `folder`.
+    """Copy the readable rows of the record in the file `source` into a new record in `folder`.
 
-    Raises RecordError where `folder` has a record already, or the file is none at all.
+    Raises RecordError if `folder` has a record already, or if the file is not a record.
     """
     target = folder / FILE
     if target.exists():
-        raise RecordError(f"{target}: is there already; name a folder without a record")
+        raise RecordError(f"{target}: this record exists already; give a folder without a record")
     open_file(target).dispose()
     with closing(_opened(source)) as old, closing(sqlite3.connect(target)) as new:
         rows, damaged = {}, []
@@ -54,24 +54,24 @@ def recover(source: Path, folder: Path) -> Recovered:
 
 
 def _opened(source: Path) -> sqlite3.Connection:
-    """The damaged file, with its log, never written to."""
+    """The damaged file with its log, read-only."""
     try:
         old = sqlite3.connect(f"{source.resolve().as_uri()}?mode=ro", uri=True)
         old.execute("SELECT count(*) FROM sqlite_master").fetchone()
     except UNREADABLE as error:
-        raise RecordError(f"{source}: nothing of it can be read ({error}); restore a copy") from None
+        raise RecordError(f"{source}: no row is readable ({error}); restore a copy of the record") from None
     return old
 
 
 def _copied(old: sqlite3.Connection, new: sqlite3.Connection, table: str) -> tuple[int, bool]:
-    """How many rows of a table were copied, and whether that is all of them."""
+    """The number of copied rows of a table, and whether these are all."""
     known = {row[1] for row in new.execute(f"PRAGMA table_info({table})")}
     try:
         names = [row[1] for row in old.execute(f"PRAGMA table_info({table})") if row[1] in known]
     except UNREADABLE:
         return 0, False
     if not names:
-        return 0, True  # a table that is younger than the record
+        return 0, True  # this table is newer than the record
     places = ", ".join("?" * len(names))
     insert = f"INSERT OR IGNORE INTO {table} ({', '.join(names)}) VALUES ({places})"  # noqa: S608 - our own schema's
     copied, whole = 0, True
@@ -88,7 +88,7 @@ def _copied(old: sqlite3.Connection, new: sqlite3.Connection, table: str) -> tup
 
 
 def _readable(old: sqlite3.Connection, select: str) -> Iterator[tuple[object, ...] | None]:
-    """Rows up to the first that cannot be read, which is None."""
+    """Rows up to the first unreadable row, which is None."""
     try:
         yield from old.execute(select)
     except UNREADABLE:
@@ -96,7 +96,7 @@ def _readable(old: sqlite3.Connection, select: str) -> Iterator[tuple[object, ..
 
 
 def _spoilt(new: sqlite3.Connection) -> Iterator[str]:
-    """Poses whose samples came, but are not what was written; they are taken out."""
+    """Delete the samples that are damaged. Returns their poses."""
     for run, number, samples in new.execute("SELECT run, number, samples FROM blocks").fetchall():
         try:
             codec.decode(samples)

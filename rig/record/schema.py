@@ -1,13 +1,84 @@
-"""The tables of the record, the rig's own and the lab's. `SCHEMA` counts their versions.
-
-The number is kept beside the tables: in a file's `user_version`, on a server in the comment on the table `runs`.
-"""
+"""The tables of the record, and the differences between SQLite (the rig's record) and PostgreSQL (the lab's)."""
 
 from __future__ import annotations
 
-from sqlalchemy import Column, Float, ForeignKey, Index, Integer, LargeBinary, MetaData, String, Table
+import hashlib
+import json
+import sqlite3
+from collections.abc import Mapping
+from typing import Any
 
-from rig.record.dialects import Counter, Document
+from sqlalchemy import (
+    JSON,
+    BigInteger,
+    Column,
+    Connection,
+    Dialect,
+    Float,
+    ForeignKey,
+    Index,
+    Integer,
+    LargeBinary,
+    MetaData,
+    String,
+    Table,
+    Text,
+    TypeDecorator,
+    text,
+)
+from sqlalchemy.dialects import postgresql, sqlite
+from sqlalchemy.sql.expression import TextClause
+from sqlalchemy.types import TypeEngine
+
+SERVER = "postgresql"
+
+# A number given by the database; SQLite needs the type INTEGER for it.
+Counter = BigInteger().with_variant(Integer, "sqlite")
+
+
+class Document(TypeDecorator[Any]):
+    """JSON as Python writes it, with Infinity. It is text in PostgreSQL, because its JSON type refuses Infinity."""
+
+    impl = JSON
+    cache_ok = True
+
+    def load_dialect_impl(self, dialect: Dialect) -> TypeEngine[Any]:
+        return dialect.type_descriptor(Text() if dialect.name == SERVER else JSON())
+
+    def process_bind_param(self, value: Any, dialect: Dialect) -> Any:
+        return json.dumps(value) if dialect.name == SERVER and value is not None else value
+
+    def process_result_value(self, value: Any, dialect: Dialect) -> Any:
+        return json.loads(value) if dialect.name == SERVER and value is not None else value
+
+
+def is_new(to: Connection, table: Table, values: Mapping[str, Any]) -> bool:
+    """Insert a row unless its key exists. Returns whether it was inserted."""
+    statement = insert_or(to, table).values(values).on_conflict_do_nothing()
+    return bool(to.execute(statement, execution_options={"preserve_rowcount": True}).rowcount)
+
+
+def insert_or(to: Connection, table: Table) -> sqlite.Insert | postgresql.Insert:
+    """An insert with a clause for an existing key."""
+    return postgresql.insert(table) if to.dialect.name == SERVER else sqlite.insert(table)
+
+
+def newest_first(at: Connection) -> TextClause:
+    """The order of runs: by their begin in this record; with many rigs, by their clocks."""
+    return text("runs.created DESC, runs.run DESC" if at.dialect.name == SERVER else "runs.rowid DESC")
+
+
+def give_sha256(connection: sqlite3.Connection) -> None:
+    """Define the function sha256 of PostgreSQL in SQLite."""
+    connection.create_function("sha256", 1, _sha256, deterministic=True)
+
+
+def _sha256(data: bytes | None) -> bytes | None:
+    return None if data is None else hashlib.sha256(data).digest()
+
+
+# `SCHEMA` is the version of the tables. It is stored in `user_version` of a file, and on a server in the comment on the
+# table `runs`.
 
 SCHEMA = 8
 metadata = MetaData()
@@ -146,7 +217,7 @@ answers = Table(  # about one sensor of a fleet, so that the same question is no
     Column("answer", Document, nullable=False),
 )
 
-# What brings an older file to the next version. Tables that are wholly new are made before.
+# Statements from each version to the next. New tables are made before.
 MIGRATIONS = {
     1: ("ALTER TABLE poses ADD COLUMN excluded VARCHAR",),
     2: tuple(f"ALTER TABLE poses ADD COLUMN {role}_read_deg FLOAT" for role in ("alpha", "beta")),

@@ -1,7 +1,6 @@
-"""The record: what is written and read, one transaction at a time.
+"""The record: writes and reads runs, one transaction at a time.
 
-A pose, its samples and the simulated bench's state are one transaction, so a kill loses the pose in flight and
-nothing else.
+A pose, its samples and the state of the simulated bench are one transaction, so a kill loses only the present pose.
 """
 
 from __future__ import annotations
@@ -24,55 +23,68 @@ from sqlalchemy import Table as SqlTable
 from sqlalchemy.exc import DatabaseError
 
 from calibrations.table import Table
+from drivers.errors import did_you_mean
 from procedures.session import Dwell, Pose, Reading
 from rig.errors import RecordError, UnknownRun
-from rig.home import RECORD, home
+from rig.files import RECORD, home
 from rig.lease import is_held
-from rig.nearest import did_you_mean
 from rig.record import codec
-from rig.record.dialects import insert_or, is_new, newest_first
 from rig.record.file import RECOVER, open_file
-from rig.record.schema import arrivals, blocks, columns, dwells, events, log, poses, readings, runs, states
+from rig.record.schema import (
+    arrivals,
+    blocks,
+    columns,
+    dwells,
+    events,
+    insert_or,
+    is_new,
+    log,
+    newest_first,
+    poses,
+    readings,
+    runs,
+    states,
+)
 from rig.record.values import Block, Event, Kept, Line, Run
 
 FILE = "record.db"
-MOST_LINES = 1000  # of the log that wait
+MOST_LINES = 1000  # of the log in memory
 _POSE = ("alpha_deg", "beta_deg", "direction", "path", "mount_deg", "flip", "up", "rate_deg_s")
 _BESIDE = ("t_s", "temperature_c", "alpha_read_deg", "beta_read_deg")
 
 
 class Record:
-    """The runs in the folder `place` (default: the application's own), or on the server that it names.
+    """The record in the folder `place` (default: the folder of the application), or on the server with this URL.
 
-    A context manager. Raises RecordError where the file cannot be opened, is damaged, or was written by a newer
-    program; LabAway for a server that cannot be reached.
+    A context manager. Raises RecordError if the file cannot be opened, is damaged, or belongs to a newer program;
+    LabAway without a connection to the server.
     """
 
     def __init__(self, place: Path | URL | None = None) -> None:
-        self.folder = home() if isinstance(place, URL) else place or home()  # of the locks, too
+        self.folder = home() if isinstance(place, URL) else place or home()  # also of the locks
         self.path = self.folder / FILE
         self.where, self._engine = _opened(place) if isinstance(place, URL) else (str(self.path), open_file(self.path))
-        self._lines: list[dict[str, Any]] = []  # of the log, on their way into the file
+        self._lines: list[dict[str, Any]] = []  # of the log, not written yet
 
     @classmethod
     def to_read(cls) -> Self:
-        """The lab's record where it is the one to be read (`--record URL`, RIG_RECORD), else the application's own."""
+        """The record for reading: of a lab if it is chosen (`--record URL`, RIG_RECORD), else of this rig."""
         if not (url := os.environ.get(RECORD)):
             return cls()
-        from rig.record.lab_url import lab_url  # a rig without a lab needs no driver
+        from rig.record.lab import lab_url  # only a rig with a lab needs the database driver
 
         return cls(lab_url(url, RECORD))
 
     @classmethod
     def to_find(cls, run: str, own: bool = False) -> Self:
-        """The record to read, or the application's `own`, to look for a run in, which makes none. Raises UnknownRun."""
+        """The record for reading, or the rig's `own`, for a search. It does not make a record. Raises UnknownRun."""
         if not (home() / FILE).is_file() and (own or not cls.is_there()):
-            raise UnknownRun(f"no run {run!r}: nothing is recorded yet in {home()}")
+            raise UnknownRun(f"no run {run!r}: there is no record yet in {home()}; run a procedure first")
         return cls() if own else cls.to_read()
 
     @staticmethod
     def is_there() -> bool:
-        """Whether the record to read has been made; a server's is asked for when it is opened."""
+        """Whether the record for reading exists. A record on a server is checked when it is opened."""
         return bool(os.environ.get(RECORD)) or (home() / FILE).is_file()
 
     def __enter__(self) -> Self:
@@ -85,7 +97,7 @@ class Record:
 
     @property
     def engine(self) -> Engine:
-        """The database, for whoever copies whole runs."""
+        """The database."""
         return self._engine
 
     def close(self) -> None:
@@ -105,14 +117,14 @@ class Record:
         source: str,
         kind: str = "poses",
     ) -> str:
-        """A new run of `procedure`, in the state "running", for a table of `kind`; its id."""
+        """Add a run of `procedure` in the state "running", for a table of `kind`. Returns its id."""
         values = {"kind": kind, "procedure": procedure, "state": "running", "settings": dict(settings)}
         values |= {"bench": dict(bench), "identities": dict(identities), "configuration": configuration}
         with self._engine.begin() as to:
             return _new_run(to, values | {"constants": dict(constants), "source": source})
 
     def keep(self, run: str, number: int, kept: Kept, state: Mapping[str, Any] | None) -> None:
-        """Pose, samples and the simulated bench's `state`, in one transaction."""
+        """Add pose, samples and the `state` of the simulated bench, in one transaction."""
         key = {"run": run, "number": number}
         pose = {name: getattr(kept.pose, name) for name in _POSE}
         samples = {name: getattr(kept.samples, name) for name in ("rate_hz", "start_s")}
@@ -129,7 +141,7 @@ class Record:
             self._put_lines(to)
 
     def keep_readings(self, run: str, read: Iterable[Reading], state: Mapping[str, Any] | None) -> None:
-        """Readings and the simulated bench's `state`, in one transaction; a name that is there is replaced."""
+        """Add readings and the `state` of the simulated bench, in one transaction. An existing name is replaced."""
         with self._engine.begin() as to:
             for reading in read:
                 _put(to, readings, {"run": run, "at": now(), **vars(reading)}, ("run", "name"))
@@ -138,7 +150,7 @@ class Record:
             self._put_lines(to)
 
     def log(self, run: str, clock_s: float, who: str, what: str, text: str) -> None:
-        """A line of a run's log. It is on the disk with what is kept next, or when MOST_LINES wait for that."""
+        """Add a line to the log of a run. It is written with the next pose, or with MOST_LINES other lines."""
         line = {"run": run, "at": now(), "clock_s": clock_s, "who": who, "what": what, "text": text}
         self._lines.append(line)
         if len(self._lines) >= MOST_LINES:
@@ -146,26 +158,26 @@ class Record:
                 self._put_lines(to)
 
     def exclude(self, run: str, number: int, reason: str | None) -> None:
-        """Leave a pose out of every analysis, with a reason that stays as an event; None takes it in again.
+        """Exclude a pose from every analysis, with a reason that stays as an event; None includes it again.
 
-        Raises RecordError where there is no such pose.
+        Raises RecordError for an unknown pose.
         """
         chosen = (poses.c.run == run) & (poses.c.number == number)
         with self._engine.begin() as to:
             if not to.execute(update(poses).where(chosen).values(excluded=reason)).rowcount:
-                raise RecordError(f"run {run} has no pose {number}; `rig show {run} --poses` lists those that it has")
+                raise RecordError(f"run {run} has no pose {number}; `rig show {run} --poses` lists its poses")
             what = f"pose {number} {'included' if reason is None else 'excluded'}"
             to.execute(insert(events), {"run": run, "at": now(), "what": what, "text": reason or "again"})
 
     def keep_state(self, run: str, state: Mapping[str, Any]) -> None:
-        """The simulated bench's state before the first pose."""
+        """Store the state of the simulated bench before the first pose."""
         with self._engine.begin() as to:
             _put_state(to, run, state)
 
     def set_state(
         self, run: str, state: str, message: str | None = None, results: Mapping[str, Any] | None = None
     ) -> None:
-        """running, complete, stopped or failed; the last three end the run."""
+        """Set the state: running, complete, stopped or failed. The last three end the run."""
         ended = None if state == "running" else now()
         values = {"state": state, "message": message, "ended": ended, "results": dict(results or {})}
         with self._engine.begin() as to:
@@ -173,17 +185,17 @@ class Record:
             self._put_lines(to)
 
     def set_results(self, run: str, results: Mapping[str, Any]) -> None:
-        """Results that were made anew after the end of a run."""
+        """Replace the results of a run after its end."""
         with self._engine.begin() as to:
             to.execute(update(runs).where(runs.c.run == run).values(results=dict(results)))
 
     def note(self, run: str, what: str, text: str) -> None:
-        """Something that happened in a run."""
+        """Add an event to a run."""
         with self._engine.begin() as to:
             to.execute(insert(events), {"run": run, "at": now(), "what": what, "text": text})
 
     def add_table(self, table: Table, settings: Mapping[str, Any] | None = None) -> str:
-        """An imported table as a run of its own, with how it was taken from its file; its id."""
+        """Add an imported table as a run, with the settings of the import. Returns its id."""
         values = {"kind": table.kind, "procedure": "import", "state": "complete", "bench": {}}
         values |= {"settings": dict(settings or {})}
         values |= {"configuration": table.digest, "constants": dict(table.constants), "source": table.source}
@@ -206,7 +218,7 @@ class Record:
             return [self._seen(Run(**row._mapping)) for row in rows]
 
     def run(self, run: str) -> Run:
-        """One run. Raises UnknownRun with the nearest name."""
+        """One run. Raises UnknownRun with a suggestion."""
         with self._reading() as at:
             row = at.execute(_select_runs().where(runs.c.run == run)).one_or_none()
             if row is not None:
@@ -215,27 +227,27 @@ class Record:
         raise UnknownRun(f"no run {run!r} in {self.where}.{did_you_mean(run, known[-20:])}")
 
     def poses(self, run: str) -> list[Pose]:
-        """The kept poses, in their order, without those that were excluded."""
+        """The poses in order, without the excluded ones."""
         chosen = (poses.c.run == run) & poses.c.excluded.is_(None)
         query = select(*[poses.c[name] for name in _POSE]).where(chosen).order_by(poses.c.number)
         with self._reading() as at:
             return [Pose(**row._mapping) for row in at.execute(query)]
 
     def excluded(self, run: str) -> dict[int, str]:
-        """Why each pose that is left out of every analysis is, by its number."""
+        """The reason of each excluded pose, by its number."""
         chosen = (poses.c.run == run) & poses.c.excluded.is_not(None)
         query = select(poses.c.number, poses.c.excluded).where(chosen).order_by(poses.c.number)
         with self._reading() as at:
             return {row.number: row.excluded for row in at.execute(query)}
 
     def next_number(self, run: str) -> int:
-        """The number of the next pose to be kept; excluded ones keep theirs."""
+        """The number of the next pose. Excluded poses count."""
         with self._reading() as at:
             highest = at.execute(select(func.max(poses.c.number)).where(poses.c.run == run)).scalar_one()
         return 0 if highest is None else int(highest) + 1
 
     def last_t_s(self, run: str) -> float | None:
-        """The time of the last kept pose; None before the first."""
+        """The time of the last pose; None before the first."""
         with self._reading() as at:
             last: float | None = at.execute(select(func.max(poses.c.t_s)).where(poses.c.run == run)).scalar_one()
         return last
@@ -248,7 +260,7 @@ class Record:
             return [Reading(*row) for row in at.execute(query)]
 
     def kept(self, run: str) -> Iterator[Kept]:
-        """Every pose with its samples, in order, excluded ones too; few in memory at a time."""
+        """Every pose with its samples, in order, with the excluded ones. Only a few are in memory at a time."""
         same = (poses.c.run == blocks.c.run) & (poses.c.number == blocks.c.number)
         query = select(poses, blocks).join_from(poses, blocks, same).where(poses.c.run == run)
         with self._reading() as at:
@@ -257,9 +269,9 @@ class Record:
                 yield _kept(row)
 
     def dwells(self, run: str, after: int = -1) -> list[tuple[int, Dwell]]:
-        """Every pose with a number above `after` that is not excluded, as means and scatter, without its samples.
+        """Means and scatter of every pose with a number above `after`, without the excluded ones.
 
-        Those of runs of an older program are made of the samples, which takes longer.
+        For runs of an older program they are computed from the samples, which is slower.
         """
         same = (poses.c.run == dwells.c.run) & (poses.c.number == dwells.c.number)
         query = select(poses, dwells.c.n, dwells.c.means, dwells.c.stds).join_from(poses, dwells, same, isouter=True)
@@ -270,18 +282,18 @@ class Record:
         return [(row.number, older.get(row.number) or _dwell(row)) for row in rows]
 
     def state(self, run: str) -> dict[str, Any] | None:
-        """The simulated bench's state after the last kept pose; None on a real bench."""
+        """The state of the simulated bench after the last pose; None on a real bench."""
         with self._reading() as at:
             return at.execute(select(states.c.state).where(states.c.run == run)).scalar_one_or_none()
 
     def events(self, run: str) -> list[Event]:
-        """What happened in a run, in order."""
+        """The events of a run, in order."""
         query = select(events.c.at, events.c.what, events.c.text).where(events.c.run == run)
         with self._reading() as at:
             return [Event(*row) for row in at.execute(query.order_by(events.c.event))]
 
     def lines(self, run: str, what: Sequence[str] = ()) -> list[Line]:
-        """A run's log, in order; of `what` only, where it says some."""
+        """The log of a run, in order; only the kinds in `what`, if there are any."""
         columns = [log.c[name] for name in ("at", "clock_s", "who", "what", "text")]
         chosen = (log.c.run == run) & (log.c.what.in_(what) if what else true())
         with self._reading() as at:
@@ -297,7 +309,7 @@ class Record:
 
     @contextmanager
     def _reading(self) -> Iterator[Connection]:
-        """A connection to read by; what cannot be in a sound record is a RecordError."""
+        """A connection for reading. An impossible value is a RecordError."""
         try:
             with self._engine.connect() as at:
                 yield at
@@ -306,21 +318,20 @@ class Record:
             raise RecordError(f"{self.where}: the record is damaged; {RECOVER} ({what})") from None
 
     def _put_lines(self, to: Connection) -> None:
-        """Lines of the log that wait are written; where that fails they are not tried again."""
+        """Write the lines of the log. After a failure they are dropped."""
         lines, self._lines = self._lines, []
         if lines:
             to.execute(insert(log), lines)
 
     def _seen(self, run: Run) -> Run:
-        """A run that says "running" though no process holds it was killed: it is stopped, and can be resumed."""
+        """The run; in the state "stopped" if it is "running" without a process, because its process was killed."""
         if run.state != "running" or is_held(self.folder, run.run):
             return run
         return replace(run, state="stopped", message="its process was killed")
 
 
 def _opened(url: URL) -> tuple[str, Engine]:
-    from rig.record.lab_url import shown
-    from rig.record.server import open_server
+    from rig.record.lab import open_server, shown
 
     return shown(url), open_server(url)
 
@@ -331,12 +342,12 @@ def now() -> str:
 
 
 def _new_run(to: Connection, values: Mapping[str, Any]) -> str:
-    """Its id sorts by time and reads well: 20261121-093012-sweep-a1b."""
+    """Add a run. Returns its id, which sorts by time: 20261121-093012-sweep-a1b."""
     while True:
         run = f"{datetime.now(UTC):%Y%m%d-%H%M%S}-{values['procedure']}-{secrets.token_hex(2)[:3]}"
         row = {"results": {}, "identities": {}, **values, "run": run, "created": now(), "uid": uuid.uuid4().hex}
         if is_new(to, runs, row):
-            return run  # else another of the same second has it: draw again
+            return run  # else a run of the same second has this id
 
 
 def _put_state(to: Connection, run: str, state: Mapping[str, Any]) -> None:
@@ -363,7 +374,7 @@ def _dwell(row: Row[Any]) -> Dwell:
 def _kept(row: Row[Any]) -> Kept:
     where = f"run {row.run}, pose {row.number}"
     if row.codec != codec.CODEC:
-        raise RecordError(f"{where}: samples in the unknown format {row.codec!r}; update the program")
+        raise RecordError(f"{where}: the samples have the unknown format {row.codec!r}; update the program")
     try:
         volts = codec.decode(row.samples)
     except ValueError as error:

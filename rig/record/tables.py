@@ -1,30 +1,137 @@
-"""A run as the table that analysis takes: the mean, std and number of every pose's samples.
+"""Tables of runs for the analysis, from the samples of the record: poses, and single samples.
 
-The displacement sensor is left out: of a carriage that stands still it tells nothing, and noise is no regressor.
+The record has the commanded angles of the poses. The table has the actual angles: for a manual stage the reading of its
+dial, and for a stage with an error table the true angle. The commanded angles are in the column `alpha_set_deg`. The
+constant `alpha_std_deg` is the standard uncertainty of the angles (rms over the poses).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from math import sqrt
+from typing import Any
 
 import numpy as np
 
-from calibrations.noise_estimation.mean_noise import measured_inflation
+from calibrations.geometry.error_table import ErrorTable
+from calibrations.noise.mean_noise import measured_inflation
 from calibrations.table import Array, Table
 from procedures.session import Samples
-from rig.bench import D63
+from rig.bench import D63, TURNING, Bench, Instrument
 from rig.errors import RecordError
-from rig.record.angles import as_they_were
 from rig.record.values import Kept, Run
 
-AXES = ("vx", "vy", "vz")  # channels whose scatter is kept; others are regressors
-MOST_BLOCKS = 256  # spread over the run, that its noise is measured on: bounds the memory
-SURE = 0.1  # relative standard error above which the filter's formula knows a mean's noise better
+Columns = Mapping[str, Array]
+
+
+def correct_angles(run: Run, columns: Columns) -> tuple[dict[str, Array], dict[str, float]]:
+    """Columns with the actual angles of `run`, and constants with their standard uncertainties.
+
+    Raises DataError for an angle outside an error table.
+    """
+    corrected, constants = dict(columns), {}
+    for role in TURNING:
+        if f"{role}_deg" not in corrected:
+            continue
+        read_deg = corrected.pop(f"{role}_read_deg", None)
+        part = run.bench.get("instruments", {}).get(role)
+        points = part and part.get("error_table")
+        if read_deg is None and not points:
+            continue
+        shown_deg = corrected[f"{role}_deg"] if read_deg is None else read_deg
+        variance = np.full(len(shown_deg), 0.0 if read_deg is None else _resolution_deg(part) ** 2 / 12)
+        true_deg = shown_deg
+        if points:
+            true_deg, table_std_deg = ErrorTable(tuple(map(tuple, points))).true_deg(shown_deg)
+            variance = variance + table_std_deg**2
+        corrected |= {f"{role}_set_deg": corrected[f"{role}_deg"], f"{role}_deg": true_deg}
+        constants[f"{role}_std_deg"] = sqrt(float(variance.mean()))
+    return corrected, constants
+
+
+def _resolution_deg(part: Mapping[str, Any]) -> float:
+    """Resolution of the dial of a manual stage, deg."""
+    return float(Instrument.model_validate(part).typed_settings().resolution_deg)
+
+
+# Displacement of the carriage, from the channel d63 and the calibration curve of the run's bench. It is positive
+# towards the sensor's +x. The converter samples the channels of a scan in turn; the constants have the delays.
+
+UM = 1e-6
+AXES = ("vx", "vy", "vz")  # outputs of the sensor; other channels are regressors
+
+
+def displacement_m(run: Run, volts: Array) -> Array:
+    """Displacement of each sample, m, shape (n,), from an arbitrary zero.
+
+    Raises SensorFault for a reading outside the curve, RecordError without a curve in the run's bench.
+    """
+    sensor = Bench.model_validate(run.bench).d63
+    if sensor is None:
+        raise RecordError(f"run {run.run}: its bench has no key d63 with the curve of the displacement sensor")
+    return sensor.direction * UM * sensor.curve.displacement_um(volts, sensor.side)
+
+
+def constants(run: Run, sensor: str | None) -> dict[str, str | float]:
+    """Serial number and date of the displacement sensor's curve, and the delay of each axis after it, s."""
+    bench = Bench.model_validate(run.bench)
+    if bench.d63 is None:
+        return {}
+    adc, prefix = bench.instruments["adc"].typed_settings(), f"{sensor}." if sensor else ""
+    there = {axis: f"{prefix}{axis}" for axis in AXES if f"{prefix}{axis}" in adc.channels}
+    skews = {f"skew_{axis[1]}_s": round(adc.lag_s(channel) - adc.lag_s(D63), 9) for axis, channel in there.items()}
+    return {"d63_serial": bench.d63.curve.serial, "d63_calibrated": bench.d63.curve.date, **skews}
+
+
+# Tables of single samples: from the poses whose path begins with the kind of the table, such as `still 0`. A table of
+# `motion` has the displacement in place of the displacement sensor's volts, and the attitude.
+
+
+def samples_table(run: Run, poses: Iterable[Kept]) -> Table:
+    """Every sample of the run's kind with its time. Raises RecordError without samples."""
+    stretches = [kept for kept in poses if kept.pose.path.split(" ")[0] == run.kind]
+    if not stretches:
+        raise RecordError(f"run {run.run} has no samples of kind {run.kind} yet; `rig resume` continues it")
+    names = stretches[0].samples.channels
+    volts = np.concatenate([kept.samples.volts for kept in stretches])
+    columns = {"t_s": np.concatenate([_times_s(kept) for kept in stretches])}
+    columns |= {f"{name}_v": volts[:, k] for k, name in enumerate(names)}
+    if run.kind == "motion":
+        columns |= _attitude(stretches) | {"displacement_m": displacement_m(run, columns.pop(f"{D63}_v"))}
+    columns, angle_stds = correct_angles(run, columns)
+    constants = {**run.constants, **angle_stds, "sample_rate_hz": stretches[0].samples.rate_hz}
+    return Table.from_columns(run.kind, columns, constants, run.run)
+
+
+def _attitude(stretches: Sequence[Kept]) -> dict[str, Array]:
+    """Stage angles and temperature, one value for each stretch; columns with an unknown value are omitted."""
+    lengths = [len(kept.samples.volts) for kept in stretches]
+    each: dict[str, list[float | None]] = {
+        "alpha_deg": [kept.pose.alpha_deg for kept in stretches],
+        "beta_deg": [kept.pose.beta_deg for kept in stretches],
+        "alpha_read_deg": [kept.alpha_read_deg for kept in stretches],
+        "beta_read_deg": [kept.beta_read_deg for kept in stretches],
+        "temperature_c": [kept.temperature_c for kept in stretches],
+    }
+    return {name: np.repeat(np.array(v, dtype=float), lengths) for name, v in each.items() if None not in v}
+
+
+def _times_s(kept: Kept) -> Array:
+    """Times of the samples of a stretch on the run's clock, s."""
+    n, rate_hz = len(kept.samples.volts), kept.samples.rate_hz
+    return np.asarray(kept.t_s + (np.arange(n) - n / 2) / rate_hz)
+
+
+# Tables of poses: mean, standard deviation and number of the samples. The displacement sensor is omitted: at rest its
+# signal is noise, which must not become a regressor.
+
+MOST_BLOCKS = 256  # blocks of a run for the measurement of its noise: bounds the memory
+SURE = 0.1  # relative standard error above which the formula of the filter is better
 
 
 def poses_table(run: Run, poses: Iterable[Kept]) -> Table:
-    """A row for each of the run's `poses`. Raises RecordError where there is none yet."""
+    """A row for each of the run's `poses`. Raises RecordError without one."""
     rows: list[dict[str, float]] = []
     paths: list[str] = []
     numbers: list[int] = []
@@ -37,23 +144,23 @@ def poses_table(run: Run, poses: Iterable[Kept]) -> Table:
         if number % stride == 0:
             blocks.append(kept.samples)
     if not rows:
-        raise RecordError(f"run {run.run} holds no pose yet; `rig resume` goes on with it")
+        raise RecordError(f"run {run.run} has no pose yet; `rig resume` continues it")
     names = [name for name in rows[0] if all(name in row for row in rows)]
     columns = {name: np.array([row[name] for row in rows]) for name in names}
     labels = {"path": tuple(paths)} if any(paths) else {}
-    columns, angle_stds = as_they_were(run, columns)
+    columns, angle_stds = correct_angles(run, columns)
     constants = {**run.constants, **angle_stds, "sample_rate_hz": blocks[0].rate_hz, **inflations(blocks)}
     table = Table.from_columns(run.kind, _useful(columns), constants, run.run, labels)
     return replace(table, numbers=np.array(numbers))
 
 
 def _row(kept: Kept) -> dict[str, float]:
-    """One pose's numbers by column."""
+    """The numbers of one pose by column."""
     pose, samples = kept.pose, kept.samples
     row: dict[str, float] = {"alpha_deg": pose.alpha_deg, "beta_deg": pose.beta_deg, "direction": pose.direction}
     row |= {"mount_deg": pose.mount_deg, "flip": pose.flip, "t_s": kept.t_s}
-    beside = {name: getattr(kept, name) for name in ("temperature_c", "alpha_read_deg", "beta_read_deg")}
-    row |= {name: value for name, value in beside.items() if value is not None}
+    optional = {name: getattr(kept, name) for name in ("temperature_c", "alpha_read_deg", "beta_read_deg")}
+    row |= {name: value for name, value in optional.items() if value is not None}
     means = samples.volts.mean(axis=0)
     row |= {f"{name}_v": float(m) for name, m in zip(samples.channels, means, strict=True) if name != D63}
     if len(samples.volts) > 1:
@@ -63,12 +170,12 @@ def _row(kept: Kept) -> dict[str, float]:
 
 
 def _useful(columns: dict[str, Array]) -> dict[str, Array]:
-    """How the sensor is mounted is a column only where it was ever changed."""
+    """The columns, with those of the mounting only if it was changed."""
     return {k: column for k, column in columns.items() if k not in ("mount_deg", "flip") or column.any()}
 
 
 def inflations(blocks: Sequence[Samples], axes: Sequence[str] = AXES) -> dict[str, float]:
-    """How much more a mean scatters than one of independent samples, from the blocks as long as the first."""
+    """Ratio of the noise of a mean to that of independent samples, from the blocks with the length of the first."""
     first = blocks[0]
     places = [k for k, name in enumerate(first.channels) if name in axes]
     alike = np.stack([b.volts[:, places] for b in blocks if b.volts.shape == first.volts.shape])

@@ -1,4 +1,4 @@
-"""What the record holds, as values."""
+"""The values in the record: runs, poses, events, lines of the log."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from procedures.session import Dwell, Pose, Samples
 class Run:
     """One run. `state`: running, complete, stopped or failed; `created` and `ended` are ISO 8601, UTC.
 
-    `rows`: kept poses, or the rows of an imported table. `uid` is the run's own wherever it is copied to; runs of
-    older programs have none.
+    `rows`: number of poses, or of rows of an imported table. `uid`: the same in all copies of the run; "" for runs of
+    older programs.
     """
 
     run: str
@@ -39,7 +39,7 @@ class Run:
 
     @property
     def extent(self) -> str:
-        """How much it holds, for people; a record without gaps is kept as many blocks."""
+        """The number of poses, rows or turns, as text. A record without gaps consists of many blocks."""
         if not self.bench:
             return f"{self.rows} rows"
         return {
@@ -51,7 +51,7 @@ class Run:
 
 @dataclass(frozen=True)
 class Block:
-    """A stretch of samples: `volts`, shape (n, channels), from `start_s` on the clock."""
+    """A block of samples: `volts`, shape (n, channels), from `start_s` on the clock."""
 
     volts: NDArray[np.float64]
     channels: tuple[str, ...]
@@ -61,16 +61,16 @@ class Block:
 
 @dataclass(frozen=True)
 class Kept:
-    """A pose as it was kept: its samples, the middle of its dwell (s), its temperature (C, or unknown)."""
+    """A recorded pose: its samples, the middle of its dwell (s), its temperature (C, or None)."""
 
     pose: Pose
     samples: Samples
     t_s: float
     temperature_c: float | None
-    excluded: str | None = None  # why it is left out of every analysis
-    alpha_read_deg: float | None = None  # what the dial of a stage that is turned by hand showed
+    excluded: str | None = None  # reason of the exclusion from every analysis
+    alpha_read_deg: float | None = None  # reading of the dial of a manual stage
     beta_read_deg: float | None = None
-    number: int = 0  # in the run, from 0; excluded ones count
+    number: int = 0  # in the run, from 0; excluded poses count
 
     @property
     def dwell(self) -> Dwell:
@@ -96,7 +96,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened in a run."""
+    """An event of a run."""
 
     at: str
     what: str

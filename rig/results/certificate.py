@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from calibrations.certificates.terms import names
-from calibrations.effect import catalogue
+from calibrations.effects.catalogue import catalogue
+from calibrations.presentation.certificate.terms import names
 
 NAMES = tuple(name for effect in catalogue().values() for name in names(effect))

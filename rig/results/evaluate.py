@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from calibrations.errors import CalibrationError
-from calibrations.reports.words import joined
+from calibrations.presentation.text import joined
 from rig.bench import Bench
 from rig.errors import RecordError
 from rig.record import Record, Run
@@ -54,3 +54,15 @@ def evaluated(record: Record, run: Run) -> dict[str, Result | Missing]:
         return found
     each = {sensor: module.evaluate(Measured(record, run, sensor)) for sensor in sensors}
     return {f"{sensor}/{name}": result for sensor, results in each.items() for name, result in results.items()}
+
+
+# The names that results can have: NAMES of each procedure's file, in which `{axis}` stands for any axis.
+
+AXES = "xyz"
+
+
+def names() -> list[str]:
+    """Those of all shipped procedures, in alphabetical order."""
+    files = (path.stem for path in Path(__file__).parent.glob("[a-z]*.py"))
+    patterns = [each for file in files for each in getattr(importlib.import_module(f"rig.results.{file}"), "NAMES", ())]
+    return sorted({pattern.format(axis=axis) for pattern in patterns for axis in AXES})

@@ -6,19 +6,23 @@ from math import hypot
 
 import numpy as np
 
-from calibrations.coverage import uncovered
+from calibrations.analyses.magnetometer_turn import (
+    Elements,
+    ExtremesEstimate,
+    field_elements,
+    iron_by_extremes,
+    level_elements_by_extremes,
+)
 from calibrations.errors import DataError
-from calibrations.evaluations.magnetometer_turn import ByHand, Elements, by_hand, elements, level_by_hand
 from calibrations.fit import Fit
-from calibrations.general import general
-from calibrations.noise import rms
-from calibrations.noise_estimation.mean_noise import white_std
+from calibrations.fitting.matrices import calibration_matrices
+from calibrations.geometry.sphere import magnetometer_coverage_warning
+from calibrations.noise.mean_noise import white_std
+from calibrations.noise.means import rms
 from calibrations.table import Array, Table
 from procedures.session import Pose
-from rig.record.measured import Measured
-from rig.record.turned import sensor_from_base
-from rig.results.result import Missing, Result
-from rig.results.turned import estimates, fitted, result
+from rig.record.measured import Measured, sensor_from_base
+from rig.results.result import Missing, Result, estimates, fitted, result
 
 AXES = "xyz"
 SOFT = ("xx", "yy", "xy", "xz", "yz")
@@ -66,15 +70,17 @@ def evaluate(measured: Measured) -> dict[str, Result | Missing]:
             f"run {measured.name} holds nothing of the turn about z any more; rig exclude --include takes it in again"
         )
     names, std_v = [p.path for p in poses], _std_v(table)
-    extremes = by_hand(table.outputs, [p.up for p in poses], names, std_v)
-    why = uncovered(table)
+    extremes = iron_by_extremes(table.outputs, [p.up for p in poses], names, std_v)
+    why = magnetometer_coverage_warning(table)
     ellipsoid = _all_missing(why) if why else _by_ellipsoid(table, poses)
     level = [k for k, pose in enumerate(poses) if pose.path == poses[0].path]  # the turn about z, upward, is first
     attitudes = np.array([sensor_from_base(poses[k]) for k in level])
     azimuth = ellipsoid[ELEMENTS["D"]]
     std_deg = azimuth.std if isinstance(azimuth, Result) else None
     turn_std_deg = None if std_deg is None else std_deg * len(set(names)) ** 0.5
-    return ellipsoid | _by_extremes(extremes, level_by_hand(table.outputs[level], attitudes, turn_std_deg), std_v)
+    return ellipsoid | _by_extremes(
+        extremes, level_elements_by_extremes(table.outputs[level], attitudes, turn_std_deg), std_v
+    )
 
 
 def _std_v(table: Table) -> float:
@@ -98,12 +104,12 @@ def _by_ellipsoid(table: Table, poses: list[Pose]) -> dict[str, Result | Missing
 
 
 def _elements(found: Fit, table: Table, poses: list[Pose]) -> dict[str, Result | Missing]:
-    made = general(found)
+    made = calibration_matrices(found)
     if made is None:
         return {name: Missing("the ellipsoid gives no calibration") for name in ELEMENTS.values()}
     (strength,) = estimates(found, "field-strength")
     attitudes: Array = np.array([sensor_from_base(pose) for pose in poses])
-    turned = elements(strength.value * made(table.outputs), attitudes, [p.path for p in poses])
+    turned = field_elements(strength.value * made(table.outputs), attitudes, [p.path for p in poses])
     units = {"F": "V", "H": "V", "D": "deg", "I": "deg"}
     results: dict[str, Result | Missing] = {}
     for name, value in turned.value.items():
@@ -118,7 +124,7 @@ def _elements(found: Fit, table: Table, poses: list[Pose]) -> dict[str, Result |
     return results
 
 
-def _by_extremes(found: ByHand, level: Elements, noise_v: float) -> dict[str, Result | Missing]:
+def _by_extremes(found: ExtremesEstimate, level: Elements, noise_v: float) -> dict[str, Result | Missing]:
     results: dict[str, Result | Missing] = {}
     for name, unit in (("H", "V"), ("D", "deg")):
         results[f"{ELEMENTS[name]}-by-hand"] = Result(level.value[name], unit, level.std[name])

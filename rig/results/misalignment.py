@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from calibrations.evaluations.axis_search import Direction, correction, directions, non_orthogonality_deg
+from calibrations.analyses.misalignment import Direction, correction_matrix, estimate_directions, non_orthogonality_deg
 from rig.record.measured import Measured
 from rig.results.result import Result
 
@@ -21,13 +21,13 @@ def evaluate(measured: Measured) -> dict[str, Result]:
 
     Raises DataError where no round of the search is complete.
     """
-    found = directions(measured.table())
+    found = estimate_directions(measured.table())
     results: dict[str, Result] = {}
     for direction in found.values():
         results |= _of_axis(direction)
     value, std = non_orthogonality_deg(found["x"], found["y"])
     results["non-orthogonality"] = Result(value, "deg", std)
-    matrix = correction(found["x"].theta, found["y"].theta)
+    matrix = correction_matrix(found["x"].theta, found["y"].theta)
     for (row, column), factor in np.ndenumerate(matrix):
         results[f"correction-{REFERENCE[row]}{REFERENCE[column]}"] = Result(float(factor), "")
     return results | {"rounds": Result(float(found["x"].rounds), "")}

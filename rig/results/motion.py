@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from calibrations.motion import models
-from calibrations.motion.evaluate import MotionResult
-from calibrations.motion.evaluate import evaluate as judged
+from calibrations.motion.evaluate import MotionResult, evaluate_motion, fit_physical, linear_from_turns
 from procedures.motion import SWEEP
 from rig.record.measured import Measured
 from rig.results.result import Result
@@ -24,4 +22,4 @@ def evaluate(measured: Measured) -> dict[str, Result]:
 def beside_displacement(measured: Measured) -> MotionResult:
     """Both models beside the displacement sensor, as in the paper's Fig. 12; raises as `evaluate`."""
     sweep = measured.part("poses", SWEEP)
-    return judged(measured.table(), models.linear(sweep), models.physical(sweep), measured.part("still"))
+    return evaluate_motion(measured.table(), linear_from_turns(sweep), fit_physical(sweep), measured.part("still"))

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from calibrations.analyses.noise_floor import hidden_inclination_deg, noise_rms
 from calibrations.errors import DataError
-from calibrations.evaluations.noise_floor import hidden_inclination_deg, rms
 from procedures.noise_floor import STILL
 from rig.record import Kept
 from rig.record.measured import Measured
@@ -29,7 +29,7 @@ def evaluate(measured: Measured) -> dict[str, Result | Missing]:
         if (channel := f"v{axis}") not in first.channels:
             continue
         k = first.channels.index(channel)
-        value, std = rms([kept.samples.volts[:, k] for kept in still])
+        value, std = noise_rms([kept.samples.volts[:, k] for kept in still])
         results[f"noise-rms-{axis}"] = Result(value, "V", std)
         results[f"noise-pp-{axis}"] = Result(PEAK_TO_PEAK * value, "V", PEAK_TO_PEAK * std)
         results[f"inclination-{axis}"] = _inclination(upright, axis, value, std)

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from itertools import permutations
 
-from calibrations.noise import rms
+from calibrations.noise.means import rms
 from procedures.questions import EDGES
 from rig.record.measured import Measured
-from rig.results.result import Missing, Result
-from rig.results.turned import estimates, fitted, result
+from rig.results.result import Missing, Result, estimates, fitted, result
 
 AXES = "xyz"
 PAIRS = tuple(own + other for own, other in permutations(AXES, 2))

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from calibrations.evaluations.repeatability import between
-from calibrations.evaluations.tumble import tumbles
+from calibrations.analyses.stability import repeatability
+from calibrations.analyses.tumble import estimate_tumbles
 from rig.record.measured import Measured
 from rig.results.result import Result
 
@@ -15,12 +15,12 @@ def evaluate(measured: Measured) -> dict[str, Result]:
     """bias-as-is-x, scale-power-y and so on: V, and a fraction. Raises DataError for fewer than two repetitions."""
     table, results = measured.table(), {}
     for axis in (axis for axis in table.axes if axis in AXES):
-        done = tumbles(table, axis)
+        done = estimate_tumbles(table, axis)
         for kind in dict.fromkeys(each.path.partition(" ")[0] for each in done):
             mine = [each for each in done if each.path.partition(" ")[0] == kind]
-            bias = between([each.bias_v for each in mine], [each.bias_std_v for each in mine])
+            bias = repeatability([each.bias_v for each in mine], [each.bias_std_v for each in mine])
             mean = sum(each.scale_v_per_g for each in mine) / len(mine)
-            scale = between([each.scale_v_per_g / mean for each in mine], [each.scale_std for each in mine])
+            scale = repeatability([each.scale_v_per_g / mean for each in mine], [each.scale_std for each in mine])
             results[f"bias-{kind}-{axis}"] = Result(bias[0], "V", bias[1])
             results[f"scale-{kind}-{axis}"] = Result(scale[0], "", scale[1])
     return results

@@ -7,10 +7,9 @@ from itertools import groupby
 
 import numpy as np
 
-from calibrations.evaluations.forecast import Foreseen, foreseen, steady_from
-from calibrations.evaluations.soak import AXES, HOUR_S, Course, Soak
-from calibrations.evaluations.soak import soak as soak_of
-from calibrations.evaluations.steady_state import COVERAGE, FEWEST, SteadyState
+from calibrations.analyses.forecast import ForecastHistory, forecast_history, steady_time
+from calibrations.analyses.soak import AXES, COVERAGE, FEWEST_VALUES, HOUR_S, Course, Soak, SteadyState
+from calibrations.analyses.soak import analyse_soak as soak_of
 from calibrations.table import Table
 from procedures.session import Dwell
 from procedures.soak import REVERSAL
@@ -67,9 +66,9 @@ def night(measured: Measured) -> Soak:
     return soak_of(measured.table(), measured.run.settings["oven_c"])
 
 
-def foreseen_of(measured: Measured) -> dict[str, Foreseen]:
+def foreseen_of(measured: Measured) -> dict[str, ForecastHistory]:
     """What was known of each quantity in the course of the run."""
-    return foreseen(measured.table(), measured.run.settings["oven_c"])
+    return forecast_history(measured.table(), measured.run.settings["oven_c"])
 
 
 def steady(dwells: Sequence[Dwell], oven_c: float) -> bool:
@@ -78,7 +77,7 @@ def steady(dwells: Sequence[Dwell], oven_c: float) -> bool:
     `oven_c` is the temperature of the oven that it is in (0: none).
     """
     reversals = [dwell for dwell in dwells if dwell.pose.path.startswith(REVERSAL)]
-    if len(list(groupby(reversals, lambda dwell: dwell.pose.path))) < FEWEST:
+    if len(list(groupby(reversals, lambda dwell: dwell.pose.path))) < FEWEST_VALUES:
         return False
     sensors = dict.fromkeys(name.rpartition(".")[0] for name in dwells[0].means if name[-2:] in ("vx", "vy"))
     return all(_at_rest(soak_of(table_of(reversals, sensor), oven_c)) for sensor in sensors)
@@ -121,20 +120,20 @@ def table_of(
     return Table.from_columns("poses", columns, constants or {}, "the run", labels)
 
 
-def _steady(found: Soak, ahead: Mapping[str, Foreseen], axis: str) -> dict[str, Result]:
+def _steady(found: Soak, ahead: Mapping[str, ForecastHistory], axis: str) -> dict[str, Result]:
     """When it was reached; else when it will be."""
     time, end = found.time_s(axis), f"-{axis}" if axis else ""
     results = {f"steady-state{end}": Result(float(time is not None), "")}
     if time is not None:
         return results | {f"steady-state-time{end}": Result(time[0] / HOUR_S, "h", time[1] / HOUR_S)}
-    bounds = steady_from(ahead, axis)
+    bounds = steady_time(ahead, axis)
     shown = {} if bounds is None else {"earliest": bounds.low}
     if bounds is not None and np.isfinite(bounds.high):
         shown |= {"expected": bounds.value, "latest": bounds.high}
     return results | {f"steady-state-{name}{end}": Result(s / HOUR_S, "h") for name, s in shown.items()}
 
 
-def _foreseen(found: Mapping[str, Foreseen]) -> dict[str, Result]:
+def _foreseen(found: Mapping[str, ForecastHistory]) -> dict[str, Result]:
     """What was known at the end, and since when."""
     results: dict[str, Result] = {}
     for name, course in found.items():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from calibrations.evaluations.trend import FEWEST, trend
+from calibrations.analyses.stability import FEWEST_TREND_POINTS, fit_trend
 from procedures.sweep import REFERENCE
 from rig.record.measured import Measured
 from rig.results.result import Result
@@ -18,11 +18,11 @@ def evaluate(measured: Measured) -> dict[str, Result]:
     if not measured.run.settings.get("reference_every"):
         return {}
     visits = [kept.dwell for kept in measured.kept() if kept.pose.path == REFERENCE.path]
-    if len(visits) < FEWEST:
+    if len(visits) < FEWEST_TREND_POINTS:
         return {}
     hours = np.array([dwell.t_s for dwell in visits]) / HOUR_S
     results = {}
     for axis in (axis for axis in "xyz" if f"v{axis}" in visits[0].means):
-        drift, std = trend(hours, np.array([dwell.means[f"v{axis}"] for dwell in visits]))
+        drift, std = fit_trend(hours, np.array([dwell.means[f"v{axis}"] for dwell in visits]))
         results[f"reference-drift-{axis}"] = Result(drift, "V/h", std)
     return results

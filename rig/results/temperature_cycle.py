@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from calibrations.evaluations.temperature_coefficients import bias_coefficients, scale_coefficients
-from calibrations.evaluations.tumble import tumbles
+from calibrations.analyses.tumble import bias_coefficients, estimate_tumbles, scale_coefficients
 from rig.record.measured import Measured
 from rig.results.result import Result
 
@@ -18,7 +17,7 @@ def evaluate(measured: Measured) -> dict[str, Result]:
     """Slopes in V/K and 1/K; hysteresis (up minus down) in V and as a fraction. Raises DataError for too few steps."""
     table, results = measured.table(), {}
     for axis in (axis for axis in table.axes if axis in AXES):
-        steps = tumbles(table, axis)
+        steps = estimate_tumbles(table, axis)
         for name, unit, found in (
             ("bias", "V", bias_coefficients(steps)),
             ("scale", "", scale_coefficients(steps)),

@@ -8,47 +8,46 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rig.home import RECORD, home
+from rig.files import RECORD, home
 from rig.record import Record, Run
 
 if TYPE_CHECKING:
-    from rig.analysis.growing import Growing
+    from rig.services.session import ModelSession
 
-MOST_OPEN = 6  # trails that are kept: each holds its data
+MOST_OPEN = 6  # sessions that are kept: each holds its data
 MODELS = "models"  # the folder in the home where the workbench saves models
 FILES = "files"  # the folder of files that were given to the workbench
 
 
 @dataclass
 class Desk:
-    """`dark`: None as the browser likes it. `trails`: the models that grow, by data and model, last used last."""
+    """`dark`: None as the browser likes it. `sessions`: the open model sessions, by data and model, last used last."""
 
     bench_file: Path | None
     dark: bool | None = None
-    trails: OrderedDict[tuple[str, str], Growing] = field(default_factory=OrderedDict)
+    sessions: OrderedDict[tuple[str, str], ModelSession] = field(default_factory=OrderedDict)
 
-    def open(self, data: str, model: str) -> Growing:
-        """The trail that lies open, or a new one; `model` "" is the one by default. Raises what `trail` raises."""
-        from rig.analysis.request import Request
-        from rig.analysis.trail import trail
-        from rig.analysis.trail_still import still_trail
+    def open(self, data: str, model: str) -> ModelSession:
+        """The open session, or a new one; `model` "" is the one by default. Raises what `model_session` raises."""
+        from rig.services.request import Request
+        from rig.services.session import model_session
 
         request = Request(data, model or None, self.bench_file)
-        found = self.trails.get((data, model)) or still_trail(request) or trail(request)
+        found = self.sessions.get((data, model)) or model_session(request)
         self.keep(data, model, found)
         return found
 
-    def keep(self, data: str, model: str, trail: Growing) -> None:
+    def keep(self, data: str, model: str, session: ModelSession) -> None:
         """How far the model has grown."""
-        self.trails[data, model] = trail
-        self.trails.move_to_end((data, model))
-        while len(self.trails) > MOST_OPEN:
-            self.trails.popitem(last=False)
+        self.sessions[data, model] = session
+        self.sessions.move_to_end((data, model))
+        while len(self.sessions) > MOST_OPEN:
+            self.sessions.popitem(last=False)
 
     def forget(self, data: str) -> None:
         """Begin anew with `data`, which may have changed."""
-        for key in [key for key in self.trails if key[0] == data]:
-            del self.trails[key]
+        for key in [key for key in self.sessions if key[0] == data]:
+            del self.sessions[key]
 
 
 def runs() -> list[Run]:
@@ -63,14 +62,14 @@ def lab_read() -> str | None:
     """The lab's record, for people, where the workbench shows that instead of the rig's own."""
     if not (url := os.environ.get(RECORD)):
         return None
-    from rig.record.lab_url import lab_url, shown
+    from rig.record.lab import lab_url, shown
 
     return shown(lab_url(url, RECORD))
 
 
 def models(chosen: str = "", default: str = "by kind of data") -> dict[str, str]:
     """The models to choose from, by name or file, with names for people; "" is that by default."""
-    from calibrations.model_file import shipped_names
+    from calibrations.model.file import shipped_names
 
     found = {"": default, **{name: name for name in shipped_names()}, **saved_models()}
     return found if chosen in found else {**found, chosen: chosen}

@@ -1,8 +1,10 @@
-"""Small parts that pages are made of: boxes, and the states of having nothing, waiting, and having failed."""
+"""How far a search through the catalogue is, as seen by the effects that it asks for; and its end before its time."""
 
 from __future__ import annotations
 
 import asyncio
+import logging
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import contextmanager
@@ -14,6 +16,58 @@ from typing import Any, ParamSpec, TypeVar
 
 from nicegui import ui
 from nicegui.element import Element
+
+from calibrations.effects import Effect
+from calibrations.errors import CalibrationError
+from drivers.errors import DriverError
+from procedures.errors import ProcedureError
+from rig.errors import RigError
+
+
+class Cancelled(Exception):
+    """Nobody waits for the answer any more."""
+
+
+class Counted(Mapping[str, Effect]):
+    """The same effects. A search goes through them in rounds; `round` is the present one, `at` how far it is."""
+
+    def __init__(self, effects: Mapping[str, Effect]) -> None:
+        self._effects = effects
+        self.round, self.at, self.now = 0, 0, ""
+        self.cancelled = False
+
+    def __getitem__(self, name: str) -> Effect:
+        """Raises Cancelled."""
+        if self.cancelled:
+            raise Cancelled
+        return self._effects[name]
+
+    def __len__(self) -> int:
+        return len(self._effects)
+
+    def __iter__(self) -> Iterator[str]:
+        self.round += 1
+        for at, name in enumerate(self._effects):
+            self.at, self.now = at, name
+            yield name
+        self.at = len(self)
+
+    @property
+    def share(self) -> float:
+        """Of the present round."""
+        return self.at / len(self)
+
+    @property
+    def told(self) -> str:
+        """For people."""
+        if not self.round:
+            return "Fitting the model"
+        if self.at == len(self):
+            return f"Round {self.round}: weighing what was tried"
+        return f"Round {self.round}, effect {self.at + 1} of {len(self)}: {self.now}"
+
+
+# Small parts that pages are made of: boxes, and the states of having nothing, waiting, and having failed.
 
 # A cell of a sorted table: it leads to the row's `to`, where there is one.
 LINKED = """<q-td :props="props">
@@ -116,3 +170,26 @@ def _settled(future: Future[R], work: Callable[[], R]) -> None:
             future.set_exception(error)
         else:
             future.set_result(result)
+
+
+# What the program says, on a page: its sentences with their signs, its errors as one message.
+#
+# A message says what, where and what to do; what the program did wrong is said to be its fault.
+
+KNOWN = (CalibrationError, ProcedureError, DriverError, RigError)
+
+
+def message(error: Exception) -> str:
+    """What went wrong; a fault of the program goes to the server's log as well."""
+    if isinstance(error, KNOWN):
+        return str(error)
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.filename or 'a file'}: cannot be used: {error.strerror.lower()}"
+    logging.getLogger("rig.web").error("a fault of this program", exc_info=error)
+    return f"A fault of this program: {type(error).__name__}: {error}. The terminal of `rig web` shows where."
+
+
+def for_page(text: str) -> str:
+    """A sentence of the command line with the signs that a terminal may not have: −, ±, ×, °C."""
+    signs = re.sub(r"(?<![\w.)\]-])-(?=\d)", "−", text.replace(" +- ", " ± "))
+    return re.sub(r"(?<=\d) x (?=the |that |its )", " × ", re.sub(r"(?<=\d) (deg)?C\b", " °C", signs))

@@ -13,8 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrations.noise_analysis.exact import deviations
-from calibrations.noise_analysis.octaves import octaves
+from calibrations.noise.deviations import deviations, octaves
 
 SAMPLES, RATE_HZ = 43_200_000, 1000.0
 MEAN = 20_000.0

@@ -10,7 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from calibrations.compensation.inverse import invert
+from calibrations.compensation.inverse import invert_model
 from tests.calibrations.compiled import build, written
 from tests.calibrations.fitted import LINEAR, PHYSICAL, model
 from tests.calibrations.test_compensation import EVERYTHING
@@ -61,7 +61,7 @@ def main() -> None:
 
 
 def _measured(values: Any, precision: str, compiler: str) -> dict[str, Any]:
-    made = invert(model(values), precision=precision)
+    made = invert_model(model(values), precision=precision)
     with TemporaryDirectory() as name:
         folder = Path(name)
         sources = [path for path in written(made, folder) if "self_test" not in path.name]

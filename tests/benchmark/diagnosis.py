@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 import sys
 
-from calibrations.diagnose import diagnose
-from calibrations.model_file import read_model
+from calibrations.loop import diagnose
+from calibrations.model.file import read_model
 from calibrations.table import Table
 from rig.analysis.data import load
 from tests.benchmark.timed import seconds
@@ -21,7 +21,7 @@ def main(data: str) -> None:
 
     found = diagnose(fresh(), model)
     taken = seconds(lambda: diagnose(fresh(), model), 3)
-    print(json.dumps({"seconds": taken, "verdict": found.verdict, "steps": len(found.path.steps)}))
+    print(json.dumps({"seconds": taken, "verdict": found.verdict, "steps": len(found.missing)}))
 
 
 if __name__ == "__main__":

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 
-from drivers.simulation.config import WorldConfig
-from drivers.simulation.world import World
+from drivers.world.config import WorldConfig
+from drivers.world.world import World
 from tests.benchmark.timed import seconds
 from tests.hidden.rigs import sweep
 

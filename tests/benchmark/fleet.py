@@ -21,13 +21,13 @@ from typing import Any
 
 import psutil
 
-from calibrations.effect import catalogue
-from calibrations.model_file import dump_model, read_model
-from calibrations.reading.read_csv import write_csv
-from rig.fleet.asked import Fleet
+from calibrations.effects.catalogue import catalogue
+from calibrations.importing.foreign import write_csv
+from calibrations.model.file import dump_model, read_model
 from rig.fleet.crew import crew
 from rig.fleet.discover import discover_fleet
 from rig.fleet.members import fleet_of
+from rig.fleet.questions import Fleet
 from rig.fleet.worker import Question
 from rig.record import Record
 from tests.calibrations.fleets import Flaw, Rig, sensor

@@ -19,10 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from drivers.labjack_t7_stream import Calibration
-from drivers.labjack_t7_twin import FLASH_WORDS, Inputs
-from drivers.simulation.config import WorldConfig
-from drivers.simulation.world import World
+from drivers.labjack_t7.stream import Calibration
+from drivers.labjack_t7.twin import FLASH_WORDS, Inputs
+from drivers.world.config import WorldConfig
+from drivers.world.world import World
 
 SCANS, INTERVAL_S = 10_000, 1e-3  # what the simulated clock lets a stream gather at most: 10 s
 OUTPUTS = ("vx", "vy")  # every channel with all of that

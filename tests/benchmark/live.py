@@ -13,13 +13,14 @@ from dataclasses import dataclass
 from statistics import median
 from typing import Any
 
-from calibrations.discover import Discovery, discover
-from calibrations.effect import catalogue
-from calibrations.model_file import read_model
-from drivers.simulation.config import WorldConfig
-from drivers.simulation.defects import DEFECTS
+from calibrations.discovery.results import Discovery
+from calibrations.effects.catalogue import catalogue
+from calibrations.loop import discover
+from calibrations.model.file import read_model
+from drivers.world.config import WorldConfig
+from drivers.world.defects import DEFECTS
 from rig.bench import read_bench
-from rig.running.live import STANDARD, Live, stands
+from rig.runs.live import STANDARD, Live, stands
 from tests.hidden import rigs
 from tests.hidden.quick_rig import QuickRig
 from tests.hidden.test_hidden_defects import NAMES

@@ -17,9 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import next_fast_len
 
-from calibrations.noise_analysis.bands import slow_bands
-from calibrations.noise_analysis.identify import Mixture, Spectrum, bounded, estimates, mixture
-from calibrations.noise_analysis.processes import Sampling
+from calibrations.noise.analysis import Coefficient, analyse
+from calibrations.noise.record import Samples, reduce_record
 
 SAMPLES = 43_200
 TRUTH = {"white-noise": 1.0, "flicker-noise": 0.5, "rate-random-walk": 0.02}
@@ -53,10 +52,8 @@ def bound() -> dict[str, float]:
     return dict(zip(TRUTH, np.sqrt(np.diag(np.linalg.inv(scaled.T @ scaled / 2))).tolist(), strict=True))
 
 
-def ours(samples: Array) -> tuple[Spectrum, Mixture, dict[str, tuple[float, float]]]:
-    spectrum = Spectrum((slow_bands(samples - samples.mean(), Sampling(1.0)),))
-    found = mixture(spectrum)
-    return spectrum, found, estimates(spectrum, found)
+def ours(samples: Array) -> dict[str, Coefficient]:
+    return analyse(reduce_record([Samples("x", [samples], 1.0, "V")], "made")).channels["x"].coefficients
 
 
 def theirs(samples: Array) -> dict[str, float]:
@@ -72,13 +69,13 @@ def compared(seeds: int) -> dict[str, Any]:
     for seed in range(seeds):
         samples = record(seed)
         began = time.process_time()
-        spectrum, processes, found = ours(samples)
+        found = ours(samples)
         milliseconds.append(1e3 * (time.process_time() - began))
-        false += bool(found.keys() - TRUTH.keys())
+        false += any(each.identified for name, each in found.items() if name not in TRUTH)
         peer = theirs(samples)
         for name, true in TRUTH.items():
-            value, std = found[name] if name in found else (bounded(spectrum, processes, name)[0], 0.0)
-            errors[name].append((value - true, std, peer[name] - true))
+            std = found[name].std if found[name].identified else 0.0
+            errors[name].append((found[name].value - true, std, peer[name] - true))
     return {
         "median_ms": median(milliseconds),
         "false": false / seeds,

@@ -15,18 +15,19 @@ from typing import Any
 
 import numpy as np
 
-from calibrations.effect import catalogue
+from calibrations.discovery.results import Discovery
+from calibrations.effects.catalogue import catalogue
+from calibrations.loop import discover
 from calibrations.model import Model
-from calibrations.model_file import read_model
-from calibrations.still.discover import Discovery, discover
-from calibrations.still.record import Samples, reduced
+from calibrations.model.file import read_model
+from calibrations.noise.record import Samples, reduce_record
 from tests.calibrations.hidden_noise import OTHERS, RATE_HZ, RECORDS, Array
 
 CLEAN = 10  # times as many clean records
 
 
 def found(samples: Array, model: Model) -> Discovery:
-    return discover(reduced([Samples("x", [samples], RATE_HZ, "V")], "made"), model)
+    return discover(reduce_record([Samples("x", [samples], RATE_HZ, "V")], "made"), model)
 
 
 def figures(seeds: int) -> Iterator[tuple[str, dict[str, Any]]]:

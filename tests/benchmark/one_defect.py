@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from calibrations.reading.read_csv import write_csv
+from calibrations.importing.foreign import write_csv
 from calibrations.table import Table
 from tests.hidden.rigs import rig_with
 

@@ -12,16 +12,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from calibrations.diagnose import diagnose
-from calibrations.effect import catalogue
+from calibrations.discovery.check_poses import MARK, unseen
+from calibrations.effects.catalogue import catalogue
 from calibrations.fit import fit
+from calibrations.loop import diagnose
 from calibrations.model import Model
-from calibrations.model_file import read_model
-from calibrations.search.unseen import MARK, unseen
+from calibrations.model.file import read_model
 from calibrations.table import Array, Table
-from drivers.simulation.config import WorldConfig
-from drivers.simulation.defects import DEFECTS
-from drivers.simulation.world import World
+from drivers.world.config import WorldConfig
+from drivers.world.defects import DEFECTS
+from drivers.world.world import World
 from procedures.catalogue import find
 from procedures.session import Pose
 from procedures.settings import parse

@@ -14,12 +14,17 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 
-from drivers import labjack_t7, labjack_t7_twin, omega_cn7500, omega_cn7500_twin, oriental_az, oriental_az_twin
 from drivers.clock import WallClock, serve_forever
-from drivers.links import Links
-from drivers.simulation.config import WorldConfig
-from drivers.simulation.trajectory import Trajectory
-from drivers.simulation.world import World
+from drivers.labjack_t7 import driver as labjack_t7
+from drivers.labjack_t7 import twin as labjack_t7_twin
+from drivers.omega_cn7500 import driver as omega_cn7500
+from drivers.omega_cn7500 import twin as omega_cn7500_twin
+from drivers.oriental_az import driver as oriental_az
+from drivers.oriental_az import twin as oriental_az_twin
+from drivers.transport import Links
+from drivers.world.config import WorldConfig
+from drivers.world.stage import Trajectory
+from drivers.world.world import World
 
 STAGE, CONVERTER, OVEN = oriental_az.Settings(), labjack_t7.Settings(), omega_cn7500.Settings()
 STEP_DEG, SETTLE_S = 10.0, 0.5

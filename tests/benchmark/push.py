@@ -24,10 +24,8 @@ from sqlalchemy import event
 from rig.errors import LabAway
 from rig.record import Record
 from rig.record import push as pushing
-from rig.record.lab_url import lab_url
-from rig.record.push import push, unsent
-from rig.record.roles import prepare
-from rig.record.verify import verify
+from rig.record.lab import lab_url, prepare
+from rig.record.push import push, unsent, verify
 from tests.rig.cutting import at_random, wire
 from tests.rig.postgres import Server, serving
 from tests.rig.pushing import a_run, held

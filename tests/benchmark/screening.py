@@ -12,11 +12,11 @@ from functools import partial
 
 import numpy as np
 
-from calibrations.effect import catalogue
+from calibrations.discovery.significance import reductions
+from calibrations.effects.catalogue import catalogue
 from calibrations.fit import Fit, fit
-from calibrations.model_file import read_model
+from calibrations.model.file import read_model
 from calibrations.problem import Problem
-from calibrations.search.screen import reductions
 from calibrations.table import Array, Table
 from tests.benchmark.timed import seconds
 

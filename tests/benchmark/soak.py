@@ -8,11 +8,12 @@ import time
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 
-from drivers import labjack_t7, labjack_t7_twin
 from drivers.clock import SimulatedClock
-from drivers.links import Links
-from drivers.simulation.config import WorldConfig
-from drivers.simulation.world import World
+from drivers.labjack_t7 import driver as labjack_t7
+from drivers.labjack_t7 import twin as labjack_t7_twin
+from drivers.transport import Links
+from drivers.world.config import WorldConfig
+from drivers.world.world import World
 from procedures.session import Pose
 from rig.record import Kept, Record
 

@@ -18,10 +18,10 @@ from typing import Any
 
 import numpy as np
 
+from calibrations.analyses.forecast import MOST_KNOWN_WIDTH, Forecast, QuantityFilter, filter_soak
+from calibrations.analyses.soak import fit_steady_state
+from calibrations.analyses.tumble import estimate_tumbles
 from calibrations.errors import TooFewRows
-from calibrations.evaluations.forecast import NARROW, Followed, Forecast, followed
-from calibrations.evaluations.steady_state import steady_state
-from calibrations.evaluations.tumble import tumbles
 from tests.calibrations.drifting import Drifting, drifting, soak_of_world
 from tests.calibrations.warming import warming
 
@@ -51,10 +51,14 @@ def looked(forecast: Forecast, at_h: float, final_v: float, reversals: list[tupl
     """At one time: `reversals` are those so far, (s, V, V)."""
     batch = (np.inf, np.inf, False)
     try:
-        state = steady_state(*(np.array(column) for column in zip(*reversals, strict=True)))
+        state = fit_steady_state(*(np.array(column) for column in zip(*reversals, strict=True)))
         half = SIGMAS * state.final[1]
         change = abs(state.final[0] - reversals[0][1])
-        batch = half, state.final[0] - final_v, bool(state.terms) and half <= max(state.tolerance, NARROW * change)
+        batch = (
+            half,
+            state.final[0] - final_v,
+            bool(state.terms) and half <= max(state.tolerance, MOST_KNOWN_WIDTH * change),
+        )
     except TooFewRows:
         pass
     holds = forecast.final.low <= final_v <= forecast.final.high
@@ -75,7 +79,10 @@ def of_bias(soak: Drifting) -> Iterator[Look]:
     """Looked at while its values come."""
     looks = list(LOOKS_H)
     first, *rest = soak.values
-    told, reversals = Followed.of(first.t_s, first.volts, first.std_v, 1.0), [(first.t_s, first.volts, first.std_v)]
+    told, reversals = (
+        QuantityFilter.of(first.t_s, first.volts, first.std_v, 1.0),
+        [(first.t_s, first.volts, first.std_v)],
+    )
     for value in rest:
         told = told.after(value.t_s, value.volts, value.std_v, offset=value.held)
         if not value.held:
@@ -88,9 +95,9 @@ def of_world(seed: int) -> Iterator[Look]:
     """The bias of x, and of y, of a simulated sensor."""
     table, settled = soak_of_world(seed)
     for axis in "xy":
-        (end,), looks = tumbles(settled, axis), list(LOOKS_H)
-        done = tumbles(table, axis)
-        for told in followed(table):
+        (end,), looks = estimate_tumbles(settled, axis), list(LOOKS_H)
+        done = estimate_tumbles(table, axis)
+        for told in filter_soak(table):
             here = told.followed.get(f"bias-{axis}")
             if here and looks and here.bank.t_s >= 3600 * looks[0]:
                 reversals = [(each.t_s, each.bias_v, each.bias_std_v) for each in done if each.t_s <= here.bank.t_s]
@@ -122,7 +129,7 @@ def cost() -> dict[str, float]:
     """Processor time of one value, in the beginning and on average over a soak, and of one forecast; ms."""
     soak = drifting(1)
     first, *rest = soak.values
-    told, spent = Followed.of(first.t_s, first.volts, first.std_v, 1.0), []
+    told, spent = QuantityFilter.of(first.t_s, first.volts, first.std_v, 1.0), []
     for value in rest:
         began = time.process_time()
         told = told.after(value.t_s, value.volts, value.std_v, offset=value.held)

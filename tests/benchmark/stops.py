@@ -16,17 +16,17 @@ import threading
 from contextlib import suppress
 from unittest.mock import patch
 
-from drivers import oriental_az_table as az
 from drivers.clock import WallClock, serve_forever
-from drivers.links import Links
-from drivers.links.faults import Fault
-from drivers.links.wire_faults import faults_of
-from drivers.oriental_az_twin import Drive
+from drivers.oriental_az import registers as az
+from drivers.oriental_az.twin import Drive
+from drivers.transport import Links
+from drivers.transport.faults import Fault
+from drivers.transport.wire_faults import faults_of
 from rig.bench import read_bench
-from rig.connected.guard import GuardedClock
-from rig.connected.instruments import Rig
-from rig.connected.wiring import Wiring, serve, world_of
-from rig.running.signals import stoppable
+from rig.instruments.guard import GuardedClock
+from rig.instruments.instruments import Rig
+from rig.instruments.wiring import Wiring, serve, world_of
+from rig.runs.signals import stoppable
 from rig.warm import main as compile_all
 from tests.rig.misbehaving import guarded_bench
 

@@ -6,27 +6,28 @@ import yaml
 
 from rig.bench import DEFAULT
 
-HELD_UP = '''"""held-up: a parabola that is long in coming.
-
-    V += k a_i^2
-
-Symptom   none.
-Excited by  anything.
-Source    none.
-"""
-
-import time
+HELD_UP = '''import time
 from pathlib import Path
 
-from calibrations.effect import Parameter
-
-PARAMETERS = (Parameter("square", "{{out}}/g^2", typical=0.02, doc="of the square"),)
+from calibrations.effects import Effect, Parameter
 
 
-def transduction(a, table, p):
-    while not Path("{go}").exists():
-        time.sleep(0.01)
-    return a**2 * p["square"]
+class HeldUp(Effect):
+    """held-up: a parabola that takes long to compute.
+
+        V += k a_i^2
+
+    Symptom   none.
+    Excited by  anything.
+    Source    none.
+    """
+
+    square = Parameter("{{out}}/g^2", typical=0.02, doc="of the square")
+
+    def transduction(self, a, table, p):
+        while not Path("{go}").exists():
+            time.sleep(0.01)
+        return a**2 * p.square
 '''
 
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from calibrations.reading.read_csv import write_csv
+from calibrations.importing.foreign import write_csv
 from calibrations.table import Array, Table
-from drivers.simulation.world import World
+from drivers.world.world import World
 from tests.hidden.rigs import IDEAL, rig_with, unexplained_rig
 
 CONSTANTS = {"filter_corner_hz": 15.07, "sample_rate_hz": 1000.0}

@@ -9,13 +9,15 @@ from urllib.parse import quote
 import pytest
 from playwright.sync_api import Page, expect
 
-from calibrations.model_file import read_model
+from calibrations.model.file import read_model
 from rig.analysis.history import History, closest, history, stale
 from rig.analysis.history_words import but_stale, near, next_due, summary
 from rig.record import Record
-from rig.web.pages.history_parts import LIMIT_IS_GIVEN
+from rig.web.pages.history_results import LIMIT_IS_GIVEN
 from tests.browser.conftest import Workbench
 from tests.rig.lives import calibrated
+
+pytestmark = pytest.mark.slow
 
 LIFE = "Its life"
 BIASES_V = (2.5, 2.501, 2.502, 2.503, 2.504, 2.510)  # 1 mV a year, and then a jump

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import expect
 
-from calibrations.reading.read_csv import read_csv
+from calibrations.importing.foreign import read_csv
 from procedures.session import Pose
 from rig.record import Block, Kept, Record
 from tests.browser.conftest import Workbench
@@ -50,6 +50,7 @@ def test_runs_are_searched_and_one_is_opened_and_noted(workbench: Workbench, run
     workbench.shot(page, "run")
 
 
+@pytest.mark.slow
 def test_two_runs_are_compared(workbench: Workbench, runs: list[str]) -> None:
     page = workbench.visit("/record")
     for run in runs[:2]:
@@ -71,14 +72,16 @@ def test_two_runs_are_compared(workbench: Workbench, runs: list[str]) -> None:
     expect(page.locator(".chosen .title").first).to_have_text(runs[1])
 
 
+@pytest.mark.slow
 def test_what_is_of_two_kinds_is_not_compared_and_why(workbench: Workbench, runs: list[str], tmp_path: Path) -> None:
     still = wandering(tmp_path)
     page = workbench.visit(f"/compare?first={quote(still)}&second={runs[0]}")
-    expect(page.get_by_role("alert").first).to_contain_text("is a still record")
+    expect(page.get_by_role("alert").first).to_contain_text("is of still")
     page.goto(f"{workbench.origin}/compare?first={quote(still)}&second={quote(still)}")
     expect(page.locator("[aria-label^='Allan deviation of both'] .points path").first).to_be_attached()
 
 
+@pytest.mark.slow
 def test_a_run_is_exported_and_reported(workbench: Workbench, runs: list[str], tmp_path: Path) -> None:
     page = workbench.visit(f"/record/{runs[0]}")
     with page.expect_download() as csv:

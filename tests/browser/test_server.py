@@ -19,6 +19,8 @@ from tests.browser.conftest import Workbench
 from tests.browser.held import held_up
 from tests.browser.measured import thousand
 
+pytestmark = pytest.mark.slow
+
 WEB = [sys.executable, "-m", "rig", "web", "--no-open"]
 
 

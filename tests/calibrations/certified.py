@@ -7,11 +7,11 @@ from functools import cache
 
 import numpy as np
 
-from calibrations.certificates.content import Certificate, Condition, Instrument, Laboratory, Sample
-from calibrations.certificates.results import figures
 from calibrations.fit import Fit, fit
 from calibrations.model import Model
-from calibrations.model_file import read_model
+from calibrations.model.file import read_model
+from calibrations.presentation.certificate.content import Certificate, Condition, Instrument, Laboratory, Sample
+from calibrations.presentation.certificate.results import figures
 from calibrations.table import Table
 from tests.calibrations.synthetic import components, poses, turns
 

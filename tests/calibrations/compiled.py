@@ -10,8 +10,8 @@ import numpy as np
 
 from calibrations.compensation import c99
 from calibrations.compensation.about import Origin
+from calibrations.compensation.document import make_vectors
 from calibrations.compensation.inverse import Compensation
-from calibrations.compensation.vectors import vectors
 from calibrations.table import Array
 
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wconversion", "-Wdouble-promotion", "-O2")
@@ -35,7 +35,7 @@ FOLLOWING = DRIVER.replace("sensor_input in;", "sensor_input in;\n    sensor_mem
 
 def written(made: Compensation, folder: Path, origin: Origin = ORIGIN) -> list[Path]:
     """The C files, and what they are made of; the header is among them."""
-    files: Mapping[str, str] = c99.files(made, origin, vectors(made))
+    files: Mapping[str, str] = c99.files(made, origin, make_vectors(made))
     for name, text in files.items():
         (folder / name).write_text(text)
     return [folder / name for name in files]

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calibrations.evaluations.forecast import STRETCH_S
+from calibrations.analyses.forecast import STRETCH_S
 from calibrations.table import Array, Table
-from drivers.simulation.config import WorldConfig
-from drivers.simulation.world import World
+from drivers.world.config import WorldConfig
+from drivers.world.world import World
 from procedures.soak import HOLD, schedule
 from procedures.tumbles import tumble
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from calibrations.effect import Effect, catalogue
+from calibrations.effects import Effect
+from calibrations.effects.catalogue import catalogue
 from calibrations.model import Estimate, Model, Term
 
 Numbers = float | tuple[float, ...]
@@ -44,8 +45,9 @@ def model(
     terms = []
     for name, parameters in values.items():
         effect = known[name]
+        units = {parameter.name: parameter.unit for parameter in effect.parameters}
         estimates = [
-            Estimate(p, axis, value, std, "V")
+            Estimate(p, axis, value, std, units[p].replace("{out}", "V"))
             for p, given in parameters.items()
             for axis, value in (zip("xyz", given, strict=False) if isinstance(given, tuple) else [("", given)])
         ]

@@ -5,11 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from calibrations.analyses.misalignment import (
+    along_reference,
+    correction_matrix,
+    estimate_directions,
+    non_orthogonality_deg,
+    search_angles_x,
+    search_angles_y,
+    theta_x,
+    theta_y,
+)
 from calibrations.errors import DataError
-from calibrations.evaluations.axis_search import correction, directions, non_orthogonality_deg
-from calibrations.evaluations.misalignment import along_reference, search_angles_x, search_angles_y, theta_x, theta_y
 from calibrations.table import Table
-from procedures.misalignment import Centre, around
+from procedures.misalignment import Centre, round_poses
 
 X, Y = theta_x(0.75, -0.33), theta_y(0.75, 0.5)
 WHITE_V = 50e-6
@@ -18,7 +26,7 @@ N = 5000
 
 def search(centre: Centre = Centre(), rounds: int = 2, *, acts: float = 0.0, random: object = None) -> Table:  # noqa: B008
     """A search without a rig: the loads along X and Y at about 1 V/g, and `acts` times all else that may act."""
-    poses = [pose for k in range(1, rounds + 1) for pose in around(centre, k)]
+    poses = [pose for k in range(1, rounds + 1) for pose in round_poses(centre, k)]
     a, b = (np.radians([getattr(p, name) for p in poses]) for name in ("alpha_deg", "beta_deg"))
     load = np.column_stack([np.sin(a) * np.cos(b), np.sin(a) * np.sin(b), np.cos(a)])
     t_s = 10.0 * np.arange(len(poses))
@@ -40,19 +48,19 @@ def search(centre: Centre = Centre(), rounds: int = 2, *, acts: float = 0.0, ran
 
 @pytest.mark.parametrize("centre", [Centre(), Centre(3, (-2, 4)), Centre(-170)])
 def test_exact_without_noise(centre: Centre) -> None:
-    found = directions(search(centre))
+    found = estimate_directions(search(centre))
     np.testing.assert_allclose(found["x"].theta, X, atol=1e-9)
     np.testing.assert_allclose(found["y"].theta, Y, atol=1e-9)
 
 
 def test_what_else_acts_is_not_taken_for_misalignment() -> None:
-    found = directions(search(acts=1.0))
+    found = estimate_directions(search(acts=1.0))
     np.testing.assert_allclose(found["x"].theta, X, atol=1e-8)
     np.testing.assert_allclose(found["y"].theta, Y, atol=1e-8)
 
 
 def test_the_angles_are_those_of_ang() -> None:
-    found = directions(search())
+    found = estimate_directions(search())
     for axis, theta, angles in (("x", X, search_angles_x), ("y", Y, search_angles_y)):
         alpha_deg, beta_deg = np.degrees([np.arccos(theta[2]), np.arctan2(theta[1], theta[0])])
         np.testing.assert_allclose(found[axis].angles_deg, angles(alpha_deg, beta_deg), atol=1e-6)
@@ -63,7 +71,7 @@ def test_standard_errors_are_true() -> None:
     random = np.random.default_rng(3)
     ratios = []
     for _ in range(300):
-        found = directions(search(acts=1.0, random=random))
+        found = estimate_directions(search(acts=1.0, random=random))
         for axis, theta, angles in (("x", X, [0.75, -0.33]), ("y", Y, [0.75, 0.5])):
             direction = found[axis]
             off = [*(direction.theta - theta)[[2, 1 if axis == "x" else 0]], *(direction.angles_deg - angles)]
@@ -79,13 +87,13 @@ def test_a_search_is_judged_by_the_rounds_about_its_last_centre() -> None:
     joined["vx_v"][:16] += 1.0
     later = [f"{path.split()[0]} {int(path.split()[1]) + 1}" for path in last.labels["path"]]
     table = Table.from_columns("poses", joined, {}, "", {"path": (*first.labels["path"], *later)})
-    found = directions(table)
+    found = estimate_directions(table)
     assert found["x"].rounds == 2
     np.testing.assert_allclose(found["x"].theta, X, atol=1e-9)
 
 
 def test_the_angle_between_the_axes_does_not_depend_on_the_zero_of_beta() -> None:
-    found = directions(search(random=np.random.default_rng(1)))
+    found = estimate_directions(search(random=np.random.default_rng(1)))
     value, std = non_orthogonality_deg(found["x"], found["y"])
     assert value == pytest.approx(np.degrees(np.arcsin(X @ Y)), abs=4 * std)
     assert 0 < std < 0.003
@@ -93,13 +101,13 @@ def test_the_angle_between_the_axes_does_not_depend_on_the_zero_of_beta() -> Non
 
 def test_the_correction_is_that_of_ang() -> None:
     a = np.random.default_rng(1).uniform(-1, 1, (5, 3))
-    np.testing.assert_allclose(a @ correction(X, Y).T, along_reference(a, X, Y), atol=1e-15)
+    np.testing.assert_allclose(a @ correction_matrix(X, Y).T, along_reference(a, X, Y), atol=1e-15)
 
 
 def test_a_search_without_a_complete_round_is_refused() -> None:
     table = search(rounds=1)
     half = {name: column[:15] for name, column in table.columns.items()}
     with pytest.raises(DataError, match="no round of the search is complete"):
-        directions(Table.from_columns("poses", half, {}, "half", {"path": table.labels["path"][:15]}))
+        estimate_directions(Table.from_columns("poses", half, {}, "half", {"path": table.labels["path"][:15]}))
     with pytest.raises(DataError, match="is no search for the axes"):
-        directions(Table.from_columns("poses", half, {}, "half"))
+        estimate_directions(Table.from_columns("poses", half, {}, "half"))

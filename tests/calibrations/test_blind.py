@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from calibrations.effect import catalogue
+from calibrations.effects.catalogue import catalogue
 from calibrations.fit import fit
-from calibrations.model_file import read_model
-from calibrations.search.blind import blind_to
+from calibrations.fitting.determined import blind_to
+from calibrations.model.file import read_model
 from calibrations.table import Table
 from tests.calibrations.synthetic import components, poses, turns
 

@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calibrations.axes import rotation
-from calibrations.budget import Budget, Line, budget, slow_freedom
-from calibrations.effect import catalogue
+from calibrations.effects.catalogue import catalogue
 from calibrations.fit import fit
-from calibrations.inputs import contributions
+from calibrations.fitting.budget import Budget, Line, make_budget, slow_freedom
+from calibrations.fitting.inputs import input_contributions
+from calibrations.geometry.orientation import rotation
 from calibrations.model import Model
-from calibrations.model_file import read_model
-from calibrations.noise import Noise
+from calibrations.model.file import read_model
+from calibrations.noise.means import Noise
 from calibrations.table import Array, Table
 from tests.calibrations import synthetic
 from tests.calibrations.test_real_data import mikoff
@@ -78,7 +78,7 @@ def given(table: Table, **std: float) -> Table:
 
 def test_type_a_adds_to_what_the_fit_says() -> None:
     found = fit(model(), measured(3))
-    parts = budget(found, ())
+    parts = make_budget(found, ())
     said = np.array([e.std for term in found.model.terms for e in term.estimates])
     np.testing.assert_allclose(parts.combined, said, rtol=1e-9)
     assert "white noise of the dwells" in [line.source for line in parts.lines]
@@ -89,7 +89,7 @@ def test_the_budget_is_the_spread_of_simulated_calibrations() -> None:
     tables = [measured(seed, errors(np.random.default_rng([seed, 1]))) for seed in range(60)]
     spread = np.std([fit(model(), table).theta for table in tables], axis=0)
     known = given(tables[0], **GIVEN)
-    ratio = spread / budget(fit(model(), known), contributions(known)).combined
+    ratio = spread / make_budget(fit(model(), known), input_contributions(known)).combined
     np.testing.assert_allclose(ratio, 1.0, atol=0.3)  # chance: 1 / sqrt(2 * 60) each
     assert np.mean(ratio) == pytest.approx(1.0, abs=0.1)
 
@@ -113,7 +113,7 @@ def test_an_error_of_the_whole_table_moves_the_parameters_as_its_line_says(sourc
     name, error = COMMON[source]
     table = given(measured(2), **{name: GIVEN[name]})
     found = fit(model(), table)
-    said = line_of(budget(found, contributions(table)), source)
+    said = line_of(make_budget(found, input_contributions(table)), source)
     moved = (fit(model(), measured(2, {name: PART * np.array(error)})).theta - found.theta) / PART
     size = found.problem.layout.typical
     assert np.max(said / size) > 1e-5
@@ -124,7 +124,7 @@ def test_what_an_input_shows_of_itself_is_not_counted_twice() -> None:
     """Stages that err by 0.01 deg from pose to pose scatter the residual: known, it is no noise of the sensor."""
     shaky = measured(4, {"repeat_std_deg": errors(np.random.default_rng(4))["repeat_std_deg"]})
     known = given(shaky, repeat_std_deg=GIVEN["repeat_std_deg"])
-    silent, told = (budget(fit(model(), table), contributions(table)) for table in (shaky, known))
+    silent, told = (make_budget(fit(model(), table), input_contributions(table)) for table in (shaky, known))
     np.testing.assert_allclose(line_of(told, WHITE), line_of(silent, WHITE))
     rest = [sum(line_of(b, line.source) ** 2 for line in b.given if line.kind == "A") for b in (silent, told)]
     white = line_of(silent, WHITE) ** 2
@@ -143,7 +143,7 @@ def test_repeats_at_one_angle_share_the_error_of_that_angle() -> None:
     columns = {name: np.concatenate([t.column(name) for t in tables]) for name in tables[0].columns}
     columns["t_s"] = 7.0 * np.arange(4 * N)
     both = [given(tables[0], **GIVEN), Table.from_columns("poses", columns, GIVEN)]
-    once, often = (budget(fit(model(), table), contributions(table)) for table in both)
+    once, often = (make_budget(fit(model(), table), input_contributions(table)) for table in both)
     for source, factor in (("true angle of beta", 1.0), ("beta from pose to pose", 0.5)):
         np.testing.assert_allclose(line_of(often, source), factor * line_of(once, source), rtol=0.1)
 
@@ -151,7 +151,7 @@ def test_repeats_at_one_angle_share_the_error_of_that_angle() -> None:
 def test_the_sign_of_a_sensitivity() -> None:
     """A converter that is known to show too much leaves less to the sensor."""
     table = given(measured(1), gain_std=1e-4, offset_std_v=1e-4)
-    lines = budget(fit(read_model("linear"), table), contributions(table)).given
+    lines = make_budget(fit(read_model("linear"), table), input_contributions(table)).given
     found = {line.source: np.asarray(line.sensitivity, dtype=float) for line in lines if line.kind == "B"}
     np.testing.assert_allclose(found["offset of the converter"], [-1, -1, 0, 0], atol=1e-3)
     np.testing.assert_allclose(found["gain of the converter"], [-2.5, -2.5, -1, -1], rtol=0.01)
@@ -159,17 +159,17 @@ def test_the_sign_of_a_sensitivity() -> None:
 
 def test_what_is_not_given_is_said_and_counts_for_nothing() -> None:
     table = measured(1)
-    silent = budget(fit(model(), table), contributions(table))
+    silent = make_budget(fit(model(), table), input_contributions(table))
     assert "gain of the converter" in silent.not_given
     assert len(silent.not_given) == 13
     zero = given(table, gain_std=0.0)
-    assert "gain of the converter" not in budget(fit(model(), zero), contributions(zero)).not_given
+    assert "gain of the converter" not in make_budget(fit(model(), zero), input_contributions(zero)).not_given
 
 
 def test_positions_have_no_angles_and_a_parameter_that_is_not_determined_has_no_number() -> None:
     table = replace(mikoff(), constants={**mikoff().constants, "gravity_std_m_s2": 0.01})
     found = fit(read_model("common-scale"), table)
-    parts = budget(found, contributions(table))
+    parts = make_budget(found, input_contributions(table))
     assert parts.not_given == ("gain of the converter",)
     gravity = next(line for line in parts.given if line.source == "gravity at the place")
     assert gravity.std is not None
@@ -177,7 +177,7 @@ def test_positions_have_no_angles_and_a_parameter_that_is_not_determined_has_no_
     columns = synthetic.turns((90,))
     a_x, a_y, _ = synthetic.components(columns)
     blind = fit(read_model("linear").with_effect(catalogue()["z-axis-bias"]), synthetic.poses(columns, a_x, a_y))
-    assert list(np.isnan(budget(blind, ()).combined)) == [False, False, False, False, True, True]
+    assert list(np.isnan(make_budget(blind, ()).combined)) == [False, False, False, False, True, True]
 
 
 def test_welch_and_satterthwaite_as_in_the_guide() -> None:

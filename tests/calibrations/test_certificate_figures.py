@@ -7,18 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calibrations.budget import Budget, Line, budget
-from calibrations.certificates.decision import decide
-from calibrations.certificates.monte_carlo import interval, simulate, verdict
-from calibrations.certificates.results import _why_further, figures
-from calibrations.certificates.si import in_si
-from calibrations.certificates.terms import name, names, term
-from calibrations.correlation import correlation
-from calibrations.effect import catalogue
+from calibrations.effects.catalogue import catalogue
 from calibrations.errors import DataError, ModelError
 from calibrations.fit import fit
-from calibrations.inputs import contributions
-from calibrations.model_file import read_model
+from calibrations.fitting.budget import Budget, Line, make_budget, parameter_correlation
+from calibrations.fitting.inputs import input_contributions
+from calibrations.model.file import read_model
+from calibrations.presentation.certificate.content import decide
+from calibrations.presentation.certificate.results import _why_further, figures, interval, simulate, verdict
+from calibrations.presentation.certificate.terms import in_si, name, names, term
 from tests.calibrations import turned
 from tests.calibrations.certified import LIMITS, before, certificate, fitted, table
 
@@ -46,13 +43,15 @@ def test_correlations_are_those_of_the_propagation_of_distributions() -> None:
     trials = 6000
     for given in (1e-4, 2e-6, 0.0):
         found = fit(read_model("linear"), table(gain_std=given, tilt_std_deg=0.02))
-        inputs = contributions(found.table)
-        drawn = correlation(found, budget(found, inputs), inputs)
+        inputs = input_contributions(found.table)
+        drawn = parameter_correlation(found, make_budget(found, inputs), inputs)
         simulated = np.corrcoef(simulate(found, inputs, trials).T)
         assert np.abs(drawn - simulated).max() < 4 / np.sqrt(trials)
         assert np.diag(drawn) == pytest.approx(1)
     assert np.array(certificate().figures.correlations) == pytest.approx(
-        correlation(fitted(), budget(fitted(), contributions(fitted().table)), contributions(fitted().table))
+        parameter_correlation(
+            fitted(), make_budget(fitted(), input_contributions(fitted().table)), input_contributions(fitted().table)
+        )
     )
 
 
@@ -63,7 +62,7 @@ def test_what_follows_from_two_results_is_as_certain_as_their_correlation_says()
     r = certificate().figures.correlations[i][k]
     slopes = np.array([1 / b.value, -a.value / b.value**2]) * [a.std, b.std]
     std = np.sqrt(slopes @ np.array([[1, r], [r, 1]]) @ slopes)
-    trial = simulate(found, contributions(found.table), 4000)
+    trial = simulate(found, input_contributions(found.table), 4000)
     assert std == pytest.approx(np.std(trial[:, i] / trial[:, k]), rel=0.15)
     assert std < 0.2 * np.linalg.norm(slopes)
 
@@ -89,7 +88,7 @@ def test_the_simulation_agrees_with_the_budget_where_the_model_is_straight() -> 
 
 def test_the_simulation_scatters_as_repeated_calibrations_do() -> None:
     found = fit(read_model("linear"), table())
-    trials = simulate(found, contributions(found.table), 400)
+    trials = simulate(found, input_contributions(found.table), 400)
     again = np.array([fit(read_model("linear"), table(seed=100 + k)).theta for k in range(24)])
     assert np.allclose(trials.std(axis=0), again.std(axis=0), rtol=0.55)
     low, high = interval(trials)

@@ -19,11 +19,10 @@ import pypdf
 import pytest
 import xmlschema
 
-from calibrations.certificates.dcc import dcc
-from calibrations.certificates.document import document
-from calibrations.certificates.html import html
-from calibrations.certificates.pdf import pdf
-from calibrations.certificates.sections import sections, verdict
+from calibrations.presentation.certificate.content import document
+from calibrations.presentation.certificate.dcc import dcc
+from calibrations.presentation.certificate.pages import html, pdf
+from calibrations.presentation.certificate.sections import sections, verdict
 from tests.calibrations.certified import certificate
 
 SCHEMAS = Path(__file__).parents[1] / "data" / "dcc"

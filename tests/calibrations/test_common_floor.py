@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from calibrations.diagnose import diagnose
-from calibrations.discover import Discovery, add, discover
-from calibrations.effect import catalogue
-from calibrations.model_file import read_model
+from calibrations.discovery.results import Discovery
+from calibrations.effects.catalogue import catalogue
+from calibrations.loop import add, diagnose, discover
+from calibrations.model.file import read_model
 from calibrations.table import Array, Table
 
 BENDING = (
@@ -61,6 +61,7 @@ def test_a_magnet_is_found_though_no_column_tells_the_noise() -> None:
     falls(add(catalogue()["hard-iron"], read_model("field"), magnetometer()))
 
 
+@pytest.mark.slow
 def test_no_effect_is_added_that_makes_a_magnitude_of_anything() -> None:
     found = discover(accelerometer(1), read_model("common-scale"), {name: catalogue()[name] for name in BENDING})
     assert (found.causes, found.refinements) == (("scale-factor",), ())

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
-from calibrations.compare import compare, scales
+from calibrations.discovery.places import scales
 from calibrations.fit import fit
-from calibrations.model_file import read_model
+from calibrations.loop import compare
+from calibrations.model.file import read_model
 from calibrations.table import Array, Table
 from tests.calibrations import synthetic
 
@@ -30,8 +33,7 @@ def test_names_the_inclinations() -> None:
     found = compare(table(0.004 * A_Z**2), read_model("linear"))
     (place,) = (p for p in found.fails if p.where == "alpha")
     assert (place.axis, place.low) == ("x", 90.0)
-    assert place.mean == pytest.approx(-0.004 * 0.4, rel=0.02)  # the bias takes the mean of cos^2 alpha, 0.4
-    assert place.text.startswith("alpha 90 deg: x is off by -1.5")
+    assert place.text.startswith("alpha 90 deg: x is off by -1.5")  # mV: the bias takes the mean of cos^2 alpha, 0.4
     assert "mg) on average, rms" in place.text
 
 
@@ -41,8 +43,8 @@ def test_counts_in_mg_of_its_axis() -> None:
     np.testing.assert_allclose(scales(found.fit), [2.0, 1.0], rtol=1e-3)
     assert all(p.axis == "x" for p in found.fails)
     for place in found.fails:  # 2 mV at 2 V/g
-        assert f"x is off by {1e3 * place.mean:+.3g} mV ({500 * place.mean:+.3g} mg) on average" in place.text
-        assert place.mean == pytest.approx(0.002, rel=0.02)
+        mv, mg = map(float, re.findall(r"([+-][\d.]+) m", place.text))
+        assert (mv, mg) == pytest.approx((2.0, 1.0), rel=0.02)
 
 
 @pytest.mark.parametrize(("side", "words"), [(1.0, "turning clockwise"), (-1.0, "turning anticlockwise")])

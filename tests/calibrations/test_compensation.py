@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,15 +12,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from calibrations.chain import respond, sensed
-from calibrations.compensation.about import covered, uncertainty
-from calibrations.compensation.forward import INVERTED, LEFT_OUT, NOISE, OF_THE_RIG, forward_of, steps_of
-from calibrations.compensation.inverse import Compensation, Range, invert
-from calibrations.effect import Effect, catalogue, read_effect
+from calibrations.compensation.about import coverage_text, uncertainty_text
+from calibrations.compensation.forward import INVERTED, LEFT_OUT, NOISE, OF_THE_RIG, steps_of, trace_model
+from calibrations.compensation.inverse import Compensation, Range, invert_model
+from calibrations.effects import Effect
+from calibrations.effects.catalogue import catalogue, read_effect
+from calibrations.effects.expression_effect import own_effect
 from calibrations.errors import ModelError
-from calibrations.expressions.effect import own_effect
 from calibrations.model import Model
-from calibrations.model_file import read_model
+from calibrations.model.chain import respond, sensed
+from calibrations.model.file import read_model
 from calibrations.table import Array, Table
 from tests.calibrations.fitted import LINEAR, PHYSICAL, model
 
@@ -59,7 +61,7 @@ def error(made: Compensation, within: Model, n: int = 500, seed: int = 0) -> flo
 @pytest.mark.parametrize("values", [LINEAR, PHYSICAL, EVERYTHING], ids=["linear", "physical", "everything"])
 def test_it_gives_back_what_the_model_was_given(values: Any) -> None:
     fitted = model(values)
-    made = invert(fitted)
+    made = invert_model(fitted)
     assert {fate.how for fate in made.forward.fates} == {INVERTED}
     assert error(made, fitted) < 1e-9
     assert made.bound.q**made.bound.steps * 1.5 == pytest.approx(made.bound.within)
@@ -79,7 +81,7 @@ def test_whatever_the_sensor(bent: list[float], turned: tuple[float, float, floa
         "axis-misalignment": dict(zip("xyz", turned, strict=True)),
     }
     fitted = model({**LINEAR, **values})
-    made = invert(fitted)
+    made = invert_model(fitted)
     assert error(made, fitted, 50, seed) < 1e-9
 
 
@@ -87,7 +89,7 @@ def test_three_axes_need_nothing_beside() -> None:
     bias, scale = (0.1, -0.2, 0.3), (1.0, 1.1, 0.9)
     bent = {"axis-nonorthogonality": {"xy": 1.0, "xz": -0.5, "yz": 2.0}, "z-axis-bias": {"square": (0.01, 0.02, 0.01)}}
     fitted = model({"bias": {"bias": bias}, "scale-factor": {"scale": scale}, **bent})
-    made = invert(fitted)
+    made = invert_model(fitted)
     assert made.program.inputs == ("vx", "vy", "vz")
     assert error(made, fitted) < 1e-9
 
@@ -96,7 +98,7 @@ def test_one_axis_is_told_the_others() -> None:
     fitted = model(
         {"bias": {"bias": (2.5,)}, "scale-factor": {"scale": (1.0,)}, "axis-misalignment": {"x": 0, "y": 1, "z": 1}}
     )
-    made = invert(fitted)
+    made = invert_model(fitted)
     assert made.program.inputs == ("vx", "ay", "az")
     assert error(made, fitted) < 1e-9
 
@@ -118,7 +120,7 @@ def test_magnetometers_and_gyroscopes() -> None:
         constants=turned,
     )
     for fitted, unit, reach in ((magnetometer, "field", 1.5), (gyroscope, "deg/s", 300.0)):
-        made = invert(fitted)
+        made = invert_model(fitted)
         assert (made.unit, made.range.reach) == (unit, reach)
         assert error(made, fitted) < 1e-9 * reach
 
@@ -130,22 +132,22 @@ def test_every_effect_is_inverted_or_says_why_not(name: str) -> None:
     (*_, fate) = fates(model({**LINEAR, name: values} if name not in LINEAR else LINEAR))
     if effect.left_out:
         assert (fate.how, fate.why) == (LEFT_OUT, effect.left_out)
-    elif effect.force or effect.transduction or effect.output:
+    elif effect.places & {"force", "transduction", "output"}:
         assert fate.how == INVERTED, fate.why
     else:
-        assert fate.how == (OF_THE_RIG if effect.pose else NOISE)
+        assert fate.how == (OF_THE_RIG if "pose" in effect.places else NOISE)
 
 
 def fates(fitted: Model) -> Any:
     """What becomes of the effects, whether or not there is an inverse."""
-    return forward_of(fitted).fates
+    return trace_model(fitted).fates
 
 
 def test_what_is_left_out_comes_with_its_cost() -> None:
     slips = {"hysteresis": {"height": (0.003, 0.002), "reach": 0.1, "spread": 0.5, "pressing": 0.0}}
     fitted = model({**PHYSICAL, **slips, "stage-zero-offset": {"alpha": 0.1, "beta": 0.2}})
-    assert invert(fitted).forward.left_out == ()
-    made = invert(fitted, without=["hysteresis"])
+    assert invert_model(fitted).forward.left_out == ()
+    made = invert_model(fitted, without=["hysteresis"])
     size = made.costs.left_out["hysteresis"]
     assert size is not None
     assert 0.001 < size.rms < size.most < 1.1 * 0.003 / 1.01  # all elements slip: the whole height, in g
@@ -153,30 +155,30 @@ def test_what_is_left_out_comes_with_its_cost() -> None:
 
 
 def test_an_axis_found_out_of_gravity_costs_little() -> None:
-    size = invert(model(PHYSICAL)).costs.out_of_gravity
+    size = invert_model(model(PHYSICAL)).costs.out_of_gravity
     assert size is not None
     assert 0 < size.most < 1e-4
-    assert invert(model(LINEAR)).costs.out_of_gravity is None
+    assert invert_model(model(LINEAR)).costs.out_of_gravity is None
 
 
 def test_uncertainties_reach_the_result() -> None:
-    size = invert(model(LINEAR, std=1e-3)).costs.parameters
+    size = invert_model(model(LINEAR, std=1e-3)).costs.parameters
     assert size is not None
     assert size.most == pytest.approx(1e-3 * np.sqrt(2) / 0.98, rel=0.02)  # bias and scale factor, at 1 g
     assert size.largest == pytest.approx(1e-3 * np.sqrt(1 + 1.5**2) / 0.98, rel=0.001)  # at 1.5 g
-    assert invert(model(LINEAR, std=None)).costs.parameters is None
+    assert invert_model(model(LINEAR, std=None)).costs.parameters is None
 
 
 def test_an_uncertain_temperature_coefficient_tells_the_more_the_further_the_range_goes() -> None:
     """As 3000 sensors scatter whose parameters were drawn: at the reference, and where it is greatest."""
     fitted = model({**LINEAR, "temperature-bias": {"slope": (0.001, -0.002)}}, std=1e-4)
-    made = invert(fitted)
+    made = invert_model(fitted)
     size = made.costs.parameters
     assert size is not None
     assert (size.within, size.at) == ({"temperature_c": (25.0, 25.0)}, {"temperature_c": 85.0})
     assert size.largest == pytest.approx(scatter(made, 85.0, 1.5), rel=0.05)
     assert size.most == pytest.approx(scatter(made, 25.0, 1.0), rel=0.05)
-    narrow = invert(fitted, Range.for_model(fitted, temperature_c=(22.0, 26.0))).costs.parameters
+    narrow = invert_model(fitted, Range.for_model(fitted, temperature_c=(22.0, 26.0))).costs.parameters
     assert narrow is not None
     assert narrow.largest < size.largest / 10
     assert narrow.at == {"temperature_c": 22.0}
@@ -198,26 +200,26 @@ def test_what_happens_soon_after_the_power_comes_on_is_not_missed() -> None:
     fitted = model({**LINEAR, **warming}, std=1e-4)
     (*others, warm) = fitted.terms
     known = tuple(replace(e, std=60.0 if e.name == "time_constant" else e.std) for e in warm.estimates)
-    size = invert(replace(fitted, terms=(*others, replace(warm, estimates=known)))).costs.parameters
+    size = invert_model(replace(fitted, terms=(*others, replace(warm, estimates=known)))).costs.parameters
     assert size is not None
     assert 200 < size.at["t_s"] < 1800  # t exp(-t/600 s) is greatest at 600 s
 
 
 def test_what_the_calibration_covered_is_where_its_uncertainty_is_told() -> None:
     fitted = replace(model({**LINEAR, **THERMAL}), covered={"temperature_c": (10.0, 99.0), "supply_v": (5.0, 5.0)})
-    made = invert(fitted)
+    made = invert_model(fitted)
     size = made.costs.parameters
     assert size is not None
     assert size.within == {"temperature_c": (10.0, 85.0)}
-    assert "temperature_c 10 to 99 C, supply_v 5 V; beyond, the model is extrapolated" in covered(made)
-    assert "goes beyond in temperature_c." in covered(made)
-    assert "does not say" in covered(invert(model(LINEAR)))
-    assert "temperature_c 10 to 85 C;" in uncertainty(made)
+    assert "temperature_c 10 to 99 C, supply_v 5 V; beyond, the model is extrapolated" in coverage_text(made)
+    assert "goes beyond in temperature_c." in coverage_text(made)
+    assert "does not give" in coverage_text(invert_model(model(LINEAR)))
+    assert "temperature_c 10 to 85 C;" in uncertainty_text(made)
 
 
 def test_an_effect_left_out_costs_what_it_does_over_the_stated_range() -> None:
     fitted = model({**LINEAR, "temperature-bias": {"slope": (0.001, -0.002)}})
-    size = invert(fitted, without=["temperature-bias"]).costs.left_out["temperature-bias"]
+    size = invert_model(fitted, without=["temperature-bias"]).costs.left_out["temperature-bias"]
     assert size is not None
     assert size.most == pytest.approx(0.002 * 60 / 0.98, rel=0.01)
 
@@ -225,20 +227,20 @@ def test_an_effect_left_out_costs_what_it_does_over_the_stated_range() -> None:
 def test_what_is_not_contractive_is_refused_with_the_way_out() -> None:
     fitted = model({**LINEAR, "dead-zone": {"width": (0.01, 0.02)}})
     with pytest.raises(ModelError, match=r"not contractive within \+-1.5 g.*--leave-out dead-zone"):
-        invert(fitted)
-    size = invert(fitted, without=["dead-zone"]).costs.left_out["dead-zone"]
+        invert_model(fitted)
+    size = invert_model(fitted, without=["dead-zone"]).costs.left_out["dead-zone"]
     assert size is not None
     assert size.most == pytest.approx(0.02)
     bent = model({**LINEAR, "cubic-nonlinearity": {"cube": (-0.4, 0.0)}})  # falls from 0.92 g on
     with pytest.raises(ModelError, match="not contractive"):
-        invert(bent)
-    assert error(made := invert(bent, Range.for_model(bent, 0.5)), bent) < 1e-9
+        invert_model(bent)
+    assert error(made := invert_model(bent, Range.for_model(bent, 0.5)), bent) < 1e-9
     assert made.bound.q > 0.2
 
 
 def test_part_of_a_saturation_is_inverted() -> None:
     fitted = model({**LINEAR, "saturation": {"high": (3.2, 3.2), "low": (1.7, 1.7), "loss": 0.2}})
-    assert error(invert(fitted), fitted) < 1e-9
+    assert error(invert_model(fitted), fitted) < 1e-9
 
 
 def test_own_expressions_are_inverted_where_a_product_knows_their_variables() -> None:
@@ -252,8 +254,8 @@ def test_own_expressions_are_inverted_where_a_product_knows_their_variables() ->
     values = {"own-bend": {"a": (0.01, 0.0), "b": (0.01, 0.02), "c": (0.0, 0.01)}, "own-wet": {"k": 1e-4}}
     fitted = model({**LINEAR, **values, "own-gear": {"a": 0.1}, "own-angle": {"a": 0.001}}, own)
     with pytest.raises(ModelError, match="--input humidity_pct=LOW:HIGH"):
-        invert(fitted)
-    made = invert(fitted, Range.for_model(fitted, humidity_pct=(0.0, 100.0)))
+        invert_model(fitted)
+    made = invert_model(fitted, Range.for_model(fitted, humidity_pct=(0.0, 100.0)))
     how = {fate.effect: (fate.how, fate.why) for fate in made.forward.fates}
     assert how["own-gear"] == (OF_THE_RIG, "")
     assert how["own-angle"] == (LEFT_OUT, "it needs alpha_deg, which is not known at run time")
@@ -264,34 +266,36 @@ def test_own_expressions_are_inverted_where_a_product_knows_their_variables() ->
 def test_a_column_whose_name_no_source_can_have_is_left_out() -> None:
     for column in ("double", "t7", "lambda"):
         text = f"v += k*{column}" if column != "lambda" else "v += k*humidity_pct"
-        own = {"own-wet": replace(own_effect("own-wet", text, (text[7:],)), needs=(column,))}
-        ((*_, fate),) = (forward_of(model({**LINEAR, "own-wet": {"k": (0.1, 0.2)}}, own)).fates,)
+        wet = copy(own_effect("own-wet", text, (text[7:],)))
+        wet.needs = (column,)
+        own = {"own-wet": wet}
+        ((*_, fate),) = (trace_model(model({**LINEAR, "own-wet": {"k": (0.1, 0.2)}}, own)).fates,)
         assert fate.how == LEFT_OUT
         assert "which is not known at run time" in fate.why
 
 
 def test_an_effect_of_the_users_own_file(tmp_path: Path) -> None:
-    parameters = 'PARAMETERS = (Parameter("k", "{out}", typical=0.01),)'
-    doc = '"""own: x.\n\n    V += k\n\nSymptom   s.\nExcited by  e.\nConfused with  c.\nSource    s.\n"""\n'
-    head = f"{doc}import numpy as np\nfrom calibrations.effect import Parameter\n{parameters}\n"
+    head = "import numpy as np\nfrom calibrations.effects import Effect, Parameter\n"
+    body = '    """own: x.\n\n    V += k\n\n    Symptom   s.\n    """\n    k = Parameter("{out}", typical=0.01)\n'
     made = {}
-    for name, formula in (("good", "np.sin(a) ** 2 * p['k']"), ("bad", "np.round(a) * p['k']")):
-        (tmp_path / f"{name}.py").write_text(f"{head}\ndef transduction(a, table, p):\n    return {formula}\n")
+    for name, formula in (("good", "np.sin(a) ** 2 * p.k"), ("bad", "np.round(a) * p.k")):
+        method = f"    def transduction(self, a, table, p):\n        return {formula}\n"
+        (tmp_path / f"{name}.py").write_text(f"{head}class {name.title()}(Effect):\n{body}{method}")
         own: dict[str, Effect] = {name: read_effect(tmp_path / f"{name}.py")}
         fitted = model({**LINEAR, name: {"k": (0.02, 0.01)}}, own)
-        made[name] = invert(fitted)
+        made[name] = invert_model(fitted)
         if name == "good":
             assert error(made[name], fitted) < 1e-9
     assert made["bad"].forward.fates[-1].why == "its function uses np.round"
 
 
 def test_noise_has_no_inverse() -> None:
-    with pytest.raises(ModelError, match="by-hand: is a model of noise alone, which has no inverse to write"):
-        invert(model({"white-noise": {p.name: 0.1 for p in catalogue()["white-noise"].parameters}}))
+    with pytest.raises(ModelError, match="by-hand: a model of noise alone has no inverse"):
+        invert_model(model({"white-noise": {p.name: 0.1 for p in catalogue()["white-noise"].parameters}}))
 
 
 def test_a_model_without_values_is_refused() -> None:
     with pytest.raises(ModelError, match="linear: has no values yet; `rig fit"):
-        invert(read_model("linear"))
-    with pytest.raises(ModelError, match="has no effect colour to leave out"):
-        invert(model(LINEAR), without=["colour"])
+        invert_model(read_model("linear"))
+    with pytest.raises(ModelError, match="the model has no effect colour"):
+        invert_model(model(LINEAR), without=["colour"])

@@ -10,15 +10,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from calibrations.chain import nominal_pose, respond, specific_force
 from calibrations.compensation import python_source
-from calibrations.compensation.about import lines
+from calibrations.compensation.about import header_lines
+from calibrations.compensation.cost import memory_at
+from calibrations.compensation.document import make_vectors
 from calibrations.compensation.forward import FORCES, steps_of
-from calibrations.compensation.graph import evaluate
-from calibrations.compensation.inverse import invert
-from calibrations.compensation.memory import memory_at
-from calibrations.compensation.vectors import vectors
+from calibrations.compensation.graph import evaluate_nodes
+from calibrations.compensation.inverse import invert_model
+from calibrations.geometry.orientation import nominal_pose, specific_force
 from calibrations.kernels import slip
+from calibrations.model.chain import respond
 from calibrations.table import Table
 from tests.calibrations.compiled import FOLLOWING, ORIGIN, build, through, written
 from tests.calibrations.fitted import LINEAR, PHYSICAL, model
@@ -34,7 +35,7 @@ COMPILERS = [
 
 def test_what_an_effect_remembers_is_what_its_kernel_does() -> None:
     ((effect, p),) = steps_of(model(SLIPS))
-    assert effect.follow is not None
+    assert effect.memory == 6
     a = np.cumsum(np.random.default_rng(3).normal(0, 0.05, (500, 3)), axis=0)
     table: Any = None  # hysteresis asks nothing of it
     held: Any = [np.zeros((1, 3))] * effect.memory
@@ -55,7 +56,7 @@ def test_on_the_way_of_the_stages_it_remembers_what_the_model_has() -> None:
     columns = {"alpha_deg": np.full(len(beta), 90.0), "beta_deg": beta, "t_s": t_s, "vx_v": 0 * beta, "vy_v": 0 * beta}
     columns |= {"direction": np.repeat([1.0, -1.0], len(beta) // 2), "temperature_c": 25 + 2 * np.sin(t_s / 60)}
     table = Table.from_columns("poses", columns)
-    made = invert(model({**LINEAR, **LAGS, "hysteresis": {**SLIPS["hysteresis"], "pressing": 0.0}}))
+    made = invert_model(model({**LINEAR, **LAGS, "hysteresis": {**SLIPS["hysteresis"], "pressing": 0.0}}))
     a = specific_force(nominal_pose(table))
     v = respond(a, table, steps_of(made.model))
     inputs = {"vx": v[:, 0], "vy": v[:, 1], "temperature_c": table.column("temperature_c")}
@@ -68,13 +69,13 @@ def test_on_the_way_of_the_stages_it_remembers_what_the_model_has() -> None:
 
 @pytest.mark.parametrize("compiler", COMPILERS)
 def test_every_language_follows_the_same_samples(compiler: str, tmp_path: Path) -> None:
-    made = invert(model(BOTH))
+    made = invert_model(model(BOTH))
     sources = written(made, tmp_path)
     (tmp_path / "driver.c").write_text(FOLLOWING)
-    checks = vectors(made, 512)
+    checks = make_vectors(made, 512)
     found = through(build(compiler, [*sources, tmp_path / "driver.c"], tmp_path / "driver"), checks.inputs, 2)
     assert np.abs(found - checks.expected).max() < 1e-9
-    (text,) = python_source.files(made, ORIGIN, vectors(made)).values()
+    (text,) = python_source.files(made, ORIGIN, make_vectors(made)).values()
     names: dict[str, Any] = {"__name__": "sensor"}
     exec(compile(text, "sensor.py", "exec"), names)  # noqa: S102 it is what we wrote
     memory = names["begin"]()
@@ -86,24 +87,26 @@ def test_every_language_follows_the_same_samples(compiler: str, tmp_path: Path) 
 
 
 def test_the_proof_holds_whatever_is_remembered() -> None:
-    made = invert(model(BOTH))
+    made = invert_model(model(BOTH))
     random = np.random.default_rng(8)
     n = 4000
     at = {name: random.uniform(-1.5, 1.5, n) for name in FORCES}
     at |= {"temperature_c": random.uniform(-20, 85, n)}
     memory = {name: random.normal(0, 3, n) for name in made.forward.memory}
-    outputs = evaluate(made.forward.outputs, at | memory)
+    outputs = evaluate_nodes(made.forward.outputs, at | memory)
     inputs = at | memory | dict(zip(("vx", "vy"), outputs, strict=True))
     found = made.program.run({name: inputs[name] for name in (*made.program.inputs, *memory)})
     worst = max(np.abs(found[name] - at[name]).max() for name in ("ax", "ay"))
     assert worst < made.bound.within + 1e-14
-    half_held = invert(model({**LINEAR, **SLIPS})).bound.C  # friction may hold, 0.03 V/g, or slip, whatever was before
+    half_held = invert_model(
+        model({**LINEAR, **SLIPS})
+    ).bound.C  # friction may hold, 0.03 V/g, or slip, whatever was before
     assert np.diag(half_held) == pytest.approx([1 / (1.01 + 0.03 / 2), 1 / (0.98 + 0.02 / 2)])
 
 
 def test_gravity_stands_in_for_an_axis_and_what_is_remembered_is_kept_once() -> None:
-    made = invert(model({**PHYSICAL, **SLIPS}))
-    (text,) = python_source.files(made, ORIGIN, vectors(made)).values()
+    made = invert_model(model({**PHYSICAL, **SLIPS}))
+    (text,) = python_source.files(made, ORIGIN, make_vectors(made)).values()
     names: dict[str, Any] = {"__name__": "sensor"}
     exec(compile(text, "sensor.py", "exec"), names)  # noqa: S102
     angle = np.linspace(0, 4 * np.pi, 200)
@@ -112,12 +115,12 @@ def test_gravity_stands_in_for_an_axis_and_what_is_remembered_is_kept_once() -> 
     memory, remembered = names["begin"](), dict.fromkeys(made.forward.memory, 0.0)
     for row in a:
         at = dict(zip(FORCES, row, strict=True)) | remembered
-        vx, vy, *after = evaluate((*made.forward.outputs, *made.forward.memory.values()), at)
+        vx, vy, *after = evaluate_nodes((*made.forward.outputs, *made.forward.memory.values()), at)
         remembered = dict(zip(made.forward.memory, map(float, after), strict=True))
         found = names["in_gravity"](float(vx), float(vy), 1.0, memory)
         assert found == pytest.approx(row[:2], abs=3e-5)
 
 
 def test_the_head_says_that_samples_come_in_order() -> None:
-    head = " ".join(" ".join(lines(invert(model(BOTH)), ORIGIN)).split())
+    head = " ".join(" ".join(header_lines(invert_model(model(BOTH)), ORIGIN)).split())
     assert "With a history: hysteresis, temperature-hysteresis. Give every sample, in order: 14 numbers" in head

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 
 from calibrations.compensation import document, python_source
-from calibrations.compensation.about import Origin, lines, upward
-from calibrations.compensation.inverse import Compensation, invert
-from calibrations.compensation.operations import OPERATIONS
-from calibrations.compensation.vectors import vectors
+from calibrations.compensation.about import Origin, header_lines, round_up
+from calibrations.compensation.document import make_vectors
+from calibrations.compensation.graph import OPERATIONS
+from calibrations.compensation.inverse import Compensation, invert_model
 from calibrations.table import Array
 from tests.calibrations.compiled import DRIVER, ORIGIN, build, through, written
 from tests.calibrations.fitted import LINEAR, PHYSICAL, model
@@ -31,7 +31,7 @@ MODELS = {"linear": LINEAR, "physical": PHYSICAL, "everything": EVERYTHING}
 
 def rows(made: Compensation, n: int = 20_000) -> tuple[Array, Array]:
     """Inputs all over the range, and its corners; true values that the model made them of."""
-    found = vectors(made, 1 << (n - 1).bit_length())
+    found = make_vectors(made, 1 << (n - 1).bit_length())
     return found.inputs, found.expected
 
 
@@ -40,7 +40,7 @@ def python() -> Any:
     """Carry out a written Python file; its names."""
 
     def run(made: Compensation) -> dict[str, Any]:
-        (text,) = python_source.files(made, ORIGIN, vectors(made)).values()
+        (text,) = python_source.files(made, ORIGIN, make_vectors(made)).values()
         names: dict[str, Any] = {"__name__": "sensor"}
         exec(compile(text, "sensor.py", "exec"), names)  # noqa: S102 it is what we wrote
         return names
@@ -51,7 +51,7 @@ def python() -> Any:
 @pytest.mark.parametrize("compiler", COMPILERS)
 @pytest.mark.parametrize("values", MODELS.values(), ids=MODELS)
 def test_c_agrees_with_python_over_the_whole_range(compiler: str, values: Any, tmp_path: Path, python: Any) -> None:
-    made = invert(model(values))
+    made = invert_model(model(values))
     sources = written(made, tmp_path)
     (tmp_path / "driver.c").write_text(DRIVER)
     inputs, true = rows(made)
@@ -63,7 +63,7 @@ def test_c_agrees_with_python_over_the_whole_range(compiler: str, values: Any, t
 
 @pytest.mark.parametrize("compiler", COMPILERS)
 def test_the_self_test_passes_and_can_fail(compiler: str, tmp_path: Path) -> None:
-    made = invert(model(EVERYTHING), precision="float" if compiler == "clang" else "double")
+    made = invert_model(model(EVERYTHING), precision="float" if compiler == "clang" else "double")
     sources = written(made, tmp_path)
     program = build(compiler, sources, tmp_path / "test", "-DSENSOR_MAIN")
     assert subprocess.run([str(program)], capture_output=True, text=True, check=True).stdout.startswith("0 of 16")
@@ -75,10 +75,10 @@ def test_the_self_test_passes_and_can_fail(compiler: str, tmp_path: Path) -> Non
 
 
 def test_python_and_json_compute_the_same(python: Any, tmp_path: Path) -> None:
-    made = invert(model(EVERYTHING))
+    made = invert_model(model(EVERYTHING))
     names = python(made)
     assert names["self_test"]() == 0
-    (text,) = document.files(made, ORIGIN, vectors(made)).values()
+    (text,) = document.files(made, ORIGIN, make_vectors(made)).values()
     read = json.loads(text)
     assert read["schema"] == "rig.compensation/1"
     for inputs, expected in zip(read["self_test"]["inputs"], read["self_test"]["expected"], strict=True):
@@ -103,7 +103,7 @@ def interpreted(read: dict[str, Any], values: dict[str, float]) -> list[float]:
 
 
 def test_gravity_stands_in_for_an_axis_that_is_not_measured(python: Any, tmp_path: Path) -> None:
-    made = invert(model(PHYSICAL))
+    made = invert_model(model(PHYSICAL))
     a = np.array([0.6, -0.48, math.sqrt(1 - 0.36 - 0.2304)])
     for side in (1.0, -1.0):
         inputs = dict(zip(made.program.inputs, _outputs(made, a * [1, 1, side]), strict=False))
@@ -111,30 +111,32 @@ def test_gravity_stands_in_for_an_axis_that_is_not_measured(python: Any, tmp_pat
         assert found == pytest.approx(a[:2], abs=1e-5)
     header = next(path for path in written(made, tmp_path) if path.suffix == ".h").read_text()
     assert "sensor_in_gravity(const sensor_input *in, sensor_real side);" in header
-    assert "sensor_in_gravity" not in "".join(path.read_text() for path in written(invert(model(LINEAR)), tmp_path))
+    assert "sensor_in_gravity" not in "".join(
+        path.read_text() for path in written(invert_model(model(LINEAR)), tmp_path)
+    )
 
 
 def _outputs(made: Compensation, a: Array) -> list[float]:
-    from calibrations.compensation.graph import evaluate
+    from calibrations.compensation.graph import evaluate_nodes
 
-    return [float(v) for v in evaluate(made.forward.outputs, dict(zip(("ax", "ay", "az"), a, strict=True)))]
+    return [float(v) for v in evaluate_nodes(made.forward.outputs, dict(zip(("ax", "ay", "az"), a, strict=True)))]
 
 
 def test_the_head_says_what_a_user_must_know() -> None:
     slips = {"hysteresis": {"height": (0.003, 0.002), "reach": 0.1, "spread": 0.5, "pressing": 0.0}}
-    made = invert(model({**PHYSICAL, **slips, "stage-backlash": {"half_play": 0.1}}), without=["hysteresis"])
-    head = " ".join(" ".join(lines(made, ORIGIN)).split())
-    assert f"q <= {upward(made.bound.q)}, proved over the whole range" in head
-    assert float(upward(made.bound.q)) >= made.bound.q
+    made = invert_model(model({**PHYSICAL, **slips, "stage-backlash": {"half_play": 0.1}}), without=["hysteresis"])
+    head = " ".join(" ".join(header_lines(made, ORIGIN)).split())
+    assert f"q <= {round_up(made.bound.q)}, proved over the whole range" in head
+    assert float(round_up(made.bound.q)) >= made.bound.q
     assert f"{sum(made.program.operations.values())} a sample" in head
-    assert "Of the rig, not of the sensor, and dropped: stage-backlash." in head
-    assert "Left out: hysteresis, because that was asked for; costs" in head
+    assert "Effects of the rig, not compensated: stage-backlash." in head
+    assert "Left out: hysteresis, because the user asked for it; error" in head
     assert "mg rms and" in head
     assert "bias bias x = 2.5 +- 1e-05 V" in head
     assert ("serial number 17" in head, "SHA-256 " + "0" * 64 in head) == (True, True)
 
 
 def test_a_name_cannot_end_the_comment_that_it_stands_in(tmp_path: Path) -> None:
-    made = invert(model(LINEAR))
+    made = invert_model(model(LINEAR))
     sources = written(made, tmp_path, Origin("sensor", "*/ int x = ; /*\n.yaml", "0", "*/ p", "2026"))
     build("gcc", sources, tmp_path / "test", "-DSENSOR_MAIN")

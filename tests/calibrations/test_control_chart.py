@@ -7,8 +7,8 @@ import pytest
 from numpy.polynomial.legendre import leggauss
 from scipy.stats import norm
 
+from calibrations.analyses.control_chart import D2, D4, EWMA_LIMIT, EWMA_WEIGHT, LIMIT_SIGMAS, Chart, control_chart
 from calibrations.errors import TooFewRows
-from calibrations.evaluations.control_chart import D2, D4, LAMBDA, Chart, K, L, control_chart
 
 # NIST/SEMATECH e-Handbook 6.3.2.2, flow rates of ten batches
 FLOWRATE = (49.6, 47.6, 49.9, 51.3, 47.8, 51.2, 52.6, 52.4, 53.6, 52.1)
@@ -20,13 +20,15 @@ def test_the_constants_are_the_tables() -> None:
 
 
 def test_the_run_lengths_are_the_published_ones() -> None:
-    assert 1 / (2 * norm.sf(K)) == pytest.approx(370.4, abs=0.05)
-    reach = L * np.sqrt(LAMBDA / (2 - LAMBDA))  # of the EWMA: Crowder's integral equation, Technometrics 29, 1987
+    assert 1 / (2 * norm.sf(LIMIT_SIGMAS)) == pytest.approx(370.4, abs=0.05)
+    reach = EWMA_LIMIT * np.sqrt(
+        EWMA_WEIGHT / (2 - EWMA_WEIGHT)
+    )  # of the EWMA: Crowder's integral equation, Technometrics 29, 1987
     nodes, weights = leggauss(40)
     z, w = nodes * reach, weights * reach
-    steps = norm.pdf((z[None, :] - (1 - LAMBDA) * z[:, None]) / LAMBDA) / LAMBDA * w
+    steps = norm.pdf((z[None, :] - (1 - EWMA_WEIGHT) * z[:, None]) / EWMA_WEIGHT) / EWMA_WEIGHT * w
     lengths = np.linalg.solve(np.eye(40) - steps, np.ones(40))
-    assert 1 + w @ (norm.pdf(z / LAMBDA) / LAMBDA * lengths) == pytest.approx(500, abs=1)
+    assert 1 + w @ (norm.pdf(z / EWMA_WEIGHT) / EWMA_WEIGHT * lengths) == pytest.approx(500, abs=1)
 
 
 def test_the_individuals_of_a_textbook() -> None:
@@ -42,11 +44,11 @@ def test_the_ewma_is_its_recursion() -> None:
     chart = control_chart(FLOWRATE, baseline=4)
     z, expected = chart.centre, []
     for value in FLOWRATE:
-        z = LAMBDA * value + (1 - LAMBDA) * z
+        z = EWMA_WEIGHT * value + (1 - EWMA_WEIGHT) * z
         expected.append(z)
     np.testing.assert_allclose(chart.ewma, expected)
-    assert chart.ewma_reach[0] == pytest.approx(L * LAMBDA * chart.sigma)
-    assert chart.ewma_reach[-1] == pytest.approx(L * chart.sigma * np.sqrt(1 / 9), rel=0.01)
+    assert chart.ewma_reach[0] == pytest.approx(EWMA_LIMIT * EWMA_WEIGHT * chart.sigma)
+    assert chart.ewma_reach[-1] == pytest.approx(EWMA_LIMIT * chart.sigma * np.sqrt(1 / 9), rel=0.01)
 
 
 def runs_until_a_signal(baseline: int, changed: np.ndarray, charts: int = 400) -> np.ndarray:
@@ -95,5 +97,5 @@ def test_runs_that_agree_better_than_their_noise_set_no_narrower_limits() -> Non
 
 
 def test_one_run_is_no_chart() -> None:
-    with pytest.raises(TooFewRows, match="needs 2 runs at least, there are 1"):
+    with pytest.raises(TooFewRows, match="needs at least 2 runs; there are 1"):
         control_chart([1.0])

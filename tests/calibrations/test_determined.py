@@ -3,14 +3,13 @@
 import numpy as np
 import pytest
 
-from calibrations.diagnose import diagnose
-from calibrations.discover import add, discover
-from calibrations.effect import catalogue
+from calibrations.effects.catalogue import catalogue
 from calibrations.fit import fit
+from calibrations.fitting.determined import leverages, undetermined, unseen_variance
+from calibrations.loop import add, diagnose, discover
 from calibrations.model import Model
-from calibrations.model_file import read_model
-from calibrations.reports.words import headline, summary
-from calibrations.search.determined import leverages, undetermined, unseen_variance
+from calibrations.model.file import read_model
+from calibrations.presentation.report.words import summary
 from calibrations.table import Table
 from tests.calibrations.test_real_data import mikoff, suarez, xsens
 
@@ -95,5 +94,5 @@ def test_adding_an_effect_on_ten_positions_says_so_too() -> None:
 def test_a_report_on_ten_positions_says_so_too() -> None:
     found = discover(suarez(), nine())
     assert not found.steps
-    assert headline(found).endswith("but this data does not determine it.")
+    assert found.judgement.headline.startswith("No effect is significant, but the ")
     assert "not identifiable from these positions" in summary(found)

@@ -9,7 +9,7 @@ import pytest
 from scipy.signal import lfilter
 
 from calibrations.errors import DataError
-from calibrations.reading.dwells import dwells, is_pose_log, pose_means
+from calibrations.importing.raw_logs import average_dwells, find_dwells, is_pose_log
 from calibrations.table import Array, Table
 
 RATE_HZ = 100.0
@@ -48,7 +48,7 @@ def log(
 def test_every_dwell_becomes_a_row(speed_deg_s: float, jitter_deg: float) -> None:
     samples = log(speed_deg_s=speed_deg_s, jitter_deg=jitter_deg)
     assert is_pose_log(samples)
-    table = pose_means(samples)
+    table = average_dwells(samples)
     assert np.column_stack([table.column("alpha_deg"), table.column("beta_deg")]) == pytest.approx(
         np.array(TURN), abs=0.01
     )
@@ -62,32 +62,32 @@ def test_every_dwell_becomes_a_row(speed_deg_s: float, jitter_deg: float) -> Non
 def test_rows_while_the_stages_move_are_left_out() -> None:
     samples = log(speed_deg_s=20.0)
     alpha, beta = samples.column("alpha_deg"), samples.column("beta_deg")
-    for a, b in dwells(samples):
+    for a, b in find_dwells(samples):
         assert np.ptp(alpha[a:b]) == np.ptp(beta[a:b]) == 0
-    assert set(pose_means(samples).column("n")[1:-1]) == {ROWS - 2 * 20.0}  # 0.2 s off either end
-    assert set(pose_means(log()).column("n")) == {float(ROWS)}  # where nothing moves, nothing is taken off
+    assert set(average_dwells(samples).column("n")[1:-1]) == {ROWS - 2 * 20.0}  # 0.2 s off either end
+    assert set(average_dwells(log()).column("n")) == {float(ROWS)}  # where nothing moves, nothing is taken off
 
 
 def test_a_creeping_stage_is_not_taken_for_a_resting_one() -> None:
     creeping = log([(90.0, 0.0), (90.0, 2.0), (90.0, 4.0)], speed_deg_s=0.08)  # 0.04 deg in as many rows as a dwell has
-    assert pose_means(creeping).column("beta_deg") == pytest.approx(np.array([0.0, 2.0, 4.0]), abs=0.02)
+    assert average_dwells(creeping).column("beta_deg") == pytest.approx(np.array([0.0, 2.0, 4.0]), abs=0.02)
 
 
 def test_time_is_the_middle_and_other_columns_are_averaged() -> None:
     samples = log(temperature_c=np.linspace(20, 27, ROWS * len(TURN)))
-    table = pose_means(samples)
+    table = average_dwells(samples)
     assert table.column("t_s") == pytest.approx((np.arange(7) + 0.5) * ROWS / RATE_HZ - 0.5 / RATE_HZ)
     assert table.column("temperature_c") == pytest.approx(20.5 + np.arange(7), abs=2e-3)
 
 
 def test_the_direction_follows_from_beta() -> None:
-    assert pose_means(log()).column("direction").tolist() == [0, 1, 1, -1, -1, 0, 1]
-    assert "direction" not in pose_means(log(TURN[:3]))
+    assert average_dwells(log()).column("direction").tolist() == [0, 1, 1, -1, -1, 0, 1]
+    assert "direction" not in average_dwells(log(TURN[:3]))
 
 
 def test_a_given_direction_parts_dwells_at_one_pose() -> None:
     turning = np.repeat([1.0, 1.0, -1.0], ROWS)
-    table = pose_means(log([(90.0, 0.0), (90.0, 60.0), (90.0, 60.0)], direction=turning))
+    table = average_dwells(log([(90.0, 0.0), (90.0, 60.0), (90.0, 60.0)], direction=turning))
     assert table.column("direction").tolist() == [1, 1, -1]
     assert table.column("n").tolist() == [ROWS] * 3
 
@@ -95,14 +95,14 @@ def test_a_given_direction_parts_dwells_at_one_pose() -> None:
 def test_a_gap_in_time_parts_dwells_at_one_pose() -> None:
     samples = log([(90.0, 0.0), (90.0, 60.0), (90.0, 60.0)], times=False)
     t_s = np.arange(samples.n) / RATE_HZ + np.repeat([0.0, 2.0, 4.0], ROWS)
-    assert pose_means(Table.from_columns("poses", {**samples.columns, "t_s": t_s})).n == 3
-    assert pose_means(samples).n == 2
+    assert average_dwells(Table.from_columns("poses", {**samples.columns, "t_s": t_s})).n == 3
+    assert average_dwells(samples).n == 2
 
 
 @pytest.mark.parametrize("rho", [0.0, 0.8])
 def test_the_noise_of_a_mean_is_measured(rho: float) -> None:
     many = [(90.0, float(beta)) for beta in range(0, 360, 4)]
-    assert pose_means(log(many, rho=rho)).number("noise_inflation_x", 0.0) == pytest.approx(
+    assert average_dwells(log(many, rho=rho)).number("noise_inflation_x", 0.0) == pytest.approx(
         (1 + rho) / (1 - rho), rel=0.15
     )
 
@@ -135,5 +135,5 @@ def test_a_log_that_only_moves_is_none() -> None:
     beta = np.linspace(0, 360, 5000)
     sweeping = Table.from_columns("poses", {"alpha_deg": np.full(5000, 90.0), "beta_deg": beta, "vx_v": beta})
     assert not is_pose_log(sweeping)
-    with pytest.raises(DataError, match="no dwell: alpha and beta never hold still for 50 rows on end"):
-        pose_means(sweeping)
+    with pytest.raises(DataError, match="no dwell: alpha and beta never rest for 50 successive rows"):
+        average_dwells(sweeping)

@@ -10,9 +10,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 from scipy.stats import norm
 
-from calibrations.effect import catalogue
+from calibrations.effects.catalogue import catalogue
 from calibrations.fit import fit
-from calibrations.model_file import read_model
+from calibrations.model.file import read_model
 from calibrations.table import Array, Table
 from tests.calibrations import synthetic
 

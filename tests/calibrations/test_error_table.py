@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from calibrations.error_table import ErrorTable, read_error_table
 from calibrations.errors import DataError
+from calibrations.geometry.error_table import ErrorTable, read_error_table
 
 EVERY_30 = np.arange(0.0, 360.0, 30.0)
 

@@ -7,9 +7,8 @@ import pytest
 from scipy.stats import chi2, kstest
 
 from calibrations.errors import TooFewRows
-from calibrations.estimators.kalman import Belief, Correction, corrected, predicted
-from calibrations.estimators.least_squares import least_squares
-from calibrations.estimators.recursive import Recursive
+from calibrations.estimators.kalman import Belief, Correction, correct, predict
+from calibrations.estimators.least_squares import Recursive, least_squares
 from calibrations.table import Array
 
 ALMOST = 1e-10
@@ -116,7 +115,7 @@ PUBLISHED = ((49.69, 22.5), (48.47, 11.84), (50.57, 8.04), (51.68, 6.08), (51.33
 def test_a_published_example() -> None:
     belief, one = Belief(np.array([60.0]), np.array([[225.0]])), np.eye(1)
     for measured, (mean, variance) in zip(HEIGHTS_M, PUBLISHED, strict=True):
-        belief = corrected(predicted(belief, one, 0 * one), np.array([measured]), one, 25.0 * one).belief
+        belief = correct(predict(belief, one, 0 * one), np.array([measured]), one, 25.0 * one).belief
         assert belief.mean[0] == pytest.approx(mean, abs=0.006)
         assert belief.covariance[0, 0] == pytest.approx(variance, abs=0.006)
 
@@ -141,7 +140,7 @@ def walked(seed: int, steps: int, nudges: Array = NUDGES) -> tuple[Array, Array]
 def filtered(measured: Array) -> list[Correction]:
     belief, corrections = START, []
     for z in measured:
-        corrections.append(corrected(predicted(belief, STEP, NUDGES), z, SEEN, NOISE))
+        corrections.append(correct(predict(belief, STEP, NUDGES), z, SEEN, NOISE))
         belief = corrections[-1].belief
     return corrections
 
@@ -183,7 +182,7 @@ def test_the_covariance_stays_positive_where_the_plain_form_does_not() -> None:
     for row in rows[:, None]:
         gain = plain @ row.T / (row @ plain @ row.T + 1.0)
         plain = plain - gain @ row @ plain
-        belief = corrected(belief, np.zeros(1), row, np.eye(1)).belief
+        belief = correct(belief, np.zeros(1), row, np.eye(1)).belief
     whole = least_squares(np.vstack([small * np.eye(2), rows]), np.zeros(4)).covariance
     np.testing.assert_allclose(belief.covariance, whole, rtol=1e-9)
     assert abs(plain / whole - 1).max() > 1

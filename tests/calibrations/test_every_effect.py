@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from calibrations.effect import HOOKS, Effect, catalogue, find
+from calibrations.effects import HOOKS, Effect, Parameter, Values
+from calibrations.effects.catalogue import catalogue, find
 from calibrations.errors import ModelError, UnknownName
 from calibrations.fit import fit
-from calibrations.model_file import read_model
+from calibrations.model.file import read_model
 from calibrations.problem import Problem
 from calibrations.table import Array, Table
 from tests.calibrations import shaken, synthetic
@@ -103,16 +104,25 @@ def test_unknown_effect_names_the_nearest() -> None:
         find("hysteresys", catalogue())
 
 
-OWN = '''"""sag: the output sags with time.
+OWN = '''from calibrations.effects import Constant, Effect, Parameter
 
-    V += s t
+class Sag(Effect):
+    """sag: the output sags with time.
 
-Symptom   the residual follows time.
-"""
-from calibrations.effect import Parameter
-PARAMETERS = (Parameter("sag", "{out}/s", typical=1e-4),)
-def transduction(a, table, p):
-    return table.time_s[:, None] * p["sag"]
+        V += s t
+
+    Symptom   the residual follows time.
+    """
+
+    needs = ("t_s",)
+    sag = Parameter("{out}/s", typical=1e-4)
+    begin_s = Constant(lambda table: float(table.time_s[0]))
+
+    def transduction(self, a, table, p):
+        return (table.time_s - p.begin_s)[:, None] * p.sag
+
+    def _helper(self):
+        return 1
 '''
 
 
@@ -120,18 +130,97 @@ def test_a_users_own_effect_is_one_file(tmp_path: Path) -> None:
     (tmp_path / "sag.py").write_text(OWN)
     effects = catalogue(tmp_path)
     assert set(effects) == {*catalogue(), "sag"}
-    assert effects["sag"].summary == "the output sags with time."
-    assert effects["sag"].acts_on == "transduction"
+    sag = effects["sag"]
+    assert (sag.summary, sag.acts_on) == ("the output sags with time.", "transduction")
+    assert [(p.name, p.unit) for p in sag.parameters] == [("sag", "{out}/s")]
+    table = Table.from_columns("poses", {n: [1.0, 3.0] for n in ("alpha_deg", "beta_deg", "vx_v", "t_s")})
+    p = Values.of({"sag": np.full(3, 0.5), "begin_s": sag.constants["begin_s"](table)})
+    assert np.array_equal(sag.transduction(np.zeros((2, 3)), table, p), [[0.0] * 3, [1.0] * 3])
+
+
+MISSPELT = [
+    ("needs =", "need =", 'has no member "need"; did you mean "needs"'),
+    ("def transduction", "def tranduction", 'has no member "tranduction"; did you mean "transduction"'),
+    ('needs = ("t_s",)', 'needs = "t_s"', 'needs must be a tuple of names, as in ("temperature_c",)'),
+    ('needs = ("t_s",)', 'kinds = ("pose",)', 'no kind of table "pose"; did you mean "poses"'),
+    ('needs = ("t_s",)', 'exact = "no"', "exact is 'no'; it must be of type bool"),
+    ('needs = ("t_s",)', 'after = ("bais",)', 'there is no effect "bais"; did you mean "bias"'),
+    ('needs = ("t_s",)', "memory = 2", "memory and follow belong together"),
+    ("(self, a, table, p)", "(a, table, p)", "transduction must be a method: def transduction(self, a, table, p)"),
+    ("(self, a, table, p)", "(self, a, p)", "transduction must be a method: def transduction(self, a, table, p)"),
+    ("typical=1e-4", "typical=1e-4, where='begin'", 'sag: the effect has no constant "begin"; did you mean "begin_s"'),
+    ("typical=1e-4", "typical=0", "typical is 0; it must be a number above 0"),
+    ("sag = Parameter", "force = Parameter", '"force" has a meaning of its own in an effect'),
+    ("sag = Parameter", "items = Parameter", '"items" has a meaning of its own in an effect'),
+    ("lambda table: float(table.time_s[0])", "3.0", "the constant begin_s needs a function of the table"),
+    ("class Sag", "class Sagging", "must define one effect, `class Sag(Effect):`; it defines Sagging"),
+]
+
+
+@pytest.mark.parametrize(("right", "wrong", "says"), MISSPELT, ids=[wrong for _, wrong, _ in MISSPELT])
+def test_a_wrong_member_is_refused_with_the_right_one(tmp_path: Path, right: str, wrong: str, says: str) -> None:
+    assert right in OWN
+    (tmp_path / "sag.py").write_text(OWN.replace(right, wrong))
+    with pytest.raises(ModelError) as error:
+        catalogue(tmp_path)
+    assert says in str(error.value)
+
+
+def test_a_misspelt_parameter_names_the_nearest() -> None:
+    with pytest.raises(AttributeError, match='no parameter "slpoe"; did you mean "slope"'):
+        Values(slope=np.zeros(3)).slpoe  # noqa: B018
+
+
+def test_an_effect_defined_in_a_notebook_has_its_class_as_name() -> None:
+    class FifthHarmonic(Effect):
+        sine = Parameter("{out}", typical=0.1)
+        cosine = Parameter("{out}", typical=0.1)
+
+        def transduction(self, a: Array, table: Table, p: Values) -> Array:
+            return a * p.sine
+
+    effect = FifthHarmonic()
+    assert (effect.name, [p.name for p in effect.parameters]) == ("fifth-harmonic", ["sine", "cosine"])
+
+
+OLD = '''"""sag: the output sags with time.
+
+Symptom   the residual follows time.
+"""
+from calibrations.effect import Parameter
+PARAMETERS = (Parameter("sag", "{out}/s", typical=1e-4),)
+def output(v, table, p):
+    return v * p["sag"]
+'''
+
+
+def test_the_old_form_of_an_effect_is_answered_by_the_new_one(tmp_path: Path) -> None:
+    (tmp_path / "slow_sag.py").write_text(OLD)
+    with pytest.raises(ModelError) as error:
+        catalogue(tmp_path)
+    for part in (
+        "slow_sag.py",
+        "an effect is a class now",
+        "class SlowSag(Effect):",
+        "def output(self, ",
+        "CONTRIBUTING",
+    ):
+        assert part in str(error.value)
+
+
+SHORT = OWN.replace("Sag(", "Wrong(").replace("sag: ", "wrong: ")
 
 
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("x = 1\n", "is not an effect: it defines none of the functions pose, force, transduction, output"),
+        ("x = 1\n", r"must define one effect, `class Wrong\(Effect\):`; it defines no effect"),
         ("import nowhere_to_be_found\n", "ModuleNotFoundError: No module named"),
-        ("def output(v, table, p):\n    return v\n", "PARAMETERS must be a tuple"),
-        (OWN.replace("Symptom", "Sympton"), "its docstring must begin with"),
-        (OWN.replace("sag: the", "the"), "its docstring must begin with"),
+        ("def output(v, table, p):\n    return v\n", "an effect is a class now"),
+        (SHORT.replace("Symptom", "Sympton"), "the docstring of Wrong must begin with"),
+        (SHORT.replace("wrong: the", "the"), "the docstring of Wrong must begin with"),
+        (SHORT.replace("sag =", "_sag ="), "Wrong has no parameter"),
+        (SHORT.replace("def transduction", "def _transduction"), "Wrong acts nowhere"),
     ],
 )
 def test_a_file_that_is_not_an_effect(tmp_path: Path, text: str, says: str) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from calibrations.errors import DataError
-from calibrations.noise_analysis.exact import deviations
+from calibrations.noise.deviations import deviations
 
 DATA = Path(__file__).parents[1] / "data" / "allantools"
 STABLE32 = {"adev": "allan", "oadev": "overlapping", "mdev": "modified", "hdev": "separate-hadamard", "totdev": "total"}

@@ -5,15 +5,21 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from calibrations.design.expected import CERTAIN, Expected, expected, one_way, told_apart
-from calibrations.design.foreseen import foreseen
-from calibrations.effect import catalogue
+from calibrations.design.expected import (
+    CERTAIN_PROBABILITY,
+    Expected,
+    expected_gain,
+    pairs_separated,
+    predict_data,
+    vary_one_way,
+)
+from calibrations.effects.catalogue import catalogue
 from calibrations.fit import Fit, fit, refit
 from calibrations.joined import joined
 from calibrations.model import Model
-from calibrations.model_file import read_model
+from calibrations.model.file import read_model
 from calibrations.table import Array, Table
-from drivers.simulation.world import World
+from drivers.world.world import World
 from tests.hidden.rigs import IDEAL
 
 UP = np.arange(0.0, 361.0, 45.0)
@@ -44,16 +50,17 @@ def rivals(table: Table) -> tuple[Fit, Fit]:
 def planned(best: Fit, flip: float | Array) -> Table:
     t = best.table.time_s.max() + 60 + 7 * np.arange(float(len(ALPHA)))
     columns = {"alpha_deg": ALPHA, "beta_deg": BETA, "direction": DIRECTION, "t_s": t, "flip": flip + np.zeros(len(t))}
-    return foreseen(best, columns)
+    return predict_data(best, columns)
 
 
+@pytest.mark.slow
 def test_what_is_identical_stays_so_and_what_turns_with_the_sensor_does_not() -> None:
     best, rival = rivals(measured(0.05, 1, (0,))[0])
-    up, down = (expected(best, rival, planned(best, flip)) for flip in (0.0, 1.0))
-    assert told_apart(up.together) < 0.1
-    assert told_apart(down.together) > 0.999
+    up, down = (expected_gain(best, rival, planned(best, flip)) for flip in (0.0, 1.0))
+    assert pairs_separated(up.together) < 0.1
+    assert pairs_separated(down.together) > 0.999
     assert down.deviations == pytest.approx(np.sqrt(down.together))
-    assert told_apart(down.alone) < 0.1, "face down alone it is as face up alone: only both faces tell"
+    assert pairs_separated(down.alone) < 0.1, "face down alone it is as face up alone: only both faces tell"
 
 
 def test_it_is_the_gain_in_likelihood_that_the_experiment_then_brings() -> None:
@@ -61,7 +68,7 @@ def test_it_is_the_gain_in_likelihood_that_the_experiment_then_brings() -> None:
     for seed in range(6):
         tables = measured(0.02, seed, (0, 1))
         best, rival = rivals(tables[0])
-        foretold = expected(best, rival, planned(best, 1.0)).together
+        foretold = expected_gain(best, rival, planned(best, 1.0)).together
         wrong, right = rivals(joined(tables))
         gain = np.sum((wrong.residual**2 - right.residual**2) / right.noise.white**2)
         ratios.append(gain / foretold)
@@ -73,17 +80,19 @@ def test_a_longer_dwell_brings_more_in_proportion() -> None:
     best, rival = rivals(measured(0.05, 2, (0,))[0])
     table = planned(best, np.repeat([0.0, 1.0], len(ALPHA) // 2))
     columns = {name: table.column(name) for name in ("alpha_deg", "beta_deg", "direction", "t_s", "flip")}
-    longer = foreseen(best, {**columns, "n": 4 * table.column("n")})
-    assert expected(best, rival, longer).alone / expected(best, rival, table).alone == pytest.approx(4.0, rel=0.05)
+    longer = predict_data(best, {**columns, "n": 4 * table.column("n")})
+    assert expected_gain(best, rival, longer).alone / expected_gain(best, rival, table).alone == pytest.approx(
+        4.0, rel=0.05
+    )
 
 
 def test_the_probability_of_telling_apart() -> None:
     """Odds of 20 to 1 are six in twice the logarithm: at lambda = 6 they are reached half of the time."""
-    assert told_apart(0.0) == 0.0
-    assert told_apart(6.0) == pytest.approx(0.5)
-    assert told_apart(21.2) == pytest.approx(CERTAIN, abs=0.001)
+    assert pairs_separated(0.0) == 0.0
+    assert pairs_separated(6.0) == pytest.approx(0.5)
+    assert pairs_separated(21.2) == pytest.approx(CERTAIN_PROBABILITY, abs=0.001)
     draws = 30.0 + 2 * np.sqrt(30.0) * np.random.default_rng(1).standard_normal(20000)
-    assert told_apart(30.0) == pytest.approx(np.mean(draws > 6), abs=0.005)
+    assert pairs_separated(30.0) == pytest.approx(np.mean(draws > 6), abs=0.005)
 
 
 def test_what_does_not_show_by_itself_is_not_named_by_itself() -> None:
@@ -94,4 +103,4 @@ def test_what_does_not_show_by_itself_is_not_named_by_itself() -> None:
     assert faint.probability == clear.probability
     best, _ = rivals(measured(0.05, 3, (0,))[0])
     nothing = refit(best, best.model.without("stage-zero-offset"))
-    assert one_way(best, nothing, planned(best, 0.0)).alone > 1000
+    assert vary_one_way(best, nothing, planned(best, 0.0)).alone > 1000

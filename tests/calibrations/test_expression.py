@@ -9,10 +9,9 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from calibrations.effects.expression import FUNCTIONS, Apply, Name, Number, evaluate, nodes, parse
+from calibrations.effects.expression_start import linear
 from calibrations.errors import ExpressionError
-from calibrations.expressions.expression import Apply, Name, Number, evaluate, nodes, parse
-from calibrations.expressions.shape import linear
-from calibrations.expressions.words import FUNCTIONS
 
 T = np.array([-2.0, 0.0, 0.5, 3.0])
 VALUES = [

@@ -7,13 +7,13 @@ import re
 import numpy as np
 import pytest
 
-from calibrations.compare import compare
-from calibrations.diagnose import diagnose
-from calibrations.effect import Effect, catalogue
+from calibrations.effects import Effect
+from calibrations.effects.catalogue import catalogue
+from calibrations.effects.expression_effect import effect_for, own_effect
 from calibrations.errors import ExpressionError, ModelError
-from calibrations.expressions.effect import effect_for, own_effect
 from calibrations.fit import Fit, fit
-from calibrations.model_file import dump_model, parse_model, read_model
+from calibrations.loop import compare, diagnose
+from calibrations.model.file import dump_model, parse_model, read_model
 from calibrations.table import Array, Table
 from tests.calibrations import synthetic
 
@@ -140,6 +140,7 @@ def test_the_same_text_is_the_same_effect() -> None:
     assert "own" not in catalogue()
 
 
+@pytest.mark.slow
 def test_unequal_sizes_and_positions() -> None:
     """A column in thousands is fitted as well as one in thousandths; positions need no angles."""
     found = added("a*t**2 + b*1e-6*humidity", table(1e-9 * TIME**2 + 1e-4 * COLUMNS["humidity"]))

@@ -7,11 +7,11 @@ from collections.abc import Iterable
 import numpy as np
 import pytest
 
-from calibrations.effect import catalogue
+from calibrations.effects.catalogue import catalogue
 from calibrations.errors import ModelError, TooFewRows
 from calibrations.fit import evaluate, fit
-from calibrations.model_file import read_model
-from calibrations.parameters import Layout
+from calibrations.model.file import read_model
+from calibrations.model.parameters import Layout
 from calibrations.table import Table
 from tests.calibrations import synthetic
 from tests.calibrations.test_effects_recovered import hysteretic

@@ -9,29 +9,28 @@ from typing import Any
 import numpy as np
 import pytest
 
-from calibrations.chain import nominal_pose, specific_force
-from calibrations.effect import catalogue
+from calibrations.discovery.candidates import candidates
+from calibrations.discovery.significance import Screen
+from calibrations.effects import Constant, Effect, Parameter, Values
+from calibrations.effects.catalogue import catalogue
 from calibrations.fit import fit
-from calibrations.fleet.batch import batch_effects
-from calibrations.fleet.columns import Shared
-from calibrations.fleet.corrected import corrected
-from calibrations.fleet.look import Look, Score, information, look
-from calibrations.fleet.pooling import pooled
-from calibrations.fleet.rigs import Measured, RigError, rig_errors, unconnected
-from calibrations.model_file import read_model
-from calibrations.search.candidates import candidates
-from calibrations.search.screen import Screen
-from calibrations.table import Table
+from calibrations.fleet.batch import find_batch_effects
+from calibrations.fleet.look import Score, Screening, SharedDesigns, information, screen_sensor
+from calibrations.fleet.rigs import Measured, RigError, correct_stage_errors, find_rig_errors, unconnected_rigs
+from calibrations.fleet.siblings import pool_siblings
+from calibrations.geometry.orientation import nominal_pose, specific_force
+from calibrations.model.file import read_model
+from calibrations.table import Array, Table
 from tests.calibrations.fleets import Flaw, Rig, sensor
 
 LINEAR = read_model("linear")
 EFFECTS = {k: e for k, e in catalogue().items() if not {"t_s", "temperature_c"} & set(e.needs) and k != "quantisation"}
-SHARED = Shared(EFFECTS)
-STAGE = [name for name, effect in catalogue().items() if effect.pose is not None]
+SHARED = SharedDesigns(EFFECTS)
+STAGE = [name for name, effect in catalogue().items() if "pose" in effect.places]
 
 
-def looks(tables: Iterable[Table]) -> list[Look]:
-    return [look(table, LINEAR, SHARED) for table in tables]
+def looks(tables: Iterable[Table]) -> list[Screening]:
+    return [screen_sensor(table, LINEAR, SHARED) for table in tables]
 
 
 def test_a_look_scores_as_the_search_for_one_sensor_does() -> None:
@@ -54,14 +53,14 @@ def test_information_is_that_of_the_stated_uncertainties() -> None:
 def test_a_batch_shows_what_none_of_its_sensors_does() -> None:
     found = looks(sensor(100 + k, Flaw(bend=30e-6)) for k in range(20))
     assert sum(each.chance < 0.003 for each in found) <= 1
-    first = batch_effects(found, STAGE)[0]
+    first = find_batch_effects(found, STAGE)[0]
     assert "quadratic-nonlinearity" in (first.effect, *first.rivals)
     assert first.common
     assert first.p_value < 1e-3
 
 
 def test_sensors_that_each_have_their_own_value_make_a_batch_too_and_it_is_no_stage_that_has() -> None:
-    first = batch_effects(looks(sensor(200 + k, Flaw(askew=0.1)) for k in range(8)), STAGE)[0]
+    first = find_batch_effects(looks(sensor(200 + k, Flaw(askew=0.1)) for k in range(8)), STAGE)[0]
     assert (first.effect, first.common) == ("axis-misalignment", False)
 
 
@@ -70,14 +69,14 @@ def test_an_effect_may_have_more_parameters_in_one_sensor_than_in_another() -> N
     short = [
         replace(each, scores=tuple(_cut(s) if k == 0 else s for k, s in enumerate(each.scores))) for each in found[:4]
     ]
-    assert not batch_effects([*short, *found[4:]], STAGE)
+    assert not find_batch_effects([*short, *found[4:]], STAGE)
 
 
 def _cut(score: Score) -> Score:
     return replace(score, score=score.score[:1], information=score.information[:1, :1], rank=1)
 
 
-def scored(scores: Iterable[np.ndarray[Any, np.dtype[np.float64]]]) -> list[Look]:
+def scored(scores: Iterable[np.ndarray[Any, np.dtype[np.float64]]]) -> list[Screening]:
     """Looks of sensors with these scores of one effect, whose information is 1 for each parameter."""
     bare = looks([sensor(1)])[0]
     return [replace(bare, scores=(Score("bent", 0, s, np.eye(len(s)), float(s @ s), len(s), 1.0),)) for s in scores]
@@ -86,14 +85,14 @@ def scored(scores: Iterable[np.ndarray[Any, np.dtype[np.float64]]]) -> list[Look
 def test_one_sensor_far_off_does_not_hide_what_all_others_have() -> None:
     rng = np.random.default_rng(1)
     scores = [np.array([1.5, 1.5]) + rng.standard_normal(2) for _ in range(30)]
-    assert batch_effects(scored([*scores, np.array([-300.0, -300.0])]))[0].common
+    assert find_batch_effects(scored([*scores, np.array([-300.0, -300.0])]))[0].common
 
 
 def test_what_less_than_half_of_the_sensors_have_is_not_their_batchs() -> None:
     rng = np.random.default_rng(2)
     scores = [40.0 * (k < 18) * rng.choice([-1, 1], 3) + rng.standard_normal(3) for k in range(40)]
-    assert not batch_effects(scored(scores))
-    assert batch_effects(scored(scores[:30]))[0].common is False
+    assert not find_batch_effects(scored(scores))
+    assert find_batch_effects(scored(scores[:30]))[0].common is False
 
 
 def test_who_came_first_hardly_makes_a_difference() -> None:
@@ -101,35 +100,45 @@ def test_who_came_first_hardly_makes_a_difference() -> None:
     table = sensor(2, Flaw(bend=3e-4))
     outputs = {"vx_v": 3 * table.column("vx_v"), "vy_v": 0.5 * table.column("vy_v")}
     other = replace(table, columns={**table.columns, **outputs})
-    shared, alone = Shared(EFFECTS), Shared(EFFECTS)
-    look(sensor(1, Flaw(warmth=1e-3), Rig(wave=0.3)), LINEAR, shared)
-    after, own = look(other, LINEAR, shared), look(other, LINEAR, alone)
+    shared, alone = SharedDesigns(EFFECTS), SharedDesigns(EFFECTS)
+    screen_sensor(sensor(1, Flaw(warmth=1e-3), Rig(wave=0.3)), LINEAR, shared)
+    after, own = screen_sensor(other, LINEAR, shared), screen_sensor(other, LINEAR, alone)
     assert after.stage.information == pytest.approx(own.stage.information, abs=1e-2 * np.max(own.stage.information))
     assert [s.statistic for s in after.scores] == pytest.approx([s.statistic for s in own.scores], rel=1e-2, abs=1e-2)
     assert after.chance == pytest.approx(own.chance, rel=0.02)
-    drifting, still = (Shared(EFFECTS).of(fit(LINEAR, s)).trials for s in (sensor(1, Flaw(warmth=1e-2)), sensor(2)))
+    drifting, still = (
+        SharedDesigns(EFFECTS).of(fit(LINEAR, s)).trials for s in (sensor(1, Flaw(warmth=1e-2)), sensor(2))
+    )
     assert drifting == pytest.approx(still, rel=1e-2)
 
 
 def test_columns_of_an_effect_on_the_output_are_each_sensors_own() -> None:
-    bent = replace(EFFECTS["quadratic-nonlinearity"], transduction=None,
-                   output=lambda v, _, p: v + p["square"] * v * v)  # fmt: skip
-    table, shared = sensor(1), Shared({bent.name: bent})
+    class BentOutput(Effect):
+        square = Parameter("{out}/g^2", typical=0.02)
+
+        def output(self, v: Array, table: Table, p: Values) -> Array:
+            return v + p.square * v * v
+
+    bent = BentOutput()
+    table, shared = sensor(1), SharedDesigns({bent.name: bent})
     far = replace(table, columns={**table.columns, "vx_v": 40 * table.column("vx_v")})
-    look(far, LINEAR, shared)
-    after, own = (look(table, LINEAR, s).scores[0] for s in (shared, Shared({bent.name: bent})))
+    screen_sensor(far, LINEAR, shared)
+    after, own = (screen_sensor(table, LINEAR, s).scores[0] for s in (shared, SharedDesigns({bent.name: bent})))
     assert after.information == pytest.approx(own.information)
 
 
 def test_columns_are_shared_where_an_effects_constants_are_the_same() -> None:
-    bent = EFFECTS["quadratic-nonlinearity"]
-    hook = bent.transduction
-    assert hook is not None
-    effect = replace(bent, constants={"times": lambda table: table.number("times", 1.0)},
-                     transduction=lambda a, table, p: p["times"] * hook(a, table, p))  # fmt: skip
-    shared = Shared({effect.name: effect})
+    class Multiplied(Effect):
+        square = Parameter("{out}/g^2", typical=0.02)
+        times = Constant(lambda table: table.number("times", 1.0))
+
+        def transduction(self, a: Array, table: Table, p: Values) -> Array:
+            return p.times * a**2 * p.square
+
+    effect = Multiplied()
+    shared = SharedDesigns({effect.name: effect})
     once, thrice = (
-        look(replace(sensor(1), constants={"times": times}), LINEAR, shared).scores[0].information
+        screen_sensor(replace(sensor(1), constants={"times": times}), LINEAR, shared).scores[0].information
         for times in (1.0, 3.0)
     )
     assert thrice == pytest.approx(9 * once)
@@ -137,8 +146,8 @@ def test_columns_are_shared_where_an_effects_constants_are_the_same() -> None:
 
 def test_an_equal_batch_misses_nothing_and_one_defect_does_not_speak_for_it() -> None:
     clean = looks(sensor(300 + k) for k in range(14))
-    assert not batch_effects(clean, STAGE)
-    assert not batch_effects([*clean[1:], *looks([sensor(400, Flaw(bend=0.01))])], STAGE)
+    assert not find_batch_effects(clean, STAGE)
+    assert not find_batch_effects([*clean[1:], *looks([sensor(400, Flaw(bend=0.01))])], STAGE)
 
 
 def fleet(rigs: dict[str, Rig], count: int = 5) -> list[Measured]:
@@ -155,7 +164,7 @@ def beyond(errors: Iterable[RigError]) -> dict[tuple[str, str, str], RigError]:
 def test_what_all_sensors_of_a_rig_share_is_the_rigs() -> None:
     """Each sensor is askew by an angle of its own, which looks like its stage's zero: a fleet tells them apart."""
     members = fleet({"a": Rig(), "b": Rig(wave=0.05), "c": Rig(), "d": Rig(zero=0.8)})
-    found = beyond(rig_errors(members))
+    found = beyond(find_rig_errors(members))
     assert set(found) == {("b", "stage-eccentricity", "sine"), ("d", "stage-zero-offset", "beta")}
     wave, zero = found["b", "stage-eccentricity", "sine"], found["d", "stage-zero-offset", "beta"]
     assert abs(wave.value - 0.05) < 4 * wave.std < 0.02
@@ -163,27 +172,26 @@ def test_what_all_sensors_of_a_rig_share_is_the_rigs() -> None:
 
 
 def test_rigs_that_are_alike_have_no_error_and_one_rig_alone_tells_none() -> None:
-    assert not rig_errors(fleet({"a": Rig(), "b": Rig(), "c": Rig()}, count=4))
-    assert not rig_errors(fleet({"a": Rig(wave=0.1)}))
+    assert not find_rig_errors(fleet({"a": Rig(), "b": Rig(), "c": Rig()}, count=4))
+    assert not find_rig_errors(fleet({"a": Rig(wave=0.1)}))
 
 
 def test_rigs_are_compared_where_a_batch_connects_them() -> None:
     stage = looks([sensor(1)])[0].stage
     of = [Measured(batch, rig, stage) for batch, rig in ("1a", "1b", "2c", "3b", "3d")]
-    assert unconnected(of) == [("c",), ("a", "b", "d")] or unconnected(of) == [("a", "b", "d"), ("c",)]
+    assert unconnected_rigs(of) == [("c",), ("a", "b", "d")] or unconnected_rigs(of) == [("a", "b", "d"), ("c",)]
 
 
 def test_a_corrected_table_stands_where_the_stage_truly_was() -> None:
     table = sensor(1)
     errors = {"stage-zero-offset": {"beta": 0.3, "alpha": 0.1}, "base-tilt": {"x": 0.2}}
-    moved = corrected(table, errors, EFFECTS)
+    moved = correct_stage_errors(table, errors, EFFECTS)
     pose = nominal_pose(table)
     for name, values in errors.items():
-        hook = EFFECTS[name].pose
-        assert hook is not None
-        pose = hook(pose, table, {p.name: np.asarray(values.get(p.name, 0.0)) for p in EFFECTS[name].parameters})
+        effect = EFFECTS[name]
+        pose = effect.pose(pose, table, Values.of({p.name: values.get(p.name, 0.0) for p in effect.parameters}))
     assert specific_force(nominal_pose(moved)) == pytest.approx(specific_force(pose), abs=1e-12)
-    assert corrected(table, {}, EFFECTS) is table
+    assert correct_stage_errors(table, {}, EFFECTS) is table
 
 
 def test_siblings_save_poses() -> None:
@@ -195,7 +203,7 @@ def test_siblings_save_poses() -> None:
         truth.append(bend)
         few.append(fit(bent, sensor(700 + k, Flaw(bend=bend), chosen=slice(0, 60, 3))))
         alone.append(fit(bent, sensor(700 + k, Flaw(bend=bend))))
-    together = pooled(
+    together = pool_siblings(
         np.array([f.theta for f in few]), np.array([information(f) for f in few]), few[0].problem.layout.typical
     )
     error = np.sqrt(np.mean((together.values[:, 4] - truth) ** 2))
@@ -213,7 +221,7 @@ def test_pooled_intervals_of_correlated_parameters_hold_what_they_say(count: int
         truth = np.array([1.0, -2.0, 0.5]) + np.array([2.0, 0.3, 0.0]) * rng.standard_normal((count, 3))
         cov = np.linalg.inv(A)
         theta = truth + np.einsum("nij,nj->ni", np.linalg.cholesky(cov), rng.standard_normal((count, 3)))
-        low, high = pooled(theta, A, np.ones(3)).intervals()
+        low, high = pool_siblings(theta, A, np.ones(3)).intervals()
         held.append(np.mean((low <= truth) & (high >= truth), axis=0))
     assert np.all(np.mean(held, axis=0) > 0.9)
 
@@ -222,7 +230,7 @@ def test_what_siblings_tell_of_one_parameter_tells_of_another_that_poses_mix_wit
     rng, cov = np.random.default_rng(4), np.array([[1.0, 0.97], [0.97, 1.0]])
     truth = np.column_stack([np.full(40, 2.0), 5 * rng.standard_normal(40)])
     theta = truth + rng.multivariate_normal(np.zeros(2), cov, 40)
-    found = pooled(theta, np.tile(np.linalg.inv(cov), (40, 1, 1)), np.ones(2))
+    found = pool_siblings(theta, np.tile(np.linalg.inv(cov), (40, 1, 1)), np.ones(2))
     error, alone = found.values[:, 1] - truth[:, 1], theta[:, 1] - truth[:, 1]
     assert np.sqrt(np.mean(error**2)) < 0.5 * np.std(alone)
     assert np.all(found.stds[:, 1] < 0.6)
@@ -233,7 +241,7 @@ def test_what_a_sensors_poses_do_not_tell_is_foretold_by_its_siblings() -> None:
     A[0] = np.diag([4.0, 0.0])
     theta = np.tile([1.0, 5.0], (10, 1)) + 0.1 * np.random.default_rng(0).standard_normal((10, 2))
     theta[0, 1] = 50.0
-    found = pooled(theta, A, np.ones(2))
+    found = pool_siblings(theta, A, np.ones(2))
     assert found.values[0, 1] == pytest.approx(5, abs=0.5)
     assert np.isinf(found.alone[0, 1])
     assert found.stds[0, 1] < 1

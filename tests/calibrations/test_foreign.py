@@ -10,19 +10,18 @@ import numpy as np
 import pytest
 
 from calibrations.errors import DataError, MissingColumn
-from calibrations.reading.foreign import read_foreign
-from calibrations.reading.read_csv import read_csv, write_csv
-from calibrations.reading.units import Mapped
+from calibrations.importing.foreign import read_csv, read_foreign, write_csv
+from calibrations.importing.units import ColumnMapping
 from calibrations.table import Table
 from tests.calibrations.synthetic import components, poses, turns
 
-THREE = [Mapped(name, str(k)) for k, name in enumerate(("ax", "ay", "az"), start=1)]
+THREE = [ColumnMapping(name, str(k)) for k, name in enumerate(("ax", "ay", "az"), start=1)]
 
 
 def read(tmp_path: Path, text: str, *columns: str, kind: str | None = None, **constants: float | str) -> Table:
     path = tmp_path / "theirs.txt"
     path.write_text(text, encoding="utf-8")
-    return read_foreign(path, kind, [Mapped.parse(column) for column in columns], constants)
+    return read_foreign(path, kind, [ColumnMapping.parse(column) for column in columns], constants)
 
 
 @pytest.mark.parametrize("separator", [",", ";", "\t", " ", "   ", ", "])
@@ -114,7 +113,7 @@ GOOD = "ax,ay,az\n1,2,3\n4,5,6\n"
     [
         ("", (), "theirs.txt: the file is empty"),
         ("# unit: g\n", (), "theirs.txt: the file is empty"),
-        ("ax,ay,az\n", (), "theirs.txt: no rows below the header"),
+        ("ax,ay,az\n", (), "theirs.txt: there are no rows below the header"),
         ("ax,ay,ax\n1,2,3\n", (), 'line 1: the column "ax" occurs twice'),
         ("ax,ay,\n1,2,3\n", (), "line 1: a column has no name: ax, ay, "),
         ("ax,ay,az\n1,2,3\n\n4,5\n1,2,3\n", (), "theirs.txt, line 4: 2 values for 3 columns (ax, ay, az)"),
@@ -126,10 +125,10 @@ GOOD = "ax,ay,az\n1,2,3\n4,5,6\n"
         ("axx,ay,az\n1,2,3\n", (), 'theirs.txt, line 1: no kind of table has the column "axx"; did you mean "ax"?'),
         (GOOD, ("ax=acx",), 'theirs.txt: there is no column "acx"; did you mean "ax"?'),
         (GOOD, ("ax=ax:mgg",), 'theirs.txt: unknown unit "mgg" of the column "ax"; did you mean "mg"?'),
-        (GOOD, ("ax=ax:g", "ay=ay:mg", "az=az:V"), "the three axes must be in one unit: ax in g, ay in g, az in V"),
-        (GOOD, ("ax=ax", "ax=ay"), 'theirs.txt: the column "ax" is given twice'),
-        (GOOD, ("t_s=ax:V",), 'the column "t_s" is in s; "ax" in V cannot become that'),
-        (GOOD, ("vx_v=ax:rad",), 'the column "vx_v" is in V; "ax" in rad cannot become that'),
+        (GOOD, ("ax=ax:g", "ay=ay:mg", "az=az:V"), "the three axes must have the same unit: ax in g, ay in g, az in V"),
+        (GOOD, ("ax=ax", "ax=ay"), 'theirs.txt: the column "ax" is mapped twice'),
+        (GOOD, ("t_s=ax:V",), 'the column "t_s" is in s; "ax" in V cannot be converted to it'),
+        (GOOD, ("vx_v=ax:rad",), 'the column "vx_v" is in V; "ax" in rad cannot be converted to it'),
     ],
 )
 def test_what_is_wrong_is_said_with_its_place(tmp_path: Path, text: str, columns: tuple[str, ...], says: str) -> None:
@@ -139,8 +138,8 @@ def test_what_is_wrong_is_said_with_its_place(tmp_path: Path, text: str, columns
 
 @pytest.mark.parametrize("text", ["vx_v", "=Vout", "vx_v=", "vx_v=:mV", ""])
 def test_a_column_is_given_as_name_and_theirs(text: str) -> None:
-    with pytest.raises(DataError, match="a column is given as NAME=THEIRS or NAME=THEIRS:UNIT, such as vx_v=Vout:mV"):
-        Mapped.parse(text)
+    with pytest.raises(DataError, match="write a column as NAME=THEIRS or NAME=THEIRS:UNIT, such as vx_v=Vout:mV"):
+        ColumnMapping.parse(text)
 
 
 def test_a_missing_column_is_named_with_the_way_out(tmp_path: Path) -> None:
@@ -149,7 +148,7 @@ def test_a_missing_column_is_named_with_the_way_out(tmp_path: Path) -> None:
     assert f"    rig import {tmp_path}/theirs.txt --kind poses --column vx_v=output\n" in str(error.value)
     with pytest.raises(MissingColumn, match='a table of poses needs the column "vx_v"'):
         read(tmp_path, "alpha_deg,beta_deg,output\n1,2,3\n", kind="poses")
-    with pytest.raises(MissingColumn, match="; --column gives one of yours the name, as in vx_v=Vout:mV"):
+    with pytest.raises(MissingColumn, match="; name a column with --column, such as vx_v=Vout:mV"):
         read(tmp_path, "when,where\n1,2\n")
 
 

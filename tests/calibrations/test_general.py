@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from calibrations.effect import catalogue
+from calibrations.effects.catalogue import catalogue
 from calibrations.fit import fit
-from calibrations.general import General, general
-from calibrations.model_file import read_model
+from calibrations.fitting.matrices import CalibrationMatrices, calibration_matrices
+from calibrations.model.file import read_model
 from calibrations.table import Array, Table
 from rig.cli import calibrated
 from tests.calibrations import synthetic, turned
@@ -21,8 +21,8 @@ AXES = AXES / np.linalg.norm(AXES, axis=1, keepdims=True)
 SCALE, BIAS = np.array([2050.0, 2040.0, 2106.0]), np.array([-6.0, -48.0, -29.0])
 
 
-def made(found: object) -> General:
-    assert isinstance(found, General)
+def made(found: object) -> CalibrationMatrices:
+    assert isinstance(found, CalibrationMatrices)
     return found
 
 
@@ -38,7 +38,7 @@ def positions(seed: int, noise: float = 1.0, n: int = 40) -> tuple[Table, Array]
 def test_positions_give_the_matrices() -> None:
     table, a = positions(0)
     model = read_model("linear").with_effect(catalogue()["axis-nonorthogonality"])
-    found = made(general(fit(model, table)))
+    found = made(calibration_matrices(fit(model, table)))
     assert found(table.outputs) == pytest.approx(a, abs=4e-3)
     assert pytest.approx(np.linalg.inv(AXES), abs=2e-3) == found.M
     assert pytest.approx(1 / SCALE, rel=1e-3) == found.S
@@ -50,7 +50,7 @@ def test_uncertainties_of_the_matrices_cover_them() -> None:
     model = read_model("linear").with_effect(catalogue()["axis-nonorthogonality"])
     errors: list[float] = []
     for seed in range(16):
-        found = made(general(fit(model, positions(seed)[0])))
+        found = made(calibration_matrices(fit(model, positions(seed)[0])))
         off = (found.M - np.linalg.inv(AXES)) / np.where(found.M_std > 0, found.M_std, 1.0)
         errors += [off[1, 0], off[2, 0], off[2, 1], (found.S[0] - 1 / SCALE[0]) / found.S_std[0]]
         errors.append((found.b[2] + BIAS[2] / SCALE[2]) / found.b_std[2])
@@ -67,7 +67,7 @@ def test_poses_give_them_with_the_turn_of_the_whole_sensor() -> None:
     std = {f"v{k}_std_v": np.full(len(v), 1e-4) for k in "xyz"} | {"n": np.ones(len(v))}
     table = Table.from_columns("poses", columns | outputs | std)
     model = read_model("linear").with_effect(catalogue()["axis-misalignment"])
-    found = made(general(fit(model.with_effect(catalogue()["quadratic-nonlinearity"]), table)))
+    found = made(calibration_matrices(fit(model.with_effect(catalogue()["quadratic-nonlinearity"]), table)))
     assert pytest.approx(turn, abs=1e-5) == found.M
     assert pytest.approx([1 / 1.02, 1 / 0.98, 1 / 1.01], rel=1e-4) == found.S
     assert found.beyond == ("quadratic-nonlinearity",)
@@ -75,10 +75,10 @@ def test_poses_give_them_with_the_turn_of_the_whole_sensor() -> None:
 
 def test_a_magnetometer_and_a_gyroscope_have_one_each() -> None:
     table = turned.magnetometer(turned.in_iron(60, seed=1))
-    magnetic = made(general(fit(read_model("magnetometer"), table)))
+    magnetic = made(calibration_matrices(fit(read_model("magnetometer"), table)))
     assert np.linalg.norm(magnetic(table.outputs), axis=1) == pytest.approx(1.0, abs=5e-3)
     gyro = turned.gyroscope(seed=1, lean_deg=0.4)
-    found = made(general(fit(read_model("gyroscope").with_effect(catalogue()["gyro-misalignment"]), gyro)))
+    found = made(calibration_matrices(fit(read_model("gyroscope").with_effect(catalogue()["gyro-misalignment"]), gyro)))
     rate = gyro.column("rate_deg_s")[:, None] * np.column_stack([gyro.column(f"a{k}") for k in "xyz"])
     assert found(gyro.outputs) == pytest.approx(rate, abs=0.01)
     assert (magnetic.unit, found.unit) == ("field", "deg/s")
@@ -87,7 +87,7 @@ def test_a_magnetometer_and_a_gyroscope_have_one_each() -> None:
 def test_two_axes_have_none() -> None:
     columns = synthetic.turns((90,))
     x, y, _ = synthetic.components(columns)
-    assert general(fit(read_model("linear"), synthetic.poses(columns, x + 2.5, y + 2.5))) is None
+    assert calibration_matrices(fit(read_model("linear"), synthetic.poses(columns, x + 2.5, y + 2.5))) is None
 
 
 def test_a_fit_tells_it_in_words_and_as_json() -> None:
@@ -98,6 +98,6 @@ def test_a_fit_tells_it_in_words_and_as_json() -> None:
     whole = json.loads(json.dumps(calibrated.document(found), allow_nan=False))
     assert whole["by_hand"]["hard_iron"] == pytest.approx([-0.1625, -2.09375, -12.3125])
     document = whole["calibration"]
-    assert np.array(document["M"]["value"]) == pytest.approx(made(general(found)).M)
+    assert np.array(document["M"]["value"]) == pytest.approx(made(calibration_matrices(found)).M)
     assert document["S"]["std"][0][0] > 0
     assert document["unit"] == {"from": "uT", "to": "field"}

@@ -8,9 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from calibrations.axes import other_in_plane, out_of_plane, rotation
-from calibrations.chain import Pose, Step, backward, force, nominal_pose, respond, sensed, specific_force
-from calibrations.effect import catalogue
+from calibrations.effects import Values
+from calibrations.effects.catalogue import catalogue
+from calibrations.geometry.orientation import Pose, nominal_pose, other_in_plane, out_of_plane, rotation, specific_force
+from calibrations.model.chain import Step, backward, force, respond, sensed
 from calibrations.table import Array, Table
 from tests.calibrations import synthetic
 
@@ -23,7 +24,7 @@ def about(axis: str, angle_deg: float) -> Array:
 
 
 def step(name: str, **values: float | list[float]) -> Step:
-    return catalogue()[name], {key: np.array(value) for key, value in values.items()}
+    return catalogue()[name], Values.of(values)
 
 
 @given(angles, angles, angles, st.booleans(), small, small)
@@ -90,5 +91,5 @@ def test_the_other_axes() -> None:
 def test_outputs_that_no_force_explains_are_solved_as_far_as_they_show_one() -> None:
     """A sensor whose axis z is dead: what it would sense along z stays at none."""
     table = Table.from_columns("positions", {"ax": [0.5], "ay": [-0.2], "az": [0.1]}, {"unit": "m/s2"})
-    dead = [(catalogue()["scale-factor"], {"scale": np.array([1.0, 1.0, 0.0])})]
+    dead = [(catalogue()["scale-factor"], Values(scale=np.array([1.0, 1.0, 0.0])))]
     np.testing.assert_allclose(backward(table, dead), [[0.5, -0.2, 0.0]], atol=1e-9)

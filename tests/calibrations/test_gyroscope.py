@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from calibrations.discover import discover
-from calibrations.effect import catalogue
+from calibrations.analyses.tumble import estimate_faces
+from calibrations.effects.catalogue import catalogue
 from calibrations.errors import DataError
-from calibrations.evaluations.six_faces import faces
 from calibrations.fit import Fit, fit
-from calibrations.model_file import dump_model, parse_model, read_model
+from calibrations.geometry.rate_table import EARTH_DEG_S, earth_rate_warning, rate_deg_s, turn_axes
+from calibrations.loop import discover
+from calibrations.model.file import dump_model, parse_model, read_model
 from calibrations.table import Table
-from calibrations.turning import EARTH_DEG_S, axes_of_turn, earth_unknown, rate_deg_s
 from tests.calibrations import turned
 
 GYROSCOPE = read_model("gyroscope")
@@ -44,7 +44,7 @@ def test_the_published_calibration_is_reproduced() -> None:
 def test_the_accelerometer_beside_it_has_the_published_bias() -> None:
     table = turned.ferraris()
     still = table.column("rate_deg_s") == 0
-    held = faces(np.column_stack([table.column(f"a{axis}")[still] for axis in "xyz"]))
+    held = estimate_faces(np.column_stack([table.column(f"a{axis}")[still] for axis in "xyz"]))
     assert held is not None
     assert held.bias == pytest.approx([-6.01887, -48.28787, -28.96637], abs=5e-6)
 
@@ -121,8 +121,8 @@ def test_the_earths_rotation_is_taken_off_where_the_latitude_is_known() -> None:
     table = about_z(latitude_deg=40.443)
     assert rate_deg_s(table)[0] == pytest.approx([0.0, 0.0, EARTH_DEG_S * np.sin(np.radians(40.443))])
     assert pytest.approx(15.041 / 3600, rel=1e-4) == EARTH_DEG_S  # 15.041 deg an hour
-    assert earth_unknown(table) is None
-    assert "give the constant latitude_deg" in str(earth_unknown(about_z()))
+    assert earth_rate_warning(table) is None
+    assert "give the constant latitude_deg" in str(earth_rate_warning(about_z()))
     down = turned.gyroscope(seed=0)
     upright = Table.from_columns("rates", down.columns, {"latitude_deg": 90.0})
     assert rate_deg_s(upright)[27] == pytest.approx([-EARTH_DEG_S, 0.0, 0.0])  # x down, at rest
@@ -130,10 +130,10 @@ def test_the_earths_rotation_is_taken_off_where_the_latitude_is_known() -> None:
 
 def test_the_axis_of_a_turn_is_given_or_seen() -> None:
     table = turned.gyroscope(seed=0)
-    assert np.array_equal(axes_of_turn(table)[[0, 10, 53]], [[1, 0, 0], [0, 1, 0], [0, 0, -1]])
+    assert np.array_equal(turn_axes(table)[[0, 10, 53]], [[1, 0, 0], [0, 1, 0], [0, 0, -1]])
     columns = {name: table.column(name) for name in ("rate_deg_s", "gx", "gy", "gz")}
     given = {f"axis_{axis}": 2.0 * table.column(f"a{axis}") for axis in "xyz"}
-    assert np.array_equal(axes_of_turn(Table.from_columns("rates", columns | given)), axes_of_turn(table))
+    assert np.array_equal(turn_axes(Table.from_columns("rates", columns | given)), turn_axes(table))
 
 
 def test_what_cannot_be_known_of_the_turns_is_said() -> None:

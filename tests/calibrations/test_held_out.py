@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from calibrations.chain import nominal_pose, specific_force
 from calibrations.fit import fit
-from calibrations.model_file import read_model
-from calibrations.noise import white_only
-from calibrations.search.held_out import folds, held_out, held_out_excess
+from calibrations.fitting.held_out import folds, held_out
+from calibrations.geometry.orientation import nominal_pose, specific_force
+from calibrations.model.file import read_model
+from calibrations.noise.means import white_only
 from calibrations.table import Table
 from tests.calibrations import synthetic
 
@@ -41,14 +41,14 @@ def test_extra_columns_join_the_fit() -> None:
     found = fit(read_model("linear"), table(0.003))
     column = np.zeros((2, found.table.n, 1))
     column[0, :, 0] = specific_force(nominal_pose(found.table))[:, 0] ** 2
-    assert held_out_excess(found) > 5
-    assert held_out_excess(found, column) == pytest.approx(1.0, abs=0.1)
+    assert found.held_out_excess > 5
+    assert found.held_out_with(column) == pytest.approx(1.0, abs=0.1)
 
 
 def test_a_useless_column_costs() -> None:
     found = fit(read_model("linear"), table())
     useless = np.random.default_rng(3).standard_normal((2, found.table.n, 20))
-    assert held_out_excess(found, useless) > held_out_excess(found)
+    assert found.held_out_with(useless) > found.held_out_excess
 
 
 def test_rows_of_one_pose_share_a_fold() -> None:

@@ -7,22 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calibrations.effect import catalogue
-from calibrations.model_file import read_model
-from calibrations.noise_analysis.analysis import analyse
-from calibrations.noise_analysis.document import noise_document
-from calibrations.noise_analysis.hidden import Hidden, hidden_step
-from calibrations.noise_analysis.oddities import COARSE, hidden_in
-from calibrations.noise_analysis.reduction import Reduction
-from calibrations.still.diagnose import diagnose
-from calibrations.still.discover import discover
-from calibrations.still.disturbed import disturbed
-from calibrations.still.documents import diagnosis_document
-from calibrations.still.fit import fit_channel
-from calibrations.still.patterns import pattern_of
-from calibrations.still.record import Samples, reduced
-from calibrations.still.telegraph import telegraph_of
-from calibrations.still.words import headline
+from calibrations.documents import diagnosis_document
+from calibrations.effects.catalogue import catalogue
+from calibrations.loop import diagnose, discover
+from calibrations.model.file import read_model
+from calibrations.noise.analysis import analyse, noise_document
+from calibrations.noise.fit import fit_channel
+from calibrations.noise.patterns import pattern_of
+from calibrations.noise.record import Reduction, Samples, reduce_record
+from calibrations.noise.samples import COARSE, Hidden, hidden_in, hidden_step
+from calibrations.noise.telegraph import telegraph_of
 from calibrations.table import Array
 from tests.calibrations.hidden_noise import RECORDS, telegraph
 
@@ -88,12 +82,13 @@ def test_noise_behind_a_low_pass_is_judged_by_what_reaches_the_converter() -> No
     assert not behind(1.0, np.inf)
 
 
+@pytest.mark.slow
 def test_what_is_slow_is_told_where_only_the_fast_is_hidden() -> None:
     random = np.random.default_rng(2)
     walk = 10 / np.sqrt(N) * np.cumsum(random.standard_normal(N))
     x = np.round(0.1 * random.standard_normal(N) + walk)
-    found = analyse([x], RATE_HZ, "count", "made")
-    seen = hidden_in(found.record.oddities)
+    found = analyse(reduce_record([Samples("x", [x], RATE_HZ, "count")], "made")).channels["x"]
+    seen = hidden_in(found.channel.oddities)
     assert seen is not None
     assert not seen.all
     said = found.coefficients
@@ -104,18 +99,17 @@ def test_what_is_slow_is_told_where_only_the_fast_is_hidden() -> None:
 def test_nothing_is_stated_of_hidden_noise() -> None:
     x = read(np.random.default_rng(3), 0.15, np.linspace(0.1, 0.5, 120_000), 120_000)
     x[0] = 3 * STEP
-    found = analyse([x], RATE_HZ, "V", "made")
-    told = disturbed(found, "vx", {})
-    assert [each.kind for each in told.disturbances] == [COARSE]
-    assert "at 4 values 0.002 apart" in told.disturbances[0].text
-    coefficients = noise_document(found)["coefficients"]
+    analysis = analyse(reduce_record([Samples("x", [x], RATE_HZ, "V")], "made", every_deviation=True))
+    assert [each.kind for each in analysis.disturbances] == [COARSE]
+    assert "at 4 values 0.002 apart" in analysis.disturbances[0].text
+    coefficients = noise_document(analysis)["coefficients"]
     assert not any(each["identified"] for each in coefficients.values())
     assert 0.15 * STEP / 10 < coefficients["white-noise"]["upper"] < STEP / 10
     assert (coefficients["flicker-noise"]["upper"], coefficients["flicker-noise"]["std"]) == (None, None)
 
 
 def test_the_loop_says_so_and_asks_for_no_second_record() -> None:
-    record = reduced(
+    record = reduce_record(
         [Samples("x", [read(np.random.default_rng(4), 0.15, np.linspace(0.1, 0.5, N))], RATE_HZ, "V")], "made"
     )
     asked, found = diagnose(record, read_model("still")), discover(record, read_model("still"))
@@ -125,19 +119,19 @@ def test_the_loop_says_so_and_asks_for_no_second_record() -> None:
     assert "dither" in str(asked.residual_structure)
     assert "changes with time" not in str(asked.residual_structure)
     assert [each["kind"] for each in said["disturbances"]] == [COARSE]
-    assert str(asked.residual_structure)[1:] in headline(asked)
+    assert str(asked.residual_structure)[1:] in asked.judgement.text
     assert not any(e.identified for term in found.end.model.terms for e in term.estimates)
 
 
 def test_the_steps_of_rounding_are_no_steps_and_no_two_levels_of_the_sensor() -> None:
     random = np.random.default_rng(6)
     wave = 0.5 + 0.3 * telegraph(random, N, 300.0) + 0.3 * random.standard_normal(N)
-    record = reduced([Samples("x", [np.round(wave)], RATE_HZ, "V")], "made")
+    record = reduce_record([Samples("x", [np.round(wave)], RATE_HZ, "V")], "made")
     found = fit_channel(record.channels[0], [catalogue()[name] for name in ("white-noise", "gauss-markov-noise")])
     bare = replace(found, channel=replace(found.channel, oddities=()))
     assert (telegraph_of(found), telegraph_of(bare) is None) == (None, False)
     ramp = np.round(np.linspace(0, 1, N) + 0.02 * random.standard_normal(N))
-    stepped = reduced([Samples("x", [ramp], RATE_HZ, "V")], "made")
+    stepped = reduce_record([Samples("x", [ramp], RATE_HZ, "V")], "made")
     white = fit_channel(stepped.channels[0], [catalogue()["white-noise"]])
     plain = replace(white, channel=replace(white.channel, oddities=()))
     assert (pattern_of(white), pattern_of(plain) is None) == (None, False)

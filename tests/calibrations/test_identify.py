@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from calibrations.effect import catalogue
+from calibrations.effects.catalogue import catalogue
 from calibrations.fit import fit
+from calibrations.fitting.identifiability import covariance
 from calibrations.model import Estimate, Model
-from calibrations.model_file import read_model
-from calibrations.search.identify import covariance
+from calibrations.model.file import read_model
 from calibrations.table import Table
 from tests.calibrations import synthetic
 

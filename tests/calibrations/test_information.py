@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calibrations.design.foreseen import foreseen
-from calibrations.design.information import covariance_of, information
-from calibrations.effect import catalogue
+from calibrations.design.expected import predict_data
+from calibrations.design.optimal_design import covariance_of, information
+from calibrations.effects.catalogue import catalogue
 from calibrations.errors import DataError, MissingColumn
 from calibrations.fit import Fit, fit
-from calibrations.model_file import read_model
-from calibrations.noise import white_only
+from calibrations.model.file import read_model
+from calibrations.noise.means import white_only
 from calibrations.table import Table
 from tests.calibrations.synthetic import NOISE_V, components, gauss_markov, poses, turns
 
@@ -37,7 +37,9 @@ def white(found: Fit) -> Fit:
 
 def test_a_plan_like_the_data_tells_what_the_data_told() -> None:
     found = fitted("physical")
-    again = foreseen(found, {name: found.table.column(name) for name in ("alpha_deg", "beta_deg", "t_s", "direction")})
+    again = predict_data(
+        found, {name: found.table.column(name) for name in ("alpha_deg", "beta_deg", "t_s", "direction")}
+    )
     rows = information(found, again)
     assert rows.shape == (2 * found.table.n, len(found.theta))
     assert np.allclose(rows, found.whitened[:, 1:], rtol=1e-6, atol=1e-6 * np.abs(rows).max())
@@ -47,21 +49,21 @@ def test_a_plan_like_the_data_tells_what_the_data_told() -> None:
 
 
 def test_outputs_are_those_of_the_fitted_sensor() -> None:
-    table = foreseen(fitted(), PLAN)
+    table = predict_data(fitted(), PLAN)
     assert table.column("vx_v") == pytest.approx([3.51, 2.5, 1.49, 2.5], abs=1e-4)
     assert table.column("vy_v") == pytest.approx([2.4, 3.38, 2.4, 1.42], abs=1e-4)
 
 
 def test_four_poses_tell_bias_and_scale_factor_as_textbooks_say() -> None:
     found = white(fitted())
-    cov = covariance_of(information(found, foreseen(found, PLAN)))
+    cov = covariance_of(information(found, predict_data(found, PLAN)))
     assert np.sqrt(np.diag(cov)) == pytest.approx(NOISE_V * np.sqrt([1 / 4, 1 / 4, 1 / 2, 1 / 2]), rel=0.02)
 
 
 def test_a_dwell_four_times_as_long_halves_the_errors() -> None:
     found = white(fitted())
     short, long = (
-        covariance_of(information(found, foreseen(found, {**PLAN, "dwell_s": np.full(4, dwell_s)})))
+        covariance_of(information(found, predict_data(found, {**PLAN, "dwell_s": np.full(4, dwell_s)})))
         for dwell_s in (5.0, 20.0)
     )
     assert np.diag(short) == pytest.approx(4 * np.diag(long))
@@ -71,13 +73,13 @@ def test_slow_noise_is_no_smaller_in_a_longer_dwell() -> None:
     found = fitted(slow_v=2 * NOISE_V)
     apart = 1e5 * np.arange(4.0)
     for more in ({}, {"t_s": apart}):  # long after each other, rows are as independent as without times
-        cov = covariance_of(information(found, foreseen(found, {**PLAN, **more, "dwell_s": np.full(4, 1e5)})))
+        cov = covariance_of(information(found, predict_data(found, {**PLAN, **more, "dwell_s": np.full(4, 1e5)})))
         assert np.sqrt(cov[0, 0]) == pytest.approx(float(found.noise.slow[0]) / 2, rel=0.1)
 
 
 def test_what_a_plan_cannot_tell_is_infinitely_uncertain() -> None:
     found = fitted("physical")
-    std = np.sqrt(np.diag(covariance_of(information(found, foreseen(found, PLAN)))))
+    std = np.sqrt(np.diag(covariance_of(information(found, predict_data(found, PLAN)))))
     assert np.isinf(std[[s.parameter.name == "bias" for s in found.problem.layout.slots].index(True)])
     assert np.all(np.isinf(np.diag(covariance_of(np.zeros((0, 3))))))
 
@@ -86,17 +88,17 @@ def test_what_the_model_needs_and_nobody_plans_is_held_as_in_the_data() -> None:
     columns = turns(step_deg=30.0)
     temperature_c = 25 + np.sin(np.arange(len(columns["t_s"])))
     found = fitted("linear", temperature_c=temperature_c)
-    assert "temperature_c" not in foreseen(found, PLAN)
+    assert "temperature_c" not in predict_data(found, PLAN)
     warm = found.model.with_effect(catalogue()["temperature-bias"])
     with_it = fit(warm, found.table)
-    assert foreseen(with_it, PLAN).column("temperature_c") == pytest.approx(temperature_c.mean())
+    assert predict_data(with_it, PLAN).column("temperature_c") == pytest.approx(temperature_c.mean())
     settling = fit(found.model.with_effect(catalogue()["warm-up-bias"]), found.table)
     with pytest.raises(MissingColumn, match="t_s"):
-        foreseen(settling, PLAN)
+        predict_data(settling, PLAN)
 
 
 def test_a_dwell_means_nothing_without_a_sample_rate() -> None:
     columns = turns(step_deg=30.0)
     x, y, _ = components(columns)
     with pytest.raises(DataError, match="no sample rate is known"):
-        foreseen(fit(read_model("linear"), poses(columns, x, y)), {**PLAN, "dwell_s": np.full(4, 5.0)})
+        predict_data(fit(read_model("linear"), poses(columns, x, y)), {**PLAN, "dwell_s": np.full(4, 5.0)})

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from calibrations.kernels import slip, whiten
-from calibrations.noise import Noise, rms, white_only
+from calibrations.noise.means import Noise, rms, white_only
 from calibrations.table import Array
 
 

@@ -5,15 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from calibrations.compare import compare
-from calibrations.diagnose import diagnose
-from calibrations.effect import catalogue
+from calibrations.effects.catalogue import catalogue
 from calibrations.errors import DataError, ModelError
 from calibrations.fit import fit
+from calibrations.loop import compare, diagnose
 from calibrations.model import Estimate, Model, Term
-from calibrations.model_file import read_model
-from calibrations.noise import Noise, correlated
-from calibrations.noise_estimation.known_noise import processes, with_noise
+from calibrations.model.file import read_model
+from calibrations.noise.means import Noise, correlated
+from calibrations.noise.table_noise import slow_processes, with_noise
 from calibrations.table import Table
 from tests.calibrations.hidden_noise import fractional
 from tests.calibrations.synthetic import NOISE_V, components, poses, turns
@@ -53,7 +52,7 @@ def test_false_alarms_fall_where_the_noise_is_known() -> None:
 def test_what_is_missing_is_found_beside_known_noise() -> None:
     found = diagnose(with_noise(sweep(1, square=1.5e-3), KNOWN), read_model("linear"))
     assert found.verdict in ("effect-missing", "ambiguous")
-    best = found.path.steps[0].taken
+    best = found.candidates[0]
     assert "quadratic-nonlinearity" in (best.name, *best.indistinguishable_from)
 
 
@@ -72,11 +71,11 @@ def test_parameters_are_within_their_uncertainties() -> None:
 def test_processes_have_the_variance_and_the_spectrum_of_the_model() -> None:
     table = sweep(0)
     span_s = float(np.ptp(table.time_s))
-    flicker = processes(KNOWN, "x", table)
+    flicker = slow_processes(KNOWN, "x", table)
     f = np.geomspace(2 / span_s, 1 / 60, 20)
     density = sum(2 * s**2 * tau / (1 + (2 * np.pi * f * tau) ** 2) for s, tau in flicker)
     assert density == pytest.approx((TIMES * NOISE_V) ** 2 / (2 * np.pi * f), rel=0.15)
-    ((std, tau_s),) = processes(noise_model(rate_random_walk=1e-6), "x", table)
+    ((std, tau_s),) = slow_processes(noise_model(rate_random_walk=1e-6), "x", table)
     assert 2 * std**2 / tau_s == pytest.approx(1e-12)
     assert tau_s > 5 * span_s
 

@@ -5,18 +5,23 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from calibrations.compare import compare
-from calibrations.coverage import SOFT_IRON, directions, harmonics, too_small, worse
-from calibrations.diagnose import diagnose
-from calibrations.discover import discover
-from calibrations.effect import catalogue
+from calibrations.analyses.magnetometer_turn import (
+    components,
+    correct_by_extremes,
+    declination_deg,
+    estimate_hard_iron,
+    fit_ellipse,
+    horizontal,
+    inclination_deg,
+    total,
+)
+from calibrations.effects.catalogue import catalogue
 from calibrations.errors import DataError, ModelError
-from calibrations.evaluations.horizontal_turn import by_hand, ellipse, hard_iron
-from calibrations.field import components, declination_deg, horizontal, inclination_deg, total
 from calibrations.fit import fit
-from calibrations.model_file import read_model
-from calibrations.reading.directions import one_for_each_direction
-from calibrations.reading.stills import is_raw_log
+from calibrations.geometry.sphere import SOFT_IRON, coverage_fault, directions, harmonics, worst_ratio
+from calibrations.importing.raw_logs import is_raw_log, thin_by_direction
+from calibrations.loop import compare, diagnose, discover
+from calibrations.model.file import read_model
 from calibrations.table import Array, Table
 from tests.calibrations import turned
 
@@ -88,7 +93,7 @@ def test_a_log_of_turning_by_hand_is_one_sample_for_each_direction() -> None:
     resting = np.vstack([u[:5000], np.tile(u[5000], (30_000, 1)), u[5000:]])
     log = turned.magnetometer(turned.in_iron(50_000, seed=7, directions=resting))
     assert is_raw_log(log)
-    table = one_for_each_direction(log)
+    table = thin_by_direction(log)
     assert 400 < table.n <= 486  # 81 cells on each face of a cube
     found = fit(read_model("magnetometer"), table)
     offsets = [e.value for term in found.model.terms if term.name == "hard-iron" for e in term.estimates]
@@ -105,11 +110,11 @@ def turn(n: int = 24) -> Array:
 
 
 def test_how_badly_few_orientations_show_it_is_a_sentence() -> None:
-    few = too_small(turned.magnetometer(turned.in_iron(5, seed=1)), SOFT_IRON)
+    few = coverage_fault(turned.magnetometer(turned.in_iron(5, seed=1)), SOFT_IRON)
     assert "something in it would be known not at all; turn the sensor about three axes" in str(few)
     cap = np.random.default_rng(3).normal([0.0, 0.0, 2.0], 0.5, (200, 3))
     cap /= np.linalg.norm(cap, axis=1, keepdims=True)
-    some = too_small(turned.magnetometer(turned.in_iron(200, 1, directions=cap)), SOFT_IRON)
+    some = coverage_fault(turned.magnetometer(turned.in_iron(200, 1, directions=cap)), SOFT_IRON)
     assert " times worse than from as many on all sides, and 10 times is the limit; turn" in str(some)
 
 
@@ -130,7 +135,7 @@ def test_a_cap_of_the_sphere_shows_less_the_smaller_it_is(degrees: float, hard: 
     across, side = rng.uniform(0, 2 * np.pi, 400), np.sqrt(1 - z**2)
     cap = np.column_stack([side * np.cos(across), side * np.sin(across), z])
     table = turned.magnetometer(turned.in_iron(400, seed=3, noise=0.0, directions=cap))
-    assert (too_small(table, 1) is None, too_small(table, 2) is None) == (hard, soft)
+    assert (coverage_fault(table, 1) is None, coverage_fault(table, 2) is None) == (hard, soft)
     assert (catalogue()["soft-iron"].excluded(table) is None) == soft
 
 
@@ -139,7 +144,7 @@ def test_harmonics_are_orthonormal_over_the_whole_sphere() -> None:
     u /= np.linalg.norm(u, axis=1, keepdims=True)
     columns = harmonics(u, 2)
     assert np.allclose(columns.T @ columns / len(u), np.eye(9), atol=0.02)
-    assert worse(u, 2) == pytest.approx(1.0, abs=0.02)
+    assert worst_ratio(u, 2) == pytest.approx(1.0, abs=0.02)
 
 
 def test_a_model_without_a_field_is_refused() -> None:
@@ -149,11 +154,11 @@ def test_a_model_without_a_field_is_refused() -> None:
 
 def test_the_way_by_hand_makes_a_circle_of_a_turn() -> None:
     outputs = turn(720)
-    assert hard_iron(outputs)[:2] == pytest.approx([5.0, -3.0], abs=0.05)
-    found = ellipse((outputs - hard_iron(outputs))[:, :2])
+    assert estimate_hard_iron(outputs)[:2] == pytest.approx([5.0, -3.0], abs=0.05)
+    found = fit_ellipse((outputs - estimate_hard_iron(outputs))[:, :2])
     assert (found.greatest, found.least) == pytest.approx((22.0, 18.0), abs=0.06)
     assert np.degrees(found.angle_rad) % 180.0 == pytest.approx(30.0, abs=2.0)
-    assert np.ptp(np.linalg.norm(by_hand(outputs)[:, :2], axis=1)) < 0.2
+    assert np.ptp(np.linalg.norm(correct_by_extremes(outputs)[:, :2], axis=1)) < 0.2
 
 
 def test_beside_an_accelerometer_a_constant_says_which_is_meant() -> None:

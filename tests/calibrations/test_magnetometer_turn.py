@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from calibrations.evaluations.magnetometer_turn import by_hand, elements, level_by_hand
-from calibrations.experiment import by_physics
+from calibrations.analyses.magnetometer_turn import field_elements, iron_by_extremes, level_elements_by_extremes
+from calibrations.design.experiment import experiment_by_physics
 from calibrations.table import Array
 
 OVER = np.diag([-1.0, 1.0, -1.0])
@@ -26,7 +26,7 @@ def turns(names: tuple[str, ...], step_deg: float = 10.0) -> tuple[Array, list[s
 
 def test_the_elements_are_those_of_the_field() -> None:
     attitudes, _, names = turns(tuple(FACES))
-    found = elements(attitudes @ EARTH, attitudes, names)
+    found = field_elements(attitudes @ EARTH, attitudes, names)
     assert found.value["F"] == pytest.approx(np.linalg.norm(EARTH))
     assert found.value["H"] == pytest.approx(np.hypot(18.0, 10.0))
     assert found.value["D"] == pytest.approx(np.degrees(np.arctan2(10.0, 18.0)))
@@ -42,14 +42,14 @@ def test_their_uncertainty_is_how_the_turns_disagree() -> None:
     for _ in range(60):
         tilts = {name: Rotation.from_rotvec(rng.normal(0, 0.1, 3), degrees=True).as_matrix() for name in names}
         tilted = np.array([tilts[label] @ a for label, a in zip(labels, attitudes, strict=True)])
-        found = elements(tilted @ EARTH, attitudes, labels)
+        found = field_elements(tilted @ EARTH, attitudes, labels)
         off.append((found.value["I"] - np.degrees(np.arctan2(43.0, np.hypot(18.0, 10.0)))) / (found.std["I"] or 1.0))
     assert 0.6 < np.median(np.abs(off)) / 0.82 < 1.6  # of t with two degrees of freedom
 
 
 def test_one_turn_says_nothing_of_how_turns_agree() -> None:
     attitudes, _, names = turns(("z up",))
-    found = elements(attitudes @ EARTH, attitudes, names)
+    found = field_elements(attitudes @ EARTH, attitudes, names)
     assert set(found.std.values()) == {None}
 
 
@@ -59,7 +59,7 @@ def test_hard_iron_by_hand_is_the_middle_of_each_turn_and_soft_iron_that_of_the_
     iron = np.array([7.0, -3.0, 11.0])
     long = Rotation.from_euler("z", 30.0, degrees=True).as_matrix()
     bent = long @ np.diag([1.2, 1.0, 1.0]) @ long.T  # longer by a fifth along 30 deg from x
-    found = by_hand((attitudes @ EARTH) @ bent.T + iron, edges, names, std=0.02)
+    found = iron_by_extremes((attitudes @ EARTH) @ bent.T + iron, edges, names, std=0.02)
     assert found.hard_iron == pytest.approx(iron, abs=0.02)
     assert found.hard_iron_std == pytest.approx([0.01 / np.sqrt(2)] * 3)  # four turns each; half of a sum of two
     assert found.soft_iron.least / found.soft_iron.greatest == pytest.approx(1 / 1.2, rel=1e-3)
@@ -76,9 +76,9 @@ def test_uncertainties_by_hand_hold_what_one_side_cannot_show() -> None:
         for kind, sides in (("one", ("z up",)), ("both", ("z up", "z down"))):
             attitudes, edges, names = turns(sides, step_deg=15.0)
             outputs = (attitudes @ EARTH) @ bent.T + [7.0, -3.0, 11.0] + 0.005 * rng.standard_normal((len(edges), 3))
-            found = by_hand(outputs, edges, names, std=0.005)
+            found = iron_by_extremes(outputs, edges, names, std=0.005)
             off[kind] += ((found.hard_iron - [7.0, -3.0, 11.0]) / found.hard_iron_std)[:2].tolist()
-        level = level_by_hand(outputs[:24], attitudes[:24], 0.0)
+        level = level_elements_by_extremes(outputs[:24], attitudes[:24], 0.0)
         off["H"].append((level.value["H"] - np.hypot(18.0, 10.0)) / (level.std["H"] or 1.0))
         _, ways = np.linalg.eigh((bent.T @ bent)[:2, :2])
         turned = np.degrees(found.soft_iron.angle_rad - np.arctan2(*ways[::-1, 1]))
@@ -92,14 +92,14 @@ def test_uncertainties_by_hand_hold_what_one_side_cannot_show() -> None:
 
 def test_by_one_horizontal_turn_the_third_component_is_not_known() -> None:
     attitudes, edges, names = turns(("z up",))
-    found = by_hand(attitudes @ EARTH + [7.0, -3.0, 11.0], edges, names, std=0.0)
+    found = iron_by_extremes(attitudes @ EARTH + [7.0, -3.0, 11.0], edges, names, std=0.0)
     assert found.hard_iron[:2] == pytest.approx([7.0, -3.0], abs=0.2)
     assert np.isnan(found.hard_iron[2])
-    level = level_by_hand(attitudes @ EARTH + [7.0, -3.0, 11.0], attitudes, 0.1)
+    level = level_elements_by_extremes(attitudes @ EARTH + [7.0, -3.0, 11.0], attitudes, 0.1)
     assert level.value["H"] == pytest.approx(np.hypot(18.0, 10.0), rel=0.02)
     assert level.value["D"] == pytest.approx(np.degrees(np.arctan2(10.0, 18.0)), abs=1.0)
     assert 0.1 <= (level.std["D"] or 0.0) < 0.3
-    assert level_by_hand(attitudes @ EARTH, attitudes, None).std["D"] is None  # how it sits in its mount
+    assert level_elements_by_extremes(attitudes @ EARTH, attitudes, None).std["D"] is None  # how it sits in its mount
     assert found.left_per_mille < 5.0
 
 
@@ -112,4 +112,4 @@ def test_by_one_horizontal_turn_the_third_component_is_not_known() -> None:
     ],
 )
 def test_what_cannot_be_told_apart_is_turned_otherwise(names: set[str], procedure: str) -> None:
-    assert by_physics(names)[0] == procedure
+    assert experiment_by_physics(names)[0] == procedure

@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calibrations.noise_analysis.minimum import minimum_s
-from calibrations.noise_analysis.octaves import Curve, octaves
+from calibrations.noise.deviations import Curve, minimum_s, octaves
 from calibrations.table import Array
 from tests.calibrations.hidden_noise import fractional, white
 

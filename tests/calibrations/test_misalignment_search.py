@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from calibrations.evaluations.misalignment import along_reference, search_angles_x, search_angles_y, theta_x, theta_y
+from calibrations.analyses.misalignment import along_reference, search_angles_x, search_angles_y, theta_x, theta_y
 
 
 def test_printed_theta_x() -> None:

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from calibrations.effect import catalogue
+from calibrations.effects.catalogue import catalogue
 from calibrations.errors import CalibrationError, ModelError, UnknownName
 from calibrations.model import Estimate, Model, Term
-from calibrations.model_file import SHIPPED, dump_model, parse_model, read_model, shipped_names
+from calibrations.model.file import SHIPPED, dump_model, parse_model, read_model, shipped_names
 
 numbers = st.floats(allow_nan=False, allow_infinity=False)
 words = st.text(st.characters(exclude_categories=("C", "Zl", "Zp")), max_size=20)
@@ -21,7 +21,7 @@ HEAD = "schema: rig.model/1\nname: mine\n"
 
 
 @st.composite
-def terms(draw: st.DrawFn, name: str) -> Term:
+def terms(draw: st.DrawFn, name: str, unit: str) -> Term:
     effect = catalogue()[name]
     tied = draw(st.booleans())
     estimates = []
@@ -30,7 +30,8 @@ def terms(draw: st.DrawFn, name: str) -> Term:
             identified = draw(st.booleans())
             std = draw(st.none() | numbers.map(abs))
             why = None if identified else draw(words)
-            estimates.append(Estimate(parameter.name, axis, draw(numbers), std, draw(words), identified, why))
+            own = parameter.unit.replace("{out}", unit)
+            estimates.append(Estimate(parameter.name, axis, draw(numbers), std, own, identified, why))
     constants = {key: draw(numbers) for key in effect.constants if draw(st.booleans())}
     return Term(effect, tied, tuple(estimates), constants)
 
@@ -40,7 +41,8 @@ def models(draw: st.DrawFn) -> Model:
     names = draw(st.lists(st.sampled_from(sorted(catalogue())), min_size=1, max_size=4, unique=True))
     provenance = draw(st.dictionaries(st.from_regex(r"[a-z]{3,8}", fullmatch=True), words | numbers, max_size=2))
     covered = draw(st.dictionaries(st.just("temperature_c"), st.tuples(numbers, numbers)))
-    return Model(draw(words), tuple(draw(terms(name)) for name in names), draw(words), provenance, covered)
+    unit = draw(words.filter(bool))
+    return Model(draw(words), tuple(draw(terms(name, unit)) for name in names), unit, provenance, covered)
 
 
 @given(models())
@@ -134,3 +136,39 @@ def test_a_tied_effect_is_untied_instead_of_added() -> None:
     untied = common.with_effect(catalogue()["scale-factor"])
     assert untied.effects == common.effects
     assert untied.holds("scale-factor")
+
+
+VALUES = """unit: {unit}
+effects:
+- effect: bias
+  parameters: [{{name: bias, axis: x, value: 2.5{bias}}}]
+- effect: scale-factor
+  parameters: [{{name: scale, axis: x, value: 1.0, unit: {scale}}}]
+- effect: stage-zero-offset
+  parameters: [{{name: {angle}, value: 0.1, unit: {deg}}}]
+"""
+ANGLE = catalogue()["stage-zero-offset"].parameters[0].name
+
+
+def with_units(unit: str = "V", bias: str = ", unit: V", scale: str = "V/g", deg: str = "deg") -> Model:
+    text = VALUES.format(unit=unit, bias=bias, scale=scale, angle=ANGLE, deg=deg)
+    return parse_model(HEAD + text, "mine.yaml")
+
+
+@pytest.mark.parametrize(
+    ("units", "says"),
+    [
+        ({"unit": "mV"}, 'bias: the unit of "bias" x is V, and must be mV in a model with `unit: mV`; values are not'),
+        ({"scale": "mV/g"}, 'scale-factor: the unit of "scale" x is mV/g, and must be V/g in a model with `unit: V`'),
+        ({"deg": "rad"}, f'stage-zero-offset: the unit of "{ANGLE}" is rad, and must be deg; values are not converted'),
+        ({"unit": '""'}, 'bias: the unit of "bias" x is V; give the unit of the outputs too, such as `unit: V`'),
+    ],
+)
+def test_units_that_do_not_fit_are_refused(units: dict[str, str], says: str) -> None:
+    with pytest.raises(ModelError, match=re.escape(f"mine.yaml: {says}")):
+        with_units(**units)
+
+
+def test_a_parameter_without_a_unit_has_the_declared_one() -> None:
+    model = with_units(bias="")
+    assert [e.unit for term in model.terms for e in term.estimates] == ["V", "V/g", "deg"]

@@ -8,14 +8,15 @@ from functools import cache
 import numpy as np
 import pytest
 
-from calibrations.effect import catalogue
+from calibrations.effects.catalogue import catalogue
 from calibrations.errors import DataError, ModelError
 from calibrations.fit import fit
 from calibrations.model import Model
-from calibrations.model_file import read_model
-from calibrations.motion.evaluate import MotionResult, evaluate
-from calibrations.pictures.motion import evaluation
-from calibrations.pictures.save import png
+from calibrations.model.file import read_model
+from calibrations.motion.evaluate import MotionResult, evaluate_motion
+from calibrations.presentation.chart import Line
+from calibrations.presentation.charts.motion import evaluation
+from calibrations.presentation.static import png
 from calibrations.table import Array, Table
 from tests.calibrations import shaken, synthetic
 
@@ -49,7 +50,7 @@ def still() -> Table:
 
 @cache
 def result(seed: int = 0) -> MotionResult:
-    return evaluate(shaken_rig(seed), *models(), still())
+    return evaluate_motion(shaken_rig(seed), *models(), still())
 
 
 def test_the_physical_model_leaves_the_sensors_noise() -> None:
@@ -60,7 +61,7 @@ def test_the_physical_model_leaves_the_sensors_noise() -> None:
 
 
 def test_noise_limit_is_that_of_the_paper() -> None:
-    with_still, without = result().noise_limit, evaluate(shaken_rig(), *models()).noise_limit
+    with_still, without = result().noise_limit, evaluate_motion(shaken_rig(), *models()).noise_limit
     # white noise in the band of a second-order Butterworth, pi / (2 sqrt 2) x 20 Hz, the line's correction 1.031
     expected = 1e3 * shaken.GRAVITY * NOISE_V * np.sqrt(np.pi / (2 * np.sqrt(2)) * 20) * 1.031
     assert with_still.value == pytest.approx(expected, abs=4 * with_still.std)
@@ -99,7 +100,7 @@ def test_both_references_agree_within_the_probes_noise() -> None:
 
 
 def test_one_axis_takes_the_other_from_the_attitude() -> None:
-    one = evaluate(shaken.without_y(shaken_rig()), *(_of_x(m) for m in models()), still())
+    one = evaluate_motion(shaken.without_y(shaken_rig()), *(_of_x(m) for m in models()), still())
     assert one.rmse_physical.value == pytest.approx(result().rmse_physical.value, abs=1.0)
 
 
@@ -114,7 +115,7 @@ def test_a_corner_that_the_model_holds_takes_the_place_of_the_nominal_one() -> N
     term = next(t for t in filtered.model.terms if t.name == "output-filter")
     physical = models()[1]
     with_filter = replace(physical, terms=(*physical.terms, term))
-    before, after = (evaluate(moved, models()[0], m) for m in (physical, with_filter))
+    before, after = (evaluate_motion(moved, models()[0], m) for m in (physical, with_filter))
     assert before.excess > 4
     assert after.excess < 2
 
@@ -125,31 +126,31 @@ def _two_lines() -> Table:
 
 def test_models_without_values_and_records_without_motion_are_said() -> None:
     with pytest.raises(ModelError, match="the model linear has no values yet; fit it to a sweep of the same sensor"):
-        evaluate(shaken_rig(), read_model("linear"), models()[1])
+        evaluate_motion(shaken_rig(), read_model("linear"), models()[1])
     with pytest.raises(DataError, match="holds no motion that stands out of its noise"):
-        evaluate(shaken.record(((1e-12, 10.0),)), *models())
+        evaluate_motion(shaken.record(((1e-12, 10.0),)), *models())
     mirrored = {**shaken_rig().columns, "displacement_m": -shaken_rig().column("displacement_m")}
     with pytest.raises(DataError, match="falls where the sensor's acceleration along x rises; change its sign"):
-        evaluate(Table.from_columns("motion", mirrored, shaken.CONSTANTS, "mirrored"), *models())
+        evaluate_motion(Table.from_columns("motion", mirrored, shaken.CONSTANTS, "mirrored"), *models())
 
 
 def test_picture_shows_reference_models_and_errors() -> None:
-    figure = evaluation(result())
-    (above, other), (left, right) = np.reshape(np.array(figure.axes), (2, 2))
-    lines: list[Array] = [line.get_ydata() for ax in (above, other) for line in ax.lines]
+    chart = evaluation(result())
+    (above, other), (left, right) = chart.panels
+    lines: list[Array] = [line.y for panel in (above, other) for line in panel.series if isinstance(line, Line)]
     n = len(lines[0])
     for drawn, values in zip(lines, ("linear", "reference", "physical", "reference"), strict=True):
         np.testing.assert_array_equal(drawn, getattr(result(), values)[:n])
-    assert "rmse 300" in above.get_title(loc="left")
-    assert all("(" in ax.get_ylabel() for ax in (above, left))
-    assert left.get_xlabel() == right.get_xlabel() == "time (s)"
-    assert png(figure).startswith(b"\x89PNG")
+    assert "rmse 300" in above.title
+    assert all("(" in panel.y.label for panel in (above, left))
+    assert left.x.label == right.x.label == "time (s)"
+    assert png(chart).startswith(b"\x89PNG")
 
 
 def test_motion_that_is_no_sine_is_followed() -> None:
     lines = tuple((40e-6 / f, f) for f in np.arange(3.0, 14.0, 0.37))  # none stands out of the others for long
     table = shaken.record(lines, 30.0, kappa=KAPPA, noise_v=NOISE_V)
-    found = evaluate(table, *models(), still())
+    found = evaluate_motion(table, *models(), still())
     assert found.improvement.value > 0.97
     assert found.excess < 1.2
     assert np.ptp(found.reference) > 200
@@ -159,5 +160,5 @@ def test_a_line_above_the_motion_is_the_probes_hum() -> None:
     table = shaken_rig()
     hum = 2e-6 * np.sin(2 * np.pi * 50 * table.time_s)
     columns = {**table.columns, "displacement_m": table.column("displacement_m") + hum}
-    found = evaluate(Table.from_columns("motion", columns, table.constants), *models(), still())
+    found = evaluate_motion(Table.from_columns("motion", columns, table.constants), *models(), still())
     assert found.rmse_physical.value == pytest.approx(result().rmse_physical.value, rel=0.01)

@@ -5,16 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from calibrations.compare import compare
-from calibrations.diagnose import diagnose
-from calibrations.discover import discover
 from calibrations.documents import comparison_document
 from calibrations.fit import fit
+from calibrations.loop import compare, diagnose, discover
 from calibrations.model import Model
-from calibrations.model_file import parse_model, read_model
-from calibrations.search.held_out import held_out_excess
+from calibrations.model.file import parse_model, read_model
 from calibrations.table import Table
 from tests.calibrations import shaken
+from tests.slow import first_fast
 
 LINEAR = read_model("linear")
 ATTITUDES = ((45.0, 90.0), (90.0, 0.0), (90.0, 180.0), (90.0, 90.0), (90.0, 270.0), (135.0, 45.0))
@@ -41,6 +39,7 @@ def test_a_clean_record_misses_nothing() -> None:
     assert np.quantile(p_values, 0.1) > 0.03  # least of a search on noise: uniform, or above
 
 
+@pytest.mark.slow
 def test_slow_noise_is_found_in_the_means_and_is_no_effect() -> None:
     rng = np.random.default_rng(4)
     slow = []
@@ -49,7 +48,7 @@ def test_slow_noise_is_found_in_the_means_and_is_no_effect() -> None:
         wander = 4e-6 * np.cumsum(rng.standard_normal(table.n))
         columns = {**table.columns, "vx_v": table.column("vx_v") + wander}
         found = diagnose(Table.from_columns("motion", columns, table.constants), LINEAR)
-        assert not found.path.steps
+        assert not found.missing
         slow.append(found.fit.noise.slow / found.fit.noise.floor)
     means, others = np.mean(slow, axis=0)[0], np.mean(slow, axis=0)[1:]
     assert means > 3 * np.max(others)
@@ -84,12 +83,12 @@ def test_a_hidden_defect_of_the_output_is_found_first(
     assert found.excess_before == pytest.approx(times, rel=0.4)
     assert found.candidates[0].held_out_after < 1.15
     end = discover(table, LINEAR).end
-    assert held_out_excess(end) < 1.15
+    assert end.held_out_excess < 1.15
     estimate, std = value(end.model, effect, parameter)
     assert abs(estimate - true) < 4 * std
 
 
-@pytest.mark.parametrize("turn_deg", [0.5, 1.0, 3.0])
+@pytest.mark.parametrize("turn_deg", first_fast([0.5, 1.0, 3.0]))
 def test_a_hidden_turn_is_found_first_where_attitudes_differ(turn_deg: float) -> None:
     table = shaken.record(shaken.TWO, 48.0, attitudes=ATTITUDES, turn_deg=(0.3 * turn_deg, 0.0, turn_deg))
     found = diagnose(table, LINEAR)
@@ -100,7 +99,7 @@ def test_a_hidden_turn_is_found_first_where_attitudes_differ(turn_deg: float) ->
     assert abs(z - turn_deg) < 4 * std + 0.01 * turn_deg
 
 
-@pytest.mark.parametrize("more", [5e-4, 2e-3, 6e-3])
+@pytest.mark.parametrize("more", first_fast([2e-3, 5e-4, 6e-3]))
 def test_a_scale_factor_that_differs_between_axes_is_found_first(more: float) -> None:
     table = shaken.record(shaken.TWO, 48.0, attitudes=ATTITUDES, scale_v=(1.0, 1 + more))
     found = diagnose(table, read_model("common-scale"))

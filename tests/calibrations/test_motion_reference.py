@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from calibrations.motion.reference import biases, paper_reference, reference
-from calibrations.motion.smoother import smooth
-from calibrations.motion.spectrum import butterworth, corrected, delayed, first_order, through
+from calibrations.motion.reference import paper_reference, reference_acceleration, reference_biases, smooth
+from calibrations.motion.spectrum import apply_response, butterworth, correct_at, delay, first_order
 from calibrations.table import Array
 
 RATE = 1000.0
@@ -58,7 +57,7 @@ def _drawn(count: int) -> Array:
 
 def test_sines_and_smoother_differentiate_without_bias() -> None:
     x = 30e-6 * np.sin(TURN * T) + 0.3e-6 * np.random.default_rng(0).standard_normal(len(T))
-    found = reference(T, x, RATE)
+    found = reference_acceleration(T, x, RATE)
     assert abs(found.acceleration_m_s2 - TRUE)[INNER].max() < 3e-3 * abs(TRUE).max()
     amplitude, std = found.amplitude
     assert abs(amplitude - 30e-6 * TURN**2) < 3 * std < 1e-3 * amplitude
@@ -68,14 +67,16 @@ def test_smoother_follows_a_motion_that_begins_in_the_record() -> None:
     on = np.clip((T - 3.0) / 0.5, 0, 1)
     x = 30e-6 * on**3 * (10 - 15 * on + 6 * on**2) * np.sin(TURN * T)
     true = np.gradient(np.gradient(x, T), T)
-    found = reference(T, x + 0.1e-6 * np.random.default_rng(0).standard_normal(len(T)), RATE)
+    found = reference_acceleration(T, x + 0.1e-6 * np.random.default_rng(0).standard_normal(len(T)), RATE)
     error = (found.acceleration_m_s2 - true)[INNER]
     assert np.sqrt(np.mean(error**2)) < 0.06 * np.sqrt(np.mean(true**2))
 
 
 def test_each_filter_does_what_its_bias_says() -> None:
     x = 30e-6 * np.sin(TURN * T)
-    paper, sine, smoother = biases(reference(T, x + 0.3e-6 * np.random.default_rng(0).standard_normal(len(T)), RATE))
+    paper, sine, smoother = reference_biases(
+        reference_acceleration(T, x + 0.3e-6 * np.random.default_rng(0).standard_normal(len(T)), RATE)
+    )
     made = paper_reference(x, RATE, 10.0)
     assert np.ptp(made[INNER]) / np.ptp(TRUE[INNER]) - 1 == pytest.approx(paper.amplitude, abs=2e-5)
     assert paper.amplitude == pytest.approx(-((TURN / RATE) ** 2) / 12, rel=1e-2)
@@ -92,18 +93,20 @@ def test_paper_reference_is_right_at_one_frequency_only() -> None:
 
     assert size(10.0) == pytest.approx(1, abs=1e-3)
     assert size(15.0) < 0.95
-    assert biases(reference(T, np.sin(TURN * T), RATE))[0].band_hz == pytest.approx((8.97, 10.75), abs=0.1)
+    assert reference_biases(reference_acceleration(T, np.sin(TURN * T), RATE))[0].band_hz == pytest.approx(
+        (8.97, 10.75), abs=0.1
+    )
 
 
 @pytest.mark.parametrize(
     ("response", "gain", "late_s"),
     [
         (first_order(15.07), 1 / np.hypot(1, 10 / 15.07), np.arctan(10 / 15.07) / TURN),
-        (delayed(3.3e-4), 1.0, 3.3e-4),
-        (corrected(butterworth(RATE), 10.0), 1.0, 0.0),
+        (delay(3.3e-4), 1.0, 3.3e-4),
+        (correct_at(butterworth(RATE), 10.0), 1.0, 0.0),
     ],
     ids=["R-C", "delay", "corrected"],
 )
 def test_a_sine_goes_through_a_filter_exactly(response: object, gain: float, late_s: float) -> None:
-    out = through(5.0 + np.sin(TURN * T), RATE, response)  # type: ignore[arg-type]
+    out = apply_response(5.0 + np.sin(TURN * T), RATE, response)  # type: ignore[arg-type]
     np.testing.assert_allclose(out[INNER], 5 + gain * np.sin(TURN * (T - late_s))[INNER], atol=2e-5)

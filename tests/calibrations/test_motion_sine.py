@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from calibrations.errors import DataError
-from calibrations.motion.sine import Sine, four_parameter, sines, strongest, three_parameter
+from calibrations.motion.reference import Sine, find_sines, fit_four_parameter, fit_three_parameter, strongest_line
 
 RATE = 1000.0
 T = 50.0 + np.arange(4000) / RATE
@@ -27,7 +27,7 @@ def of_many(fit: object) -> list[Sine]:
 
 @pytest.mark.parametrize("free", [False, True], ids=["three parameters", "four parameters"])
 def test_amplitude_reaches_the_cramer_rao_bound(free: bool) -> None:
-    found = of_many(lambda x: four_parameter(T, x) if free else three_parameter(T, x, TRUE["frequency"]))
+    found = of_many(lambda x: fit_four_parameter(T, x) if free else fit_three_parameter(T, x, TRUE["frequency"]))
     bound = NOISE * np.sqrt(2 / len(T))
     amplitudes = np.array([s.amplitude for s in found])
     assert abs(amplitudes.mean() / TRUE["amplitude"] - 1) < 1e-4
@@ -36,7 +36,7 @@ def test_amplitude_reaches_the_cramer_rao_bound(free: bool) -> None:
 
 
 def test_every_standard_uncertainty_is_the_scatter() -> None:
-    found = of_many(lambda x: four_parameter(T, x))
+    found = of_many(lambda x: fit_four_parameter(T, x))
     duration = len(T) / RATE
     scatter = np.std([[s.frequency_hz, s.phase_rad, s.offset] for s in found], axis=0)
     told = np.mean([[s.frequency_std_hz, s.phase_std_rad, s.offset_std] for s in found], axis=0)
@@ -52,24 +52,24 @@ def test_uncertainty_holds_for_noise_behind_a_low_pass() -> None:
     found = []
     for seed in range(100):
         noise = lfilter([1 - rho], [1, -rho], np.random.default_rng(seed).standard_normal(len(T)))
-        found.append(three_parameter(T, 10 * np.cos(2 * np.pi * 10 * T) + noise, 10.0))
+        found.append(fit_three_parameter(T, 10 * np.cos(2 * np.pi * 10 * T) + noise, 10.0))
     scatter, told = np.std([s.amplitude for s in found]), np.mean([s.amplitude_std for s in found])
     assert told == pytest.approx(scatter, rel=0.2)
 
 
 def test_lines_are_found_beside_each_other() -> None:
     x = made(0) + 2e-6 * np.cos(2 * np.pi * 17.4 * T) + 50e-6 * np.cos(2 * np.pi * 4.2 * T - 1)
-    found = sines(T, x)
+    found = find_sines(T, x)
     assert [round(s.frequency_hz, 1) for s in found] == [4.2, 10.0, 17.4]
     for line, amplitude in zip(found, (50e-6, 30e-6, 2e-6), strict=True):
         assert abs(line.amplitude - amplitude) < 5 * line.amplitude_std
 
 
 def test_noise_alone_holds_no_line() -> None:
-    assert sum(len(sines(T, np.random.default_rng(seed).standard_normal(len(T)))) for seed in range(60)) == 0
-    assert strongest(T, made(0))[0] == pytest.approx(10.03, abs=0.01)
+    assert sum(len(find_sines(T, np.random.default_rng(seed).standard_normal(len(T)))) for seed in range(60)) == 0
+    assert strongest_line(T, made(0))[0] == pytest.approx(10.03, abs=0.01)
 
 
 def test_too_few_samples_are_said() -> None:
     with pytest.raises(DataError, match="5 samples are too few for a sine; it takes 8"):
-        three_parameter(T[:5], T[:5], 10.0)
+        fit_three_parameter(T[:5], T[:5], 10.0)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from calibrations.chain import forward
-from calibrations.effect import catalogue
-from calibrations.model_file import read_model
-from calibrations.near import Near
+from calibrations.effects import Values
+from calibrations.effects.catalogue import catalogue
+from calibrations.model.chain import Near, forward
+from calibrations.model.file import read_model
 from calibrations.problem import Problem
 from tests.calibrations import synthetic
 
@@ -39,6 +39,7 @@ def test_what_only_adds_has_derivatives_to_the_last_digits() -> None:
     near, term = Near(problem.table, layout.steps(theta)), layout.model.effects.index("hysteresis")
     values = layout.values(term, theta)
     more, less, whole = (
-        near.output(term, {**values, "height": values["height"] * factor}) for factor in (1 + 1e-4, 1 - 1e-4, 1.0)
+        near.output(term, Values({**values, "height": values["height"] * factor}))
+        for factor in (1 + 1e-4, 1 - 1e-4, 1.0)
     )
     np.testing.assert_allclose((more - less) / 2e-4, whole, rtol=0, atol=1e-11 * np.max(np.abs(whole)))

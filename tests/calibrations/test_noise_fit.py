@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from calibrations.noise import white_only
-from calibrations.noise_estimation.noise_fit import (
+from calibrations.noise.means import white_only
+from calibrations.noise.means_fit import (
     FLICKER_PROCESSES,
     FLICKER_RATIOS,
-    NOT_TOLD_APART,
+    INSEPARABLE,
     RATIOS,
     TIME_CONSTANTS,
     estimate,
@@ -94,7 +94,7 @@ def dense_best(gaps: Array, X: Array, r: Array) -> Dense:
         dense(gaps, X, r, ratio, (tau,)) for tau in np.geomspace(3 * gap, span / 3, TIME_CONSTANTS) for ratio in RATIOS
     ]
     first, single = (min(points, key=lambda d: d.restricted) for points in (cautious, singles))
-    return first if first.restricted < single.restricted + NOT_TOLD_APART else single
+    return first if first.restricted < single.restricted + INSEPARABLE else single
 
 
 def dense(gaps: Array, X: Array, r: Array, ratio: float, taus_s: tuple[float, ...]) -> Dense:
@@ -159,6 +159,6 @@ def test_what_rounding_leaves_is_no_gain_and_no_noise() -> None:
     jacobian = np.full((1, N, 1), 2.5)
     noise = estimate(white_only(None, GAPS, 1), residual, jacobian, NONE)
     np.testing.assert_allclose(noise.fast, 2.5e-12)
-    assert gains(noise, residual, jacobian, [shape], NONE)[0] < NOT_TOLD_APART
+    assert gains(noise, residual, jacobian, [shape], NONE)[0] < INSEPARABLE
     known = white_only(np.full((1, N), 1e-17), GAPS, 1)  # who states the noise is believed
     assert gains(known, residual, jacobian, [shape], NONE)[0] > 1e3

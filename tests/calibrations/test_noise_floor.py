@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from calibrations.analyses.noise_floor import hidden_inclination_deg, noise_rms
 from calibrations.errors import DataError
-from calibrations.evaluations.noise_floor import hidden_inclination_deg, rms
 
 SEEDS = 200
 
@@ -18,21 +18,21 @@ def filtered(seed: int, n: int = 20_000, corner: float = 15.07 / 1000) -> np.nda
 
 
 def test_its_standard_error_is_the_scatter_over_many_records() -> None:
-    values, stds = np.array([rms(np.split(filtered(seed), 4)) for seed in range(SEEDS)]).T
+    values, stds = np.array([noise_rms(np.split(filtered(seed), 4)) for seed in range(SEEDS)]).T
     assert values.mean() == pytest.approx(1.0, abs=0.01)
     assert stds.mean() == pytest.approx(values.std(), rel=0.2)
 
 
 def test_independent_samples_have_the_textbook_error() -> None:
-    value, std = rms([np.random.default_rng(1).normal(5.0, 2.0, 10_000)])
+    value, std = noise_rms([np.random.default_rng(1).normal(5.0, 2.0, 10_000)])
     assert value == pytest.approx(2.0, abs=4 * std)
     assert std == pytest.approx(2.0 / np.sqrt(2 * 10_000), rel=0.05)
 
 
 @pytest.mark.parametrize("samples", [np.full(100, 2.5), np.array([1.0])])
 def test_a_record_without_noise_is_no_record(samples: np.ndarray) -> None:
-    with pytest.raises(DataError, match="is the sensor connected and powered"):
-        rms([samples])
+    with pytest.raises(DataError, match="check that the sensor is connected and powered"):
+        noise_rms([samples])
 
 
 def test_the_noise_of_the_paper_hides_its_inclination() -> None:

@@ -7,12 +7,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from calibrations.noise_analysis.bands import fast_bands, flickering, slow_bands
-from calibrations.noise_analysis.decimated import MOST, Means
-from calibrations.noise_analysis.exact import deviations
-from calibrations.noise_analysis.expected import of_line, weighted
-from calibrations.noise_analysis.processes import Sampling, gauss_markov, random_walk
-from calibrations.noise_analysis.welch import LENGTH, Welch
+from calibrations.noise.allan import line_variance, quadrature
+from calibrations.noise.deviations import deviations
+from calibrations.noise.processes import Sampling, gauss_markov, random_walk
+from calibrations.noise.spectrum import LENGTH, MOST_MEANS, Means, Welch, fast_bands, flickering, slow_bands
 from tests.calibrations import noises
 
 N, RECORDS = 2048, 60
@@ -78,7 +76,7 @@ def test_allan_variances_are_those_of_the_processes(name: str) -> None:
     steps = [1, 2, 16, 64]
     records = [MADE[name](np.random.default_rng(seed), 1 << 14) for seed in range(20)]
     shown = np.mean([deviations(each, steps) ** 2 for each in records], axis=0)
-    asked = [weighted(m, 1.0, np.inf) for m in steps]
+    asked = [quadrature(m, 1.0, np.inf) for m in steps]
     assert shown == pytest.approx([w @ at.column(name, 30.0) for at, w in asked], rel=0.12)
 
 
@@ -93,17 +91,19 @@ def test_allan_variances_are_those_of_the_processes(name: str) -> None:
 )
 def test_at_long_times_they_are_those_of_the_standard(name: str, continuous: Callable[[float], float]) -> None:
     """IEEE 952, annex C."""
-    at, weights = weighted(500, 1.0, np.inf)
+    at, weights = quadrature(500, 1.0, np.inf)
     assert weights @ at.column(name) == pytest.approx(continuous(500.0), rel=0.01)
 
 
 def test_allan_variance_of_a_sinusoid() -> None:
     wave = noises.sinusoid(1 << 14, 0.01)
-    assert deviations(wave, [1, 16, 40]) ** 2 == pytest.approx(of_line(0.01, np.array([1.0, 16.0, 40.0])), rel=0.02)
+    assert deviations(wave, [1, 16, 40]) ** 2 == pytest.approx(
+        line_variance(0.01, np.array([1.0, 16.0, 40.0])), rel=0.02
+    )
 
 
 def test_means_take_twice_as_many_samples_when_they_are_full() -> None:
-    samples = 1e6 + np.random.default_rng(1).standard_normal(2 * MOST + 4097)
+    samples = 1e6 + np.random.default_rng(1).standard_normal(2 * MOST_MEANS + 4097)
     seen = Means()
     for part in np.split(samples, [5, 1000, 150_000, 150_001]):
         seen.add(part)

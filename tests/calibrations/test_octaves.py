@@ -7,10 +7,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from calibrations.noise_analysis.exact import deviations
-from calibrations.noise_analysis.freedom import freedom, interval, overlap_of
-from calibrations.noise_analysis.noise_type import moments_of, noise_type
-from calibrations.noise_analysis.octaves import KINDS, Octaves, octaves
+from calibrations.noise.deviations import (
+    OCTAVE_KINDS,
+    Octaves,
+    deviations,
+    freedom,
+    interval,
+    moments_of,
+    noise_type,
+    octaves,
+    overlap_of,
+)
 from tests.calibrations.noises import flicker, quantisation, random_walk
 
 GRID = 2.0**-20
@@ -30,7 +37,7 @@ def test_up_to_32_samples_every_overlap_is_used(kind: str) -> None:
     assert curve.deviation[:6] == pytest.approx(deviations(samples, (1, 2, 4, 8, 16, 32), kind), rel=1e-12)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", OCTAVE_KINDS)
 def test_beyond_it_is_as_near_as_the_windows_left_out_allow(kind: str) -> None:
     samples = np.random.default_rng(1).standard_normal(100_000)
     curve = octaves([samples], 1.0, kind)
@@ -57,7 +64,7 @@ def test_blocks_do_not_matter(n: int, cuts: list[int], seed: int) -> None:
     parts.add(samples[:1])
     for part in np.split(samples[1:], sorted(min(cut, n - 1) for cut in cuts)):
         parts.add(part)
-    for kind in KINDS:
+    for kind in OCTAVE_KINDS:
         assert parts.curve(kind).deviation == pytest.approx(whole.curve(kind).deviation, rel=1e-9)
 
 
@@ -71,7 +78,7 @@ def test_a_curve_may_be_asked_for_on_the_way() -> None:
     assert seen.curve().deviation == pytest.approx(octaves([samples], 1.0).deviation)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", OCTAVE_KINDS)
 def test_a_mean_of_20000_under_the_noise_costs_no_digits(kind: str) -> None:
     noise = np.round(np.random.default_rng(2).standard_normal(1 << 18) / GRID) * GRID  # the sum is exact
     plain, lifted = octaves([noise], 1.0, kind), octaves([20_000.0 + noise], 1.0, kind)

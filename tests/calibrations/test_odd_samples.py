@@ -7,9 +7,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from calibrations.noise_analysis.outliers import Outliers, Wild
-from calibrations.noise_analysis.reduction import Reduction
-from calibrations.noise_analysis.stuck import Run, Stuck
+from calibrations.noise.record import Reduction
+from calibrations.noise.samples import Outliers, Run, Stuck, Wild
 from calibrations.table import Array
 from tests.calibrations.hidden_noise import counted, room, telegraph, traps, walk, white
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from calibrations.discovery.patterns import patterns
+from calibrations.discovery.structure import structure_of
 from calibrations.fit import fit
-from calibrations.model_file import read_model
-from calibrations.search.patterns import patterns
-from calibrations.search.structure import structure_of
+from calibrations.model.file import read_model
 from calibrations.table import Array, Table
 from tests.calibrations import synthetic
 

@@ -1,31 +1,30 @@
-"""Pictures show the numbers that they are made of, with labels and units, and are the same bytes each time."""
+"""Charts show the numbers that they are made of, with labels and units; both renderers draw all of it."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from copy import copy
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
-from calibrations.compare import compare
-from calibrations.discover import Added, Discovery, discover
-from calibrations.effect import catalogue
+from calibrations.discovery.results import Discovery, Step
+from calibrations.effects.catalogue import catalogue
 from calibrations.fit import Fit, fit
+from calibrations.loop import compare, discover
 from calibrations.model import Model
-from calibrations.model_file import read_model
-from calibrations.pictures import candidate, failure, measurement, residual, waterfall
-from calibrations.pictures.album import MOST_CURVES, album, tried
-from calibrations.pictures.columns import telling_columns
-from calibrations.pictures.compact import compact
-from calibrations.pictures.inline import inline
-from calibrations.pictures.save import PictureError, png, save, save_all, svg
-from calibrations.pictures.view import groups
+from calibrations.model.file import read_model
+from calibrations.presentation.chart import Bars, Chart, Line, Panel, Points, Second
+from calibrations.presentation.charts import fit as charts
+from calibrations.presentation.charts.columns import telling_columns
+from calibrations.presentation.charts.discovery import MOST_CURVES, album, effect_chart, levels, tried, waterfall
+from calibrations.presentation.interactive import figure
+from calibrations.presentation.residual import pooled_milli
+from calibrations.presentation.static import PictureError, compact, draw, inline, png, save, save_all, svg
 from calibrations.table import Array, Table
-from calibrations.units import pooled_mg
 from tests.calibrations.synthetic import components, poses, turns
 
 EFFECTS = {name: catalogue()[name] for name in ("temperature-bias", "quadratic-nonlinearity", "z-axis-bias")}
@@ -84,14 +83,17 @@ def fits() -> dict[str, Fit]:
     }
 
 
-def panels(figure: Figure) -> list[Axes]:
-    return [ax for ax in figure.axes if ax.get_label() != "<colorbar>"]
+def panels(chart: Chart) -> list[Panel]:
+    return [panel for row in chart.panels for panel in row]
 
 
-def drawn(ax: Axes) -> set[tuple[float, float]]:
-    """Every point of every marker of a panel."""
-    lines = [line for line in ax.lines if line.get_marker() == "o"]
-    return {(float(x), float(y)) for line in lines for x, y in np.column_stack(line.get_data()).astype(float)}
+def dots(panel: Panel) -> Points:
+    return next(series for series in panel.series if isinstance(series, Points))
+
+
+def drawn(panel: Panel) -> set[tuple[float, float]]:
+    """Every marker of a panel."""
+    return points(dots(panel).x, dots(panel).y)
 
 
 def points(x: Array, y: Array) -> set[tuple[float, float]]:
@@ -99,99 +101,97 @@ def points(x: Array, y: Array) -> set[tuple[float, float]]:
 
 
 @pytest.mark.parametrize("name", ["two axes", "one axis", "three axes", "positions"])
-@pytest.mark.parametrize("make", [measurement.picture, residual.picture, failure.picture])
-def test_every_panel_has_a_label_with_a_unit(name: str, make: object) -> None:
-    figure = make(fits()[name])  # type: ignore[operator]
-    assert all("(" in ax.get_xlabel() or not ax.get_subplotspec().is_last_row() for ax in panels(figure))
-    first = [ax for ax in panels(figure) if ax.get_subplotspec().is_first_col()]
-    assert all("(" in ax.get_ylabel() for ax in first)
-    assert png(figure).startswith(b"\x89PNG")
+@pytest.mark.parametrize("make", [charts.measurement_chart, charts.residual_chart, charts.failure_chart])
+def test_every_axis_has_a_unit_and_both_renderers_draw_every_point(name: str, make: Callable[[Fit], Chart]) -> None:
+    chart = make(fits()[name])
+    assert all("(" in panel.y.label for panel in panels(chart))
+    assert all("(" in panel.x.label for panel in panels(chart))
+    assert png(chart).startswith(b"\x89PNG")
+    traces = [trace for trace in figure(chart, "k")["data"] if trace["mode"] == "markers"]
+    assert [trace["x"] for trace in traces] == [dots(panel).x.tolist() for panel in panels(chart)]
+    for ax, panel in zip(draw(chart).axes, panels(chart), strict=False):
+        shown = np.concatenate([np.asarray(found.get_offsets()) for found in ax.collections]).reshape(-1, 2)
+        assert {(float(x), float(y)) for x, y in shown} >= drawn(panel)
 
 
 def test_measurement_is_dots_and_the_model_lines() -> None:
     found = warm().start
     beta, v = found.table.column("beta_deg"), found.table.outputs.T
-    for c, ax in enumerate(panels(measurement.picture(found))):
-        assert drawn(ax) == points(beta, v[c])
-        lines = np.concatenate([line.get_ydata() for line in ax.lines if line.get_marker() != "o"])
+    for c, panel in enumerate(panels(charts.measurement_chart(found))):
+        assert drawn(panel) == points(beta, v[c])
+        (line,) = [series for series in panel.series if isinstance(series, Line)]
+        lines = line.y[np.isfinite(line.y)]
         np.testing.assert_allclose(np.sort(lines), np.sort(v[c] - found.residual[c]), rtol=0, atol=1e-15)
 
 
 def test_measurement_of_positions_is_their_magnitude() -> None:
     found = by_hand().start
-    (ax,) = panels(measurement.picture(found))
-    assert drawn(ax) == points(np.arange(1.0, 61), 1 + found.residual[0])
-    assert ax.get_ylabel() == "|a| (g)"
+    (panel,) = panels(charts.measurement_chart(found))
+    assert drawn(panel) == points(np.arange(1.0, 61), 1 + found.residual[0])
+    assert panel.y.label == "|a| by the model (g)"
 
 
 def test_residual_is_in_millivolts_over_angle_time_and_temperature() -> None:
     found = warm().start
-    axes = np.reshape(np.array(panels(residual.picture(found))), (2, 3))
+    rows = charts.residual_chart(found).panels
     columns = [found.table.column("beta_deg"), found.table.time_s / 60, found.table.column("temperature_c")]
     for c in range(2):
-        for ax, x in zip(axes[c], columns, strict=True):
-            assert drawn(ax) == points(x, 1e3 * found.residual[c])
-    assert [ax.get_xlabel() for ax in axes[1]] == ["β (deg)", "time (min)", "temperature (°C)"]
-    assert axes[0, 0].get_ylabel() == "residual of x (mV)"
-    assert axes[0, 2].child_axes[0].get_ylabel() == "mg"
+        for panel, x in zip(rows[c], columns, strict=True):
+            assert drawn(panel) == points(x, 1e3 * found.residual[c])
+    assert [panel.x.label for panel in rows[1]] == ["β (deg)", "time (min)", "temperature (°C)"]
+    assert rows[0][0].y.label == "residual of x (mV)"
+    assert rows[0][2].second is not None
+    assert rows[0][2].second.label == "mg"
 
 
 def test_the_right_axis_is_the_left_over_the_scale_factor() -> None:
-    figure = residual.picture(warm().start)
-    svg(figure)  # lays it out
-    left, right = panels(figure)[5].get_ylim(), panels(figure)[5].child_axes[0].get_ylim()
+    second = charts.residual_chart(warm().start).panels[1][2].second
+    assert second == Second(pytest.approx(0.99, rel=1e-3), 0.0, "mg")
+    drawing = draw(charts.residual_chart(warm().start))
+    drawing.draw_without_rendering()
+    left, right = drawing.axes[5].get_ylim(), drawing.axes[5].child_axes[0].get_ylim()  # type: ignore[attr-defined]
     np.testing.assert_allclose(np.array(left) / 0.99, right, rtol=1e-3)
 
 
 def test_colours_are_inclinations_and_open_markers_anticlockwise() -> None:
     found = warm().start
-    ax = panels(residual.picture(found))[0]
-    lines = [line for line in ax.lines if line.get_marker() == "o"]
-    assert len({line.get_markeredgecolor() for line in lines}) == 5
-    for line, group in zip(lines, groups(found), strict=True):
-        assert line.get_markerfacecolor() == (group.colour if group.side > 0 else "none")
-        assert set(found.table.column("direction")[group.rows]) == {group.side}
+    shown = dots(charts.residual_chart(found).panels[0][0])
+    assert shown.values is not None
+    np.testing.assert_array_equal(shown.values, found.table.column("alpha_deg"))
+    hollow = [str(symbol).endswith("-open") for symbol in shown.symbol]
+    np.testing.assert_array_equal(hollow, found.table.column("direction") < 0)
 
 
-def test_the_map_holds_the_mean_residual_over_the_floor() -> None:
+def test_the_map_holds_the_residual_over_the_floor_at_each_pose() -> None:
     found = warm().start
-    alpha, beta = found.table.column("alpha_deg"), found.table.column("beta_deg")
-    rows = np.flatnonzero(found.table.column("direction") > 0)
-    edges, cells = failure.mean_cells(found, 1, rows, np.unique(alpha))
-    assert cells.shape == (5, 25)
-    chosen = rows[(alpha[rows] == 60) & (beta[rows] == 45)]
-    assert cells[1, 3] == pytest.approx(np.mean(found.residual[1, chosen]) / found.noise.floor[1])
-    assert edges[3] < 45 < edges[4]
-    figure = failure.picture(found)
-    np.testing.assert_array_equal(panels(figure)[2].collections[0].get_array(), cells)
-    assert [ax.get_title(loc="left") for ax in panels(figure)[:2]] == ["axis x, clockwise", "axis x, anticlockwise"]
-
-
-def test_the_map_of_a_column_that_was_not_measured_is_empty() -> None:
-    found = warm().start
-    rows = np.flatnonzero(found.table.column("alpha_deg") == 90)
-    _, cells = failure.mean_cells(found, 0, rows, np.unique(found.table.column("alpha_deg")))
-    assert np.isfinite(cells).all(axis=1).tolist() == [False, False, True, False, False]
+    for c, panel in enumerate(panels(charts.failure_chart(found))):
+        shown = dots(panel)
+        np.testing.assert_allclose(shown.values, found.residual[c] / found.noise.floor[c])  # type: ignore[arg-type]
+        np.testing.assert_array_equal(shown.x, found.table.column("beta_deg"))
+        side = found.table.column("direction")
+        np.testing.assert_array_equal(np.sign(shown.y - found.table.column("alpha_deg")), side)
+        assert [symbol == "triangle-up" for symbol in shown.symbol] == (side > 0).tolist()
 
 
 def test_the_map_of_positions_is_of_equal_area() -> None:
-    figure = failure.picture(by_hand().start)
-    shown = np.concatenate([np.asarray(ax.collections[0].get_offsets()) for ax in panels(figure)])
-    assert len(shown) == 60
-    assert np.all(np.hypot(*shown.T) <= 1.001)
+    (panel,) = panels(charts.failure_chart(by_hand().start))
+    shown = dots(panel)
+    assert len(shown.x) == 60
+    right = np.where(shown.x > 1.1, charts.HALF_SPHERES, 0.0)
+    assert np.all(np.hypot(shown.x - right, shown.y) <= 1.001)
 
 
 def test_an_effect_is_drawn_over_what_it_follows() -> None:
     (step,) = warm().steps
     assert step.name == "temperature-bias"
-    assert candidate.most_telling(step).name == "temperature_c"
-    left, right, *_ = panels(candidate.picture(step))
+    assert charts.most_telling(step).name == "temperature_c"
+    left, right, *_ = panels(effect_chart(step))
     kelvin = step.before.table.column("temperature_c")
     assert drawn(left) == points(kelvin, 1e3 * step.before.residual[0])
     assert drawn(right) == points(kelvin, 1e3 * step.after.residual[0])
-    curve = left.lines[-1]
-    slope = np.polyfit(*curve.get_data(), 1)[0]
-    assert slope == pytest.approx(0.2, rel=0.02)  # mV/K
+    curve = left.series[-1]
+    assert isinstance(curve, Line)
+    assert np.polyfit(curve.x, curve.y, 1)[0] == pytest.approx(0.2, rel=0.02)  # mV/K
 
 
 def test_a_quadratic_is_drawn_over_the_axis_itself() -> None:
@@ -199,8 +199,8 @@ def test_a_quadratic_is_drawn_over_the_axis_itself() -> None:
     x, y, _ = components(columns)
     table = poses(columns, 2.5 + x + 2e-3 * x**2, 2.5 + y + 1e-3 * y**2)
     before = fit(read_model("linear"), table)
-    step = Added("quadratic-nonlinearity", before, fit(with_(before.model, "quadratic-nonlinearity"), table))
-    column = candidate.most_telling(step)
+    step = Step("quadratic-nonlinearity", before, fit(with_(before.model, "quadratic-nonlinearity"), table))
+    column = charts.most_telling(step)
     assert column.labels == ("specific force along x (g)", "specific force along y (g)")
     np.testing.assert_allclose(column.values[0], x[step.before.table.order], atol=1e-12)
 
@@ -210,15 +210,16 @@ def test_where_no_column_tells_the_change_itself_is_drawn() -> None:
     x, y, z = components(columns)
     table = poses(columns, 2.5 + x + 5e-3 * x * z, 2.5 + y - 5e-3 * y * z)
     before = fit(read_model("linear"), table)
-    step = Added("z-axis-scale", before, fit(with_(before.model, "z-axis-scale"), table))
-    column = candidate.most_telling(step)
+    step = Step("z-axis-scale", before, fit(with_(before.model, "z-axis-scale"), table))
+    column = charts.most_telling(step)
     assert column.name == "change"
-    ((_, along, curve),) = candidate.curves(step, column, 0)
+    ((_, along, curve),) = charts.curves(step, column, 0)
     np.testing.assert_allclose(along, 1e3 * curve)  # the diagonal
 
 
 def test_an_effect_is_drawn_over_what_it_needs() -> None:
-    effect = replace(catalogue()["bias"], needs=("t_s", "temperature_c", "direction"))
+    effect = copy(catalogue()["bias"])
+    effect.needs = ("t_s", "temperature_c", "direction")
     labels = [column.labels[1] for column in telling_columns(warm().start, effect)]
     forces = [f"specific force along {axis} (g)" for axis in "yxz"]
     assert labels == [*forces, "β (deg)", "time (min)", "temperature (°C)"]
@@ -232,36 +233,24 @@ def test_a_function_of_a_column_is_explained_by_it_and_noise_is_not() -> None:
     x = np.linspace(0, 10, 500)[None]
     noise = np.random.default_rng(0).standard_normal((1, 500))
     sides = np.where(np.arange(500) % 2, 1.0, -1.0)
-    assert candidate.explained(np.sin(x) * sides, x, sides) > 0.95
-    assert candidate.explained(noise, x, sides) < 0.3
-    assert candidate.explained(0 * x, x, sides) == 0
+    assert charts.explained(np.sin(x) * sides, x, sides) > 0.95
+    assert charts.explained(noise, x, sides) < 0.3
+    assert charts.explained(0 * x, x, sides) == 0
 
 
 def test_the_waterfall_falls_from_level_to_level() -> None:
     found = warm()
-    (ax,) = panels(waterfall.picture(found))
-    first, fall, last = ax.patches[1:4]  # the first is the band
-    before, after = found.start.pooled_excess, found.end.pooled_excess
-    assert [first.get_y() + first.get_height(), fall.get_y(), fall.get_height()] == pytest.approx(  # type: ignore[attr-defined]
-        [before, after, before - after]
-    )
-    assert last.get_y() + last.get_height() == pytest.approx(after)  # type: ignore[attr-defined]
-    diamonds = next(line for line in ax.lines if line.get_marker() == "D")
-    assert diamonds.get_ydata() == pytest.approx([waterfall.levels(found)[0].unseen, found.steps[0].held_out_after])
-    words = [text.get_text() for text in ax.texts]
-    assert f"noise floor\n{pooled_mg(found.start)[1]:.3f} mg" in words
-    assert [tick.get_text() for tick in ax.get_xticklabels()] == ["linear", "+ temperature-\nbias", "left"]
-
-
-def test_a_large_fall_is_logarithmic_and_a_small_one_is_not() -> None:
-    assert panels(waterfall.picture(by_hand()))[0].get_yscale() == "log"
-    small = discover(warm_table(3e-5), read_model("linear"), EFFECTS)
-    assert panels(waterfall.picture(small))[0].get_yscale() == "linear"
+    (panel,) = panels(waterfall(levels(found)))
+    bars = next(series for series in panel.series if isinstance(series, Bars))
+    assert bars.ends.tolist() == [found.start.pooled_excess, found.end.pooled_excess]
+    assert dots(panel).x.tolist() == [levels(found)[0].unseen, found.steps[0].held_out_after]
+    assert panel.y.names == ("linear", "+ temperature-bias")
+    assert bars.texts[0].endswith(f"× ({pooled_milli(found.start)[0]:.2f} mg)")
 
 
 def test_rms_in_mg_is_that_of_the_residual() -> None:
     found = by_hand().start
-    error, floor = pooled_mg(found)
+    error, floor = pooled_milli(found)
     assert error == pytest.approx(1e3 * np.sqrt(np.mean(found.residual**2)))
     assert error / floor == pytest.approx(found.pooled_excess)
 
@@ -275,15 +264,15 @@ def test_the_album_holds_every_picture_once() -> None:
 
 def test_only_the_greatest_falls_are_drawn() -> None:
     (step,) = warm().steps
-    idle = [Added(f"e{k}", step.after, step.after) for k in range(MOST_CURVES)]
-    found = replace(warm(), steps=(*idle[:2], step, *idle[2:]))
-    shown = tried(found)
+    idle = [Step(f"e{k}", step.after, step.after) for k in range(MOST_CURVES)]
+    findings = replace(warm().findings, steps=(*idle[:2], step, *idle[2:]))
+    shown = tried(Discovery.of(findings))
     assert step in shown
 
 
 @pytest.mark.parametrize("make", [svg, png])
-def test_the_same_figure_gives_the_same_bytes(make: object) -> None:
-    first, second = (make(residual.picture(warm().start)) for _ in range(2))  # type: ignore[operator]
+def test_the_same_chart_gives_the_same_bytes(make: object) -> None:
+    first, second = (make(charts.residual_chart(warm().start)) for _ in range(2))  # type: ignore[operator]
     assert first == second
     assert b"20" + b"2" not in first.split(b"<defs>")[0] if make is svg else True  # no date
 
@@ -302,12 +291,12 @@ def test_compact_cuts_digits_of_places_and_none_of_words() -> None:
 
 def test_words_of_users_are_not_taken_for_formulas() -> None:
     model = Model("a$b$ & <c>", warm().start.model.terms)
-    found = replace(warm(), start=fit(model, warm_table()))
-    assert b"a$b$ &amp; &lt;c&gt;" in svg(waterfall.picture(found))
+    found = Discovery.of(replace(warm().findings, start=fit(model, warm_table())))
+    assert b"a$b$ &amp; &lt;c&gt;" in svg(waterfall(levels(found)))
 
 
 def test_an_inline_picture_reaches_nowhere_and_owns_its_names() -> None:
-    text = inline(failure.picture(warm().start), "map", 'where "it" fails')
+    text = inline(charts.failure_chart(warm().start), "map", 'where "it" fails')
     assert text.startswith('<svg role="img" aria-label="where &quot;it&quot; fails"')
     assert "http" not in text
     assert "<style" not in text
@@ -319,20 +308,20 @@ def test_an_inline_picture_reaches_nowhere_and_owns_its_names() -> None:
 
 
 def test_save_writes_whole_files(tmp_path: Path) -> None:
-    figure = waterfall.picture(warm())
-    save(figure, tmp_path / "a.svg")
-    save(figure, tmp_path / "b.PNG")
-    assert (tmp_path / "a.svg").read_bytes() == svg(figure)
+    chart = waterfall(levels(warm()))
+    save(chart, tmp_path / "a.svg")
+    save(chart, tmp_path / "b.PNG")
+    assert (tmp_path / "a.svg").read_bytes() == svg(chart)
     assert (tmp_path / "b.PNG").read_bytes().startswith(b"\x89PNG")
     assert sorted(path.name for path in tmp_path.iterdir() if path.is_file()) == ["a.svg", "b.PNG"]
 
 
 def test_save_says_what_is_wrong(tmp_path: Path) -> None:
-    figure = Figure()
+    chart = Chart(((Panel(()),),))
     with pytest.raises(PictureError, match=r'a\.pdf: pictures end in \.png or \.svg, not in "\.pdf"'):
-        save(figure, tmp_path / "a.pdf")
+        save(chart, tmp_path / "a.pdf")
     with pytest.raises(PictureError, match=r"cannot be written: No such file or directory"):
-        save(figure, tmp_path / "no" / "a.svg")
+        save(chart, tmp_path / "no" / "a.svg")
     (tmp_path / "file").touch()
     with pytest.raises(PictureError, match="the folder cannot be made"):
-        save_all({"a": figure}, tmp_path / "file", "svg")
+        save_all({"a": chart}, tmp_path / "file", "svg")

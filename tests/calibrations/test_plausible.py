@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 
 from calibrations.errors import DataError
-from calibrations.reading.duplicates import without_copies
-from calibrations.reading.foreign import take
-from calibrations.reading.plausible import gravity_unit, looks_like_radians
-from calibrations.reading.separated import sheet
-from calibrations.reading.text_file import text
-from calibrations.reading.units import Mapped
+from calibrations.importing.files import text_source
+from calibrations.importing.foreign import drop_duplicate_rows, import_sheet
+from calibrations.importing.plausible import gravity_unit, looks_like_radians
+from calibrations.importing.sheet import read_sheet
+from calibrations.importing.units import ColumnMapping
 from calibrations.table import Table
 
 TURN = np.arange(0.0, 361.0, 30.0)
@@ -28,15 +27,17 @@ def poses(alpha: float = 90.0, scale: float = 1.0, **more: float) -> str:
 
 
 def read(content: str, *columns: str, kind: str | None = None) -> Table:
-    return take(sheet(text(content, "some.csv")), kind, [Mapped.parse(c) for c in columns]).table
+    return import_sheet(
+        read_sheet(text_source(content, "some.csv")), kind, [ColumnMapping.parse(c) for c in columns]
+    ).table
 
 
 @pytest.mark.parametrize(
     ("content", "name", "says", "fits"),
     [
-        (poses(scale=np.pi / 180), "alpha_deg", "these look like radians", "alpha_deg=alpha_deg:rad"),
-        (poses(scale=np.pi / 180), "alpha_deg", "these look like radians", "beta_deg=beta_deg:rad"),
-        (poses(vy_v=2500.0), "vy_v", "reaches 2500 V, and no sensor puts out more than 50 V", "vy_v=vy_v:mV"),
+        (poses(scale=np.pi / 180), "alpha_deg", "it looks like radians", "alpha_deg=alpha_deg:rad"),
+        (poses(scale=np.pi / 180), "alpha_deg", "it looks like radians", "beta_deg=beta_deg:rad"),
+        (poses(vy_v=2500.0), "vy_v", "reaches 2500 V; no sensor output exceeds 50 V", "vy_v=vy_v:mV"),
         (poses(supply_v=5000.0), "supply_v", "reaches 5000 V", "supply_v=supply_v:mV"),
         (poses(vy_v=2.5e6), "vy_v", "reaches 2.5e+06 V", "vy_v=vy_v:uV"),
         (poses(temperature_c=295.0), "temperature_c", "from 295 to 295 degC", "temperature_c=temperature_c:K"),
@@ -61,8 +62,8 @@ def test_a_unit_that_can_hardly_be(content: str, name: str, says: str, fits: str
 @pytest.mark.parametrize(
     ("column", "says"),
     [
-        ("alpha_deg=alpha_deg:rad", "reaches 5156.62 deg, and no stage turns beyond 360; give the unit that it is in"),
-        ("beta_deg=beta_deg:rad", "reaches 20626.5 deg, and no stage turns beyond 3600; give the unit that it is in"),
+        ("alpha_deg=alpha_deg:rad", "reaches 5156.62 deg; no stage turns beyond 360 deg; state its unit"),
+        ("beta_deg=beta_deg:rad", "reaches 20626.5 deg; no stage turns beyond 3600 deg; state its unit"),
     ],
 )
 def test_degrees_taken_for_radians(column: str, says: str) -> None:
@@ -78,7 +79,7 @@ def test_a_mapping_without_a_unit_states_none() -> None:
 
 
 def test_what_nobody_knows_a_unit_for_may_still_be_stated() -> None:
-    with pytest.raises(DataError, match="give the unit that it is in, as in --column temperature_c=temperature_c:degC"):
+    with pytest.raises(DataError, match="state its unit, as in --column temperature_c=temperature_c:degC"):
         read(poses(temperature_c=5000.0))
     assert read(poses(temperature_c=5000.0), "temperature_c=temperature_c:degC").n == len(TURN)
 
@@ -110,13 +111,11 @@ def test_gravity_gives_the_unit_of_a_sensor_at_rest(size: float, unit: str) -> N
 
 def test_a_sensor_at_rest_shows_gravity() -> None:
     content = "ax,ay,az\n9.8,0,0\n0,9.8,0\n0,0,9.8\n"
-    with pytest.raises(
-        DataError, match=r"have the magnitude 9.8 g, where a sensor at rest shows 1; they look like m/s2"
-    ):
+    with pytest.raises(DataError, match=r"have the magnitude 9.8 g; a sensor at rest shows 1; they look like m/s2"):
         read(content, "ax=ax:g", "ay=ay:g", "az=az:g")
-    with pytest.raises(DataError, match=r"the magnitude 1 m/s2, where a sensor at rest shows 9.807; they look like g"):
+    with pytest.raises(DataError, match=r"the magnitude 1 m/s2; a sensor at rest shows 9.807; they look like g"):
         read(content.replace("9.8", "1"), *(f"{a}={a}:m/s2" for a in ("ax", "ay", "az")))
-    with pytest.raises(DataError, match=r"are imported as counts: --column ax=\.\.\.:counts"):
+    with pytest.raises(DataError, match=r"import outputs of an unknown scale as counts: --column ax=\.\.\.:counts"):
         read(content.replace("9.8", "17"), "ax=ax:g", "ay=ay:g", "az=az:g")
     assert read(content, *(f"{a}={a}:m/s2" for a in ("ax", "ay", "az"))).unit == "m/s2"
     assert read(content, *(f"{a}={a}:counts" for a in ("ax", "ay", "az"))).unit == "count"
@@ -124,13 +123,13 @@ def test_a_sensor_at_rest_shows_gravity() -> None:
 
 def test_rows_that_are_there_twice() -> None:
     columns = {"t_s": [0.0, 1, 2, 0, 1], "alpha_deg": [90.0] * 5, "beta_deg": [0.0, 30, 60, 0, 30], "vx_v": [1.0] * 5}
-    kept, said = without_copies(Table.from_columns("poses", columns, source="made"))
+    kept, said = drop_duplicate_rows(Table.from_columns("poses", columns, source="made"))
     assert kept.n == 3
     assert said is not None
-    assert said.startswith("made: rows 4 (as 1), 5 (as 2) are copies of earlier ones and count once")
+    assert said.startswith("made: rows 4 (as 1), 5 (as 2) copy earlier rows (same time, same digits)")
     for name, values in {"t_s": [0.0, 1, 2, 3, 4], "vx_v": [1.0, 1, 1, 1.1, 1.1]}.items():  # measured again
         again = Table.from_columns("poses", {**columns, name: values})
-        assert without_copies(again) == (again, None)
+        assert drop_duplicate_rows(again) == (again, None)
     del columns["t_s"]
     timeless = Table.from_columns("poses", columns)  # maybe read to few digits
-    assert without_copies(timeless) == (timeless, None)
+    assert drop_duplicate_rows(timeless) == (timeless, None)

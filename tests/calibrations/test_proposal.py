@@ -9,20 +9,20 @@ import numpy as np
 import pytest
 
 from calibrations.errors import DataError, MissingColumn
-from calibrations.reading.foreign import needs_mapping, take
-from calibrations.reading.proposal import command, likely_kind, propose
-from calibrations.reading.separated import Sheet, sheet
-from calibrations.reading.text_file import text
-from calibrations.reading.units import Mapped, name_and_unit, unit_of
+from calibrations.importing.files import text_source
+from calibrations.importing.foreign import import_sheet, needs_mapping
+from calibrations.importing.proposal import import_command, likely_kind, propose_mapping
+from calibrations.importing.sheet import Sheet, read_sheet
+from calibrations.importing.units import ColumnMapping, parse_unit, split_unit
 from calibrations.table import Array
 
 
 def laid(content: str) -> Sheet:
-    return sheet(text(content, "theirs.csv"))
+    return read_sheet(text_source(content, "theirs.csv"))
 
 
 def proposed(content: str, kind: str | None = None, *mapped: str) -> set[str]:
-    return {m.text for m in propose(laid(content), kind, [Mapped.parse(m) for m in mapped])}
+    return {m.text for m in propose_mapping(laid(content), kind, [ColumnMapping.parse(m) for m in mapped])}
 
 
 ROWS = "90;0;3500\n90;30;3400\n30;0;3000\n"
@@ -100,7 +100,7 @@ def test_a_magnetometer_is_told_by_its_names() -> None:
     content = "MagX (uT),MagY (uT),MagZ (uT)\n12,-3,40\n11,-2,41\n"
     assert proposed(content) == {"mx=MagX (uT):uT", "my=MagY (uT):uT", "mz=MagZ (uT):uT"}
     with pytest.raises(MissingColumn, match=r"rig import theirs\.csv --kind positions --column mx=MagX:uT"):
-        take(laid(content), "positions")
+        import_sheet(laid(content), "positions")
 
 
 def test_a_gyroscope_on_a_table_is_told_by_rate_and_outputs() -> None:
@@ -108,9 +108,9 @@ def test_a_gyroscope_on_a_table_is_told_by_rate_and_outputs() -> None:
     assert likely_kind(laid(content)) == "rates"
     outputs = {f"g{axis}=gyro_{axis}" for axis in "xyz"} | {f"a{axis}=acc_{axis}" for axis in "xyz"}
     assert proposed(content) == outputs | {"rate_deg_s=Table rate (deg/s):deg/s"}
-    units = [Mapped.parse(m) for m in ("rate_deg_s=Table rate", "ax=acc_x:g", "ay=acc_y:g", "az=acc_z:g")]
-    units += [Mapped.parse(f"g{axis}=gyro_{axis}:rad/s") for axis in "xyz"]
-    table = take(laid(content), "rates", units).table
+    units = [ColumnMapping.parse(m) for m in ("rate_deg_s=Table rate", "ax=acc_x:g", "ay=acc_y:g", "az=acc_z:g")]
+    units += [ColumnMapping.parse(f"g{axis}=gyro_{axis}:rad/s") for axis in "xyz"]
+    table = import_sheet(laid(content), "rates", units).table
     assert table.unit == "deg/s"
     assert table.column("gx")[0] == pytest.approx(np.degrees(1.0))
 
@@ -123,28 +123,30 @@ def test_what_is_given_already_stays() -> None:
 def test_a_message_ends_with_the_command_that_works() -> None:
     content = f"Inclination (°);Table angle (°);Vx [mV]\n{ROWS}"
     with pytest.raises(MissingColumn) as error:
-        take(laid(content), None)
+        import_sheet(laid(content), None)
     line = str(error.value).splitlines()[-1]
     assert shlex.split(line)[:5] == ["rig", "import", "theirs.csv", "--kind", "poses"]
-    columns = [Mapped.parse(word) for word in shlex.split(line)[6::2]]
-    assert take(laid(content), "poses", columns).table.column("vx_v").tolist() == [3.5, 3.4, 3.0]
+    columns = [ColumnMapping.parse(word) for word in shlex.split(line)[6::2]]
+    assert import_sheet(laid(content), "poses", columns).table.column("vx_v").tolist() == [3.5, 3.4, 3.0]
 
 
 def test_what_is_still_to_be_named_is_said() -> None:
     with pytest.raises(MissingColumn, match=re.escape("put your column's name for YOURS: one, two")) as error:
-        take(laid(f"one;two;Vout\n{ROWS}"), None)
+        import_sheet(laid(f"one;two;Vout\n{ROWS}"), None)
     assert "--column vx_v=Vout:mV --column alpha_deg=YOURS --column beta_deg=YOURS" in str(error.value)
 
 
 def test_a_mapping_is_needed_where_our_names_are_missing() -> None:
     assert not needs_mapping(laid(f"alpha_deg (°);beta_deg;vx_v [mV]\n{ROWS}"), None, [])
     assert needs_mapping(laid(f"alpha_deg;beta_deg;Vout\n{ROWS}"), None, [])
-    assert not needs_mapping(laid(f"alpha_deg;beta_deg;Vout\n{ROWS}"), None, [Mapped("vx_v", "Vout", "mV")])
+    assert not needs_mapping(laid(f"alpha_deg;beta_deg;Vout\n{ROWS}"), None, [ColumnMapping("vx_v", "Vout", "mV")])
     assert needs_mapping(laid(f"alpha_deg;beta_deg;vx_v\n{ROWS}"), "positions", [])
 
 
 def test_the_command_holds_all_that_was_said() -> None:
-    words = shlex.split(command(laid(f"a a;b;c\n{ROWS}"), "poses", [Mapped("vx_v", "a a", "mV")], ["sensor=A 7"]))
+    words = shlex.split(
+        import_command(laid(f"a a;b;c\n{ROWS}"), "poses", [ColumnMapping("vx_v", "a a", "mV")], ["sensor=A 7"])
+    )
     assert words == [
         *("rig", "import", "theirs.csv", "--kind", "poses"),
         *("--column", "vx_v=a a:mV", "--constant", "sensor=A 7"),
@@ -152,17 +154,17 @@ def test_the_command_holds_all_that_was_said() -> None:
 
 
 def test_how_units_are_spelt() -> None:
-    assert [unit_of(u) for u in ("mV", "°", "[°C]", "m/s²", "Volts", "µV", "k", "kPa", "")] == [
+    assert [parse_unit(u) for u in ("mV", "°", "[°C]", "m/s²", "Volts", "µV", "k", "kPa", "")] == [
         "mV", "deg", "degC", "m/s2", "V", "uV", "", "", "",
     ]  # fmt: skip
-    assert name_and_unit("Vx [mV]") == ("Vx", "mV")
-    assert name_and_unit("Run (raw data)") == ("Run (raw data)", "")
+    assert split_unit("Vx [mV]") == ("Vx", "mV")
+    assert split_unit("Run (raw data)") == ("Run (raw data)", "")
 
 
 def advised(content: str, **constants: str | float) -> str:
     """The message about a file that is not understood."""
     with pytest.raises(MissingColumn) as error:
-        take(laid(content), None, (), constants)
+        import_sheet(laid(content), None, (), constants)
     return str(error.value)
 
 
@@ -179,13 +181,15 @@ def session(turned: bool, *, sections: str = "part") -> str:
 
 def test_a_session_in_named_sections_is_rates_and_its_counter_counts_nothing() -> None:
     told = advised(session(turned=True))
-    assert "(put by how many degrees it was turned in each section for YOURS in turn_deg; the samples a second" in told
+    assert "(put the angle of each turn in deg for YOURS in turn_deg; the sample rate in Hz" in told
     words = shlex.split(told.splitlines()[-1])
     assert words[3:7] == ["--kind", "rates", "--column", "path=part"]
     assert words[-4:] == ["--constant", "turn_deg=YOURS", "--constant", "sample_rate_hz=YOURS"]
     assert not any("samples" in word for word in words[:-2])
-    columns = [Mapped.parse(word) for word in words[6:-4:2]]
-    rates = take(laid(session(turned=True)), "rates", columns, {"turn_deg": 360.0, "sample_rate_hz": 40.0}).table
+    columns = [ColumnMapping.parse(word) for word in words[6:-4:2]]
+    rates = import_sheet(
+        laid(session(turned=True)), "rates", columns, {"turn_deg": 360.0, "sample_rate_hz": 40.0}
+    ).table
     assert np.unique(rates.column("rate_deg_s")).tolist() == [0.0, 360.0]
     assert not needs_mapping(laid(session(turned=True)), "rates", columns)
     assert "turn_deg=180 --constant sample_rate_hz=YOURS" in advised(session(turned=True), turn_deg=180.0)
@@ -194,7 +198,7 @@ def test_a_session_in_named_sections_is_rates_and_its_counter_counts_nothing() -
 def test_sections_in_which_nothing_turns_are_positions() -> None:
     told = advised(session(turned=False))
     assert "--kind positions --column ax=acc_x:counts" in told
-    assert "this takes it:\n" in told
+    assert "this import is likely:\n" in told
 
 
 @pytest.mark.parametrize(
@@ -209,8 +213,8 @@ def test_only_whole_numbers_that_do_not_run_count_samples(values: str, counted: 
 def test_what_was_tried_in_vain_is_said_so() -> None:
     rows = "".join(f"{9.8 * (k == 0)},{9.8 * (k == 1)},{9.8 * (k == 2)}\n" for k in range(3))
     told = advised(f"accX,accY,accZ\n{rows}")
-    assert "was tried in vain: theirs.csv: 3 positions; no model has fewer than 4 parameters" in told
-    assert "this takes it" not in told
+    assert "The most likely import fails: theirs.csv: 3 positions; no model has fewer than 4 parameters" in told
+    assert "this import is likely" not in told
 
 
 def columns_of(values: Array) -> str:
@@ -224,7 +228,7 @@ def test_columns_without_names_are_positions_only_where_they_show_one_magnitude_
     assert "--kind positions --column ax=1:m/s2" in advised(columns_of(9.8 * sides))
     for others in (random.normal(size=(30, 3)), np.cumsum(np.abs(random.normal(size=(30, 3))), axis=0)):
         told = advised(columns_of(others))
-        assert told.endswith("; --column gives one of them a name by its number, as in vx_v=2:mV")
+        assert told.endswith("; name a column with --column, by its number, such as vx_v=2:mV")
         assert "rig import" not in told
 
 
@@ -237,7 +241,7 @@ def test_constants_that_are_given_stay_and_a_rate_by_another_name_is_taken() -> 
     told = advised(f"Fs,50\naccX,accY,accZ\n{samples}", sensor="A 7")
     assert told.endswith("--constant 'sensor=A 7' --constant sample_rate_hz=50\n")
     assert "YOURS" not in told
-    assert "(put the samples a second for YOURS in sample_rate_hz)" in advised(f"accX,accY,accZ\n{samples}")
+    assert "(put the sample rate in Hz for YOURS in sample_rate_hz)" in advised(f"accX,accY,accZ\n{samples}")
 
 
 @pytest.mark.parametrize("triad", ["a", "m"])
@@ -252,14 +256,16 @@ def test_of_a_magnetometer_beside_an_accelerometer_each_is_asked_for_its_own_mag
     content = f"mag_x,mag_y,mag_z,grav_x,grav_y,grav_z\n{rows}"
     words = shlex.split(advised(content, triad=triad).splitlines()[-1])
     assert words[-2:] == ["--constant", f"triad={triad}"]
-    taken = take(laid(content), "positions", [Mapped.parse(word) for word in words[6:-2:2]], {"triad": triad}).table
+    taken = import_sheet(
+        laid(content), "positions", [ColumnMapping.parse(word) for word in words[6:-2:2]], {"triad": triad}
+    ).table
     assert taken.unit == {"a": "m/s2", "m": "uT"}[triad]
-    heavy = [Mapped.parse(word.replace("grav", "mag")) for word in words[12:-2:2]]
+    heavy = [ColumnMapping.parse(word.replace("grav", "mag")) for word in words[12:-2:2]]
     with pytest.raises(DataError, match="ax, ay, az have the magnitude 4"):
-        take(laid(content), "positions", heavy, {})
+        import_sheet(laid(content), "positions", heavy, {})
 
 
 def test_a_field_is_not_asked_for_gravity_whatever_unit_the_file_states() -> None:
     rows = "".join(f"{45 * (k == 0)},{45 * (k == 1)},{45 * (k == 2)},1,0,0\n" for k in range(3))
     content = f"# unit: g\n# triad: m\nmx,my,mz,ax,ay,az\n{rows}"
-    assert take(laid(content), None).table.content == "fields"
+    assert import_sheet(laid(content), None).table.content == "fields"

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from calibrations.errors import CalibrationError, DataError
-from calibrations.reading.read_csv import parse_csv, read_csv, require_kind, write_csv
+from calibrations.importing.foreign import parse_csv, read_csv, require_kind, write_csv
 from calibrations.table import Table
 
 HEADER = "alpha_deg,beta_deg,vx_v"
@@ -97,7 +97,7 @@ def test_any_text_is_a_table_or_one_clear_error(text: str) -> None:
     [
         ("", "bad.csv: the file is empty"),
         ("# sensor: A\n\n", "bad.csv: the file is empty: a header line with column names is missing"),
-        (f"{HEADER}\n", "bad.csv: no rows below the header"),
+        (f"{HEADER}\n", "bad.csv: there are no rows below the header"),
         ("90,0,3.5\n90,90,2.5\n", "bad.csv, line 1: a header line with column names is missing"),
         (f"{HEADER},vx_v\n1,2,3,4\n", 'bad.csv, line 1: the column "vx_v" occurs twice'),
         ("alpha_deg,,vx_v\n1,2,3\n", "bad.csv, line 1: a column has no name"),

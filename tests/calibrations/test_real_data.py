@@ -7,22 +7,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from calibrations.diagnose import diagnose
-from calibrations.discover import discover
-from calibrations.effect import Effect, catalogue
+from calibrations.effects import Effect
+from calibrations.effects.catalogue import catalogue
 from calibrations.fit import Fit, fit
-from calibrations.model_file import read_model
-from calibrations.reading.foreign import read_foreign
-from calibrations.reading.stills import positions
-from calibrations.reading.units import Mapped
+from calibrations.importing.foreign import read_foreign
+from calibrations.importing.raw_logs import average_still_positions
+from calibrations.importing.units import ColumnMapping
+from calibrations.loop import diagnose, discover
+from calibrations.model.file import read_model
 from calibrations.table import Table
 
 DATA = Path(__file__).parent.parent / "data"
 
 
 def log(file: str, *mapped: str, rate_hz: float = 100.0, **constants: float) -> Table:
-    table = read_foreign(DATA / file, "positions", [Mapped.parse(m) for m in mapped], constants)
-    return positions(table, rate_hz)
+    table = read_foreign(DATA / file, "positions", [ColumnMapping.parse(m) for m in mapped], constants)
+    return average_still_positions(table, rate_hz)
 
 
 def xsens() -> Table:

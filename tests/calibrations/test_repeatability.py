@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from calibrations.analyses.stability import repeatability
+from calibrations.analyses.tumble import Tumble, bias_coefficients, estimate_tumbles, scale_coefficients
 from calibrations.errors import DataError
-from calibrations.evaluations.repeatability import between
-from calibrations.evaluations.temperature_coefficients import bias_coefficients, scale_coefficients
-from calibrations.evaluations.tumble import Tumble, tumbles
 from calibrations.table import Table
 from procedures.tumbles import tumble
 
@@ -34,40 +33,40 @@ def table(paths: list[str], random: np.random.Generator | None = None, last: int
 
 
 def test_a_tumble_gives_bias_and_scale_whatever_hysteresis() -> None:
-    (one,) = tumbles(table(["as-is 1"]), "x")
+    (one,) = estimate_tumbles(table(["as-is 1"]), "x")
     assert (one.bias_v, one.scale_v_per_g) == pytest.approx((2.5, 1.02), abs=1e-12)
 
 
 def test_its_standard_errors_are_true() -> None:
     random = np.random.default_rng(2)
-    done = tumbles(table([f"as-is {k}" for k in range(400)], random), "x")
+    done = estimate_tumbles(table([f"as-is {k}" for k in range(400)], random), "x")
     assert np.std([t.bias_v for t in done]) == pytest.approx(done[0].bias_std_v, rel=0.1)
     assert np.std([t.scale_v_per_g / 1.02 for t in done]) == pytest.approx(done[0].scale_std, rel=0.1)
 
 
 def test_an_incomplete_tumble_is_refused() -> None:
-    with pytest.raises(DataError, match="no tumble is complete: 'as-is 1' is without beta 180 deg"):
-        tumbles(table(["as-is 1"], last=2), "x")
-    with pytest.raises(DataError, match="holds no tumble"):
-        tumbles(table(["reference"]), "x")
+    with pytest.raises(DataError, match="no tumble is complete: 'as-is 1' lacks beta 180 deg"):
+        estimate_tumbles(table(["as-is 1"], last=2), "x")
+    with pytest.raises(DataError, match="there is no tumble"):
+        estimate_tumbles(table(["reference"]), "x")
 
 
 def test_the_spread_between_is_freed_from_noise_on_the_mean() -> None:
     """2000 times six repetitions: 3 between them, noise of 2 on each."""
     random = np.random.default_rng(1)
     values = 3 * random.standard_normal((2000, 6)) + 2 * random.standard_normal((2000, 6))
-    found = np.array([between(row, [2.0] * 6) for row in values])
+    found = np.array([repeatability(row, [2.0] * 6) for row in values])
     assert np.mean(found[:, 0] ** 2) == pytest.approx(9.0, rel=0.1)
     within = np.abs(found[:, 0] - 3) < 2 * found[:, 1]
     assert 0.8 < within.mean() < 1.0
 
 
 def test_noise_alone_is_no_spread_but_its_bound_is_told() -> None:
-    value, std = between([1.0, 1.1, 0.9], [0.5] * 3)
+    value, std = repeatability([1.0, 1.1, 0.9], [0.5] * 3)
     assert value == 0
     assert std == pytest.approx(np.sqrt(0.01 * np.sqrt(2 / 2)))
-    with pytest.raises(DataError, match="two repetitions"):
-        between([1.0], [0.1])
+    with pytest.raises(DataError, match="at least two repetitions"):
+        repeatability([1.0], [0.1])
 
 
 def steps(cycles: int, drift_v: float = 0.0, curve: float = 0.0) -> list[Tumble]:
@@ -99,5 +98,5 @@ def test_what_a_straight_line_leaves_widens_the_standard_errors() -> None:
 
 
 def test_one_temperature_has_no_slope() -> None:
-    with pytest.raises(DataError, match="no temperatures up and down"):
+    with pytest.raises(DataError, match="lacks different temperatures on the way up and down"):
         bias_coefficients([step for step in steps(1) if step.temperature_c == 35])

@@ -7,23 +7,24 @@ from collections import Counter
 from dataclasses import replace
 from functools import cache
 from html.parser import HTMLParser
+from typing import Any
 
 import pytest
-from matplotlib.figure import Figure
 
-from calibrations.compare import Comparison, compare
 from calibrations.design.expected import Expected
-from calibrations.discover import Discovery, discover
-from calibrations.effect import catalogue
-from calibrations.experiment import Experiment
+from calibrations.design.experiment import Experiment
+from calibrations.discovery.results import Comparison, Discovery
+from calibrations.effects.catalogue import catalogue
+from calibrations.fit import Fit
+from calibrations.loop import compare, discover
 from calibrations.model import Estimate, Model, Term
-from calibrations.model_file import read_model
-from calibrations.numerals import chance, measured, minus, plain, stretch, unit
-from calibrations.pictures.album import Picture
-from calibrations.reports.report import report
-from calibrations.reports.words import headline, joined, next_takes, next_words, state, summary
+from calibrations.model.file import read_model
+from calibrations.presentation.chart import Chart, Panel, Picture
+from calibrations.presentation.report.report import report
+from calibrations.presentation.report.words import next_takes, next_words, state, summary
+from calibrations.presentation.residual import pooled_milli
+from calibrations.presentation.text import chance, joined, measured, minus, plain, stretch, unit
 from calibrations.table import Table
-from calibrations.units import pooled_mg
 from tests.calibrations.test_pictures import EFFECTS, by_hand, hand_table, warm, warm_table
 
 EMPTY = {"meta", "br", "link", "hr", "img"}
@@ -90,11 +91,14 @@ def nothing() -> Discovery:
 
 def blank() -> list[Picture]:
     """Pictures that take no time to draw."""
-    return [Picture(name, name, "Nothing.", Figure()) for name in ("waterfall", "measurement", "residual", "failure")]
+    empty = Chart(((Panel(()),),))
+    return [Picture(name, name, "Nothing.", empty) for name in ("waterfall", "measurement", "residual", "failure")]
 
 
-def changed(found: Discovery, **values: object) -> Discovery:
-    return replace(found, **values)  # type: ignore[arg-type]
+def changed(found: Discovery[Fit], **values: Any) -> Discovery[Fit]:
+    """A discovery with other findings, or another next experiment."""
+    following = values.pop("next_experiment", found.next_experiment)
+    return Discovery(replace(found.findings, **values), following)
 
 
 @pytest.mark.parametrize("make", [page, hand_page])
@@ -131,7 +135,7 @@ def test_it_holds_the_errors_before_and_after() -> None:
     for value in (found.start.pooled_excess, found.end.pooled_excess, step.held_out_before, step.held_out_after):
         assert f" {plain(value)} " in text
     for fit in (found.start, found.end):
-        assert f"{plain(pooled_mg(fit)[0], 2)} mg" in text
+        assert f"{plain(pooled_milli(fit)[0], 2)} mg" in text
         for c in range(2):
             assert f"{plain(1e3 * fit.rmse[c])} mV" in text
             assert f"{plain(1e3 * fit.noise.floor[c])} mV" in text
@@ -147,9 +151,9 @@ def test_it_holds_every_place_where_the_model_fails() -> None:
 
 def test_it_holds_every_candidate() -> None:
     text = Page(page()).text
-    for c in warm().path.first:
+    for c in warm().findings.candidates:
         assert f"{c.name} {plain(c.excess_after)} {plain(c.held_out_after)} {chance(c.p_value)}" in text
-    best = warm().path.first[0].effect
+    best = warm().findings.candidates[0].effect
     assert best.formula.split()[-1] in text
     assert best.symptom[1:] in text
 
@@ -168,7 +172,15 @@ def test_it_says_why_a_parameter_is_not_identified() -> None:
     still = Estimate("bias", "x", 1.0, None, "V", False, "nothing moved")
     bias = Term(catalogue()["bias"], estimates=(still, *end.model.terms[0].estimates[1:]))
     model = Model("m", (bias, *end.model.terms[1:]))
-    text = Page(report(changed(warm(), start=_with_model(end, model), steps=()), beside(), "d", "p", blank())).text
+    text = Page(
+        report(
+            changed(warm(), start=_with_model(end, model), baseline=_with_model(end, model), steps=()),
+            beside(),
+            "d",
+            "p",
+            blank(),
+        )
+    ).text
     assert "not identified: nothing moved" in text
 
 
@@ -219,17 +231,16 @@ def test_positions_are_told_as_positions() -> None:
 
 def test_nothing_missing_is_said_so() -> None:
     assert state(nothing()) == "adequate"
-    assert headline(nothing()) == "Nothing is missing from the model linear: what it leaves is noise."
+    assert nothing().judgement.headline == "No effect is missing."
     assert "On 250 poses its rms error is 0.05" in summary(nothing())
 
 
 def test_doubt_is_said_so_with_the_experiment_that_ends_it() -> None:
     e = Experiment("sweep", {"flip": 1}, (("a", "b"), ("a", "c")), "it turns")
-    found = changed(
-        warm(), verdict="ambiguous", alternatives={"temperature-bias": ("warm-up-bias", "drift")}, next_experiment=e
-    )
-    doubt = "on this data temperature-bias cannot be told from warm-up-bias or drift"
-    assert headline(found) == f"The model linear misses temperature-bias; {doubt}."
+    found = changed(warm(), alternatives={"temperature-bias": ("warm-up-bias", "drift")}, next_experiment=e)
+    assert found.judgement.headline == "The model linear misses temperature-bias."
+    assert "This data cannot separate temperature-bias from warm-up-bias or drift." in found.judgement.text
+    assert found.verdict == "ambiguous"
     assert next_words(e) == "To tell a from b or c, run sweep with flip = 1: it turns."
     assert next_words(e) in Page(report(found, beside(), "d", "p", blank())).text
 
@@ -241,22 +252,22 @@ def test_the_next_experiment_stands_with_its_command_and_what_it_brings() -> Non
     assert next_takes(replace(e, duration_s=50835.0, expected=None)).startswith("It takes 14.1 h; what it will tell")
     brings = "It takes 64 min, and is expected to tell them apart with a probability of 99.9 %, by all data together."
     assert next_takes(e) == brings
-    found = changed(warm(), verdict="ambiguous", alternatives={"temperature-bias": ("w",)}, next_experiment=e)
+    found = changed(warm(), alternatives={"temperature-bias": ("w",)}, next_experiment=e)
     page = report(found, beside(), "d", "p", blank())
     assert "<pre>rig run sweep --bench b.yaml</pre>" in page
     assert brings in Page(page).text
 
 
 def test_what_is_not_explained_is_said_so() -> None:
-    found = changed(warm(), steps=(), causes=(), verdict="unexplained", residual_structure="step at t = 3120 s")
-    assert headline(found) == "The model linear misses something that no effect of the catalogue describes."
+    dropped = warm().findings.without_steps()
+    found = Discovery.of(replace(dropped, left="step at t = 3120 s"))
+    assert found.judgement.text == "No effect of the catalogue explains the residual: step at t = 3120 s."
     text = Page(report(found, beside(), "d", "p")).text
     assert "Start from its pattern: step at t = 3120 s." in text
-    assert "It was tried and not kept" in text
+    assert "This effect was tried and not kept" in text
 
 
-def test_many_causes_are_counted() -> None:
-    assert headline(changed(warm(), causes=("a", "b", "c", "d"))) == "The model linear misses a, b and 2 more effects."
+def test_names_are_joined() -> None:
     assert joined(["a", "b", "c"]) == "a, b and c"
 
 

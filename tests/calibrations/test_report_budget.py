@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import json
 
-from calibrations.compare import compare
-from calibrations.discover import discover
 from calibrations.fit import fit
-from calibrations.model_file import read_model
-from calibrations.reports.budget import document, section
-from calibrations.reports.report import report
+from calibrations.loop import compare, discover
+from calibrations.model.file import read_model
+from calibrations.presentation.report.parameters import budget, budget_document
+from calibrations.presentation.report.report import report
 from tests.calibrations.test_budget import given, measured
 
 
@@ -24,7 +23,7 @@ def test_the_report_shows_sources_and_what_is_not_given() -> None:
 
 def test_the_section_says_what_counts_most() -> None:
     table = given(measured(1), gain_std=0.2)
-    found = section(fit(read_model("linear"), table))
+    found = budget(fit(read_model("linear"), table))
     assert found is not None
     assert {row["largest"] for row in found["parameters"]} == {"gain of the converter"}
     assert [name for name, _ in found["groups"]] == ["bias", "scale-factor"]
@@ -35,7 +34,7 @@ def test_the_section_says_what_counts_most() -> None:
 
 def test_the_document_is_json_and_adds_up() -> None:
     table = given(measured(1), gain_std=2e-4)
-    found = document(fit(read_model("linear"), table))
+    found = budget_document(fit(read_model("linear"), table))
     assert found is not None
     told = json.loads(json.dumps(found, allow_nan=False))
     for row in told["parameters"]:

@@ -7,7 +7,7 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from calibrations.design.run_order import Order, Tour, ordered
+from calibrations.design.run_order import Order, Tour, order_tour
 from calibrations.table import Array
 
 
@@ -34,7 +34,7 @@ def test_without_a_drift_the_shortest_way_is_found() -> None:
     rng = np.random.default_rng(1)
     places = rng.permutation(np.arange(1.0, 21.0))
     tour = line(places)
-    order = ordered(tour)
+    order = order_tour(tour)
     assert list(places[order]) == list(range(1, 21))
     assert tour.travel_s(order) == 20
 
@@ -43,7 +43,7 @@ def test_a_way_that_is_not_the_same_back_is_taken_the_right_way() -> None:
     rng = np.random.default_rng(2)
     move_s = rng.uniform(1, 5, (7, 7))
     tour = Tour(rng.uniform(1, 5, 7), move_s, np.zeros((7, 2, 1)), 0.0)
-    assert tour.cost_s(ordered(tour)) == pytest.approx(least_s(tour))
+    assert tour.cost_s(order_tour(tour)) == pytest.approx(least_s(tour))
 
 
 def test_the_loss_is_the_growth_of_the_variance_with_a_drift_beside() -> None:
@@ -64,10 +64,10 @@ def test_poses_that_no_fit_sees_suffer_no_drift() -> None:
 def test_a_long_dwell_is_worth_a_longer_way() -> None:
     places = np.linspace(-1, 1, 6)
     short, long = line(places, 0.1), line(places, 1000.0)
-    assert long.cost_s(ordered(long)) == pytest.approx(least_s(long), rel=0.2)  # annealing promises no more
-    assert correlated(places, ordered(long)) < 0.3 < correlated(places, ordered(short))
+    assert long.cost_s(order_tour(long)) == pytest.approx(least_s(long), rel=0.2)  # annealing promises no more
+    assert correlated(places, order_tour(long)) < 0.3 < correlated(places, order_tour(short))
 
 
 def test_the_same_tour_has_the_same_order() -> None:
     tour = line(np.random.default_rng(3).normal(size=12), 50.0)
-    assert np.array_equal(ordered(tour), ordered(tour))
+    assert np.array_equal(order_tour(tour), order_tour(tour))

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
+from calibrations.discovery.significance import SMALLEST, Screen, Search, of_search, reductions
 from calibrations.fit import Fit, fit
-from calibrations.model_file import read_model
-from calibrations.noise import Noise
-from calibrations.search.screen import SMALLEST, Screen, Search, of_search, reductions
+from calibrations.model.file import read_model
+from calibrations.noise.means import Noise
 from calibrations.table import Array
 from tests.calibrations import synthetic
 from tests.calibrations.test_kernels import covariance

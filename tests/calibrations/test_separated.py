@@ -12,17 +12,16 @@ import numpy as np
 import pytest
 
 from calibrations.errors import DataError
-from calibrations.reading.cells import cells
-from calibrations.reading.read_csv import parse_csv, read_csv
-from calibrations.reading.separated import Sheet, sheet
-from calibrations.reading.text_file import LARGEST_BYTES, text, text_file
+from calibrations.importing.files import LARGEST_BYTES, open_text_file, text_source
+from calibrations.importing.foreign import parse_csv, read_csv
+from calibrations.importing.sheet import Sheet, read_cells, read_sheet
 
 HEADER = "alpha_deg;beta_deg;vx_v"
 EXPECTED = {"alpha_deg": [90.0, 90.0], "beta_deg": [0.0, 30.0], "vx_v": [3.4987, 3.3614]}
 
 
 def laid(content: str) -> Sheet:
-    return sheet(text(content, "some.csv"))
+    return read_sheet(text_source(content, "some.csv"))
 
 
 @pytest.mark.parametrize(
@@ -64,12 +63,12 @@ def test_what_stands_above_the_header_is_kept() -> None:
 
 @pytest.mark.parametrize("cell", ["1.25", "1,25"])
 def test_a_file_takes_no_memory_but_for_its_numbers(tmp_path: Path, cell: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delattr("calibrations.reading.cells._one_by_one")  # numpy takes it all
+    monkeypatch.delattr("calibrations.importing.sheet._one_by_one")  # numpy takes it all
     path = tmp_path / "log.csv"
     path.write_text("ax;ay;az\n" + f"{cell};2;3\n" * 50_000)
-    layout = sheet(text_file(path))
+    layout = read_sheet(open_text_file(path))
     tracemalloc.start()
-    numbers, labels = cells(layout, [])
+    numbers, labels = read_cells(layout, [])
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert (numbers["ax"] == 1.25).all()
@@ -101,11 +100,14 @@ def sparse(path: Path) -> None:
 @pytest.mark.parametrize(
     ("make", "says"),
     [
-        (sparse, "2.0 GiB are more than the 1 GiB that are read; write the mean of each pose instead of samples"),
+        (sparse, "the file has 2.0 GiB; the limit is 1 GiB; write the mean of each pose instead of samples"),
         (lambda path: path.write_bytes(b"PK\x03\x04" + bytes(100)), "is not text (byte 2 is 0x03); is it really a CSV"),
         (lambda path: path.write_bytes("1;2\n".encode("utf-16-le")), "is not text (byte 1 is 0x00)"),
         (lambda path: path.write_bytes(b"a;b\n\x81\x8d"), "is not text in UTF-8; is it really a CSV file?"),
-        (lambda path: path.write_bytes(b"ax,ay,az\n" + b"1,2,3\n" * 20_000 + b"\xe4"), "is not text throughout; save"),
+        (
+            lambda path: path.write_bytes(b"ax,ay,az\n" + b"1,2,3\n" * 20_000 + b"\xe4"),
+            "contains bytes that are not text",
+        ),
         (lambda path: path.mkdir(), "cannot be read: Is a directory; name a file in it"),
         (lambda _: None, "cannot be read: No such file or directory"),
     ],
@@ -121,4 +123,4 @@ def test_gzip_is_read_like_its_content(tmp_path: Path) -> None:
     path = tmp_path / "table.csv.gz"
     path.write_bytes(gzip.compress(f"{HEADER}\n90;0;3,4987\n90;30;3,3614\n".encode("utf-16")))
     np.testing.assert_array_equal(read_csv(path).column("vx_v"), EXPECTED["vx_v"])
-    assert sheet(text_file(path)).separator == ";"
+    assert read_sheet(open_text_file(path)).separator == ";"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from calibrations.fleet.siblings import Siblings, siblings
+from calibrations.fleet.siblings import Siblings, fit_siblings
 
 # Rubin (1981), coaching in eight schools: effects and standard errors; Gelman et al., Bayesian Data Analysis, 5.5:
 # quantiles of the posterior from 200 draws, so to a few points.
@@ -17,7 +17,7 @@ HIGH = np.array([31, 23, 19, 21, 18, 28, 26, 33])
 
 
 def test_eight_schools_as_in_the_book() -> None:
-    found = siblings(EFFECTS, ERRORS**2)
+    found = fit_siblings(EFFECTS, ERRORS**2)
     low, high = found.interval()
     assert np.abs(found.interval(0.0)[0] - MEDIAN).max() < 2
     assert np.abs(low - LOW).max() < 3
@@ -33,7 +33,7 @@ SEASON = np.array([346, 298, 276, 222, 273, 270, 263, 210, 269, 230, 264, 256, 3
 
 def test_batting_averages_are_foretold_better_by_pooling() -> None:
     average = float(FIRST.mean())
-    found = siblings(FIRST, np.full(18, average * (1 - average) / 45))
+    found = fit_siblings(FIRST, np.full(18, average * (1 - average) / 45))
     shrunk = 1 - np.polyfit(FIRST - average, found.values - average, 1)[0]
     assert 0.65 < shrunk < 0.9  # in the paper 0.788, with one estimate of tau
     alone, pooled = np.sum((FIRST - SEASON) ** 2), np.sum((found.values - SEASON) ** 2)
@@ -71,12 +71,12 @@ def _held(count: int, tau: float, seed: int, off: float = 0.0) -> tuple[float, S
     v = rng.uniform(0.5, 1.5, count) ** 2
     truth = 3 + tau * rng.standard_normal(count)
     truth[0] += off
-    found = siblings(truth + np.sqrt(v) * rng.standard_normal(count), v)
+    found = fit_siblings(truth + np.sqrt(v) * rng.standard_normal(count), v)
     low, high = found.interval()
     return float(np.mean(((low <= truth) & (high >= truth))[int(off > 0) :])), found
 
 
 def test_two_teach_each_other_nothing() -> None:
-    found = siblings(np.array([1.0, 2.0]), np.array([0.1, 0.1]))
+    found = fit_siblings(np.array([1.0, 2.0]), np.array([0.1, 0.1]))
     assert not found.pooled
     assert list(found.values) == [1.0, 2.0]

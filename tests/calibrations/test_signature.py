@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from calibrations.effect import catalogue
-from calibrations.pictures.signature import signature
+from calibrations.effects.catalogue import catalogue
+from calibrations.presentation.charts.signature import signature
 
 
 def test_a_square_leaves_a_parabola_over_the_own_force() -> None:

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from calibrations.analyses.soak import analyse_soak
 from calibrations.errors import TooFewRows
-from calibrations.evaluations.soak import soak
-from calibrations.numerals import measured
-from calibrations.pictures.soak import soak_album
-from calibrations.reports.soak import soak_report
+from calibrations.presentation.charts.soak import soak_album
+from calibrations.presentation.report.soak import soak_report
+from calibrations.presentation.text import measured
 from tests.calibrations.soaks import BLOCK_S, soak_table
 
 FACTS = {"sensor": "a <sensor>", "run": "a night"}
@@ -23,7 +23,7 @@ def page(found: Any, results: Any = None) -> str:
 
 
 def test_bias_and_scale_factor_come_to_rest() -> None:
-    found = soak(soak_table())
+    found = analyse_soak(soak_table())
     assert list(found.courses) == ["bias-x", "scale-x", "bias-y", "scale-y"]
     for course in found.courses.values():
         assert course.state is not None
@@ -38,8 +38,8 @@ def test_bias_and_scale_factor_come_to_rest() -> None:
 def test_times_count_from_power_on() -> None:
     table = soak_table()
     columns = {**table.columns, "t_s": table.time_s + 3600.0}
-    late = soak(type(table).from_columns("poses", columns, table.constants, "", table.labels))
-    early = soak(table)
+    late = analyse_soak(type(table).from_columns("poses", columns, table.constants, "", table.labels))
+    early = analyse_soak(table)
     assert late.courses["bias-x"].t_s == pytest.approx(early.courses["bias-x"].t_s + 3600)
     times = late.time_s(), early.time_s()
     assert times[0] is not None
@@ -48,7 +48,7 @@ def test_times_count_from_power_on() -> None:
 
 
 def test_a_gap_is_marked_and_the_fit_goes_by_real_time() -> None:
-    found = soak(soak_table(cut_s=5000.0))
+    found = analyse_soak(soak_table(cut_s=5000.0))
     (gap,) = found.gaps
     assert (gap.path, gap.length_s) == ("hold 10", pytest.approx(5000.0))
     state = found.courses["bias-x"].state
@@ -65,25 +65,25 @@ def test_a_reversal_that_was_interrupted_is_left_out() -> None:
     cut = type(table).from_columns(
         "poses", {**table.columns, "t_s": table.time_s + late}, table.constants, "", table.labels
     )
-    found = soak(cut)
+    found = analyse_soak(cut)
     assert [gap.path for gap in found.gaps] == ["reversal 10"]
     assert found.left_out == 1
-    assert len(found.courses["bias-x"].t_s) == len(soak(table).courses["bias-x"].t_s) - 1
+    assert len(found.courses["bias-x"].t_s) == len(analyse_soak(table).courses["bias-x"].t_s) - 1
 
 
 def test_a_reversal_that_is_not_complete_yet_is_left_out() -> None:
     table = soak_table()
-    assert soak(table.rows(np.arange(table.n - 3))).left_out == 1
+    assert analyse_soak(table.rows(np.arange(table.n - 3))).left_out == 1
 
 
 def test_in_an_oven_the_approach_begins_when_it_is_warm() -> None:
-    whole, warm = soak(soak_table()), soak(soak_table(), oven_c=28.0)
+    whole, warm = analyse_soak(soak_table()), analyse_soak(soak_table(), oven_c=28.0)
     assert warm.left_out > whole.left_out == 0
     assert warm.courses["bias-x"].t_s[0] > 5400 * np.log(6)
 
 
 def test_a_short_soak_has_courses_and_no_verdict_on_steady_state() -> None:
-    found = soak(soak_table(120.0))
+    found = analyse_soak(soak_table(120.0))
     assert all(course.state is None for course in found.courses.values())
     assert found.time_s() is None
     assert found.temperature_wander_k is None
@@ -93,11 +93,11 @@ def test_a_short_soak_has_courses_and_no_verdict_on_steady_state() -> None:
 def test_without_a_whole_reversal_there_is_nothing() -> None:
     table = soak_table()
     with pytest.raises(TooFewRows, match="holds no reversal"):
-        soak(table.rows(np.char.startswith(np.array(table.labels["path"]), "hold")))
+        analyse_soak(table.rows(np.char.startswith(np.array(table.labels["path"]), "hold")))
 
 
 def test_noise_of_hours_and_allan_deviation_are_those_of_the_still_record() -> None:
-    found = soak(soak_table())
+    found = analyse_soak(soak_table())
     hours_s, rms = found.noise_of_hours("x")
     assert hours_s[0] == 1800.0
     assert rms == pytest.approx(0.8e-3)
@@ -115,17 +115,19 @@ def test_a_still_record_in_pieces_has_the_deviation_of_each() -> None:
     paths = np.array(table.labels["path"])
     jumps = np.cumsum(np.append(False, paths[1:] != paths[:-1]))
     columns = {**table.columns, "vx_v": 1e-6 * table.time_s + 0.1 * jumps}
-    times_s, deviations = soak(type(table).from_columns("poses", columns, table.constants, "", table.labels)).allan("x")
+    times_s, deviations = analyse_soak(
+        type(table).from_columns("poses", columns, table.constants, "", table.labels)
+    ).allan("x")
     assert deviations == pytest.approx(1e-6 * times_s / np.sqrt(2))
 
 
 def test_holds_of_one_block_have_no_deviation() -> None:
-    times_s, deviations = soak(soak_table(60.0)).allan("x")
+    times_s, deviations = analyse_soak(soak_table(60.0)).allan("x")
     assert len(times_s) == len(deviations) == 0
 
 
 def test_the_page_tells_the_night_without_a_network() -> None:
-    found = soak(soak_table())
+    found = analyse_soak(soak_table())
     rounded = {"value": 0.123456, "std": None, "unit": "K", "limit": 0.3, "verdict": "pass"}
     limited = {"value": 3.0, "std": 0.1, "unit": "h", "limit": [0, 7], "verdict": "pass"}
     results = {"steady-state-time": limited, "gap": {**limited, "limit": None}, "temperature-wander": rounded}
@@ -143,7 +145,7 @@ def test_the_page_tells_the_night_without_a_network() -> None:
 
 
 def test_the_page_says_what_is_not_reached() -> None:
-    text = page(soak(soak_table(7200.0, drift_v=0.02)))
+    text = page(analyse_soak(soak_table(7200.0, drift_v=0.02)))
     assert "Steady state is not shown within" in text
     assert "steady state not reached" in text
 
@@ -154,8 +156,8 @@ def test_a_room_that_wandered_is_told() -> None:
     warm = type(table).from_columns(
         "poses", {**table.columns, "temperature_c": wandering}, table.constants, "", table.labels
     )
-    assert "no soak at constant ambient" in page(soak(warm))
+    assert "no soak at constant ambient" in page(analyse_soak(warm))
 
 
 def test_pictures_are_named() -> None:
-    assert [picture.name for picture in soak_album(soak(soak_table()))] == ["drift", "night", "allan"]
+    assert [picture.name for picture in soak_album(analyse_soak(soak_table()))] == ["drift", "night", "allan"]

@@ -7,18 +7,18 @@ from functools import cache
 import numpy as np
 import pytest
 
-from calibrations.estimators.approach import LEVEL, REST, WALK, Bank, bank
-from calibrations.evaluations.forecast import (
-    Followed,
+from calibrations.analyses.forecast import (
     Forecast,
-    Foreseen,
+    ForecastHistory,
+    QuantityFilter,
     SoakForecast,
-    followed,
-    foreseen,
-    parts,
-    steady_from,
+    filter_soak,
+    forecast_history,
+    soak_parts,
+    steady_time,
 )
-from calibrations.evaluations.tumble import tumbles
+from calibrations.analyses.tumble import estimate_tumbles
+from calibrations.estimators.approach import LEVEL, REST, WALK, Bank, make_bank
 from calibrations.table import Array, Table
 from procedures.tumbles import tumble
 from tests.calibrations.drifting import Drifting, drifting, soak_of_world
@@ -42,7 +42,7 @@ def test_the_bounds_hold_where_heat_flows_into_a_house() -> None:
 
 def told(t_s: Array, volts: Array) -> list[Forecast]:
     """After every third reversal."""
-    now = Followed.of(t_s[0], volts[0], WHITE_V, 1.0)
+    now = QuantityFilter.of(t_s[0], volts[0], WHITE_V, 1.0)
     found = []
     for k, (t, value) in enumerate(zip(t_s[1:], volts[1:], strict=True)):
         now = now.after(t, value, WHITE_V)
@@ -60,7 +60,7 @@ def looked(seed: int) -> tuple[tuple[Forecast, ...], float]:
 def at_looks(soak: Drifting) -> list[Forecast]:
     looks, found = list(LOOKS_H), []
     first, *rest = soak.values
-    now = Followed.of(first.t_s, first.volts, first.std_v, 1.0)
+    now = QuantityFilter.of(first.t_s, first.volts, first.std_v, 1.0)
     for value in rest:
         now = now.after(value.t_s, value.volts, value.std_v, offset=value.held)
         if looks and value.t_s >= 3600 * looks[0]:
@@ -69,6 +69,7 @@ def at_looks(soak: Drifting) -> list[Forecast]:
     return found
 
 
+@pytest.mark.slow
 def test_the_bounds_hold_as_often_as_they_say_by_laws_that_are_not_the_filters_own() -> None:
     held = [each.final.low <= final <= each.final.high for seed in range(SEEDS) for each in looked(seed)[0]
             for final in [looked(seed)[1]]]  # fmt: skip
@@ -84,9 +85,9 @@ def test_what_is_known_is_so_and_is_known_early() -> None:
 
 def test_a_simulated_sensor_comes_to_what_was_foreseen() -> None:
     table, settled = soak_of_world(1)
-    found = foreseen(table)
+    found = forecast_history(table)
     for axis in "xy":
-        (end,) = tumbles(settled, axis)
+        (end,) = estimate_tumbles(settled, axis)
         for name, true in ((f"bias-{axis}", end.bias_v), (f"scale-{axis}", end.scale_v_per_g)):
             held = [each.final.low <= true <= each.final.high for each in found[name].forecasts]
             assert np.mean(held) > 0.8
@@ -96,7 +97,7 @@ def test_a_simulated_sensor_comes_to_what_was_foreseen() -> None:
 
 def test_the_end_is_foreseen_hours_before_it_is_reached() -> None:
     """Steady after 6 h: said after 2.5 h, within minutes."""
-    early = Foreseen(tuple(told_of("bias-x", 2.5)))
+    early = ForecastHistory(tuple(told_of("bias-x", 2.5)))
     assert early.known_s is not None
     assert early.last.final.low < 2.5 < early.last.final.high
     assert early.last.final.half < 0.1e-3
@@ -108,7 +109,7 @@ def test_the_end_is_foreseen_hours_before_it_is_reached() -> None:
 
 
 def told_of(name: str, until_h: float) -> list[Forecast]:
-    *_, last = (each for each in followed(soak_table(until_h * 3600)))
+    *_, last = (each for each in filter_soak(soak_table(until_h * 3600)))
     return [last.forecasts()[name]]
 
 
@@ -154,8 +155,8 @@ def test_a_room_that_swings_within_a_day_is_in_the_bounds() -> None:
 
 
 def test_the_latest_of_all_quantities_is_when_all_are_steady() -> None:
-    found = foreseen(soak_table(2.5 * 3600))
-    bounds, x = steady_from(found), steady_from(found, "x")
+    found = forecast_history(soak_table(2.5 * 3600))
+    bounds, x = steady_time(found), steady_time(found, "x")
     assert bounds is not None
     assert x is not None
     assert bounds.high >= x.high == max(found[f"{q}-x"].last.steady_s.high for q in ("bias", "scale"))
@@ -164,19 +165,19 @@ def test_the_latest_of_all_quantities_is_when_all_are_steady() -> None:
 
 def test_beyond_two_days_there_is_no_latest_and_of_no_approach_nothing() -> None:
     t_s = times_s(14)
-    early = Foreseen((told(t_s, 2.5 + 3e-7 * t_s + noise(1, t_s, "white"))[-1],))
-    bounds = steady_from({"bias-x": early})
+    early = ForecastHistory((told(t_s, 2.5 + 3e-7 * t_s + noise(1, t_s, "white"))[-1],))
+    bounds = steady_time({"bias-x": early})
     assert bounds is not None
     assert bounds.low > t_s[-1]
     assert bounds.high == np.inf
     t_s = times_s(40)
     step = told(t_s, 2.5 + noise(3, t_s, "white") + np.where(t_s > 5 * 3600, 30e-3, 0.0))[-1]
     assert step.surprised
-    assert steady_from({"bias-x": Foreseen((step,))}) is None
+    assert steady_time({"bias-x": ForecastHistory((step,))}) is None
 
 
 def follow(values: list[tuple[float, float, bool]]) -> Bank:
-    now = bank(0.0, 0.0, 300.0)
+    now = make_bank(0.0, 0.0, 300.0)
     for t_s, value, held in values:
         now = now.after(t_s, value, 1.0, offset=held)
     return now
@@ -201,7 +202,7 @@ def test_time_alone_lets_the_drift_go_on_and_tells_nothing_new() -> None:
 
 def test_the_parts_of_a_table_are_reversals_and_stretches() -> None:
     table = soak_table(3600.0)
-    found = list(parts(table))
+    found = list(soak_parts(table))
     assert sum(part.n for part in found) == table.n
     assert [path for part in found for path in paths(part)][:4] == ["reversal 0", "hold 0", "reversal 1", "hold 1"]
     assert all(len(paths(part)) == 1 for part in found)
@@ -210,11 +211,11 @@ def test_the_parts_of_a_table_are_reversals_and_stretches() -> None:
 
 def test_hysteresis_drops_out_of_a_tumble_however_noisy_one_pose_was() -> None:
     table = soak_table(3600.0)
-    whole = next(parts(table))
+    whole = next(soak_parts(table))
     way = np.array([pose.direction for pose in tumble("reversal 0")])
     sticky = whole.column("vx_v") + 1e-3 * way
     noisy = changed(changed(whole, "vx_v", sticky), "vx_std_v", np.where(np.arange(whole.n) == 1, 0.1, 8e-4))
-    (plain,), (found,) = tumbles(whole, "x"), tumbles(noisy, "x")
+    (plain,), (found,) = estimate_tumbles(whole, "x"), estimate_tumbles(noisy, "x")
     assert found.bias_v == pytest.approx(plain.bias_v, abs=1e-12)
     assert found.scale_v_per_g == pytest.approx(plain.scale_v_per_g, abs=1e-12)
     assert found.bias_std_v > 5 * plain.bias_std_v
@@ -228,8 +229,10 @@ def test_an_interrupted_reversal_is_left_out() -> None:
     table = soak_table(3600.0)
     rows = [k for k, path in enumerate(table.labels["path"]) if path == "reversal 3"]
     late = np.where(np.arange(table.n) > rows[3], 4000.0, 0.0)
-    reversal = next(part for part in parts(changed(table, "t_s", table.time_s + late)) if paths(part) == ["reversal 3"])
-    begun = SoakForecast({}).after(next(parts(table)))
+    reversal = next(
+        part for part in soak_parts(changed(table, "t_s", table.time_s + late)) if paths(part) == ["reversal 3"]
+    )
+    begun = SoakForecast({}).after(next(soak_parts(table)))
     assert begun.after(reversal).followed == begun.followed
     assert begun.after(reversal.rows(np.arange(5))).followed == begun.followed
 
@@ -237,5 +240,5 @@ def test_an_interrupted_reversal_is_left_out() -> None:
 def test_in_an_oven_all_begins_when_it_is_warm() -> None:
     table = soak_table(7200.0)
     heating = changed(table, "temperature_c", np.where(table.time_s < 3600, 30.0, 45.0))
-    cold, warm = foreseen(table, 0.0), foreseen(heating, 45.0)
+    cold, warm = forecast_history(table, 0.0), forecast_history(heating, 45.0)
     assert cold["bias-x"].forecasts[0].t_s < 3600 < warm["bias-x"].forecasts[0].t_s

@@ -9,9 +9,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from calibrations.analyses.soak import SteadyState, fit_steady_state
 from calibrations.errors import TooFewRows
-from calibrations.evaluations.steady_state import SteadyState, steady_state
 from tests.calibrations.soaks import WHITE_V, noise, times_s
+from tests.slow import first_fast
 
 SEEDS = 20
 TAU_S, FAST_S, DRIFT_V = 5400.0, 240.0, 2.2e-3
@@ -20,10 +21,10 @@ TAU_S, FAST_S, DRIFT_V = 5400.0, 240.0, 2.2e-3
 def found(seed: int, kind: str, n: int = 52, *, slow_v: float = DRIFT_V, fast_v: float = 0.0) -> SteadyState:
     t_s = times_s(n)
     values = 2.5 - slow_v * np.exp(-t_s / TAU_S) + fast_v * np.exp(-t_s / FAST_S) + noise(seed, t_s, kind)
-    return steady_state(t_s, values, np.full(n, WHITE_V))
+    return fit_steady_state(t_s, values, np.full(n, WHITE_V))
 
 
-@pytest.mark.parametrize("kind", ["white", "slow", "flicker"])
+@pytest.mark.parametrize("kind", first_fast(["flicker", "white", "slow"]))
 def test_time_constants_come_with_true_standard_errors(kind: str) -> None:
     states = [found(seed, kind) for seed in range(3 * SEEDS)]
     assert all(len(state.terms) == 1 for state in states)
@@ -74,7 +75,7 @@ def test_a_drift_that_outlasts_the_record_reaches_no_steady_state() -> None:
 
 def test_a_straight_drift_is_no_steady_state_either() -> None:
     t_s = times_s(40)
-    state = steady_state(t_s, 2.5 + 1e-7 * t_s + noise(1, t_s, "white"), np.full(40, WHITE_V))
+    state = fit_steady_state(t_s, 2.5 + 1e-7 * t_s + noise(1, t_s, "white"), np.full(40, WHITE_V))
     assert state.time_s is None
     assert state.drift[0] == pytest.approx(1e-7 * np.ptp(t_s), rel=0.05)
 
@@ -83,8 +84,8 @@ def test_unit_and_zero_of_the_values_do_not_matter() -> None:
     t_s = times_s(30)
     values = 2.5 - DRIFT_V * np.exp(-t_s / TAU_S) + noise(3, t_s, "slow")
     plain, scaled = (
-        steady_state(t_s, values, np.full(30, WHITE_V)),
-        steady_state(t_s, 1e3 * values - 7, np.full(30, 1e3 * WHITE_V)),
+        fit_steady_state(t_s, values, np.full(30, WHITE_V)),
+        fit_steady_state(t_s, 1e3 * values - 7, np.full(30, 1e3 * WHITE_V)),
     )
     assert plain.time_s is not None
     assert scaled.time_s == pytest.approx(plain.time_s, rel=1e-6)
@@ -93,7 +94,7 @@ def test_unit_and_zero_of_the_values_do_not_matter() -> None:
 
 def test_without_known_white_noise_it_is_found_too() -> None:
     t_s = times_s(40)
-    state = steady_state(t_s, 28 - 6 * np.exp(-t_s / TAU_S) + noise(1, t_s, "white"), np.zeros(40))
+    state = fit_steady_state(t_s, 28 - 6 * np.exp(-t_s / TAU_S) + noise(1, t_s, "white"), np.zeros(40))
     assert state.terms[0].tau_s[0] == pytest.approx(TAU_S, rel=1e-3)
 
 

@@ -7,8 +7,8 @@ import re
 import numpy as np
 import pytest
 
+from calibrations.analyses.stepwise import estimate_stepwise
 from calibrations.errors import DataError, MissingColumn
-from calibrations.evaluations.stepwise import stepwise
 from calibrations.table import Array, Table
 from tests.calibrations import synthetic
 
@@ -35,7 +35,7 @@ def test_all_coefficients_of_an_axis_beside_a_linear_one(own: str) -> None:
     v_other = SF[other] * across + B[other]
     p, r = crossed(0.011, B[other]), (*R, SF[own])
     v = np.polyval(r, a_z) * a + B[own] + np.polyval(p, v_other) + np.polyval(Q, a_z)
-    found = stepwise(table(*((v, v_other) if own == "x" else (v_other, v)), columns))
+    found = estimate_stepwise(table(*((v, v_other) if own == "x" else (v_other, v)), columns))
     axis = getattr(found, own)
     assert axis.bias == pytest.approx(B[own], abs=1e-12)
     assert axis.scale == pytest.approx(SF[own], abs=1e-12)
@@ -64,7 +64,7 @@ def test_both_axes_crossed_at_once() -> None:
     for _ in range(50):
         vx = B["x"] + SF["x"] * a_x + bend(square["x"], vy, y_at)
         vy = B["y"] + SF["y"] * a_y + bend(square["y"], vx, x_at)
-    found = stepwise(table(vx, vy, columns))
+    found = estimate_stepwise(table(vx, vy, columns))
     for axis, roots in (("x", y_at), ("y", x_at)):
         k = square[axis]
         np.testing.assert_allclose(getattr(found, axis).p, [k, -k * sum(roots), k * roots[0] * roots[1]], atol=1e-10)
@@ -75,7 +75,7 @@ def test_both_axes_crossed_at_once() -> None:
 def test_linear_sensor() -> None:
     columns = synthetic.turns()
     a_x, a_y, a_z = synthetic.components(columns)
-    found = stepwise(table(SF["x"] * a_x + B["x"], SF["y"] * a_y + B["y"], columns))
+    found = estimate_stepwise(table(SF["x"] * a_x + B["x"], SF["y"] * a_y + B["y"], columns))
     np.testing.assert_allclose(found.linear_rmse_v, 0, atol=1e-12)
     np.testing.assert_allclose(found.linear_rmse_mg, 0, atol=1e-9)
     np.testing.assert_allclose(found.a_z_by_outputs, a_z, atol=1e-7)  # the root loses half the digits near 90 deg
@@ -85,7 +85,7 @@ def test_linear_sensor() -> None:
 def test_radicand_is_clipped() -> None:
     columns = synthetic.turns()
     a_x, a_y, _ = synthetic.components(columns)
-    found = stepwise(table(SF["x"] * a_x + B["x"], SF["y"] * a_y + B["y"] + 0.01 * a_x**2, columns))
+    found = estimate_stepwise(table(SF["x"] * a_x + B["x"], SF["y"] * a_y + B["y"] + 0.01 * a_x**2, columns))
     assert np.all(np.isfinite(found.acceleration_by_outputs))
 
 
@@ -94,7 +94,7 @@ def test_repeats_are_averaged_and_the_linear_error_stands_beside() -> None:
     a_x, a_y, _ = synthetic.components(columns)
     loop = 0.01 * columns["direction"]
     vx, vy = SF["x"] * a_x + B["x"] + loop, SF["y"] * a_y + B["y"]
-    found = stepwise(table(vx, vy, columns))
+    found = estimate_stepwise(table(vx, vy, columns))
     assert found.x.bias == pytest.approx(B["x"], abs=1e-12)  # both directions: the loop's middle
     assert found.linear_rmse_v[0] == pytest.approx(0.01, rel=1e-9)
     assert found.linear_rmse_mg[0] == pytest.approx(1e3 * 0.01 / SF["x"], rel=1e-9)
@@ -106,7 +106,7 @@ def test_negative_inclinations_and_turned_mounts_find_their_places() -> None:
     a_x, a_y, a_z = synthetic.components(columns)
     vx, vy = SF["x"] * a_x + B["x"] + np.polyval(Q, a_z), SF["y"] * a_y + B["y"]
     for given in (columns, turned):
-        np.testing.assert_allclose(stepwise(table(vx, vy, given)).x.q, Q, atol=1e-10)
+        np.testing.assert_allclose(estimate_stepwise(table(vx, vy, given)).x.q, Q, atol=1e-10)
 
 
 def test_a_tilt_ends_up_in_p1_and_q1() -> None:
@@ -115,7 +115,7 @@ def test_a_tilt_ends_up_in_p1_and_q1() -> None:
     a_x, a_y, a_z = synthetic.components(columns)
     theta_xy, theta_xz = -0.0058, -0.0131
     vx = SF["x"] * (a_x + theta_xy * a_y + theta_xz * a_z) + B["x"]
-    found = stepwise(table(vx, SF["y"] * a_y + B["y"], columns))
+    found = estimate_stepwise(table(vx, SF["y"] * a_y + B["y"], columns))
     tilt, none = found.tilts
     assert tilt.in_plane == pytest.approx(theta_xy, abs=1e-10)
     assert tilt.out_of_plane == pytest.approx(theta_xz, abs=1e-10)
@@ -149,13 +149,13 @@ def test_says_which_poses_are_missing(
         there = (columns["alpha_deg"] != absent[0]) | (columns["beta_deg"] % 360 != absent[1])
         columns = {name: values[there] for name, values in columns.items()}
     with pytest.raises(DataError, match=re.escape(says)):
-        stepwise(lacking(columns))
+        estimate_stepwise(lacking(columns))
 
 
 def test_needs_poses_and_both_outputs() -> None:
     columns = synthetic.turns()
     one = Table.from_columns("poses", {**columns, "vx_v": columns["beta_deg"]}, source="one.csv")
     with pytest.raises(MissingColumn, match=r'one\.csv: column "vy_v" is missing'):
-        stepwise(one)
+        estimate_stepwise(one)
     with pytest.raises(DataError, match="a table of positions; this needs poses"):
-        stepwise(Table.from_columns("positions", {"ax": [1.0], "ay": [0.0], "az": [0.0]}))
+        estimate_stepwise(Table.from_columns("positions", {"ax": [1.0], "ay": [0.0], "az": [0.0]}))

@@ -7,27 +7,26 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calibrations.effect import Effect, Parameter, catalogue
+from calibrations.effects import Effect, Parameter
+from calibrations.effects.catalogue import catalogue
 from calibrations.errors import DataError, ModelError, TooFewRows
+from calibrations.loop import add, compare, diagnose, discover
 from calibrations.model import Model
-from calibrations.model_file import dump_model, parse_model, read_model
-from calibrations.noise_analysis.lines import Line
-from calibrations.still.allan import averaged, deviation
-from calibrations.still.chance import chance, least_gain
-from calibrations.still.compare import FREQUENCY, TIME, compare
-from calibrations.still.diagnose import diagnose
-from calibrations.still.discover import add, discover
-from calibrations.still.fit import fit, seen
-from calibrations.still.held_out import held_out_excess
-from calibrations.still.patterns import pattern_of
-from calibrations.still.record import Samples, Still, reduced
+from calibrations.model.file import dump_model, parse_model, read_model
+from calibrations.noise.allan import compare_deviations, deviation
+from calibrations.noise.channel_spectrum import Line
+from calibrations.noise.fit import fit, without_effects
+from calibrations.noise.mixtures import chance, least_gain
+from calibrations.noise.patterns import pattern_of
+from calibrations.noise.places import FREQUENCY, TIME
+from calibrations.noise.record import Samples, Still, reduce_record
 from calibrations.table import Array
 from tests.calibrations import noises
 from tests.calibrations.hidden_noise import OTHERS, RATE_HZ, RECORDS, SAMPLES, telegraph, traps, walk, white
 
 
 def still(**channels: Array) -> Still:
-    return reduced([Samples(axis, [x], RATE_HZ, "V") for axis, x in channels.items()], "made")
+    return reduce_record([Samples(axis, [x], RATE_HZ, "V") for axis, x in channels.items()], "made")
 
 
 def model(*names: str) -> Model:
@@ -86,8 +85,8 @@ def test_a_step_beside_flicker_leaves_the_flicker_named() -> None:
 def test_axes_have_coefficients_of_their_own() -> None:
     random = np.random.default_rng(5)
     record = still(x=white(random) + 0.5 * traps(random), y=2 * white(random))
-    found = diagnose(record, model())
-    assert found.missing == ("flicker-noise",)
+    found = discover(record, model())
+    assert found.causes == ("flicker-noise",)
     x, y = values(found.end.model), values(found.end.model, "y")
     per_root_hz = 1 / np.sqrt(RATE_HZ)
     for (value, std), true in (
@@ -116,7 +115,7 @@ def test_axes_have_coefficients_of_their_own() -> None:
 def test_the_modelled_allan_deviation_is_right_at_every_time(names: tuple[str, ...], make) -> None:  # type: ignore[no-untyped-def]
     record = still(x=make(np.random.default_rng(2), 1 << 16))
     result = compare(record, model(*names))
-    curve = result.averaged[0]
+    curve = compare_deviations(result.fit.channels[0], record.allan["x"])
     assert curve.tau_s[0] == 1 / RATE_HZ
     assert curve.ratio[:4] == pytest.approx(np.ones(4), abs=0.03)
     assert np.all(np.abs(curve.deviations) < 4)
@@ -151,7 +150,9 @@ def test_a_model_with_values_is_compared_as_it_is() -> None:
 def test_a_given_line_is_taken_off_with_the_phase_that_it_has() -> None:
     x = white(np.random.default_rng(1)) + 0.3 * noises.sinusoid(SAMPLES, 0.0371)
     (channel,) = still(x=x).channels
-    before, right, half = (seen(channel, lines) for lines in ((), (Line(0.371, 0.3, 0.0),), (Line(0.371, 0.15, 0.0),)))
+    before, right, half = (
+        without_effects(channel, lines) for lines in ((), (Line(0.371, 0.3, 0.0),), (Line(0.371, 0.15, 0.0),))
+    )
     at = int(np.argmin(np.abs(before.frequency_hz - 0.371)))
     heights = [each.seen[at] * RATE_HZ for each in (before, right, half)]
     assert heights[1] == pytest.approx(1, rel=0.4)
@@ -162,7 +163,7 @@ def test_hum_beyond_the_means_is_found_at_its_own_frequency() -> None:
     """A fast line folds into the means of a long record, far from where it is."""
     n, f_hz = 600_000, 50.0137
     x = white(np.random.default_rng(1), n) + 0.1 * noises.sinusoid(n, f_hz / 1000)
-    found = discover(reduced([Samples("x", [x], 1000.0, "V")], "made"), model())
+    found = discover(reduce_record([Samples("x", [x], 1000.0, "V")], "made"), model())
     assert found.causes == ("sinusoidal-noise",)
     known = values(found.end.model)
     value, std = known["sinusoidal-noise", "frequency_1"]
@@ -174,7 +175,8 @@ def test_hum_beyond_the_means_is_found_at_its_own_frequency() -> None:
 
 def test_the_mismatch_of_a_complete_model_is_that_of_chance() -> None:
     """Weighted by degrees of freedom: over many records its mean square is as computed."""
-    curves = [compare(still(x=white(np.random.default_rng(seed), 4000)), model()).averaged[0] for seed in range(25)]
+    records = [still(x=white(np.random.default_rng(seed), 4000)) for seed in range(25)]
+    curves = [compare_deviations(fit(model(), each).channels[0], each.allan["x"]) for each in records]
     squares = np.array([curve.mismatch**2 for curve in curves])
     assert squares.mean() == pytest.approx(curves[0].by_chance ** 2, abs=3.5 * squares.std() / 5)
     worst = replace(curves[0], measured=curves[0].measured * np.where(curves[0].edf < 5, 3.0, 1.0))
@@ -216,8 +218,8 @@ def test_a_constant_drift_is_no_walk_and_a_walk_is_no_drift() -> None:
 def test_held_out_halves_punish_what_is_only_fitted() -> None:
     random = np.random.default_rng(6)
     record = still(x=white(random) + 0.5 * traps(random))
-    assert held_out_excess(model("flicker-noise"), record) < 1.2
-    assert held_out_excess(model(), record) > 2
+    assert fit(model("flicker-noise"), record).held_out_excess < 1.2
+    assert fit(model(), record).held_out_excess > 2
 
 
 def test_chances_are_those_of_a_bound_and_of_a_tube() -> None:
@@ -229,11 +231,14 @@ def test_chances_are_those_of_a_bound_and_of_a_tube() -> None:
 
 
 def test_an_effect_of_ones_own_is_one_more_process() -> None:
-    def blue(at, p):  # type: ignore[no-untyped-def]
-        return p["level"] ** 2 * at.frequency_hz
+    class BlueNoise(Effect):
+        kinds = ("still",)
+        level = Parameter("{out}", typical=1.0, low=0.0)
 
-    level = Parameter("level", "{out}", typical=1.0, low=0.0)
-    own = Effect("blue-noise", (level,), "the faster, the more.", *[""] * 5, kinds=("still",), spectrum=blue)
+        def spectrum(self, at, p):  # type: ignore[no-untyped-def]
+            return p.level**2 * at.frequency_hz
+
+    own = BlueNoise()
     random = np.random.default_rng(1)
     spectrum = np.fft.rfft(random.standard_normal(SAMPLES)) * np.sqrt(np.arange(SAMPLES // 2 + 1) / SAMPLES)
     found = discover(still(x=white(random) + 2 * np.fft.irfft(spectrum)), model(), {**catalogue(), own.name: own})
@@ -252,8 +257,8 @@ def test_what_cannot_be_asked_is_refused() -> None:
 def test_a_record_in_blocks_is_that_record() -> None:
     x = white(np.random.default_rng(1), 30_000)
     whole = still(x=x)
-    parts = reduced([Samples("x", np.split(x, [5, 9000, 20_001]), RATE_HZ, "V")], "made")
+    parts = reduce_record([Samples("x", np.split(x, [5, 9000, 20_001]), RATE_HZ, "V")], "made")
     assert parts.digest == whole.digest
-    ours, theirs = (averaged(fit(model(), each).channels[0], each.allan["x"]) for each in (whole, parts))
+    ours, theirs = (compare_deviations(fit(model(), each).channels[0], each.allan["x"]) for each in (whole, parts))
     assert ours.measured == pytest.approx(theirs.measured)
     assert deviation(fit(model(), parts).channels[0], ours.tau_s) == pytest.approx(ours.modelled)

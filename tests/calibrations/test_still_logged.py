@@ -8,19 +8,18 @@ import numpy as np
 import pytest
 from scipy.fft import idct
 
-from calibrations.model_file import read_model
-from calibrations.still.diagnose import diagnose
-from calibrations.still.discover import Discovery, discover
-from calibrations.still.logged import without_scatter
-from calibrations.still.patterns import FOLLOWS, STEP, Pattern
-from calibrations.still.record import Samples, Still, reduced
+from calibrations.discovery.results import Discovery
+from calibrations.loop import diagnose, discover
+from calibrations.model.file import read_model
+from calibrations.noise.patterns import FOLLOWS, STEP, Pattern
+from calibrations.noise.record import Samples, Still, reduce_record, without_scatter
 from calibrations.table import Array
 from tests.calibrations.hidden_noise import FOLLOWING, RATE_HZ, SAMPLES, room, white
 
 
 def beside(x: Array, **logged: Array) -> Still:
     blocks = {name: list(np.array_split(values, 7)) for name, values in logged.items()}
-    return reduced([Samples("x", np.array_split(x, 5), RATE_HZ, "V", logged=blocks)], "made")
+    return reduce_record([Samples("x", np.array_split(x, 5), RATE_HZ, "V", logged=blocks)], "made")
 
 
 def found(x: Array, **logged: Array) -> Discovery:
@@ -43,7 +42,7 @@ def test_what_follows_a_logged_temperature_is_told_and_nothing_else(name: str) -
 
 def test_slope_and_lag_are_those_of_the_sensor() -> None:
     x, warm = FOLLOWING["follows behind"][0](np.random.default_rng(2))
-    (pattern,) = diagnose(beside(x, temperature_c=warm), read_model("still")).search.patterns
+    (pattern,) = diagnose(beside(x, temperature_c=warm), read_model("still")).findings.search.patterns
     assert pattern.size == pytest.approx(-0.8, abs=5 * pattern.std)
     assert pattern.std < 0.05
     assert float(pattern.plain.split("V/K, ")[1].split(" s behind")[0]) == pytest.approx(60, rel=0.4)
@@ -62,7 +61,7 @@ def test_a_temperature_and_a_step_are_two_things() -> None:
     random = np.random.default_rng(1)
     warm = room(random)
     result = found(white(random) + 0.5 * warm + 0.5 * (np.arange(SAMPLES) > 9000), temperature_c=warm)
-    (follows, step) = result.search.patterns
+    (follows, step) = result.findings.search.patterns
     assert (follows.kind, step.kind) == (FOLLOWS, STEP)
     for pattern in (follows, step):
         assert pattern.size == pytest.approx(0.5, abs=3 * pattern.std)
@@ -79,7 +78,7 @@ def test_a_column_that_is_constant_or_too_short_is_left_out() -> None:
 
 def followed(x: Array, **logged: Array) -> Pattern:
     """What x is told to do: to follow the column by 0.8, as it does."""
-    (pattern,) = diagnose(beside(x, **logged), read_model("still")).search.patterns
+    (pattern,) = diagnose(beside(x, **logged), read_model("still")).findings.search.patterns
     assert pattern.size == pytest.approx(0.8, abs=3 * pattern.std)
     return pattern
 
@@ -117,7 +116,7 @@ def test_a_diagnosis_counts_the_doubt() -> None:
     doubted = {name: replace(column, doubt=0.5) for name, column in channel.logged.items()}
     (pattern,) = diagnose(
         replace(still, channels=(replace(channel, logged=doubted),)), read_model("still")
-    ).search.patterns
+    ).findings.search.patterns
     assert pattern.std == pytest.approx(0.5 * pattern.size, rel=0.01)
 
 

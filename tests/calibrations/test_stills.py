@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from calibrations.errors import DataError
-from calibrations.reading.stills import is_raw_log, positions, still_intervals
+from calibrations.importing.raw_logs import average_still_positions, is_raw_log, still_intervals
 from calibrations.table import Array, Table
 
 RATE_HZ = 100.0
@@ -77,7 +77,7 @@ def test_a_rest_shorter_than_a_second_is_none() -> None:
 def test_means_lie_on_the_directions_and_other_columns_are_averaged() -> None:
     samples, bounds = held()
     warm = 20 + np.arange(len(samples)) / RATE_HZ
-    table = positions(log(samples, temperature_c=warm), RATE_HZ)
+    table = average_still_positions(log(samples, temperature_c=warm), RATE_HZ)
     assert table.n == 8
     assert table.outputs == pytest.approx(directions(8), abs=5 * NOISE / np.sqrt(340))
     middle_s = [(first + last) / 2 / RATE_HZ for first, last in bounds]
@@ -87,7 +87,7 @@ def test_means_lie_on_the_directions_and_other_columns_are_averaged() -> None:
 
 
 def test_white_samples_keep_their_own_standard_deviation() -> None:
-    table = positions(log(held(n=20)[0]), RATE_HZ)
+    table = average_still_positions(log(held(n=20)[0]), RATE_HZ)
     for name in ("ax_std", "ay_std", "az_std", "norm_std"):
         assert np.sqrt(np.mean(table.column(name) ** 2)) == pytest.approx(NOISE, rel=0.15)
 
@@ -99,13 +99,13 @@ def test_the_effective_std_of_correlated_samples_is_that_of_their_mean(phi: floa
     for _ in range(6):  # logs, of 20 intervals each
         samples, _ = held(n=20)
         samples += np.column_stack([20 * NOISE * ar1(phi, len(samples), rng) for _ in range(3)])
-        stds.append(positions(log(samples), RATE_HZ).column("ax_std"))
+        stds.append(average_still_positions(log(samples), RATE_HZ).column("ax_std"))
     expected = 20 * NOISE * np.sqrt((1 + phi) / (1 - phi))  # std of a mean x sqrt(n), for n long beside 1 / (1 - phi)
     assert np.sqrt(np.mean(np.concatenate(stds) ** 2)) == pytest.approx(expected, rel=0.15)
 
 
 def test_a_hand_that_sways_leaves_the_magnitude_alone() -> None:
-    table = positions(log(held(n=12, sway=0.003)[0]), RATE_HZ)
+    table = average_still_positions(log(held(n=12, sway=0.003)[0]), RATE_HZ)
     assert table.n == 12
     sides = np.column_stack([table.column(f"{axis}_std") for axis in ("ax", "ay", "az")])
     assert np.median(sides.max(axis=1)) > 3 * NOISE
@@ -113,7 +113,7 @@ def test_a_hand_that_sways_leaves_the_magnitude_alone() -> None:
 
 
 def test_an_offset_does_not_turn_sway_into_noise() -> None:
-    table = positions(log(held(n=12, sway=0.003)[0] + [0.4, -0.3, 0.2]), RATE_HZ)
+    table = average_still_positions(log(held(n=12, sway=0.003)[0] + [0.4, -0.3, 0.2]), RATE_HZ)
     assert np.median(table.column("norm_std")) == pytest.approx(NOISE, rel=0.25)
 
 
@@ -124,8 +124,8 @@ def test_a_log_that_never_rests_or_only_rests_is_refused(motion: str) -> None:
     swing = np.column_stack([np.sin(rate * t_s) for rate in (0.6, 1.9, 3.1)])
     noise = NOISE * rng.standard_normal((4000, 3))
     samples = {"walk": np.cumsum(noise, axis=0), "swing": swing + noise, "rest": noise}[motion]
-    with pytest.raises(DataError, match="log: found no still intervals; a log of positions has many of 1 s or more"):
-        positions(log(samples), RATE_HZ)
+    with pytest.raises(DataError, match="log: found no still intervals; keep the sensor still for 1 s or more"):
+        average_still_positions(log(samples), RATE_HZ)
 
 
 def test_a_log_is_raw_where_its_rows_are_samples() -> None:
@@ -133,4 +133,4 @@ def test_a_log_is_raw_where_its_rows_are_samples() -> None:
     assert is_raw_log(log(samples))
     assert not is_raw_log(log(samples[:100]))
     assert not is_raw_log(log(samples, n=np.full(len(samples), 50.0)))
-    assert not is_raw_log(positions(log(samples), RATE_HZ))
+    assert not is_raw_log(average_still_positions(log(samples), RATE_HZ))

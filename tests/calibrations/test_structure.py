@@ -7,11 +7,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from calibrations.expressions.effect import effect_for
+from calibrations.discovery.patterns import Pattern
+from calibrations.discovery.structure import structure_of
+from calibrations.effects.expression_effect import effect_for
 from calibrations.fit import Fit, fit
-from calibrations.model_file import read_model
-from calibrations.search.patterns import Pattern
-from calibrations.search.structure import structure_of
+from calibrations.model.file import read_model
 from calibrations.table import Array, Table
 from tests.hidden import sampled
 

@@ -50,13 +50,35 @@ def test_a_constant_must_be_a_number() -> None:
         table.number("serial", 0.0)
 
 
-@pytest.mark.parametrize("name", ["gravity_m_s2", "sample_rate_hz", "filter_corner_hz"])
+@pytest.mark.parametrize("name", ["sample_rate_hz", "filter_corner_hz"])
 @pytest.mark.parametrize(
     ("value", "says"), [("ten", "'ten', not a number"), (0.0, "0.0; it must be above 0"), (-1.0, "-1")]
 )
 def test_a_constant_that_cannot_be(name: str, value: str | float, says: str) -> None:
     with pytest.raises(DataError, match=f'made.csv: the constant "{name}" is {says}'):
         Table.from_columns("poses", POSES, {name: value}, "made.csv")
+
+
+EARTH = "not the gravity of a place on Earth"
+
+
+@pytest.mark.parametrize(
+    ("value", "says"),
+    [
+        (1.0, f"1, {EARTH}; it looks like g; give it in m/s^2, 9.76 to 9.84"),
+        (980.131, f"980.131, {EARTH}; it looks like cm/s^2; give it in m/s^2, 9.76 to 9.84"),
+        ("9801.31", f"9801.31, {EARTH}; it looks like mm/s^2; give it in m/s^2, 9.76 to 9.84"),
+        (9.75, f"9.75, {EARTH}; give it in m/s^2, 9.76 to 9.84"),
+        (-9.81, f"-9.81, {EARTH}; give it in m/s^2, 9.76 to 9.84"),
+        ("nan", f"nan, {EARTH}; give it in m/s^2, 9.76 to 9.84"),
+        ("9,80131", "'9,80131', not a number; write 9.80131, with a decimal point"),
+        ("ten", "'ten', not a number"),
+    ],
+)
+def test_a_gravity_that_is_not_of_this_earth_is_refused(value: str | float, says: str) -> None:
+    with pytest.raises(DataError) as error:
+        Table.from_columns("poses", POSES, {"gravity_m_s2": value}, "made.csv")
+    assert str(error.value) == f'made.csv: the constant "gravity_m_s2" is {says}'
 
 
 @pytest.mark.parametrize(

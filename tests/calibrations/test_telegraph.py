@@ -7,17 +7,14 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from calibrations.effect import catalogue
-from calibrations.model_file import read_model
-from calibrations.noise_analysis.analysis import analyse
-from calibrations.still.diagnose import diagnose
-from calibrations.still.discover import discover
-from calibrations.still.disturbed import disturbed
-from calibrations.still.documents import diagnosis_document
-from calibrations.still.fit import fit_channel
-from calibrations.still.record import Samples, Still, reduced
-from calibrations.still.telegraph import TWO_LEVELS, Telegraph, telegraph_of
-from calibrations.still.words import headline
+from calibrations.documents import diagnosis_document
+from calibrations.effects.catalogue import catalogue
+from calibrations.loop import diagnose, discover
+from calibrations.model.file import read_model
+from calibrations.noise.analysis import analyse
+from calibrations.noise.fit import fit_channel
+from calibrations.noise.record import Samples, Still, reduce_record
+from calibrations.noise.telegraph import TWO_LEVELS, Telegraph, telegraph_of
 from calibrations.table import Array
 from tests.calibrations.hidden_noise import RATE_HZ, _relaxing, telegraph, traps, walk, white
 
@@ -27,7 +24,7 @@ N = 10_000
 
 
 def still(x: Array) -> Still:
-    return reduced([Samples("x", [x], RATE_HZ, "V")], "made")
+    return reduce_record([Samples("x", [x], RATE_HZ, "V")], "made")
 
 
 def told(x: Array, *slow: str) -> Telegraph | None:
@@ -79,9 +76,9 @@ def test_strong_popcorn_is_one_process_and_no_steps_and_nothing_taken_off_makes_
     record = still(1e-3 * (white(random, 4 * N) + 2.5 * telegraph(random, 4 * N, 2000.0)))
     asked, found = diagnose(record, read_model("still")), discover(record, read_model("still"))
     assert (asked.verdict, asked.missing, asked.residual_structure) == ("effect-missing", ("gauss-markov-noise",), None)
-    assert (found.verdict, found.cleaned) == ("adequate", None)
+    assert (found.verdict, found.findings.baseline) == ("adequate", found.start)
     assert [each["kind"] for each in diagnosis_document(asked, "still")["disturbances"]] == [TWO_LEVELS]
-    assert "x goes between two levels 0.00499 V apart" in headline(asked)
+    assert "x goes between two levels 0.00499 V apart" in asked.judgement.text
 
 
 def test_steps_of_a_process_that_jumps_are_taken_off_only_where_the_model_is_better_without() -> None:
@@ -89,7 +86,8 @@ def test_steps_of_a_process_that_jumps_are_taken_off_only_where_the_model_is_bet
         random = np.random.default_rng(seed)
         jumps = telegraph(random, N, 800.0) + telegraph(random, N, 800.0) + telegraph(random, N, 800.0)
         found = discover(still(0.2 * white(random, N) + jumps), read_model("still"))
-        assert found.cleaned is None or found.cleaned.log_likelihood > found.start.log_likelihood
+        baseline = found.findings.baseline
+        assert baseline is found.start or baseline.log_likelihood > found.start.log_likelihood
 
 
 def test_two_levels_without_any_noise_are_no_fault() -> None:
@@ -100,6 +98,6 @@ def test_two_levels_without_any_noise_are_no_fault() -> None:
 def test_beside_coefficients() -> None:
     random = np.random.default_rng(7)
     x = white(random, 2 * N) + 2.5 * telegraph(random, 2 * N, 500.0)
-    told = disturbed(analyse([x], RATE_HZ, "V", "made"), "vx", {})
-    assert [(each.kind, each.matters) for each in told.disturbances] == [(TWO_LEVELS, False)]
-    assert told.rest is None
+    analysis = analyse(still(x))
+    assert [(each.kind, each.matters) for each in analysis.disturbances] == [(TWO_LEVELS, False)]
+    assert analysis.uncleaned is None

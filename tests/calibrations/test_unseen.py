@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from calibrations.model_file import read_model
-from calibrations.search.unseen import unseen
+from calibrations.discovery.check_poses import unseen
+from calibrations.model.file import read_model
 from calibrations.table import Array, Table
 from tests.calibrations.synthetic import NOISE_V, components, poses, turns
 

@@ -1,44 +1,83 @@
-"""What a verdict says of a candidate that chance alone would seldom show."""
+"""The verdict: decided from facts by one function, and written by one."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from calibrations.diagnose import Diagnosis, diagnose
-from calibrations.model_file import read_model
-from calibrations.reports.verdict import headline
+from calibrations.discovery.results import Diagnosis
+from calibrations.discovery.verdict import Judgement, Verdict
+from calibrations.fit import Fit
+from calibrations.loop import diagnose
+from calibrations.model.file import read_model
 from tests.calibrations import synthetic
 
 
 @pytest.fixture(scope="module")
-def clean() -> Diagnosis:
+def clean() -> Diagnosis[Fit]:
     return clean_of(4)
 
 
-def clean_of(seed: int) -> Diagnosis:
+def clean_of(seed: int) -> Diagnosis[Fit]:
     """Of a linear sensor at 70 poses."""
     columns = synthetic.turns((90, 30, 150, 60, 120), 60.0)
     ax, ay, _ = synthetic.components(columns)
     return diagnose(synthetic.poses(columns, 2.5 + 0.8 * ax, 2.5 + 0.8 * ay, seed=seed), read_model("linear"))
 
 
-def test_a_clean_sensor_misses_nothing_and_that_is_likeliest(clean: Diagnosis) -> None:
-    assert headline(clean) == "nothing is missing; what is left is noise."
+def test_a_clean_sensor_misses_nothing_and_that_is_likeliest(clean: Diagnosis[Fit]) -> None:
+    assert clean.judgement.headline == "No effect is missing."
     assert sum(c.probability for c in clean.candidates) < 0.5
 
 
-def test_what_chance_would_seldom_show_is_said(clean: Diagnosis) -> None:
-    best = replace(clean.candidates[0], p_value=0.009, held_out_after=0.9 * clean.held_out_before)
-    found = replace(clean, candidates=(best, *clean.candidates[1:]))
-    assert headline(found) == (
-        f"nothing is missing beyond what chance may show, but {best.name} comes near: chance alone shows as much in "
-        "0.9% of such searches, and an effect is named below 0.3%; measure once more to tell."
-    )
+def test_a_candidate_that_chance_seldom_shows_is_named_with_its_threshold(clean: Diagnosis[Fit]) -> None:
+    first = clean.candidates[0]
+    best = replace(first, p_value=0.009, held_out_after=0.9 * clean.held_out_before)
+    close = replace(clean.findings, candidates=(best, *clean.candidates[1:]))
+    closest = f"Closest: {best.name} (p = 0.9 %, threshold 0.3 %). Repeat the measurement to decide."
+    assert close.given.text == f"No effect is significant. {closest}"
+    probable = replace(first, p_value=0.2, probability=0.69, held_out_after=0.9 * clean.held_out_before)
+    assert "Closest" in replace(clean.findings, candidates=(probable,)).given.text
     unseen = replace(best, held_out_after=1.1 * clean.held_out_before)
-    assert headline(replace(clean, candidates=(unseen,))) == headline(clean)
+    assert replace(clean.findings, candidates=(unseen,)).given.text == clean.judgement.text
+
+
+@pytest.mark.parametrize(
+    ("facts", "verdict"),
+    [
+        ({}, Verdict.ADEQUATE),
+        ({"missing": ("a",)}, Verdict.EFFECT_MISSING),
+        ({"missing": ("a",), "alternatives": {"a": ("b",)}}, Verdict.AMBIGUOUS),
+        ({"missing": ("a",), "left": "a step", "share_left": 0.1}, Verdict.EFFECT_MISSING),
+        ({"missing": ("a",), "left": "a step", "share_left": 0.3}, Verdict.UNEXPLAINED),
+        ({"added": ("a",)}, Verdict.ADEQUATE),
+        ({"added": ("a",), "alternatives": {"a": ("b",)}}, Verdict.AMBIGUOUS),
+        ({"added": ("a",), "left": "a step", "share_left": 0.01}, Verdict.AMBIGUOUS),
+        ({"added": ("a",), "left": "a step", "share_left": 0.1}, Verdict.UNEXPLAINED),
+        ({"left": "a step", "share_left": 1.0}, Verdict.UNEXPLAINED),
+        ({"left": "2 poses stand out", "spoilt": True}, Verdict.UNEXPLAINED),
+        ({"undetermined": "too few orientations"}, Verdict.AMBIGUOUS),
+        ({"left": "vy is constant", "unresponsive": True}, Verdict.NO_RESPONSE),
+        ({"added": ("a",), "searched": False, "error": 27.1}, Verdict.AMBIGUOUS),
+        ({"added": ("a",), "searched": False, "error": 1.0}, Verdict.ADEQUATE),
+    ],
+)
+def test_a_verdict_follows_from_the_facts_alone(facts: dict[str, Any], verdict: Verdict) -> None:
+    judgement = Judgement(model="linear", **facts)
+    assert judgement.verdict is verdict
+    if judgement.left:
+        assert judgement.left in judgement.text
+    for name in (*judgement.missing, *judgement.added):
+        assert name in judgement.text
+
+
+def test_an_error_above_the_floor_without_a_search_is_no_complete_model() -> None:
+    judgement = Judgement(model="linear", added=("a",), searched=False, error=27.1)
+    assert "no effect is missing" not in judgement.text
+    assert "No search for further effects was made" in judgement.text
 
 
 def test_before_nothing_is_as_likely_as_anything() -> None:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from calibrations.chain import nominal_pose, specific_force
+from calibrations.geometry.orientation import nominal_pose, specific_force
+from calibrations.geometry.stage_path import last_turn, turning_points
 from calibrations.table import Array, Table
-from calibrations.visits import last_turn, turning_points
 
 
 def way(alpha: list[float], beta: list[float], **more: list[float]) -> Table:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from calibrations.effect import catalogue
+from calibrations.effects.catalogue import catalogue
 from calibrations.pages import drawing, page, pages, write
 from tests.docs.markdown import ROOT
 
@@ -39,9 +39,7 @@ def test_the_picture_is_up_to_date_and_small(name: str) -> None:
     made = drawing(catalogue()[name])
     assert (FOLDER / "pictures" / f"{name}.svg").read_text(encoding="utf-8") == made, REMEDY
     assert len(made.encode()) < 20_000
-    assert (
-        "Allan deviation (V)" if catalogue()[name].kinds == ("still",) else "left over ("
-    ) in made  # text stays text
+    assert ("Allan deviation (V)" if catalogue()[name].kinds == ("still",) else "residual (") in made  # text stays text
     ET.fromstring(made)  # noqa: S314 what we have just made
 
 

@@ -20,11 +20,13 @@ PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").rglob("*.md"))]
 LINK = re.compile(r"\]\(([^)#:\s]*)(?:#([^)\s]+))?\)")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("title", FOLLOWED)
 def test_a_section_works_as_written(title: str, follow: Callable[..., Any]) -> None:
     follow(commands(section("README.md", title)))
 
 
+@pytest.mark.slow
 def test_the_first_story_works_as_written_and_makes_the_picture(tmp_path: Path, follow: Callable[..., Any]) -> None:
     follow(commands(section("README.md", "Find what is missing")))
     made, shown = tmp_path / "pictures" / "waterfall.svg", ROOT / "docs" / "falling-error.svg"

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 import yaml
 
-from drivers.simulation.config import WorldConfig
-from drivers.simulation.floor import Floor
-from drivers.simulation.noise import Noise
+from drivers.world.config import WorldConfig
+from drivers.world.noise import Noise
+from drivers.world.pickup import Floor
 
 TEXT = (Path(__file__).parents[2] / "docs" / "simulated-noise.md").read_text(encoding="utf-8")
 

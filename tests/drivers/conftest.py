@@ -10,13 +10,18 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike, NDArray
 
-from drivers import labjack_t7, labjack_t7_twin, omega_cn7500, omega_cn7500_twin, oriental_az, oriental_az_twin
 from drivers.clock import SimulatedClock
-from drivers.links import Links
-from drivers.links.server import Server
-from drivers.simulation import positioner
-from drivers.simulation.kernel import record
-from drivers.simulation.trajectory import Trajectory, at_rest
+from drivers.labjack_t7 import driver as labjack_t7
+from drivers.labjack_t7 import twin as labjack_t7_twin
+from drivers.omega_cn7500 import driver as omega_cn7500
+from drivers.omega_cn7500 import twin as omega_cn7500_twin
+from drivers.oriental_az import driver as oriental_az
+from drivers.oriental_az import twin as oriental_az_twin
+from drivers.transport import Links
+from drivers.transport.server import Server
+from drivers.world import positioner
+from drivers.world.kernel import record
+from drivers.world.stage import Trajectory, at_rest
 
 STAGE = oriental_az.Settings(limits_deg=(-400.0, 400.0), speed_deg_s=20.0, acceleration_deg_s2=40.0)
 CONVERTER = labjack_t7.Settings(channels={"time": 2, "noise": 0, "supply": 5}, rate_hz=1000.0, power_dio=3)

@@ -11,9 +11,9 @@ import pytest
 
 from drivers.clock import SimulatedClock
 from drivers.errors import DriverError, LinkTimeout, NotSettled, Refused, StageAlarm, StreamError
-from drivers.links import Links
-from drivers.links.faults import Fault
-from drivers.links.wire_faults import EFFECTS, faults_of
+from drivers.transport import Links
+from drivers.transport.faults import Fault
+from drivers.transport.wire_faults import EFFECTS, faults_of
 
 DRIVERS = ["oriental_az", "labjack_t7", "omega_cn7500", "dpg2", "pi_e727"]
 LONGEST_S = 60.0  # simulated, for an identification and a self-test
@@ -25,7 +25,7 @@ def afflicted(small_world: Any) -> Iterator[Callable[..., tuple[Any, SimulatedCl
     opened: list[Any] = []
 
     def make(name: str, fault: Fault) -> tuple[Any, SimulatedClock]:
-        driver, twin = import_module(f"drivers.{name}"), import_module(f"drivers.{name}_twin")
+        driver, twin = import_module(f"drivers.{name}.driver"), import_module(f"drivers.{name}.twin")
         settings = driver.Settings() if name != "labjack_t7" else driver.Settings(channels={"supply": 0})
         server, clock = twin.serve(small_world, {"alpha": (1, settings)}, twin.LISTEN), SimulatedClock()
         clock.attach(server)

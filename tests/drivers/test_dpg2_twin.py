@@ -11,16 +11,19 @@ from typing import Any
 import pytest
 import serial
 
-from drivers import dpg2, dpg2_twin, labjack_t7, labjack_t7_twin
 from drivers.clock import SimulatedClock, serve_forever
-from drivers.dpg2_twin import LevelServer
+from drivers.dpg2 import driver as dpg2
+from drivers.dpg2 import twin as dpg2_twin
+from drivers.dpg2.twin import LevelServer
 from drivers.errors import InstrumentError
-from drivers.links import Links
-from drivers.links.link import Link, open_link
-from drivers.links.url import Url
-from drivers.simulation.config import WorldConfig
-from drivers.simulation.trajectory import Trajectory, at_rest
-from drivers.simulation.world import World
+from drivers.labjack_t7 import driver as labjack_t7
+from drivers.labjack_t7 import twin as labjack_t7_twin
+from drivers.transport import Links
+from drivers.transport.address import Url
+from drivers.transport.link import Link, open_link
+from drivers.world.config import WorldConfig
+from drivers.world.stage import Trajectory, at_rest
+from drivers.world.world import World
 
 PAIR = re.compile(r"X=([+-]\d\d\.\d{3})\r\nY=([+-]\d\d\.\d{3})\r\n")
 CHARACTER_S = 10 / 9600

@@ -6,7 +6,11 @@ from typing import Any
 
 import pytest
 
-from drivers import labjack_t7, manual_stage, omega_cn7500, oriental_az, pi_e727
+from drivers.labjack_t7 import driver as labjack_t7
+from drivers.manual_stage import driver as manual_stage
+from drivers.omega_cn7500 import driver as omega_cn7500
+from drivers.oriental_az import driver as oriental_az
+from drivers.pi_e727 import driver as pi_e727
 
 
 @pytest.mark.parametrize(

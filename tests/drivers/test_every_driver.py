@@ -14,11 +14,10 @@ import pytest
 from drivers import clock as clock_module
 from drivers.clock import SimulatedClock
 from drivers.instrument import Check, Identity
-from drivers.links import Links
+from drivers.transport import Links
 
-MODULES = sorted(file.stem for file in Path(clock_module.__file__).parent.glob("[a-z]*.py"))
-NAMES = [name for name in MODULES if hasattr(import_module(f"drivers.{name}"), "connect")]
-SERIAL = [name for name in NAMES if import_module(f"drivers.{name}_twin").LISTEN.startswith("pty")]
+NAMES = sorted(file.parent.name for file in Path(clock_module.__file__).parent.glob("*/driver.py"))
+SERIAL = [name for name in NAMES if import_module(f"drivers.{name}.twin").LISTEN.startswith("pty")]
 OTHERS = ("rtu+tcp://127.0.0.1:0", "tcp://127.0.0.1:0")
 WIRES = [(name, None) for name in NAMES] + [(name, listen) for name in SERIAL for listen in OTHERS]
 
@@ -26,7 +25,7 @@ WIRES = [(name, None) for name in NAMES] + [(name, listen) for name in SERIAL fo
 @pytest.fixture(params=WIRES, ids=lambda wire: f"{wire[0]}-{wire[1] or 'usual'}")
 def instrument(request: pytest.FixtureRequest, small_world: Any) -> Iterator[Any]:
     name, listen = request.param
-    driver, twin = import_module(f"drivers.{name}"), import_module(f"drivers.{name}_twin")
+    driver, twin = import_module(f"drivers.{name}.driver"), import_module(f"drivers.{name}.twin")
     settings = driver.Settings() if name != "labjack_t7" else driver.Settings(channels={"supply": 0})
     server = twin.serve(small_world, {"alpha": (1, settings)}, listen or twin.LISTEN)
     clock = SimulatedClock()
@@ -43,7 +42,7 @@ def test_there_are_the_three_of_the_bench() -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_driver_has_settings_connect_and_a_twin(name: str) -> None:
-    driver, twin = import_module(f"drivers.{name}"), import_module(f"drivers.{name}_twin")
+    driver, twin = import_module(f"drivers.{name}.driver"), import_module(f"drivers.{name}.twin")
     assert is_dataclass(driver.Settings)
     assert driver.Settings.__dataclass_params__.frozen
     assert driver.Settings() is not None

@@ -7,14 +7,17 @@ from typing import Any
 
 import pytest
 
-from drivers import dpg2, dpg2_twin, omega_cn7500, omega_cn7500_twin
 from drivers.clock import SimulatedClock
+from drivers.dpg2 import driver as dpg2
+from drivers.dpg2 import twin as dpg2_twin
 from drivers.errors import InstrumentError, OverTemperature, SensorFault
-from drivers.links import Links
-from drivers.links.faults import Fault
-from drivers.links.wire_faults import faults_of
-from drivers.simulation.config import WorldConfig
-from drivers.simulation.world import World
+from drivers.omega_cn7500 import driver as omega_cn7500
+from drivers.omega_cn7500 import twin as omega_cn7500_twin
+from drivers.transport import Links
+from drivers.transport.faults import Fault
+from drivers.transport.wire_faults import faults_of
+from drivers.world.config import WorldConfig
+from drivers.world.world import World
 
 
 @pytest.fixture

@@ -15,20 +15,18 @@ import pytest
 from pipython import GCSDevice, GCSError, datarectools, pitools
 from pipython.pidevice.interfaces.pisocket import PISocket
 
-from drivers import (
-    labjack_t7,
-    labjack_t7_twin,
-    omega_cn7500,
-    omega_cn7500_twin,
-    oriental_az,
-    oriental_az_twin,
-    pi_e727,
-    pi_e727_twin,
-)
 from drivers.clock import serve_forever
-from drivers.labjack_t7_stream import Calibration
-from drivers.links.server import Server
-from drivers.links.url import Url
+from drivers.labjack_t7 import driver as labjack_t7
+from drivers.labjack_t7 import twin as labjack_t7_twin
+from drivers.labjack_t7.stream import Calibration
+from drivers.omega_cn7500 import driver as omega_cn7500
+from drivers.omega_cn7500 import twin as omega_cn7500_twin
+from drivers.oriental_az import driver as oriental_az
+from drivers.oriental_az import twin as oriental_az_twin
+from drivers.pi_e727 import driver as pi_e727
+from drivers.pi_e727 import twin as pi_e727_twin
+from drivers.transport.address import Url
+from drivers.transport.server import Server
 
 MBPOLL = shutil.which("mbpoll")
 needs_mbpoll = pytest.mark.skipif(MBPOLL is None, reason="mbpoll is not installed (Debian: apt install mbpoll)")

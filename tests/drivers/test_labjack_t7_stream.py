@@ -14,16 +14,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers import labjack_t7, labjack_t7_reception, labjack_t7_twin
 from drivers.clock import SimulatedClock
 from drivers.errors import LimitError, LinkTimeout, StreamError
-from drivers.labjack_t7_reception import Reception
-from drivers.labjack_t7_stream import Packets
-from drivers.links import Links
-from drivers.links.link import Link, open_link
-from drivers.links.server import Port, Server
-from drivers.simulation.config import WorldConfig
-from drivers.simulation.world import World
+from drivers.labjack_t7 import driver as labjack_t7
+from drivers.labjack_t7 import stream as labjack_t7_reception
+from drivers.labjack_t7 import twin as labjack_t7_twin
+from drivers.labjack_t7.stream import Packets, Reception
+from drivers.transport import Links
+from drivers.transport.link import Link, open_link
+from drivers.transport.server import Port, Server
+from drivers.world.config import WorldConfig
+from drivers.world.world import World
 
 FOUR = labjack_t7.Settings(channels={"vx": 0, "vy": 1, "supply": 2, "thermistor": 3})
 

@@ -9,15 +9,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers import labjack_t7, labjack_t7_twin
 from drivers.clock import SimulatedClock
 from drivers.errors import Interlocked, OverRange, Refused
 from drivers.instrument import Check
-from drivers.labjack_t7 import Settings
-from drivers.links import Links
-from drivers.links.faults import Fault
-from drivers.links.link import open_link
-from drivers.links.wire_faults import faults_of
+from drivers.labjack_t7 import driver as labjack_t7
+from drivers.labjack_t7 import twin as labjack_t7_twin
+from drivers.labjack_t7.driver import Settings
+from drivers.transport import Links
+from drivers.transport.faults import Fault
+from drivers.transport.link import open_link
+from drivers.transport.wire_faults import faults_of
 
 STEP_V = 3.2e-4  # one code in the range of 10 V
 

@@ -10,10 +10,10 @@ import pytest
 
 from drivers.clock import SimulatedClock
 from drivers.errors import LimitError, LinkRefused, NotSettled
-from drivers.links import Address, Links
-from drivers.manual_stage import ManualStage, Settings, connect
-from drivers.manual_stage_twin import Hand
-from drivers.simulation.trajectory import Trajectory
+from drivers.manual_stage.driver import ManualStage, Settings, connect
+from drivers.manual_stage.twin import Hand
+from drivers.transport import Address, Links
+from drivers.world.stage import Trajectory
 
 MARK_DEG = 5 / 60
 

@@ -8,12 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from drivers import labjack_t7, labjack_t7_twin, pi_e727, pi_e727_twin
 from drivers.clock import SimulatedClock
-from drivers.links import Links
+from drivers.labjack_t7 import driver as labjack_t7
+from drivers.labjack_t7 import twin as labjack_t7_twin
 from drivers.philtec_d63 import SIMULATED, Curve
-from drivers.simulation.config import WorldConfig
-from drivers.simulation.world import World
+from drivers.pi_e727 import driver as pi_e727
+from drivers.pi_e727 import twin as pi_e727_twin
+from drivers.transport import Links
+from drivers.world.config import WorldConfig
+from drivers.world.world import World
 
 CONVERTER = labjack_t7.Settings(channels={"vx": 0, "vy": 1, "d63": 8})
 POSITIONER = pi_e727.Settings()

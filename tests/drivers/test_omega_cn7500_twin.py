@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from drivers import omega_cn7500_twin
 from drivers.clock import SimulatedClock
-from drivers.links.link import open_link
-from drivers.omega_cn7500 import Settings
+from drivers.omega_cn7500 import twin as omega_cn7500_twin
+from drivers.omega_cn7500.driver import Settings
+from drivers.transport.link import open_link
 
 
 @pytest.fixture

@@ -7,13 +7,14 @@ from typing import Any
 
 import pytest
 
-from drivers import oriental_az, oriental_az_twin
 from drivers.clock import SimulatedClock
-from drivers.errors import Interlocked, LimitError, StageAlarm
-from drivers.links import Links
-from drivers.links.faults import Fault
-from drivers.links.server import Server
-from drivers.links.wire_faults import faults_of
+from drivers.errors import Interlocked, LimitError, NotSettled, StageAlarm
+from drivers.oriental_az import driver as oriental_az
+from drivers.oriental_az import twin as oriental_az_twin
+from drivers.transport import Links
+from drivers.transport.faults import Fault
+from drivers.transport.server import Server
+from drivers.transport.wire_faults import faults_of
 
 LIMITED = oriental_az.Settings(steps_per_turn=36000, limits_deg=(-90.0, 100.0), own_limits=True)
 CARELESS = oriental_az.Settings(steps_per_turn=36000, limits_deg=(-1000.0, 1000.0))
@@ -89,8 +90,25 @@ def test_a_stop_input_brakes_the_stage_and_keeps_it_from_starting(
             act()
     clock.sleep(60.0)
     assert small_world.motor_angle_deg("alpha") == stood_deg, "it does not go on by itself"
-    moving.require_steady()
+    with pytest.raises(NotSettled, match=r"instead of 90.000 deg"):
+        moving.require_steady()
     moving.move_to(90.0)
+    moving.require_steady()
+
+
+def test_a_stage_moved_by_another_program_is_not_steady(stage: Make) -> None:
+    mine = stage(CARELESS)
+    mine.require_steady()  # no command since homing
+    mine.move_to(10.0)
+    other = stage(CARELESS)
+    other.move_to(10.04)
+    mine.move_to(10.0)
+    mine.require_steady()
+    other.move_to(10.06)
+    with pytest.raises(NotSettled, match=r"alpha: stands at 10.060 deg instead of 10.000 deg, more than 0.05 deg away"):
+        mine.require_steady()
+    mine.stop()
+    mine.require_steady()  # a stop replaces the command
 
 
 def test_an_alarm_is_seen_by_whoever_looks(stage: Make, server: Server, clock: SimulatedClock) -> None:
@@ -111,3 +129,14 @@ def test_a_stage_that_is_told_to_halt_brakes_while_others_are_told(stage: Make, 
     clock.sleep(1.0)
     assert moving.angle_deg() < 35.0  # 22.5 when it was told, 7.5 to brake; else 52.5
     moving.stop()
+
+
+@pytest.mark.parametrize(("start_deg", "end_deg"), [(90.0, 100.0), (40.0, -40.0)])
+def test_a_move_takes_as_long_as_its_distance_needs(
+    stage: Make, clock: SimulatedClock, start_deg: float, end_deg: float
+) -> None:
+    mine = stage()
+    mine.move_to(start_deg)
+    begun_s = clock.now()
+    mine.move_to(end_deg)
+    assert clock.now() - begun_s == pytest.approx(LIMITED.move_s(abs(end_deg - start_deg)), abs=0.5)

@@ -7,12 +7,12 @@ from typing import Any
 
 import pytest
 
-from drivers import oriental_az_twin
 from drivers.clock import SimulatedClock
 from drivers.errors import LimitError, LinkTimeout, NotSettled, StageLost
-from drivers.links import Address
-from drivers.links.link import open_link
-from drivers.oriental_az import Settings, connect
+from drivers.oriental_az import twin as oriental_az_twin
+from drivers.oriental_az.driver import Settings, connect
+from drivers.transport import Address
+from drivers.transport.link import open_link
 
 MOVE = (
     "01 10 00 58 00 10 20 00 00 00 00 00 00 00 01 00 00 21 34 00 00 07 D0 00 00 05 DC 00 00 05 DC "

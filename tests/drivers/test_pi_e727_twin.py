@@ -11,13 +11,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers import pi_e727_twin
 from drivers.clock import SimulatedClock
 from drivers.errors import LinkTimeout, Refused
-from drivers.links import Links
-from drivers.links.link import Link, open_link
-from drivers.links.server import Server
-from drivers.pi_e727 import Positioner, Settings, connect
+from drivers.pi_e727 import twin as pi_e727_twin
+from drivers.pi_e727.driver import Positioner, Settings, connect
+from drivers.transport import Links
+from drivers.transport.link import Link, open_link
+from drivers.transport.server import Server
 from tests.drivers.conftest import SmallWorld
 
 SINE = "WAV 2 X SIN_P 2000 20 10 2000 0 1000"  # 10 Hz at table rate 1

@@ -9,13 +9,15 @@ from typing import Any
 
 import pytest
 
-from drivers import manual_stage, oriental_az, oriental_az_twin
 from drivers.clock import SimulatedClock
 from drivers.errors import LimitError, NotSettled, StageAlarm
-from drivers.links import Links
-from drivers.links.faults import Fault
-from drivers.links.wire_faults import faults_of
-from drivers.oriental_az import RotaryStage, Settings
+from drivers.manual_stage import driver as manual_stage
+from drivers.oriental_az import driver as oriental_az
+from drivers.oriental_az import twin as oriental_az_twin
+from drivers.oriental_az.driver import RotaryStage, Settings
+from drivers.transport import Links
+from drivers.transport.faults import Fault
+from drivers.transport.wire_faults import faults_of
 from tests.drivers.conftest import SmallWorld
 
 ENDLESS = Settings(limits_deg=(-math.inf, math.inf), communication_timeout_s=1.0)

@@ -11,16 +11,14 @@ from pathlib import Path
 
 import numpy as np
 
-from calibrations.error_table import ErrorTable, read_error_table
+from calibrations.effects.expression_effect import own_effect
 from calibrations.errors import CalibrationError
-from calibrations.expressions.effect import own_effect
-from calibrations.model_file import SHIPPED, parse_model
-from calibrations.reading.foreign import take
-from calibrations.reading.proposal import propose
-from calibrations.reading.read_csv import parse_csv
-from calibrations.reading.separated import sheet
-from calibrations.reading.text_file import text, text_file
-from calibrations.reading.yaml_file import load_yaml
+from calibrations.geometry.error_table import ErrorTable, read_error_table
+from calibrations.importing.files import load_yaml, open_text_file, text_source
+from calibrations.importing.foreign import import_sheet, parse_csv
+from calibrations.importing.proposal import propose_mapping
+from calibrations.importing.sheet import read_sheet
+from calibrations.model.file import SHIPPED, parse_model
 from drivers.philtec_d63 import Curve
 from procedures.session import Pose
 from rig.analysis.still import stream
@@ -52,8 +50,8 @@ def remove() -> None:
 def csv_text(data: bytes) -> object:
     with suppress(CalibrationError):
         parse_csv(data.decode("latin-1"), "data.csv")
-    laid = sheet(text(data.decode("latin-1"), "data.csv"))
-    return take(laid, None, propose(laid))
+    laid = read_sheet(text_source(data.decode("latin-1"), "data.csv"))
+    return import_sheet(laid, None, propose_mapping(laid))
 
 
 def file(name: str, data: bytes) -> Path:
@@ -63,12 +61,12 @@ def file(name: str, data: bytes) -> Path:
 
 
 def csv_file(data: bytes) -> object:
-    with text_file(file("data.csv", data)).lines() as lines:
+    with open_text_file(file("data.csv", data)).lines() as lines:
         return sum(map(len, lines))
 
 
 def compressed(data: bytes) -> object:
-    with text_file(file("data.csv.gz", data)).lines() as lines:
+    with open_text_file(file("data.csv.gz", data)).lines() as lines:
         return sum(map(len, lines))
 
 

@@ -13,20 +13,21 @@ import numpy as np
 from pymodbus.framer import FramerRTU
 from pymodbus.pdu.register_message import ReadHoldingRegistersRequest
 
-from drivers import dpg2, pi_e727
-from drivers import labjack_t7_twin as t7
-from drivers import pi_e727_table as e727
+from drivers.dpg2 import driver as dpg2
 from drivers.errors import DriverError
-from drivers.labjack_t7_stream import Calibration, Packets, packet_type
-from drivers.links.faults import Faults
-from drivers.links.gcs import Gcs
-from drivers.links.gcs_server import commands
-from drivers.links.modbus import Bus
-from drivers.links.modbus_server import ILLEGAL_ADDRESS, Refusal, Responder
-from drivers.links.url import Url
-from drivers.pi_e727_twin import Controller
-from drivers.simulation.config import WorldConfig
-from drivers.simulation.world import World
+from drivers.labjack_t7 import twin as t7
+from drivers.labjack_t7.stream import Calibration, Packets, packet_type
+from drivers.pi_e727 import driver as pi_e727
+from drivers.pi_e727 import parameters as e727
+from drivers.pi_e727.twin import Controller
+from drivers.transport.address import Url
+from drivers.transport.faults import Faults
+from drivers.transport.gcs import Gcs
+from drivers.transport.gcs_server import commands
+from drivers.transport.modbus import Bus
+from drivers.transport.modbus_server import ILLEGAL_ADDRESS, Refusal, Responder
+from drivers.world.config import WorldConfig
+from drivers.world.world import World
 from tests.fuzz.target import Target
 
 

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calibrations.effect import catalogue
+from calibrations.effects.catalogue import catalogue
 from calibrations.fit import Fit, fit, refit
-from calibrations.model_file import read_model
+from calibrations.model.file import read_model
 from calibrations.table import Array, Table
-from drivers.simulation.defects import DEFECTS
+from drivers.world.defects import DEFECTS
 from tests.hidden import rigs, sampled
 from tests.hidden.test_hidden_defects import NAMES
 

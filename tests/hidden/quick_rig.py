@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from calibrations.experiment import Experiment
+from calibrations.design.experiment import Experiment
 from calibrations.joined import joined
 from calibrations.table import Table
-from drivers.simulation.config import WorldConfig
-from drivers.simulation.world import World
+from drivers.world.config import WorldConfig
+from drivers.world.world import World
 from procedures.catalogue import find
 from procedures.session import Pose
 from procedures.settings import parse

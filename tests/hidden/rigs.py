@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.simulation import dwell
-from drivers.simulation.config import WorldConfig
-from drivers.simulation.defects import DEFECTS, UNEXPLAINED, Defect
-from drivers.simulation.visit import Timing
-from drivers.simulation.world import World
+from drivers.world import visit
+from drivers.world.config import WorldConfig
+from drivers.world.defects import DEFECTS, UNEXPLAINED, Defect
+from drivers.world.visit import Timing
+from drivers.world.world import World
 
 Table = dict[str, NDArray[Any]]
 
@@ -37,7 +37,7 @@ def sweep() -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]
 
 def noise_floor_v(config: WorldConfig = IDEAL) -> float:
     """Standard deviation of one dwell's mean."""
-    return dwell.spreads(config.noise.x, config.converter, Timing())[0]
+    return visit.spreads(config.noise.x, config.converter, Timing())[0]
 
 
 def clean_rig(seed: int) -> Table:

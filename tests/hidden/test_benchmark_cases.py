@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from calibrations.effect import catalogue
+from calibrations.effects.catalogue import catalogue
 from tests.benchmark.discovery import noises, score
 from tests.benchmark.discovery.cases import case
 from tests.benchmark.discovery.equals import equals

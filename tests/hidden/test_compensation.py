@@ -5,19 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
-from calibrations.chain import nominal_pose, specific_force
-from calibrations.compensation.inverse import Compensation, invert
-from calibrations.compensation.residual import residual
-from calibrations.effect import catalogue
+from calibrations.compensation.inverse import Compensation, compensated_residual, invert_model
+from calibrations.effects.catalogue import catalogue
 from calibrations.fit import fit
-from calibrations.model_file import read_model
-from calibrations.noise import rms
-from calibrations.pictures.compensation import compensated
-from calibrations.pictures.save import save
+from calibrations.geometry.orientation import nominal_pose, specific_force
+from calibrations.model.file import read_model
+from calibrations.noise.means import rms
+from calibrations.presentation.charts.motion import compensated
+from calibrations.presentation.static import save
 from calibrations.table import Array, Table
-from drivers.simulation.config import WorldConfig
-from drivers.simulation.world import World
+from drivers.world.config import WorldConfig
+from drivers.world.world import World
 
 CONSTANTS = {"sample_rate_hz": 1000.0, "filter_corner_hz": 15.07}
 FAULTY = WorldConfig.ideal().changed(
@@ -42,6 +42,7 @@ def turned(world: World, inclinations_deg: tuple[float, ...], step_deg: float) -
     return Table.from_columns("poses", world.dwell_mean(alpha, beta, direction=direction), CONSTANTS, "simulated")
 
 
+@pytest.mark.slow
 def test_the_error_on_unseen_poses_falls_to_a_fiftieth(tmp_path: Path) -> None:
     world = World(FAULTY, seed=7)
     seen = turned(world, (90.0, 30.0, 150.0, 60.0), 30.0)
@@ -49,7 +50,7 @@ def test_the_error_on_unseen_poses_falls_to_a_fiftieth(tmp_path: Path) -> None:
     for name in ("axis-misalignment", "quadratic-nonlinearity", "temperature-bias"):
         model = model.with_effect(catalogue()[name])
     unseen = turned(world, (120.0, 70.0, 40.0), 20.0)
-    left = residual(invert(fit(model, seen).model), unseen)
+    left = compensated_residual(invert_model(fit(model, seen).model), unseen)
     for linear, compensated_ in left.rmse.values():
         assert 30 < linear < 100  # mm/s^2
         assert compensated_ < linear / 50
@@ -80,9 +81,10 @@ def test_hysteresis_that_is_remembered_errs_a_fifth_of_that_which_is_left_out() 
     unseen = turned(world, (120.0, 70.0, 40.0), 10.0)
     true = specific_force(nominal_pose(unseen))[:, :2]
     left_out, remembered = (
-        1e3 * rms((streamed(invert(fitted, without=without), unseen) - true).T) for without in (["hysteresis"], [])
+        1e3 * rms((streamed(invert_model(fitted, without=without), unseen) - true).T)
+        for without in (["hysteresis"], [])
     )
     assert (left_out > 3).all()  # mg
     assert (remembered < left_out / 5).all()
-    for linear, compensated_ in residual(invert(fitted), unseen).rmse.values():
+    for linear, compensated_ in compensated_residual(invert_model(fitted), unseen).rmse.values():
         assert compensated_ < linear / 4

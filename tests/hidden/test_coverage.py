@@ -9,6 +9,8 @@ import pytest
 
 from tests.hidden.intervals import of_rigs, share
 
+pytestmark = pytest.mark.slow
+
 RIGS = 14  # some 100 intervals: chance alone moves their share by 2 %
 
 

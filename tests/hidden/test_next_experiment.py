@@ -1,6 +1,6 @@
 """What one sweep cannot tell apart, the proposed experiment tells, whichever of the two is the truth.
 
-The rigs are mechanisms of `drivers.simulation`; the experiment is carried out on the same rig, which goes on in time.
+The rigs are mechanisms of `drivers.world`; the experiment is carried out on the same rig, which goes on in time.
 """
 
 from __future__ import annotations
@@ -9,15 +9,16 @@ from typing import Any
 
 import pytest
 
-from calibrations.discover import discover
-from calibrations.effect import catalogue
-from calibrations.experiment import Experiment
-from calibrations.model_file import read_model
-from drivers.simulation.config import WorldConfig
-from drivers.simulation.defects import DEFECTS
+from calibrations.design.experiment import Experiment
+from calibrations.effects.catalogue import catalogue
+from calibrations.loop import discover
+from calibrations.model.file import read_model
+from drivers.world.config import WorldConfig
+from drivers.world.defects import DEFECTS
 from rig.bench import read_bench
 from rig.planning.next_experiment import proposed
 from tests.hidden.quick_rig import QuickRig
+from tests.slow import first_fast
 
 IDEAL = WorldConfig.ideal()
 WARMING: dict[str, Any] = {"heat": {"board_rise_k": 8.0, "board_rise_s": 900.0, "powered_for_s": 0.0}}
@@ -50,7 +51,7 @@ CASES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", first_fast(CASES, 2))
 def test_the_proposed_experiment_tells_which_it_is(case: str) -> None:
     config, first, truth, procedure = CASES[case]
     bench, effects = read_bench(None), catalogue()

@@ -8,20 +8,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from calibrations.diagnose import diagnose
-from calibrations.model_file import read_model
+from calibrations.loop import diagnose
+from calibrations.model.file import read_model
 from calibrations.table import Table
-from drivers.simulation.config import WorldConfig
-from drivers.simulation.defects import DEFECTS
-from drivers.simulation.world import World
+from drivers.world.config import WorldConfig
+from drivers.world.defects import DEFECTS
+from drivers.world.world import World
 from procedures.catalogue import find
 from procedures.settings import parse
 from rig.bench import read_bench
 from rig.cli.watch import Quiet
 from rig.record import Record
 from rig.record.measured import table_of
-from rig.running.runner import start
+from rig.runs.runner import start
 from tests.hidden import rigs
+from tests.slow import slow
 
 EVERY_INCLINATION = {"step_deg": "20"}
 GRID = EVERY_INCLINATION | {"inclinations_deg": "90,30,150"}  # enough for most defects of ten times the noise
@@ -42,9 +43,13 @@ def swept(config: WorldConfig, seed: int, folder: Path, **settings: str) -> Tabl
     ("defect", "effect", "grid"),
     [
         ("plate mismatch", "quadratic-nonlinearity", GRID),
-        ("package stress", "temperature-bias", GRID),
-        ("slipping contacts", "hysteresis", EVERY_INCLINATION),
-        ("gear play", "stage-backlash", GRID),
+        *slow(
+            [
+                ("package stress", "temperature-bias", GRID),
+                ("slipping contacts", "hysteresis", EVERY_INCLINATION),
+                ("gear play", "stage-backlash", GRID),
+            ]
+        ),
     ],
 )
 def test_the_missing_effect_is_named(defect: str, effect: str, grid: dict[str, str], tmp_path: Path) -> None:
@@ -56,10 +61,11 @@ def test_the_missing_effect_is_named(defect: str, effect: str, grid: dict[str, s
     assert named.held_out_after <= 1.15
 
 
+@pytest.mark.slow
 @pytest.mark.sockets
 def test_nothing_is_named_on_a_clean_rig(tmp_path: Path) -> None:
     found = diagnose(swept(rigs.IDEAL, 12, tmp_path, **GRID), read_model("linear"))
-    assert (found.verdict, found.path.steps) == ("adequate", ())
+    assert (found.verdict, found.missing) == ("adequate", ())
 
 
 @pytest.mark.sockets
@@ -76,6 +82,7 @@ def test_means_over_the_wire_are_the_worlds_own(tmp_path: Path) -> None:
         assert abs(np.corrcoef(z, own[name])[0, 1]) < 4 / np.sqrt(table.n)
 
 
+@pytest.mark.slow
 @pytest.mark.sockets
 def test_the_proposed_sweep_on_both_faces_tells_the_sensor_from_the_stages(tmp_path: Path) -> None:
     config = rigs.IDEAL.changed({"sensor": {"package": {"turn_z_deg": 0.3}}})
@@ -85,4 +92,4 @@ def test_the_proposed_sweep_on_both_faces_tells_the_sensor_from_the_stages(tmp_p
     assert once.next_experiment is not None
     more = {name: str(value) for name, value in once.next_experiment.settings.items()}
     both = diagnose(swept(config, 14, tmp_path / "both", **grid, **more), read_model("linear"))
-    assert (both.verdict, both.path.steps[0].taken.name) == ("effect-missing", "axis-misalignment")
+    assert (both.verdict, both.missing[0]) == ("effect-missing", "axis-misalignment")

@@ -11,18 +11,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from calibrations.diagnose import diagnose
-from calibrations.discover import discover
-from calibrations.general import general
-from calibrations.model_file import read_model
+from calibrations.fitting.matrices import calibration_matrices
+from calibrations.loop import diagnose, discover
+from calibrations.model.file import read_model
 from calibrations.table import Table
-from drivers.simulation.config import WorldConfig
-from drivers.simulation.world import World
+from drivers.world.config import WorldConfig
+from drivers.world.world import World
 from procedures.magnetometer_turn import magnetometer_turn
 from procedures.rate_turn import rate_turn
-from rig.record.turned import positions_table, rates_table
+from rig.record.measured import positions_table, rates_table
 from rig.record.values import Run
-from rig.results.turned import estimates, fitted
+from rig.results.result import estimates, fitted
 from tests.procedures.bench import session
 
 SQUARE = {"turn_x_deg": 0.5, "turn_y_deg": -0.8, "turn_z_deg": 0.3}
@@ -138,7 +137,7 @@ def test_a_ball_of_iron_comes_back_as_its_dipole() -> None:
         {"xx": expected[0, 0], "yy": expected[1, 1], "xy": expected[0, 1], "xz": expected[0, 2], "yz": expected[1, 2]},
         abs=2e-4,
     )
-    made = general(found)
+    made = calibration_matrices(found)
     assert made is not None
     assert pytest.approx(np.linalg.inv(np.eye(3) + expected), abs=3e-4) == made.M
 

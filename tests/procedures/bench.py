@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from calibrations.table import Table
-from drivers.simulation.trajectory import Trajectory
-from drivers.simulation.world import World
+from drivers.world.stage import Trajectory
+from drivers.world.world import World
 from procedures.questions import Mounting, Question
 from procedures.session import Dwell, Limits, Pose, Reading, Samples, Session
 from rig.planning.planned import PlannedTurn

@@ -8,10 +8,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers.simulation.config import WorldConfig
-from drivers.simulation.world import World
+from drivers.world.config import WorldConfig
+from drivers.world.world import World
 from procedures.errors import ProcedureError, SettingError
-from procedures.misalignment import Centre, around, centred, coarse, extremes, is_off, misalignment, standard_error_deg
+from procedures.misalignment import (
+    Centre,
+    centre_of,
+    coarse_poses,
+    extremes,
+    is_off,
+    misalignment,
+    round_poses,
+    standard_error_deg,
+)
 from procedures.session import Dwell, Pose
 from tests.procedures.bench import session
 
@@ -33,7 +42,7 @@ def dwells(poses: list[Pose], x: np.ndarray, y: np.ndarray) -> list[Dwell]:
 
 
 def test_the_signs_of_a_bracket_take_out_drift_and_hysteresis() -> None:
-    poses = list(around(Centre(), 1))
+    poses = list(round_poses(Centre(), 1))
     assert len(poses) == 16
     turn = [(k, p) for k, p in enumerate(poses) if p.path == "turn 1"]
     for axis, zero_crossings in (("x", (90, 270)), ("y", (0, 180))):
@@ -49,15 +58,15 @@ def test_the_signs_of_a_bracket_take_out_drift_and_hysteresis() -> None:
 
 def test_extremes_are_those_of_the_axes() -> None:
     x, y = np.array([0.99, 0.02, -0.05]), np.array([-0.03, 1.02, 0.01])
-    for poses in (list(coarse()), list(around(Centre(3, (4, -2)), 1))):
+    for poses in (list(coarse_poses()), list(round_poses(Centre(3, (4, -2)), 1))):
         found = extremes(dwells(poses, x, y))
         assert found[0] == pytest.approx([np.degrees(0.02 / 0.99), np.degrees(0.05 / np.hypot(0.99, 0.02))], abs=4e-3)
         assert found[1] == pytest.approx([np.degrees(0.03 / 1.02), np.degrees(-0.01 / np.hypot(1.02, 0.03))], abs=2e-3)
 
 
 def test_a_sensor_that_lies_backwards_has_its_extremes_behind() -> None:
-    found = extremes(dwells(list(coarse()), np.array([-1.0, 0.0, 0.0]), np.array([0.0, -1.0, 0.0])))
-    assert abs(centred(found).beta_deg) == 180
+    found = extremes(dwells(list(coarse_poses()), np.array([-1.0, 0.0, 0.0]), np.array([0.0, -1.0, 0.0])))
+    assert abs(centre_of(found).beta_deg) == 180
 
 
 def test_only_a_bracket_that_is_well_off_is_centred_anew() -> None:
@@ -84,7 +93,7 @@ def test_two_rounds_are_enough_on_a_quiet_rig(package: Mapping[str, float], pose
     misalignment(rig, dwell_s=1.0)
     assert len(book.dwells) == poses
     found = extremes([d for d in book.dwells if d.pose.path.endswith(" 2")])
-    assert found[0, 0] == pytest.approx(centred(found).beta_deg, abs=1.5)
+    assert found[0, 0] == pytest.approx(centre_of(found).beta_deg, abs=1.5)
 
 
 def test_it_goes_on_while_rounds_disagree_and_ends_at_the_most() -> None:
@@ -110,4 +119,4 @@ def test_what_it_needs_is_said() -> None:
     with pytest.raises(SettingError, match="target_deg"):
         misalignment(rig, target_deg=0.0)
     with pytest.raises(ProcedureError, match="the adc has no channel vx"):
-        extremes([Dwell(pose, 0.0, {"supply": 5.0}, {}, 1) for pose in coarse()])
+        extremes([Dwell(pose, 0.0, {"supply": 5.0}, {}, 1) for pose in coarse_poses()])

@@ -38,15 +38,15 @@ def test_a_choice_is_one_of_its_own() -> None:
 @pytest.mark.parametrize(
     ("question", "said", "told"),
     [
-        (MOUNTED, "maybe", "it takes yes or no"),
-        (MOUNTED, "", "it takes yes or no"),
-        (LEVEL, "45.1", "it takes a number from -45 to 45 deg"),
-        (LEVEL, "nan", "it takes a number from -45 to 45 deg"),
-        (LEVEL, "level", "it takes a number from -45 to 45 deg"),
-        (DIAL, "9", "it takes yes for 90 deg, or a number from 89.5 to 90.5 deg"),
-        (DIAL, "no", "it takes yes for 90 deg"),
-        (replace(DIAL, expected=None), "", "it takes a number from 89.5 to 90.5 deg"),
-        (SIDE, "bakc", "it takes one of front, back; did you mean 'back'?"),
+        (MOUNTED, "maybe", "answer with yes or no"),
+        (MOUNTED, "", "answer with yes or no"),
+        (LEVEL, "45.1", "answer with a number from -45 to 45 deg"),
+        (LEVEL, "nan", "answer with a number from -45 to 45 deg"),
+        (LEVEL, "level", "answer with a number from -45 to 45 deg"),
+        (DIAL, "9", "answer with yes for 90 deg, or a number from 89.5 to 90.5 deg"),
+        (DIAL, "no", "answer with yes for 90 deg"),
+        (replace(DIAL, expected=None), "", "answer with a number from 89.5 to 90.5 deg"),
+        (SIDE, "bakc", "answer with one of front, back. Did you mean 'back'?"),
     ],
 )
 def test_what_makes_no_sense_is_refused(question: Question, said: str, told: str) -> None:

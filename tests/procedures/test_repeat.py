@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 
 from drivers.errors import LimitError
-from drivers.simulation.config import WorldConfig
-from drivers.simulation.world import World
+from drivers.world.config import WorldConfig
+from drivers.world.world import World
 from procedures.errors import SettingError
 from procedures.repeat import repeat
 from tests.procedures.bench import Adc, session

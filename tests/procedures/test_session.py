@@ -119,7 +119,7 @@ def test_a_pose_without_direction_is_approached_straight() -> None:
 @pytest.mark.parametrize("temperature", [9.9, 40.1, float("nan"), float("inf")])
 def test_a_temperature_outside_the_limits_stops(temperature: float) -> None:
     book, samples = Book(), None
-    with pytest.raises(SafetyLimit, match="outside the bench's limits of 10 to 40 C"):
+    with pytest.raises(SafetyLimit, match="outside the limits of 10 to 40 C"):
         session(book).keep(Pose(90, 0), samples=samples, temperature_c=temperature)  # type: ignore[arg-type]
     assert not book.held
 
@@ -145,7 +145,7 @@ def test_what_a_person_confirms_lets_the_procedure_go_on() -> None:
 
 
 def test_what_a_person_declines_stops_it() -> None:
-    with pytest.raises(Declined, match='mounting: "Is it mounted\\?" was answered with no'):
+    with pytest.raises(Declined, match='mounting: the answer to "Is it mounted\\?" is no'):
         session(Book(answers={"mounting": "no"})).confirm("mounting", "Is it mounted?")
 
 

@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 
 from drivers.errors import LimitError
-from drivers.simulation.config import WorldConfig
-from drivers.simulation.world import World
+from drivers.world.config import WorldConfig
+from drivers.world.world import World
 from procedures.errors import SafetyLimit, SettingError
 from procedures.session import Dwell, Limits, Samples
 from procedures.soak import POWER_ON, schedule, soak
@@ -124,7 +124,7 @@ def test_it_ends_when_it_is_told_that_all_is_steady(until_steady: bool) -> None:
 
 def test_too_hot_a_sensor_stops_it_in_the_middle_of_a_hold() -> None:
     rig, book = bench(limits=Limits(temperature_c=(-20.0, 45.0)))
-    with pytest.raises(SafetyLimit, match="outside the bench's limits"):
+    with pytest.raises(SafetyLimit, match="outside the limits"):
         soak(rig, **SHORT | {"duration_s": 4000.0, "interval_s": 1000.0, "block_s": 10.0}, oven_c=60.0)
     assert book.dwells[-1].pose.path.startswith("hold")
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from procedures.errors import SettingError
 from procedures.session import Pose
-from procedures.sweep import INCLINATIONS_DEG, REFERENCE, grid, referenced, turn
+from procedures.sweep import INCLINATIONS_DEG, REFERENCE, grid, turn, with_references
 
 STEPS = st.sampled_from([180 / k for k in range(1, 40)])
 ANGLES = st.lists(st.floats(-180, 180), min_size=1, max_size=4, unique=True)
@@ -71,7 +71,7 @@ def test_no_inclination_is_refused() -> None:
 
 def test_the_reference_pose_comes_first_last_and_between() -> None:
     poses = list(turn(90, 0, 180, 45, "up"))
-    kept = referenced(poses, 2)
+    kept = with_references(poses, 2)
     assert [pose == REFERENCE for pose in kept] == [True, False, False, True, False, False, True, False, True]
     assert [pose for pose in kept if pose != REFERENCE] == poses
-    assert referenced(poses, 0) == poses
+    assert with_references(poses, 0) == poses

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drivers.simulation.config import WorldConfig
-from drivers.simulation.world import World
+from drivers.world.config import WorldConfig
+from drivers.world.world import World
 from procedures.errors import SettingError
 from procedures.magnetometer_turn import magnetometer_turn
 from procedures.rate_turn import rate_turn

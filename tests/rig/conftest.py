@@ -9,12 +9,11 @@ from pathlib import Path
 import pytest
 import yaml
 
-from calibrations.reading.read_csv import write_csv
+from calibrations.importing.foreign import write_csv
 from rig.bench import DEFAULT
 from rig.cli import main
 from rig.record import Record
-from rig.record.lab_url import lab_url
-from rig.record.roles import prepare
+from rig.record.lab import lab_url, prepare
 from tests.calibrations.synthetic import components, poses, turns
 from tests.rig.postgres import Server, serving
 

@@ -12,15 +12,15 @@ from typing import Any, Literal
 import numpy as np
 
 from drivers.errors import DriverError
-from drivers.links.faults import Fault
-from drivers.links.wire_faults import kinds_of
+from drivers.transport.faults import Fault
+from drivers.transport.wire_faults import kinds_of
 from procedures.catalogue import paths
 from procedures.errors import ProcedureError
 from procedures.session import Reading
 from rig.bench import Bench
 from rig.cli.failure import status_of
 from rig.record import Kept, Record
-from rig.running.runner import Outcome, resume
+from rig.runs.runner import Outcome, resume
 from tests.rig.misbehaving import (
     STRETCHES,
     Aftermath,

@@ -8,13 +8,13 @@ from dataclasses import dataclass, field
 from typing import Any
 from unittest.mock import patch
 
-from drivers.links.faults import Fault
+from drivers.transport.faults import Fault
 from procedures.catalogue import find
 from procedures.settings import parse
 from rig.bench import Bench, read_bench
-from rig.connected.instruments import Rig
+from rig.instruments.instruments import Rig
 from rig.record import Record
-from rig.running.runner import Outcome, start
+from rig.runs.runner import Outcome, start
 from tests.rig.rigging import Onlooker
 
 STAGES = ("alpha", "beta")

@@ -154,7 +154,7 @@ class Points:
         """Be told of every statement, commit and request; write a byte into the file `kept` for a committed pose."""
         from sqlalchemy import Engine, event
 
-        from drivers.links.link import Link
+        from drivers.transport.link import Link
         from rig.record import Record
 
         for name in ("before_cursor_execute", "after_cursor_execute", "commit"):

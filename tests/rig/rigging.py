@@ -19,7 +19,7 @@ from procedures.session import Reading
 from procedures.settings import parse
 from rig.planning.plan import Plan
 from rig.record import Kept
-from rig.running.runner import Outcome, Wish
+from rig.runs.runner import Outcome, Wish
 
 SMALL = {"step_deg": "90", "dwell_s": "0.2", "inclinations_deg": "90,45"}
 SMALL_ARGUMENTS = ("--step-deg", "90", "--dwell-s", "0.2", "--inclinations-deg", "90,45")

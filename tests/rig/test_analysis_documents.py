@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from calibrations.reading.read_csv import write_csv
+from calibrations.importing.foreign import write_csv
 from calibrations.table import Table
 from rig.record import Record
 from tests.calibrations.synthetic import components, poses, turns
@@ -118,7 +118,8 @@ def test_compare(rig: Rig, clean: str, bent: str) -> None:
     found = document(rig("compare", bent, "--model", "linear", "--json"), "rig.comparison/1")
     place = {"where": str, "from": NUMBER, "to": NUMBER, "axis": str, "excess": float, "text": str}
     both = dict.fromkeys(("rmse", "noise_floor", "slow_noise", "excess"), BOTH)
-    check(found, {"schema": str, "data": str, "model": str, "n": int, **both, "fails": [place]})
+    none = dict.fromkeys(("verdict", "residual_structure"), type(None))
+    check(found, {"schema": str, "data": str, "model": str, "n": int, **both, "fails": [place], **none})
     assert (found["data"], found["model"], found["n"]) == (bent, "linear", 130)
     excesses = [place["excess"] for place in found["fails"]]
     assert excesses
@@ -144,6 +145,12 @@ def test_diagnose(rig: Rig, clean: str, bent: str) -> None:
     kinds |= dict.fromkeys(("next_experiment", "own_effect"), (dict, type(None))) | {
         "residual_structure": (str, type(None)),
         "outliers": [int],
+        "text": str,
+        "missing": [str],
+        "provisional": bool,
+        "alternatives": dict,
+        "reason": (str, type(None)),
+        "disturbances": [dict],
     }
     for data, verdict in ((bent, "effect-missing"), (clean, "adequate")):
         found = document(rig("diagnose", data, "--model", "linear", "--json"), "rig.diagnosis/1")

@@ -10,29 +10,30 @@ from typing import Any
 import pytest
 import yaml
 
-from calibrations.model_file import read_model
-from calibrations.reading.read_csv import read_csv, write_csv
+from calibrations.importing.foreign import read_csv, write_csv
+from calibrations.model.file import read_model
 from calibrations.table import Table
 from tests.calibrations.synthetic import components, poses, turns
 
 Rig = Callable[..., Any]
-OWN = '''"""sag: the proof mass sags with the cube of the out-of-plane axis.
-
-    V += c a_o^3      c in {out}/g^3
-
-Symptom   the residual has opposite signs on both sides of alpha = 90 deg.
-Excited by  inclinations on both sides of alpha = 90 deg.
-Confused with  axis-misalignment, near alpha = 90 deg.
-Source    a test.
-"""
-
-from calibrations.effect import Parameter
-
-PARAMETERS = (Parameter("cube", "{out}/g^3", typical=1e-2, doc="output per cube"),)
+OWN = '''from calibrations.effects import Effect, Parameter
 
 
-def transduction(a, table, p):
-    return p["cube"] * a[:, 2:] ** 3
+class Sag(Effect):
+    """sag: the proof mass sags with the cube of the out-of-plane axis.
+
+        V += c a_o^3      c in {out}/g^3
+
+    Symptom   the residual has opposite signs on both sides of alpha = 90 deg.
+    Excited by  inclinations on both sides of alpha = 90 deg.
+    Confused with  axis-misalignment, near alpha = 90 deg.
+    Source    a test.
+    """
+
+    cube = Parameter("{out}/g^3", typical=1e-2, doc="output per cube")
+
+    def transduction(self, a, table, p):
+        return p.cube * a[:, 2:] ** 3
 '''
 
 

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 import yaml
 
-from calibrations.error_table import ErrorTable
-from calibrations.reading.read_csv import read_csv
+from calibrations.geometry.error_table import ErrorTable
+from calibrations.importing.foreign import read_csv
 from rig.bench import DEFAULT
 from rig.record import Record
-from rig.record.angles import as_they_were
 from rig.record.measured import table_of
+from rig.record.tables import correct_angles
 
 WOBBLE_DEG, PHASE_DEG = 0.07, 30.0
 STAGES = {"beta": {"wobble_deg": WOBBLE_DEG, "wobble_phase_deg": PHASE_DEG}}
@@ -46,6 +46,7 @@ def swept(rig: Rig, bench_file: str, *more: str) -> Any:
     return rig("run", "sweep", *settings, "--bench", bench_file, "--unattended", "--json")
 
 
+@pytest.mark.slow
 @pytest.mark.sockets
 def test_an_eccentric_stage_is_found_until_its_error_table_is_given(rig: Rig, tmp_path: Path) -> None:
     autocollimator(tmp_path)
@@ -94,9 +95,9 @@ def test_every_row_of_a_motion_has_the_true_attitude_and_a_still_record_needs_no
         about: dict[str, Any] = {"identities": {}, "configuration": "", "constants": {}, "source": "bench"}
         run = record.run(record.begin("motion", {}, bench=document, **about))
     columns = {"alpha_deg": np.full(3, 45.0), "beta_deg": np.full(3, 90.0), "vx_v": np.arange(3.0)}
-    found, stds = as_they_were(run, columns)
+    found, stds = correct_angles(run, columns)
     np.testing.assert_allclose(found["alpha_deg"], 45.1)
     np.testing.assert_array_equal(found["alpha_set_deg"], 45.0)
     assert stds == {"alpha_std_deg": pytest.approx(0.02)}
     still = {"t_s": np.arange(3.0)}
-    assert as_they_were(run, still) == (still, {})
+    assert correct_angles(run, still) == (still, {})

@@ -13,17 +13,16 @@ import pytest
 from procedures.catalogue import find
 from procedures.errors import SettingError
 from procedures.settings import parse
-from rig.apart import process, steering
-from rig.apart.beside import Beside
-from rig.apart.order import Order, file
-from rig.apart.status import KEPT, Asked, Seat, Status, folder, keys, lock, read, tidy
 from rig.bench import read_bench
 from rig.cli.watch import Quiet
 from rig.errors import RigError
-from rig.home import home
+from rig.files import home
 from rig.lease import lease
 from rig.record import Kept, Record
-from rig.running.runner import Outcome, start
+from rig.runs.background import control, process
+from rig.runs.background.control import Beside
+from rig.runs.background.status import KEPT, Asked, Order, Seat, Status, file, folder, keys, lock, read, tidy
+from rig.runs.runner import Outcome, start
 from tests.rig.rigging import POSES, SMALL
 
 POLL_S = 0.002
@@ -53,7 +52,7 @@ def carried_out(procedure: str, settings: dict[str, str], steer: Callable[[], No
     ended.set()
     person.join()
     assert faults == []
-    status = steering.latest()
+    status = control.latest()
     assert status is not None
     return status
 
@@ -62,7 +61,7 @@ def when(phase: str, also: Callable[[Status], bool] = lambda _: True) -> Status:
     """The status, as soon as it is at `phase`."""
     never = threading.Event()
     for _ in range(round(PATIENCE_S / POLL_S)):
-        status = steering.latest()
+        status = control.latest()
         if status is not None and status.phase == phase and also(status):
             return status
         never.wait(POLL_S)
@@ -82,11 +81,11 @@ def test_a_run_tells_how_it_stands_and_how_it_ended() -> None:
 
 def test_paused_and_gone_on_and_stopped() -> None:
     def person() -> None:
-        steering.pause(when("running"))
+        control.pause(when("running"))
         paused = when("paused")
         assert paused.error == ""
-        steering.answer(paused, "resume")
-        steering.stop(when("running"))
+        control.answer(paused, "resume")
+        control.stop(when("running"))
 
     status = carried_out("soak", {"duration_s": "43200"}, person)
     assert (status.phase, status.state) == ("ended", "stopped")
@@ -95,8 +94,8 @@ def test_paused_and_gone_on_and_stopped() -> None:
 
 def test_stopped_while_it_is_paused() -> None:
     def person() -> None:
-        steering.pause(when("running"))
-        steering.stop(when("paused"))
+        control.pause(when("running"))
+        control.stop(when("paused"))
 
     assert carried_out("soak", {"duration_s": "43200"}, person).state == "stopped"
 
@@ -109,23 +108,23 @@ def test_a_question_is_asked_until_its_answer_makes_sense() -> None:
         assert asking.asked is not None
         assert asking.asked.choices == ["yes", "no"]
         assert asking.asked.attitude is not None
-        steering.answer(asking, "perhaps")
+        control.answer(asking, "perhaps")
         again = when("asking", lambda s: bool(s.asked and s.asked.refused))
         refused.append(again.asked.refused if again.asked else "")
-        steering.answer(again, "yes")
+        control.answer(again, "yes")
 
     status = carried_out("sweep", SMALL, person, attended=True)
     assert status.state == "complete"
-    assert "takes yes or no" in refused[0]
+    assert "answer with yes or no" in refused[0]
 
 
 def test_what_cannot_be_run_is_told_as_well() -> None:
     with pytest.raises(SettingError):
         carried_out("sweep", {"step_deg": "ten"}, lambda: None)
-    status = steering.latest()
+    status = control.latest()
     assert status is not None
     assert (status.phase, status.state) == ("ended", "failed")
-    assert "it takes a number" in status.error
+    assert "give a number" in status.error
 
 
 def test_a_process_that_was_killed_has_ended() -> None:
@@ -156,7 +155,7 @@ def test_of_those_that_are_kept_none_is_under_way() -> None:
     with lease(home(), lock(f"{KEY}-03"), "a test"):
         tidy()
         assert keys()[0] == f"{KEY}-03"
-        status = steering.latest()  # the one that is under way, though others are newer
+        status = control.latest()  # the one that is under way, though others are newer
         assert status is not None
         assert (status.key, status.phase) == (f"{KEY}-03", "running")
 
@@ -171,9 +170,9 @@ class Onlooker(Quiet):
 
     def kept(self, kept: Kept) -> None:
         super().kept(kept)
-        self.seen.append(steering.latest())
+        self.seen.append(control.latest())
         if len(self.seen) == self.stop_at and (status := self.seen[-1]):
-            steering.stop(status)
+            control.stop(status)
 
 
 def in_a_terminal(onlooker: Onlooker, seat: Seat) -> Outcome:
@@ -190,16 +189,16 @@ def test_a_run_of_a_terminal_is_told_as_well() -> None:
     assert last is not None
     assert (last.run, last.phase, last.done, last.total, last.seat) == (run, "running", POSES - 1, POSES, "nobody")
     assert {value["name"] for value in last.values} >= {"temperature", "vx", "vy"}
-    ended = steering.latest()
+    ended = control.latest()
     assert ended is not None
     assert (ended.phase, ended.state, ended.error) == ("ended", "complete", "")
-    with pytest.raises(RigError, match="a pause would end it"):
-        steering.pause(last)
+    with pytest.raises(RigError, match="so it cannot pause"):
+        control.pause(last)
 
 
 def test_a_run_of_a_terminal_is_stopped_from_elsewhere() -> None:
     assert in_a_terminal(Onlooker(stop_at=3), "nobody").run.state == "stopped"
-    ended = steering.latest()
+    ended = control.latest()
     assert ended is not None
     assert (ended.phase, ended.state) == ("ended", "stopped")
     assert "stopped by SIGTERM" in ended.error
@@ -208,8 +207,8 @@ def test_a_run_of_a_terminal_is_stopped_from_elsewhere() -> None:
 def test_what_a_terminal_asks_is_answered_there() -> None:
     asked = Asked("mounting", "Is it mounted?", "yes or no")
     status = Status(KEY, 4711, "sweep", "a bench", phase="asking", asked=asked, seat="terminal")
-    with pytest.raises(RigError, match="asks there"):
-        steering.answer(status, "yes")
+    with pytest.raises(RigError, match="answer there"):
+        control.answer(status, "yes")
 
 
 def test_a_run_goes_on_where_nothing_can_be_told() -> None:
@@ -219,12 +218,12 @@ def test_a_run_goes_on_where_nothing_can_be_told() -> None:
 
 
 def test_nobody_is_answered_who_does_not_ask() -> None:
-    assert (steering.latest(), keys()) == (None, [])
+    assert (control.latest(), keys()) == (None, [])
     status = Status(KEY, 4711, "sweep", "a bench")
     status_of_one_who_asked = replace(status, asked=Asked("mounting", "Is it mounted?", "yes or no"))
-    with pytest.raises(RigError, match="nothing is asked"):
-        steering.answer(status, "yes")
+    with pytest.raises(RigError, match="the run has no question"):
+        control.answer(status, "yes")
     file(KEY, "answers").parent.mkdir(parents=True)
     os.mkfifo(file(KEY, "answers"))
-    with pytest.raises(RigError, match="nobody waits for an answer"):
-        steering.answer(status_of_one_who_asked, "yes")
+    with pytest.raises(RigError, match="does not wait for an answer"):
+        control.answer(status_of_one_who_asked, "yes")

@@ -17,13 +17,13 @@ import pytest
         (("good.csv", "--kind", "pose"), "'pose' is not one of 'poses', 'positions'"),
         (
             ("good.csv", "--column", "vx_v"),
-            '"vx_v": a column is given as NAME=THEIRS or NAME=THEIRS:UNIT, such as vx_v=Vout:mV',
+            '"vx_v": write a column as NAME=THEIRS or NAME=THEIRS:UNIT, such as vx_v=Vout:mV',
         ),
         (("good.csv", "--column", "vx_v=Vot"), 'good.csv: there is no column "Vot"'),
         (("good.csv", "--column", "vx_v=vx_v:mvolt"), 'good.csv: unknown unit "mvolt" of the column "vx_v"'),
         (
             ("good.csv", "--column", "vx_v=vx_v:rad"),
-            'good.csv: the column "vx_v" is in V; "vx_v" in rad cannot become that',
+            'good.csv: the column "vx_v" is in V; "vx_v" in rad cannot be converted to it',
         ),
         (("good.csv", "--kind", "positions"), 'good.csv: a table of positions needs the column "ax"'),
         (
@@ -40,11 +40,11 @@ import pytest
         (("log.csv", "--constant", "sample_rate_hz=fast"), "the constant \"sample_rate_hz\" is 'fast', not a number"),
         (
             ("log.csv", "--constant", "sample_rate_hz=100"),
-            "log.csv: found no still intervals; a log of positions has many of 1 s or more",
+            "log.csv: found no still intervals; keep the sensor still for 1 s or more",
         ),
         (
             ("gyro.csv", "--constant", "sample_rate_hz=100"),
-            "gyro.csv: ax, ay, az are the same in all 5 still intervals, to the noise of a sample",
+            "gyro.csv: ax, ay, az are the same in all 5 still intervals within the noise",
         ),
     ],
 )

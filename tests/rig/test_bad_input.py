@@ -25,12 +25,6 @@ def test_data_that_is_neither_file_nor_run(refused: Callable[..., str], rig: Rig
     assert "nowhere.csv: there is no such file" in refused("diagnose", "nowhere.csv")
 
 
-def test_a_folder_is_no_data(refused: Callable[..., str]) -> None:
-    for command in ("fit", "compare", "diagnose", "discover"):
-        assert ".: is a folder; name a file in it, or a run (`rig runs` lists them)" in refused(command, ".")
-    assert "is a directory" in refused("import", ".")
-
-
 def denied(name: str, method: str) -> Callable[..., Any]:
     """A method of Path that this user may not use on files with `name` in their names; for root as well."""
     original = getattr(Path, method)
@@ -47,43 +41,8 @@ def test_a_file_that_may_not_be_read(refused: Callable[..., str], monkeypatch: p
     def bytes_of(path: Path) -> None:
         raise PermissionError(EACCES, "Permission denied", str(path))
 
-    monkeypatch.setattr("calibrations.reading.text_file._bytes", bytes_of)
+    monkeypatch.setattr("calibrations.importing.files._bytes", bytes_of)
     assert "good.csv: cannot be read: Permission denied" in refused("compare", "good.csv", "--model", "linear")
-
-
-@pytest.mark.parametrize(
-    ("arguments", "says"),
-    [
-        (
-            ("compare", "good.csv", "--model", "liner"),
-            'no shipped model and no file is called "liner"; did you mean "linear"?',
-        ),
-        (
-            ("compare", "good.csv", "--model", "nowhere.yaml"),
-            "nowhere.yaml: the model file cannot be read: No such file",
-        ),
-        (("compare", "good.csv", "--model", "."), ".: the model file cannot be read: Is a directory"),
-        (("effects", "hysterisis"), 'unknown effect "hysterisis"; did you mean "hysteresis"?'),
-        (
-            ("add", "hysterisis", "--model", "linear", "--data", "good.csv", "--out", "o.yaml"),
-            'did you mean "hysteresis"?',
-        ),
-        (
-            ("add", "bias", "--model", "linear", "--data", "good.csv", "--out", "o.yaml"),
-            "linear: bias is in the model already; its effects: bias, scale-factor",
-        ),
-        (
-            ("add", "temperature-bias", "--model", "linear", "--data", "good.csv", "--out", "o.yaml"),
-            "temperature-bias needs the column temperature_c; good.csv is a table of poses: alpha_deg",
-        ),
-        (("diagnos", "good.csv"), "no command 'diagnos'. Did you mean 'diagnose'?"),
-        (("add", "hysteresis", "--model", "linear", "--data", "good.csv"), "Missing option '--out'"),
-        (("fit", "good.csv", "--mdel", "linear"), "No such option"),
-        (("report", "good.csv"), "nothing to write: give --out FILE.html, --pictures FOLDER, or both"),
-    ],
-)
-def test_a_name_that_nobody_knows(refused: Callable[..., str], arguments: tuple[str, ...], says: str) -> None:
-    assert says in refused(*arguments)
 
 
 @pytest.mark.parametrize(
@@ -135,25 +94,29 @@ def test_a_result_that_cannot_be_written(
     refused: Callable[..., str], command: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     said = refused(*command, "--out", "no/model.yaml")
-    assert "no/model.yaml: there is no folder no; make it, or name another file" in said
-    assert "good.csv: would overwrite good.csv, which this is made from" in refused(*command, "--out", "good.csv")
-    assert "mine.yaml: would overwrite mine.yaml" in refused(*command, "--out", "mine.yaml")
+    assert "no/model.yaml: there is no folder no; make it, or give another file" in said
+    assert "good.csv: this would overwrite the input file good.csv; give another file" in refused(
+        *command, "--out", "good.csv"
+    )
+    assert "mine.yaml: this would overwrite the input file mine.yaml; give another file" in refused(
+        *command, "--out", "mine.yaml"
+    )
     assert "is a directory" in refused(*command, "--out", ".")
 
     with monkeypatch.context() as patch:
         patch.setattr(Path, "write_bytes", denied("model.yaml", "write_bytes"))
         said = refused(*command, "--out", "model.yaml")
-    assert "model.yaml: cannot be written: Permission denied; name another file" in said
+    assert "model.yaml: cannot write the file: Permission denied; give another file" in said
 
 
 @pytest.mark.parametrize(
     ("content", "says"),
     [
         ("instrumets: {}\n", "bench.yaml, key instrumets: no such key. Did you mean 'instruments'?"),
-        ("- a\n", "bench.yaml: a bench file is a mapping that begins with `instruments:`"),
-        ("a: [\n", "bench.yaml: is not a YAML file"),
-        ("a: 2001-99-99\n", "bench.yaml: is not a YAML file: month must be in 1..12"),
-        ("[" * 1200, "bench.yaml: is not a YAML file"),
+        ("- a\n", "bench.yaml: the bench file is not a mapping"),
+        ("a: [\n", "bench.yaml: the bench file is not YAML"),
+        ("a: 2001-99-99\n", "bench.yaml: the bench file is not YAML: month must be in 1..12"),
+        ("[" * 1200, "bench.yaml: the bench file is not YAML"),
         ({"folders": {"effect": "mine"}}, "bench.yaml, key folders.effect: no such key. Did you mean 'effects'?"),
         ({"folders": {"effects": "nowhere"}}, "bench.yaml, key folders.effects: there is no folder"),
     ],
@@ -169,34 +132,65 @@ def test_a_bench_file_with_a_fault(
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ("\ndef transduction(", "\ndef transduction", "sag.py, line 16: SyntaxError"),
+        ("def transduction(", "def transduction", "sag.py, line 17: SyntaxError"),
         (
             "def transduction(",
             "def transductoin(",
-            "sag.py: is not an effect: it defines none of the functions pose, force",
+            'sag.py, line 4: Sag: an effect has no member "transductoin"; did you mean "transduction"?',
         ),
-        ('"""sag: ', '"""', 'sag.py: its docstring must begin with "name: what happens."'),
+        (
+            "    def transduction",
+            "    kinds = ('poss',)\n\n    def transduction",
+            'sag.py, line 4: Sag: there is no kind of table "poss"; did you mean "poses"?',
+        ),
+        ('"""sag: ', '"""', 'sag.py: the docstring of Sag must begin with "sag: what happens."'),
         ("Symptom   ", "What one sees ", 'and have a line "Symptom ..."'),
+        ("\n\nclass", "\nimport no_such_module\n\n\nclass", "sag.py, line 3: ModuleNotFoundError: No module named"),
+        ("\n\nclass", "\n1 / 0\n\n\nclass", "sag.py, line 3: ZeroDivisionError: division by zero"),
+        ("\n\nclass", "\nraise SystemExit(0)\n\n\nclass", "sag.py, line 3: SystemExit: 0"),
+        ("class Sag(", "class Sagging(", "sag.py: must define one effect, `class Sag(Effect):`; it defines Sagging"),
         (
-            "\nPARAMETERS",
-            "\nimport no_such_module\n\nPARAMETERS",
-            "sag.py, line 13: ModuleNotFoundError: No module named",
+            "class Sag(Effect)",
+            "class Sag",
+            "sag.py: must define one effect, `class Sag(Effect):`; it defines no effect",
         ),
-        ("\nPARAMETERS", "\n1 / 0\nPARAMETERS", "sag.py, line 13: ZeroDivisionError: division by zero"),
-        ("\nPARAMETERS", "\nraise SystemExit(0)\nPARAMETERS", "sag.py, line 13: SystemExit: 0"),
-        ("PARAMETERS = (", "VALUES = (", "sag.py: is not an effect: PARAMETERS must be a tuple"),
-        ('per cube"),)', 'per cube"))', "sag.py: is not an effect: PARAMETERS must be a tuple"),
-        ("typical=1e-2", "typical='1e-2'", "cube: typical is '1e-2'; it must be a number above 0"),
+        ("cube = Parameter", "_cube = Parameter", "sag.py: Sag has no parameter, as in slope = Parameter("),
         (
-            "\nPARAMETERS",
-            '\nNEEDS = "temperature_c"\nPARAMETERS',
-            'sag.py: NEEDS must be a tuple of names, as in ("temperature_c",)',
+            "def transduction(",
+            "def _transduction(",
+            "sag.py: Sag acts nowhere; define at least one of the methods pose, force, transduction",
         ),
-        ('p["cube"]', 'p["cub"]', "sag.py, line 17: KeyError: 'cub'"),
-        ("a, table, p", "a, table", "sag.py: TypeError: transduction() takes 2 positional arguments"),
+        (
+            "typical=1e-2",
+            "typical='1e-2'",
+            "sag.py, line 15: a parameter: typical is '1e-2'; it must be a number above 0",
+        ),
+        ('"{out}/g^3"', "3", "sag.py, line 15: the unit of a parameter is 3; write it as text, such as"),
+        ("cube = Parameter", "cube = 1.0  # ", 'sag.py, line 4: Sag: an effect has no member "cube"'),
+        (
+            "    cube =",
+            '    needs = "temperature_c"\n    cube =',
+            'sag.py, line 4: Sag: needs must be a tuple of names, as in ("temperature_c",)',
+        ),
+        (
+            "    cube =",
+            '    exact = "no"\n    cube =',
+            "sag.py, line 4: Sag: exact is 'no'; it must be of type bool",
+        ),
+        (
+            "p.cube",
+            "p.cub",
+            'sag.py, line 18: AttributeError: the effect has no parameter "cub"; did you mean "cube"?',
+        ),
+        (
+            "self, a, table, p",
+            "self, a, table",
+            "sag.py, line 4: Sag: transduction must be a method: def transduction(self, a, table, p)",
+        ),
         ("return p", "p", "sag.py: transduction() must give an array of shape (52, 3), and gave a NoneType"),
         ("a[:, 2:] ** 3", "a[:3]", "sag.py: transduction() must give an array of shape (52, 3), and gave shape (3, 3)"),
         ("** 3", "* float('nan')", "sag.py: transduction() gave numbers that are not finite"),
+        ("class Sag(", "PARAMETERS = ()\n\n\nclass Sag(", "sag.py: an effect is a class now"),
     ],
 )
 def test_an_effect_of_ones_own_with_a_fault(
@@ -209,10 +203,10 @@ def test_an_effect_of_ones_own_with_a_fault(
     refused("add", "sag", "--model", "linear", "--data", "good.csv", "--out", "o.yaml", "--bench", bench)
 
 
-def test_a_fault_in_the_file_of_an_effect_is_told_with_its_line(refused: Callable[..., str], work: Path) -> None:
-    (work / "sag.py").write_text(OWN.replace('p["cube"]', 'p["cub"]'))
+def test_an_error_of_an_effect_file_given_by_path_has_its_line(refused: Callable[..., str], work: Path) -> None:
+    (work / "sag.py").write_text(OWN.replace("p.cube", "p.cub"))
     said = refused("add", "sag.py", "--model", "linear", "--data", "good.csv", "--out", "o.yaml")
-    assert "sag.py, line 17: KeyError: 'cub'" in said
+    assert 'sag.py, line 18: AttributeError: the effect has no parameter "cub"; did you mean "cube"?' in said
 
 
 @pytest.mark.sockets

@@ -51,7 +51,7 @@ def test_a_table_with_a_fault(
     [
         (b"", "bad.csv: the file is empty: a header line with column names is missing"),
         (b"# sensor: mine\n\n", "bad.csv: the file is empty"),
-        (b"alpha_deg,beta_deg,vx_v\n", "bad.csv: no rows below the header"),
+        (b"alpha_deg,beta_deg,vx_v\n", "bad.csv: there are no rows below the header"),
         (b"90,0,2.5\n90,10,2.5\n", "bad.csv, line 1: a header line with column names is missing"),
         (b"90,90,2.5\n90,10,2.5\n", "bad.csv, line 1: a header line with column names is missing"),
         (

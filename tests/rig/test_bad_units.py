@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from calibrations.reading.text_file import LARGEST_BYTES
+from calibrations.importing.files import LARGEST_BYTES
 from tests.rig.test_analysis_models import OWN
 
 Refused = Callable[..., str]
@@ -29,7 +29,7 @@ def poses(*more: str, alpha: float = 90.0, scale: float = 1.0, volts: float = 1.
         (poses("temperature_c", "295.1"), "--column temperature_c=temperature_c:K"),
         (poses("supply_v", "0"), 'bad.csv: row 1, column "supply_v" is 0; it must be above 0: without supply there is'),
         ("ax,ay,az\n" + "1e200,1,2\n2,3e200,1\n" * 9, 'row 1, column "ax" is 1e+200, more than anything measured'),
-        ("# unit: g\nax,ay,az\n" + "9.8,0,1\n0,9.8,0\n0,1,9.8\n" * 5, "where a sensor at rest shows 1; they look like"),
+        ("# unit: g\nax,ay,az\n" + "9.8,0,1\n0,9.8,0\n0,1,9.8\n" * 5, "a sensor at rest shows 1; they look like"),
     ],
     ids=["radians", "millivolts", "kelvin", "no-supply", "astronomic", "m/s2"],
 )
@@ -42,7 +42,7 @@ def test_numbers_that_cannot_be(refused: Refused, work: Path, content: str, says
 def test_degrees_taken_for_radians(refused: Refused, work: Path) -> None:
     (work / "bad.csv").write_text(poses())
     said = refused("import", "bad.csv", "--column", "alpha_deg=alpha_deg:rad")
-    assert "reaches 5156.62 deg, and no stage turns beyond 360; give the unit that it is in" in said
+    assert "reaches 5156.62 deg; no stage turns beyond 360 deg; state its unit" in said
 
 
 @pytest.mark.parametrize("size", [2 * LARGEST_BYTES, LARGEST_BYTES // 2])
@@ -54,15 +54,24 @@ def test_a_huge_file_of_nothing_is_answered_at_once(
     monkeypatch.setattr("tests.rig.conftest.contents", lambda folder: sorted(folder.iterdir()))  # reads no GiB
     for command in ("fit", "import"):
         said = refused(command, "huge.csv")
-        assert "more than the 1 GiB that are read" in said or "is not text (byte 0 is 0x00)" in said
+        assert "the limit is 1 GiB" in said or "is not text (byte 0 is 0x00)" in said
 
 
-def test_a_model_in_counts_says_nothing_of_volts(refused: Refused, work: Path) -> None:
-    model = (work / "mine.yaml").read_text().replace("unit: V", "unit: counts")
-    (work / "counts.yaml").write_text(model)
+@pytest.mark.parametrize("unit", ["counts", "mV"])
+def test_a_model_in_another_unit_is_not_taken_for_volts(refused: Refused, work: Path, unit: str) -> None:
+    model = (work / "mine.yaml").read_text().replace("unit: V", f"unit: {unit}")
+    (work / "other.yaml").write_text(model)
     for command in ("compare", "diagnose", "fit"):
-        said = refused(command, "good.csv", "--model", "counts.yaml")
-        assert "its values are for outputs in counts, and good.csv is in V; take a model that was fitted to" in said
+        said = refused(command, "good.csv", "--model", "other.yaml")
+        assert f"its values are for outputs in {unit}, and good.csv is in V; take a model that was fitted to" in said
+
+
+def test_a_compensation_is_not_written_for_a_model_whose_units_differ(refused: Refused, work: Path) -> None:
+    """Otherwise the header of the C file says mV, and its arithmetic is in V."""
+    (work / "mixed.yaml").write_text((work / "mine.yaml").read_text().replace("unit: V", "unit: mV", 1))
+    said = refused("compensate", "mixed.yaml", "--language", "c", "--out", "c")
+    assert 'mixed.yaml: bias: the unit of "bias" x is V, and must be mV in a model with `unit: mV`' in said
+    assert not (work / "c").exists()
 
 
 def test_looking_for_a_run_makes_no_record(
@@ -71,18 +80,18 @@ def test_looking_for_a_run_makes_no_record(
     monkeypatch.setenv("RIG_HOME", str(tmp_path / "home"))
     ended = rig("compare", "nowhere")
     assert getattr(ended, "status", 0) == 2
-    assert "there is no such file, and no run 'nowhere': nothing is recorded yet in" in getattr(ended, "err", "")
+    assert "there is no such file, and no run 'nowhere': there is no record yet in" in getattr(ended, "err", "")
     assert not (tmp_path / "home").exists()
 
 
 def test_an_effect_of_ones_own_takes_no_shipped_name(
     refused: Refused, work: Path, bench_file: Callable[..., Path]
 ) -> None:
-    (work / "bias.py").write_text(OWN)
+    (work / "bias.py").write_text(OWN.replace("class Sag", "class Bias").replace("sag: ", "bias: "))
     bench = str(bench_file({"folders": {"effects": str(work)}}))
     said = refused("diagnose", "good.csv", "--bench", bench)
     assert f"{work}: bias is in the catalogue already; give your effect another name" in said
 
 
 def test_an_unknown_procedure_names_the_nearest(refused: Refused) -> None:
-    assert "did you mean 'sweep'?" in refused("run", "swep", "--unattended")
+    assert "Did you mean 'sweep'?" in refused("run", "swep", "--unattended")

@@ -87,7 +87,7 @@ def test_a_table_says_whose_it_is(run: str) -> None:
 def test_a_run_of_a_batch_needs_the_sensors_name(rig: Call, run: str) -> None:
     ended = rig("compare", run)
     assert ended.status == 2
-    assert f"holds the sensors a1, a2, a3, a4; name one, such as {run}/a1" in ended.err
+    assert f"has the sensors a1, a2, a3, a4; choose one, such as {run}/a1" in ended.err
 
 
 def test_a_sensor_that_is_not_there_is_named_with_the_nearest(rig: Call, run: str) -> None:
@@ -119,9 +119,9 @@ def test_a_search_goes_by_the_first_and_finds_all(rig: Call, swept: tuple[Path, 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"sensor": {"serial": "S9"}}, "key sensor: there is a batch in `sensors` too"),
+        ({"sensor": {"serial": "S9"}}, "key sensor: the file also has a batch in `sensors`"),
         ({"sensors": {"a1": {}, "a2": {}, "a3": {}}}, "no sensor 'a4' in `sensors`. Did you mean 'a"),
-        ({"sensors": {**{n: {} for n in NAMES}, "a5": {}}}, "key sensors.a5: no channel a5.vx of the adc"),
+        ({"sensors": {**{n: {} for n in NAMES}, "a5": {}}}, "key sensors.a5: the adc has no channel a5.vx"),
         ({"sensors": {**{n: {} for n in NAMES}, "a1": {"world": {"heat": {"ambient_c": 9}}}}}, "shared by all"),
         ({"sensors": {**{n: {} for n in NAMES}, "a/5": {}}}, "key sensors.a/5"),
     ],

@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 import yaml
 
-from drivers.links import Address
+from drivers.transport import Address
 from rig.bench import DEFAULT, Bench, drivers, read_bench
 from rig.errors import BenchError
+from rig.instruments.wiring import wired
 
 ONE_INPUT = {"vx": 1, "vy": 1}
 ALPHA = {"driver": "oriental_az", "url": "simulated"}
@@ -44,7 +45,7 @@ def test_a_curve_beside_the_file_is_read_into_the_bench(bench_file: Callable[...
 @pytest.mark.parametrize(
     ("d63", "said"),
     [
-        (None, "key d63: is missing: the channel d63 needs its calibration curve"),
+        (None, "key d63: this key is missing; the channel d63 needs its calibration curve"),
         ({"curve": "none.yaml"}, "key d63.curve: "),
         ({"curve": "d63.yaml", "side": "far"}, "key d63.side: the curve has no far side"),
         ({"curve": "simulated", "side": "nearer"}, "key d63.side: Input should be 'near' or 'far'"),
@@ -63,7 +64,7 @@ def test_a_displacement_sensor_without_its_curve_is_refused(
 
 def test_every_driver_is_found_by_its_file() -> None:
     assert {"oriental_az", "labjack_t7", "omega_cn7500"} <= set(drivers())
-    assert not {"clock", "oriental_az_twin", "oriental_az_table"} & set(drivers())
+    assert not {"clock", "transport", "world"} & set(drivers())
 
 
 @pytest.mark.parametrize(
@@ -72,10 +73,10 @@ def test_every_driver_is_found_by_its_file() -> None:
         ({"sensr": {}}, "key sensr: no such key. Did you mean 'sensor'?"),
         ({"sensor": {"gravity": 9.8}}, "key sensor.gravity: no such key. Did you mean 'gravity_m_s2'?"),
         ({"limits": {"temprature_c": [0, 1]}}, "key limits.temprature_c: no such key. Did you mean 'temperature_c'?"),
-        ({"limits": {"temperature_c": [0]}}, "key limits.temperature_c.1: is missing"),
+        ({"limits": {"temperature_c": [0]}}, "key limits.temperature_c.1: this key is missing"),
         ({"seed": "x"}, "key seed: Input should be a valid integer"),
         ({"instruments": {"alhpa": ALPHA}}, "key instruments.alhpa: no such role. Did you mean 'alpha'?"),
-        ({"instruments": {"alpha": {"driver": "x"}}}, "key instruments.alpha.url: is missing"),
+        ({"instruments": {"alpha": {"driver": "x"}}}, "key instruments.alpha.url: this key is missing"),
         (
             {"instruments": {"alpha": ALPHA | {"drivr": 1}}},
             "key instruments.alpha.drivr: no such key. Did you mean 'driver'?",
@@ -92,7 +93,7 @@ def test_every_driver_is_found_by_its_file() -> None:
             {"instruments": {"alpha": ALPHA | {"settings": {"speed_deg_s": "fast"}}}},
             "key instruments.alpha.settings.speed_deg_s: Input should be a valid number",
         ),
-        ({"instruments": {"alpha": ALPHA | {"error_table": [[0, 0.1]]}}}, "alpha.error_table.0.2: is missing"),
+        ({"instruments": {"alpha": ALPHA | {"error_table": [[0, 0.1]]}}}, "alpha.error_table.0.2: this key is missing"),
         ({"instruments": {"alpha": ALPHA | {"error_table": "a.csv"}}}, "a.csv: cannot be read: No such file"),
         (
             {"instruments": {"alpha": ALPHA | {"error_table": [[0, 0, 0.1], [10, -11, 0.1]]}}},
@@ -100,20 +101,22 @@ def test_every_driver_is_found_by_its_file() -> None:
         ),
         (
             {"instruments": {"oven": {"driver": "omega_cn7500", "url": "simulated", "error_table": [[0, 0, 0.1]]}}},
-            "key instruments.oven.error_table: only alpha and beta have errors of angle",
+            "key instruments.oven.error_table: only alpha and beta have an error table",
         ),
         (
             {"instruments": {"alpha": ALPHA | {"certificate": {"nummer": "1", "due": "2027-03-01"}}}},
             "key instruments.alpha.certificate.nummer: no such key. Did you mean 'number'?",
         ),
         ({"certificates": {"d63": {"number": 1, "due": "soon"}}}, "key certificates.d63.due: Input should be a valid"),
-        ({"sensor": {"gravity_m_s2": 98}}, "key sensor.gravity_m_s2: 98 m/s2 is the gravity of no laboratory"),
-        ({"sensor": {"filter_corner_hz": 0}}, "key sensor.filter_corner_hz: 0 Hz is no corner of a low-pass filter"),
-        ({"limits": {"temperature_c": [60, 20]}}, "key limits.temperature_c: [60, 20] is no range; give the lowest"),
-        ({"limits": {"overrun_deg": -1}}, "key limits.overrun_deg: -1 deg is no way to approach a pose"),
-        ({"limits": {"level_deg": 0}}, "key limits.level_deg: no table is within 0 deg"),
-        ({"limits": {"results": {"gap": [2, 1]}}}, "key limits.results.gap: [2, 1] is no range"),
-        ({"limits": {"results": {"gap": -1}}}, "key limits.results.gap: -1 is no magnitude"),
+        ({"sensor": {"gravity_m_s2": 98}}, "key sensor.gravity_m_s2: is 98, not the gravity of a place on Earth; give"),
+        ({"sensor": {"gravity_m_s2": 1}}, "key sensor.gravity_m_s2: is 1, not the gravity of a place on Earth; it loo"),
+        ({"sensor": {"gravity_m_s2": "9,80131"}}, "is '9,80131'; write 9.80131, with a decimal point"),
+        ({"sensor": {"filter_corner_hz": 0}}, "key sensor.filter_corner_hz: the corner is 0 Hz; give one above 0"),
+        ({"limits": {"temperature_c": [60, 20]}}, "key limits.temperature_c: [60, 20] is not a range; give the lowest"),
+        ({"limits": {"overrun_deg": -1}}, "key limits.overrun_deg: the distance is -1 deg; give 0 or more"),
+        ({"limits": {"level_deg": 0}}, "key limits.level_deg: the limit is 0 deg; give a tilt above 0"),
+        ({"limits": {"results": {"gap": [2, 1]}}}, "key limits.results.gap: [2, 1] is not a range"),
+        ({"limits": {"results": {"gap": -1}}}, "key limits.results.gap: the limit is -1"),
         (
             {"limits": {"results": {"noise-rsm-x": 0.001}}},
             "key limits.results.noise-rsm-x: no procedure has such a result. Did you mean 'noise-rms-x'?",
@@ -124,8 +127,8 @@ def test_every_driver_is_found_by_its_file() -> None:
         ),
         ({"world": {"sensr": {}}}, "'sensr' of the simulated world. Did you mean 'sensor'?"),
         ({"folders": {"effects": "nowhere"}}, "key folders.effects: there is no folder"),
-        ("- a list", "a bench file is a mapping"),
-        ("seed: [", "is not a YAML file"),
+        ("- a list", "the bench file is not a mapping"),
+        ("seed: [", "the bench file is not YAML"),
     ],
 )
 def test_what_is_wrong_is_said_with_its_place(
@@ -149,8 +152,78 @@ def test_a_misspelt_key_is_named_before_what_is_missing_for_it(bench_file: Calla
 
 
 def test_a_file_that_is_not_there_is_said(tmp_path: Path) -> None:
-    with pytest.raises(BenchError, match="cannot be read: No such file"):
+    with pytest.raises(BenchError, match="cannot read the bench file: No such file"):
         read_bench(tmp_path / "bench.yaml")
+
+
+LINE = "serial:/dev/ttyUSB0?baud=115200&parity=E"
+OVEN = {"driver": "omega_cn7500", "url": LINE}
+POSITIONER = {"driver": "pi_e727", "url": "tcp://192.168.1.41:50000"}
+T7 = {"driver": "labjack_t7", "url": "tcp://192.168.1.40:502"}
+
+
+def on(url: str, unit: int | None = None, driver: str = "oriental_az") -> dict[str, object]:
+    return {"driver": driver, "url": url} | ({} if unit is None else {"unit": unit})
+
+
+@pytest.mark.parametrize(
+    ("instruments", "says"),
+    [
+        ({"alpha": on(LINE, 1), "beta": on(LINE)}, f"beta.unit: alpha and beta are both unit 1 at {LINE}, so both"),
+        ({"alpha": on("simulated"), "beta": on("simulated")}, "beta.unit: alpha and beta are both unit 1 at simulated"),
+        ({"alpha": on(LINE, 2), "beta": on(LINE, 3), "oven": OVEN | {"unit": 3}}, "oven.unit: beta and oven are both"),
+        (
+            {"alpha": on("rtu+tcp://LOCALHOST:4001"), "beta": on("rtu+tcp://127.0.0.1:4001")},
+            "are both unit 1 at rtu+tcp://LOCALHOST:4001 (also written rtu+tcp://127.0.0.1:4001), so both",
+        ),
+        ({"alpha": on("rtu+tcp://[::1]:4001"), "beta": on("tcp://localhost:4001")}, "are both unit 1 at"),
+        ({"alpha": on("serial:/dev/tty"), "beta": on("serial:/dev/../dev//tty?baud=9600")}, "are both unit 1 at"),
+        ({"alpha": on("serial:/dev/tty"), "beta": on("serial:/dev//tty", 2)}, "write the same address for both"),
+        ({"alpha": on(POSITIONER["url"], 2), "positioner": POSITIONER}, "but positioner has no unit number"),
+        ({"alpha": on(LINE, 0)}, "alpha.unit: unit 0 is not possible on a serial line; give 1 to 247"),
+        ({"adc": T7 | {"stream_url": "tcp://a:4001"}, "alpha": on("tcp://A:4001")}, "but adc.stream_url has no unit"),
+    ],
+)
+def test_units_that_cannot_share_a_line_are_refused(
+    bench_file: Callable[..., Path], instruments: dict[str, object], says: str
+) -> None:
+    with pytest.raises(BenchError) as error:
+        read_bench(bench_file({"instruments": instruments}))
+    assert "key instruments." in str(error.value)
+    assert says in str(error.value)
+
+
+def test_a_link_to_a_serial_line_is_the_line(bench_file: Callable[..., Path], tmp_path: Path) -> None:
+    (tmp_path / "stages").symlink_to("/dev/ttyUSB0")
+    instruments = {"alpha": on("serial:/dev/ttyUSB0"), "beta": on(f"serial:{tmp_path}/stages")}
+    with pytest.raises(BenchError, match="alpha and beta are both unit 1"):
+        read_bench(bench_file({"instruments": instruments}))
+
+
+@pytest.mark.parametrize(
+    "instruments",
+    [
+        {"alpha": on(LINE, 1), "beta": on(LINE, 2), "oven": OVEN | {"unit": 3}},
+        {"alpha": on("rtu+tcp://converter:4001"), "beta": on("rtu+tcp://converter:4002")},
+        {"alpha": on("simulated"), "oven": OVEN | {"url": "simulated"}},
+        {"alpha": on("simulated:pty:"), "beta": on("simulated")},
+        {role: on("person", driver="manual_stage") for role in ("alpha", "beta")},
+        {role: on("simulated", driver="manual_stage") for role in ("alpha", "beta")},
+    ],
+)
+def test_instruments_that_may_share_a_line_or_a_person(
+    bench_file: Callable[..., Path], instruments: dict[str, object]
+) -> None:
+    assert set(read_bench(bench_file({"instruments": instruments})).instruments) == set(instruments)
+
+
+def test_a_recorded_bench_with_two_roles_on_one_unit_is_not_connected() -> None:
+    twice = {role: part.model_copy(update={"unit": 1}) for role, part in read_bench().instruments.items()}
+    with (
+        pytest.raises(BenchError, match=r"bench 'simulated rig', key instruments\.beta\.unit: alpha and beta are both"),
+        wired(read_bench().model_copy(update={"instruments": twice})),
+    ):
+        pass
 
 
 def test_folders_are_relative_to_the_file(bench_file: Callable[..., Path], tmp_path: Path) -> None:

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from calibrations.fit import Fit, fit
-from calibrations.model_file import read_model
-from calibrations.reading.read_csv import write_csv
+from calibrations.importing.foreign import write_csv
+from calibrations.model.file import read_model
 from calibrations.table import Table
-from rig.analysis.asked_still import asked_still
 from rig.analysis.both import again, both
-from rig.analysis.request import Request
 from rig.errors import RecordError
+from rig.services.load import still_of
+from rig.services.request import Request
 
 ALPHA, BETA = (each.ravel() for each in np.meshgrid([30.0, 90.0, 150.0], np.arange(0.0, 360.0, 30.0)))
 
@@ -54,12 +54,13 @@ def test_without_a_pose_in_common_there_is_nothing() -> None:
     assert again(fitted(range(18)), fitted(range(18, 36))) is None
 
 
+@pytest.mark.slow
 def test_a_still_record_and_poses_have_no_model_in_common(tmp_path: Path) -> None:
     write_csv(table(range(36)), poses := tmp_path / "poses.csv")
     rows = {"vx_v": 2.5 + 1e-3 * np.random.default_rng(1).standard_normal(5000)}
     write_csv(Table.from_columns("still", rows, {"sample_rate_hz": 10.0}, "still"), still := tmp_path / "still.csv")
     asked = [Request(str(path)) for path in (poses, still)]
-    with pytest.raises(RecordError, match=r"still\.csv is a still record, .*poses\.csv is none: no model"):
+    with pytest.raises(RecordError, match=r"poses\.csv is of poses, .*still\.csv of still: no model"):
         both(*asked, print)
 
 
@@ -80,7 +81,6 @@ def test_a_still_record_is_told_as_what_is_sensed_where_its_scale_factor_is_stat
     rows = dict.fromkeys(columns, 2.5 + 1e-3 * np.random.default_rng(1).standard_normal(5000))
     made = Table.from_columns("still", rows, {"sample_rate_hz": 10.0, **constants}, "still")
     write_csv(made, path := tmp_path / "still.csv")
-    found = asked_still(Request(str(path)), print)
-    assert found is not None
-    sensed = found.still.sensed.get("x")
+    found = still_of(Request(str(path)), print)
+    sensed = found.sensed.get("x")
     assert (None if sensed is None else (pytest.approx(sensed.factor), sensed.unit)) == expected

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from calibrations.model_file import dump_model
+from calibrations.model.file import dump_model
 from rig.bench import Bench
 from rig.record import Record
 from tests.calibrations.certified import before

@@ -55,6 +55,7 @@ def test_check_shows_what_is_due_and_fails_for_what_has_expired(rig: Rig, file: 
     assert rig("check", "--bench", file(GOOD, GOOD)).status == 0
 
 
+@pytest.mark.slow
 @pytest.mark.sockets
 def test_a_run_with_an_expired_one_is_marked_everywhere(rig: Rig, file: Callable[..., str], tmp_path: Path) -> None:
     ended = rig(*SWEEP, "--bench", file(OLD, GOOD), "--json")

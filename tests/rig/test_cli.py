@@ -13,7 +13,7 @@ import pytest
 from calibrations.errors import DataError
 from drivers.errors import LimitError, LinkTimeout
 from procedures.errors import SafetyLimit, UnknownProcedure
-from rig.cli import FOLDER, Commands
+from rig.cli import FOLDER, GROUPS, Commands
 from rig.cli import rig as group
 from rig.cli.failure import BROKEN_PIPE, PROGRAM_FAULT, exit_status, status_of
 from rig.errors import BenchError, InstrumentFailed, Stopped
@@ -28,6 +28,11 @@ def loaded(program: str) -> tuple[str, set[str]]:
     return ended.stdout, set(ended.stderr.split())
 
 
+def test_help_groups_every_command_once() -> None:
+    grouped = [name for group in GROUPS.values() for name in group]
+    assert sorted(grouped) == COMMANDS
+
+
 def test_help_lists_every_command_and_imports_none() -> None:
     out, modules = loaded("from rig.cli import main; main(['--help'])")
     assert all(f"  {name} " in out for name in COMMANDS)
@@ -37,7 +42,7 @@ def test_help_lists_every_command_and_imports_none() -> None:
 def test_a_run_begins_without_what_only_reports_and_motions_need() -> None:
     """These take as long to load as all the rest."""
     _, modules = loaded("import rig.cli.run")
-    assert "rig.running.runner" in modules
+    assert "rig.runs.runner" in modules
     assert not {"matplotlib", "scipy.signal", "scipy.stats", "scipy.interpolate"} & modules
 
 

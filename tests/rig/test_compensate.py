@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from calibrations.model_file import dump_model
+from calibrations.model.file import dump_model
 from tests.calibrations.fitted import PHYSICAL, model
 
 Rig = Callable[..., Any]

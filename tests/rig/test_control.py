@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from rig.record import Record
-from rig.results.names import names
+from rig.results.evaluate import names
 
 Rig = Callable[..., Any]
 QUIET = [2.50001, 2.49999] * 5
@@ -93,7 +93,7 @@ def test_its_pictures_are_files_of_each_sensor(rig: Rig, tmp_path: Path) -> None
     picture = (tmp_path / "charts" / "control-CS-1.svg").read_text()
     assert f"written: {tmp_path / 'charts' / 'control-CS-1.svg'}" in ended.out
     assert all(
-        words in picture for words in ("individuals", "moving range", "EWMA", "bias-x less 2.5 V", "out of control")
+        words in picture for words in ("Individuals", "Moving ranges", "EWMA", "bias-x less 2.5 V", "out of control")
     )
 
 

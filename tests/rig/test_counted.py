@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from calibrations.effect import catalogue
-from rig.analysis.request import Request
-from rig.analysis.trail import trail
-from rig.web.counted import Cancelled, Counted
+from calibrations.effects.catalogue import catalogue
+from rig.services.request import Request
+from rig.services.session import model_session
+from rig.web.parts import Cancelled, Counted
 from tests.browser.measured import hidden
 
 
@@ -28,7 +28,7 @@ def test_it_tells_what_is_tried() -> None:
 
 
 def test_what_is_cancelled_ends(tmp_path: Path) -> None:
-    found = trail(Request(hidden(tmp_path, "package turned")))
+    found = model_session(Request(hidden(tmp_path, "package turned")))
     counted = Counted(found.effects)
     counted.cancelled = True
     with pytest.raises(Cancelled):

@@ -41,7 +41,7 @@ def test_it_collects_versions_checks_runs_and_the_last_runs_log(rig: Callable[..
 
 def test_without_any_run_there_is_nothing_to_complain_about(rig: Callable[..., Any], tmp_path: Path) -> None:
     ended = rig("doctor", "--out", str(tmp_path / "doctor.zip"))
-    assert (ended.status, "nothing is recorded yet" in ended.out) == (0, True)
+    assert (ended.status, "there is no run yet" in ended.out) == (0, True)
 
 
 def test_a_bench_goes_with_it_and_no_secret(rig: Callable[..., Any], tmp_path: Path, bench_file: Any) -> None:
@@ -111,8 +111,8 @@ def _kept(folder: Path, run: str) -> dict[int, Kept]:
 
 def test_a_record_is_not_recovered_over_another_and_nothing_out_of_nothing(tmp_path: Path) -> None:
     recorded(tmp_path / "old", 1)
-    with pytest.raises(RecordError, match="is there already; name a folder without a record"):
+    with pytest.raises(RecordError, match="this record exists already; give a folder without a record"):
         recover(tmp_path / "old" / "record.db", tmp_path / "old")
     (tmp_path / "letters").write_text("no database" * 1000)
-    with pytest.raises(RecordError, match="nothing of it can be read"):
+    with pytest.raises(RecordError, match="no row is readable"):
         recover(tmp_path / "letters", tmp_path / "new")

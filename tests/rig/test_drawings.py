@@ -16,9 +16,8 @@ import pytest
 from procedures.catalogue import SHIPPED
 from procedures.questions import Confirm, Mounting
 from rig.drawings import Attitude, drawing_of, page, sketch, svg
-from rig.drawings.named import NAMED
-from rig.drawings.rig_view import CAMERA_FROM
-from rig.drawings.solids import Camera, box, cylinder
+from rig.drawings.attitude import NAMED
+from rig.drawings.rig_view import CAMERA_FROM, Camera, box, cylinder
 
 Rig = Callable[..., Any]
 SVG = "{http://www.w3.org/2000/svg}"
@@ -127,4 +126,4 @@ def test_what_cannot_be_drawn_is_refused(rig: Rig, tmp_path: Path) -> None:
         assert not (tmp_path / name).exists()
     ended = rig("draw", "--out", str(tmp_path / "no" / "such.svg"))
     assert (ended.status, ended.out) == (2, "")
-    assert "name another file" in ended.err
+    assert "give another file" in ended.err

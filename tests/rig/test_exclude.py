@@ -13,7 +13,7 @@ from rig.analysis.exclusion import RESULTS, exclude
 from rig.lease import lease
 from rig.record import Record
 from rig.record.measured import table_of
-from rig.running.runner import resume, start
+from rig.runs.runner import resume, start
 from tests.rig.rigging import POSES, Onlooker, sigterm_at, small_sweep
 
 Rig = Callable[..., Any]
@@ -155,4 +155,4 @@ def test_a_run_that_goes_on_is_left_alone(rig: Rig, run: str) -> None:
     with Record() as record, lease(record.folder, run, "it"):
         ended = rig("exclude", run, "1", "--reason", "x")
     assert ended.status == 2
-    assert f"works on run {run}; let it finish" in ended.err
+    assert f"uses run {run}; wait until it ends" in ended.err

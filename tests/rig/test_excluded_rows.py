@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from calibrations.errors import DataError
-from calibrations.reading.read_csv import write_csv
+from calibrations.importing.foreign import write_csv
 from rig.analysis.data import load
 from tests.calibrations.synthetic import components, poses, turns
 from tests.rig.conftest import Ended

@@ -13,15 +13,14 @@ import dask
 import pytest
 from distributed import Client, LocalCluster
 
-from calibrations.model_file import dump_model, read_model
-from calibrations.reading.read_csv import write_csv
+from calibrations.importing.foreign import write_csv
+from calibrations.model.file import dump_model, read_model
 from rig.errors import RigError
-from rig.fleet.asked import Fleet
 from rig.fleet.crew import FleetError, answered, crew
 from rig.fleet.discover import discover_fleet
 from rig.fleet.members import Member, fleet_of
-from rig.fleet.worker import Question
-from rig.fleet.written import read_look, write_look
+from rig.fleet.questions import Fleet
+from rig.fleet.worker import Question, read_look, write_look
 from rig.record import Record
 from tests.calibrations.fleets import Flaw, Rig, sensor
 
@@ -98,7 +97,7 @@ def test_the_rig_in_error_and_the_strange_sensor_are_found_and_bad_files_are_lis
 def test_what_the_record_knows_is_not_worked_out_again(
     discovered: Mapping[str, Any], folder: Path, home: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rig.fleet.asked.answered", lambda *_: pytest.fail("asked again"))
+    monkeypatch.setattr("rig.fleet.questions.answered", lambda *_: pytest.fail("asked again"))
     members = [m for m in fleet_of([str(folder)]) if m.sensor not in ("BAD", "GONE")]
     with Record(home) as record:
         again = discover_fleet(Fleet(None, record, lambda *_: None), members, START)  # type: ignore[arg-type]
@@ -129,12 +128,12 @@ def test_answers_are_kept_as_they_come(cluster: LocalCluster, folder: Path, tmp_
     members = [m for m in fleet_of([str(folder)]) if m.fault is None][:3]
     asked = [(member, Question("diagnosis", LINEAR)) for member in members]
     with Client(cluster) as client, Record(tmp_path) as record, pytest.MonkeyPatch.context() as patch:
-        patch.setitem(__import__("rig.fleet.asked").fleet.asked.CHUNK, "diagnosis", 1)
+        patch.setitem(__import__("rig.fleet.questions").fleet.questions.CHUNK, "diagnosis", 1)
         stopped = Fleet(client, record, lambda *_: None).ask(asked)
         first, _ = next(stopped)
         stopped.close()
         left: list[list[Any]] = []
-        patch.setattr("rig.fleet.asked.answered", lambda _client, _work, chunks: left.extend(chunks) or [])
+        patch.setattr("rig.fleet.questions.answered", lambda _client, _work, chunks: left.extend(chunks) or [])
         again = [member for member, _ in Fleet(client, record, lambda *_: None).ask(asked)]
     assert again == [first]
     assert sum(map(len, left)) == 2
@@ -147,6 +146,7 @@ def fragile(tasks: list[int]) -> list[int]:
     return tasks
 
 
+@pytest.mark.slow
 def test_a_worker_that_dies_loses_nothing_and_what_kills_it_is_told_alone() -> None:
     with crew(None, 1) as client:
         found = list(answered(client, fragile, iter([[0, 1], [], [2, 3], [4]])))
@@ -206,10 +206,9 @@ def test_members_of_files_folders_and_runs(tmp_path: Path, monkeypatch: pytest.M
 
 
 def test_a_look_is_written_and_read_to_the_last_bit() -> None:
-    from calibrations.fleet.columns import Shared
-    from calibrations.fleet.look import look
+    from calibrations.fleet.look import SharedDesigns, screen_sensor
 
-    found = look(sensor(1), read_model("linear"), Shared({}))
+    found = screen_sensor(sensor(1), read_model("linear"), SharedDesigns({}))
     document = json.dumps(write_look(found))
     assert json.dumps(write_look(read_look(json.loads(document)))) == document
 

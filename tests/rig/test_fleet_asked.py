@@ -12,45 +12,44 @@ import numpy as np
 import pytest
 from distributed import Client, LocalCluster
 
-from calibrations.effect import catalogue
+from calibrations.discovery.candidates import candidates
+from calibrations.discovery.significance import Screen
+from calibrations.effects.catalogue import catalogue
 from calibrations.fit import fit
-from calibrations.fleet.columns import Shared
-from calibrations.fleet.look import Look, Score, look
-from calibrations.model_file import dump_model, read_model
-from calibrations.reading.read_csv import write_csv
-from calibrations.search.candidates import candidates
-from calibrations.search.screen import Screen
+from calibrations.fleet.look import Score, Screening, SharedDesigns, screen_sensor
+from calibrations.importing.foreign import write_csv
+from calibrations.model.file import dump_model, read_model
 from calibrations.table import Table
-from rig.fleet import asked as asked_module
-from rig.fleet.asked import Fleet
+from rig.fleet import questions as asked_module
 from rig.fleet.discover import discover_fleet
 from rig.fleet.members import Member, fleet_of
-from rig.fleet.worker import Question, Task, answer
-from rig.fleet.written import write_look
+from rig.fleet.questions import Fleet
+from rig.fleet.worker import Question, Task, answer, write_look
 from rig.record import Record
 from tests.calibrations import turned
 from tests.calibrations.fleets import BETA, sensor
 
-RIPPLE = '''"""ripple: the converter's reference follows the table's motor, and the output with it.
+RIPPLE = '''import numpy as np
 
-    v <- v + a cos(3 beta)      a in {out}; 3 pole pairs
-
-Symptom   three waves in a turn of beta.
-Excited by  a full turn of beta.
-Confused with  nothing.
-Source    the motor's data sheet.
-"""
-
-import numpy as np
-
-from calibrations.effect import Parameter
-
-KINDS = ("poses",)
-PARAMETERS = (Parameter("wave", "{out}", typical=1e-3, doc="height"),)
+from calibrations.effects import Effect, Parameter
 
 
-def transduction(a, table, p):
-    return np.cos(3 * np.radians(table.column("beta_deg")))[:, None] * p["wave"]
+class Ripple(Effect):
+    """ripple: the converter's reference follows the table's motor, and the output with it.
+
+        v <- v + a cos(3 beta)      a in {out}; 3 pole pairs
+
+    Symptom   three waves in a turn of beta.
+    Excited by  a full turn of beta.
+    Confused with  nothing.
+    Source    the motor's data sheet.
+    """
+
+    kinds = ("poses",)
+    wave = Parameter("{out}", typical=1e-3, doc="height")
+
+    def transduction(self, a, table, p):
+        return np.cos(3 * np.radians(table.column("beta_deg")))[:, None] * p.wave
 '''
 
 
@@ -118,9 +117,9 @@ def test_of_positions_and_rates_no_columns_are_shared(tmp_path: Path) -> None:
     """Two gyroscopes on one program of rates, one of them leaning: each has its own statistics."""
     first, table = turned.gyroscope(1), turned.gyroscope(2, lean_deg=2.0)
     model, effects = read_model("gyroscope"), catalogue()
-    shared = Shared(effects)
-    look(first, model, shared)
-    found, fitted = look(table, model, shared), fit(model, table)
+    shared = SharedDesigns(effects)
+    screen_sensor(first, model, shared)
+    found, fitted = screen_sensor(table, model, shared), fit(model, table)
     own = {c.name: Screen(fitted).statistic(c.basis) for c in candidates(fitted, effects)}
     statistics = {name: max(s.statistic for s in found.scores if s.effect == name) for name in own}
     assert statistics == pytest.approx(own, rel=1e-6, abs=1e-3)
@@ -142,14 +141,14 @@ class Told:
 
     def __init__(self, of: dict[tuple[str, ...], dict[str, float]]) -> None:
         self.of, self.asked = of, set[tuple[str, ...]]()
-        self.bare = look(sensor(1), read_model("linear"), Shared({}))
+        self.bare = screen_sensor(sensor(1), read_model("linear"), SharedDesigns({}))
 
     def ask(self, asked: Sequence[tuple[Member, Question]]) -> Iterator[tuple[Member, Any]]:
         for member, question in asked:
             self.asked.add(question.effects)
             yield member, write_look(self._look(int(member.sensor), question.effects))
 
-    def _look(self, seed: int, effects: tuple[str, ...]) -> Look:
+    def _look(self, seed: int, effects: tuple[str, ...]) -> Screening:
         rng = np.random.default_rng([seed, len(effects)])
         strong = self.of.get(effects, {})
         scores = tuple(

@@ -8,14 +8,14 @@ from unittest.mock import patch
 
 import pytest
 
-from drivers import oriental_az_table as az
 from drivers.errors import DriverError, OverTemperature
-from drivers.links.faults import Fault
-from drivers.oriental_az_twin import Drive
+from drivers.oriental_az import registers as az
+from drivers.oriental_az.twin import Drive
+from drivers.transport.faults import Fault
 from rig.cli.failure import status_of
-from rig.connected.guard import AT_ONCE_S, GuardedClock, Look
+from rig.instruments.guard import AT_ONCE_S, GuardedClock, Look
 from rig.record import Record
-from rig.running.runner import resume
+from rig.runs.runner import resume
 from tests.rig.misbehaving import afflicted, digest, guarded_bench, looking_on, short, watched_bench
 from tests.rig.rigging import Onlooker
 
@@ -143,6 +143,7 @@ def test_a_stop_is_on_the_wire_within_a_tenth_of_a_second(role: str, fault: Faul
         assert (aftermath.turning, aftermath.complaints) == ([], [])
 
 
+@pytest.mark.slow
 @pytest.mark.sockets
 def test_a_run_that_was_stopped_by_an_interlock_goes_on_as_if_nothing_had_been() -> None:
     bench = guarded_bench()

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from rich.console import Console, RenderableType
 
+from calibrations.presentation.text import columns, duration, size
 from procedures.catalogue import find
 from procedures.errors import Declined, NoAnswer
 from procedures.questions import Choice, Confirm, Mounting, Number
@@ -21,18 +22,16 @@ from rig.bench import Bench, read_bench
 from rig.cli.before import before, checks, mounting
 from rig.cli.gauge import WIDTH, gauge
 from rig.cli.guide import Guide
-from rig.cli.output import columns
 from rig.cli.screen import screen
 from rig.cli.watch import watching
 from rig.drawings import Attitude, page
 from rig.errors import Stopped
-from rig.numerals import duration, size
+from rig.files import free_bytes
 from rig.planning.plan import Plan, plan
 from rig.record import Block, Kept, Record
-from rig.room import free_bytes
-from rig.running.runner import Outcome
-from rig.running.seen import Seen, nearness
-from rig.running.way import Way
+from rig.runs.observer import Seen, nearness
+from rig.runs.progress import Way
+from rig.runs.runner import Outcome
 from tests.rig.rigging import POSES, small_sweep
 
 TODAY = date(2026, 11, 21)
@@ -93,8 +92,8 @@ def planned(name: str = "sweep", bench: Bench | None = None) -> Plan:
 def test_before_a_run_one_screen_says_all_of_it() -> None:
     text = shown(before(planned(), SWEEP, read_bench(), 2_000_000_000, TODAY))
     for piece in (
-        "Hold the sensor at a grid of stage angles, each way round.",
-        "scale factor, bias, cross-axis, misalignment, hysteresis, stage errors.",
+        "Hold the sensor at a grid of stage angles, in both directions of beta.",
+        "scale factor, bias, cross-axis effects, misalignment, hysteresis, stage errors.",
         "518 poses",
         "56:",
         "alpha 90, beta 0 to 360 deg: 37 poses  A+ to B-",
@@ -210,7 +209,7 @@ def test_scatter_is_compared_with_what_is_usual_for_such_poses(run: str) -> None
             shown_to.kept(kept(number, 0.001, "still 1"))
         assert "as usual" in shown(shown_to._screen())
         shown_to.kept(kept(4, 0.005, "still 2"))
-        assert "5 x the usual" in shown(shown_to._screen())
+        assert "5 times the usual value" in shown(shown_to._screen())
         shown_to.kept(kept(5, 0.5, "motion 1"))
         assert "usual" not in shown(shown_to._screen())
 
@@ -257,8 +256,8 @@ def test_a_procedure_that_expects_part_by_part_has_the_plans_total() -> None:
 
 def test_simulated_time_is_said_to_be_that() -> None:
     way = Way(at_s=(10.0,), end_s=60.0).expect(1, 0)
-    assert "0:50 left as planned" in shown(screen(seen(way=way), 0.0))
-    assert "0:50 of simulated time left as planned" in shown(screen(seen(way=way, simulated=True), 0.0))
+    assert "0:50 left by the plan" in shown(screen(seen(way=way), 0.0))
+    assert "0:50 of simulated time left by the plan" in shown(screen(seen(way=way, simulated=True), 0.0))
 
 
 # questions
@@ -278,7 +277,7 @@ def test_a_person_is_asked_until_the_answer_makes_sense(said: Callable[..., None
     shown_to, told = guide()
     with shown_to:
         assert shown_to.ask(Number("level-x", "What does it show?", unit="deg", low=-45, high=45), None) == "0.2"
-    assert "it takes a number from -45 to 45 deg" in told.getvalue()
+    assert "answer with a number from -45 to 45 deg" in told.getvalue()
 
 
 def test_a_question_has_its_drawing_once(said: Callable[..., None], rig_home: Path) -> None:
@@ -319,7 +318,7 @@ def test_the_menu_says_what_each_answer_means(said: Callable[..., None], outcome
         "stopped by SIGINT",
         "alpha may still move: silence",
         "alpha 90, beta 10 deg",
-        "it takes one of resume",
+        "answer with one of resume",
     ):
         assert piece in text
 

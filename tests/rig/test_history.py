@@ -12,7 +12,7 @@ import pytest
 
 from calibrations.fit import Fit, fit
 from calibrations.model import Model
-from calibrations.model_file import read_model
+from calibrations.model.file import read_model
 from calibrations.table import Table
 from rig.analysis.history import Calibration, Value, history, latest
 from rig.analysis.history_compared import compare_rigs

@@ -7,9 +7,9 @@ from datetime import date
 import pytest
 from starlette.datastructures import QueryParams
 
-from rig.analysis.provenance import today
 from rig.errors import RigError
-from rig.web.pages.history_asked import Asked, asked
+from rig.services.provenance import today
+from rig.web.pages.history_results import Asked, asked
 
 
 @pytest.mark.parametrize(

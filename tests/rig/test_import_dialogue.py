@@ -36,7 +36,7 @@ def test_a_mapping_is_confirmed_corrected_and_can_be_repeated(file: Path, rig: C
             (r'"times" is none of our columns.*Zeit .*\[-\]: ', "t_s:min"),
             (r"inclination +90 \.\. 90 +\[alpha_deg\]: ", ""),
             (r"table .*\[beta_deg\]: ", "V"),
-            (r'in deg; "table" in V cannot become that.*table .*\[beta_deg\]: ', "alpha_deg"),
+            (r'in deg; "table" in V cannot be converted to it.*table .*\[beta_deg\]: ', "alpha_deg"),
             (r"alpha_deg is taken already.*table .*\[beta_deg\]: ", ""),
             (r"Ux .*\[vx_v:mV\]: ", "uV"),
             (r"The same again, without questions:\s+rig ([^\r\n]*)", None),

@@ -21,6 +21,7 @@ from rig.record import Record
 from tests.rig.killing import MOTION, RUN, SOAK, Story, Undisturbed, finished, inspected, many, measured, undisturbed
 from tests.rig.nursery import Harm, Nursery
 from tests.rig.rigging import in_own_process, signal_at
+from tests.slow import first_fast
 
 pytestmark = pytest.mark.sockets
 KILLS = 10  # of each seed
@@ -37,12 +38,14 @@ def whole(nursery: Nursery, tmp_path_factory: pytest.TempPathFactory) -> Undistu
     return undisturbed(nursery, tmp_path_factory.mktemp("undisturbed"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_kills_at_random_moments(nursery: Nursery, whole: Undisturbed, tmp_path: Path, seed: int) -> None:
     survived = many(nursery, tmp_path, whole, seed, KILLS)
     assert survived.total() >= KILLS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [SOAK, MOTION], ids=lambda words: words[1])
 def test_kills_of_records_without_gaps(nursery: Nursery, tmp_path: Path, words: tuple[str, ...]) -> None:
     survived = many(nursery, tmp_path, undisturbed(nursery, tmp_path / "undisturbed", words), 7, 3)
@@ -51,7 +54,9 @@ def test_kills_of_records_without_gaps(nursery: Nursery, tmp_path: Path, words: 
 
 @pytest.mark.parametrize(
     ("table", "number", "poses"),
-    [("blocks", 1, 0), ("blocks", 9, 8), ("states", 1, 0), ("events", 1, 0), ("readings", 2, 0), ("readings", 4, 0)],
+    first_fast(
+        [("blocks", 9, 8), ("blocks", 1, 0), ("states", 1, 0), ("events", 1, 0), ("readings", 2, 0), ("readings", 4, 0)]
+    ),
 )
 def test_a_kill_inside_a_transaction(
     nursery: Nursery, whole: Undisturbed, rig_home: Path, table: str, number: int, poses: int
@@ -63,6 +68,7 @@ def test_a_kill_inside_a_transaction(
     finished(nursery, rig_home, whole, Story(seen=[seen]))
 
 
+@pytest.mark.slow
 def test_whole_processes_killed_while_they_start(nursery: Nursery, whole: Undisturbed, rig_home: Path) -> None:
     luck, seen = random.Random(1), Story().seen[-1]
     for _ in range(3):
@@ -80,14 +86,14 @@ def test_whole_processes_killed_while_they_start(nursery: Nursery, whole: Undist
     finished(nursery, rig_home, whole, Story(seen=[seen]))
 
 
-@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+@pytest.mark.parametrize("name", first_fast(["SIGTERM", "SIGINT"]))
 def test_a_signal_ends_the_process_with_status_4_and_resume_finishes_the_run(
     name: str, nursery: Nursery, whole: Undisturbed, rig_home: Path
 ) -> None:
     stopped = in_own_process(*RUN, harm=signal_at("blocks", 5, name))
     document = json.loads(stopped.stdout)
     assert (stopped.returncode, document["state"]) == (4, "stopped")
-    assert f"stopped by {name}; `rig resume {document['run']}` goes on" in stopped.stderr
+    assert f"stopped by {name}; `rig resume {document['run']}` continues the run" in stopped.stderr
     assert "Traceback" not in stopped.stderr
     resumed = nursery.run(rig_home, "resume", document["run"], "--unattended", "--json")
     assert resumed.status == 0, resumed.said

@@ -15,11 +15,10 @@ from rig.bench import read_bench
 from rig.cli import rig as commands
 from rig.cli.record_option import OPTION
 from rig.errors import RecordError
-from rig.home import LAB, RECORD
+from rig.files import LAB, RECORD
 from rig.record import Record
-from rig.record.lab_url import has_password, lab_url
+from rig.record.lab import has_password, lab_url, prepare
 from rig.record.push import push
-from rig.record.roles import prepare
 from rig.record.schema import SCHEMA
 from rig.web.desk import runs as runs_of_workbench
 from tests.rig.conftest import WORD, Ended
@@ -101,12 +100,12 @@ def test_a_reader_writes_nothing(reader: str, writer: str, rig: Rig) -> None:
         run = a_run(own)
     refused = rig("push", "--to", reader)
     assert refused.status == 2
-    assert "anna may not do that (permission denied for table" in refused.err
+    assert "anna has no permission for this (permission denied for table" in refused.err
     assert rig("push", "--to", writer).status == 0
     for words in (("exclude", run, "3", "--reason", "no"), ("import", "good.csv", "--kind", "poses")):
         refused = rig(*words, "--record", reader)
         assert refused.status == 2
-        assert "its owner can give it rig_writer" in refused.err
+        assert "the owner can grant it rig_writer" in refused.err
     for table in ("runs", "poses", "blocks", "arrivals", "events", "log"):
         for statement in ("DELETE FROM {}", "UPDATE {} SET run = run", "INSERT INTO {} DEFAULT VALUES"):
             assert "permission denied" in denied(reader, statement.format(table))
@@ -123,8 +122,8 @@ def test_a_rig_that_is_offline_goes_on_and_catches_up(
     bench = str(bench_file({"lab": {"url": away, "push": True}}))
     ended = rig(*SWEEP, "--bench", bench, "--json")
     run = said(ended)["run"]
-    assert f"not pushed: {away}: the lab's record cannot be reached (connection" in ended.err
-    assert "nothing is lost, the next `rig push` goes on" in ended.err
+    assert f"not pushed: {away}: no connection to the lab's record (connection" in ended.err
+    assert "nothing is lost, the next `rig push` continues" in ended.err
     assert rig("push", "--bench", bench).status == 2
     there = server.url(database)
     again = rig(*SWEEP, "--bench", str(bench_file({"lab": {"url": there, "push": True}})), "--json")
@@ -183,9 +182,7 @@ def test_a_password_is_nowhere(
 
 def test_a_bench_with_a_password_is_refused_with_its_key(bench_file: Callable[..., Path], rig: Rig) -> None:
     file = bench_file({"lab": {"url": f"postgresql://rig7:{WORD}@lab/rigs"}})
-    assert (
-        "bench.yaml, key lab.url: has a password, which every run would keep" in rig("check", "--bench", str(file)).err
-    )
+    assert "bench.yaml, key lab.url: the URL has a password" in rig("check", "--bench", str(file)).err
 
 
 def test_where_runs_are_pushed_is_no_part_of_what_they_depend_on(bench_file: Callable[..., Path]) -> None:
@@ -208,7 +205,7 @@ def test_a_database_is_prepared_once_and_brought_up_to_date(server: Server, rig:
         run = a_run(own)
         push(own, lab, run)
     server.sql("ALTER TABLE runs DROP COLUMN uid; DROP TABLE arrivals; COMMENT ON TABLE runs IS 'schema 6'", name)
-    assert f"of an older version (schema 6 of {SCHEMA}); `rig push --prepare" in rig("runs", "--record", url).err
+    assert f"this record has an older schema (6 of {SCHEMA}); `rig push --prepare" in rig("runs", "--record", url).err
     assert prepare(lab_url(url)) == 6
     assert f"{run}  complete" in rig("runs", "--record", url).out
     server.sql(f"COMMENT ON TABLE runs IS 'schema {SCHEMA + 1}'", name)
@@ -236,4 +233,4 @@ def test_a_cut_is_told_in_one_message(server: Server, database: str) -> None:
         ended = subprocess.run(words, capture_output=True, text=True, check=False)
     assert (ended.returncode, ended.stdout) == (2, "")
     assert len(ended.stderr.splitlines()) == 1
-    assert "nothing is lost, the next `rig push` goes on" in ended.stderr
+    assert "nothing is lost, the next `rig push` continues" in ended.stderr

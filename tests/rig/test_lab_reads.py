@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 import yaml
 
-from calibrations.model_file import dump_model
+from calibrations.model.file import dump_model
 from rig.analysis.several import load_all
 from rig.bench import DEFAULT
 from rig.cli import main
-from rig.home import RECORD
+from rig.files import RECORD
 from rig.record import Record
 from tests.calibrations.fitted import LINEAR, model
 from tests.rig.conftest import Ended, contents
@@ -134,7 +134,7 @@ def test_a_fleet_is_read_there_and_its_answers_are_kept_here(
     both: Callable[..., None], laboratory: Laboratory, monkeypatch: pytest.MonkeyPatch, rig_home: Path
 ) -> None:
     monkeypatch.setattr("rig.fleet.crew.crew", lambda *_: nullcontext())
-    monkeypatch.setattr("rig.fleet.asked.answered", lambda _, do, chunks: ((tasks, do(tasks)) for tasks in chunks))
+    monkeypatch.setattr("rig.fleet.questions.answered", lambda _, do, chunks: ((tasks, do(tasks)) for tasks in chunks))
     both("fleet", "calibrate", laboratory.runs["poses"], "--json")
     with Record() as own:
         assert own.runs() == []

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from rig.record.lab_url import lab_url
-from rig.record.server import options
+from rig.record.lab import lab_url, options
 from tests.rig.conftest import WORD, Ended
 from tests.rig.cutting import Judge, wire
 from tests.rig.postgres import Server
@@ -58,8 +57,8 @@ def test_a_server_of_another_root_or_name_is_refused(
         assert (ended.status, ended.out) == (2, "")
         assert len(ended.err.splitlines()) == 1
         assert why in ended.err
-        assert "no encrypted connection to a server that can be trusted" in ended.err
-        assert "sslrootcert names the certificate of who signed the server's" in ended.err
+        assert "there is no encrypted connection to a trusted server" in ended.err
+        assert "Give the certificate of the server's signer in sslrootcert" in ended.err
 
 
 def test_another_machine_is_not_spoken_to_in_plain_text_unless_somebody_says_so(
@@ -75,7 +74,7 @@ def test_another_machine_is_not_spoken_to_in_plain_text_unless_somebody_says_so(
         ended = rig("runs", "--record", url)
         assert (ended.status, asked) == (2, [bytes.fromhex("00000008 04d2162f")])
         assert "server does not support SSL, but SSL was required" in ended.err
-        assert "`ssl = on` in postgresql.conf" in ended.err
+        assert "set `ssl = on` in the server's postgresql.conf" in ended.err
         assert rig("runs", "--record", f"{url}&sslmode=disable").status == 0
 
 

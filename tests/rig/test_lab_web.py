@@ -19,7 +19,7 @@ import pytest
 from nicegui import Client, ui
 from nicegui.testing import User, user_simulation
 
-from rig.home import RECORD
+from rig.files import RECORD
 from rig.record import Record
 from rig.web.desk import Desk
 from rig.web.pages import register
@@ -71,6 +71,7 @@ def _cookie(host: str, query: str) -> str:
     return str(connection.getresponse().headers["Set-Cookie"]).partition(";")[0]
 
 
+@pytest.mark.slow
 def test_pages_read_the_lab_and_show_no_password(run: str, reader: str, tmp_path: Path) -> None:
     elsewhere = tmp_path / "elsewhere"
     with served(elsewhere, **{RECORD: reader}) as (process, page):
@@ -88,11 +89,15 @@ def test_pages_read_the_lab_and_show_no_password(run: str, reader: str, tmp_path
 
 
 def test_a_password_in_the_words_of_a_command_is_refused(rig: Rig, reader: str) -> None:
-    for words in (("runs", "--record", reader), ("push", "--to", reader), ("web", "--record", reader)):
-        ended = rig(*words)
+    for command, option, variable in (
+        ("runs", "--record", "RIG_RECORD"),
+        ("push", "--to", "RIG_LAB"),
+        ("web", "--record", "RIG_RECORD"),
+    ):
+        ended = rig(command, option, reader)
         assert (ended.status, ended.out) == (2, "")
         assert "everybody on this machine can read the words of a command" in ended.err
-        assert "leave it to ~/.pgpass or PGPASSWORD" in ended.err
+        assert f"leave it to ~/.pgpass or PGPASSWORD, or give the URL as {variable}\n" in ended.err
         assert WORD not in ended.err
 
 
@@ -129,8 +134,8 @@ def test_who_may_only_read_is_told_so_and_nothing_is_written(
     async def visit(user: User) -> None:
         await user.should_see(run)
         user.find("A note").type("a lorry").trigger("keydown.enter")
-        await user.should_see("anna may not do that")
-        await user.should_see("its owner can give it rig_writer")
+        await user.should_see("anna has no permission for this")
+        await user.should_see("the owner can grant it rig_writer")
         assert WORD not in str(user.notify.messages)
 
     visiting(f"/record/{run}", visit)

@@ -9,11 +9,11 @@ from typing import Any
 
 import pytest
 
-from drivers.links.faults import Fault
+from drivers.transport.faults import Fault
 from rig.bench import read_bench
 from rig.record import Record
-from rig.running.runner import resume, start
-from rig.running.trace import SHOWN_BYTES, shown
+from rig.runs.runner import resume, start
+from rig.runs.signals import SHOWN_BYTES, shown
 from tests.rig.misbehaving import afflicted
 from tests.rig.rigging import POSES, Onlooker, small_sweep
 
@@ -47,7 +47,7 @@ def test_a_run_tells_what_it_did_what_stopped_it_and_that_it_went_on(rig: Callab
     error = told.index("error")
     assert lines[error].text.startswith("StageAlarm: alpha: stands still with alarm 30")
     assert [(line.what, line.text) for line in lines[error + 1 : error + 3]] == [
-        ("stopped", "all stands still"),
+        ("stopped", "all instruments are at rest"),
         ("begun", f"sweep at pose {kept}"),
     ]
     assert 30.0 <= lines[error].clock_s < 40.0

@@ -21,7 +21,7 @@ from rig.errors import BenchError
 from rig.planning.plan import plan
 from rig.record import Record
 from rig.record.measured import table_of
-from rig.running.runner import resume, start
+from rig.runs.runner import resume, start
 from tests.rig.rigging import Onlooker
 
 MARK_DEG = 5 / 60
@@ -82,11 +82,11 @@ def test_what_a_script_reads_off_the_dial_counts(rig: Rig, file: Callable[..., s
 
 
 @pytest.mark.sockets
-def test_a_reading_that_makes_no_sense_ends_the_run(rig: Rig, file: Callable[..., str]) -> None:
+def test_an_implausible_reading_ends_the_run(rig: Rig, file: Callable[..., str]) -> None:
     answers = file({"beta-90": 9}, "answers.yaml")
     ended = rig("run", "sweep", *SMALL, "--bench", file(manual()), "--answers", answers, "--unattended")
     assert ended.status == 2
-    assert "beta-90: '9' is no answer" in ended.err
+    assert "beta-90: '9' does not answer 'Turn beta to 90 deg. What does its dial show?'" in ended.err
     assert "yes for 90 deg, or a number from 89.5 to 90.5 deg" in ended.err
 
 

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 import yaml
 
-from calibrations.evaluations.misalignment import along_reference
+from calibrations.analyses.misalignment import along_reference
 from procedures.catalogue import find
 from procedures.settings import parse
 from rig.bench import DEFAULT, Bench, read_bench
 from rig.planning.plan import plan
 from rig.record import Record
-from rig.results.names import names
-from rig.running.runner import start
+from rig.results.evaluate import names
+from rig.runs.runner import start
 from tests.rig.rigging import Onlooker
 
 Rig = Callable[..., Any]

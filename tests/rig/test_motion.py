@@ -12,12 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from calibrations.compare import compare
-from calibrations.diagnose import diagnose
-from calibrations.discover import discover
-from calibrations.model_file import read_model
-from calibrations.motion.records import records
-from calibrations.motion.sine import four_parameter
+from calibrations.loop import compare, diagnose, discover
+from calibrations.model.file import read_model
+from calibrations.motion.reference import fit_four_parameter
+from calibrations.motion.spectrum import find_records
 from drivers.errors import LimitError, SensorFault
 from procedures.catalogue import find
 from procedures.errors import ProcedureError, SettingError
@@ -28,9 +26,10 @@ from rig.bench import Bench, read_bench
 from rig.planning.plan import plan
 from rig.record import Kept, Record
 from rig.record.measured import Measured
-from rig.results.names import names
-from rig.running.runner import Outcome, resume, start
+from rig.results.evaluate import names
+from rig.runs.runner import Outcome, resume, start
 from tests.rig.rigging import Onlooker
+from tests.slow import first_fast
 
 pytestmark = pytest.mark.sockets
 MOTION = find("motion")
@@ -54,7 +53,7 @@ def shaken(record: Record, on: Bench, watch: Any = None, **settings: str) -> Out
     return start(record, on, MOTION, parse(MOTION, settings), watch or Onlooker())
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", first_fast([1, 2, 3]))
 def test_the_physical_model_reaches_the_limit_that_noise_sets(seed: int, rig_home: Path) -> None:
     with Record() as record:
         results = shaken(record, bench(PAPERS, seed), duration_s="30").run.results
@@ -69,6 +68,7 @@ def test_the_physical_model_reaches_the_limit_that_noise_sets(seed: int, rig_hom
     assert {result["unit"] for result in results.values()} == {"mm/s^2", "", "Hz"}
 
 
+@pytest.mark.slow
 def test_its_plan_takes_as_long_as_the_run(rig_home: Path) -> None:
     planned = plan(read_bench(), MOTION, parse(MOTION, BRIEF))
     with Record() as record:
@@ -84,10 +84,10 @@ def test_its_plan_takes_as_long_as_the_run(rig_home: Path) -> None:
     ("settings", "error", "said"),
     [
         ({"frequency_hz": "2000"}, LimitError, "no wave table plays 2000 Hz; nothing was moved"),
-        ({"frequency_hz": "10,-4"}, SettingError, "give a width, frequencies and times above 0"),
+        ({"frequency_hz": "10,-4"}, SettingError, "motion: amplitude, frequencies and times must be above 0"),
         ({"peak_to_peak_um": "120"}, LimitError, "-10 .. 110 um is outside its limits 0 .. 100 um"),
         ({"centre_um": "20"}, LimitError, "-10 .. 50 um is outside its limits"),
-        ({"duration_s": "0"}, SettingError, "give a width, frequencies and times above 0"),
+        ({"duration_s": "0"}, SettingError, "motion: amplitude, frequencies and times must be above 0"),
     ],
 )
 def test_what_the_positioner_cannot_do_is_refused_by_the_plan(
@@ -107,7 +107,7 @@ def test_a_bench_without_its_instruments_is_refused_before_anything_moves() -> N
         plan(Bench.model_validate(document), MOTION, parse(MOTION, {}))
 
 
-@pytest.mark.parametrize("reversed_channels", [False, True])
+@pytest.mark.parametrize("reversed_channels", first_fast([True, False]))
 def test_a_motion_run_holds_three_tables(rig_home: Path, reversed_channels: bool) -> None:
     document = bench(QUIET).document()
     channels = document["instruments"]["adc"]["settings"]["channels"]
@@ -132,6 +132,7 @@ def test_a_motion_run_holds_three_tables(rig_home: Path, reversed_channels: bool
     assert displacement_um.mean() == pytest.approx(150 + 50, abs=0.2)
 
 
+@pytest.mark.slow
 def test_a_probe_in_front_of_the_carriage_counts_the_other_way(rig_home: Path) -> None:
     backward = read_bench().document()["d63"] | {"direction": -1}
     with Record() as record:
@@ -186,12 +187,12 @@ def test_it_goes_on_after_interruptions_with_the_carriage_at_rest(
         outcome = resume(record, outcome.run.run, Onlooker())
         assert (outcome.run.state, outcome.run.rows, outcome.error) == ("complete", 58, None)
         table = Measured.named(record, outcome.run.run).table()
-    assert [round((r.end - r.first) / r.rate_hz) for r in records(table)] == lengths_s
+    assert [round((r.end - r.first) / r.rate_hz) for r in find_records(table)] == lengths_s
     assert outcome.run.results["rmse-linear-x"]["value"] < 3
 
 
 def test_the_carriage_is_stopped_whatever_ends_the_motion(rig_home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from drivers.pi_e727 import Positioner
+    from drivers.pi_e727.driver import Positioner
 
     stops: list[bool] = []
     real = Positioner.stop
@@ -202,16 +203,18 @@ def test_the_carriage_is_stopped_whatever_ends_the_motion(rig_home: Path, monkey
     assert all(stops)
 
 
+@pytest.mark.slow
 def test_two_frequencies_make_two_records_and_the_first_is_judged(rig_home: Path) -> None:
     with Record() as record:
         outcome = shaken(record, bench(QUIET), **BRIEF, frequency_hz="10,4")
         table = Measured.named(record, outcome.run.run).table()
     assert outcome.run.results["frequency"]["value"] == pytest.approx(10, abs=1e-4)
-    for record_of, hz in zip(records(table), (10.0, 4.0), strict=True):
-        line = four_parameter(record_of.times_s(table.time_s), table.column("displacement_m")[record_of.rows])
+    for record_of, hz in zip(find_records(table), (10.0, 4.0), strict=True):
+        line = fit_four_parameter(record_of.times_s(table.time_s), table.column("displacement_m")[record_of.rows])
         assert line.frequency_hz == pytest.approx(hz, rel=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("hidden", "effect", "parameter", "true"),
     [
@@ -240,6 +243,7 @@ def test_a_hidden_defect_of_the_output_is_found_added_and_right(
     assert estimate.value == pytest.approx(true, abs=4 * (estimate.std or 0) + 0.01 * abs(true))
 
 
+@pytest.mark.slow
 def test_a_sensor_turned_on_its_mount_is_found_by_the_axis_that_should_not_move(rig_home: Path) -> None:
     turned = QUIET | {"sensor": {"package": {"turn_z_deg": 1.0}}}
     with Record() as record:
@@ -253,6 +257,7 @@ def test_a_sensor_turned_on_its_mount_is_found_by_the_axis_that_should_not_move(
     assert "axis-misalignment" in {c.name for c in found.candidates}
 
 
+@pytest.mark.slow
 def test_all_commands_take_the_run(rig: Callable[..., Any], tmp_path: Path) -> None:
     arguments = [part for name, value in BRIEF.items() for part in (f"--{name.replace('_', '-')}", value)]
     ended = rig("run", "motion", *arguments, "--unattended", "--json")
@@ -264,7 +269,7 @@ def test_all_commands_take_the_run(rig: Callable[..., Any], tmp_path: Path) -> N
     assert rig("add", "output-filter", "--model", "linear", "--data", run, "--out", model).status == 0
     assert "output-filter" in Path(model).read_text()
     assert rig("export", run, "--out", csv).status == 0
-    assert "12000 rows" in rig("compare", csv).out
+    assert "12000 samples" in rig("compare", csv).out
     assert rig("report", run, "--model", "linear", "--out", page).status == 0
     text = Path(page).read_text()
     parts = (
@@ -280,6 +285,7 @@ def test_all_commands_take_the_run(rig: Callable[..., Any], tmp_path: Path) -> N
     assert places == sorted(places)
 
 
+@pytest.mark.slow
 def test_an_imported_motion_has_no_sweep_to_be_judged_by(rig_home: Path) -> None:
     with Record() as record:
         outcome = shaken(record, bench(QUIET), **BRIEF)

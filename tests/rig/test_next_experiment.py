@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from calibrations.diagnose import diagnose
+from calibrations.design.experiment import ADDITIONS, MENU, Experiment, experiment_by_physics
 from calibrations.documents import diagnosis_document
-from calibrations.effect import catalogue
-from calibrations.experiment import BESIDE, MENU, Experiment, by_physics
-from calibrations.model_file import read_model
+from calibrations.effects.catalogue import catalogue
+from calibrations.loop import diagnose
+from calibrations.model.file import read_model
 from procedures.catalogue import find
 from procedures.settings import parse
 from rig.bench import read_bench
@@ -24,7 +24,7 @@ from rig.cli import rig as commands
 from rig.cli.settings import read_settings
 from rig.planning.foresight import with_next
 from rig.planning.next_experiment import Dispute, chosen, command_line, planned_experiment, proposed
-from rig.planning.planned_columns import columns
+from rig.planning.sweep_range import columns
 from rig.record import Record
 from tests.hidden.quick_rig import QuickRig
 from tests.hidden.rigs import IDEAL
@@ -40,7 +40,7 @@ PAIRS = (
     {"axis-misalignment", "stage-zero-offset"},
     {"dead-zone", "hysteresis"},
 )
-BY_PHYSICS = tuple(Experiment(*by_physics(names)[:2], (), "") for names in PAIRS)
+BY_PHYSICS = tuple(Experiment(*experiment_by_physics(names)[:2], (), "") for names in PAIRS)
 COARSE = Experiment("sweep", {"step_deg": 45.0, "inclinations_deg": [90.0, 30.0, 150.0]}, (), "")
 
 
@@ -48,7 +48,7 @@ def named(e: Experiment) -> str:
     return " ".join([e.procedure, *map(str, e.settings.values())])
 
 
-@pytest.mark.parametrize("experiment", [*MENU, *BESIDE, *BY_PHYSICS], ids=named)
+@pytest.mark.parametrize("experiment", [*MENU, *ADDITIONS, *BY_PHYSICS], ids=named)
 def test_every_experiment_can_be_planned_and_its_command_line_means_the_same(experiment: Experiment) -> None:
     e, planned = planned_experiment(experiment, read_bench(None), Path("a bench.yaml"))
     name, run, procedure, *rest = shlex.split(e.command)
@@ -89,7 +89,7 @@ def test_what_is_not_computed_is_null() -> None:
 def dispute(temperature: bool) -> Dispute:
     found = turned()
     return replace(
-        Dispute.of(found.path.steps[0].after, found.next_experiment.separates, catalogue()), of_temperature=temperature
+        Dispute.of(found.findings.end, found.next_experiment.separates, catalogue()), of_temperature=temperature
     )
 
 
@@ -133,7 +133,7 @@ def test_the_oven_warms_over_minutes_and_time_goes_on() -> None:
 
 
 def test_the_commands_print_it(rig: Callable[..., Ended], tmp_path: Path) -> None:
-    from calibrations.reading.read_csv import write_csv
+    from calibrations.importing.foreign import write_csv
 
     data = str(tmp_path / "turned.csv")
     write_csv(turned().fit.table, Path(data))

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from calibrations.noise_analysis.exact import deviations
+from calibrations.noise.deviations import deviations
 from procedures.noise_floor import STILL
 from procedures.session import Pose
 from rig.analysis.still import stream
@@ -94,11 +94,11 @@ def test_other_deviations_and_the_spectrum_have_intervals(rig: Rig, folder: Path
     ("name", "kind", "says", "spoils"),
     [
         ("step", "step", "a step of +0.0", "rate-random-walk"),
-        ("drift", "drift", "a drift of vx_v by +", "rate-random-walk"),
-        ("louder", "level", "the level of vx_v changes with time", "white-noise"),
-        ("wild", "wild-samples", "of vx_v, a single sample is far from the neighbours", "white-noise"),
-        ("stuck", "constant-stretch", "of vx_v, 300 samples from t = 40 s on are all the same", "white-noise"),
-        ("warm", "follows", "vx_v follows temperature_c by +0.1", "rate-random-walk"),
+        ("drift", "drift", "a drift of x by +", "rate-random-walk"),
+        ("louder", "level", "the level of x changes with time", "white-noise"),
+        ("wild", "wild-samples", "of x, a single sample is far from the neighbours", "white-noise"),
+        ("stuck", "constant-stretch", "of x, 300 samples from t = 40 s on are all the same", "white-noise"),
+        ("warm", "follows", "x follows temperature_c by +0.1", "rate-random-walk"),
     ],
 )
 def test_what_is_no_noise_is_said_beside_the_coefficients_that_it_spoils(
@@ -118,20 +118,21 @@ def test_what_is_no_noise_is_said_beside_the_coefficients_that_it_spoils(
     assert says in found["text"]
     assert spoils in found["spoils"]
     shown = rig("noise", file).out
-    assert "There is something that is no noise:" in shown
-    assert f"{found['text']}; it spoils " in shown
-    taken_off = kind in ("step", "drift", "follows")
-    assert ("Without what could be taken off:" in shown) == taken_off
-    if taken_off:
-        assert said["coefficients"][spoils]["identified"]
-        assert not said["coefficients_without"][spoils]["identified"]
-        assert said["coefficients_without"]["white-noise"]["identified"]
+    removed = kind in ("step", "drift", "follows")
+    assert "Disturbances that are not noise:" in shown
+    assert f"{found['text']}{', removed before the fit' if removed else ''}; it spoils " in shown
+    assert ("With these disturbances in the record, the fit would give:" in shown) == removed
+    assert said["coefficients_without"] == (said["coefficients"] if removed else None)
+    assert said["coefficients"]["white-noise"]["identified"]
+    if removed:
+        assert f"  x: {spoils}" in shown
+        assert not said["coefficients"][spoils]["identified"]
 
 
 def test_a_clean_record_has_no_disturbance(rig: Rig, folder: Path) -> None:
     said = document(rig("noise", "still.npy", "--rate", "50", "--json"))
     assert (said["disturbances"], said["coefficients_without"]) == ([], None)
-    assert "no noise" not in rig("noise", "still.npy", "--rate", "50").out
+    assert "not noise" not in rig("noise", "still.npy", "--rate", "50").out
 
 
 def test_a_table_with_its_rate_in_its_times(rig: Rig, folder: Path) -> None:
@@ -139,14 +140,14 @@ def test_a_table_with_its_rate_in_its_times(rig: Rig, folder: Path) -> None:
     ended = rig("noise", file, "--channel", "vy", "--json")
     assert document(ended)["coefficients"]["white-noise"]["value"] == pytest.approx(0.2 / np.sqrt(50), rel=0.05)
     assert document(ended)["rate_hz"] == pytest.approx(50)
-    assert "Channel vy_v; --channel takes another: vx_v." in ended.err
+    assert "still.csv: vy_v; --channel takes another: vx_v." in ended.err
     assert '"vq"' in rig("noise", file, "--channel", "vq").err
 
 
 def test_words_and_pictures(rig: Rig, folder: Path) -> None:
     ended = rig("noise", "still.npy", "--rate", "50", "--pictures", "pictures", "--format", "svg")
     assert ended.status == 0, ended.err
-    assert "still.npy, values: 6000 samples at 50 Hz, 2:00" in ended.out
+    assert "still.npy: 6000 samples at 50 Hz, 2:00" in ended.out
     assert "white-noise         0.0141" in ended.out
     assert "flicker-noise       not identified, below" in ended.out
     assert "Allan deviation (count)  95 % interval" in ended.out
@@ -175,11 +176,11 @@ def run(rig: Rig, home: Path, monkeypatch: pytest.MonkeyPatch) -> str:
 def test_a_run_straight_from_its_record(rig: Rig, run: str) -> None:
     ended = rig("noise", run)
     assert ended.status == 0, ended.err
-    assert f"{run}, vx: 30000 samples at 1000 Hz, 0:30" in ended.out
+    assert f"{run}: 30000 samples at 1000 Hz, 0:30" in ended.out
     assert "uV/sqrt(Hz)" in ended.out
     assert "ug/sqrt(Hz)" in ended.out
     assert "15.07 Hz low-pass" in ended.err
-    assert "supply_v was read in steps of 0.316 mV, with less noise than that" in ended.err
+    assert "supply_v was read in steps of 0.316 mV, larger than its noise" in ended.err
     white = document(rig("noise", run, "--json"))["coefficients"]["white-noise"]
     assert white["unit"] == "V/sqrt(Hz)"
     assert white["value"] == pytest.approx(1.1e-4, rel=0.15)  # 3.1 mV peak to peak is 4 rms behind 15.07 Hz (Ang V)
@@ -283,7 +284,7 @@ def test_times_that_are_asked_for(rig: Rig, folder: Path) -> None:
 def test_a_time_that_is_no_whole_number_of_samples_is_said_to_be_rounded(rig: Rig, folder: Path) -> None:
     ended = rig("noise", "still.npy", "--rate", "50", "--tau", "0.05", "--tau", "0.1")
     assert ended.status == 0
-    assert "An averaging time of 0.05 s is no whole number of samples: 0.04 s is taken." in ended.err
+    assert "An averaging time of 0.05 s is not a whole number of samples: 0.04 s is used." in ended.err
     assert "of 0.1 s" not in ended.err
 
 
@@ -293,15 +294,15 @@ def test_noise_below_the_converters_step_and_of_two_levels_is_said_first(rig: Ri
     trap = np.where(np.cumsum(random.random(6000) < 0.01) % 2, 0.0, 0.4)
     np.save("trap.npy", samples() + trap)
     coarse = rig("noise", "coarse.npy", "--rate", "50")
-    assert "Of values, the noise is below the converter's step: the samples are at 2 values 1 apart" in coarse.out
+    assert "Of x, the noise is below the converter's step: the samples are at 2 values 1 apart" in coarse.out
     assert "flicker-noise       not known" in coarse.out
-    assert "no noise:" not in coarse.out
-    assert "slow noise; the record cannot tell" not in coarse.err
+    assert "not noise:" not in coarse.out
+    assert "cannot separate" not in coarse.err
     said = document(rig("noise", "trap.npy", "--rate", "50", "--json"))
     assert [each["kind"] for each in said["disturbances"]] == ["two-levels"]
     shown = rig("noise", "trap.npy", "--rate", "50").out
-    assert "Random telegraph noise (burst noise, popcorn): values goes between two levels 0.4" in shown
-    assert "no noise:" not in shown
+    assert "Random telegraph noise (burst noise, popcorn): x goes between two levels 0.4" in shown
+    assert "not noise:" not in shown
     assert "averaging for longer does not help" not in rig("noise", "still.npy", "--rate", "50").out
 
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from calibrations.noise_estimation.mean_noise import inflation, measured_inflation, white_std
-from drivers.simulation.config import WorldConfig
-from drivers.simulation.world import World
+from calibrations.noise.mean_noise import inflation, measured_inflation, white_std
+from drivers.world.config import WorldConfig
+from drivers.world.world import World
 from procedures.session import Pose
 from rig.record import Kept, Record
 from rig.record.measured import table_of

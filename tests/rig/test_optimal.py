@@ -13,20 +13,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from calibrations.effect import catalogue
-from calibrations.model_file import read_model
+from calibrations.effects.catalogue import catalogue
+from calibrations.model.file import read_model
 from procedures.catalogue import find
-from procedures.pose_list import written
+from procedures.pose_list import format_poses
 from procedures.session import Pose
 from procedures.settings import parse
 from rig.bench import read_bench
 from rig.cli.chosen import document, lines
 from rig.errors import PlanError
 from rig.planning.optimal import AGAIN, CHECK, DESIGN, Optimal, most_relative, optimal, relative
-from rig.planning.planned import EXCHANGE_S
-from rig.planning.travel import from_home_s, moves_s
+from rig.planning.planned import EXCHANGE_S, from_home_s, moves_s
 from rig.record import Kept, Record
-from rig.running.runner import resume, start
+from rig.runs.runner import resume, start
 from tests.rig.rigging import Onlooker
 
 COARSE = {"step_deg": "30", "inclinations_deg": "90,45,135"}  # a small sweep, to be quick
@@ -79,7 +78,7 @@ def test_what_the_sweep_tells_is_told() -> None:
 
 def test_what_check_poses_tell_is_not_counted() -> None:
     found = chosen()
-    fitted = written(pose for pose in found.equal.poses if pose.path != CHECK)
+    fitted = format_poses(pose for pose in found.equal.poses if pose.path != CHECK)
     judged = found.over.judged({**found.equal.plan.settings, "pose_list": fitted})
     assert judged.errors == pytest.approx(found.equal.errors)
 
@@ -160,6 +159,7 @@ def test_options_of_chosen_poses_need_optimal(rig: Callable[..., Any]) -> None:
     assert rig("plan", "soak", "--optimal").status == 2
 
 
+@pytest.mark.slow
 @pytest.mark.sockets
 def test_a_run_of_chosen_poses_checks_its_model(rig: Callable[..., Any], tmp_path: Path, rig_home: Path) -> None:
     out = tmp_path / "poses.csv"

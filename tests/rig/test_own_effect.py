@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import yaml
 
-from calibrations.reading.read_csv import write_csv
+from calibrations.importing.foreign import write_csv
 from tests.calibrations.synthetic import NOISE_V, components, poses, turns
 
 Rig = Callable[..., Any]
@@ -37,6 +37,7 @@ def data(here: Path) -> str:
     return "waves.csv"
 
 
+@pytest.mark.slow
 def test_what_is_left_becomes_an_effect_by_the_command_that_is_printed(rig: Rig, here: Path) -> None:
     """The stage's gear errs five times a turn, which no effect of the catalogue does."""
     columns = turns((90, 30, 150, 60), step_deg=15.0)
@@ -107,22 +108,23 @@ def test_what_cannot_be_added_is_refused_and_nothing_is_written(
     assert not (here / "m2.yaml").exists()
 
 
-PYTHON = '''"""five-waves: five waves in a turn of beta.
+PYTHON = '''import numpy as np
 
-    V += c sin(5 beta)      c in {out}, per axis
-
-Symptom   five waves.
-"""
-
-import numpy as np
-
-from calibrations.effect import Parameter
-
-PARAMETERS = (Parameter("wave", "{out}", typical=0.01),)
+from calibrations.effects import Effect, Parameter
 
 
-def transduction(a, table, p):
-    return np.outer(np.sin(5 * np.radians(table.column("beta_deg"))), p["wave"])
+class FiveWaves(Effect):
+    """five-waves: five waves in a turn of beta.
+
+        V += c sin(5 beta)      c in {out}, per axis
+
+    Symptom   five waves.
+    """
+
+    wave = Parameter("{out}", typical=0.01)
+
+    def transduction(self, a, table, p):
+        return np.outer(np.sin(5 * np.radians(table.column("beta_deg"))), p.wave)
 '''
 
 

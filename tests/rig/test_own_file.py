@@ -89,13 +89,13 @@ def test_raw_samples_become_poses_and_it_is_said(rig: Rig, folder: Path) -> None
     assert "100 rows of poses" in ended.out
 
 
-def test_one_inclination_is_told_with_what_it_hides(rig: Rig, folder: Path) -> None:
+def test_a_single_inclination_is_reported_with_the_effects_it_cannot_test(rig: Rig, folder: Path) -> None:
     text = (folder / "ours.csv").read_text("utf-16").splitlines()
     (folder / "one.csv").write_text("\n".join([text[0], *(line for line in text if line.startswith("90;"))]))
     for command in ("fit", "diagnose"):
         ended = rig(command, "one.csv", "--model", "linear", "--json")
         assert ended.status == 0
         assert json.loads(ended.out)
-        assert "This data cannot show, beside linear: " in ended.err
-        assert "z-axis-scale. It holds one inclination only, alpha = 90 deg; measure at others." in ended.err
+        assert "With the model linear, these effects cannot be tested on these data: " in ended.err
+        assert "z-axis-scale. They hold one inclination only, alpha = 90 deg; measure at others." in ended.err
     assert "one inclination" not in rig("fit", "ours.csv", "--model", "linear").err

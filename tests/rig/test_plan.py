@@ -14,7 +14,7 @@ from procedures.settings import parse
 from rig.bench import Bench, read_bench
 from rig.planning.plan import plan
 from rig.record import Record
-from rig.running.runner import start
+from rig.runs.runner import start
 from tests.rig.rigging import Onlooker, small_sweep
 
 
@@ -58,7 +58,7 @@ def test_nothing_is_touched(rig_home: Path, monkeypatch: pytest.MonkeyPatch) -> 
         raise AssertionError("a plan connected to something")
 
     monkeypatch.setattr("socket.socket.connect", refuse)
-    monkeypatch.setattr("rig.connected.instruments.connected", refuse)
+    monkeypatch.setattr("rig.instruments.instruments.connected", refuse)
     plan(read_bench(), *small_sweep())
     assert not rig_home.exists()
 

@@ -12,9 +12,8 @@ import pytest
 from rig.errors import LabAway, RecordError, UnknownRun
 from rig.record import Record
 from rig.record import push as pushing
-from rig.record.lab_url import lab_url
-from rig.record.push import Pushed, push, unsent
-from rig.record.verify import verify
+from rig.record.lab import lab_url
+from rig.record.push import Pushed, push, unsent, verify
 from tests.rig.cutting import Enough, Judge, after_bytes, at_random, whole, wire
 from tests.rig.postgres import Server
 from tests.rig.pushing import POSES, a_run, a_table, held, pushed, until_there
@@ -55,7 +54,9 @@ def test_only_what_is_complete_is_pushed(own: Record, lab: Record) -> None:
     stopped = a_run(own, state="stopped")
     assert unsent(own, lab) == []
     for call in (lambda: push(own, lab, stopped), lambda: unsent(own, lab, [stopped])):
-        with pytest.raises(RecordError, match=f"is stopped: only complete runs are pushed; `rig resume {stopped}`"):
+        with pytest.raises(
+            RecordError, match=f"{stopped} is stopped, and only complete runs are pushed; `rig resume {stopped}`"
+        ):
             call()
     with pytest.raises(UnknownRun):
         unsent(own, lab, ["sweep-1"])
@@ -196,7 +197,7 @@ def test_what_was_changed_in_the_lab_is_not_overwritten(own: Record, lab: Record
     assert verify(lab).changed == (run,)
     assert unsent(own, lab) == []
     own.exclude(run, 4, "by the rig")
-    with pytest.raises(RecordError, match="nothing was replaced; it was changed in the lab"):
+    with pytest.raises(RecordError, match="is different from the run of this rig, so nothing was replaced"):
         push(own, lab, run)
     assert lab.excluded(run) == {3: "by the lab"}
 

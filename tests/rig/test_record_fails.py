@@ -17,7 +17,7 @@ import pytest
 from rig.bench import read_bench
 from rig.errors import RecordError
 from rig.record import Kept, Record, file
-from rig.running.runner import resume, start
+from rig.runs.runner import resume, start
 from tests.rig.misbehaving import looking_on
 from tests.rig.rigging import POSES, SMALL_ARGUMENTS, Onlooker, small_sweep
 
@@ -53,7 +53,7 @@ def test_a_full_disk_stops_the_run_which_goes_on_when_there_is_room(tmp_path: Pa
     with Record(tmp_path) as record, looking_on() as aftermath:
         outcome = swept(record, lambda: fill(record))
         assert isinstance(outcome.error, RecordError)
-        assert "the disk is full; free some space, then go on with `rig resume`" in str(outcome.error)
+        assert "the disk is full; free some space, then continue with `rig resume`" in str(outcome.error)
         assert str(record.path) in str(outcome.error)
         assert (aftermath.stops, aftermath.turning) == (1, [])
     with Record(tmp_path) as record:
@@ -68,7 +68,7 @@ def test_a_record_that_goes_away_stops_the_run(tmp_path: Path) -> None:
     with Record(home) as record, looking_on() as aftermath:
         outcome = swept(record, lambda: shutil.move(home, away))
         assert isinstance(outcome.error, RecordError)
-        assert "is not there any more (No such file or directory); look where its folder is" in str(outcome.error)
+        assert "the record has disappeared (No such file or directory); put its folder back" in str(outcome.error)
         assert (outcome.run.state, aftermath.turning) == ("failed", [])
     with Record(away) as record:
         (run,) = record.runs()
@@ -79,7 +79,7 @@ def test_a_record_that_goes_away_stops_the_run(tmp_path: Path) -> None:
 def test_a_record_that_is_exchanged_is_not_written_into(tmp_path: Path) -> None:
     with Record(tmp_path) as record:
         outcome = swept(record, lambda: Path(shutil.copy(record.path, tmp_path / "new")).replace(record.path))
-        assert "is another file than before" in str(outcome.error)
+        assert "the record was exchanged during this command" in str(outcome.error)
 
 
 READS = """
@@ -122,7 +122,7 @@ def test_a_read_only_record_is_read_and_a_run_into_it_is_refused(read_only: str)
     assert (listed.returncode, read_only in listed.stdout) == (0, True), listed.stderr
     refused = as_nobody("run", "sweep", *SMALL_ARGUMENTS, "--unattended")
     assert refused.returncode == 2
-    assert "cannot be written: it is read-only; make file and folder writable, or name another" in refused.stderr
+    assert "cannot be written: it is read-only; make file and folder writable" in refused.stderr
     assert "Traceback" not in refused.stderr
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from calibrations.reading.read_csv import write_csv
+from calibrations.importing.foreign import write_csv
 from tests.calibrations.test_pictures import warm_table
 
 NAMES = ["waterfall", "measurement", "residual", "failure", "effect-temperature-bias"]
@@ -45,7 +45,7 @@ def test_pictures_alone_as_svg(rig: Callable[..., Any], data: str, tmp_path: Pat
     ("arguments", "message"),
     [
         ((), "nothing to write: give --out FILE.html, --pictures FOLDER, or both"),
-        (("--out", "{tmp}/no/page.html"), "make it, or name another file"),
+        (("--out", "{tmp}/no/page.html"), "make it, or give another file"),
         (("--out", "{tmp}/page.html", "--model", "liner"), 'did you mean "linear"'),
         (("--pictures", "{tmp}/warm.csv"), "is a file"),
     ],

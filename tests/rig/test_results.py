@@ -15,7 +15,7 @@ from rig.bench import DEFAULT
 from rig.record import Record
 from rig.record.measured import table_of
 from rig.results import Result, documents, returned
-from rig.results.names import names
+from rig.results.evaluate import names
 
 Rig = Callable[..., Any]
 
@@ -109,8 +109,8 @@ def test_a_table_that_is_not_level_refuses_to_start(rig: Rig, tmp_path: Path, pr
     ended = rig("run", procedure, "--bench", bench, "--unattended", "--json")
     document = json.loads(ended.out)
     assert (ended.status, document["state"], document["poses"]) == (4, "stopped", 0)
-    assert "the table is tilted by " in ended.err
-    assert "more than limits.level_deg = 0.3; level the base" in ended.err
+    assert "level: the table is tilted by " in ended.err
+    assert "limits.level_deg is 0.3; level the base" in ended.err
     with Record() as record:
         assert len(record.readings(document["run"])) == 4
 

@@ -19,7 +19,7 @@ from rig.errors import Busy, InstrumentFailed, RunMismatch
 from rig.lease import lease
 from rig.record import Kept, Record
 from rig.record.measured import table_of
-from rig.running.runner import Outcome, resume, start
+from rig.runs.runner import Outcome, resume, start
 from tests.rig.rigging import POSES, Onlooker, small_sweep
 
 pytestmark = pytest.mark.sockets
@@ -144,7 +144,7 @@ def test_a_temperature_outside_the_limits_stops_the_run() -> None:
     with Record() as record:
         outcome = run_small(record, bench)
     assert (outcome.run.state, outcome.run.rows) == ("stopped", 0)
-    assert "outside the bench's limits of 0 to 10 C" in str(outcome.error)
+    assert "outside the limits of 0 to 10 C" in str(outcome.error)
 
 
 def test_a_complete_run_is_not_begun_again() -> None:
@@ -167,7 +167,7 @@ def test_a_question_is_asked_once_even_if_the_run_is_resumed() -> None:
 def test_another_bench_is_refused() -> None:
     with Record() as record:
         run = run_small(record, watch=Interrupting(2, raising(KeyboardInterrupt()))).run.run
-        with pytest.raises(RunMismatch, match="begun with another bench"):
+        with pytest.raises(RunMismatch, match="began with another bench"):
             resume(record, run, Onlooker(), read_bench().model_copy(update={"seed": 2}))
         assert resume(record, run, Onlooker(), read_bench()).run.state == "complete"
 
@@ -178,7 +178,7 @@ def test_two_processes_do_not_work_on_one_run() -> None:
         with lease(record.folder, run, "it"):
             record.set_state(run, "running")
             assert record.run(run).state == "running"
-            with pytest.raises(Busy, match=f"another process .* works on run {run}"):
+            with pytest.raises(Busy, match=f"another process .* uses run {run}"):
                 resume(record, run, Onlooker())
         assert record.run(run).state == "stopped"  # nobody holds it
 

@@ -33,7 +33,7 @@ def with_faults(role: str, *faults: dict[str, Any], **part: Any) -> dict[str, ob
             {"what": "alarm", "for": 3},
             "key instruments.alpha.faults.0.for: no such key. Did you mean 'for_s'?",
         ),
-        ("alpha", {"at_s": 3}, "key instruments.alpha.faults.0.what: is missing"),
+        ("alpha", {"at_s": 3}, "key instruments.alpha.faults.0.what: this key is missing"),
         ("alpha", {"what": "alarm", "at_s": -1}, "at_s and after must not be negative"),
         ("alpha", {"what": "alarm", "probability": 2}, "probability must be above 0, and at most 1"),
         ("oven", {"what": "garbage", "size": 0}, "key instruments.oven.faults.0.size: must be at least 1 byte"),
@@ -52,7 +52,7 @@ def test_a_fault_that_cannot_be_is_refused(
 
 def test_a_real_instrument_is_given_no_faults(bench_file: Callable[..., Path]) -> None:
     path = bench_file(with_faults("alpha", {"what": "alarm"}, url="serial:/dev/ttyUSB0"))
-    with pytest.raises(BenchError, match=r"key instruments\.alpha\.faults: a real instrument has its own; remove them"):
+    with pytest.raises(BenchError, match=r"key instruments\.alpha\.faults: only a simulated instrument takes faults"):
         read_bench(path)
 
 

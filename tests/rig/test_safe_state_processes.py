@@ -17,9 +17,9 @@ from typing import Any
 import pytest
 import yaml
 
-from drivers import oriental_az
 from drivers.clock import WallClock
-from drivers.links import Address, Links
+from drivers.oriental_az import driver as oriental_az
+from drivers.transport import Address, Links
 from rig.bench import DEFAULT
 from rig.errors import Busy
 from rig.lease import lease
@@ -36,9 +36,9 @@ with lease(Path(sys.argv[1]), "wire-x", "serial:/dev/ttyUSB0"), lease(Path(sys.a
 """
 MOVES = """
 import sys
-from drivers import oriental_az
+from drivers.oriental_az import driver as oriental_az
 from drivers.clock import WallClock
-from drivers.links import Address, Links
+from drivers.transport import Address, Links
 stage = oriental_az.connect(
     Address(sys.argv[1]), Links(WallClock()), oriental_az.Settings(communication_timeout_s=0.5), "alpha"
 )
@@ -69,9 +69,7 @@ def said(child: subprocess.Popen[str]) -> str:
 def test_who_is_refused_is_told_who_holds_it_and_a_kill_sets_it_free(tmp_path: Path) -> None:
     with process("-c", HOLDS, str(tmp_path)) as child:
         assert said(child) == "holding"
-        holder = (
-            rf"another process \({child.pid}, since \d{{4}}-\d\d-\d\d \d\d:\d\d:\d\d, with run r1\) works on serial:"
-        )
+        holder = rf"another process \({child.pid}, since \d{{4}}-\d\d-\d\d \d\d:\d\d:\d\d, with run r1\) uses serial:"
         for _ in range(2):  # whoever is refused does not wipe out who holds it
             with pytest.raises(Busy, match=holder), lease(tmp_path, "wire-x", "serial:/dev/ttyUSB0"):
                 pass
@@ -82,6 +80,7 @@ def test_who_is_refused_is_told_who_holds_it_and_a_kill_sets_it_free(tmp_path: P
             assert told["pid"] == os.getpid()
 
 
+@pytest.mark.slow
 def test_a_second_controller_is_refused_before_anything_is_sent(
     tmp_path: Path, bench_file: Callable[..., Path]
 ) -> None:
@@ -101,7 +100,7 @@ def test_a_second_controller_is_refused_before_anything_is_sent(
             [sys.executable, *command, "--unattended"], capture_output=True, text=True, timeout=60, check=False
         )
         assert second.returncode == 2
-        assert re.search(rf"another process \({first.pid}, since .*, with run {run}\) works on serial:", second.stderr)
+        assert re.search(rf"another process \({first.pid}, since .*, with run {run}\) uses serial:", second.stderr)
         first.send_signal(signal.SIGTERM)
         assert first.wait(timeout=30) == 4
 

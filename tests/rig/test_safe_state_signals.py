@@ -13,9 +13,10 @@ from procedures.questions import Question
 from rig.bench import read_bench
 from rig.cli.failure import status_of
 from rig.record import Record
-from rig.running.runner import resume, start
+from rig.runs.runner import resume, start
 from tests.rig.misbehaving import SHORT, STRETCHES, digest, looking_on, short
 from tests.rig.rigging import Onlooker, small_sweep
+from tests.slow import first_fast
 
 pytestmark = pytest.mark.sockets
 
@@ -49,7 +50,7 @@ def signal_at(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, int], list[int]
 
 
 @pytest.mark.parametrize("procedure", sorted(SHORT.keys() - {"motion", "repeat"}))
-@pytest.mark.parametrize(("method", "share"), [("sleep", 0.4), ("wait_readable", 0.7)])
+@pytest.mark.parametrize(("method", "share"), first_fast([("sleep", 0.4), ("wait_readable", 0.7)]))
 def test_wherever_it_waits(
     procedure: str, method: str, share: float, signal_at: Callable[[str, int], list[int]]
 ) -> None:

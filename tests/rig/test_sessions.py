@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from calibrations.errors import DataError
-from calibrations.reading.foreign import read_foreign
-from calibrations.reading.json_arrays import as_lines
-from calibrations.reading.text_file import text
+from calibrations.importing.files import text_source
+from calibrations.importing.foreign import read_foreign
+from calibrations.importing.sheet import json_as_lines
 from tests.calibrations.turned import DATA
 
 Rig = Callable[..., Any]
@@ -81,7 +81,7 @@ def test_a_device_that_writes_json_is_calibrated(rig: Rig, tmp_path: Path, devic
 
 
 def read(content: str) -> str:
-    with as_lines(text(content, "some.json")).lines() as lines:
+    with json_as_lines(text_source(content, "some.json")).lines() as lines:
         return "".join(lines)
 
 
@@ -96,9 +96,9 @@ def test_json_is_arrays_or_rows_and_the_rest_is_constants() -> None:
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        ('{"mag": [[1, 2, 3]', "is not JSON throughout; wanted are arrays"),
+        ('{"mag": [[1, 2, 3]', "is not valid JSON; give arrays"),
         ('{"a": [1, 2], "b": [1]}', "arrays of different length: {'a': 2, 'b': 1}"),
-        ('{"mag": [[1, 2, 3], [1, 2]]}', 'row 2 of "mag" is not 3 numbers'),
+        ('{"mag": [[1, 2, 3], [1, 2]]}', 'row 2 of "mag" does not have 3 numbers'),
         ('{"name": "x"}', "holds no arrays of measurements"),
         ("[1, 2]", "holds no arrays of measurements"),
     ],

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from calibrations.fit import fit
-from calibrations.model_file import read_model
+from calibrations.model.file import read_model
 from calibrations.table import Table
 from rig.analysis.side_by_side import Pair, parameters_of, results_of
 from rig.record import Record, Run

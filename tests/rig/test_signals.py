@@ -8,7 +8,7 @@ from types import FunctionType
 
 import pytest
 
-from rig.running.signals import SIGNALS, stoppable
+from rig.runs.signals import SIGNALS, stoppable
 
 
 def twice(number: signal.Signals) -> None:
@@ -92,14 +92,14 @@ def signalled_in(module: str, name: str) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    ("module", "name"), [("drivers.simulation.world", "advance"), ("rich.console", "print"), ("rich.live", "start")]
+    ("module", "name"), [("drivers.world.world", "advance"), ("rich.console", "print"), ("rich.live", "start")]
 )
 def test_a_computing_world_and_a_screen_half_written_are_not_interrupted(module: str, name: str) -> None:
     assert signalled_in(module, name) == ["whole"]
 
 
 @pytest.mark.parametrize(
-    ("module", "name"), [("rich.console", "input"), ("richer", "print"), ("rig.running.runner", "run")]
+    ("module", "name"), [("rich.console", "input"), ("richer", "print"), ("rig.runs.runner", "run")]
 )
 def test_who_waits_for_a_person_is(module: str, name: str) -> None:
     assert signalled_in(module, name) == []

@@ -13,12 +13,13 @@ from typing import Any
 import pytest
 import yaml
 
-from drivers import labjack_t7, oriental_az
 from drivers.clock import WallClock
-from drivers.links import Address, Links
+from drivers.labjack_t7 import driver as labjack_t7
+from drivers.oriental_az import driver as oriental_az
+from drivers.transport import Address, Links
 from rig.bench import DEFAULT, read_bench
-from rig.connected.instruments import connected
 from rig.errors import Busy
+from rig.instruments.instruments import connected
 
 pytestmark = pytest.mark.sockets
 
@@ -74,6 +75,7 @@ def test_the_signals_are_given_back(rig: Callable[..., Any], monkeypatch: pytest
     assert [signal.getsignal(each) for each in ENDING] == before
 
 
+@pytest.mark.slow
 def test_a_bench_of_which_a_part_is_real_runs_in_real_time(
     served: Any, bench_file: Callable[..., Path], rig: Callable[..., Any]
 ) -> None:
@@ -84,7 +86,7 @@ def test_a_bench_of_which_a_part_is_real_runs_in_real_time(
     instruments["oven"]["url"] = document["instruments"]["oven"]["url"]  # elsewhere, so real for this bench
     path = bench_file({"instruments": instruments})
     with connected(read_bench(path)) as mixed:
-        with pytest.raises(Busy, match=r"another process .* works on "), connected(read_bench(path)):
+        with pytest.raises(Busy, match=r"another process .* uses "), connected(read_bench(path)):
             pass  # its connecting would disturb who measures
         assert mixed.state() is None
         assert mixed.power_on_s() is None

@@ -12,8 +12,8 @@ from procedures.magnetometer_turn import full_turn
 from procedures.rate_turn import turns
 from procedures.session import Pose
 from rig.record import Block, Kept, Record
-from rig.record.turned import sensor_from_base, sensor_from_table, specific_force_g
-from rig.running.so_far import SoFar
+from rig.record.measured import sensor_from_base, sensor_from_table, specific_force_g
+from rig.runs.progress import SoFar
 
 NOISE_V = 1e-4
 

@@ -14,14 +14,14 @@ import numpy as np
 import pytest
 import yaml
 
-from calibrations.evaluations.forecast import Bounds, Forecast, SoakForecast
+from calibrations.analyses.forecast import Bounds, Forecast, SoakForecast
 from procedures.soak import schedule
 from rig.bench import DEFAULT
 from rig.record import Record
 from rig.record.measured import Measured
-from rig.results.names import names
+from rig.results.evaluate import names
 from rig.results.soak import night
-from rig.running.soak_forecast import SoakWatch, lines, outlook
+from rig.runs.soak_forecast import SoakWatch, lines, outlook
 from tests.rig.nursery import Harm, Nursery
 
 pytestmark = pytest.mark.sockets
@@ -42,6 +42,7 @@ def cold(tmp_path: Path) -> str:
     return str(path)
 
 
+@pytest.mark.slow
 def test_a_night_reaches_its_steady_state_after_hours_and_is_told_on_one_page(
     rig: Rig, cold: str, tmp_path: Path
 ) -> None:
@@ -54,26 +55,28 @@ def test_a_night_reaches_its_steady_state_after_hours_and_is_told_on_one_page(
     assert 2.0 < found["steady-state-time"]["value"] < 12.0
     assert found["time-constant-x"]["value"] == pytest.approx(1.5, abs=4 * found["time-constant-x"]["std"])
     assert abs(found["bias-drift-x"]["value"]) > 1e-3
-    assert "not yet known what it comes to" in ended.err
+    assert "final value not yet known" in ended.err
     assert "bias-x " in ended.err
-    assert "comes to" in ended.err
+    assert "final value 2." in ended.err
     assert 0.5 < found["scale-foreseen-x"]["value"] < 12
     assert found["scale-final-x"]["std"] < 1e-3
     page = tmp_path / "night.html"
     assert rig("report", document["run"], "--out", str(page)).status == 0
     text = page.read_text(encoding="utf-8")
     assert "are steady" in text
-    assert "What was foreseen, and when" in text
+    assert "Forecasts of the final values" in text
     assert "steady-state-time" in text
     assert str(tmp_path) not in text
 
 
+@pytest.mark.slow
 def test_in_an_oven_it_is_steady_within_an_hour(rig: Rig, cold: str) -> None:
     ended = rig("run", "soak", "--bench", cold, "--oven-c", "45", "--off-s", "36000", "--duration-s", "21600", *NIGHT)
     found = json.loads(ended.out)["results"]
     assert 0.05 < found["steady-state-time"]["value"] < 1.0
 
 
+@pytest.mark.slow
 def test_a_soak_that_goes_on_is_foreseen_as_one_that_was_not_interrupted(rig: Rig, rig_home: Path) -> None:
     """The part that was being kept when the first half ended is all that a follower misses."""
     run = json.loads(rig("run", *SHORT_RUN, "--block-s", "5", "--json").out)["run"]
@@ -82,10 +85,10 @@ def test_a_soak_that_goes_on_is_foreseen_as_one_that_was_not_interrupted(rig: Ri
     whole, resumed = SoakWatch(), SoakWatch()
     for watch in (whole, resumed):
         watch.begun(run)  # the record holds all of it
-    begun = {name: each.forecast() for name, each in whole.followers[0].told.followed.items()}
+    begun = {name: each.forecast() for name, each in whole.followers[0].forecast.followed.items()}
     assert set(begun) == {"bias-x", "scale-x", "bias-y", "scale-y"}
     assert "not yet known" in lines(begun)
-    resumed.followers[0].told = SoakForecast({})
+    resumed.followers[0].forecast = SoakForecast({})
     told = [forecasts for each in kept if (forecasts := resumed.kept(each))]
     assert len(told) == len([pose for pose in schedule(**SHORT) if pose.path.startswith("reversal")]) / 8
     assert told[-1]["scale-x"].final.value == pytest.approx(begun["scale-x"].final.value, rel=1e-6)
@@ -94,10 +97,10 @@ def test_a_soak_that_goes_on_is_foreseen_as_one_that_was_not_interrupted(rig: Ri
 @pytest.mark.parametrize(
     ("steady_h", "half_v", "said"),
     [
-        ((3.0, 5.0, 9.0), 1e-5, "comes to 2.50000 +- 10 uV (95 %); steady in 3.0 h (1.0 h to 7.0 h)"),
-        ((2.0, 3.0, 9.0), 5e-3, "not yet known what it comes to: 2.4950 to 2.5050 V (95 %); steady in at most 7.0 h"),
+        ((3.0, 5.0, 9.0), 1e-5, "final value 2.50000 +- 10 uV (95 %); steady in 3.0 h (1.0 h to 7.0 h)"),
+        ((2.0, 3.0, 9.0), 5e-3, "final value not yet known: 2.4950 to 2.5050 V (95 %); steady in at most 7.0 h"),
         ((3.0, 5.0, 99.0), 5e-3, "2.5050 V (95 %); steady in 1.0 h at the earliest"),
-        ((2.0, 5.0, 99.0), 5e-3, "2.5050 V (95 %); not yet known when it is steady"),
+        ((2.0, 5.0, 99.0), 5e-3, "2.5050 V (95 %); time of steady state not yet known"),
         ((1.0, 1.5, 2.0), 1e-5, "+- 10 uV (95 %); steady"),
     ],
 )
@@ -107,9 +110,10 @@ def test_bounds_are_told_however_wide(steady_h: tuple[float, float, float], half
     forecast = Forecast(7200.0, Bounds(2.49, 2.491, 2.492), final, steady_s, 1e-4, 9e-3, 1.0)
     assert outlook("bias-x", forecast).endswith(said)
     step = replace(forecast, surprise=9.0)
-    assert outlook("bias-x", step) == "what came is no approach to a steady state: nothing is foreseen"
+    assert outlook("bias-x", step) == "the drift does not look like a warm-up, so there is no forecast"
 
 
+@pytest.mark.slow
 def test_until_steady_it_ends_early_and_says_when(rig: Rig, cold: str) -> None:
     ended = rig("run", "soak", "--until-steady", "--bench", cold, "--off-s", "36000", *NIGHT)
     document = json.loads(ended.out)
@@ -125,6 +129,7 @@ def test_until_steady_it_ends_early_and_says_when(rig: Rig, cold: str) -> None:
     assert document["results"]["steady-state-time"]["value"] < last_h < 12
 
 
+@pytest.mark.slow
 def test_the_result_does_not_depend_on_the_blocks(rig: Rig) -> None:
     words = ("--duration-s", "96", "--interval-s", "32", "--json")
     volts, runs = [], [json.loads(rig("run", *SHORT_RUN, *words, "--block-s", s).out)["run"] for s in ("2", "1")]
@@ -137,6 +142,7 @@ def test_the_result_does_not_depend_on_the_blocks(rig: Rig) -> None:
     assert np.array_equal(*volts)
 
 
+@pytest.mark.slow
 def test_killed_at_random_moments_it_ends_with_every_block_once(tmp_path: Path) -> None:
     luck, words = random.Random(1), ("run", *SHORT_RUN, "--block-s", "5")
     with Nursery() as nursery:

@@ -109,7 +109,7 @@ def test_an_unknown_run_names_the_nearest() -> None:
 
 
 def test_a_run_without_poses_is_no_table_yet() -> None:
-    with Record() as record, pytest.raises(RecordError, match="holds no pose yet"):
+    with Record() as record, pytest.raises(RecordError, match="has no pose yet"):
         table_of(record, begin(record))
 
 

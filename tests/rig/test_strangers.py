@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 
 from calibrations.errors import DataError, ModelError
-from calibrations.model_file import parse_model
-from calibrations.reading import text_file
-from calibrations.reading.yaml_file import LONGEST, load_yaml
+from calibrations.importing import files
+from calibrations.importing.files import LONGEST_YAML, load_yaml
+from calibrations.model.file import parse_model
 from drivers.errors import LinkRefused
-from drivers.links.url import Url
+from drivers.transport.address import Url
 from procedures.catalogue import find
 from rig.bench import read_bench
 from rig.errors import BenchError
@@ -31,10 +31,10 @@ PAGE = "schema: rig.model/1\nname: mine\neffects:\n- effect: bias\n"
     [
         ("!!python/object/apply:os.system ['touch ran']", "could not determine a constructor"),
         ("!!python/name:os.system", "could not determine a constructor"),
-        (BOMB, "more than 100000 parts; write it without aliases"),
+        (BOMB, "more than 100000 parts; do not let aliases"),
         ("a: &a [*a]", "contains itself"),
         ("[" * 10_000, "nested too deeply"),
-        ("x: " + "y" * LONGEST, f"more than the {LONGEST} that are read"),
+        ("x: " + "y" * LONGEST_YAML, f"the limit is {LONGEST_YAML}"),
         ("2024-13-45", "month must be in 1..12"),
     ],
     ids=["object", "name", "bomb", "itself", "deep", "long", "date"],
@@ -47,7 +47,7 @@ def test_yaml_is_data_of_bounded_size(text: str, said: str, tmp_path: Path, monk
         parse_model(text, "theirs.yaml")
     path = tmp_path / "bench.yaml"
     path.write_text(text)
-    with pytest.raises(BenchError, match="is not a YAML file"):
+    with pytest.raises(BenchError, match=r"bench\.yaml: the bench file is not YAML: "):
         read_bench(path)
     assert not (tmp_path / "ran").exists()
 
@@ -129,15 +129,15 @@ def test_that_a_persons_own_program_is_run_is_said(tmp_path: Path, caplog: pytes
     path.write_text('"""mine: nothing.\n"""\ndef mine(rig):\n    pass\n')
     with caplog.at_level(logging.WARNING):
         find("mine", tmp_path)
-    assert f"{path} is run: the bench file names its folder for procedures" in caplog.text
+    assert f"the program runs {path}, because the bench file names its folder" in caplog.text
 
 
 def test_a_compressed_file_is_no_bomb(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(text_file, "LARGEST_BYTES", 1 << 20)
+    monkeypatch.setattr(files, "LARGEST_BYTES", 1 << 20)
     path = tmp_path / "bomb.csv.gz"
     path.write_bytes(gzip.compress(b"1,2,3\n" * (1 << 19)))
     assert path.stat().st_size < 1 << 14
-    with pytest.raises(DataError, match="holds more than"), text_file.text_file(path).lines() as lines:
+    with pytest.raises(DataError, match="holds more than"), files.open_text_file(path).lines() as lines:
         assert sum(1 for _ in lines) < 0
 
 

@@ -12,9 +12,8 @@ from procedures.catalogue import find, paths
 from procedures.session import Pose
 from procedures.settings import parse
 from rig.bench import read_bench
-from rig.planning.plan import Plan, plan
+from rig.planning.plan import Plan, Stretch, plan, stretches
 from rig.planning.planned import Held, Step
-from rig.planning.stretches import Stretch, stretches
 
 Rig = Callable[..., Any]
 

@@ -10,8 +10,9 @@ import pexpect
 import pytest
 
 from rig.record import Record, Run
-from rig.running.runner import REPEATED
+from rig.runs.runner import REPEATED
 from tests.rig.rigging import POSES, SMALL_ARGUMENTS
+from tests.slow import first_fast
 
 pytestmark = pytest.mark.sockets
 
@@ -58,7 +59,7 @@ def test_a_guided_run_asks_shows_and_ends() -> None:
         terminal.sendline("go")
         terminal.expect("Is the sensor mounted face up.*:")
         terminal.sendline("perhaps")
-        terminal.expect("it takes yes or no")
+        terminal.expect("answer with yes or no")
         terminal.sendline("yes")
         terminal.expect(f"{POSES}/{POSES}")
         terminal.expect(f"complete, {POSES} poses")
@@ -80,7 +81,7 @@ def test_a_cancelled_run_leaves_nothing() -> None:
         assert record.runs() == []
 
 
-@pytest.mark.parametrize(("wish", "excluded"), [("resume", []), ("repeat", [REPEATED])])
+@pytest.mark.parametrize(("wish", "excluded"), first_fast([("repeat", [REPEATED]), ("resume", [])]))
 def test_ctrl_c_stops_and_a_person_has_it_go_on(wish: str, excluded: list[str]) -> None:
     with begun(*LONG) as terminal:
         terminal.expect(UNDER_WAY)
@@ -110,7 +111,7 @@ def test_the_menu_ends_a_run_that_can_be_resumed(end: Callable[[pexpect.spawn[st
         press_ctrl_c(terminal)
         terminal.expect("What now.*:")
         end(terminal)
-        terminal.expect("rig resume .* goes on where it was")
+        terminal.expect("`rig resume .*` continues the run")
         terminal.expect(pexpect.EOF)
     assert terminal.exitstatus == 4
     run, _ = only_run()
@@ -135,7 +136,7 @@ def test_a_refusal_is_no_end() -> None:
         terminal.sendline("go")
         terminal.expect("Is the sensor mounted face up.*:")
         terminal.sendline("no")
-        terminal.expect("was answered with no")
+        terminal.expect("is no; correct this")
         terminal.expect("What now.*:")
         terminal.sendline("resume")
         terminal.expect("Is the sensor mounted face up.*:")

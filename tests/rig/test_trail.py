@@ -7,21 +7,20 @@ from pathlib import Path
 import pytest
 
 from calibrations.errors import ExpressionError, ModelError
-from calibrations.pictures.waterfall import levels
-from calibrations.reading.read_csv import write_csv
-from rig.analysis.request import Request
-from rig.analysis.trail import Trail, trail
-from rig.analysis.trail_still import still_trail
+from calibrations.importing.foreign import write_csv
+from calibrations.presentation.charts.discovery import levels
+from rig.services.request import Request
+from rig.services.session import ModelSession, model_session
 from tests.browser.measured import hidden, wandering
 from tests.calibrations.test_common_floor import magnetometer
 
 
 @pytest.fixture
-def turned(tmp_path: Path) -> Trail:
-    return trail(Request(hidden(tmp_path, "package turned")))
+def turned(tmp_path: Path) -> ModelSession:
+    return model_session(Request(hidden(tmp_path, "package turned")))
 
 
-def test_an_effect_is_tried_added_and_undone(turned: Trail) -> None:
+def test_an_effect_is_tried_added_and_undone(turned: ModelSession) -> None:
     assert turned.diagnosed().candidates[0].name == "axis-misalignment"
     assert not turned.compared().adequate
     grown = turned.with_step(turned.tried(turned.effects["axis-misalignment"]))
@@ -34,14 +33,14 @@ def test_an_effect_is_tried_added_and_undone(turned: Trail) -> None:
 
 def test_where_no_column_tells_the_noise_the_error_falls_and_rises_again(tmp_path: Path) -> None:
     write_csv(magnetometer(), path := tmp_path / "hemisphere.csv")
-    begun = trail(Request(str(path), "field"))
+    begun = model_session(Request(str(path), "field"))
     grown = begun.with_step(begun.tried(begun.effects["hard-iron"]))
     assert grown.start.pooled_excess == grown.steps[0].before.pooled_excess > 5
     assert grown.end.pooled_excess == pytest.approx(1.0, abs=0.1)
     assert grown.undone().end.pooled_excess == begun.end.pooled_excess == pytest.approx(1.0, abs=0.1)
 
 
-def test_what_says_nothing_new_is_refused(turned: Trail) -> None:
+def test_what_says_nothing_new_is_refused(turned: ModelSession) -> None:
     with pytest.raises(ModelError, match="bias is in the model already"):
         turned.tried(turned.effects["bias"])
     with pytest.raises(ModelError, match="hard-iron is not defined for poses"):
@@ -50,7 +49,7 @@ def test_what_says_nothing_new_is_refused(turned: Trail) -> None:
         turned.tried(turned.written("mine", "a + 0*beta"))
 
 
-def test_an_effect_of_ones_own_is_tried_like_any_other(turned: Trail) -> None:
+def test_an_effect_of_ones_own_is_tried_like_any_other(turned: ModelSession) -> None:
     step = turned.tried(turned.written("mine", "a*az + b*cos(beta)*sin(2*alpha)"))
     assert step.after.pooled_excess < step.before.pooled_excess
     with pytest.raises(ExpressionError, match='did you mean "beta"'):
@@ -61,8 +60,7 @@ def test_an_effect_of_ones_own_is_tried_like_any_other(turned: Trail) -> None:
 
 def test_a_noise_model_grows_as_well(tmp_path: Path) -> None:
     request = Request(wandering(tmp_path))
-    found = still_trail(request)
-    assert found is not None
+    found = model_session(request)
     result = found.diagnosed()
     assert (result.verdict, result.missing) == ("effect-missing", ("rate-random-walk",))
     step = found.tried(result.candidates[0].effect)
@@ -74,7 +72,3 @@ def test_a_noise_model_grows_as_well(tmp_path: Path) -> None:
     assert grown.undone() == found
     with pytest.raises(ModelError, match="rate-random-walk is in the model already"):
         grown.tried(result.candidates[0].effect)
-
-
-def test_rows_are_no_still_record(tmp_path: Path) -> None:
-    assert still_trail(Request(hidden(tmp_path, "package turned"))) is None

@@ -11,16 +11,15 @@ import numpy as np
 import pytest
 import yaml
 
-from calibrations.reading.read_csv import read_csv
+from calibrations.importing.foreign import read_csv
 from drivers.errors import StageAlarm
-from drivers.oriental_az import RotaryStage
+from drivers.oriental_az.driver import RotaryStage
 from procedures.catalogue import find
 from procedures.settings import parse
 from rig.bench import DEFAULT, read_bench
 from rig.record import Record
-from rig.record.measured import table_of
-from rig.record.turned import RATE
-from rig.running.runner import start
+from rig.record.measured import RATE, table_of
+from rig.runs.runner import start
 from tests.rig.rigging import Onlooker
 
 Rig = Callable[..., Any]

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from drivers.simulation.world import World
+from drivers.world.world import World
 from procedures.catalogue import find, paths
 from procedures.errors import NoAnswer, SafetyLimit
 from procedures.questions import Question
@@ -14,10 +14,10 @@ from procedures.settings import parse
 from rig.bench import Bench, read_bench
 from rig.cli.failure import status_of
 from rig.cli.watch import Quiet
-from rig.connected.instruments import Rig
+from rig.instruments.instruments import Rig
 from rig.planning.plan import plan
 from rig.record import Record
-from rig.running.runner import Outcome, resume, start
+from rig.runs.runner import Outcome, resume, start
 from tests.rig.rigging import Onlooker, small_sweep
 
 pytestmark = pytest.mark.sockets
@@ -35,7 +35,7 @@ def bench_without_level() -> Bench:
 @pytest.fixture
 def deserted(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Nobody stands at the simulated bench; what was stopped there, in order."""
-    monkeypatch.setattr("rig.running.run_host.answer", lambda question, rig: None)
+    monkeypatch.setattr("rig.runs.host.answer", lambda question, rig: None)
     stopped: list[str] = []
     stop = Rig.stop
 
@@ -85,13 +85,13 @@ def test_a_table_that_is_not_level_stops_it_and_is_read_again_when_it_was_levell
     shown = iter([(1.0, 0.0)] * 2 + [(-1.0, 0.0)] * 2)  # before it is levelled: each axis on its own
     real = World.level_deg
     monkeypatch.setattr(World, "level_deg", lambda world: next(shown, None) or real(world))
-    monkeypatch.setattr("rig.running.run_host.answer", typed)
+    monkeypatch.setattr("rig.runs.host.answer", typed)
     watch = Onlooker(wishes=["resume"])
     with Record() as record:
         outcome = start(record, bench_without_level(), *small_sweep(), watch)
     assert [type(seen.error) for seen in watch.outcomes] == [SafetyLimit]
     assert "tilted by 1.000 deg along x" in str(watch.outcomes[0].error)
-    assert "then resume the run" in str(watch.outcomes[0].error)
+    assert "level the base, correct the zero of alpha, resume the run" in str(watch.outcomes[0].error)
     assert outcome.run.state == "complete"
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from calibrations.inputs import contributions
+from calibrations.fitting.inputs import input_contributions
 from calibrations.table import Table
 from rig.bench import Bench, read_bench
 from rig.bench.parts import Uncertainty
@@ -18,7 +18,7 @@ ONE = {"alpha_deg": [90.0], "beta_deg": [0.0], "vx_v": [3.5], "temperature_c": [
 def test_every_uncertainty_of_the_bench_is_one_of_the_budget() -> None:
     bench = Bench(instruments={}, uncertainty=Uncertainty(**dict.fromkeys(Uncertainty.model_fields, 0.5)))
     table = Table.from_columns("poses", ONE, bench.constants)
-    silent = {c.source for c in contributions(table) if c.std is None}
+    silent = {c.source for c in input_contributions(table) if c.std is None}
     assert silent == {"true angle of alpha", "true angle of beta"}  # those have error tables
 
 

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from calibrations.chain import Pose as Angles
-from calibrations.chain import specific_force
+from calibrations.geometry.orientation import Pose as Angles
+from calibrations.geometry.orientation import specific_force
+from calibrations.geometry.stage_path import SHORTEST_APPROACH_DEG, turning_points
 from calibrations.kernels import slip
 from calibrations.table import Array, Table
-from calibrations.visits import SHORTEST_APPROACH_DEG, turning_points
 from procedures.session import SHORTEST_APPROACH_DEG as SESSION_DEG
 from procedures.session import Limits, Pose, Session
 from procedures.sweep import grid

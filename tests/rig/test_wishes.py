@@ -14,11 +14,11 @@ from procedures.errors import Declined
 from procedures.session import Limits
 from procedures.settings import parse
 from rig.bench import read_bench
-from rig.connected.instruments import Rig
 from rig.errors import InstrumentFailed
+from rig.instruments.instruments import Rig
 from rig.planning.plan import Plan
 from rig.record import Kept, Record
-from rig.running.runner import REPEATED, Outcome, Wish, start
+from rig.runs.runner import REPEATED, Outcome, Wish, start
 from tests.rig.rigging import POSES, Onlooker, small_sweep
 
 pytestmark = pytest.mark.sockets
@@ -124,7 +124,7 @@ def test_an_instrument_that_does_not_come_back_is_told_and_asked_about_again(mon
     def gone(*arguments: object) -> None:
         raise InstrumentFailed("beta does not answer")
 
-    watch = Disturbed(lambda: (monkeypatch.setattr("rig.running.runner._same_instruments", gone), alarm()), "resume")
+    watch = Disturbed(lambda: (monkeypatch.setattr("rig.runs.runner._same_instruments", gone), alarm()), "resume")
     with Record() as record:
         outcome = start(record, read_bench(), *small_sweep(), watch)
     assert [str(seen.error) for seen in watch.outcomes][1:] == ["beta does not answer"]
@@ -137,7 +137,7 @@ def test_a_limit_that_is_still_passed_is_asked_about_until_the_end() -> None:
     with Record() as record:
         outcome = start(record, bench, *small_sweep(), watch)
     assert len(watch.outcomes) == 3
-    assert "outside the bench's limits" in str(outcome.error)
+    assert "outside the limits" in str(outcome.error)
 
 
 def test_a_run_that_is_not_wanted_leaves_nothing() -> None:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from calibrations.discovery.rows import Rows
 from calibrations.fit import fit
-from calibrations.model import Estimate
-from calibrations.model_file import read_model
+from calibrations.model.file import read_model
+from calibrations.presentation.text import concise
 from calibrations.table import Table
-from rig.cli.words import too_quiet, with_uncertainty
 from tests.calibrations.test_pictures import warm_table
 
 
@@ -24,11 +24,12 @@ from tests.calibrations.test_pictures import warm_table
     ],
 )
 def test_an_uncertainty_has_two_digits(value: float, std: float | None, text: str) -> None:
-    assert with_uncertainty(Estimate("bias", "x", value, std, "V")) == text
+    assert concise(value, std, "V") == text
 
 
 def test_a_residual_below_the_noise_is_doubted() -> None:
     table = warm_table()
     single = Table.from_columns("poses", {**table.columns, "n": np.ones(table.n)}, source="single samples")
-    assert too_quiet(fit(read_model("linear"), table)) == ""
-    assert "less than noise leaves" in too_quiet(fit(read_model("linear"), single))
+    assert Rows(table).remarks(fit(read_model("linear"), table)) == []
+    (remark,) = Rows(single).remarks(fit(read_model("linear"), single))
+    assert remark.startswith("The error is smaller than the noise floor")

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drivers.simulation.config import WorldConfig
+from drivers.world.config import WorldConfig
 
 SILENT = {"white_v": 0.0, "flicker_v": 0.0}
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drivers.simulation.config import WorldConfig
-from drivers.simulation.world import World
+from drivers.world.config import WorldConfig
+from drivers.world.world import World
 
 SEEDS = range(3)
 

@@ -5,11 +5,11 @@ import json
 import numpy as np
 import pytest
 
-from drivers.simulation.batch import Batch
-from drivers.simulation.config import WorldConfig
-from drivers.simulation.errors import BadSetting, UnknownInput
-from drivers.simulation.trajectory import Trajectory
-from drivers.simulation.world import World
+from drivers.world.batch import Batch
+from drivers.world.config import WorldConfig
+from drivers.world.errors import BadSetting, UnknownInput
+from drivers.world.stage import Trajectory
+from drivers.world.world import World
 
 CONFIG = WorldConfig.adxl203().changed({"spread": {"sensitivity_fraction": 0.02}})
 INPUTS = ("a.vx", "a.vy", "b.vx", "b.vy", "supply")

@@ -4,10 +4,10 @@ from dataclasses import FrozenInstanceError, fields, is_dataclass
 
 import pytest
 
-from drivers.simulation.config import WorldConfig
-from drivers.simulation.errors import BadSetting, SimulationError, UnknownSetting
-from drivers.simulation.kernel import record
-from drivers.simulation.scatter import individual
+from drivers.world.config import WorldConfig
+from drivers.world.errors import BadSetting, SimulationError, UnknownSetting
+from drivers.world.initial_state import individual
+from drivers.world.kernel import record
 
 
 def test_a_mapping_changes_a_preset() -> None:

@@ -3,9 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drivers.simulation.config import WorldConfig
-from drivers.simulation.defects import DEFECTS, UNEXPLAINED, Defect
-from drivers.simulation.world import World
+from drivers.world.config import WorldConfig
+from drivers.world.defects import DEFECTS, UNEXPLAINED, Defect
+from drivers.world.world import World
 
 ALL = {**DEFECTS, **UNEXPLAINED}
 TURN = np.concatenate([np.arange(0.0, 361.0, 30.0), np.arange(360.0, -1.0, -30.0)])

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from drivers.simulation import dwell
-from drivers.simulation.config import WorldConfig
-from drivers.simulation.trajectory import Trajectory
-from drivers.simulation.visit import Timing, path_direction
-from drivers.simulation.world import World
+from drivers.world import visit
+from drivers.world.config import WorldConfig
+from drivers.world.stage import Trajectory
+from drivers.world.visit import Timing, path_direction
+from drivers.world.world import World
 
 ALPHA = np.array([90.0, 90.0, 30.0, 30.0, 135.0, 135.0])
 BETA = np.array([0.0, 90.0, 200.0, 360.0, 250.0, 10.0])
@@ -34,7 +34,7 @@ def test_means_agree_with_averaged_samples_to_a_microvolt(silent: WorldConfig) -
     averages = np.array([sampled(world, a, b).mean(axis=0) for a, b in zip(ALPHA, BETA, strict=True)])
     expected = np.column_stack([means["vx_v"], means["vy_v"]])
     # without noise of the sensor, the rounding to codes is all that is left to chance
-    rounding = dwell.spreads(silent.noise.x, silent.converter, Timing())[0]
+    rounding = visit.spreads(silent.noise.x, silent.converter, Timing())[0]
     assert np.abs(averages - expected).max() < 1e-6 + 4 * rounding
     free = World(silent, seed=4).dwell_mean(ALPHA, BETA, noise_free=True)
     assert np.abs(averages - np.column_stack([free["vx_v"], free["vy_v"]])).max() < 1e-6
@@ -47,7 +47,7 @@ def test_means_scatter_as_averaged_and_rounded_samples_do() -> None:
     averages = blocks.reshape(500, 5000, 2).mean(axis=1)
     stds = blocks.reshape(500, 5000, 2).std(axis=1, ddof=1)
     means = World(config, seed=9).dwell_mean(np.zeros(500), 0.0, settle_s=0.0)
-    predicted, relative = dwell.spreads(config.noise.x, config.converter, Timing())
+    predicted, relative = visit.spreads(config.noise.x, config.converter, Timing())
     for seen in (averages.ravel() - np.tile(averages.mean(axis=0), 500), *(means[v] for v in ("vx_v", "vy_v"))):
         chi2 = len(seen) * seen.var() / predicted**2
         assert 0.001 < stats.chi2.cdf(chi2, len(seen)) < 0.999
@@ -60,14 +60,14 @@ def test_means_scatter_as_averaged_and_rounded_samples_do() -> None:
 def test_the_predicted_spread_is_that_of_many_means() -> None:
     config = WorldConfig.ideal()
     means = World(config, seed=2).dwell_mean(np.zeros(4000), 0.0, dwell_s=0.5, settle_s=0.0)
-    predicted = dwell.spreads(config.noise.x, config.converter, Timing(dwell_s=0.5))[0]
+    predicted = visit.spreads(config.noise.x, config.converter, Timing(dwell_s=0.5))[0]
     assert np.std(np.concatenate([means["vx_v"] - means["vx_v"].mean(), means["vy_v"] - means["vy_v"].mean()])) == (
         pytest.approx(predicted, rel=0.05)
     )
 
 
 def test_a_dwells_noise_is_fifty_microvolts() -> None:
-    assert dwell.spreads(WorldConfig.ideal().noise.x, WorldConfig.ideal().converter, Timing())[0] == pytest.approx(
+    assert visit.spreads(WorldConfig.ideal().noise.x, WorldConfig.ideal().converter, Timing())[0] == pytest.approx(
         50e-6, rel=0.02
     )
 

@@ -7,9 +7,8 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 from drivers.philtec_d63 import SIMULATED, Curve
-from drivers.simulation.fibre_probe import FibreProbe, seen_v
-from drivers.simulation.fibre_probe_certificate import certificate
-from drivers.simulation.kernel import record
+from drivers.world.displacement_sensor import FibreProbe, certificate, seen_v
+from drivers.world.kernel import record
 
 PROBE = record(FibreProbe())
 

@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drivers.simulation.friction import ELEMENTS, Friction, drag_nm
-from drivers.simulation.kernel import record
+from drivers.world.accelerometer import ELEMENTS, Friction, drag_nm
+from drivers.world.kernel import record
 
 
 def drags(friction: Friction, path: np.ndarray, neighbour_g: float = 0.0) -> np.ndarray:

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.simulation.gravity import Base, Package, along_y, felt_g, mounting, rotation, vertical
-from drivers.simulation.kernel import record
+from drivers.world.gravity import Base, Package, along_y, felt_g, mounting, rotation, vertical
+from drivers.world.kernel import record
 
 LEVEL, SQUARE = Base(), Package()
 angle = st.floats(-360, 360)

@@ -5,9 +5,9 @@ from math import exp
 import numpy as np
 import pytest
 
-from drivers.simulation.config import WorldConfig
-from drivers.simulation.heat import wandered
-from drivers.simulation.world import World
+from drivers.world.config import WorldConfig
+from drivers.world.heat import wandered
+from drivers.world.world import World
 
 
 def world(**heat: float) -> World:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drivers.simulation.config import WorldConfig
-from drivers.simulation.trajectory import at_rest
-from drivers.simulation.world import World
+from drivers.world.config import WorldConfig
+from drivers.world.stage import at_rest
+from drivers.world.world import World
 
 QUIET = {"level": {"noise_deg": 0.0}, "spread": {"imperfection_fraction": 0.0}}
 

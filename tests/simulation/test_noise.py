@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from drivers.simulation.config import WorldConfig
-from drivers.simulation.noise import FLICKER_S
-from drivers.simulation.trajectory import Trajectory
-from drivers.simulation.world import World
+from drivers.world.config import WorldConfig
+from drivers.world.noise import FLICKER_S
+from drivers.world.stage import Trajectory
+from drivers.world.world import World
 
 TAU_S = 32e3 * 0.33e-6
 

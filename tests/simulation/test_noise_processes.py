@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from drivers.simulation.config import WorldConfig
-from drivers.simulation.world import World
+from drivers.world.config import WorldConfig
+from drivers.world.world import World
 
 QUIET: dict[str, object] = {"white_v": 0.0, "flicker_v": 0.0}
 SEEDS = 4

@@ -2,9 +2,8 @@ from __future__ import annotations
 
 import pytest
 
-from drivers.simulation.kernel import record
-from drivers.simulation.plates import Plates, read_v
-from drivers.simulation.springs import per_g_nm
+from drivers.world.accelerometer import Plates, per_g_nm, read_v
+from drivers.world.kernel import record
 
 G_NM = per_g_nm(5500.0)
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from drivers.simulation.kernel import record
-from drivers.simulation.positioner import (
+from drivers.world.kernel import record
+from drivers.world.positioner import (
     Command,
     Positioner,
     at_rest,

@@ -5,10 +5,10 @@ import json
 import numpy as np
 import pytest
 
-from drivers.simulation.config import WorldConfig
-from drivers.simulation.errors import BadSetting, TimeReversal, UnknownInput
-from drivers.simulation.trajectory import Trajectory
-from drivers.simulation.world import World
+from drivers.world.config import WorldConfig
+from drivers.world.errors import BadSetting, TimeReversal, UnknownInput
+from drivers.world.stage import Trajectory
+from drivers.world.world import World
 
 INPUTS = ("vx", "vy", "supply", "thermistor", "ground")
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drivers.simulation.config import WorldConfig
-from drivers.simulation.gravity import rotation
-from drivers.simulation.seating import Seating, seated
-from drivers.simulation.springs import per_g_nm
-from drivers.simulation.world import World
+from drivers.world.accelerometer import per_g_nm
+from drivers.world.config import WorldConfig
+from drivers.world.gravity import Seating, rotation, seated
+from drivers.world.world import World
 
 LOOSE = {"seating": {"grip_pm": 20.0}, "spread": {"imperfection_fraction": 0.0}, "noise": {"white_v": 0.0}}
 

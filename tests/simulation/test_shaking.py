@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from drivers.philtec_d63 import SIMULATED, Curve
-from drivers.simulation.config import WorldConfig
-from drivers.simulation.errors import UnknownInput
-from drivers.simulation.positioner import Command, standing
-from drivers.simulation.trajectory import Trajectory
-from drivers.simulation.world import World
+from drivers.world.config import WorldConfig
+from drivers.world.errors import UnknownInput
+from drivers.world.positioner import Command, standing
+from drivers.world.stage import Trajectory
+from drivers.world.world import World
 
 QUIET = WorldConfig.ideal().changed(
     {"noise": {"white_v": 0.0}, "d63": {"noise_v": 0.0}, "positioner": {"noise_nm": 0.0}}

@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.simulation.kernel import record
-from drivers.simulation.springs import Springs, balanced_nm, drawn_aside_nm, per_g_nm, restoring_nm
+from drivers.world.accelerometer import Springs, balanced_nm, drawn_aside_nm, per_g_nm, restoring_nm
+from drivers.world.kernel import record
 
 PLAIN = Springs()
 load = st.floats(-1.5, 1.5)

@@ -4,8 +4,8 @@ from math import degrees
 
 import pytest
 
-from drivers.simulation.kernel import record
-from drivers.simulation.stage import Stage, engaged_deg, true_angle_rad
+from drivers.world.kernel import record
+from drivers.world.stage import Stage, engaged_deg, true_angle_rad
 
 
 def true_deg(stage: Stage, table_deg: float) -> float:

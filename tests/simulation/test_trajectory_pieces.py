@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.simulation.stage import PIECES, motion, motor_angle_deg
-from drivers.simulation.trajectory import Trajectory, at_rest
+from drivers.world.stage import PIECES, Trajectory, at_rest, motion, motor_angle_deg
 
 angles = st.floats(-400, 400)
 

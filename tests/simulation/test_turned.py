@@ -7,13 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers.simulation.config import WorldConfig
-from drivers.simulation.gravity import Base
-from drivers.simulation.iron import Iron, Magnet, near_iron_ut, near_magnet_ut
-from drivers.simulation.kernel import record
-from drivers.simulation.laboratory import Laboratory, field_ut, rotation_deg_s
-from drivers.simulation.trajectory import Trajectory
-from drivers.simulation.world import World
+from drivers.world.config import WorldConfig
+from drivers.world.gravity import Base
+from drivers.world.kernel import record
+from drivers.world.laboratory import Iron, Laboratory, Magnet, field_ut, near_iron_ut, near_magnet_ut, rotation_deg_s
+from drivers.world.stage import Trajectory
+from drivers.world.world import World
 
 SILENT = {"converter": {"noise_v": 0.0}, "magnetometer": {"noise_v": 0.0}, "gyroscope": {"noise_v": 0.0}}
 FIELD, RATE = ("mx", "my", "mz"), ("gx", "gy", "gz")

@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from drivers.clock import SimulatedClock
-from drivers.links import Address, Links
-from drivers.links.modbus import Unit
-from drivers.links.server import Connection, Port, Server
+from drivers.transport import Address, Links
+from drivers.transport.modbus import Unit
+from drivers.transport.server import Connection, Port, Server
 
 ANSWER_S = 0.001
 RTU = "rtu+tcp://127.0.0.1:0"

@@ -6,12 +6,12 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from drivers import dpg2
 from drivers.clock import SimulatedClock
-from drivers.dpg2 import Level, Settings
+from drivers.dpg2 import driver as dpg2
+from drivers.dpg2.driver import Level, Settings
 from drivers.errors import BadFrame, InstrumentError, LinkTimeout, NotSettled
-from drivers.links import Address, Links
-from drivers.links.server import Connection, Port, Server
+from drivers.transport import Address, Links
+from drivers.transport.server import Connection, Port, Server
 
 Answers = dict[bytes, list[bytes]]
 Levels = Callable[..., Level]

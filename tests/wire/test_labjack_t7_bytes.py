@@ -7,12 +7,12 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
-from drivers import labjack_t7
 from drivers.clock import SimulatedClock
 from drivers.errors import LimitError, LinkTimeout, OverRange, Refused, StreamError
-from drivers.labjack_t7 import T7, Settings
-from drivers.links import Address, Links
-from drivers.links.server import Port, Server
+from drivers.labjack_t7 import driver as labjack_t7
+from drivers.labjack_t7.driver import T7, Settings
+from drivers.transport import Address, Links
+from drivers.transport.server import Port, Server
 
 TCP = "tcp://127.0.0.1:0"
 SLOPE = 0.00031580578  # nominal, as FLOAT32 39 A5 92 BC

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivers.errors import StreamError
-from drivers.labjack_t7_stream import Calibration, codes_of, packet_type
-from drivers.labjack_t7_twin import codes_of_volts
+from drivers.labjack_t7.stream import Calibration, codes_of, packet_type
+from drivers.labjack_t7.twin import codes_of_volts
 
 FIRST = bytes.fromhex("FF FF 00 00 00 0E 01 4C 10 00 00 00 00 00 00 00 00 01 80 00")
 SECOND = bytes.fromhex("00 00 00 00 00 0E 01 4C 10 00 00 00 00 00 00 00 FF FF 00 02")

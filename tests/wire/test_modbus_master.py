@@ -9,10 +9,9 @@ import pytest
 
 from drivers.clock import SimulatedClock
 from drivers.errors import BadFrame, LinkRefused, LinkTimeout, Refused, WrongUnit
-from drivers.links import Address, Links
-from drivers.links.modbus import Unit
-from drivers.links.register import Register
-from drivers.links.server import Port, Server
+from drivers.transport import Address, Links
+from drivers.transport.modbus import Register, Unit
+from drivers.transport.server import Port, Server
 
 ALARM = Register(0x0080, "uint32", "present alarm")
 OUTPUTS = Register(0x007F, "uint16", "driver output status")

@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 import pytest
 
-from drivers import omega_cn7500
 from drivers.errors import LimitError, SensorFault
-from drivers.links import Address, Links
-from drivers.omega_cn7500 import Oven, Settings
+from drivers.omega_cn7500 import driver as omega_cn7500
+from drivers.omega_cn7500.driver import Oven, Settings
+from drivers.transport import Address, Links
 
 ASK_PV, ASK_SV, ASK_METHOD = (
     "01 03 10 00 00 01 80 CA",

@@ -8,11 +8,11 @@ from collections.abc import Callable
 
 import pytest
 
-from drivers import oriental_az
 from drivers.clock import SimulatedClock
 from drivers.errors import Interlocked, LimitError, NotSettled, StageAlarm, StageLost
-from drivers.links import Address, Links
-from drivers.oriental_az import RotaryStage, Settings
+from drivers.oriental_az import driver as oriental_az
+from drivers.oriental_az.driver import RotaryStage, Settings
+from drivers.transport import Address, Links
 
 SETTINGS = Settings(
     steps_per_turn=36000, limits_deg=(-90.0, 100.0), speed_deg_s=20.0, acceleration_deg_s2=15.0, settle_deg=0.05

@@ -7,12 +7,12 @@ from collections.abc import Callable
 
 import pytest
 
-from drivers import pi_e727
 from drivers.clock import SimulatedClock
 from drivers.errors import BadFrame, LimitError, LinkTimeout, NotSettled, Refused, StreamError
 from drivers.instrument import Identity
-from drivers.links import Address, Links
-from drivers.pi_e727 import Positioner, Settings
+from drivers.pi_e727 import driver as pi_e727
+from drivers.pi_e727.driver import Positioner, Settings
+from drivers.transport import Address, Links
 
 SETTINGS = Settings(limits_um=(5.0, 95.0), settle_um=0.02)
 NO_ERROR = ("ERR?\n", "0\n")

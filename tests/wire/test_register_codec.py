@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.links.register import CODES, Kind, Register
+from drivers.transport.modbus import CODES, Kind, Register
 
 
 @pytest.mark.parametrize(

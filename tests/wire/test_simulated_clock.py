@@ -10,8 +10,8 @@ import pytest
 from drivers import clock as clock_module
 from drivers.clock import SimulatedClock, WallClock, serve_forever
 from drivers.errors import ClockStuck
-from drivers.links.link import Link, open_link
-from drivers.links.server import Connection, Port, Server
+from drivers.transport.link import Link, open_link
+from drivers.transport.server import Connection, Port, Server
 
 LISTEN = "tcp://127.0.0.1:0"
 

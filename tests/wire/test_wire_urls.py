@@ -6,8 +6,8 @@ import pytest
 
 from drivers.clock import SimulatedClock
 from drivers.errors import LinkRefused
-from drivers.links.link import open_link
-from drivers.links.url import Url
+from drivers.transport.address import Url
+from drivers.transport.link import open_link
 
 
 def test_a_serial_line_is_taken_apart() -> None:

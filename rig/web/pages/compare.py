@@ -2,21 +2,125 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from urllib.parse import urlencode
 
 from nicegui import ui
 
-from calibrations.numerals import measured, plain
-from rig.analysis.both import both
-from rig.analysis.request import Request
+from calibrations.discovery.results import FittedModel
+from calibrations.fit import Fit
+from calibrations.noise.allan import compare_deviations
+from calibrations.noise.fit import NoiseFit
+from calibrations.presentation.chart import Chart
+from calibrations.presentation.charts.columns import choices, first_choices
+from calibrations.presentation.charts.noise import scaled, units
+from calibrations.presentation.interactive import figure, height_px
+from calibrations.presentation.residual import Shown, residual_units
+from calibrations.presentation.text import measured, plain, unit
+from rig.analysis.both import again, both
+from rig.analysis.charts import deviations, difference, differences, residuals
 from rig.analysis.side_by_side import Pair, parameters_of, results_of
 from rig.record import Record
+from rig.services.request import Request
 from rig.web.desk import Desk, models
-from rig.web.figures.beside import differences, unit_of
 from rig.web.frame import Key, frame
-from rig.web.pages.compare_pictures import Pictures, of_both
-from rig.web.parts import box, div, failed, off_loop, table, waiting, words
-from rig.web.told import message
+from rig.web.parts import box, div, failed, message, off_loop, redraw, table, waiting, words
+
+# The pictures of the page Compare, of one axis at a time: of two tables, and of two still records.
+
+RESIDUALS, DIFFERENCE = "What the model leaves of both", "Second less first, at the poses that both have"
+ALLAN = "Allan deviation of both, and the model fitted to each"
+
+
+@dataclass(frozen=True)
+class Both:
+    """What there is to draw: axes, units, titles; `draw` makes the charts of an axis, as what is sensed or not."""
+
+    axes: Sequence[str]
+    units: dict[bool, str]
+    titles: Sequence[str]
+    draw: Callable[[int, bool], Sequence[Chart]]
+
+
+class Pictures:
+    """Draws one axis in one unit."""
+
+    def __init__(self, both: Both) -> None:
+        self.both = both
+        with box("controls row-of"):
+            self.axis = ui.select(dict(enumerate(both.axes)), label="axis", value=0, on_change=self.draw)
+            self.axis.props("dense options-dense").style("min-width: 120px")
+            self.unit = ui.toggle(both.units, value=next(iter(both.units)), on_change=self.draw).props("dense no-caps")
+            self.unit.set_visibility(len(both.units) > 1)
+            words("● first, ◇ second. Draw a box in a picture to zoom into it; a double click zooms out.",
+                  "told quiet small")  # fmt: skip
+        self.plots: list[ui.plotly] = []
+        with div("two" if len(both.titles) > 1 else ""):
+            for title in both.titles:
+                with box("picture"):
+                    words(title, "title")
+                    plot = ui.plotly({"data": [], "layout": {}}).classes("tall-plot").props(f'aria-label="{title}"')
+                    self.plots.append(plot)
+        self.draw()
+
+    def draw(self) -> None:
+        """All of them anew."""
+        charts = self.both.draw(int(self.axis.value or 0), bool(self.unit.value))
+        for plot, chart in zip(self.plots, charts, strict=True):
+            redraw(plot, figure(chart, f"{self.axis.value} {self.unit.value}"))
+
+    def next_axis(self) -> None:
+        """The next channel."""
+        self.axis.set_value((int(self.axis.value or 0) + 1) % len(self.both.axes))
+
+    def other_unit(self) -> None:
+        """V to g, or back."""
+        if len(self.both.units) > 1:
+            self.unit.set_value(not self.unit.value)
+
+
+def of_both(found: tuple[FittedModel, FittedModel]) -> Both:
+    """Those that go with what was fitted."""
+    first, second = found
+    if isinstance(first, NoiseFit) and isinstance(second, NoiseFit):
+        return _of_noise(first, second)
+    if isinstance(first, Fit) and isinstance(second, Fit):
+        return _of_rows(first, second)
+    raise TypeError(found)
+
+
+def _of_rows(first: Fit, second: Fit) -> Both:
+    """Residuals, and where both have the same poses the difference of what was measured there."""
+    shared = again(first, second)
+    columns, there = choices(first), choices(second)
+    x, _ = first_choices([name for name in columns if name in there])
+
+    def draw(c: int, in_sensed: bool) -> Sequence[Chart]:
+        one, other = Shown(first, c, in_sensed), Shown(second, c, in_sensed)
+        made = [residuals(one, other, columns[x], there[x])]
+        return made if shared is None else [*made, difference(one, shared)]
+
+    titles = [RESIDUALS] if shared is None else [RESIDUALS, DIFFERENCE]
+    axes = [name for name in first.channels if name in second.channels]
+    return Both(axes, residual_units(first), titles, draw)
+
+
+def _of_noise(first: NoiseFit, second: NoiseFit) -> Both:
+    """How both average."""
+    axes = [axis for axis in first.still.axes if axis in second.still.axes]
+    there = [{each.channel.axis: each for each in found.channels} for found in (first, second)]
+    offered = units(first.still) if units(first.still) == units(second.still) else {False: first.still.unit}
+
+    def draw(c: int, in_sensed: bool) -> Sequence[Chart]:
+        axis = axes[c]
+        pairs = zip(there, (first, second), strict=True)
+        curves = [compare_deviations(channels[axis], fit.still.allan[axis]) for channels, fit in pairs]
+        into = (scaled(first.still, axis, in_sensed), scaled(second.still, axis, in_sensed))
+        return [deviations(curves, into)]
+
+    return Both(axes, offered, [ALLAN], draw)
+
 
 HEAD = ("", "first ●", "second ◇", "second − first", "in its uncertainties")
 
@@ -93,12 +197,13 @@ def _results(first: str, second: str) -> None:
 
 def _parameters(model: str, pairs: list[Pair]) -> None:
     """The model's, as a picture and in numbers."""
-    figure, height_px = differences(pairs)
+    chart = differences(pairs)
     title = f"How the parameters of {model} differ"
     with div("two beside"):
         with box("picture"):
             words(title, "title")
-            ui.plotly(figure).style(f"height: {height_px}px; width: 100%").props(f'aria-label="{title}"')
+            plot = ui.plotly(figure(chart, "differences", False)).props(f'aria-label="{title}"')
+            plot.style(f"height: {height_px(chart)}px; width: 100%")
             words("Second less first, with two standard uncertainties each way; ◆ differ beyond that.", "quiet small")
         with box("stack"):
             words(f"Parameters of {model}", "title")
@@ -106,7 +211,7 @@ def _parameters(model: str, pairs: list[Pair]) -> None:
 
 
 def _row(pair: Pair) -> tuple[str, ...]:
-    of = unit_of(pair)
+    of = unit(pair.unit)
     times = "unknown" if pair.deviations is None else plain(pair.deviations, 2)
     return (
         pair.name,

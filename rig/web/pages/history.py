@@ -6,24 +6,68 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from fastapi import Request
-from nicegui import ui
+from nicegui import events, ui
 
-from calibrations.evaluations.control_chart import FEWEST
-from calibrations.model_file import read_model
-from rig.analysis.asked import effects_of
-from rig.analysis.history import Calibration, History, Limit, Quantity, history, judged, latest
+from calibrations.analyses.control_chart import FEWEST_RUNS
+from calibrations.model.file import read_model
+from rig.analysis.history import Calibration, History, Limit, Quantity, history, judged, latest, when
 from rig.analysis.history_limits import limits_of
 from rig.analysis.sensors import calibrating
-from rig.record import Record
+from rig.record import Record, Run
+from rig.services.load import effects_of
 from rig.web.desk import Desk, models, runs
 from rig.web.frame import Key, frame
-from rig.web.pages.history_asked import Asked, asked
-from rig.web.pages.history_beside import Beside
-from rig.web.pages.history_parts import Closest, calibrations_table, quantities_table, standing
-from rig.web.pages.history_pictures import LifePictures
-from rig.web.pages.history_sensors import listed
-from rig.web.parts import box, div, failed, off_loop, waiting, words
-from rig.web.told import message
+from rig.web.pages.history_results import (
+    Asked,
+    Beside,
+    Closest,
+    LifePictures,
+    asked,
+    calibrations_table,
+    quantities_table,
+    standing,
+)
+from rig.web.parts import LINKED, box, div, failed, message, off_loop, state, waiting, words
+
+# Whose life is to be shown: all sensors of the record.
+
+COLUMNS: list[dict[str, object]] = [
+    {"name": "sensor", "label": "sensor", "field": "sensor", "align": "left", "sortable": True},
+    {"name": "count", "label": "runs to calibrate it by", "field": "count", "align": "left", "sortable": True},
+    {"name": "first", "label": "first", "field": "first", "align": "left", "sortable": True},
+    {"name": "last", "label": "last", "field": "last", "align": "left", "sortable": True},
+]
+PAGE = 25
+NONE = (
+    "A sensor's life is its calibrations: sweeps and other runs of poses, positions or turns. It goes by its serial "
+    "number, which the bench file names (sensor: {serial: ...}), a table in a line `# serial: 17` above its header, "
+    "beside `# date: 2025-03-01`."
+)
+
+
+def listed(known: Mapping[str, list[Run]]) -> None:
+    """A line for each sensor, which leads to its life."""
+    if not known:
+        with state("No sensor is calibrated yet", NONE):
+            ui.button("Measure", icon="play_arrow", on_click=lambda: ui.navigate.to("/run?procedure=sweep"))
+        return
+
+    def opened(event: events.GenericEventArguments) -> None:
+        ui.navigate.to(Asked(event.args[1]["sensor"]).address)
+
+    with box("stack"):
+        words("Whose life?", "title")
+        search = ui.input("Search: serial number or name").props("dense clearable")
+        rows = [_row(sensor, runs) for sensor, runs in known.items()]
+        table = ui.table(rows=rows, columns=COLUMNS, row_key="sensor", pagination=PAGE).props("flat dense")
+        table.on("rowClick", opened).bind_filter_from(search, "value")
+        table.add_slot("body-cell-sensor", LINKED)
+
+
+def _row(sensor: str, runs: list[Run]) -> dict[str, object]:
+    days = sorted(when(run).date().isoformat() for run in runs)
+    return {"sensor": sensor, "to": Asked(sensor).address, "count": len(runs), "first": days[0], "last": days[-1]}
+
 
 LOOK_S = 0.15
 
@@ -73,7 +117,11 @@ class Life:
             self.quantity = ui.select([], label="Quantity", on_change=self._other_quantity).props("dense options-dense")
             self.limit = ui.number("Greatest change", min=0, on_change=self._other_limit).props("dense debounce=300")
             self.baseline = ui.number(
-                "Baseline of the charts", value=wanted.baseline, min=FEWEST, precision=0, on_change=self._other_baseline
+                "Baseline of the charts",
+                value=wanted.baseline,
+                min=FEWEST_RUNS,
+                precision=0,
+                on_change=self._other_baseline,
             ).props("dense debounce=300")
         self.fields = (self.quantity, self.limit, self.baseline)
         for each in self.fields:
@@ -178,7 +226,7 @@ class Life:
         self._now(replace(self.asked, limits=others | own))
 
     def _other_baseline(self) -> None:
-        if self.baseline.value and self.baseline.value >= FEWEST:
+        if self.baseline.value and self.baseline.value >= FEWEST_RUNS:
             self._now(replace(self.asked, baseline=int(self.baseline.value)))
 
     def _other_day(self) -> None:

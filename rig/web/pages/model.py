@@ -4,30 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from urllib.parse import urlencode
 
 from nicegui import ui
 
 from rig.analysis.exclusion import numbered_run
-from rig.analysis.trail_still import StillTrail
 from rig.errors import RecordError
-from rig.web.counted import Cancelled, Counted
 from rig.web.desk import Desk, runs
 from rig.web.frame import Key, frame
-from rig.web.pages import left_out
+from rig.web.pages import run_record
 from rig.web.pages.model_choice import Choice
 from rig.web.pages.model_missing import Missing
 from rig.web.pages.model_noise import NoisePictures
-from rig.web.pages.model_page import AnyPictures
 from rig.web.pages.model_pictures import Pictures
-from rig.web.pages.model_verdict import Verdict
-from rig.web.pages.model_words import OfRows, Words, words_of
-from rig.web.parts import box, div, failed, off_loop, state, words
-from rig.web.told import message
+from rig.web.pages.model_verdict import VerdictBox
+from rig.web.parts import Cancelled, Counted, box, div, failed, message, off_loop, state, words
 
 if TYPE_CHECKING:
-    from rig.analysis.growing import Diagnosis, Growing, Step
+    from calibrations.discovery.results import Diagnosis, Step
+    from rig.services.session import ModelSession
 
 
 def register(desk: Desk) -> None:
@@ -43,11 +39,10 @@ class Workbench:
 
     def __init__(self, desk: Desk, data: str, model: str) -> None:
         self.desk, self.data, self.model = desk, data, model
-        self.trail: Growing | None = None
-        self.told: Words = OfRows()
+        self.session: ModelSession | None = None
         self.search = Counted({})
         self.turn = 0  # answers to questions that were asked before the last one are let go
-        self.diagnoses: dict[tuple[str, ...], Diagnosis] = {}
+        self.diagnoses: dict[tuple[str, ...], Diagnosis[Any]] = {}
 
     def build(self) -> None:
         """The page, laid out; what takes long is asked for as soon as the browser shows it."""
@@ -65,18 +60,19 @@ class Workbench:
                 _nothing()
                 return
             self.notes = div("stack")
-            self.verdict = Verdict()
+            self.verdict = VerdictBox()
             self.analysis = div("analysis")
         self.keys = keys
-        self._lay_out(still=False)
+        self._lay_out("rows")
         ui.timer(0.0, self.open, once=True)
 
-    def _lay_out(self, still: bool) -> None:
+    def _lay_out(self, form: str) -> None:
         """The places of pictures and candidates, as the kind of data wants them."""
         self.analysis.clear()
         with self.analysis:
-            self.pictures: AnyPictures = NoisePictures() if still else Pictures(self._leaving_out())
-            self.missing = Missing(self, own=not still)
+            rows = form == "rows"
+            self.pictures: Pictures | NoisePictures = Pictures(self._leaving_out()) if rows else NoisePictures()
+            self.missing = Missing(self, own=rows)
         self.keys["a"] = Key("add the effect that is looked at", self.missing.add_shown)
         self.keys["u"] = Key("undo the last effect", self.undo)
         self.keys["x"] = Key("the next axis", self.pictures.next_axis)
@@ -86,7 +82,7 @@ class Workbench:
 
     def _leaving_out(self) -> Callable[[Sequence[int]], None] | None:
         """What asks why selected poses are to be left out; None where the data are no run of the rig."""
-        return partial(left_out.ask, self.data, done=self.afresh) if numbered_run(self.data) else None
+        return partial(run_record.ask, self.data, done=self.afresh) if numbered_run(self.data) else None
 
     def afresh(self) -> None:
         """Read the data again, which have changed."""
@@ -102,47 +98,45 @@ class Workbench:
         """Read the data, fit the model, and show how far it had grown."""
         self.verdict.wait(f"Reading {self.data} and fitting the model")
         try:
-            trail = await off_loop(self.desk.open, self.data, self.model)
+            session = await off_loop(self.desk.open, self.data, self.model)
         except Exception as error:
             self.body.clear()
             with self.body:
                 failed(f"{self.data} cannot be looked at with this model", message(error))
             return
-        self.told = words_of(trail)
-        if isinstance(trail, StillTrail):
-            self._lay_out(still=True)
-        self.chosen.opened(trail)
-        for note in trail.notes:
+        self._lay_out(session.data.form)
+        self.chosen.opened(session)
+        for note in session.notes:
             with self.notes, box("note"):
                 words(note, "small")
-        if found := left_out.left_out(self.data):
+        if found := run_record.left_out(self.data):
             with self.notes, ui.expansion(f"{len(found)} left out of every analysis").props("dense").classes("box"):
-                left_out.listed(self.data, self.afresh)
-        await self.show(trail)
+                run_record.listed(self.data, self.afresh)
+        await self.show(session)
 
-    async def show(self, trail: Growing) -> None:
+    async def show(self, session: ModelSession) -> None:
         """Pictures and error of the model as it is now; then, when it is found, what it misses."""
         self.turn += 1
         turn = self.turn
-        self.trail = trail
-        self.desk.keep(self.data, self.model, trail)
-        compared = await off_loop(trail.compared)
+        self.session = session
+        self.desk.keep(self.data, self.model, session)
+        compared = await off_loop(session.compared)
         if turn != self.turn:
             return
-        self.pictures.show(compared, trail)
-        self.verdict.error(self.told, compared, trail)
-        self.chosen.grown(trail)
-        await self._diagnose(trail, turn)
+        self.pictures.show(compared, session)
+        self.verdict.error(compared, session)
+        self.chosen.grown(session)
+        await self._diagnose(session, turn)
 
-    async def _diagnose(self, trail: Growing, turn: int) -> None:
+    async def _diagnose(self, session: ModelSession, turn: int) -> None:
         self.search.cancelled = True  # the one before, which nobody waits for any more
-        key = tuple(step.name for step in trail.steps)
+        key = session.names
         if key not in self.diagnoses:
-            self.search = Counted(trail.effects)
+            self.search = Counted(session.effects)
             self.missing.wait(self.search)
             self.verdict.wait("Looking for what is missing")
             try:
-                self.diagnoses[key] = await off_loop(trail.among(self.search).diagnosed)
+                self.diagnoses[key] = await off_loop(session.among(self.search).diagnosed)
             except Cancelled:
                 return
             except Exception as error:
@@ -150,7 +144,7 @@ class Workbench:
                     self.missing.fail(message(error))
                 return
         if turn == self.turn:
-            self.verdict.found(self.told, self.diagnoses[key])
+            self.verdict.found(self.diagnoses[key])
             await self.missing.show(self.diagnoses[key])
 
     def cancel(self) -> None:
@@ -162,22 +156,22 @@ class Workbench:
 
     async def again(self) -> None:
         """Look for what is missing after all."""
-        if self.trail is not None:
-            await self._diagnose(self.trail, self.turn)
+        if self.session is not None:
+            await self._diagnose(self.session, self.turn)
 
-    async def add(self, step: Step) -> None:
+    async def add(self, step: Step[Any]) -> None:
         """The model gains an effect."""
-        if self.trail is not None:
+        if self.session is not None:
             if (effect := step.after.model.terms[-1].effect).expression:
-                self.trail = self.trail.among({**self.trail.effects, effect.name: effect})
-            await self.show(self.trail.with_step(step))
+                self.session = self.session.among({**self.session.effects, effect.name: effect})
+            await self.show(self.session.with_step(step))
 
     async def undo(self) -> None:
         """The last effect is taken back."""
-        if self.trail is not None and self.trail.steps:
-            last = self.trail.steps[-1].name
+        if self.session is not None and self.session.steps:
+            last = self.session.steps[-1].name
             self.diagnoses = {key: found for key, found in self.diagnoses.items() if last not in key}
-            await self.show(self.trail.undone())
+            await self.show(self.session.undone())
 
 
 def _nothing() -> None:

@@ -9,14 +9,13 @@ from nicegui import events, ui
 
 from calibrations.errors import CalibrationError
 from rig.errors import RigError
-from rig.home import home
+from rig.files import home
 from rig.web.desk import FILES, MODELS, models, runs, saved_models
-from rig.web.parts import box, off_loop, words
-from rig.web.told import message
+from rig.web.parts import box, message, off_loop, words
 
 if TYPE_CHECKING:
-    from rig.analysis.growing import Growing
-    from rig.web.pages.model_page import ModelPage
+    from rig.services.session import ModelSession
+    from rig.web.pages.model import Workbench
 
 MOST_BYTES = 200_000_000
 
@@ -24,7 +23,7 @@ MOST_BYTES = 200_000_000
 class Choice:
     """Selects data and model by going to their address; acts on the model that is there."""
 
-    def __init__(self, page: ModelPage) -> None:
+    def __init__(self, page: Workbench) -> None:
         self.page = page
         with box("chosen"):
             self.data = ui.select(
@@ -53,19 +52,19 @@ class Choice:
         if (data or "", model or "") != (self.page.data, self.page.model):
             self.page.go(data or "", model or "")
 
-    def opened(self, trail: Growing) -> None:
+    def opened(self, session: ModelSession) -> None:
         """What lies open has a name, even where the address has none."""
         data = self.page.data
         self.data.set_options({**_data(data)}, value=data)
         if not self.page.model:
-            self.model.set_options(models(default=f"{trail.model.name} (by default)"), value="")
+            self.model.set_options(models(default=f"{session.model.name} (by default)"), value="")
         self.save.enable()
         self.report.enable()
 
-    def grown(self, trail: Growing) -> None:
+    def grown(self, session: ModelSession) -> None:
         """Undo is there as soon as there is something to undo."""
-        self.undo.set_enabled(bool(trail.steps))
-        self.undo.set_text(f"Undo {trail.steps[-1].name}" if trail.steps else "Undo")
+        self.undo.set_enabled(bool(session.steps))
+        self.undo.set_text(f"Undo {session.steps[-1].name}" if session.steps else "Undo")
 
     def _ask_file(self) -> None:
         with ui.dialog() as dialog, ui.card():
@@ -108,11 +107,11 @@ class Choice:
         dialog.open()
 
     def _text(self) -> str:
-        from calibrations.model_file import dump_model
+        from calibrations.model.file import dump_model
 
-        trail = self.page.trail
-        assert trail is not None  # noqa: S101 the button is enabled with the trail
-        return dump_model(trail.kept())
+        session = self.page.session
+        assert session is not None  # noqa: S101 the button is enabled with the session
+        return dump_model(session.complete_model())
 
     def _saved(self, name: str) -> Path:
         from rig.files import write_whole
@@ -125,10 +124,10 @@ class Choice:
 
     async def _report(self) -> None:
         """The report of `rig report`, as a file of the browser's."""
-        from rig.analysis.reported import reported
-        from rig.analysis.request import Request
+        from rig.services.report import reported
+        from rig.services.request import Request
 
-        page, trail = self.page, self.page.trail
+        page, session = self.page, self.page.session
         hint = ui.notification("Making the report: all pictures, all candidates", spinner=True, timeout=None)
         try:
             notes: list[str] = []
@@ -136,7 +135,7 @@ class Choice:
                 reported, Request(page.data, page.model or None, page.desk.bench_file), notes.append
             )
             text = await off_loop(made)
-            ui.download.content(text, f"{Path(page.data).stem}-{trail.model.name if trail else 'model'}.html")
+            ui.download.content(text, f"{Path(page.data).stem}-{session.model.name if session else 'model'}.html")
         except Exception as error:
             ui.notify(message(error), type="negative", multi_line=True, timeout=0, close_button="Close")
         finally:

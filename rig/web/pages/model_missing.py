@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import re
+from typing import TYPE_CHECKING, Any
 from urllib.parse import urlencode
 
 from nicegui import ui
 
-from calibrations.numerals import plain
-from calibrations.reports.words import capital, next_takes, next_words
+from calibrations.criteria import SIGNIFICANT
+from calibrations.discovery.verdict import Verdict
+from calibrations.presentation.report.words import next_takes, next_words
+from calibrations.presentation.text import capital, chance, plain
 from rig.web.pages.model_own import Own
-from rig.web.pages.model_words import chances, formula
-from rig.web.parts import box, div, facts, failed, off_loop, waiting, words
-from rig.web.told import for_page, message
+from rig.web.parts import box, div, facts, failed, message, off_loop, waiting, words
 
 if TYPE_CHECKING:
-    from rig.analysis.growing import Candidate, Diagnosis, Step
-    from rig.web.counted import Counted
-    from rig.web.pages.model_page import ModelPage
+    from calibrations.discovery.results import Candidate, Diagnosis, Step
+    from rig.web.pages.model import Workbench
+    from rig.web.parts import Counted
 
 FIRST = 6  # cards that are shown at once
 PROGRESS_S = 0.15
@@ -26,10 +27,10 @@ PROGRESS_S = 0.15
 class Missing:
     """The side of the page on which a person decides."""
 
-    def __init__(self, page: ModelPage, own: bool) -> None:
+    def __init__(self, page: Workbench, own: bool) -> None:
         self.page = page
         self.looked_at: Candidate | None = None
-        self.tried: dict[str, Step] = {}
+        self.tried: dict[str, Step[Any]] = {}
         with div("side"):
             words("What is missing", "title")
             self.cards = div("stack")
@@ -39,7 +40,7 @@ class Missing:
     @property
     def unit(self) -> str:
         """Of the outputs."""
-        return self.page.trail.unit if self.page.trail is not None else ""
+        return self.page.session.unit if self.page.session is not None else ""
 
     def wait(self, counted: Counted) -> None:
         """A search is on its way: how far it is."""
@@ -71,15 +72,17 @@ class Missing:
         with self.cards:
             failed("The search for effects failed", why)
 
-    async def show(self, result: Diagnosis) -> None:
+    async def show(self, result: Diagnosis[Any]) -> None:
         """The candidates, best first; the best is looked at where there is one to add."""
         self.cards.clear()
         self.tried, self.looked_at = {}, None
-        self.own.begin(self.page.told.left(result))
-        missing = self.page.told.missing(result)
+        self.own.begin(result.pattern if result.verdict is Verdict.UNEXPLAINED else None)
+        missing = bool(result.missing)
         with self.cards:
             if not missing:
                 self._nothing_to_add(result)
+            if missing and result.judgement.provisional:
+                words("Provisional: may change when further effects are added.", "quiet small")
             cards = [Card(self, c, result, missing and not k) for k, c in enumerate(result.candidates[:FIRST])]
             if len(result.candidates) > FIRST:
                 self._others(result)
@@ -90,32 +93,27 @@ class Missing:
             with below:
                 await self._next(result)
 
-    def _nothing_to_add(self, result: Diagnosis) -> None:
-        good = result.verdict == "adequate"
+    def _nothing_to_add(self, result: Diagnosis[Any]) -> None:
+        good = result.verdict is Verdict.ADEQUATE
         with box("verdict good" if good else "verdict doubt"):
-            if good:
-                words("Save the model, or see below what was tried.")
-            elif result.residual_structure:
-                above = " What it may be, you can write above;" if self.own.box.visible else ""
-                words(for_page(f"Unexplained: {result.residual_structure}.{above} What was tried:"))
-            else:
-                words("Nothing shows that an effect is missing; what was tried:")
+            above = " Write your own effect above." if self.own.box.visible and result.residual_structure else ""
+            words("Save the model, or see the candidates below." if good else f"No effect to add.{above} Candidates:")
 
-    def _others(self, result: Diagnosis) -> None:
+    def _others(self, result: Diagnosis[Any]) -> None:
         rest = result.candidates[FIRST:]
         with ui.expansion(f"{len(rest)} more, less likely").props("dense"):
             for c in rest:
                 Card(self, c, result, best=False)
 
-    async def _next(self, result: Diagnosis) -> None:
+    async def _next(self, result: Diagnosis[Any]) -> None:
         """The experiment that would tell, planned on the bench."""
         page, notes = self.page, list[str]()
-        assert page.trail is not None  # noqa: S101 a diagnosis is of a trail
+        assert page.session is not None  # noqa: S101 a diagnosis is of a trail
         with box("note"):
             words("Next experiment", "title")
             hint = waiting("Planning it on the bench")
         try:
-            found = await off_loop(page.trail.with_next, result, notes.append)
+            found = await off_loop(page.session.with_next, result, notes.append)
             experiment = found.next_experiment
             assert experiment is not None  # noqa: S101 it had one before
             hint.set_text(" ".join([next_words(experiment), next_takes(experiment), *notes]))
@@ -133,12 +131,12 @@ class Missing:
         if step is not None and self.looked_at is c:
             self.page.pictures.consider(step)
 
-    async def step_of(self, c: Candidate) -> Step | None:
+    async def step_of(self, c: Candidate) -> Step[Any] | None:
         """The candidate fitted in full; None where that fails, which is told."""
-        trail = self.page.trail
-        if c.name not in self.tried and trail is not None:
+        session = self.page.session
+        if c.name not in self.tried and session is not None:
             try:
-                self.tried[c.name] = await off_loop(trail.tried, c.effect)
+                self.tried[c.name] = await off_loop(session.tried, c.effect)
             except Exception as error:
                 ui.notify(message(error), type="negative", multi_line=True)
         return self.tried.get(c.name)
@@ -158,7 +156,7 @@ class Missing:
 class Card:
     """One candidate: what it is, what it does to the error, and the button that adds it."""
 
-    def __init__(self, side: Missing, c: Candidate, result: Diagnosis, best: bool) -> None:
+    def __init__(self, side: Missing, c: Candidate, result: Diagnosis[Any], best: bool) -> None:
         self.side, self.c = side, c
         with div("card first" if best else "card"):
             with ui.element("button").classes("head").props("type=button aria-expanded=false") as self.head:
@@ -174,7 +172,7 @@ class Card:
                     ui.button(f"Add {c.name}", icon="add", on_click=lambda: side.add(c)).props("dense unelevated")
                     ui.button("Show its curve", on_click=lambda: side.look_at(c)).props("dense flat")
 
-    def _told(self, result: Diagnosis) -> None:
+    def _told(self, result: Diagnosis[Any]) -> None:
         c = self.c
         words(capital(c.effect.summary))
         words(formula(c.effect.formula, self.side.unit), "formula")
@@ -184,7 +182,7 @@ class Card:
         facts(
             {
                 "Symptom": capital(c.effect.symptom),
-                **self.side.page.told.facts(c, result),
+                **result.findings.data.facts(c, result),
                 "Probability": chances(c),
                 "Cannot be told from": rivals or "nothing in the catalogue",
                 "Source": c.effect.source or "–",
@@ -209,3 +207,22 @@ class Card:
 def _written(value: object) -> str:
     """A setting as it is written on the command line."""
     return ",".join(f"{part:g}" for part in value) if isinstance(value, (list, tuple)) else str(value)
+
+
+def chances(c: Candidate) -> str:
+    """The probability of a candidate, and the chance of so large a gain where nothing is missing."""
+    beyond = "" if c.p_value < SIGNIFICANT else ", which is not significant"
+    return f"{share(c.probability)}; by chance {chance(c.p_value)}{beyond}"
+
+
+def share(probability: float) -> str:
+    """A probability, which is only approximate: neither certain nor impossible."""
+    for limit, text in ((0.999, "above 99.9 %"), (0.99, "above 99 %")):
+        if probability > limit:
+            return text
+    return "below 0.1 %" if probability < 1e-3 else f"{100 * probability:.2g} %"
+
+
+def formula(text: str, unit: str) -> str:
+    """A formula with the data's unit; a remark beside it comes in a line of its own, as a card is narrow."""
+    return re.sub(r" {3,}", "\n", text.replace("{out}", unit)).replace("\n\n", "\n")

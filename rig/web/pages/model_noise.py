@@ -8,19 +8,28 @@ from typing import TYPE_CHECKING
 
 from nicegui import ui
 
-from calibrations.pictures.still import levels
-from rig.web.figures.averaging import allan, ratio
-from rig.web.figures.record import record
-from rig.web.figures.sensed import scaled, units
-from rig.web.figures.spectrum import spectrum
-from rig.web.figures.waterfall import Measure, waterfall
+from calibrations.noise.allan import compare_deviations
+from calibrations.presentation.chart import one
+from calibrations.presentation.charts.discovery import waterfall
+from calibrations.presentation.charts.noise import (
+    MEASURE,
+    Drawn,
+    allan,
+    candidate,
+    levels,
+    ratio,
+    record,
+    scaled,
+    spectrum,
+    units,
+)
+from calibrations.presentation.interactive import figure
 from rig.web.parts import box, div, redraw, words
 
 if TYPE_CHECKING:
-    from calibrations.still.channel_fit import ChannelFit
-    from calibrations.still.compare import Comparison
-    from calibrations.still.discover import Added
-    from rig.analysis.trail_still import StillTrail
+    from calibrations.discovery.results import Comparison, Step
+    from calibrations.noise.fit import NoiseFit
+    from rig.services.session import ModelSession
 
 TITLES = {
     "allan": "Allan deviation beside the model",
@@ -29,16 +38,15 @@ TITLES = {
     "waterfall": "The falling error; ◆ on the other half of the record",
     "record": "The record",
 }
-MEASURE = Measure("mismatch of the spectrum / chance", "chance", "the record", "the other half")
 
 
 class NoisePictures:
     """Draws a noise model beside its record, one axis at a time."""
 
     def __init__(self) -> None:
-        self.compared: Comparison | None = None
-        self.trail: StillTrail | None = None
-        self.step: Added | None = None
+        self.compared: Comparison[NoiseFit] | None = None
+        self.session: ModelSession | None = None
+        self.step: Step[NoiseFit] | None = None
         with div("pictures"):
             with box("controls row-of"):
                 self.axis = ui.toggle({0: "x"}, value=0, on_change=self.draw).props("dense no-caps")
@@ -53,9 +61,9 @@ class NoisePictures:
                     plot = ui.plotly({"data": [], "layout": {}}).classes("plot")
                     self.plots[name] = plot.props(f'aria-label="{title}"')
 
-    def show(self, compared: Comparison, trail: StillTrail) -> None:
+    def show(self, compared: Comparison[NoiseFit], session: ModelSession) -> None:
         """A new fit."""
-        self.compared, self.trail, self.step = compared, trail, None
+        self.compared, self.session, self.step = compared, session, None
         axes = dict(enumerate(compared.fit.still.axes))
         self.axis.set_options(axes, value=min(int(self.axis.value or 0), len(axes) - 1))
         offered = units(compared.fit.still)
@@ -64,7 +72,7 @@ class NoisePictures:
         self.considered.set_visibility(False)
         self.draw()
 
-    def consider(self, step: Added | None) -> None:
+    def consider(self, step: Step[NoiseFit] | None) -> None:
         """Draw what the model would be with an effect; None takes it away."""
         self.step = step
         self.considered.set_visibility(step is not None)
@@ -73,21 +81,25 @@ class NoisePictures:
 
     def draw(self) -> None:
         """All pictures anew."""
-        if self.compared is None or self.trail is None:
+        if self.compared is None or self.session is None:
             return
         c, still = int(self.axis.value or 0), self.compared.fit.still
-        found, curve = self.compared.fit.channels[c], self.compared.averaged[c]
+        found = self.compared.fit.channels[c]
+        curve = compare_deviations(found, still.allan[found.channel.axis])
         into = scaled(still, found.channel.axis, bool(self.unit.value))
-        candidate: ChannelFit | None = None if self.step is None else self.step.after.channels[c]
-        drawn = {
-            "allan": allan(found, curve, into, candidate),
-            "spectrum": spectrum(found, into, candidate),
-            "ratio": ratio(curve, found.channel.axis),
-            "waterfall": waterfall(levels(self.trail.start, self.trail.steps), MEASURE),
+        models = [Drawn(found, "model")]
+        if self.step is not None:
+            models.append(candidate(self.step.after.channels[c], self.step.name))
+        panels = {
+            "allan": allan(curve, into, models),
+            "spectrum": spectrum(found, into, models),
+            "ratio": ratio(curve),
             "record": record(found.channel, into),
         }
-        for name, figure in drawn.items():
-            redraw(self.plots[name], figure)
+        for name, panel in panels.items():
+            redraw(self.plots[name], figure(one(panel), f"{name} {found.channel.axis} {into.unit}"))
+        fall = waterfall(levels(self.session.start, self.session.steps), MEASURE)
+        redraw(self.plots["waterfall"], figure(fall, "waterfall", False))
 
     def next_axis(self) -> None:
         """The next channel."""

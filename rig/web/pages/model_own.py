@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
 
-from calibrations.numerals import plain
-from calibrations.search.held_out import held_out_excess
-from rig.analysis.trail import Trail
-from rig.web.parts import box, off_loop, words
-from rig.web.told import message
+from calibrations.presentation.text import plain
+from rig.web.parts import box, message, off_loop, words
 
 if TYPE_CHECKING:
-    from calibrations.discover import Added
-    from calibrations.search.patterns import Pattern
-    from rig.web.pages.model_page import ModelPage
+    from calibrations.discovery.patterns import Pattern
+    from calibrations.discovery.results import Step
+    from rig.web.pages.model import Workbench
 
 PAUSE_S = 0.35  # without a keystroke, before what is written is tried
 HELP = (
@@ -27,9 +24,9 @@ HELP = (
 class Own:
     """The field, its preview and its errors."""
 
-    def __init__(self, page: ModelPage) -> None:
+    def __init__(self, page: Workbench) -> None:
         self.page, self.asked = page, 0
-        self.step: Added | None = None
+        self.step: Step[Any] | None = None
         with box("own") as self.box:
             words("An effect of your own", "title")
             self.hint = words("", "quiet small")
@@ -60,18 +57,18 @@ class Own:
     async def tries(self) -> None:
         """Fit what is written, and show its curve and what it does to the error; or where it is wrong."""
         self.asked += 1
-        asked, text, trail = self.asked, str(self.text.value or "").strip(), self.page.trail
+        asked, text, session = self.asked, str(self.text.value or "").strip(), self.page.session
         self.step = None
         self.add.disable()
         self.said.set_text("")
         self.fall.set_text("")
-        if not text or not isinstance(trail, Trail):  # beside a still record the field is not shown
+        if not text or session is None:
             return
         self.fall.set_text("trying ...")
         try:
-            effect = trail.written(str(self.name.value or "").strip(), text)
-            step = await off_loop(trail.tried, effect)
-            unseen = await off_loop(held_out_excess, step.after)
+            effect = session.written(str(self.name.value or "").strip(), text)
+            step = await off_loop(session.tried, effect)
+            unseen = await off_loop(lambda: step.after.held_out_excess)
         except Exception as error:
             if asked == self.asked:
                 self.fall.set_text("")
@@ -80,7 +77,7 @@ class Own:
         if asked == self.asked:
             self._preview(step, unseen)
 
-    def _preview(self, step: Added, unseen: float) -> None:
+    def _preview(self, step: Step[Any], unseen: float) -> None:
         self.step = step
         before, after = step.before.pooled_excess, step.after.pooled_excess
         self.fall.set_text(

@@ -3,28 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 from nicegui import events, ui
 
-from calibrations.pictures.candidate import most_telling
-from calibrations.pictures.columns import Column
-from calibrations.pictures.waterfall import levels
-from calibrations.units import rows_of
-from rig.web.figures import motion
-from rig.web.figures.failure import failure
-from rig.web.figures.measurement import measurement
-from rig.web.figures.residual import residual
-from rig.web.figures.rows import Shown, choices, first_choices, residual_units
-from rig.web.figures.style import Figure
-from rig.web.figures.waterfall import waterfall
+from calibrations.presentation.chart import one
+from calibrations.presentation.charts import motion
+from calibrations.presentation.charts.columns import Column, choices, first_choices
+from calibrations.presentation.charts.discovery import levels, waterfall
+from calibrations.presentation.charts.fit import failure, measurement, most_telling, residual
+from calibrations.presentation.interactive import figure
+from calibrations.presentation.residual import Shown, residual_units, row_name
 from rig.web.parts import box, div, redraw, words
 
 if TYPE_CHECKING:
-    from calibrations.compare import Comparison
-    from calibrations.discover import Added
+    from calibrations.discovery.results import Comparison, Step
     from calibrations.fit import Fit
-    from rig.analysis.trail import Trail
+    from rig.services.session import ModelSession
 
 LONG = 4  # letters of a channel's name
 LINKED = ("measurement", "residual", "failure")
@@ -47,8 +43,8 @@ class Pictures:
         """`leave_out` is told the numbers of the rows that are selected; None where they can be left out by nobody."""
         self.leave_out = leave_out
         self.fit: Fit | None = None
-        self.trail: Trail | None = None
-        self.step: Added | None = None
+        self.session: ModelSession | None = None
+        self.step: Step[Fit] | None = None
         self.columns: dict[str, Column] = {}
         self.selected: list[int] = []
         self.plots: dict[str, ui.plotly] = {}
@@ -90,14 +86,14 @@ class Pictures:
             plot.on("plotly_selected", self._brushed, js_handler=POINTS)
             plot.on("plotly_deselect", lambda: self.select([]), js_handler="() => emit()")
 
-    def show(self, compared: Comparison, trail: Trail) -> None:
+    def show(self, compared: Comparison[Fit], session: ModelSession) -> None:
         """A new fit: what was chosen stays chosen where it can."""
         fit = compared.fit
         if self.fit is None or self.fit.table.n != fit.table.n:
             self.selected = []
-        self.fit, self.trail, self.step = fit, trail, None
+        self.fit, self.session, self.step = fit, session, None
         self.columns = choices(fit)
-        self.falling.set_text(f"{TITLES['waterfall']}; ◆ on {rows_of(fit.table)} that the fit did not see")
+        self.falling.set_text(f"{TITLES['waterfall']}; ◆ on {row_name(fit.table)} that the fit did not see")
         x, colour = first_choices(list(self.columns))
         self._offer(fit.channels)
         self.unit.set_options(residual_units(fit), value=fit.table.kind == "positions" or bool(self.unit.value))
@@ -120,7 +116,7 @@ class Pictures:
         self.axis.set_options(dict(enumerate(channels)), value=value)
         self.axis.set_visibility(len(channels) > 1)
 
-    def consider(self, step: Added | None) -> None:
+    def consider(self, step: Step[Fit] | None) -> None:
         """Draw the curve of an effect through the residual, against what it follows; None takes it away."""
         self.step = step
         self.columns.pop(FOLLOWED, None)
@@ -150,26 +146,28 @@ class Pictures:
 
     def draw(self) -> None:
         """All pictures anew."""
-        if self.fit is None or self.trail is None or self.x.value not in self.columns:
+        if self.fit is None or self.session is None or self.x.value not in self.columns:
             return
-        trail, shown, colour = (
-            self.trail,
+        session, shown, colour = (
+            self.session,
             self.shown,
             self.columns.get(self.colour.value or "", self.columns[self.x.value]),
         )
         moving = shown.fit.table.kind == "motion"  # its samples are drawn, which are no rows
         plain = self.columns[self.x.value if self.x.value != FOLLOWED else next(iter(self.columns))]
-        drawn: dict[str, Callable[[], Figure]] = {
-            "measurement": lambda: motion.measurement(shown) if moving else measurement(shown, plain, colour),
-            "residual": lambda: residual(shown, self.columns[self.x.value], colour, self.step),
-            "failure": lambda: motion.failure(shown) if moving else failure(shown),
-            "waterfall": lambda: waterfall(levels(trail)),
+        panels = {
+            "measurement": motion.measurement(shown) if moving else measurement(shown, plain, colour),
+            "residual": residual(shown, self.columns[self.x.value], colour, self.step),
+            "failure": motion.failure(shown) if moving else failure(shown),
         }
-        for name, make in drawn.items():
-            figure = make()
-            if "customdata" in figure["data"][0] and self.selected:
-                figure["data"][0]["selectedpoints"] = self.selected
-            redraw(self.plots[name], figure)
+        for name, panel in panels.items():
+            linked = not moving or name == "residual"
+            keep = f"{panel.x.label} {panel.y.label}"
+            drawn = figure(one(replace(panel, title="", second=None)), keep, "select" if linked else "zoom")
+            if linked and self.selected:
+                drawn["data"][_dots(drawn)]["selectedpoints"] = self.selected
+            redraw(self.plots[name], drawn)
+        redraw(self.plots["waterfall"], figure(waterfall(levels(session)), "waterfall", False))
         self._tell(shown)
 
     def next_axis(self) -> None:
@@ -196,10 +194,11 @@ class Pictures:
             return
         self.selected = sorted({int(point) for point in points})
         for plot in (self.plots[name] for name in LINKED):
-            if "customdata" not in plot.figure["data"][0]:
+            number = _dots(plot.figure)
+            if number is None:
                 continue
-            plot.figure["data"][0]["selectedpoints"] = self.selected or None
-            plot.run_plot_method("restyle", {"selectedpoints": [self.selected or None]}, [0])
+            plot.figure["data"][number]["selectedpoints"] = self.selected or None
+            plot.run_plot_method("restyle", {"selectedpoints": [self.selected or None]}, [number])
             if not self.selected:
                 plot.run_plot_method("relayout", {"selections": []})
         self._tell(self.shown)
@@ -208,5 +207,10 @@ class Pictures:
         """What is selected, or that not all is drawn, or what can be done."""
         self.clear.set_visibility(bool(self.selected))
         self.leave.set_visibility(bool(self.selected) and self.leave_out is not None)
-        self.told.set_text(shown.summary(self.selected) if self.selected else shown.thinned or
-                           f"Draw a box in a picture to select {rows_of(shown.fit.table)} in all of them.")  # fmt: skip
+        hint = f"Draw a box in a picture to select {row_name(shown.fit.table)} in all of them."
+        self.told.set_text(shown.summary(self.selected) if self.selected else shown.thinned or hint)
+
+
+def _dots(figure: dict[str, Any]) -> Any:
+    """The number of the trace whose points can be selected; None where there is none."""
+    return next((k for k, trace in enumerate(figure["data"]) if "customdata" in trace), None)

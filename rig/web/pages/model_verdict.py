@@ -6,19 +6,25 @@ from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
 
-from calibrations.reports.words import capital
-from rig.web.parts import box, div, words
-from rig.web.told import for_page
+from calibrations.discovery.verdict import Verdict
+from rig.web.parts import box, div, for_page, words
 
 if TYPE_CHECKING:
-    from rig.analysis.growing import Diagnosis, Growing
-    from rig.web.pages.model_words import Words
+    from calibrations.discovery.results import Comparison, Diagnosis
+    from rig.services.session import ModelSession
 
-LOOKS = {"adequate": "good", "effect-missing": "bad", "ambiguous": "doubt", "unexplained": "doubt"}
+LOOKS = {
+    Verdict.ADEQUATE: "good",
+    Verdict.EFFECT_MISSING: "bad",
+    Verdict.AMBIGUOUS: "doubt",
+    Verdict.UNEXPLAINED: "doubt",
+    Verdict.NO_RESPONSE: "bad",
+}
+MOST_PLACES = 3
 
 
-class Verdict:
-    """What the page says first."""
+class VerdictBox:
+    """The head of the page: the verdict and its numbers."""
 
     def __init__(self) -> None:
         with box("verdict").props("role=status aria-live=polite") as self.box:
@@ -29,34 +35,42 @@ class Verdict:
                     self.whole = ui.tooltip("").props("max-width=640px")
             self.numbers = div("row-of numbers")
 
-    def error(self, told: Words, compared: Any, trail: Growing) -> None:
+    def error(self, compared: Comparison[Any], session: ModelSession) -> None:
         """How large the error is, and where it is largest: known before anything is diagnosed."""
         self.numbers.clear()
         with self.numbers:
-            for what, value in told.numbers(compared, trail).items():
+            for name, value in session.data.figures(compared.fit).items():
                 with div("figure"):
                     words(value, "value")
-                    words(what, "quiet small")
-        self._tell(told.detail(compared))
+                    words(name, "quiet small")
+        self._show(_failing(compared))
 
     def wait(self, what: str) -> None:
         """The verdict is on its way."""
         self.headline.set_text(f"{what} ...")
         self.box.classes(remove="good bad doubt")
 
-    def found(self, told: Words, result: Diagnosis) -> None:
+    def found(self, result: Diagnosis[Any]) -> None:
         """The verdict."""
-        self.headline.set_text(for_page(capital(told.verdict(result))))
-        if caution := told.caution(result):
-            self._tell(f"But {caution}. {self.detail.text}")
+        self.headline.set_text(for_page(result.judgement.text))
+        if result.caution:
+            self._show(f"But {result.caution}. {self.detail.text}")
         self.box.classes(remove="good bad doubt", add=LOOKS[result.verdict])
 
     def cancelled(self) -> None:
-        """Nobody wanted to wait for it."""
+        """The search was cancelled."""
         self.headline.set_text("Not diagnosed")
         self.box.classes(remove="good bad doubt")
 
-    def _tell(self, text: str) -> None:
+    def _show(self, text: str) -> None:
         """A line; all of it when it is pointed at."""
         self.detail.set_text(for_page(text))
         self.whole.set_text(self.detail.text)
+
+
+def _failing(compared: Comparison[Any]) -> str:
+    """The data, and the places where the model fails."""
+    places = "; ".join(place.text for place in compared.fails[:MOST_PLACES])
+    what = f"{compared.fit.model.name} on {compared.data.description}"
+    text = f"{what}. Fails: {places}." if places else f"{what}. No place stands out."
+    return " ".join(filter(None, (text, compared.data.note)))

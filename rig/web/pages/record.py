@@ -11,9 +11,8 @@ from rig.analysis.sensors import calibrating, members
 from rig.record import Run
 from rig.web.desk import Desk, runs
 from rig.web.frame import frame
-from rig.web.pages.history_asked import Asked
-from rig.web.parts import LINKED, box, div, failed, state, words
-from rig.web.told import message
+from rig.web.pages.history_results import Asked
+from rig.web.parts import LINKED, box, div, failed, message, state, words
 
 COLUMNS: list[dict[str, object]] = [
     {"name": "name", "label": "run", "field": "name", "align": "left", "sortable": True},

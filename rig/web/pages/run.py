@@ -9,13 +9,12 @@ from nicegui import ui
 
 from rig.bench import Bench, read_bench
 from rig.bench.certificates import expired
-from rig.connected.instruments import checked
+from rig.instruments.instruments import checked
 from rig.web.desk import Desk
 from rig.web.frame import Key, frame
 from rig.web.pages.run_live import Live
 from rig.web.pages.run_plan import Planning
-from rig.web.parts import box, div, failed, off_loop, table, waiting, words
-from rig.web.told import message
+from rig.web.parts import box, div, failed, message, off_loop, table, waiting, words
 
 
 def register(desk: Desk) -> None:

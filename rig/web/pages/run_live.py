@@ -12,13 +12,12 @@ from urllib.parse import urlencode
 
 from nicegui import ui
 
-from rig.apart import steering
-from rig.apart.status import Asked, Status
 from rig.drawings import Attitude, page
-from rig.web.pages.over_time import OverTime
-from rig.web.parts import box, div, failed, off_loop, words
-from rig.web.strip import steer
-from rig.web.told import for_page
+from rig.runs.background import control
+from rig.runs.background.status import Asked, Status
+from rig.web.frame import steer
+from rig.web.pages.run_record import OverTime
+from rig.web.parts import box, div, failed, for_page, off_loop, words
 
 LOOK_S = 0.4
 PHASES = {
@@ -60,25 +59,25 @@ class Live:
 
     def buttons(self) -> None:
         """What can be done to it; what makes no sense now is not shown."""
-        self.pause = ui.button("Pause", icon="pause", on_click=lambda: steer(steering.pause)).props("outline dense")
+        self.pause = ui.button("Pause", icon="pause", on_click=lambda: steer(control.pause)).props("outline dense")
         self.resume = ui.button("Go on", icon="play_arrow", on_click=lambda: self.wish("resume")).props("dense")
         self.repeat = ui.button("Repeat the last pose", icon="replay", on_click=lambda: self.wish("repeat"))
         self.repeat.props("outline dense")
-        self.stop = ui.button("Stop", icon="stop", color="negative", on_click=lambda: steer(steering.stop))
+        self.stop = ui.button("Stop", icon="stop", color="negative", on_click=lambda: steer(control.stop))
         self.stop.props("unelevated dense")
         self.again = ui.button("Resume", icon="play_arrow", on_click=self.go_on).props("outline dense")
         self.see = ui.button("See the model", icon="insights", on_click=self._see).props("dense")
 
     def wish(self, what: str) -> None:
         """How a paused run goes on."""
-        steer(lambda status: steering.answer(status, what))
+        steer(lambda status: control.answer(status, what))
 
     def pause_or_go_on(self) -> None:
         """One key for both."""
         if self.status is not None and self.status.phase == "paused":
             self.wish("resume")
         elif self.status is not None and self.status.phase == "running":
-            steer(steering.pause)
+            steer(control.pause)
 
     def _enlarge(self) -> None:
         """The drawing, as large as the window."""
@@ -95,11 +94,11 @@ class Live:
     async def go_on(self) -> None:
         """Resume a run that has ended before its time."""
         if (status := self.status) is not None and status.run:
-            await off_loop(steering.go_on, status.run, status.procedure, None, False)
+            await off_loop(control.go_on, status.run, status.procedure, None, False)
 
     async def look(self) -> None:
         """Show how it stands; only what has changed is sent."""
-        status = steering.latest()
+        status = control.latest()
         self.box.set_visibility(status is not None)
         if status is None:
             return
@@ -173,7 +172,7 @@ class Live:
                 ui.button("Answer", on_click=lambda: self._answer(str(typed.value)))
 
     def _answer(self, text: str) -> None:
-        steer(lambda status: steering.answer(status, text))
+        steer(lambda status: control.answer(status, text))
 
     def _values(self, status: Status) -> None:
         """The last values, each between its limits."""

@@ -8,19 +8,44 @@ from typing import Any
 
 from nicegui import ui
 
+from calibrations.presentation.text import duration, size
 from procedures.catalogue import Procedure, find, paths, summary
 from procedures.settings import choices, parse
-from rig.apart import steering
 from rig.bench import Bench
-from rig.home import home
-from rig.numerals import duration, size
-from rig.planning.plan import Plan, plan
-from rig.planning.stretches import stretches
-from rig.room import free_bytes
+from rig.files import free_bytes, home
+from rig.planning.plan import Plan, plan, stretches
+from rig.runs.background import control
 from rig.web.desk import Desk, lab_read
-from rig.web.pages.settings_words import label, written
-from rig.web.parts import box, div, facts, failed, off_loop, table, waiting, words
-from rig.web.told import message
+from rig.web.parts import box, div, facts, failed, message, off_loop, table, waiting, words
+
+# Settings as people read and write them: `step_deg = 10.0` as `step (deg)`, `10`.
+
+UNITS = {  # ends of names, longest first
+    "deg_s": "deg/s",
+    "m_s2": "m/s²",
+    "deg": "deg",
+    "hz": "Hz",
+    "um": "µm",
+    "c": "°C",
+    "s": "s",
+}
+
+
+def label(name: str) -> str:
+    """`step_deg` as `step (deg)`."""
+    unit = next((end for end in UNITS if name.endswith(f"_{end}")), "")
+    head = name.removesuffix(f"_{unit}").replace("_", " ")
+    return f"{head} ({UNITS[unit]})" if unit else head
+
+
+def written(value: Any) -> str:
+    """A setting as it is typed."""
+    if isinstance(value, (list, tuple)):
+        return ",".join(f"{part:g}" if isinstance(part, float) else str(part) for part in value)
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
 
 MOST_STRETCHES = 12
 FIRST = "sweep"
@@ -111,14 +136,14 @@ class Planning:
         if lab_read() is not None:
             ui.notify("This workbench reads the lab's record; `rig web` without --record makes runs", type="warning")
             return
-        under_way = steering.latest()
+        under_way = control.latest()
         if under_way is not None and under_way.phase != "ended":
             ui.notify(f"{under_way.procedure} is under way; stop it first", type="warning")
             return
         if self.good:
             self.button.disable()
             name, settings = str(self.name.value), self.settings()
-            await off_loop(steering.begin, name, settings, self.desk.bench_file, bool(self.attended.value))
+            await off_loop(control.begin, name, settings, self.desk.bench_file, bool(self.attended.value))
             if self.started is not None:
                 await self.started()
             self.button.enable()

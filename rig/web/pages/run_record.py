@@ -1,30 +1,173 @@
-"""One run of the record: how it was made, what it measured, what people noted; export and report."""
+"""Poses that a person leaves out of every analysis, with a reason that stays, and takes in again."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 from urllib.parse import urlencode
 
 from nicegui import ui
 
-from calibrations.numerals import bound, measured, unit
+from calibrations.presentation.interactive import figure
+from calibrations.presentation.text import bound, joined, measured, unit
+from rig.analysis.charts import course_chart
+from rig.analysis.course import Course, kind_of
+from rig.analysis.exclusion import exclude, numbered_run
 from rig.analysis.next_steps import next_steps
-from rig.analysis.reported import reported
-from rig.analysis.request import Request
 from rig.analysis.sensors import lives
 from rig.errors import RecordError
 from rig.export import export
 from rig.record import Event, Record, Run
+from rig.services.report import reported
+from rig.services.request import Request
 from rig.web.desk import Desk
 from rig.web.frame import frame
-from rig.web.pages import left_out
-from rig.web.pages.history_asked import Asked
-from rig.web.pages.over_time import OverTime
-from rig.web.pages.settings_words import label, written
-from rig.web.parts import box, div, facts, failed, off_loop, table, words
-from rig.web.told import message
+from rig.web.pages.history_results import Asked
+from rig.web.pages.run_plan import label, written
+from rig.web.parts import box, div, facts, failed, message, off_loop, table, words
+
+MOST_NAMED = 8
+
+
+def left_out(data: str) -> dict[int, str]:
+    """Why each pose of what lies open is left out, by its number; none of what is no run of the rig."""
+    run = numbered_run(data)
+    if run is None:
+        return {}
+    with Record.to_find(run) as record:
+        return record.excluded(run)
+
+
+def ask(data: str, numbers: Sequence[int], done: Callable[[], None]) -> None:
+    """Why these poses are to be left out; then they are, and `done` is called."""
+    named = joined([str(number) for number in numbers[:MOST_NAMED]])
+    more = f" and {len(numbers) - MOST_NAMED} more" if len(numbers) > MOST_NAMED else ""
+    with ui.dialog() as dialog, ui.card().style("min-width: 420px"):
+        words(f"Leave out pose {named}{more}" if len(numbers) == 1 else f"Leave out poses {named}{more}", "title")
+        words("They stay in the record, with the reason, and can be taken in again.", "quiet small")
+        reason = ui.input("Why").props("autofocus").classes("grow")
+        wrong = words("", "fault")
+
+        async def leave() -> None:
+            if why := str(reason.value or "").strip():
+                dialog.close()
+                await change(data, numbers, why, done)
+            else:
+                wrong.set_text("Say why: whoever reads the record later wants to know.")
+
+        reason.on("keydown.enter", leave)
+        with div("row-of"):
+            ui.button("Leave out", on_click=leave)
+            ui.button("Cancel", on_click=dialog.close).props("flat")
+    dialog.open()
+
+
+def listed(data: str, done: Callable[[], None]) -> None:
+    """Those that are left out, each with its reason and a button that takes it in again."""
+    for number, why in left_out(data).items():
+        with div("row-of"):
+            words(f"pose {number}: {why}", "small grow")
+            again = partial(change, data, [number], None, done)
+            ui.button("Take in again", icon="undo", on_click=again).props("dense flat")
+
+
+async def change(data: str, numbers: Sequence[int], reason: str | None, done: Callable[[], None]) -> None:
+    """Leave poses out, or take them in again."""
+    try:
+        await off_loop(_change, data, numbers, reason)
+    except Exception as error:
+        ui.notify(message(error), type="negative", multi_line=True)
+        return
+    done()
+
+
+def _change(data: str, numbers: Sequence[int], reason: str | None) -> None:
+    run = numbered_run(data)
+    if run is None:
+        raise RecordError(f"{data} is no run of the rig: put a column `excluded` into the file")
+    with Record.to_find(run) as record:
+        exclude(record, run, numbers, reason)
+
+
+# What a run has measured so far, over time: a picture that grows with the run, and does not grow for ever.
+
+
+class OverTime:
+    """Follows a run in the record; thinned, so that a night is no larger than an hour."""
+
+    def __init__(self) -> None:
+        self.run, self.last = "", -1
+        self.courses: dict[str, Course] = {}
+        self.chosen = False  # a person has said of which kind
+        with div("row-of"):
+            self.kind = ui.select([], label="of", on_change=self.draw).props("dense options-dense")
+            self.name = ui.select([], label="over time", on_change=self.draw).props("dense options-dense")
+        self.kind.on("update:model-value", self._choose)
+        for select in (self.kind, self.name):
+            select.style("min-width: 150px").set_visibility(False)
+        self.place = div("")
+        self.plot: ui.plotly | None = None
+
+    async def follow(self, run: str) -> None:
+        """Take in what is new of `run`."""
+        if run != self.run:
+            self.run, self.last, self.courses, self.plot, self.chosen = run, -1, {}, None, False
+            self.place.clear()
+            self.kind.set_visibility(False)
+            self.name.set_visibility(False)
+        if not run:
+            return
+        new = await off_loop(_new, run, self.last)
+        if not new or run != self.run:
+            return
+        for number, dwell in new:
+            self.courses.setdefault(kind_of(dwell), Course()).add(dwell)
+            self.last = number
+        self._offer()
+        self.draw()
+
+    def _choose(self) -> None:
+        self.chosen = True
+
+    def _offer(self) -> None:
+        """The kinds of poses and the quantities that there are; those with most until a person chooses."""
+        kinds = {kind: kind or "poses" for kind in self.courses}
+        most = max(self.courses, key=lambda kind: len(self.courses[kind].parts))
+        value = self.kind.value if self.chosen and self.kind.value in kinds else most
+        if (list(kinds), value) != (list(self.kind.options), self.kind.value):
+            self.kind.set_options(kinds, value=value)
+        names = self.courses[str(self.kind.value or "")].names
+        if names != list(self.name.options):
+            self.name.set_options(names, value=self.name.value if self.name.value in names else names[0])
+        self.kind.set_visibility(len(kinds) > 1)
+        self.name.set_visibility(True)
+
+    def draw(self) -> None:
+        """The picture anew."""
+        course = self.courses.get(str(self.kind.value or ""))
+        if course is None or self.name.value not in course.names:
+            return
+        name = str(self.name.value)
+        self.lay_out().update_figure(figure(course_chart(course, name), name))
+
+    def lay_out(self) -> ui.plotly:
+        """The picture's place, where it was not made yet: the browser can fetch what draws it meanwhile."""
+        if self.plot is None:
+            with self.place:
+                self.plot = ui.plotly({"data": [], "layout": {}}).classes("live-plot")
+                self.plot.props('aria-label="the run over time"')
+        return self.plot
+
+
+def _new(run: str, after: int) -> list[tuple[int, Any]]:
+    with Record.to_read() as record:
+        return record.dwells(run, after)
+
+
+# One run of the record: how it was made, what it measured, what people noted; export and report.
 
 LOOKS = {"pass": "good", "fail": "bad", "marginal": "doubt"}
 FORMATS = {"csv": "csv", "event-model": "jsonl"}
@@ -77,7 +220,7 @@ class OneRun:
                 if excluded:
                     with box("stack"):
                         words("Poses that are left out", "title")
-                        left_out.listed(run.run, ui.navigate.reload)
+                        listed(run.run, ui.navigate.reload)
                 with box("stack"):
                     self._notes()
         ui.timer(0.0, lambda: self.over_time.follow(run.run), once=True)

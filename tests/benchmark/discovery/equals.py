@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from calibrations.effect import catalogue
+from calibrations.effects.catalogue import catalogue
 from calibrations.fit import Fit, fit, refit
-from calibrations.model_file import read_model
+from calibrations.model.file import read_model
 from calibrations.table import Array, Table
 from tests.benchmark.discovery.cases import Truth
 from tests.benchmark.discovery.library import Library

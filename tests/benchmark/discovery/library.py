@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calibrations.effect import catalogue
+from calibrations.effects.catalogue import catalogue
 from calibrations.fit import fit
-from calibrations.model_file import read_model
+from calibrations.model.file import read_model
 from calibrations.problem import Problem
 from calibrations.table import Array, Table
 

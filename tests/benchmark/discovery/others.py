@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from calibrations.noise_estimation.mean_noise import white_std
+from calibrations.noise.mean_noise import white_std
 from calibrations.table import Table
-from drivers.simulation.defects import DEFECTS, UNEXPLAINED
+from drivers.world.defects import DEFECTS, UNEXPLAINED
 from tests.benchmark.discovery.cases import Truth
 from tests.benchmark.discovery.layouts import Array
 from tests.hidden import rigs, sampled

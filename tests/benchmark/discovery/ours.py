@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from calibrations.diagnose import Diagnosis, diagnose
-from calibrations.discover import Discovery, discover
+from calibrations.discovery.results import Diagnosis, Discovery
+from calibrations.loop import diagnose, discover
 from calibrations.model import Model
-from calibrations.model_file import read_model
+from calibrations.model.file import read_model
 from calibrations.problem import Problem
 from calibrations.table import Table
 from tests.benchmark.discovery.cases import Truth
@@ -45,9 +45,7 @@ def _listed(asked: Diagnosis, found: Discovery) -> list[str]:
     """The first cause and what it is said to be taken for."""
     if found.causes:
         return [found.causes[0], *found.alternatives.get(found.causes[0], ())]
-    return (
-        [asked.path.steps[0].taken.name, *asked.path.steps[0].taken.indistinguishable_from] if asked.path.steps else []
-    )
+    return [asked.missing[0], *asked.candidates[0].indistinguishable_from] if asked.missing else []
 
 
 def _fresh(table: Table) -> Table:

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from calibrations.effect import catalogue
+from calibrations.effects.catalogue import catalogue
 from calibrations.fit import fit, refit
-from calibrations.model_file import read_model
+from calibrations.model.file import read_model
 from calibrations.table import Table
 from tests.benchmark.discovery.cases import Truth
 from tests.benchmark.discovery.ours import error

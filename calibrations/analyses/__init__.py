@@ -1,0 +1,1 @@
+"""Analyses of a procedure's table: soak, tumble, misalignment, stepwise estimation, field, stability, control chart."""

@@ -1,0 +1,245 @@
+"""Hard and soft iron by hand, as the Book does it: from the extremes of a full turn, beside the fit of an ellipsoid.
+
+    h = (max + min) / 2                                    of each axis: hard iron
+    r = sqrt(x1^2 + y1^2), theta = atan2(y1, x1)           (17.11), (17.12): the point farthest from the middle
+    v^ = R v, R = [[c, s], [-s, c]]                        (17.13), (17.14): the ellipse along its axes
+    S = q / r, along the major axis                        (17.15): q the least radius; then back by the transpose of R
+
+What it cannot see: iron also turns the field that stands upright, Z, into the level axes, by a constant that looks
+like hard iron; and how much it makes of a level field on average. Neither shows in the plane. Iron of no preferred
+direction has five components of one size, of which the plane shows two, as e = (r - q) / (r + q): another one is
+e / sqrt(2) times a t of two degrees of freedom. Uncertainties are half of its 95 % interval, `UNSEEN` e, of Z and of
+the level field. The former is gone in the mean of a turn and one turned over.
+
+Source  Book 17.5; JCGM 100, 4.3.7 (rectangular), G.3 (t); Konvalin, Compensating for tilt, hard-iron and soft-iron
+        effects (2009).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibrations.table import Array
+
+HIDDEN_IRON = 4.302653 / 2 / np.sqrt(2)  # t of two degrees of freedom, 97.5 %
+
+
+@dataclass(frozen=True)
+class Ellipse:
+    """The ellipse that iron makes of a horizontal turn: greatest and least radius, and the major axis's angle; of how
+    many points."""
+
+    greatest: float
+    least: float
+    angle_rad: float
+    n: int
+
+    @property
+    def flattening(self) -> float:
+        """Half the difference of the radii over their mean."""
+        return (self.greatest - self.least) / (self.greatest + self.least)
+
+    @property
+    def ratio_std(self) -> float:
+        """Standard uncertainty of least over greatest radius, from the steps between points."""
+        missed = self.flattening * (1 - np.cos(2 * np.pi / self.n))  # at most, of either radius
+        return float(self.least / self.greatest * missed / np.sqrt(6))
+
+    def angle_std_deg(self, noise: float) -> float:
+        """That of the major axis's angle, from the steps, and from the `noise` of one radius; 52: any angle."""
+        apart = max(self.greatest - self.least, 1e-12 * self.greatest)
+        return float(min(np.hypot(360 / self.n / np.sqrt(12), np.degrees(noise / (2 * apart))), 180 / np.sqrt(12)))
+
+    @property
+    def rotation(self) -> Array:
+        """R, which turns the major axis to x, shape (2, 2)."""
+        c, s = np.cos(self.angle_rad), np.sin(self.angle_rad)
+        return np.array([[c, s], [-s, c]])
+
+    @property
+    def correction(self) -> Array:
+        """The matrix (2, 2) that makes the ellipse a circle of the least radius: rotate, scale, rotate back."""
+        R = self.rotation
+        return np.asarray(R.T @ np.diag([self.least / self.greatest, 1.0]) @ R)
+
+
+def estimate_hard_iron(outputs: Array) -> Array:
+    """Half the sum of maximum and minimum of each axis, (n, axes) -> (axes,)."""
+    return np.asarray((outputs.max(axis=0) + outputs.min(axis=0)) / 2)
+
+
+def fit_ellipse(xy: Array) -> Ellipse:
+    """The ellipse of the points `xy` (n, 2) about 0, hard iron taken off."""
+    radius = np.linalg.norm(xy, axis=1)
+    x, y = xy[np.argmax(radius)]
+    return Ellipse(float(radius.max()), float(radius.min()), float(np.arctan2(y, x)), len(xy))
+
+
+def correct_by_extremes(outputs: Array) -> Array:
+    """Outputs (n, axes) with hard iron taken off each axis, and soft iron off the first two."""
+    centred = outputs - estimate_hard_iron(outputs)
+    found = fit_ellipse(centred[:, :2])
+    return np.column_stack([centred[:, :2] @ found.correction, centred[:, 2:]])
+
+
+# Full turns of a magnetometer, each with an edge upright: by hand with their extremes; the elements of the field.
+#
+# The calibrated outputs, turned back by what is known of the stages and the mount, are the field in the frame of the
+# rig: x along its base, z upward. Its elements are those of `field.py` with X = x, Y = -y, Z = -z. D is then no
+# declination, but the azimuth from the base's x axis, clockwise seen from above: where that axis points is the
+# laboratory's to say.
+#
+# Outputs of one turn err together, by how the sensor sits in its mount: uncertainties are from the scatter of the
+# turns.
+#
+# Source  Book 17.4-17.5, (17.6)-(17.15).
+
+FEWEST_TURNS = 2  # turns that tell how well they agree
+
+
+@dataclass(frozen=True)
+class Elements:
+    """F and H in the unit of the field, D and I in deg; standard uncertainties, None where one turn is all there is."""
+
+    value: Mapping[str, float]
+    std: Mapping[str, float | None]
+
+
+@dataclass(frozen=True)
+class ExtremesEstimate:
+    """Hard iron of each axis that was turned in the plane, NaN of the others, (3,); soft iron of the turn about z."""
+
+    hard_iron: Array
+    hard_iron_std: Array
+    soft_iron: Ellipse
+    left_per_mille: float  # that the magnitude of all turns varies by afterwards
+
+
+def field_elements(sensed: Array, sensor_from_base: Array, turns: Sequence[str]) -> Elements:
+    """From a calibrated field (n, 3) at known attitudes (n, 3, 3); `turns` names the turn of each row."""
+    in_base = np.einsum("nij,ni->nj", sensor_from_base, sensed)
+    names = np.array(turns)
+    means = np.array([in_base[names == turn].mean(axis=0) for turn in dict.fromkeys(turns)])
+    value = _of_field(means.mean(axis=0))
+    if len(means) < FEWEST_TURNS:
+        return Elements(value, dict.fromkeys(value))
+    covariance = np.cov(means.T) / len(means)
+    step = 1e-4 * value["F"]
+    stds = {}
+    for name in value:
+        ahead, behind = (
+            np.array([_of_field(means.mean(axis=0) + side * step * e)[name] for e in np.eye(3)]) for side in (1, -1)
+        )
+        slope = (ahead - behind) / (2 * step)
+        stds[name] = float(np.sqrt(slope @ covariance @ slope))
+    return Elements(value, stds)
+
+
+def level_elements_by_extremes(outputs: Array, sensor_from_base: Array, turn_std_deg: float | None) -> Elements:
+    """H and D of a horizontal turn alone, (n, 3) at known attitudes (n, 3, 3), corrected by its own extremes.
+
+    H is of the size that the least radius has (17.15), and uncertain by what iron makes of a field that the plane does
+    not show. How the sensor sits in its mount is in D and does not show in one turn: `turn_std_deg`, from turn to turn,
+    where several were made.
+    """
+    level = outputs[:, :2] - estimate_hard_iron(outputs[:, :2])
+    round_z = fit_ellipse(level)
+    level = np.column_stack([level @ round_z.correction, np.zeros(len(level))])
+    in_base = np.einsum("nij,ni->nj", sensor_from_base, level)
+    found = _of_field(in_base.mean(axis=0))
+    along = np.radians([found["D"], found["D"] + 90])
+    std = [float((in_base[:, :2] @ [np.cos(a), -np.sin(a)]).std(ddof=1) / np.sqrt(len(level))) for a in along]
+    h_std = float(np.hypot(std[0], HIDDEN_IRON * round_z.flattening * found["H"]))
+    d_std = None if turn_std_deg is None else float(np.hypot(np.degrees(std[1] / found["H"]), turn_std_deg))
+    return Elements({k: found[k] for k in "HD"}, {"H": h_std, "D": d_std})
+
+
+def iron_by_extremes(outputs: Array, edges: Sequence[str], turns: Sequence[str], std: float) -> ExtremesEstimate:
+    """From raw outputs (n, 3) of turns about the edge of each row, `std` that of one of them; z first.
+
+    Two turns about an edge are one and one turned over.
+    """
+    edge, turn = np.array(edges), np.array(turns)
+    about_z = outputs[turn == turn[np.argmax(edge == "z")]][:, :2]
+    round_z = fit_ellipse(about_z - estimate_hard_iron(about_z))
+    names = list(dict.fromkeys(turns))
+    middles, unseen = np.full((2, len(names), 3), np.nan)
+    for k, name in enumerate(names):
+        rows, mine = turn == name, edge[turn == name][0]
+        level = [axis for axis, letter in enumerate("xyz") if letter != mine]
+        middles[k, level] = estimate_hard_iron(outputs[rows][:, level])
+        unseen[k, level] = (
+            0.0 if len(set(turn[edge == mine])) > 1 else _hidden_iron_std(outputs[rows], "xyz".index(mine), round_z)
+        )
+    count = np.sum(np.isfinite(middles), axis=0)
+    known, least = count > 0, np.maximum(count, 1)
+    middle = np.where(known, np.nansum(middles, axis=0) / least, np.nan)
+    by_noise, by_iron = std / np.sqrt(2 * least), np.sqrt(np.nansum(unseen**2, axis=0)) / least  # half of a sum of two
+    middle_std = np.where(known, np.hypot(by_noise, by_iron), np.nan)
+    return ExtremesEstimate(middle, middle_std, round_z, _remaining_per_mille(outputs, middle, round_z, about_z))
+
+
+def _hidden_iron_std(outputs: Array, upright: int, round_z: Ellipse) -> float:
+    """Standard uncertainty by what iron lets of the upright field into the level axes of a turn, (n, 3)."""
+    return float(HIDDEN_IRON * round_z.flattening * abs(outputs[:, upright].mean()))
+
+
+def horizontal_per_mille(xy: Array) -> float:
+    """By how much the magnitude of a horizontal field (n, 2) varies."""
+    size = np.linalg.norm(xy, axis=1)
+    return float(1e3 * size.std() / size.mean())
+
+
+def _remaining_per_mille(outputs: Array, middle: Array, round_z: Ellipse, about_z: Array) -> float:
+    """Of the whole sphere where hard iron is known of every axis; else of the turn about z."""
+    if not np.isfinite(middle).all():
+        return horizontal_per_mille((about_z - estimate_hard_iron(about_z)) @ round_z.correction)
+    away = outputs - middle
+    size = np.linalg.norm(np.column_stack([away[:, :2] @ round_z.correction, away[:, 2:]]), axis=1)
+    return float(1e3 * size.std() / size.mean())
+
+
+def _of_field(base: Array) -> dict[str, float]:
+    x, y, z = base[0], -base[1], -base[2]
+    found = {
+        "F": total(x, y, z),
+        "H": horizontal(x, y),
+        "D": declination_deg(x, y),
+        "I": inclination_deg(x, y, z),
+    }
+    return {name: float(each) for name, each in found.items()}
+
+
+# The elements of the earth's magnetic field: X north, Y east, Z down; F total, H horizontal, D declination, I dip.
+#
+# Source  Book (17.6)-(17.10), with atan2 in place of the arc tangent, which does not know the quadrant.
+
+
+def horizontal(x: Array, y: Array) -> Array:
+    """H, in the unit of the components."""
+    return np.hypot(x, y)
+
+
+def total(x: Array, y: Array, z: Array) -> Array:
+    """F, in the unit of the components. (17.6)"""
+    return np.hypot(horizontal(x, y), z)
+
+
+def declination_deg(x: Array, y: Array) -> Array:
+    """D, deg from north, positive to the east. (17.9)"""
+    return np.degrees(np.arctan2(y, x))
+
+
+def inclination_deg(x: Array, y: Array, z: Array) -> Array:
+    """I, deg from the horizontal, positive downward. (17.10)"""
+    return np.degrees(np.arctan2(z, horizontal(x, y)))
+
+
+def components(f: Array, d_deg: Array, i_deg: Array) -> tuple[Array, Array, Array]:
+    """X, Y, Z of a field of strength F, declination D and inclination I. (17.7), (17.8)"""
+    d, i = np.radians(d_deg), np.radians(i_deg)
+    h = f * np.cos(i)
+    return h * np.cos(d), h * np.sin(d), f * np.sin(i)

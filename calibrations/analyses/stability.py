@@ -1,0 +1,179 @@
+"""Stability of a quantity: agreement of two calibrations, repeatability, drift over calibrations, trend of one pose.
+
+    E_n = (a - b) / sqrt(U_a^2 + U_b^2)        two values agree if |E_n| <= 1
+
+Source  ISO/IEC 17043:2023 and ISO 13528:2022, 9.7 (E_n).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.special import stdtrit
+
+from calibrations.errors import DataError, TooFewRows
+from calibrations.table import Array
+
+COVERAGE = 2.0
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """Difference a - b, its expanded uncertainty (k = 2), and E_n."""
+
+    a: float
+    b: float
+    difference: float
+    expanded: float
+
+    @property
+    def e_n(self) -> float:
+        return self.difference / self.expanded if self.expanded > 0 else 0.0
+
+    @property
+    def agrees(self) -> bool:
+        return abs(self.e_n) <= 1
+
+
+def compare_values(a: tuple[float, float], b: tuple[float, float]) -> Agreement:
+    """Compare two values with standard uncertainties, taken as independent."""
+    return Agreement(a[0], b[0], a[0] - b[0], COVERAGE * (a[1] ** 2 + b[1] ** 2) ** 0.5)
+
+
+# Repeatability: the change of a quantity between repetitions beyond the noise of each.
+#
+#     s_b^2 = s^2 - u^2      s^2: variance of n repetitions, u^2: mean square of their own standard errors
+#
+# s^2 of n repetitions has n - 1 degrees of freedom: its relative standard deviation is sqrt(2 / (n - 1)).
+#
+# Source  ISO 5725-2, variance between; JCGM 100, 4.2.
+
+
+def repeatability(values: Sequence[float], stds: Sequence[float]) -> tuple[float, float]:
+    """(s_b, its standard error) of `values` with own standard errors `stds`; 0 where noise explains the scatter.
+
+    The standard error is the distance to the root of s_b^2 plus its standard deviation, so it holds for s_b = 0 too.
+    Raises
+    DataError for fewer than two values.
+    """
+    n = len(values)
+    if n < 2:
+        raise DataError("repeatability needs at least two repetitions; resume the run")
+    variance = float(np.var(values, ddof=1))
+    left = max(0.0, variance - float(np.mean(np.square(stds))))
+    spread = variance * np.sqrt(2 / (n - 1))
+    return float(np.sqrt(left)), float(np.sqrt(left + spread) - np.sqrt(left))
+
+
+# A quantity over a sensor's calibrations: its drift, its scatter between calibrations, and the next due date.
+#
+#     y_i = a + b (t_i - t0) + e_i        var e_i = u_i^2 + s^2
+#
+# u_i is the standard uncertainty of a calibration; s is the further scatter between calibrations, such that the
+# weighted square sum equals its n - 2 degrees of freedom (Mandel and Paule). A prediction lies on the line, with the
+# uncertainty of the line and s. A calibration is due when the 95 % interval (Student, n - 2) first exceeds a limit.
+#
+# Source  Mandel and Paule, Anal. Chem. 42 (1970); ILAC-G24 / OIML D 10 (intervals by drift); JCGM 100, H.3 (a line).
+
+FEWEST_CALIBRATIONS = 3  # fewer cannot separate drift from scatter
+LEVEL = 0.95
+HORIZON_DAYS = 3653  # ten years: no forecast beyond
+YEAR_DAYS = 365.25
+
+
+@dataclass(frozen=True)
+class Stability:
+    """The line through n calibrations: `slope` per day, `scatter` s; `covariance` of (value at t0, slope)."""
+
+    t_days: Array
+    values: Array
+    stds: Array
+    middle_days: float
+    centre: float
+    slope: float
+    scatter: float
+    covariance: Array
+
+    @property
+    def coverage(self) -> float:
+        """Student's factor for 95 %."""
+        return float(stdtrit(len(self.values) - 2, (1 + LEVEL) / 2))
+
+    @property
+    def slope_std(self) -> float:
+        """Standard uncertainty of the slope, per day."""
+        return float(np.sqrt(self.covariance[1, 1]))
+
+    @property
+    def drifts(self) -> bool:
+        """Whether the slope exceeds its expanded uncertainty."""
+        return abs(self.slope) > self.coverage * self.slope_std
+
+    def predict(self, t_days: Array) -> tuple[Array, Array]:
+        """Value and standard uncertainty at other times, shape as `t_days`."""
+        since = np.asarray(t_days, dtype=np.float64) - self.middle_days
+        C = self.covariance
+        variance = C[0, 0] + 2 * since * C[0, 1] + since**2 * C[1, 1] + self.scatter**2
+        return np.asarray(self.centre + self.slope * since), np.asarray(np.sqrt(variance))
+
+    def due_days(self, low: float, high: float) -> float | None:
+        """The first day since the last calibration with the interval beyond the limits; None within ten years."""
+        days = self.t_days[-1] + np.arange(HORIZON_DAYS + 1.0)
+        value, std = self.predict(days)
+        beyond = (value - self.coverage * std < low) | (value + self.coverage * std > high)
+        return float(days[np.argmax(beyond)]) if beyond.any() else None
+
+
+def fit_stability(t_days: Sequence[float], values: Sequence[float], stds: Sequence[float]) -> Stability:
+    """The line through calibrations in order of time, each with a standard uncertainty above 0.
+
+    Raises TooFewRows for fewer than three, or for calibrations of one day only.
+    """
+    t, y, u = (np.asarray(each, dtype=np.float64) for each in (t_days, values, stds))
+    if len(t) < FEWEST_CALIBRATIONS or not np.ptp(t) > 0:
+        raise TooFewRows(
+            f"a drift needs at least {FEWEST_CALIBRATIONS} calibrations at different times; there are {len(t)}"
+        )
+    scatter = _scatter(t, y, u)
+    middle = float(np.average(t, weights=1 / (u**2 + scatter**2)))
+    theta, covariance, _ = _line(t - middle, y, u, scatter)
+    return Stability(t, y, u, middle, float(theta[0]), float(theta[1]), scatter, covariance)
+
+
+def _line(t: Array, y: Array, u: Array, scatter: float) -> tuple[Array, Array, float]:
+    """Weighted least squares: (value at 0, slope), covariance, and the weighted sum of squares."""
+    w = 1 / (u**2 + scatter**2)
+    X = np.column_stack([np.ones_like(t), t])
+    covariance = np.asarray(np.linalg.inv((X.T * w) @ X))
+    theta = covariance @ (X.T @ (w * y))
+    return theta, covariance, float(np.sum(w * (y - X @ theta) ** 2))
+
+
+def _scatter(t: Array, y: Array, u: Array) -> float:
+    """s, with which the weighted square sum equals the degrees of freedom; 0 where it is smaller without s."""
+    centred, freedom = t - t.mean(), len(t) - 2
+
+    def excess(s: float) -> float:
+        return _line(centred, y, u, s)[2] - freedom
+
+    if excess(0.0) <= 0:
+        return 0.0
+    return float(brentq(excess, 0.0, 10 * float(np.ptp(y)) + float(u.max())))
+
+
+# A straight line through repeated measurements: the drift of a reference pose.
+
+FEWEST_TREND_POINTS = 3  # fewer cannot separate a trend from scatter
+
+
+def fit_trend(times: Array, values: Array) -> tuple[float, float]:
+    """(slope, its standard error from the scatter about the line), shape (n,) each. Raises TooFewRows."""
+    if len(times) < FEWEST_TREND_POINTS:
+        raise TooFewRows(f"a trend needs at least {FEWEST_TREND_POINTS} measurements; there are {len(times)}")
+    away = times - times.mean()
+    slope = float(away @ values / (away @ away))
+    left = values - values.mean() - slope * away
+    return slope, float(np.sqrt(left @ left / (len(times) - 2) / (away @ away)))

@@ -1,0 +1,281 @@
+"""The paper's own estimation, Ang (1)-(17), step by step and axis by axis; beside the joint one of `fit`.
+
+Its terms overlap. A tilt of the sensing axis is linear in the other two components of gravity, and so ends up in p1
+and q1; the correction (20) by the angles of a search then takes it off a second time. `Tilt` says how much that is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrations.errors import DataError
+from calibrations.geometry.orientation import nominal_pose, specific_force
+from calibrations.importing.foreign import require_kind
+from calibrations.noise.means import rms
+from calibrations.table import Array, Table
+
+# The poses that Ang's equations single out: an axis held up and held down at each inclination, the turn at 90 deg.
+#
+# Poses are identified by the specific force at their angles, not by the angles: alpha and -alpha, a turned mount or a
+# sensor face down then find their places by themselves.
+
+DECIMALS = 1  # of an inclination in deg: the digital level's resolution
+UP_AND_DOWN_DEG = ((0, 180), (90, 270))  # beta where x, y are held up and down, at alpha = 90
+
+
+@dataclass(frozen=True)
+class Plane:
+    """One inclination: the mean output where the axis is held up, and where it is held down, V; a_z in g."""
+
+    inclination_deg: float
+    a_z: float
+    up: float
+    down: float
+
+    @property
+    def vertical(self) -> bool:
+        """Whether the sensing plane is vertical: alpha = 90 deg."""
+        return self.inclination_deg == 90
+
+    @property
+    def bias(self) -> float:
+        """V. Ang (2)."""
+        return (self.up + self.down) / 2
+
+    @property
+    def scale(self) -> float:
+        """V/g. Ang (1), which holds at 90 deg, over sin(alpha) at any other inclination."""
+        return (self.up - self.down) / (2 * float(np.sqrt(1 - self.a_z**2)))
+
+
+def in_vertical_plane(a: Array) -> NDArray[np.bool_]:
+    """Rows at alpha = 90 deg, of specific force `a`, shape (n, 3)."""
+    return np.asarray(_inclinations(a) == 90)
+
+
+def inclination_planes(table: Table, k: int, v: Array, a: Array) -> list[Plane]:
+    """Every inclination where axis `k` (0 or 1) was held both up and down; outputs `v` (n,), repeats averaged.
+
+    Raises DataError if the one at 90 deg is not among them, or fewer than three are.
+    """
+    found = list(_planes(k, v, a))
+    up, down = UP_AND_DOWN_DEG[k]
+    if not any(plane.vertical for plane in found):
+        raise DataError(
+            f"{table.source}: the stepwise estimate needs poses at alpha = 90, beta = {up} and {down} deg, "
+            f"where {'xy'[k]} is held up and down; measure a full turn at alpha = 90"
+        )
+    if len(found) < 3:
+        angles = " and ".join(f"{plane.inclination_deg:g}" for plane in found)
+        raise DataError(
+            f"{table.source}: the stepwise estimate needs three inclinations with poses at beta = {up} and {down} deg; "
+            f"it has {angles} deg; measure full turns at more"
+        )
+    return found
+
+
+def _planes(k: int, v: Array, a: Array) -> Iterator[Plane]:
+    inclination = _inclinations(a)
+    aligned = np.abs(a[:, 1 - k]) < np.radians(10.0**-DECIMALS)
+    for angle in np.unique(inclination):
+        here = aligned & (inclination == angle)
+        up, down = here & (a[:, k] > 0), here & (a[:, k] < 0)
+        if 0 < angle < 180 and up.any() and down.any():
+            yield Plane(float(angle), float(np.mean(a[up | down, 2])), float(np.mean(v[up])), float(np.mean(v[down])))
+
+
+def _inclinations(a: Array) -> Array:
+    """Angle between the sensor's z axis and the vertical, deg, 0 to 180, shape (n,)."""
+    angle: Array = np.degrees(np.arccos(np.clip(a[:, 2], -1.0, 1.0)))
+    return np.asarray(np.round(angle, DECIMALS))
+
+
+# One sensing axis by Ang's equations: coefficients found one after another, each from its own part of the data.
+#
+#     B, SF       output along and against gravity at alpha = 90 deg                      (1)-(2)
+#     g(V_p)      quadratic in the other axis's output: what the line (8) leaves there    (9)-(11)
+#     h(V_z)      quadratic in a_z: bias at an inclination less that at 90 deg            (12)-(13)
+#     SF(V_z)     quadratic in a_z: scale factor at an inclination                        (15), (17)
+#
+# V_z is in units of V_g^z, the z output to 1 g, as the sensor has no z channel: while calibrating it is cos(alpha).
+
+
+@dataclass(frozen=True)
+class AxisEstimate:
+    """Coefficients of one axis. `p`, `q`, `r` have shape (3,), the square's first, as in the paper."""
+
+    axis: str
+    bias: float  # B^90, V
+    scale: float  # SF^90, V/g
+    p: Array  # 1/V, V/V, V
+    q: Array  # V/g^2, V/g, V
+    r: Array  # V/g^3, V/g^2, V/g
+
+    def linear(self, v: Array) -> Array:
+        """Acceleration by the manufacturer's method, g. Ang (3)."""
+        return (v - self.bias) / self.scale
+
+    def line(self, a: Array) -> Array:
+        """Output by the manufacturer's method, V. Ang (8)."""
+        return a * self.scale + self.bias
+
+    def acceleration(self, v: Array, other: Array, a_z: Array) -> Array:
+        """Acceleration, g, from this output and that of the other axis, V. Ang (14), (16)."""
+        return (v - self._bias_at(other, a_z)) / np.polyval(self.r, a_z)
+
+    def output(self, a: Array, other: Array, a_z: Array) -> Array:
+        """Output, V, from the acceleration, g, and the other axis's output: Ang (14), (16) the other way round."""
+        return a * np.polyval(self.r, a_z) + self._bias_at(other, a_z)
+
+    def _bias_at(self, other: Array, a_z: Array) -> Array:
+        """Ang (9)."""
+        return np.asarray(self.bias + np.polyval(self.p, other) + np.polyval(self.q, a_z))
+
+
+def estimate_axis(axis: str, planes: Sequence[Plane], v: Array, other: Array, a: Array) -> AxisEstimate:
+    """The axis's coefficients, from its planes, and from the rows at 90 deg for the step that needs a full turn.
+
+    `v` output, `other` output of the other axis, V, and `a` specific force, g: of the rows at 90 deg.
+    """
+    vertical = next(plane for plane in planes if plane.vertical)
+    a_z = np.array([plane.a_z for plane in planes])
+    shift = np.array([plane.bias - vertical.bias for plane in planes])
+    return AxisEstimate(
+        axis=axis,
+        bias=vertical.bias,
+        scale=vertical.scale,
+        p=_quadratic(other, v - (a * vertical.scale + vertical.bias)),
+        q=_quadratic(a_z, shift),
+        r=_quadratic(a_z, np.array([plane.scale for plane in planes])),
+    )
+
+
+def _quadratic(x: Array, y: Array) -> Array:
+    """Least-squares polynomial of second order, the square's coefficient first, shape (3,)."""
+    return np.asarray(np.linalg.lstsq(np.vander(x, 3), y, rcond=None)[0])
+
+
+@dataclass(frozen=True)
+class Tilt:
+    """Tilt of one axis that the bias model has already taken up, as the components of Theta that (20), (21) subtract.
+
+    in_plane      slope of g about the other axis's zero-g output, p1 + 2 p2 B, times SF over SF: 1 is a radian
+    out_of_plane  q1 over SF
+    twice_mg      rms over the table of what (20) or (21) would take off a second time, mg
+    """
+
+    in_plane: float
+    out_of_plane: float
+    twice_mg: float
+
+
+@dataclass(frozen=True)
+class Stepwise:
+    """The estimate for both axes, on the table that it was made from. Arrays have shape (n, 2)."""
+
+    table: Table
+    x: AxisEstimate
+    y: AxisEstimate
+
+    @cached_property
+    def force(self) -> Array:
+        """Specific force by the stage angles, g, shape (n, 3)."""
+        return specific_force(nominal_pose(self.table))
+
+    @cached_property
+    def predicted(self) -> Array:
+        """Output at each pose, V: each axis needs the other's output, so both are solved for together."""
+        a_x, a_y, a_z = self.force.T
+        v_x, v_y = self.x.line(a_x), self.y.line(a_y)
+        for _ in range(60):  # cross-axis slopes are far below 1: the error falls by their product each time
+            v_x, v_y = self.x.output(a_x, v_y, a_z), self.y.output(a_y, v_x, a_z)
+        return np.column_stack([v_x, v_y])
+
+    @cached_property
+    def acceleration(self) -> Array:
+        """Acceleration from the measured outputs, g, a_z taken from the stage angle. Ang (14), (16)."""
+        return self._accelerations(self.force[:, 2])
+
+    @cached_property
+    def acceleration_by_outputs(self) -> Array:
+        """The same, a_z taken from the outputs themselves: what a tilt sensor without stages could do. Ang (5)-(7)."""
+        return self._accelerations(self.a_z_by_outputs)
+
+    @cached_property
+    def a_z_by_outputs(self) -> Array:
+        """a_z from the other two, g, shape (n,); its sign, which a root cannot know, is the stage's. Ang (5)-(7).
+
+        The paper's normalised voltages forget the zero-g output, with which the radicand would be negative.
+        """
+        left = 1 - np.sum(self.linear_acceleration**2, axis=1)
+        return np.asarray(np.sqrt(np.maximum(left, 0.0)) * np.sign(self.force[:, 2]))
+
+    @cached_property
+    def linear_acceleration(self) -> Array:
+        """Acceleration by the manufacturer's method, g. Ang (3)."""
+        return np.column_stack([self.x.linear(self.table.column("vx_v")), self.y.linear(self.table.column("vy_v"))])
+
+    @cached_property
+    def linear_predicted(self) -> Array:
+        """Output by the manufacturer's method, V. Ang (8)."""
+        return np.column_stack([self.x.line(self.force[:, 0]), self.y.line(self.force[:, 1])])
+
+    @property
+    def rmse_v(self) -> Array:
+        """Root mean square error of the predicted output, V, shape (2,)."""
+        return _rmse(self.predicted, self.table.outputs[:, :2])
+
+    @property
+    def rmse_mg(self) -> Array:
+        """Root mean square error of the acceleration, mg, shape (2,)."""
+        return 1e3 * _rmse(self.acceleration, self.force[:, :2])
+
+    @property
+    def linear_rmse_v(self) -> Array:
+        """The linear model's, V, shape (2,)."""
+        return _rmse(self.linear_predicted, self.table.outputs[:, :2])
+
+    @property
+    def linear_rmse_mg(self) -> Array:
+        """The linear model's, mg, shape (2,)."""
+        return 1e3 * _rmse(self.linear_acceleration, self.force[:, :2])
+
+    @cached_property
+    def tilts(self) -> tuple[Tilt, Tilt]:
+        """The tilt of x and of y that p1 and q1 hold."""
+        return self._tilt(self.x, self.y, 1), self._tilt(self.y, self.x, 0)
+
+    def _tilt(self, own: AxisEstimate, other: AxisEstimate, across: int) -> Tilt:
+        in_plane = (own.p[1] + 2 * own.p[0] * other.bias) * other.scale / own.scale
+        out_of_plane = own.q[1] / own.scale
+        twice = in_plane * self.force[:, across] + out_of_plane * self.force[:, 2]
+        return Tilt(float(in_plane), float(out_of_plane), 1e3 * float(rms(twice)))
+
+    def _accelerations(self, a_z: Array) -> Array:
+        v_x, v_y = self.table.column("vx_v"), self.table.column("vy_v")
+        return np.column_stack([self.x.acceleration(v_x, v_y, a_z), self.y.acceleration(v_y, v_x, a_z)])
+
+
+def estimate_stepwise(table: Table) -> Stepwise:
+    """Estimate (1)-(17) from full turns at alpha = 90 deg and two more inclinations at least.
+
+    Raises MissingColumn without both outputs, DataError where the poses that an equation needs are not there.
+    """
+    require_kind(table, "poses")
+    v = np.column_stack([table.column("vx_v"), table.column("vy_v")])
+    a = specific_force(nominal_pose(table))
+    turn = in_vertical_plane(a)
+    x, y = (
+        estimate_axis(axis, inclination_planes(table, k, v[:, k], a), v[turn, k], v[turn, 1 - k], a[turn, k])
+        for k, axis in enumerate("xy")
+    )
+    return Stepwise(table, x, y)
+
+
+def _rmse(given: Array, true: Array) -> Array:
+    return rms((given - true).T)

@@ -1,0 +1,172 @@
+"""What temperature does to bias and scale factor in a cycle: the slope, and the difference between up and down.
+
+    y = y0 + k (T - T0) + h s [+ d t]     s = 1/2 on the way up, the top included, -1/2 on the way down
+
+d is drift, told from hysteresis only where there is more than one cycle. What a straight line leaves (curvature, slow
+noise) widens the standard errors, with few steps by Student's t.
+
+Source  IEEE 1293; JCGM 101, 6.4.9: the standard uncertainty of a t-distribution.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrations.errors import DataError
+from calibrations.estimators.least_squares import least_squares
+from calibrations.noise.mean_noise import white_std
+from calibrations.noise.means import rms
+from calibrations.table import Array, Table
+
+# Bias and scale factor of a triad of accelerometers from its six faces, each axis from its own pair.
+#
+#     b = (v_up + v_down) / 2        s = (v_up - v_down) / 2
+#
+# Source  Ferraris, Grimaldi and Parvis, Procedure for effortless in-field calibration of three-axis rate gyros and
+#         accelerometers, Sensors and Materials 7 (1995); IEEE Std 1293, two-point tumble; Ang (1)-(2).
+
+UPRIGHT_COSINE = 0.94  # cosine between edge and vertical: within 20 deg the edge counts as upright
+
+
+@dataclass(frozen=True)
+class Faces:
+    """Bias and scale factor (output per g) of each axis, in the outputs' unit, shape (3,)."""
+
+    bias: Array
+    scale: Array
+
+
+def estimate_faces(outputs: Array) -> Faces | None:
+    """From still outputs (n, 3), averaged over each face; None if an axis was not held both up and down."""
+    middle = (outputs.max(axis=0) + outputs.min(axis=0)) / 2
+    size = np.linalg.norm(outputs - middle, axis=1, keepdims=True)
+    cosine = (outputs - middle) / np.where(size > 0, size, 1.0)
+    up, down = (_mean_along(outputs, side * cosine) for side in (1, -1))
+    if up is None or down is None:
+        return None
+    return Faces((up + down) / 2, (up - down) / 2)
+
+
+def _mean_along(outputs: Array, cosine: Array) -> Array | None:
+    """Mean output of each axis over the rows in which it is upright, shape (3,); None if one never is."""
+    held = cosine > UPRIGHT_COSINE
+    if not held.any(axis=0).all():
+        return None
+    return np.array([outputs[held[:, k], k].mean() for k in range(3)])
+
+
+# Bias and scale factor of each axis from tumble tests: the four positions of beta at alpha = 90, up and down.
+#
+#     V = B + SF a_x + C a_y      least squares over one tumble, C the cross-axis term; hysteresis is in the scatter
+#
+# Source  IEEE 1293, four-point tumble.
+
+Rows = NDArray[np.intp]
+OWN_COLUMN = {"x": 0, "y": 1}
+QUARTER_DEG = 90.0
+
+
+@dataclass(frozen=True)
+class Tumble:
+    """One tumble of one axis; standard errors are those of white noise, that of the scale factor is relative."""
+
+    path: str
+    t_s: float
+    temperature_c: float
+    bias_v: float
+    scale_v_per_g: float
+    bias_std_v: float
+    scale_std: float
+
+
+def estimate_tumbles(table: Table, axis: str) -> list[Tumble]:
+    """All complete tumbles in order of time. Raises DataError if none is complete.
+
+    A tumble with a missing pose is left out: hysteresis cancels only if each position was reached from both sides.
+    """
+    paths = np.array(table.labels.get("path", ()))
+    begun = {name: np.flatnonzero(paths == name) for name in dict.fromkeys(paths.tolist()) if " " in name}
+    if not begun:
+        raise DataError(f"{table.source}: there is no tumble yet; resume the run")
+    missing = {name: _missing(table, rows) for name, rows in begun.items()}
+    if all(missing.values()):
+        name, where = next(iter(missing.items()))
+        raise DataError(f"{table.source}: no tumble is complete: {name!r} lacks {where}; measure it again")
+    return [_tumble(table, axis, name, rows) for name, rows in begun.items() if not missing[name]]
+
+
+def _missing(table: Table, rows: Rows) -> str:
+    """The first missing position of a tumble, "" for a complete one."""
+    set_deg = table.column("beta_set_deg" if "beta_set_deg" in table else "beta_deg")
+    quarters = np.round(set_deg[rows] / QUARTER_DEG) % 4
+    directions = table.optional("direction", 0.0)[rows]
+    held = set(zip(quarters.tolist(), directions.tolist(), strict=True))
+    for direction in sorted(set(directions.tolist()), reverse=True) or [0.0]:
+        for quarter in range(4):
+            if (float(quarter), direction) not in held:
+                side = {1.0: ", reached from below", -1.0: ", reached from above"}.get(direction, "")
+                return f"beta {quarter * QUARTER_DEG:g} deg{side}"
+    return ""
+
+
+def _tumble(table: Table, axis: str, path: str, rows: Rows) -> Tumble:
+    volts, beta = table.column(f"v{axis}_v")[rows], np.radians(table.column("beta_deg")[rows])
+    columns = np.column_stack([np.cos(beta), np.sin(beta), np.ones(len(beta))])
+    white = white_std(table)
+    noise = 0.0 if white is None else float(rms(white[rows, table.axes.index(axis)]))
+    found = least_squares(columns, volts)  # equal weights, so that hysteresis cancels
+    std = noise * np.sqrt(np.diag(found.covariance))
+    scale = float(found.values[OWN_COLUMN[axis]])
+    temperature_c = table.optional("temperature_c", float("nan"))[rows]
+    return Tumble(
+        path,
+        float(table.time_s[rows].mean()),
+        float(temperature_c.mean()),
+        float(found.values[2]),
+        scale,
+        float(std[2]),
+        float(std[OWN_COLUMN[axis]] / abs(scale)),
+    )
+
+
+DIRECTIONS = {"up": 0.5, "down": -0.5}
+
+
+@dataclass(frozen=True)
+class TemperatureCoefficients:
+    """Slope per K, and up minus down, each (value, standard error): of a bias in V, of a scale factor as a fraction."""
+
+    slope: tuple[float, float]
+    hysteresis: tuple[float, float]
+
+
+def bias_coefficients(steps: Sequence[Tumble]) -> TemperatureCoefficients:
+    """Slope in V/K, hysteresis in V. Raises DataError without temperatures up and down."""
+    return _fitted(steps, np.array([s.bias_v for s in steps]), np.array([s.bias_std_v for s in steps]))
+
+
+def scale_coefficients(steps: Sequence[Tumble]) -> TemperatureCoefficients:
+    """Slope in 1/K and hysteresis, as fractions of the mean scale factor. Raises DataError as `bias_coefficients`."""
+    scale = np.array([s.scale_v_per_g for s in steps])
+    return _fitted(steps, scale / scale.mean() - 1, np.array([s.scale_std for s in steps]))
+
+
+def _fitted(steps: Sequence[Tumble], y: Array, std: Array) -> TemperatureCoefficients:
+    temperature_c, t_s = (np.array([getattr(s, name) for s in steps]) for name in ("temperature_c", "t_s"))
+    way = np.array([DIRECTIONS[s.path.partition(" ")[0]] for s in steps])
+    columns = np.column_stack([temperature_c - temperature_c.mean(), way, np.ones(len(steps))])
+    if len({s.path.rpartition(" ")[2] for s in steps}) > 1:
+        columns = np.column_stack([columns, (t_s - t_s.mean()) / np.ptp(t_s)])
+    free = len(steps) - columns.shape[1]
+    if not np.isfinite(columns).all() or np.linalg.matrix_rank(columns) < columns.shape[1]:
+        raise DataError("the cycle lacks different temperatures on the way up and down; use a bench with an oven")
+    weight = 1 / np.where(std > 0, std, 1.0)
+    inverse = np.linalg.pinv(columns * weight[:, None])
+    factors = inverse @ (y * weight)
+    left = float(np.sum(((y - columns @ factors) * weight) ** 2))
+    widened = np.sqrt(np.diag(inverse @ inverse.T) * max(1.0, left / max(free - 2, 1)))
+    return TemperatureCoefficients((float(factors[0]), float(widened[0])), (float(factors[1]), float(widened[1])))

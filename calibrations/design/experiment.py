@@ -1,0 +1,115 @@
+"""The experiment that tells apart two effects that the data at hand cannot.
+
+`separating` goes by the physics of the two alone. Where a bench is known, each experiment of MENU is planned on it, and
+`calibrations/design/expected.py` computes how far apart the two will lie.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence, Set
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from calibrations.table import Table
+
+if TYPE_CHECKING:
+    from calibrations.design.expected import Expected
+
+TEMPERATURE_EFFECTS = {"temperature-bias", "temperature-scale", "temperature-hysteresis"}
+TIME_EFFECTS = {"warm-up-bias", "warm-up-scale", "bias-drift"}
+WARM_C = 45.0  # above what a powered sensor comes to in a room
+LEVEL_EFFECTS = {"stage-zero-offset", "base-tilt"}
+DELAY_EFFECTS = {"output-filter", "sampling-delay"}
+TWO_HZ = [10.0, 4.0]  # the usual one, and one well below that is at the same stroke still above the noise
+IRON_EFFECTS = {"field-strength", "hard-iron", "soft-iron"}
+GYROSCOPE_EFFECTS = {"gyro-bias", "gyro-scale-factor", "gyro-misalignment", "gyro-g-sensitivity"}
+SQUARE_EFFECTS = {"quadratic-nonlinearity", "cross-axis-bias", "z-axis-bias"}
+FEW, MANY = [90.0, 30.0, 150.0], [90.0, 30.0, 150.0, 60.0, 120.0, 45.0, 135.0, 75.0, 105.0]  # out of order, deg
+STAY_POWERED = 0.0  # s without power: the sensor stays on, and its warm-up goes on
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """A procedure with settings, what it separates, and why it can.
+
+    Of a known bench also the command line, how long it takes, and what it is expected to tell, where its data can be
+    foreseen.
+    """
+
+    procedure: str
+    settings: Mapping[str, object]
+    separates: tuple[tuple[str, str], ...]
+    why: str
+    command: str = ""
+    duration_s: float | None = None
+    expected: Expected | None = None
+
+
+def _of(procedure: str, why: str, **settings: object) -> Experiment:
+    return Experiment(procedure, settings, (), why)
+
+
+FINE = "full turns both ways at finely spaced inclinations, out of order, excite each of them differently"
+COARSE = "inclinations out of order: height does not follow time, and what depends on the angle returns with it"
+FACES = "mounted face down, an error of the sensor's axes turns with the sensor and one of the stage does not"
+LONGER = "longer dwells: the noise of each mean is half as large"
+LATER = "with the angles held, what still changes follows the time: an exponential comes to rest, a drift goes on"
+HELD = "in the oven the temperature is held, and what still changes follows the time"
+CYCLED = "the oven goes up and down again: what lags behind the temperature comes back another way, and time does not"
+TURNED_ROUND = "a level laid on the base shows the tilt of the base alone; an offset of alpha moves the table only"
+SHAKEN = "in a field of 1 g the squares of the three axes add up to a constant; motion along one axis does not"
+RECORDED = "these data have no temperature: with a thermometer read at each pose, they tell what follows it from time"
+TWO_TONES = "a corner changes the size of an oscillation with its frequency, a delay only its phase"
+ALL_ROUND = "full turns on each edge, upward and downward, show every side of the sphere of directions"
+SIX_FACES = "turned about each edge both ways, and at rest on six faces, rate, specific force and time go separate ways"
+
+MENU = (
+    _of("sweep", COARSE, step_deg=30.0, inclinations_deg=FEW),
+    _of("sweep", COARSE, step_deg=20.0, inclinations_deg=MANY[:7]),
+    _of("sweep", FINE, step_deg=10.0, inclinations_deg=MANY),
+    _of("sweep", FACES, face="both", step_deg=45.0, inclinations_deg=FEW),
+    _of("sweep", FACES, face="both", step_deg=30.0, inclinations_deg=MANY[:7]),
+    _of("sweep", LONGER, step_deg=30.0, inclinations_deg=FEW, dwell_s=20.0),
+    _of("soak", LATER, duration_s=1800.0, interval_s=300.0, off_s=STAY_POWERED),
+    _of("soak", LATER, duration_s=7200.0, interval_s=600.0, off_s=STAY_POWERED),
+    _of("soak", HELD, duration_s=3600.0, interval_s=600.0, off_s=STAY_POWERED, oven_c=WARM_C),
+    _of("temperature-cycle", CYCLED, temperatures_c=[35.0, 50.0], soak_s=1200.0),
+    _of("temperature-cycle", CYCLED),
+)
+ADDITIONS = (  # what tells nothing by itself, but much beside data that were taken face up
+    _of("sweep", FACES, face="down", step_deg=90.0, inclinations_deg=[90.0, 45.0]),
+    _of("sweep", FACES, face="down", step_deg=45.0, inclinations_deg=FEW),
+)
+
+
+LOGGED: tuple[str, dict[str, object], str] = ("sweep", {"step_deg": 30.0, "inclinations_deg": FEW}, RECORDED)
+
+
+def separating_experiment(name: str, rivals: Sequence[str], table: Table) -> Experiment:
+    """An experiment for an effect and the rivals that this data cannot separate from it."""
+    unlogged = TEMPERATURE_EFFECTS & {name, *rivals} and "temperature_c" not in table
+    procedure, settings, why = LOGGED if unlogged else experiment_by_physics({name, *rivals})
+    return Experiment(procedure, settings, tuple((name, rival) for rival in rivals), why)
+
+
+def experiment_by_physics(names: Set[str]) -> tuple[str, dict[str, object], str]:
+    """Procedure, settings, and why they tell effects of these names apart."""
+    if names >= SQUARE_EFFECTS:
+        return "motion", {}, SHAKEN
+    if names & IRON_EFFECTS:
+        return "magnetometer-turn", {}, ALL_ROUND
+    if names & GYROSCOPE_EFFECTS:
+        return "rate-turn", {}, SIX_FACES
+    if names <= DELAY_EFFECTS:
+        return "motion", {"frequency_hz": TWO_HZ}, TWO_TONES
+    if names <= TEMPERATURE_EFFECTS:
+        return "temperature-cycle", {"temperatures_c": [35.0, 50.0], "soak_s": 1200.0}, CYCLED
+    if names <= TIME_EFFECTS:
+        return "soak", {}, LATER
+    if names <= TEMPERATURE_EFFECTS | TIME_EFFECTS:
+        return "soak", {"oven_c": WARM_C}, HELD
+    if names <= LEVEL_EFFECTS:
+        return "level-check", {"on": "base"}, TURNED_ROUND
+    if names & {"axis-misalignment"} and names & LEVEL_EFFECTS:
+        return "sweep", {"face": "both"}, FACES
+    return "sweep", {"step_deg": 10.0, "inclinations_deg": MANY}, FINE

@@ -1,0 +1,211 @@
+"""Measured data as the loop sees them: all that one kind of data does differently from another."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any, Generic
+
+from calibrations.criteria import MOST_BY_FORM
+from calibrations.discovery.results import Candidate, Comparison, Diagnosis, Discovery, F, Findings, Place, Step
+from calibrations.effects import Effect
+from calibrations.errors import ModelError
+from calibrations.model import Model
+from calibrations.plausibility import Finding
+
+Cells = tuple[Sequence[str], Sequence[Sequence[str]]]  # head and rows of a table of text
+
+
+class Dataset(ABC, Generic[F]):
+    """Data of one kind. A subclass says how they are fitted, searched, judged and described."""
+
+    form: str  # "rows" or "samples": which pictures show them
+    default_model: str
+    floor: str  # what errors are multiples of
+    unseen: str  # data that a fit did not use
+    complete: str  # a comparison without a failing place, in words
+    most_left: float = MOST_BY_FORM  # part of the excess variance that may be the form of the effects added
+
+    @property
+    @abstractmethod
+    def source(self) -> str:
+        """File or run."""
+
+    @property
+    @abstractmethod
+    def content(self) -> str:
+        """The kind of data, as models are defined for it."""
+
+    @property
+    @abstractmethod
+    def n(self) -> int:
+        """Rows, or samples of a channel."""
+
+    @property
+    @abstractmethod
+    def unit(self) -> str:
+        """Unit of the outputs."""
+
+    @property
+    @abstractmethod
+    def axes(self) -> tuple[str, ...]:
+        """Axes that were measured."""
+
+    @property
+    @abstractmethod
+    def description(self) -> str:
+        """Size and source in words, such as `518 rows of sweep.csv`."""
+
+    @property
+    def note(self) -> str:
+        """What the comparison is, where there is another one; "" where there is none."""
+        return ""
+
+    @abstractmethod
+    def fit(self, model: Model) -> F:
+        """The model with its parameters estimated. Raises ModelError, DataError, TooFewRows."""
+
+    @abstractmethod
+    def evaluate(self, model: Model) -> F | None:
+        """The model with the values that it has; None where it has none."""
+
+    @abstractmethod
+    def places(self, found: F) -> tuple[Place, ...]:
+        """Places where a model fails, worst first."""
+
+    @abstractmethod
+    def search(self, model: Model, effects: Mapping[str, Effect]) -> Findings[F]:
+        """All effects that a model misses."""
+
+    @abstractmethod
+    def addition(self, effect: Effect, model: Model, effects: Mapping[str, Effect]) -> Findings[F]:
+        """One chosen effect added to a model, both fitted."""
+
+    @abstractmethod
+    def step(self, effect: Effect, before: F) -> Step[F]:
+        """One chosen effect added to a fit."""
+
+    @abstractmethod
+    def search_on(self, start: F, origin: F, effects: Mapping[str, Effect]) -> Findings[F]:
+        """All effects that a fitted model misses; shares are those of the error of `origin`."""
+
+    @abstractmethod
+    def candidates(self, before: F, plan: Findings[F], effects: Mapping[str, Effect]) -> tuple[Candidate, ...]:
+        """Every effect alone on top of a fit that belongs to a search."""
+
+    def beginning(self, model: Model) -> tuple[Dataset[F], F]:
+        """(the data without gross outliers, the model fitted to them)."""
+        return self, self.fit(model)
+
+    def followed(self, plan: Findings[F], k: int, effects: Mapping[str, Effect]) -> Findings[F]:
+        """The rest of a search once its first `k` steps are taken."""
+        start = plan.steps[k - 1].after
+        found = self.candidates(start, plan, effects)
+        following = plan.names[k : k + 1]
+        return replace(
+            plan,
+            start=start,
+            baseline=start,
+            added=(*plan.added, *plan.names[:k]),
+            steps=plan.steps[k:],
+            candidates=tuple(sorted(found, key=lambda c: c.name not in following)),
+            undetermined=(self.undetermined(start), plan.undetermined[1]),
+        )
+
+    def rejection(self, found: F) -> Finding | None:  # noqa: ARG002
+        """Why neither the data nor the values of a fit can be used; None where they can."""
+        return None
+
+    def undetermined(self, found: F) -> str | None:  # noqa: ARG002
+        """Why the data do not determine a model, in words."""
+        return None
+
+    def untestable(self, found: F, effects: Mapping[str, Effect]) -> str | None:  # noqa: ARG002
+        """The effects that these data cannot show, in words; None where they show all."""
+        return None
+
+    def expression(self, name: str, text: str) -> Effect:  # noqa: ARG002
+        """An effect of one's own. Raises ModelError, ExpressionError with the place in the text."""
+        raise ModelError(f"{name}: an expression acts on rows, and {self.source} is a still record")
+
+    @property
+    def foreseeable(self) -> bool:
+        """Whether the data of an experiment can be computed beforehand."""
+        return False
+
+    @abstractmethod
+    def figures(self, found: F) -> dict[str, str]:
+        """The three numbers to remember of a fit, by their names."""
+
+    @abstractmethod
+    def facts(self, candidate: Candidate, result: Diagnosis[F]) -> dict[str, str]:
+        """What a candidate does to the error, by name."""
+
+    @abstractmethod
+    def errors_document(self, found: F) -> dict[str, Any]:
+        """Errors and noise by axis, for the JSON documents."""
+
+    def comparison_fields(self, result: Comparison[F]) -> dict[str, Any]:  # noqa: ARG002
+        """Further fields of a comparison's document."""
+        return {}
+
+    def step_fields(self, step: Step[F]) -> dict[str, Any]:  # noqa: ARG002
+        """Further fields of a step's document."""
+        return {}
+
+    def candidate_fields(self, candidate: Candidate) -> dict[str, Any]:  # noqa: ARG002
+        """Further fields of a candidate's document."""
+        return {}
+
+    def in_one_floor(self, start: F, steps: tuple[Step[F], ...]) -> tuple[F, tuple[Step[F], ...]]:
+        """The same with all errors in the noise floor of the last model, where each model has its own."""
+        return start, steps
+
+    @abstractmethod
+    def require_allowed(self, effect: Effect) -> None:
+        """Raises ModelError where the effect is not defined for these data."""
+
+    @abstractmethod
+    def error_table(self, found: F) -> Cells:
+        """The error of each channel, as text."""
+
+    def comparison_table(self, result: Comparison[F]) -> Cells | None:  # noqa: ARG002
+        """Further numbers of a comparison, as text; None where there are none."""
+        return None
+
+    @abstractmethod
+    def step_table(self, found: Discovery[F]) -> Cells:
+        """The error after each step, as text."""
+
+    @abstractmethod
+    def candidate_table(self, result: Diagnosis[F], candidates: Sequence[Candidate]) -> Cells:
+        """The candidates, as text."""
+
+    def remarks(self, found: F) -> list[str]:  # noqa: ARG002
+        """Sentences on an error that cannot be right."""
+        return []
+
+    def cautions(self, found: F) -> list[str]:  # noqa: ARG002
+        """Why a fit of these data may mislead."""
+        return []
+
+    def compare(self, model: Model) -> Comparison[F]:
+        """The model as it is, or fitted first where it has no values yet."""
+        found = self.evaluate(model) or self.fit(model)
+        return Comparison(self, found, self.places(found), self.rejection(found))
+
+    def diagnose(self, model: Model, effects: Mapping[str, Effect]) -> Diagnosis[F]:
+        """What the model misses."""
+        return Diagnosis.of(self.search(model, effects))
+
+    def discover(self, model: Model, effects: Mapping[str, Effect]) -> Discovery[F]:
+        """The model with all effects that it misses."""
+        return Discovery.of(self.search(model, effects))
+
+    def add(self, effect: Effect, model: Model, effects: Mapping[str, Effect]) -> Discovery[F]:
+        """The model with one effect more. Raises ModelError where it has the effect, or cannot have it."""
+        if model.holds(effect.name):
+            raise ModelError(f"{model.name}: {effect.name} is in the model already; it has {', '.join(model.effects)}")
+        self.require_allowed(effect)
+        return Discovery.of(self.addition(effect, model, effects))

@@ -1,0 +1,167 @@
+"""Where a model of rows fails: places whose residual is more than noise.
+
+A place is a stretch of a column (an angle, time, temperature, direction) of one axis whose residual has a mean too far
+from zero to be noise, or a scatter too large. Places are ranked by the excess there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtrc
+
+from calibrations.criteria import MATERIAL, MOST_SLOW_NOISE, ONE_SIDED, SIGNIFICANT, STANDS_OUT
+from calibrations.discovery.results import Place
+from calibrations.fit import Fit
+from calibrations.model.chain import backward
+from calibrations.noise.means import rms
+from calibrations.presentation.text import stretch
+from calibrations.table import MILLI, Array, Table
+
+MOST_PLACES = 8
+PARTS = 8  # of a column without a natural grid
+
+WORDS: Mapping[str, tuple[str, str]] = {
+    "alpha": ("alpha_deg", "deg"),
+    "beta": ("beta_deg", "deg"),
+    "direction": ("direction", ""),
+    "time": ("t_s", "s"),
+    "temperature": ("temperature_c", "degC"),
+    "rate": ("rate_deg_s", "deg/s"),
+}
+SIDES = ("+x", "-x", "+y", "-y", "+z", "-z")  # of the sensor, that gravity or the field points along
+
+
+@dataclass(frozen=True)
+class _Stretch:
+    """Rows of a table in which a column lies between `low` and `high`, and the residual of one channel there."""
+
+    where: str
+    low: float
+    high: float
+    channel: str
+    excess: float
+    mean: float
+    unit: str
+    scale: float  # output per g, field or deg/s of that channel; 1 for a residual in those
+    milli: str  # a thousandth of the sensed unit
+
+    @property
+    def place(self) -> Place:
+        """The stretch as a place of a comparison."""
+        return Place(self.where, self.low, self.high, axis_of(self.channel), self.excess, self._text)
+
+    @property
+    def _text(self) -> str:
+        """The place in words, with the mean residual there in the output's unit and in the sensed unit."""
+        if self.where == "side":
+            place = f"side {SIDES[round(self.low)]}"
+        elif self.where == "direction":
+            place = {1: "turning clockwise", -1: "turning anticlockwise", 0: "direction unknown"}[round(self.low)]
+        else:
+            unit = WORDS[self.where][1]
+            place = f"{self.where} {self.low:g} {unit}" if self.low == self.high else (
+                f"{self.where} {stretch(self.low, self.high)} {unit}"
+            )  # fmt: skip
+        mg = 1e3 * self.mean / self.scale
+        own = f"{1e3 * self.mean:+.3g} mV" if self.unit == "V" else f"{self.mean:+.3g} {self.unit}"
+        sensed = self.unit in ("g", "field")
+        value = f"{mg:+.3g} {self.milli}" if sensed else f"{own} ({mg:+.3g} {self.milli})"
+        return f"{place}: {self.channel} is off by {value} on average, rms {self.excess:.3g} x the noise floor"
+
+
+def places(found: Fit) -> tuple[Place, ...]:
+    """The worst places where a model fails."""
+    return tuple(each.place for each in _fails(found)[:MOST_PLACES])
+
+
+def scales(found: Fit) -> Array:
+    """Output per g, or deg/s, of each channel; 1 for a residual in what is sensed."""
+    if found.table.kind == "positions":
+        return np.ones(1)
+    terms = [term for term in found.model.terms if term.name in ("scale-factor", "gyro-scale-factor")]
+    values = {e.axis: abs(e.value) for term in terms for e in term.estimates}
+    axes = [axis_of(channel) for channel in found.channels]
+    return np.array([values.get(axis, values.get("", found.problem.layout.nominal)) for axis in axes])
+
+
+def axis_of(channel: str) -> str:
+    """The axis that a channel belongs to: "x" of "x in phase at 10 Hz"; itself where it has no parts."""
+    return channel.partition(" ")[0]
+
+
+def _fails(found: Fit) -> list[_Stretch]:
+    """Places where the residual is more than noise, worst first; at most one for each column and channel."""
+    tried: list[_Stretch] = []
+    chances: list[float] = []
+    scale = scales(found)
+    unit, milli = found.problem.unit, MILLI[found.table.input_unit]
+    floor = found.noise.floor
+    by_noise = _by_noise(found)
+    for where, low, high, rows in (*_parts(found.table), *_sides(found)):
+        for c, channel in enumerate(found.channels):
+            r = found.residual[c, rows]
+            excess = float(rms(r) / floor[c])
+            tried.append(_Stretch(where, low, high, channel, excess, float(r.mean()), unit, float(scale[c]), milli))
+            chances.append(float(chdtrc(len(r), np.sum(by_noise[c, rows] ** 2))))
+    if not tried:
+        return []
+    limit = SIGNIFICANT / len(tried)
+    bad = [k for k, p in enumerate(tried) if chances[k] < limit and p.excess > MATERIAL]
+    overall = {channel: (found.excess[c], floor[c]) for c, channel in enumerate(found.channels)}
+    bad = [k for k in bad if _stands_out(tried[k], *overall[tried[k].channel])] or bad[:1]
+    bad.sort(key=lambda k: tried[k].excess, reverse=True)
+    first = {(tried[k].where, tried[k].channel): k for k in reversed(bad)}
+    return [tried[k] for k in bad if first[tried[k].where, tried[k].channel] == k]
+
+
+def _by_noise(found: Fit) -> Array:
+    """The residual over its noise, (channels, n): rows made independent where the slow noise is known beforehand.
+
+    Slow noise that was only found in the residual counts as far as a sensor may have it; beyond, it is a misfit.
+    """
+    if found.noise.given:
+        return found.whitened[:, 0].reshape(found.residual.shape)
+    slow = np.minimum(found.noise.slow, MOST_SLOW_NOISE * found.noise.floor)
+    own = np.hypot(found.noise.floor, slow) if found.noise.known else found.noise.floor
+    return np.asarray(found.residual / own[:, None])
+
+
+def _stands_out(place: _Stretch, excess: float, floor: float) -> bool:
+    """Whether the residual there is larger than everywhere, or lies to one side."""
+    return place.excess > STANDS_OUT * excess or abs(place.mean) > ONE_SIDED * excess * floor
+
+
+def _sides(found: Fit) -> Iterator[tuple[str, float, float, NDArray[np.intp]]]:
+    """Positions by the side of the sensor that gravity, or the field, came from."""
+    if found.table.kind != "positions":
+        return
+    a = backward(found.table, found.problem.layout.steps(found.theta))
+    along = np.argmax(np.abs(a), axis=1)
+    side = 2 * along + (a[np.arange(len(a)), along] < 0)
+    for k in range(len(SIDES)):
+        if len(rows := np.flatnonzero(side == k)):
+            yield "side", float(k), float(k), rows
+
+
+def _parts(table: Table) -> Iterator[tuple[str, float, float, NDArray[np.intp]]]:
+    """Stretches of each column: its own values where they are few, else parts with equal numbers of rows."""
+    for where, (name, _) in WORDS.items():
+        if name not in table:
+            continue
+        values = table.column(name)
+        grid = np.unique(values)
+        if len(grid) < 2:
+            continue
+        if len(grid) <= PARTS + 4:
+            yield from ((where, float(v), float(v), np.flatnonzero(values == v)) for v in grid)
+            continue
+        edges = np.quantile(values, np.linspace(0, 1, PARTS + 1))
+        part = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, PARTS - 1)
+        for k in range(PARTS):
+            rows = np.flatnonzero(part == k)
+            if len(rows):
+                yield where, float(values[rows].min()), float(values[rows].max()), rows

@@ -1,0 +1,407 @@
+"""Tables of rows in the loop: poses, positions, fields, rates and motion.
+
+An effect whose loss would cost little beside the loss of the greatest is a refinement: it corrects the form in which
+another acts, known only approximately, and is not named as a cause. Geometry is exact: a strong misalignment makes
+nothing else a refinement.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from calibrations.criteria import MATERIAL, REFINEMENT
+from calibrations.design.experiment import separating_experiment
+from calibrations.discovery.candidates import candidates, with_rivals
+from calibrations.discovery.dataset import Cells, Dataset
+from calibrations.discovery.outliers import caution, fit_without, kept, told
+from calibrations.discovery.places import axis_of, places
+from calibrations.discovery.results import Candidate, Diagnosis, Discovery, Findings, Place, Step
+from calibrations.discovery.search import Path, Settled, cost, find_path, first_order, recounted, settled
+from calibrations.discovery.structure import plainer, structure_of
+from calibrations.discovery.verdict import Verdict
+from calibrations.effects import Effect
+from calibrations.effects.expression_effect import effect_for
+from calibrations.errors import ModelError
+from calibrations.fit import Fit, evaluate, fit, refit
+from calibrations.fitting.determined import blind_to, undetermined
+from calibrations.model import Model
+from calibrations.noise.means import rms
+from calibrations.plausibility import Finding, refusal, rejection
+from calibrations.presentation.residual import milli_unit, pooled_milli, row_name
+from calibrations.presentation.text import plain, quantity
+from calibrations.table import Array, Table
+
+DEFAULT_MODELS = {
+    "poses": "linear",
+    "positions": "common-scale",
+    "fields": "field",
+    "motion": "linear",
+    "rates": "gyroscope",
+}
+FITTED_TO_MOTION = (
+    "The model is fitted to this motion, and its error is that of the fit. The report of the run also compares the "
+    "models of the run's sweep with the displacement sensor: they are not fitted to the motion, so that their error "
+    "also contains changes since the sweep and the error of the reference."
+)
+NOTHING_LIKE_IT, SOME_ROWS = 0.5, 20  # error over the noise floor, and rows, that a correct noise floor does not leave
+
+
+@dataclass(frozen=True, eq=False)
+class Rows(Dataset[Fit]):
+    """A table whose rows are fitted by least squares."""
+
+    table: Table
+
+    form = "rows"
+    floor = "the noise floor"
+    complete = "The model fails nowhere: the residual is noise."
+
+    @property
+    def default_model(self) -> str:  # type: ignore[override]
+        """The shipped model for this content."""
+        return DEFAULT_MODELS.get(self.table.content, "linear")
+
+    @property
+    def unseen(self) -> str:  # type: ignore[override]
+        """Rows that a fit did not use."""
+        return f"unseen {row_name(self.table)}"
+
+    @property
+    def source(self) -> str:
+        """File or run."""
+        return self.table.source
+
+    @property
+    def content(self) -> str:
+        """The kind of data, as models are defined for it."""
+        return self.table.content
+
+    @property
+    def n(self) -> int:
+        """Rows."""
+        return self.table.n
+
+    @property
+    def unit(self) -> str:
+        """Unit of the outputs."""
+        return self.table.unit
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Axes that were measured."""
+        return self.table.axes
+
+    @property
+    def description(self) -> str:
+        """Rows and source."""
+        rows = "samples" if self.table.kind == "motion" else row_name(self.table)
+        return f"{self.table.n} {rows} of {self.table.source}"
+
+    @property
+    def note(self) -> str:
+        """That of a motion: the report also shows the models of its sweep."""
+        return FITTED_TO_MOTION if self.table.kind == "motion" else ""
+
+    def fit(self, model: Model) -> Fit:
+        """Least squares. Raises what `fit` raises."""
+        return fit(model, self.table)
+
+    def evaluate(self, model: Model) -> Fit | None:
+        """The model with its values."""
+        return evaluate(model, self.table)
+
+    def places(self, found: Fit) -> tuple[Place, ...]:
+        """Stretches of columns."""
+        return places(found)
+
+    def search(self, model: Model, effects: Mapping[str, Effect]) -> Findings[Fit]:
+        """Forward steps, then exchanges."""
+        if (reason := refusal(self.table)) is not None:
+            return self._rejected(self.fit(model), reason)
+        start, outliers = fit_without(model, self.table)
+        return self._found(find_path(start, outliers, effects), effects)
+
+    def search_on(self, start: Fit, origin: Fit, effects: Mapping[str, Effect]) -> Findings[Fit]:
+        """The same from a fitted model."""
+        return self._found(find_path(start, self._left_out(start), effects), effects, origin)
+
+    def candidates(self, before: Fit, plan: Findings[Fit], effects: Mapping[str, Effect]) -> tuple[Candidate, ...]:  # noqa: ARG002
+        """One round of the search."""
+        return tuple(candidates(before, effects))
+
+    def beginning(self, model: Model) -> tuple[Rows, Fit]:
+        """(the table without gross outliers, the model fitted to it)."""
+        start, outliers = fit_without(model, self.table)
+        return (Rows(start.table) if outliers else self), start
+
+    def _left_out(self, found: Fit) -> tuple[int, ...]:
+        """Numbers of the rows that a fit leaves out."""
+        if self.table.kind != "poses":
+            return ()
+        every = np.arange(self.table.n)
+        kept = found.table.numbered(np.arange(found.table.n))
+        return tuple(map(int, np.setdiff1d(self.table.numbered(every), kept)))
+
+    def undetermined(self, found: Fit) -> str | None:
+        """Why a small residual proves nothing on these data."""
+        return undetermined(found)
+
+    def untestable(self, found: Fit, effects: Mapping[str, Effect]) -> str | None:
+        """The effects that these data cannot show together with the model."""
+        hidden = blind_to(found, effects)
+        if not hidden:
+            return None
+        angles = found.table.column("alpha_deg") if found.table.kind == "poses" else np.arange(2.0)
+        one = f" They hold one inclination only, alpha = {angles[0]:g} deg; measure at others."
+        return (
+            f"With the model {found.model.name}, these effects cannot be tested on these data: {', '.join(hidden)}."
+            f"{'' if np.ptp(angles) else one}"
+        )
+
+    def expression(self, name: str, text: str) -> Effect:
+        """An effect of one's own on the columns of this table."""
+        return effect_for(name, text, self.table)
+
+    @property
+    def foreseeable(self) -> bool:
+        """Of poses, whose angles are planned."""
+        return self.table.kind == "poses"
+
+    def figures(self, found: Fit) -> dict[str, str]:
+        """Error, held-out error and noise floor."""
+        (error, floor), unit = pooled_milli(found), milli_unit(found)
+        return {
+            "error": f"{plain(found.pooled_excess)} × ({plain(error, 2)} {unit})",
+            f"on {self.unseen}": f"{plain(found.held_out_excess)} ×",
+            "noise floor": f"{plain(floor, 2)} {unit}",
+        }
+
+    def facts(self, candidate: Candidate, result: Diagnosis[Fit]) -> dict[str, str]:
+        """Error on the rows of the fit, and on unseen rows."""
+        kind = row_name(self.table)
+        return {
+            f"Error, {kind} of the fit": _fall(result.excess_before, candidate.excess_after),
+            f"Error, unseen {kind}": _fall(result.held_out_before, candidate.held_out_after),
+        }
+
+    def _found(self, path: Path, effects: Mapping[str, Effect], origin: Fit | None = None) -> Findings[Fit]:
+        stand = settled(path, effects)
+        path, stand = recounted(path, stand.end), replace(stand, end=stand.end.in_floor(stand.end.noise.scatter))
+        if (reason := rejection(stand.end)) is not None:
+            return self._rejected(path.start, reason)
+        better = plainer(path.start, stand.end)
+        structure = better or structure_of(stand.end)
+        left = structure if stand.end.pooled_excess > MATERIAL else None
+        steps = _in_order(path.start, stand, effects)
+        rivals = {name: c.indistinguishable_from for name, c in stand.beside.items() if c.indistinguishable_from}
+        separations = {name: separating_experiment(name, others, self.table) for name, others in rivals.items()}
+        found = Findings(
+            data=self,
+            start=path.start,
+            origin=origin or path.start,
+            baseline=path.start,
+            steps=steps,
+            candidates=_next_first(path, stand),
+            causes=_causes(steps),
+            alternatives=rivals,
+            left=left.text if left else None,
+            pattern=left,
+            spoilt=left is not None and better is not None,
+            undetermined=(undetermined(path.start), undetermined(stand.end)),
+            set_aside=caution(path.outliers),
+            outliers=path.outliers,
+            separations=separations,
+            settled=stand.tested,
+        )
+        if steps and found.given.verdict is Verdict.UNEXPLAINED:
+            return found.without_steps()
+        if path.outliers and not steps and left is None:
+            return replace(found, left=told(path.outliers), spoilt=True)
+        return found
+
+    def _rejected(self, start: Fit, reason: Finding) -> Findings[Fit]:
+        """Data in which no effect can be searched for."""
+        return Findings(
+            data=self, start=start, origin=start, baseline=start, left=reason.text, spoilt=True,
+            unresponsive=reason.verdict == Verdict.NO_RESPONSE,
+        )  # fmt: skip
+
+    def rejection(self, found: Fit) -> Finding | None:
+        """What speaks against these poses, or against the values of a fit."""
+        return rejection(found)
+
+    def addition(self, effect: Effect, model: Model, effects: Mapping[str, Effect]) -> Findings[Fit]:
+        """One effect, with what the data cannot separate from it."""
+        before, outliers = fit_without(model, self.table)
+        before = before.in_floor(before.noise.floor)
+        found = candidates(before, effects)
+        own = next((with_rivals(c, found, before) for c in found if c.name == effect.name), None)
+        rivals = own.indistinguishable_from if own is not None else ()
+        step = self.step(effect, before)
+        left = structure_of(step.after) if step.after.pooled_excess > MATERIAL else None
+        if (reason := rejection(step.after)) is not None:
+            return replace(self._rejected(step.before, reason), steps=(step,))
+        return Findings(
+            data=self,
+            start=step.before,
+            origin=step.before,
+            baseline=step.before,
+            steps=(step,),
+            candidates=tuple(found),
+            causes=(effect.name,),
+            alternatives={effect.name: rivals} if rivals else {},
+            left=left.text if left else None,
+            pattern=left,
+            undetermined=(undetermined(step.before), undetermined(step.after)),
+            set_aside=caution(outliers),
+            outliers=outliers,
+            searched=False,
+        )
+
+    def step(self, effect: Effect, before: Fit) -> Step[Fit]:
+        """The effect added; both errors are counted in one floor. Raises ModelError where it adds nothing."""
+        after = refit(before, before.model.with_effect(effect))
+        if effect.expression:
+            _require_new(after, effect.name, before.model.name)
+        floor = after.noise.scatter
+        return Step(effect.name, before.in_floor(floor), after.in_floor(floor))
+
+    def in_one_floor(self, start: Fit, steps: tuple[Step[Fit], ...]) -> tuple[Fit, tuple[Step[Fit], ...]]:
+        """All errors in what the last model leaves, where that is the only measure of noise."""
+        floor = (steps[-1].after if steps else start).noise.scatter
+        return start.in_floor(floor), tuple(
+            replace(step, before=step.before.in_floor(floor), after=step.after.in_floor(floor)) for step in steps
+        )
+
+    def require_allowed(self, effect: Effect) -> None:
+        """Raises ModelError where the table lacks a column, or the effect is defined for another kind."""
+        if (why := effect.excluded(self.table)) is not None:
+            t = self.table
+            raise ModelError(f"{effect.name} {why}; {t.source} is a table of {t.kind}: {', '.join(t.columns)}")
+
+    def errors_document(self, found: Fit) -> dict[str, Any]:
+        """rmse, noise floor, slow noise and excess by axis."""
+        return {
+            "rmse": _by_axis(found, found.rmse),
+            "noise_floor": _by_axis(found, found.noise.floor),
+            "slow_noise": _by_axis(found, found.noise.slow),
+            "excess": _by_axis(found, found.excess),
+        }
+
+    def error_table(self, found: Fit) -> Cells:
+        """Residual, noise floor and slow noise of each channel."""
+        unit = found.problem.unit
+        rows = [
+            (
+                channel,
+                quantity(found.rmse[c], unit),
+                quantity(found.noise.floor[c], unit),
+                quantity(found.noise.slow[c], unit),
+                f"{found.excess[c]:.2f}",
+            )
+            for c, channel in enumerate(found.channels)
+        ]
+        floor = "noise floor" if found.noise.known else "scatter (noise floor not known)"
+        return ("axis", "rms error", floor, "slow noise", "error / floor"), rows
+
+    def step_table(self, found: Discovery[Fit]) -> Cells:
+        """The error of each model, with bars."""
+        fits = [(found.start.model.name, found.start), *((f"+ {s.name}", s.after) for s in found.steps)]
+        rows = [
+            (name, f"{each.pooled_excess:.2f}", f"{each.held_out_excess:.2f}", _bar(each, found.start))
+            for name, each in fits
+        ]
+        return ("model", "error / floor", self.unseen, ""), rows
+
+    def candidate_table(self, result: Diagnosis[Fit], candidates: Sequence[Candidate]) -> Cells:
+        """Held-out error, chance and probability of each candidate."""
+        chance = "if it is one of these" if result.verdict is Verdict.UNEXPLAINED else "probability"
+        rows = [
+            (
+                c.name,
+                f"{result.held_out_before:.3g} -> {c.held_out_after:.3g}",
+                f"{c.p_value:.1g}",
+                f"{c.probability:.3f}",
+                ", ".join(c.indistinguishable_from) or "-",
+            )
+            for c in candidates
+        ]
+        return ("candidate", f"error on {self.unseen} / floor", "p-value", chance, "cannot be separated from"), rows
+
+    def remarks(self, found: Fit) -> list[str]:
+        """A residual below the noise floor, which only a wrong floor leaves."""
+        if not found.noise.known or found.pooled_excess > NOTHING_LIKE_IT or found.table.n < SOME_ROWS:
+            return []
+        return ["The error is smaller than the noise floor: check the standard deviations and n of these means."]
+
+    def cautions(self, found: Fit) -> list[str]:
+        """Why a fit of all rows may mislead: a model that the data do not determine, rows that stand out."""
+        return list(filter(None, (undetermined(found), kept(found))))
+
+
+def _fall(before: float, after: float) -> str:
+    return f"{plain(before)} → {plain(after)} × the noise floor"
+
+
+def _next_first(path: Path, stand: Settled) -> tuple[Candidate, ...]:
+    """Candidates on the given model; the first is the effect of the first step, with its alternatives."""
+    first = path.first
+    name = next((name for name in stand.names), None)
+    own = next((c for c in first if c.name == name), None)
+    if own is None:
+        return first
+    if name in stand.beside:
+        own = replace(own, indistinguishable_from=stand.beside[own.name].indistinguishable_from)
+    return own, *(c for c in first if c.name != name)
+
+
+def _in_order(start: Fit, stand: Settled, effects: Mapping[str, Effect]) -> tuple[Step[Fit], ...]:
+    """The effects one after another: first those that free a value that the model already has, then new ones."""
+    freed = {term.name for term in start.model.terms}
+    order = sorted(stand.names, key=lambda name: name not in freed)
+    steps: list[Step[Fit]] = []
+    present = start
+    for name in order:
+        last = len(steps) == len(order) - 1
+        after = stand.end if last else refit(present, present.model.with_effect(effects[name]))
+        steps.append(Step(name, present, after))
+        present = after
+    return tuple(steps)
+
+
+def _causes(steps: tuple[Step[Fit], ...]) -> tuple[str, ...]:
+    if not steps:
+        return ()
+    tied = {term.name for term in steps[0].before.model.terms if term.tied}
+    end = steps[-1].after
+    costs = {s.name: (first_order(end, s.name, shared=True) if s.name in tied else cost(end, s.name))[0] for s in steps}
+    approximate = [s.name for s in steps if not s.after.model.terms[-1].effect.exact]
+    greatest = max((costs[name] for name in approximate), default=0.0)
+    return tuple(name for name, lost in costs.items() if name not in approximate or lost >= REFINEMENT * greatest)
+
+
+def _require_new(found: Fit, name: str, model: str) -> None:
+    """An expression has to add something that `model` does not have. Raises ModelError."""
+    estimates = next(term.estimates for term in found.model.terms if term.name == name)
+    if all(e.std is None for e in estimates):
+        e = estimates[0]
+        where = f" of {e.axis}" if e.axis else ""
+        raise ModelError(f"{name} adds nothing that {model} does not have: {e.name}{where}: {e.why}")
+
+
+def _by_axis(found: Fit, values: Array) -> dict[str, float]:
+    """By axis; of the parts of a motion their root mean square."""
+    by_axis: dict[str, list[float]] = {}
+    for channel, value in zip(found.channels, np.asarray(values), strict=True):
+        by_axis.setdefault(axis_of(channel), []).append(float(value))
+    return {axis: each[0] if len(each) == 1 else float(rms(np.array(each))) for axis, each in by_axis.items()}
+
+
+def _bar(found: Fit, first: Fit) -> str:
+    """A bar as long as the logarithm of the error over the noise floor."""
+    longest = float(np.log(max(first.pooled_excess, 1.1)))
+    return "#" * max(1, round(40 * float(np.log(max(found.pooled_excess, 1.0))) / longest))

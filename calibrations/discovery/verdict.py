@@ -1,0 +1,172 @@
+"""The verdict on a model: one enum, one function that decides it, one function that writes it in words.
+
+A verdict is always that of the model that is judged. A diagnosis judges the given model, a discovery the final model,
+with the effects that the search added.
+
+    adequate        no effect is missing, and the residual is noise
+    effect-missing  effects of the catalogue are missing, and they explain the residual (given model only)
+    ambiguous       the data cannot decide: another effect explains them as well, a small part of the residual may be
+                    the form of a named cause, or the data do not determine the model
+    unexplained     the residual is more than noise, and no effect of the catalogue explains it
+    no-response     an output does not follow the poses; no effect is searched for
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from calibrations.criteria import MATERIAL, MOST_BY_FORM, MOST_UNEXPLAINED, SIGNIFICANT
+from calibrations.presentation.text import joined
+
+
+class Verdict(StrEnum):
+    """The verdict on a model; the value is that of the JSON documents."""
+
+    ADEQUATE = "adequate"
+    EFFECT_MISSING = "effect-missing"
+    AMBIGUOUS = "ambiguous"
+    UNEXPLAINED = "unexplained"
+    NO_RESPONSE = "no-response"
+
+
+@dataclass(frozen=True)
+class Closest:
+    """The best candidate that is not significant: chance alone seldom shows as much."""
+
+    name: str
+    p_value: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Judgement:
+    """The facts on a model from which its verdict follows, and what a sentence on it names.
+
+    model         its name
+    missing       effects that it lacks, in the order in which a search adds them
+    added         effects that the search added to it, named as causes
+    refinements   effects that the search added for the form of a cause
+    alternatives  effects that the data cannot separate from a missing or added one
+    left          what no effect explains, in words
+    share_left    part of the excess variance at the start of the search that stays
+    most_left     greatest such part that may be the form of the effects added, and no further cause
+    spoilt        whether that part makes every effect of the search doubtful
+    unresponsive  whether that part is an output that does not follow the poses
+    searched      whether further effects were searched for after the last one was added
+    undetermined  why the data do not determine the model
+    set_aside     the rows that the fit leaves out, and why
+    error         error of the model with all missing effects, as a multiple of `floor`
+    provisional   whether the names may change when further effects are added
+    remarks       further sentences
+    """
+
+    model: str
+    missing: tuple[str, ...] = ()
+    added: tuple[str, ...] = ()
+    refinements: tuple[str, ...] = ()
+    alternatives: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    left: str | None = None
+    share_left: float = 0.0
+    most_left: float = MOST_BY_FORM
+    spoilt: bool = False
+    unresponsive: bool = False
+    searched: bool = True
+    undetermined: str | None = None
+    set_aside: str | None = None
+    closest: Closest | None = None
+    error: float = 1.0
+    floor: str = "the noise floor"
+    provisional: bool = False
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def verdict(self) -> Verdict:
+        """The verdict, decided by these facts."""
+        return decide(self)
+
+    @property
+    def text(self) -> str:
+        """The verdict in words."""
+        return sentences(self)
+
+    @property
+    def headline(self) -> str:
+        """The first sentence of the text."""
+        return headline(self)
+
+
+def decide(j: Judgement) -> Verdict:
+    """The verdict on a model. Every command, page and document asks this function."""
+    if j.unresponsive:
+        return Verdict.NO_RESPONSE
+    most = MOST_UNEXPLAINED if j.missing else j.most_left
+    if j.left is not None and (j.spoilt or j.share_left > most):
+        return Verdict.UNEXPLAINED
+    inseparable = any(j.alternatives.get(name) for name in (*j.missing, *j.added))
+    if j.missing:
+        return Verdict.AMBIGUOUS if inseparable else Verdict.EFFECT_MISSING
+    if j.left is not None or inseparable or j.undetermined is not None or _incomplete(j):
+        return Verdict.AMBIGUOUS
+    return Verdict.ADEQUATE
+
+
+def sentences(j: Judgement) -> str:
+    """The verdict in words, alike for terminal, page, report and JSON."""
+    return " ".join([headline(j), *_details(j), *j.remarks])
+
+
+def headline(j: Judgement) -> str:
+    """The first sentence."""
+    if j.verdict is Verdict.NO_RESPONSE:
+        return f"No response: {j.left}."
+    if j.verdict is Verdict.UNEXPLAINED:
+        return f"No effect of the catalogue explains the residual: {j.left}."
+    if j.missing:
+        return f"The model {j.model} misses {joined(j.missing)}."
+    if j.added:
+        return f"The model {j.model} misses {joined(j.added)}."
+    if j.undetermined is not None:
+        return f"No effect is significant, but {j.undetermined}."
+    if j.closest is not None:
+        return (
+            f"No effect is significant. Closest: {j.closest.name} (p = {100 * j.closest.p_value:.2g} %, threshold "
+            f"{100 * SIGNIFICANT:.2g} %). Repeat the measurement to decide."
+        )
+    return "No effect is missing."
+
+
+def _details(j: Judgement) -> Iterator[str]:
+    """Further sentences."""
+    if j.verdict is Verdict.NO_RESPONSE:
+        return
+    if j.verdict is Verdict.UNEXPLAINED:
+        if j.missing:
+            yield f"The model {j.model} also misses {joined(j.missing)}."
+        elif j.added:
+            yield f"The model {j.model} also misses {joined(j.added)}."
+    elif not j.missing and j.closest is None and j.undetermined is None:
+        yield _remaining(j)
+    elif j.left is not None and not j.spoilt:
+        yield f"Remaining with them: {j.left}."
+    if j.refinements:
+        yield f"For the form of these effects the model also holds {joined(j.refinements)}."
+    for name in (*j.missing, *j.added):
+        if rivals := j.alternatives.get(name):
+            yield f"This data cannot separate {name} from {joined(rivals, 'or')}."
+    if j.provisional and j.missing:
+        yield "Provisional: the names may change when further effects are added."
+
+
+def _incomplete(j: Judgement) -> bool:
+    """Whether the residual is more than noise, and nobody searched for what it holds."""
+    return not j.searched and j.error > MATERIAL
+
+
+def _remaining(j: Judgement) -> str:
+    with_them = f"With {joined(j.added)}, no effect is missing. " if j.added and j.verdict is Verdict.ADEQUATE else ""
+    error = f"{with_them}Remaining error: {j.error:.3g} times {j.floor}"
+    if j.left is None:
+        return f"{error}. No search for further effects was made." if _incomplete(j) else f"{error}."
+    causes = f" This may be the form of {joined(j.added, 'or')}, or one more cause." if j.added else ""
+    return f"{error}: {j.left}.{causes}"

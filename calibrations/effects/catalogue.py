@@ -1,0 +1,185 @@
+"""The catalogue of effects: the shipped ones, and a user's own, each read from its file."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import importlib.util
+import logging
+import sys
+import traceback
+from collections.abc import Callable, Iterable, Mapping
+from functools import cache, wraps
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from calibrations.effects.effect import HOOKS, Effect
+from calibrations.errors import ModelError, UnknownName, nearest
+
+LOG = logging.getLogger(__name__)  # what is not called off is printed to standard error
+SHIPPED = ("signal", "noise")  # folders
+
+
+@cache
+def catalogue(folder: Path | None = None) -> Mapping[str, Effect]:
+    """Every effect by name: the shipped ones, and those of a user's `folder`.
+
+    Raises ModelError for a file that is not an effect, naming what it lacks, and for one with a shipped one's name.
+    """
+    effects = {
+        e.name: e for part in SHIPPED for e in _read_folder(Path(__file__).parent / part, f"{__package__}.{part}")
+    }
+    effects = dict(sorted(effects.items()))
+    if folder is not None:
+        if not folder.is_dir():
+            raise ModelError(f"{folder}: the folder of your own effects does not exist")
+        if any(folder.glob("[!_]*.py")):
+            LOG.warning("the Python files in %s are run: the bench file names this folder for effects", folder)
+        own = {e.name: e for e in _read_folder(folder, None)}
+        if taken := sorted(effects.keys() & own.keys()):
+            raise ModelError(f"{folder}: {', '.join(taken)} is in the catalogue already; give your effect another name")
+        effects |= own
+    for effect in effects.values():
+        for other in (*effect.after, *effect.contains):
+            if other not in effects:
+                raise ModelError(f'{effect.name}: there is no effect "{other}"{nearest(other, effects)}')
+    return effects
+
+
+def find(name: str, effects: Mapping[str, Effect]) -> Effect:
+    """The effect of that name. Raises UnknownName with the nearest."""
+    if name not in effects:
+        raise UnknownName(f'unknown effect "{name}"{nearest(name, effects)}')
+    return effects[name]
+
+
+def read_effect(path: Path) -> Effect:
+    """A user's effect from its file. Raises ModelError for a file without one, and for the name of a shipped one."""
+    if not path.is_file():
+        raise ModelError(f"{path}: there is no such file; an effect of your own is a Python file")
+    effect = _own(path)
+    if effect.name in catalogue():
+        raise ModelError(f"{path}: {effect.name} is in the catalogue already; give the file another name")
+    return effect
+
+
+def _read_folder(folder: Path, package: str | None) -> Iterable[Effect]:
+    for path in sorted(folder.glob("[!_]*.py")):
+        yield _of_module(importlib.import_module(f"{package}.{path.stem}"), path) if package else _own(path)
+
+
+def _own(path: Path) -> Effect:
+    """A user's effect, whose errors name the user's file."""
+    effect = _of_module(_load(path), path)
+    for method in (*HOOKS, "follow"):
+        if method in vars(type(effect)):
+            setattr(type(effect), method, guarded(vars(type(effect))[method], path))
+    return effect
+
+
+def _load(path: Path) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(f"user_effects_{path.stem}", path)
+    if spec is None or spec.loader is None:
+        raise ModelError(f"{path}: cannot be read as Python")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    try:
+        _refuse_old_form(path)
+        spec.loader.exec_module(module)
+    except (Exception, SystemExit) as error:
+        raise fault(path, error) from error
+    return module
+
+
+def _of_module(module: ModuleType, path: Path) -> Effect:
+    """The effect of the one class in a module."""
+    wanted = class_name(path)
+    classes = [v for v in vars(module).values() if isinstance(v, type) and v.__module__ == module.__name__]
+    found = [cls for cls in classes if issubclass(cls, Effect)]
+    if [cls.__name__ for cls in found] != [wanted]:
+        names = ", ".join(cls.__name__ for cls in found) or "no effect"
+        raise ModelError(f"{path}: must define one effect, `class {wanted}(Effect):`; it defines {names}")
+    effect = found[0]()
+    effect.name = path.stem.replace("_", "-")
+    if not effect.parameters:
+        raise ModelError(f'{path}: {wanted} has no parameter, as in slope = Parameter("{{out}}/K", typical=0.005)')
+    if not effect.places:
+        raise ModelError(f"{path}: {wanted} acts nowhere; define at least one of the methods {', '.join(HOOKS)}")
+    if not effect.summary or not effect.symptom:
+        raise ModelError(
+            f'{path}: the docstring of {wanted} must begin with "{effect.name}: what happens." and have a line '
+            '"Symptom ..."'
+        )
+    return effect
+
+
+def class_name(path: Path) -> str:
+    """The name of the class in an effect's file: `WormError` in worm_error.py."""
+    return "".join(part.capitalize() for part in path.stem.split("_"))
+
+
+def _refuse_old_form(path: Path) -> None:
+    """Raise ModelError for a file with PARAMETERS and functions instead of a class."""
+    body = ast.parse(path.read_text(encoding="utf-8")).body
+    names = {
+        target.id
+        for node in body
+        if isinstance(node, ast.Assign)
+        for target in node.targets
+        if isinstance(target, ast.Name)
+    }
+    names |= {node.name for node in body if isinstance(node, ast.FunctionDef) and node.name in HOOKS}
+    if "PARAMETERS" in names or (names & {*HOOKS} and not any(isinstance(node, ast.ClassDef) for node in body)):
+        hook = next((hook for hook in HOOKS if hook in names), "transduction")
+        raise ModelError(
+            "an effect is a class now, not PARAMETERS and functions. Write it so, with the docstring in the class, "
+            'lower-case names for NEEDS, KINDS, AFTER ..., and see "An effect" in CONTRIBUTING.md:\n'
+            f"    from calibrations.effects import Effect, Parameter\n"
+            f"    class {class_name(path)}(Effect):\n"
+            f'        slope = Parameter("{{out}}", typical=0.001)\n'
+            f"        def {hook}(self, ..., table, p):  # p.slope is the value"
+        )
+
+
+def fault(path: Path, error: BaseException) -> ModelError:
+    """`error`, raised in the file `path`, with the line of that file where it was raised."""
+    frames = traceback.extract_tb(error.__traceback__)
+    lines = [frame.lineno for frame in frames if Path(frame.filename).absolute() == path.absolute()]
+    line = error.lineno if isinstance(error, SyntaxError) else lines[-1] if lines else None
+    where = f"{path}, line {line}" if line else str(path)
+    if isinstance(error, ModelError):  # of a class that is no effect
+        return ModelError(f"{where}: {error}")
+    what = error.msg if isinstance(error, SyntaxError) else str(error)
+    return ModelError(f"{where}: {type(error).__name__}: {what}")
+
+
+def guarded(hook: Callable[..., Any], path: Path) -> Callable[..., Any]:
+    """The method `hook` of a user's effect. It raises ModelError where it fails, and where its result is not an array
+    of finite numbers with the shape of its first argument. A pose is not checked.
+    """
+
+    @wraps(hook)
+    def call(self: Effect, given: Any, *more: Any) -> Any:
+        try:
+            result = hook(self, given, *more)
+        except Exception as error:
+            raise fault(path, error) from error
+        if isinstance(given, np.ndarray):
+            _check(result, given, f"{path}: {hook.__name__}()")
+        return result
+
+    return call
+
+
+def _check(result: Any, given: np.ndarray, where: str) -> None:
+    if np.shape(result) != given.shape:
+        raise ModelError(f"{where} must give an array of shape {given.shape}, and gave {_described(result)}")
+    if not np.isfinite(result).all():
+        raise ModelError(f"{where} gave numbers that are not finite; see what it divides by or takes a root of")
+
+
+def _described(result: Any) -> str:
+    return f"shape {np.shape(result)}" if isinstance(result, np.ndarray) else f"a {type(result).__name__}"

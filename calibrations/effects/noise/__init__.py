@@ -1,0 +1,1 @@
+"""Effects that are noise, in the spectrum of a still record."""

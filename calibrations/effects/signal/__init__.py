@@ -1,0 +1,1 @@
+"""Effects on the signal: from the pose to the output."""

@@ -1,0 +1,23 @@
+import numpy as np
+
+from calibrations.effects import Effect, Parameter, Values
+from calibrations.table import Array, Table
+
+
+class DeadZone(Effect):
+    """dead-zone: specific force below a threshold gives no output, and the threshold is missing from larger forces.
+
+        a_i <- a_i - w_i for a_i > w_i,   a_i + w_i for a_i < -w_i,   0 between          w in g, one per axis
+
+    Symptom   the residual jumps where the specific force of its own axis changes sign, and is flat on both sides.
+    Excited by  positions close to 0 g on both sides, and others far from it.
+    Confused with  hysteresis with a small reach, which jumps at different positions on the way up and on the way down.
+    Source    Book 17.3.11; IEEE Std 528, dead band.
+    """
+
+    kinds = ("poses", "motion")
+
+    width = Parameter("g", typical=0.01, starts=(0.003, 0.05), low=0.0, high=0.5, doc="greatest without output")
+
+    def force(self, a: Array, table: Table, p: Values) -> Array:
+        return a - np.clip(a, -p.width, p.width)

@@ -1,0 +1,64 @@
+from collections.abc import Sequence
+
+import numpy as np
+
+from calibrations.effects import Effect, Parameter, Values
+from calibrations.geometry.orientation import other_in_plane
+from calibrations.geometry.stage_path import turning_points
+from calibrations.kernels import slip
+from calibrations.table import Array, Table
+
+ELEMENTS = (np.arange(6) + 0.5) / 3 - 1  # midpoints of six equal parts of -1 .. 1
+
+
+class Hysteresis(Effect):
+    """hysteresis: friction makes the output depend on the side from which a specific force was reached.
+
+        V += h s      s: force held by elements of equal stiffness that follow the specific force and slip at their
+                      limits (Jenkins, Iwan), spread evenly over r (1 - w) .. r (1 + w), times 1 + c |a_p|;
+                      s = 1 where all elements slip
+
+        h in {out}, per axis; r in g; w from 0 (one element) to 1; c in 1/g: load of the other in-plane axis
+
+    Symptom   clockwise and anticlockwise turns give two branches, with opposite signs of the residual.
+    Excited by  every angle, approached from both sides.
+    Confused with  stage-backlash, which shifts both axes by the same angle.
+    Source    Ang III.A (largest where the other axis is loaded most); Iwan (1966); IEEE Std 528, hysteresis error.
+    """
+
+    kinds = ("poses",)
+    needs = ("direction",)
+    memory = len(ELEMENTS)
+
+    height = Parameter("{out}", typical=0.01, doc="half the opening of the loop")
+    reach = Parameter(
+        "g", typical=0.1, per_axis=False, starts=(0.02, 0.2), low=1e-3, high=3.0, doc="specific force from rest to slip"
+    )
+    spread = Parameter(
+        "1", typical=1.0, per_axis=False, starts=(0.5,), low=0.0, high=0.95, doc="spread of the limits over their mean"
+    )
+    pressing = Parameter(
+        "1/g", typical=0.5, per_axis=False, low=-0.9, high=5.0, doc="growth of the limits with the other axis's load"
+    )
+
+    def transduction(self, a: Array, table: Table, p: Values) -> Array:
+        return slip(a, turning_points(table), _pressed(a, p), _limits(p)) * p.height
+
+    def follow(self, a: Array, table: Table, p: Values, before: Sequence[Array]) -> tuple[Array, list[Array]]:
+        """`before` and after: the specific force at which each element would be at rest, g."""
+        limits, pressed = _limits(p), _pressed(a, p)
+        held = [
+            np.minimum(limit * pressed, np.maximum(-limit * pressed, a - rest))
+            for limit, rest in zip(limits, before, strict=True)
+        ]
+        return sum(held[1:], held[0]) * (p.height / np.sum(limits)), [a - each for each in held]
+
+
+def _limits(p: Values) -> Array:
+    """Of each element, g, where the other axis is not loaded."""
+    return np.asarray(p.reach * (1 + p.spread * ELEMENTS))
+
+
+def _pressed(a: Array, p: Values) -> Array:
+    """Factor on the limits, shape (n, 3)."""
+    return 1 + p.pressing * np.abs(other_in_plane(a))

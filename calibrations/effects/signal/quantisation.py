@@ -1,0 +1,109 @@
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr
+
+from calibrations.effects import Effect, Parameter, Values
+from calibrations.fitting.smooth import smooth_columns
+from calibrations.table import Array, Table
+
+CODES = 3  # to either side, that noise may reach
+LEAST_NOISE = 1e-3  # of a step
+FINEST = 4.0  # points in a resolved interval of frequency
+MOST = 20_000  # frequencies
+TOGETHER = 64  # frequencies of one block
+VISIBLE = 0.6  # of a step: more noise leaves a thousandth of the saw
+
+
+class Quantisation(Effect):
+    """quantisation: a coarse converter rounds each sample, and the noise is too small to average the rounding out.
+
+        V <- o + q (m + sum_j Phi((f - 1/2 - j) q / s) - Phi((-f - 1/2 - j) q / s))     q, o, s in {out}; j = 0, 1, 2
+                                                         m: the nearest code's number, f: (V - o) / q - m
+
+    The mean of rounded samples with normal noise of standard deviation s, exactly; codes stand at o + m q.
+
+    Symptom   the residual is a sawtooth over the output, as high as one step.
+    Excited by  outputs that differ by many fractions of a step.
+    Confused with  adc-nonlinearity, if one step is as large as the range. To separate them, use smaller steps of the
+              angle.
+    Source    Widrow and Kollar, Quantization Noise (2008), chapter 4; Book 17.3.3.
+    """
+
+    kinds = ("poses",)
+    left_out = "what was rounded off is lost"
+    after = ("bias", "scale-factor")
+    rounds = True
+
+    step = Parameter(
+        "{out}",
+        typical=1e-6,
+        per_axis=False,
+        starts=(1e-3,),
+        low=1e-9,
+        guess=lambda table: _start(table, 0),
+        doc="from one code to the next",
+    )
+    offset = Parameter(
+        "{out}", typical=1e-4, per_axis=False, guess=lambda table: _start(table, 1), doc="where a code stands"
+    )
+    noise = Parameter(
+        "{out}",
+        typical=1e-4,
+        per_axis=False,
+        low=0.0,
+        guess=lambda table: _start(table, 2),
+        doc="of a sample, before it is rounded",
+    )
+
+    def searched(self, table: Table) -> float:
+        """How many steps that look different the start is the best of."""
+        return len(_frequencies(table)) / FINEST
+
+    def output(self, v: Array, table: Table, p: Values) -> Array:
+        codes = (v - p.offset) / p.step
+        nearest = np.round(codes)
+        beyond = codes - nearest
+        noise = max(float(p.noise / p.step), LEAST_NOISE)
+        mean = nearest
+        for j in range(CODES):
+            mean = mean + ndtr((beyond - 0.5 - j) / noise) - ndtr((-beyond - 0.5 - j) / noise)
+        return np.asarray(p.offset + p.step * mean)
+
+
+def _frequencies(table: Table) -> Array:
+    """Codes per {out} that could show: from three in the range up to where the samples' noise hides them."""
+    span = float(np.max(np.ptp(table.outputs, axis=0))) or 1.0
+    noise = float(np.median(table.optional("vx_std_v", 0.0)))
+    most = min(VISIBLE / noise if noise > 0 else np.inf, MOST / FINEST / span)
+    return np.arange(3 / span, most, 1 / (FINEST * span))
+
+
+def _start(table: Table, which: int) -> Array:
+    return np.full(len(table.axes), _saw(table)[which])
+
+
+@lru_cache(maxsize=8)
+def _saw(table: Table) -> tuple[float, float, float]:
+    """(step, offset, noise) of the saw that what is not smooth in the angles follows best."""
+    smooth = smooth_columns(table)
+    v = table.outputs
+    even = smooth @ (smooth.T @ v) if smooth.size else v
+    rest = (v - even).ravel()
+    frequencies = _frequencies(table)
+    if not len(frequencies):
+        return 1e-3, 0.0, 0.0
+    turned = _transform(rest, even.ravel(), frequencies)
+    best = int(np.argmax(np.abs(turned)))
+    f = float(frequencies[best])
+    # - q / pi sin(2 pi f (V - o)): its transform is + i times a phase of -2 pi f o
+    offset = -np.angle(turned[best] / 1j) / (2 * np.pi * f)
+    return 1 / f, float(offset), float(np.median(table.optional("vx_std_v", 0.0))) / 2
+
+
+def _transform(values: Array, at: Array, frequencies: Array) -> NDArray[np.complex128]:
+    """Sum of values exp(-2 pi i f at) at evenly spaced frequencies: a block's first one, and steps from there."""
+    steps = np.exp(-2j * np.pi * np.outer(frequencies[:TOGETHER] - frequencies[0], at))
+    firsts = np.exp(-2j * np.pi * np.outer(frequencies[::TOGETHER], at))
+    return np.asarray(((firsts * values) @ steps.T).ravel()[: len(frequencies)])

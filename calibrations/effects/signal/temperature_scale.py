@@ -1,0 +1,26 @@
+import numpy as np
+
+from calibrations.effects import Constant, Effect, Parameter, Values
+from calibrations.table import Array, Table
+
+
+class TemperatureScale(Effect):
+    """temperature-scale: the scale factor follows the temperature.
+
+        V += slope (T - T0) a_i          slope in {out}/g/K, one per axis; T0: mean temperature of the data
+
+    Symptom   the residual follows the temperature, in proportion to the specific force of its own axis.
+    Excited by  a run in which the temperature changes while the axis goes from -1 g to +1 g.
+    Confused with  z-axis-scale, if each inclination has its own temperature. To separate them, hold the temperature
+              constant.
+    Source    Book 17.3.7 and 17.3.12.
+    """
+
+    needs = ("temperature_c",)
+
+    slope = Parameter("{out}/g/K", typical=0.001, doc="scale factor per kelvin")
+    reference_c = Constant(lambda table: float(np.mean(table.column("temperature_c"))))
+
+    def transduction(self, a: Array, table: Table, p: Values) -> Array:
+        warmer = table.column("temperature_c") - p.reference_c
+        return warmer[:, None] * a * p.slope

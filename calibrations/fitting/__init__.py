@@ -1,0 +1,1 @@
+"""Fitting: identifiable parameters, smooth columns, errors on unseen rows, and which models the data determine."""

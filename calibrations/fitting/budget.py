@@ -1,0 +1,221 @@
+"""The uncertainty budget of a fit: for each parameter what adds to its standard uncertainty, and how much (GUM).
+
+    type A   white noise of the means and scatter, G W G^T and G k^2 G^T; slow noise, the rest of what the fit's own
+             standard uncertainty holds; and the misfit, by which the Birge ratio widens it
+    type B   inputs that are not fitted (`inputs.py`): u_i = |c_i| u(x_i), with c_i = G d residual / d x_i
+
+G is the gain of the fit, d theta = -G d residual: the pseudo-inverse of its jacobian under the noise it was found with.
+An input with an error of its own in each row adds the squares row by row. Effective degrees of freedom by Welch and
+Satterthwaite, the coverage factor for 95 % from Student's t. A source that is not given has no number.
+
+Errors of the inputs show in the residual too, and the fit takes them for scatter, slow noise or misfit. What they
+account for there, by the square of the residual that they would leave, is not counted a second time.
+
+Source  JCGM 100:2008, 4.3.10 (nothing counts twice), 5.1 (sensitivities), 5.2 (correlated inputs), G.4 (freedom).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import stdtrit
+
+from calibrations.fit import Fit, cautiously
+from calibrations.fitting.identifiability import covariance, gain
+from calibrations.fitting.inputs import Contribution
+from calibrations.noise.means import Noise
+from calibrations.table import Array
+
+COVERAGE_LEVEL = 0.95
+SLOW_NOISE = "slow noise"
+CHUNK = 512  # columns whitened at a time
+MOST_CORRELATED_ROWS = 400  # rows that the freedom of slow noise is worked out on
+
+
+@dataclass(frozen=True)
+class Line:
+    """One source. Arrays have an entry for each parameter, in its unit; None where the source is not given.
+
+    `sensitivity` is signed where the whole table has one error, else the root of the sum of squares.
+    """
+
+    source: str
+    kind: str  # "A" or "B"
+    unit: str
+    input_std: float | None
+    sensitivity: Array | None
+    std: Array | None
+    freedom: float
+
+
+@dataclass(frozen=True)
+class Budget:
+    """All sources of all parameters of a fit; entries that the data do not determine are NaN."""
+
+    lines: tuple[Line, ...]
+
+    @property
+    def given(self) -> tuple[Line, ...]:
+        """The sources that have a number."""
+        return tuple(line for line in self.lines if line.std is not None)
+
+    @property
+    def not_given(self) -> tuple[str, ...]:
+        """Names of the sources that have none."""
+        return tuple(line.source for line in self.lines if line.std is None)
+
+    @cached_property
+    def _variances(self) -> Array:
+        """Shape (sources, p)."""
+        return np.array([line.std for line in self.given]) ** 2
+
+    @cached_property
+    def combined(self) -> Array:
+        """Combined standard uncertainty of each parameter."""
+        return np.asarray(np.sqrt(self._variances.sum(axis=0)))
+
+    @cached_property
+    def freedom(self) -> Array:
+        """Effective degrees of freedom of each parameter."""
+        each = np.array([[line.freedom] for line in self.given])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(self.combined**4 / np.sum(self._variances**2 / each, axis=0))
+
+    @cached_property
+    def coverage(self) -> Array:
+        """Coverage factor of each parameter for 95 %, from the whole degrees of freedom (GUM G.4.1)."""
+        whole = np.minimum(np.maximum(np.floor(np.where(np.isnan(self.freedom), 1e9, self.freedom)), 1), 1e9)
+        return np.asarray(stdtrit(whole, (1 + COVERAGE_LEVEL) / 2))
+
+    @cached_property
+    def expanded(self) -> Array:
+        """Expanded uncertainty of each parameter."""
+        return self.coverage * self.combined
+
+
+def make_budget(found: Fit, inputs: Iterable[Contribution]) -> Budget:
+    """The budget of a fit to poses or positions, from its own noise and from `inputs` that were not fitted."""
+    cautious = cautiously(found)
+    G = row_gains(cautious)
+    of_inputs = [_of_type_b(found, G, c) for c in inputs]
+    own = _of_type_a(cautious, G, sum(seen for _, seen in of_inputs))
+    return Budget((*own, *(line for line, _ in of_inputs)))
+
+
+def row_gains(found: Fit) -> Array:
+    """How far each error of a row moves each parameter, shape (p, channels, n)."""
+    channels, n = found.residual.shape
+    inverse = gain(found.whitened[:, 1:], found.problem.layout.typical).reshape(-1, channels, n)
+    G = np.empty_like(inverse)
+    for first in range(0, n, CHUNK):
+        unit = np.eye(n)[:, first : first + CHUNK]
+        white = found.noise.whiten(np.broadcast_to(unit, (channels, *unit.shape))).reshape(channels, n, -1)
+        G[:, :, first : first + CHUNK] = np.einsum("pcn,cnk->pck", inverse, white)
+    return G
+
+
+def _of_type_a(found: Fit, G: Array, seen: float) -> list[Line]:
+    """The fit's own covariance, in its parts; what the inputs leave in the residual, `seen`, is no noise."""
+    noise, rows = found.noise, found.residual.size - len(found.theta)
+    stds = [e.std for term in found.model.terms for e in term.estimates]
+    everything = np.array([np.nan if std is None else std for std in stds]) ** 2
+    by_noise = everything / found.birge**2
+    white = np.minimum(np.einsum("pcn,cn->p", G**2, noise.white**2), by_noise)
+    scatter = np.minimum(np.einsum("pcn,c->p", G**2, noise.scatter**2), by_noise - white)
+    slow, misfit = by_noise - white - scatter, everything - by_noise
+    beyond = float(np.sum(found.residual**2) - np.sum(noise.white**2))
+    share = min(max(1 - seen / beyond, 0.0), 1.0) if seen and beyond > 0 else 1.0
+    parts = [
+        ("white noise of the dwells", white, float(rows)),
+        ("scatter from row to row", share * scatter, float(rows)),
+        (SLOW_NOISE, share * slow, slow_freedom(noise)),
+        ("misfit of the model", share * misfit, float(rows)),
+    ]
+    return [
+        Line(name, "A", "", None, None, np.sqrt(v), freedom)
+        for name, v, freedom in parts
+        if np.nanmax(v, initial=0.0) > 0
+    ]
+
+
+def _of_type_b(found: Fit, G: Array, c: Contribution) -> tuple[Line, float]:
+    """One input that is not fitted, and the sum of squares that its errors leave in the residual."""
+    if c.std is None:
+        return Line(c.source, "B", c.unit, None, None, None, c.freedom), 0.0
+    shown, number = _shown(found, c), c.shared(found.table)
+    each = input_effects(found, G, c)
+    sensitivity = each[0] if len(each) == 1 else np.sqrt(np.sum(each**2, axis=0))
+    line = Line(c.source, "B", c.unit, c.std, sensitivity, np.abs(sensitivity) * c.std, c.freedom)
+    return line, c.std**2 * _remaining_square(shown, found.jacobian, each, number)
+
+
+def input_effects(found: Fit, G: Array, c: Contribution) -> Array:
+    """What each error of an input, shared by its rows, does to each parameter, shape (errors, p)."""
+    number = c.shared(found.table)
+    each = np.zeros((int(number.max()) + 1, len(G)))
+    np.add.at(each, number, np.einsum("pcn,cn->np", G, _shown(found, c)))
+    return each
+
+
+def _shown(found: Fit, c: Contribution) -> Array:
+    """Which error of the rows looks like one of an input, shape (channels, n).
+
+    The residual is measured less predicted: a parameter follows an input against what the residual does.
+    """
+    return -c.derivative(found.problem, found.theta)
+
+
+def _remaining_square(shown: Array, jacobian: Array, each: Array, number: NDArray[np.intp]) -> float:
+    """Sum of squares of what errors (channels, n) leave of themselves when the parameters follow them by `each`.
+
+    One error for each `number`; the jacobian (channels, n, p) takes `each` (numbers, p) back to the rows.
+    """
+    crossed = np.einsum("cnp,np->cn", jacobian, each[number])
+    normal = np.einsum("cnp,cnq->pq", jacobian, jacobian)
+    return float(np.sum(shown**2) - 2 * np.sum(shown * crossed) + np.sum((each @ normal) * each))
+
+
+def slow_freedom(noise: Noise) -> float:
+    """Degrees of freedom with which slow noise is known: of the sum of squares of so correlated a record.
+
+    (tr R)^2 / tr R^2 for its correlation R (Satterthwaite); the least over the channels.
+    """
+    time_s = np.cumsum(noise.gap_s)
+    time_s = time_s[:: max(1, len(time_s) // MOST_CORRELATED_ROWS)]
+    apart_s = np.abs(time_s[:, None] - time_s)
+    freedom = np.inf
+    for taus_s, slow in zip(noise.taus_s, noise.slow, strict=True):
+        if slow > 0:
+            correlation = np.mean([np.exp(-apart_s / tau_s) for tau_s in taus_s], axis=0)
+            freedom = min(freedom, len(time_s) ** 2 / float(np.sum(correlation**2)))
+    return freedom
+
+
+# How the estimates of a fit's parameters go together: correlations of what the budget is made of.
+#
+# The noise of the data correlates them as the fit does; an input that is not fitted, as they follow it together.
+# Whoever computes something from several results needs both (GUM 5.2, H.2).
+
+
+def parameter_correlation(found: Fit, drawn: Budget, inputs: Iterable[Contribution]) -> Array:
+    """Shape (p, p), 1 on the diagonal, for the budget `drawn` of `found`; NaN where a parameter is not determined."""
+    cautious = cautiously(found)
+    G = row_gains(cautious)
+    by_noise, _ = covariance(cautious.whitened[:, 1:], found.problem.layout.typical)
+    own = np.sqrt(sum((line.std**2 for line in drawn.given if line.kind == "A" and line.std is not None), np.zeros(1)))
+    joint = _normalised(by_noise) * np.outer(own, own)
+    for c in inputs:
+        if c.std:
+            each = input_effects(found, G, c)
+            joint = joint + c.std**2 * each.T @ each
+    return _normalised(joint)
+
+
+def _normalised(covariance: Array) -> Array:
+    std = np.sqrt(np.diag(covariance))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(covariance / np.outer(std, std))

@@ -1,0 +1,125 @@
+"""What the data determine: whether a model at all, and which effects they could show.
+
+With leverages h (the diagonal of the hat matrix of the whitened jacobian), the error on an unseen row has a variance
+1 / (1 - h) times that of noise. Where it is more than twice on average, the uncertainty of the parameters counts for
+more than all noise, and a small residual proves nothing. A leverage of 1 differs: one row alone determines a parameter,
+and nothing checks it.
+
+An effect can be tested where at least one of its parameters would be known better than the typical value of a sensor
+(`identifiability`), fitted jointly with the model. One inclination, or a turn one way only, hides several effects.
+
+Source  leave-one-out prediction variance of linear least squares; Hoaglin and Welsch (1978), the hat matrix.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrations.criteria import MOST_UNCERTAIN
+from calibrations.effects import Effect
+from calibrations.fit import Fit
+from calibrations.fitting.identifiability import UNDETERMINED, covariance
+from calibrations.geometry.sphere import magnetometer_coverage_warning
+from calibrations.model.parameters import Layout
+from calibrations.problem import Problem
+from calibrations.table import Array
+
+ROUNDING = 1e-9  # of a leverage
+
+
+def unseen_variance(found: Fit) -> float:
+    """Mean variance of the error on an unseen row over that of noise; 1 where parameters are known exactly."""
+    return _mean_variance(leverages(found))
+
+
+def leverages(found: Fit) -> Array:
+    """The diagonal of the hat matrix, shape (channels, n): 1 where the fit goes through a value, whatever it is."""
+    jacobian = found.whitened[:, 1:]
+    size = np.linalg.norm(jacobian, axis=0)
+    columns = jacobian[:, size > 0] / size[size > 0]
+    basis, singular, _ = np.linalg.svd(columns, full_matrices=False)
+    kept = basis[:, singular > 1e-8 * singular[0]] if singular.size else basis[:, :0]
+    return np.asarray(np.sum(kept**2, axis=1)).reshape(found.residual.shape)
+
+
+def _mean_variance(leverage: Array) -> float:
+    return float(np.mean(1 / np.maximum(1 - leverage, 1e-12)))
+
+
+def undetermined(found: Fit) -> str | None:
+    """Why a small residual is no proof on this data, in words; None where the data determine the model."""
+    if why := magnetometer_coverage_warning(found.table):
+        return why
+    leverage = leverages(found)
+    variance, lone = _mean_variance(leverage), leverage > 1 - ROUNDING
+    if variance <= MOST_UNCERTAIN:
+        return None
+    if lone.any() and not lone.all() and _mean_variance(leverage[~lone]) <= MOST_UNCERTAIN:
+        return _unchecked(found, lone)
+    rows = "positions" if found.table.kind == "positions" else "rows"
+    times = f"{np.sqrt(variance):.1f}" if variance < 1e4 else "many"
+    return (
+        f"the {len(found.theta)} parameters are not identifiable from these {rows}: {found.table.n} of them, and an "
+        f"unseen one is predicted {times} times worse than noise alone would make it; measure at more orientations"
+    )
+
+
+def _unchecked(found: Fit, lone: NDArray[np.bool_]) -> str:
+    """That some rows, `lone` in shape (channels, n), have parameters to themselves."""
+    rows = np.flatnonzero(lone.any(axis=0))
+    paths = found.table.labels.get("path")
+    which = [paths[k] for k in rows] if paths else [f"row {number}" for number in found.table.numbered(rows)]
+    return (
+        f"nothing checks all of the {len(found.theta)} parameters: {lone.sum()} of the {lone.size} measured values "
+        f"({', '.join(which)}) are each the only one that tells a parameter, and are met whatever they are; measure "
+        "the like of them again"
+    )
+
+
+def lets_go(before: Fit, after: Fit) -> bool:
+    """Whether a parameter that `before` knew is known no longer: of positions only, whose orientation is not known.
+
+    Effects that bend the output enough make one magnitude of anything: of a sphere without end, and of no other sense.
+    """
+    if after.table.kind != "positions":
+        return False
+    known = {(t.name, e.name, e.axis) for t in before.model.terms for e in t.estimates if e.identified}
+    return any((t.name, e.name, e.axis) in known and not e.identified for t in after.model.terms for e in t.estimates)
+
+
+def blind_to(found: Fit, effects: Mapping[str, Effect]) -> tuple[str, ...]:
+    """The effects, of the model or not, that this table has the columns for and whose parameters it leaves unknown."""
+    return tuple(name for name, effect in effects.items() if _hidden(found, effect))
+
+
+def _hidden(found: Fit, effect: Effect) -> bool:
+    if found.table.content in effect.kinds and effect.lacks(found.table) is not None:
+        return True
+    return _can_be_asked(found, effect) and not _shows(found, effect)
+
+
+def _can_be_asked(found: Fit, effect: Effect) -> bool:
+    """Whether there is a column for all that it needs, and a row for each parameter."""
+    if effect.excluded(found.table) is not None:
+        return False
+    return found.residual.size > len(Layout.of(found.model.with_effect(effect), found.table).slots)
+
+
+def _shows(found: Fit, effect: Effect) -> bool:
+    """Whether a parameter of the effect is determined, from any of its starts."""
+    model = found.model if found.model.holds(effect.name) else found.model.with_effect(effect)
+    problem = Problem.of(model, found.table)
+    mine, typical = problem.layout.of_effect(effect.name), problem.layout.typical
+    starts = [found.theta] if model is found.model else problem.layout.starts()
+    return any(_determined(found, problem.jacobian(theta), mine, typical) for theta in starts)
+
+
+def _determined(found: Fit, jacobian: Array, mine: NDArray[np.bool_], typical: Array) -> bool:
+    if not np.any(jacobian[:, :, mine]):
+        return False
+    cov, null = covariance(found.noise.whiten(jacobian), typical)
+    std, free = np.sqrt(np.diag(cov)), np.sum(null**2, axis=0)
+    return bool(np.any((free[mine] <= UNDETERMINED) & (std[mine] < typical[mine])))

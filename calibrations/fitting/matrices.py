@@ -1,0 +1,97 @@
+"""A three-axis calibration as matrices, in the form that navigation uses.
+
+    G_c = M (S G_r + b)            Book (17.3)
+
+    G_r   raw output, in its unit         G_c   specific force in g, field relative to its strength, or deg/s
+    S     diagonal, 1 / scale factor      b     -bias / scale factor
+    M     the inverse of the sensing axes: misalignment, non-orthogonality, soft iron
+
+The matrices hold the linear effects of a model only. Uncertainties by first-order propagation of the parameters'
+covariance (GUM 5.2).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibrations.fit import Fit, cautiously
+from calibrations.fitting.identifiability import covariance
+from calibrations.model.chain import respond, sensed
+from calibrations.table import Array
+
+LINEAR_EFFECTS = {
+    "bias", "scale-factor", "axis-misalignment", "axis-nonorthogonality",
+    "field-strength", "hard-iron", "soft-iron",
+    "gyro-bias", "gyro-scale-factor", "gyro-misalignment",
+}  # fmt: skip
+STEP = 1e-4  # of a parameter's typical size
+
+
+@dataclass(frozen=True)
+class CalibrationMatrices:
+    """M (3, 3), the diagonal of S (3,), and b (3,), with standard uncertainties; NaN where not determined.
+
+    `beyond`: effects of the model that are not linear and not included.
+    """
+
+    M: Array
+    S: Array
+    b: Array
+    M_std: Array
+    S_std: Array
+    b_std: Array
+    unit: str
+    beyond: tuple[str, ...]
+
+    def __call__(self, raw: Array) -> Array:
+        """Calibrated from raw outputs, both of shape (n, 3)."""
+        return np.asarray((raw * self.S + self.b) @ self.M.T)
+
+
+def calibration_matrices(found: Fit) -> CalibrationMatrices | None:
+    """The matrices of a fitted model; None without three axes, and for a motion."""
+    if len(found.table.axes) < 3 or found.table.kind == "motion":
+        return None
+    M, S, b = _parts(_stacked(found, found.theta))
+    if not np.isfinite(M).all() or not np.isfinite(S).all():
+        return None
+    typical = STEP * found.problem.layout.typical
+    ahead, behind = ([_stacked(found, found.theta + side * step) for step in np.diag(typical)] for side in (1, -1))
+    slopes = (np.array(ahead) - np.array(behind)) / (2 * typical[:, None])
+    deviations = _parts(_deviation(slopes, _covariance(found)))
+    beyond = tuple(name for name in found.model.effects if name not in LINEAR_EFFECTS)
+    return CalibrationMatrices(M, S, b, *deviations, found.table.input_unit, beyond)
+
+
+def _stacked(found: Fit, theta: Array) -> Array:
+    """M, S and b of the linear effects with the values `theta`, one after another, shape (15,)."""
+    steps = [step for step in found.problem.layout.steps(theta) if step[0].name in LINEAR_EFFECTS]
+    axes = sensed(np.eye(3), found.table, steps).T
+    zero = respond(np.zeros((1, 3)), found.table, steps)[0]
+    scale = np.diag(respond(np.eye(3), found.table, steps) - zero)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.concatenate([np.linalg.inv(axes).ravel(), 1 / scale, -zero / scale]) + 0.0  # no negative zero
+
+
+def _parts(stacked: Array) -> tuple[Array, Array, Array]:
+    return stacked[:9].reshape(3, 3), stacked[9:12], stacked[12:]
+
+
+def _covariance(found: Fit) -> Array:
+    """Covariance of the parameters with the standard uncertainties that the model states; NaN where it has none."""
+    cautious = cautiously(found)
+    cov, _ = covariance(cautious.whitened[:, 1:] / cautious.birge, found.problem.layout.typical)
+    stated = [e.std for term in found.model.terms for e in term.estimates]
+    std = np.array([np.nan if s is None else s for s in stated])
+    size = np.sqrt(np.diag(cov))
+    ratio = std / np.where(size > 0, size, 1.0)
+    return np.asarray(cov * np.outer(ratio, ratio))
+
+
+def _deviation(slopes: Array, cov: Array) -> Array:
+    """Standard deviations (k,) of what has the derivatives `slopes` (p, k); NaN only where it follows a NaN."""
+    known = np.isfinite(np.diag(cov))
+    variance = np.einsum("pk,pq,qk->k", slopes[known], cov[np.ix_(known, known)], slopes[known])
+    return np.where(slopes[~known].any(axis=0), np.nan, np.sqrt(np.maximum(variance, 0.0)))

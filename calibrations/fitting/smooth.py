@@ -1,0 +1,69 @@
+"""What any static sensor could do: smooth functions of where gravity points, and of the side it was reached from.
+
+Slow noise is fitted beside these columns, so that a misfit of the model, which returns with the angles, is not taken
+for noise, which does not. This is the pure error of a lack-of-fit test, with smoothness in place of repeats.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import lru_cache
+
+import numpy as np
+from scipy.linalg import qr
+
+from calibrations.geometry.orientation import nominal_pose, specific_force
+from calibrations.table import Array, Table
+
+DEGREE = 5
+DIRECTION_DEGREE = 3
+ROWS_PER_COLUMN = 5  # at least so many rows for each column
+
+
+@lru_cache(maxsize=8)
+def smooth_columns(table: Table) -> Array:
+    """Spherical harmonics of the direction of gravity, as polynomials, and the same times direction, shape (n, k).
+
+    For motion, what a sensor could do alike in every stretch at one attitude. No columns for tables of unknown
+    orientation, nor for fewer rows than the lowest degree needs.
+    """
+    if table.kind == "motion":
+        return _attitudes(table)
+    if table.kind != "poses":
+        return np.zeros((table.n, 0))
+    a = specific_force(nominal_pose(table))
+    most = table.n // ROWS_PER_COLUMN
+    for degree in range(DEGREE, 0, -1):
+        columns = np.column_stack(list(_harmonics(a, degree)))
+        if "direction" in table:
+            turning = table.column("direction")[:, None]
+            other = np.column_stack(list(_harmonics(a, min(degree, DIRECTION_DEGREE))))
+            columns = np.hstack([columns, turning * other])
+        basis = _orthonormal(columns)
+        if basis.shape[1] <= most:
+            return basis
+    return np.zeros((table.n, 0))
+
+
+def _attitudes(table: Table) -> Array:
+    """One column for each attitude, 1 where the sensor was in it."""
+    angles = np.column_stack([table.optional(name, 0.0) for name in ("alpha_deg", "beta_deg", "mount_deg", "flip")])
+    _, group = np.unique(angles, axis=0, return_inverse=True)
+    columns: Array = (group.ravel()[:, None] == np.arange(group.max() + 1)) * 1.0
+    return columns if columns.shape[1] <= table.n // ROWS_PER_COLUMN else columns[:, :0]
+
+
+def _harmonics(a: Array, degree: int) -> Iterator[Array]:
+    """Monomials that span the spherical harmonics up to `degree`: z at most once, as x^2 + y^2 + z^2 = 1."""
+    x, y, z = a.T
+    for total in range(degree + 1):
+        for i in range(total + 1):
+            yield x**i * y ** (total - i)
+            if total < degree:
+                yield x**i * y ** (total - i) * z
+
+
+def _orthonormal(columns: Array) -> Array:
+    Q, R, _ = qr(columns, mode="economic", pivoting=True)
+    size = np.abs(np.diag(R))
+    return np.asarray(Q[:, size > 1e-8 * size[0]])

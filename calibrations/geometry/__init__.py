@@ -1,0 +1,1 @@
+"""Geometry: stage angles, orientations, the specific force in them, and the path from one pose to the next."""

@@ -1,0 +1,117 @@
+"""Errors of a rotary stage by its angle, as an autocollimator measures them, and the true angles that follow.
+
+    true = set + error(set)      error: the angle reached less the angle set
+
+Between points the true angle follows monotone cubics (Fritsch and Carlson): it stays between its neighbours and never
+reverses. The table repeats every turn. A gap longer than LONGEST_GAP_DEG is not interpolated, as nothing was measured
+there; a point's error holds within POINT_REACH_DEG of it.
+
+Source  ISO 230-2, positional deviation: reached less target; GUM 4.3 for the standard uncertainty.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import scipy  # its room of interpolation is loaded where it is first entered
+from numpy.typing import ArrayLike
+
+from calibrations.errors import DataError
+from calibrations.importing.files import open_text_file
+from calibrations.table import Array
+
+COLUMN_NAMES = ("angle_deg", "error_deg", "std_deg")
+TURN_DEG = 360.0
+LONGEST_GAP_DEG = 45.0
+POINT_REACH_DEG = 1.0
+Point = tuple[float, float, float]  # angle, error, standard uncertainty of the error, deg
+
+
+@dataclass(frozen=True)
+class ErrorTable:
+    """Points in any order; repeated angles, such as 0 and 360, get the mean of their errors.
+
+    Raises DataError for points that no stage can have.
+    """
+
+    points: tuple[Point, ...]
+
+    def __post_init__(self) -> None:
+        values = np.array(self.points, dtype=np.float64).reshape(-1, len(COLUMN_NAMES))
+        if not len(values):
+            raise DataError(f"an error table needs points: {', '.join(COLUMN_NAMES)}")
+        if not np.isfinite(values).all() or (values[:, 2] < 0).any():
+            raise DataError("an error table takes finite numbers, and standard uncertainties of 0 or more")
+        angles, errors, _ = self._nodes
+        back = np.flatnonzero(np.diff(angles + errors) <= 0)
+        if back.size:
+            at = angles[back[0]] % TURN_DEG
+            raise DataError(f"an error table makes the stage turn back after {at:g} deg; are its errors in deg?")
+
+    @cached_property
+    def _nodes(self) -> tuple[Array, Array, Array]:
+        """Angles, errors and uncertainties in order, over three turns: the middle one is from 0 to 360 deg."""
+        angle, error, std = np.array(self.points, dtype=np.float64).T
+        once, place = np.unique(np.round(angle % TURN_DEG, 9) % TURN_DEG, return_inverse=True)
+        mean = np.bincount(place, error) / np.bincount(place)
+        largest = np.array([std[place == k].max() for k in range(len(once))])
+        turns = np.concatenate([once - TURN_DEG, once, once + TURN_DEG])
+        return turns, np.tile(mean, 3), np.tile(largest, 3)
+
+    def true_deg(self, set_deg: ArrayLike) -> tuple[Array, Array]:
+        """(true angles, their standard uncertainties from the table) in deg, of angles that were set, shape (n,).
+
+        Raises DataError for an angle at which the table has nothing.
+        """
+        wanted = np.atleast_1d(np.asarray(set_deg, dtype=np.float64))
+        angles, errors, stds = self._nodes
+        at = self._joined(wanted % TURN_DEG, wanted)
+        true = scipy.interpolate.PchipInterpolator(angles, angles + errors)(at)
+        return wanted + true - at, np.interp(at, angles, stds)
+
+    def _joined(self, at: Array, named: Array) -> Array:
+        """`at`, moved to the nearest point at the edge of a gap. Raises DataError inside a gap."""
+        angles = self._nodes[0]
+        k = np.searchsorted(angles, at, side="right") - 1
+        below, above = angles[k], angles[k + 1]
+        near = np.where(at - below <= above - at, below, above)
+        inside = above - below <= LONGEST_GAP_DEG
+        lost = np.flatnonzero(~inside & (np.abs(at - near) > POINT_REACH_DEG))
+        if lost.size:
+            first = lost[0]
+            raise DataError(
+                f"at {named[first]:g} deg the stage's error table has no point between {below[first]:g} and "
+                f"{above[first]:g} deg; measure there, or choose angles that it holds"
+            )
+        return np.where(inside, at, near)
+
+
+def read_error_table(path: Path) -> tuple[Point, ...]:
+    """The points in a CSV file with the columns angle_deg, error_deg, std_deg; lines with # are remarks.
+
+    Raises DataError with file, line and column.
+    """
+    with open_text_file(path).lines() as lines:
+        rows = csv.DictReader(_without_remarks(lines), skipinitialspace=True)
+        if missing := [name for name in COLUMN_NAMES if name not in (rows.fieldnames or ())]:
+            raise DataError(
+                f"{path}: an error table needs the columns {', '.join(COLUMN_NAMES)}; {missing[0]} is missing"
+            )
+        return tuple(_point(path, number, row) for number, row in enumerate(rows, 1))
+
+
+def _without_remarks(lines: Iterable[str]) -> Iterable[str]:
+    return (line for line in lines if line.strip() and not line.startswith("#"))
+
+
+def _point(path: Path, number: int, row: dict[str, str]) -> Point:
+    try:
+        angle, error, std = (float(row[name]) for name in COLUMN_NAMES)
+    except (TypeError, ValueError):
+        raise DataError(f"{path}: point {number} is {', '.join(map(str, row.values()))}; give three numbers") from None
+    return angle, error, std

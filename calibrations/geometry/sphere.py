@@ -1,0 +1,73 @@
+"""Coverage of the sphere of directions, as a fit of the magnitude needs it.
+
+The magnitude over the sphere is a sum of spherical harmonics: degree 0 is the strength, 1 an offset (hard iron), 2 a
+stretch (soft iron). They are orthogonal over the whole sphere. Where directions are missing, a combination of them is
+known worse, by 1 / sqrt(least eigenvalue of their Gram matrix); beyond MOST_WORSE it is not fitted.
+
+Source  optimality of designs by the least eigenvalue (E-optimality): Pukelsheim, Optimal Design of Experiments
+(1993).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from calibrations.importing.raw_logs import sphere_centre
+from calibrations.table import Array, Table
+
+HARD_IRON, SOFT_IRON = 1, 2  # highest degree of what they add to the magnitude
+MOST_WORSE = 10.0
+REMEDIES = {
+    HARD_IRON: "turn the sensor about two axes at least",
+    SOFT_IRON: "turn the sensor about three axes, each of its sides up and down",
+}
+
+
+def coverage_fault(table: Table, degree: int) -> str | None:
+    """Why these directions do not determine harmonics up to `degree`; None where they do."""
+    found = worst_ratio(directions(table), degree)
+    if found <= MOST_WORSE:
+        return None
+    times = f"{found:.0f} times worse than from as many on all sides, and {MOST_WORSE:g} times is the limit"
+    known = times if found < 1e4 else "not at all"
+    return (
+        f"the orientations cover too little of the sphere: something in it would be known {known}; {REMEDIES[degree]}"
+    )
+
+
+def magnetometer_coverage_warning(table: Table) -> str | None:
+    """The effects that a magnetometer's directions cannot determine; None where they cover the sphere."""
+    if table.content != "fields":
+        return None
+    for degree, what in ((HARD_IRON, "hard-iron and soft-iron"), (SOFT_IRON, "soft-iron")):
+        if why := coverage_fault(table, degree):
+            return f"{what} cannot be asked: {why}; until then every value is that of a sensor without it"
+    return None
+
+
+def directions(table: Table) -> Array:
+    """Unit vectors (n, 3) from the centre of the sphere fitted to the outputs."""
+    away = table.outputs - sphere_centre(table.outputs)
+    return np.asarray(away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), np.finfo(float).tiny))
+
+
+def sphere_radius(table: Table) -> float:
+    """Radius of the sphere fitted to the outputs."""
+    return float(np.mean(np.linalg.norm(table.outputs - sphere_centre(table.outputs), axis=1))) or 1.0
+
+
+def worst_ratio(u: Array, degree: int) -> float:
+    """Uncertainty of the least known combination over that on the whole sphere; `u` unit vectors (n, 3)."""
+    columns = harmonics(u, degree)
+    least = float(np.linalg.eigvalsh(columns.T @ columns / len(u))[0])
+    return float(1 / np.sqrt(max(least, np.finfo(float).eps)))
+
+
+def harmonics(u: Array, degree: int) -> Array:
+    """Real spherical harmonics up to `degree` (at most 2), of mean square 1 over the sphere, shape (n, 1, 4 or 9)."""
+    x, y, z = u.T
+    columns = [np.ones(len(u)), *(np.sqrt(3) * each for each in (x, y, z))]
+    if degree > 1:
+        columns += [np.sqrt(15) * each for each in (x * y, x * z, y * z, (x**2 - y**2) / 2)]
+        columns.append(np.sqrt(5) * (3 * z**2 - 1) / 2)
+    return np.column_stack(columns)

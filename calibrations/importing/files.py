@@ -1,0 +1,163 @@
+"""Files as text, read line by line: encodings that spreadsheets write, gzip, and refusal of binary files.
+
+No file is held in memory as a whole, so a log of hundreds of megabytes needs memory for its numbers only.
+"""
+
+from __future__ import annotations
+
+import codecs
+import gzip
+import io
+import zlib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO, TextIO, cast
+
+import yaml
+
+from calibrations.errors import DataError
+
+LARGEST_BYTES = 1 << 30
+HEAD_BYTES = 1 << 16
+MARKS = {codecs.BOM_UTF8: "utf-8-sig", codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"}
+CONTROLS = frozenset(range(32)) - set(b"\t\n\r\f") - {0x1A}  # 0x1A ends a text file in old Windows programs
+
+
+@dataclass(frozen=True)
+class Source:
+    """A text that can be read several times, and its name in messages."""
+
+    name: str
+    opened: Callable[[], TextIO]
+
+    @contextmanager
+    def lines(self) -> Iterator[Iterator[str]]:
+        """Open the text and iterate over its lines. Raises DataError where they cannot be read, also during the
+        iteration.
+        """
+        try:
+            with self.opened() as file:
+                yield iter(file)
+        except UnicodeError:
+            raise DataError(f"{self.name}: contains bytes that are not text; save the file as CSV in UTF-8") from None
+        except (OSError, EOFError, zlib.error) as error:
+            raise DataError(f"{self.name}: cannot be read as text: {_reason(error)}") from None
+
+
+def open_text_file(path: Path) -> Source:
+    """The file `path` as text. Raises DataError at once for a folder, a binary file, and a file that is too large."""
+    if path.is_dir():
+        raise DataError(f"{path}: cannot be read: Is a directory; name a file in it")
+    try:
+        size = path.stat().st_size
+        if size > LARGEST_BYTES:
+            raise DataError(
+                f"{path}: the file has {size / 2**30:.1f} GiB; the limit is {LARGEST_BYTES >> 30} GiB; "
+                "write the mean of each pose instead of samples, or fewer samples per pose"
+            )
+        with _bytes(path) as file:
+            head = file.read(HEAD_BYTES)
+    except (OSError, EOFError, zlib.error) as error:
+        what = "cannot be read as text" if path.suffix == ".gz" else "cannot be read"
+        raise DataError(f"{path}: {what}: {_reason(error)}") from None
+    encoding = _encoding(head, path)
+    return Source(str(path), lambda: io.TextIOWrapper(_bytes(path), encoding=encoding))
+
+
+def text_source(content: str, name: str) -> Source:
+    """A text in memory as a source."""
+    return Source(name, lambda: io.StringIO(content, newline=None))
+
+
+def _bytes(path: Path) -> BinaryIO:
+    return cast(BinaryIO, _Unpacked(path) if path.suffix == ".gz" else path.open("rb"))
+
+
+class _Unpacked(gzip.GzipFile):
+    """A gzip file with a limit on its unpacked size."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path, "rb")
+        self._taken = 0
+
+    def read1(self, size: int = -1) -> bytes:
+        """Read for the text decoder. Raises DataError beyond LARGEST_BYTES in total."""
+        data = super().read1(size)
+        self._taken += len(data)
+        if self._taken > LARGEST_BYTES:
+            raise DataError(
+                f"{self.name}: holds more than {LARGEST_BYTES >> 30} GiB; unpack it and import a part of it"
+            )
+        return data
+
+
+def _encoding(head: bytes, path: Path) -> str:
+    """The encoding by its byte-order mark; else UTF-8, then Excel's cp1252. Raises DataError for binary content."""
+    for mark, encoding in MARKS.items():
+        if head.startswith(mark):
+            return encoding
+    binary = next((k for k, byte in enumerate(head) if byte in CONTROLS), None)
+    if binary is not None:
+        raise DataError(
+            f"{path}: is not text (byte {binary} is {head[binary]:#04x}); is it really a CSV file? "
+            "From a spreadsheet, save the sheet as CSV"
+        )
+    for encoding in ("utf-8", "cp1252"):
+        try:
+            codecs.getincrementaldecoder(encoding)().decode(head)
+        except UnicodeDecodeError:
+            continue
+        return encoding
+    raise DataError(f"{path}: is not text in UTF-8; is it really a CSV file? From a spreadsheet, save the sheet as CSV")
+
+
+def _reason(error: Exception) -> str:
+    return getattr(error, "strerror", None) or str(error)
+
+
+# YAML of other people: data only, of bounded size however often it refers to itself.
+#
+# The safe loader makes no objects but numbers, texts, dates, lists and mappings. An alias repeats a part without a
+# copy; nine levels of nine aliases are a page of text and a billion parts for whoever walks through them, so parts
+# are counted as they would be walked.
+
+LONGEST_YAML = 1 << 18  # characters: the largest bench file has a hundredth of it
+MOST_YAML_PARTS = 100_000
+
+
+def load_yaml(text: str) -> Any:
+    """The document in `text`. Raises ValueError for invalid YAML, a document that is too large, and one that contains
+    itself.
+    """
+    if len(text) > LONGEST_YAML:
+        raise ValueError(f"the document has {len(text)} characters; the limit is {LONGEST_YAML}")
+    try:
+        document = yaml.safe_load(text)
+        _require_bounded(document)
+    except RecursionError:
+        raise ValueError("its parts are nested too deeply") from None
+    except (yaml.YAMLError, ArithmeticError, LookupError, TypeError, AttributeError) as error:
+        raise ValueError(" ".join(str(error).split())) from None
+    return document
+
+
+def _require_bounded(document: Any) -> None:
+    """Raises ValueError for a document with too many parts; a part that an alias repeats counts each time."""
+    sizes: dict[int, int | None] = {}  # of parts that are done; None while they are being counted
+
+    def size(part: Any) -> int:
+        if not isinstance(part, (dict, list)):
+            return 1
+        if id(part) not in sizes:
+            sizes[id(part)] = None
+            parts = [*part, *part.values()] if isinstance(part, dict) else part
+            sizes[id(part)] = 1 + sum(map(size, parts))
+        if (count := sizes[id(part)]) is None:
+            raise ValueError("a part of the document contains itself")
+        if count > MOST_YAML_PARTS:
+            raise ValueError(f"the document has more than {MOST_YAML_PARTS} parts; do not let aliases repeat aliases")
+        return count
+
+    size(document)

@@ -1,0 +1,269 @@
+"""Foreign tables as ours: their names and units are mapped to our columns.
+
+A column is named by the file's header, or by its number from 1 in a file without one. Units are converted to those of
+the target column (V, deg, degC, s); outputs of `positions` keep any unit, which the table then carries. A header with
+our names needs no mapping, for any separator; units in it are used.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from calibrations.errors import DataError, MissingColumn, nearest
+from calibrations.importing.files import open_text_file, text_source
+from calibrations.importing.plausible import check_at_rest, find_unit_doubts
+from calibrations.importing.proposal import import_command, missing_columns, suggest_import
+from calibrations.importing.sessions import RATE, is_session, sample_rates
+from calibrations.importing.sheet import Sheet, is_number, look_like_names, read_cells, read_sheet
+from calibrations.importing.units import UNITS, ColumnMapping, column_unit
+from calibrations.table import KINDS, NUMBERS, Array, Constant, Table, guess_kind
+
+TRIADS = (("ax", "ay", "az"), ("mx", "my", "mz"))
+RATES = ("gx", "gy", "gz")
+PATH = "path"
+
+
+@dataclass(frozen=True)
+class ImportedTable:
+    """A table and its import: `mapped` has an entry for each column that was renamed or converted."""
+
+    table: Table
+    sheet: Sheet
+    mapped: tuple[ColumnMapping, ...]
+
+    @property
+    def settings(self) -> dict[str, object]:
+        """The settings of the import, kept with the run so that it can be repeated."""
+        names = {None: "blanks", ",": "comma", ";": "semicolon", "\t": "tab"}
+        return {
+            "file": Path(self.sheet.name).name,
+            "separator": names.get(self.sheet.separator, self.sheet.separator),
+            "columns": {m.name: m.text.partition("=")[2] for m in self.mapped},
+            "constants": dict(self.table.constants),
+        }
+
+
+def read_foreign(
+    path: Path, kind: str | None, mapped: Sequence[ColumnMapping] = (), constants: Mapping[str, Constant] | None = None
+) -> Table:
+    """The table in the file `path`. Mapped columns take our names; the others keep their names in the header.
+
+    Raises DataError with file, line and column.
+    """
+    return import_sheet(read_sheet(open_text_file(path)), kind, mapped, constants).table
+
+
+def import_sheet(
+    laid: Sheet, kind: str | None, mapped: Sequence[ColumnMapping] = (), constants: Mapping[str, Constant] | None = None
+) -> ImportedTable:
+    """The table in a sheet. Raises DataError; the message of MissingColumn ends with a likely import command."""
+    chosen = complete_mapping(laid, mapped)
+    try:
+        return _import_with(laid, kind, chosen, constants or {})
+    except MissingColumn as error:
+        tail = suggest_import(
+            laid, kind, chosen, constants or {}, lambda *meant: _import_with(laid, *_completed(laid, *meant)).table
+        )
+        raise MissingColumn(f"{error}{tail}") from None
+
+
+def _completed(
+    laid: Sheet, kind: str, mapped: Sequence[ColumnMapping], constants: Mapping[str, Constant]
+) -> tuple[str, list[ColumnMapping], Mapping[str, Constant]]:
+    """The given mapping, completed from the header."""
+    return kind, complete_mapping(laid, mapped), constants
+
+
+def _import_with(
+    laid: Sheet, kind: str | None, chosen: Sequence[ColumnMapping], constants: Mapping[str, Constant]
+) -> ImportedTable:
+    """The table by a complete mapping. Raises DataError, MissingColumn without advice."""
+    kept = _unmapped_columns(laid, chosen, bool(chosen))
+    try:
+        kind = kind or guess_kind([*(m.name for m in chosen), *kept])
+    except MissingColumn as error:
+        what = error if look_like_names(laid.header) else "a header line with column names is missing"
+        raise MissingColumn(f"{laid.name}, line {laid.line}: {what}") from None
+    known = {**laid.constants, **constants}
+    known |= _output_unit(chosen, kind, known.get("triad") == "m", laid.name)
+    taken = {m.theirs for m in chosen}
+    path = next((m.theirs for m in chosen if m.name == PATH), PATH)
+    words = [name for name in laid.header if name not in taken and _is_text(laid, name)]
+    numbers, texts = read_cells(laid, list(dict.fromkeys([*words, path])) if path in laid.header else words)
+    columns = {m.name: _converted(numbers[m.theirs], m) for m in chosen if m.name != PATH}
+    columns |= {name: numbers[name] for name in kept if name in numbers}
+    labels = {k: texts[k] for k in kept if k in texts} | ({PATH: texts[path]} if path in texts else {})
+    if is_session(kind, columns, labels.get(PATH)):
+        columns[RATE] = sample_rates(columns, labels[PATH], known, laid.name)
+    table = Table.from_columns(kind, columns, known, laid.name, labels)
+    _check_units(table, laid, chosen)
+    check_at_rest(table)
+    return ImportedTable(table, laid, tuple(chosen))
+
+
+def complete_mapping(laid: Sheet, mapped: Sequence[ColumnMapping]) -> list[ColumnMapping]:
+    """`mapped` with names and units from the header, and the columns that have our names. Raises DataError."""
+    chosen: list[ColumnMapping] = []
+    for m in mapped:
+        if m.name in [other.name for other in chosen]:
+            raise DataError(f'{laid.name}: the column "{m.name}" is mapped twice; give it once')
+        chosen.append(_locate(laid, m))
+    taken = {m.theirs for m in chosen}
+    for header, bare, unit in zip(laid.header, laid.bare, laid.units, strict=True):
+        if bare in NUMBERS - {m.name for m in chosen} and header not in taken:
+            chosen.append(check_unit(ColumnMapping(bare, header, unit), laid.name))
+    return [m for m in chosen if m.unit or m.name != m.theirs]
+
+
+def needs_mapping(laid: Sheet, kind: str | None, mapped: Sequence[ColumnMapping]) -> bool:
+    """Whether a table of `kind`, or of any kind, still lacks columns. Raises as `complete_mapping`."""
+    chosen = complete_mapping(laid, mapped)
+    names = {m.name for m in chosen} | set(_unmapped_columns(laid, chosen, bool(mapped)))
+    if kind == "rates" and PATH in names:
+        return bool(missing_columns(kind, laid, chosen))
+    sets = KINDS[kind] if kind else [wanted for wanteds in KINDS.values() for wanted in wanteds if len(wanted) > 1]
+    return not any(names.issuperset(wanted) for wanted in sets)
+
+
+def _locate(laid: Sheet, m: ColumnMapping) -> ColumnMapping:
+    """The mapping with the file's full column name and unit. Raises MissingColumn, DataError."""
+    for names in (laid.header, laid.bare):
+        if m.theirs in names:
+            place = names.index(m.theirs)
+            return check_unit(replace(m, theirs=laid.header[place], unit=m.unit or laid.units[place]), laid.name)
+    bare, _, unit = m.theirs.rpartition(":")
+    if not m.unit and bare in laid.header:
+        raise DataError(f'{laid.name}: unknown unit "{unit}" of the column "{bare}"{nearest(unit, UNITS)}')
+    raise MissingColumn(f'{laid.name}: there is no column "{m.theirs}"{nearest(m.theirs, laid.header)}')
+
+
+def check_unit(m: ColumnMapping, source: str) -> ColumnMapping:
+    """The mapping itself. Raises DataError for a unit that cannot be converted to the target's."""
+    own = column_unit(m.name)
+    if m.unit and own and UNITS[m.unit][0] != own:
+        raise DataError(
+            f'{source}: the column "{m.name}" is in {own}; "{m.theirs}" in {m.unit} cannot be converted to it'
+        )
+    return m
+
+
+def _unmapped_columns(laid: Sheet, chosen: Sequence[ColumnMapping], is_mapped: bool) -> list[str]:
+    """The columns that keep their own names; none of a file without a header if some are mapped."""
+    gone = {name for m in chosen for name in (m.name, m.theirs)}
+    return [name for name in laid.header if name not in gone] if laid.named or not is_mapped else []
+
+
+def _is_text(laid: Sheet, name: str) -> bool:
+    """Whether a column holds words: the path, or an unknown column whose first cell is not a number."""
+    return name == "path" or (name not in NUMBERS and not is_number(laid.sample[0][laid.header.index(name)]))
+
+
+def _converted(values: Array, m: ColumnMapping) -> Array:
+    """Values in the target column's unit."""
+    _, factor, offset = UNITS[m.unit] if m.unit else ("", 1.0, 0.0)
+    return values if (factor, offset) == (1.0, 0.0) else values * factor + offset
+
+
+def _check_units(table: Table, laid: Sheet, chosen: Sequence[ColumnMapping]) -> None:
+    """Raises DataError for numbers that are unlikely in their unit, with the import command for a better one."""
+    found = find_unit_doubts(table, {m.name for m in chosen if m.unit})
+    if not found:
+        return
+    name, (what, unit) = next(iter(found.items()))
+    by_name = {name: ColumnMapping(name, name) for name in found} | {m.name: m for m in chosen}
+    better = [replace(m, unit=found[m.name][1] if m.name in found else m.unit) for m in by_name.values()]
+    own = next(replace(m, unit=column_unit(name)) for m in better if m.name == name)
+    if not unit:
+        raise DataError(f'{laid.name}: the column "{name}" {what}; state its unit, as in --column {own.text}')
+    raise DataError(
+        f'{laid.name}: the column "{name}" {what}\nIf its unit is {unit}, import it with:\n\n'
+        f"    {import_command(laid, table.kind, better)}\n\n"
+        f"If its unit is {own.unit} after all, state it: --column {own.text}"
+    )
+
+
+def _output_unit(mapped: Sequence[ColumnMapping], kind: str, field: bool, source: str) -> dict[str, Constant]:
+    """The unit of the three output axes, where one is given: the magnetometer's if `field`, or without an
+    accelerometer.
+    Raises DataError if the axes have different units.
+    """
+    accelerometer = any(m.name == "ax" for m in mapped)
+    for axes in (RATES,) if kind == "rates" else TRIADS[1:] if field else TRIADS[:1] if accelerometer else TRIADS:
+        given = {m.name: UNITS[m.unit][0] for m in mapped if m.unit}
+        units = {axis: given.get(axis, "") for axis in axes}
+        if len(set(units.values())) > 1:
+            said = ", ".join(f"{axis} in {unit or 'no unit'}" for axis, unit in units.items())
+            raise DataError(f"{source}: the three axes must have the same unit: {said}")
+        if units[axes[0]]:
+            return {"unit": units[axes[0]]}
+    return {}
+
+
+# Rows that occur twice in a table: a copied reading, not a repeated one.
+
+MOST_ROWS_LISTED = 3
+
+
+def drop_duplicate_rows(table: Table) -> tuple[Table, str | None]:
+    """The table without rows that equal an earlier row in every number, time included; and a message that lists them.
+
+    A repeated pose has another time and another reading. Without times, equal rows may be real repetitions: they
+    stay.
+    """
+    if "t_s" not in table:
+        return table, None
+    rows = np.column_stack(list(table.columns.values()))
+    _, first, which = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+    copies = np.setdiff1d(np.arange(table.n), first)
+    if not len(copies):
+        return table, None
+    pairs = [f"{row + 1} (as {first[which.ravel()[row]] + 1})" for row in copies[:MOST_ROWS_LISTED]]
+    more = f" and {len(copies) - MOST_ROWS_LISTED} more" if len(copies) > MOST_ROWS_LISTED else ""
+    what = "copies an earlier row" if len(copies) == 1 else "copy earlier rows"
+    rows_said = f"row{'s' if len(copies) > 1 else ''} {', '.join(pairs)}{more}"
+    return table.rows(np.sort(first)), (
+        f"{table.source}: {rows_said} {what} (same time, same digits); each is used once."
+    )
+
+
+# Read and write a table as CSV: `# key: value` lines, a header, numbers; text only in columns of text.
+#
+# Reading accepts all that needs no mapping; writing uses commas and decimal points.
+
+
+def read_csv(path: Path | str, kind: str | None = None) -> Table:
+    """The table in the file `path`; without `kind` it is guessed from the columns.
+
+    Raises DataError with file, line and column.
+    """
+    return read_foreign(Path(path), kind)
+
+
+def parse_csv(content: str, source: str, kind: str | None = None) -> Table:
+    """The table in a text. Raises DataError with source, line and column."""
+    return import_sheet(read_sheet(text_source(content, source)), kind).table
+
+
+def write_csv(table: Table, path: Path | str) -> None:
+    """Write `table` so that `read_csv` restores it to the last bit."""
+    names = [*table.columns, *table.labels]
+    with Path(path).open("w", encoding="utf-8", newline="") as file:
+        file.writelines(f"# {key}: {value}\n" for key, value in table.constants.items())
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(names)
+        cells = [[repr(float(v)) for v in values] for values in table.columns.values()]
+        writer.writerows(zip(*cells, *table.labels.values(), strict=True))
+
+
+def require_kind(table: Table, *kinds: str) -> Table:
+    """The table itself. Raises DataError if it is of another kind."""
+    if table.kind not in kinds:
+        raise DataError(
+            f"{table.source}: a table of {table.kind}; this needs {' or '.join(kinds)}{nearest(table.kind, kinds)}"
+        )
+    return table

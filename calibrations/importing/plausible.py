@@ -1,0 +1,155 @@
+"""Checks whether numbers are possible in the unit that a file gives them.
+
+A wrong unit fits no model and gives no hint, so it is refused with the unit that would fit. The limits are judgements.
+A unit that a person states, in the header or as NAME=THEIRS:UNIT, is accepted unless no rig can reach the value.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping
+
+import numpy as np
+
+from calibrations.errors import DataError
+from calibrations.importing.raw_logs import sphere_centre
+from calibrations.importing.units import column_unit
+from calibrations.table import NUMBERS, Array, Table
+
+HIGHEST_V = 50.0  # analog outputs end at the supply, 36 V at most
+HOTTEST_C, COLDEST_C = 200.0, -100.0  # parts are specified from -55 to 125 degC, some to 175
+LONGEST_M = 0.5  # a piezo stage travels 0.1 mm, a shaker a few centimetres
+LARGEST_ALPHA_DEG = 360.0  # an inclination lies within one turn
+LARGEST_BETA_DEG = 3600.0  # ten turns: cables allow fewer
+ARC_MINUTE_DEG = 1 / 60
+ROUNDING_DEG = 1e-3
+FEWEST_ANGLES = 6  # distinct values: the odds that all lie on whole arc minutes by chance are one in millions
+STILL_G = (0.3, 3.0)  # a sensor at rest shows 1 g, its bias and scale factor within reason
+EARTH_UT = (20.0, 70.0)  # on the ground 22 to 67 uT (World Magnetic Model)
+MOST_MAGNITUDE_SPREAD = (
+    0.3  # interquartile range of a magnitude over its median: scale factors of cheap sensors differ by tenths
+)
+LEAST_DIRECTION_SHARE = (  # mean square of directions along their weakest axis; 1/3 over the whole sphere
+    0.01  # mean square of directions along the axis that they have least of, 1/3 over the whole sphere
+)
+Doubt = tuple[str, str]  # the reason, and the unit that would fit, "" for none
+
+
+def find_unit_doubts(table: Table, stated: Collection[str]) -> dict[str, Doubt]:
+    """The columns with an unlikely unit. `stated`: columns whose unit the file or a person gives."""
+    asked = {name: _doubt(name, values, name in stated) for name, values in table.columns.items()}
+    return {name: doubt for name, doubt in asked.items() if doubt is not None}
+
+
+def looks_like_radians(values: Array) -> bool:
+    """Whether angles lie within one turn in rad and off the grid of whole arc minutes on which degrees are set."""
+    some: Array = np.unique(np.round(np.abs(values), 6))
+    some = some[some > ROUNDING_DEG]
+    if not len(some) or some[-1] > 2 * np.pi * 1.001 or _on_grid(some, ARC_MINUTE_DEG, ROUNDING_DEG):
+        return False
+    return len(some) >= FEWEST_ANGLES or _on_grid(some, np.pi / 36, ROUNDING_DEG)
+
+
+def _on_grid(values: Array, step: float, rounding: float) -> bool:
+    return bool(np.all(np.abs(values - step * np.round(values / step)) < rounding))
+
+
+def likely_unit(name: str, values: Array) -> str:
+    """The unit that fits numbers that are unlikely in V, deg, degC or m; "" where they are likely."""
+    doubt = _unlikely(name, values)
+    return doubt[1] if doubt else ""
+
+
+def gravity_unit(outputs: Array) -> str:
+    """The unit in which still outputs, shape (n, 3), have the magnitude of gravity: g, mg or m/s2; else "counts"."""
+    size = float(np.median(np.linalg.norm(outputs, axis=1)))
+    near = {"g": 1.0, "m/s2": 9.81, "mg": 1000.0}
+    return next((unit for unit, one_g in near.items() if 0.8 < size / one_g < 1.25), "counts")
+
+
+def field_unit(outputs: Array) -> str:
+    """uT where outputs, shape (n, 3), have the magnitude of the earth's field, for any hard iron; else ""."""
+    size = float(np.median(np.linalg.norm(outputs - sphere_centre(outputs), axis=1)))
+    return "uT" if EARTH_UT[0] < size < EARTH_UT[1] else ""
+
+
+def covers_all_directions(outputs: Array) -> bool:
+    """Whether outputs, shape (n, 3), can come from a sensor turned in one field: about constant distance from a
+    sphere's
+    centre, and directions spread over the sphere.
+    """
+    away = outputs - sphere_centre(outputs)
+    size = np.linalg.norm(away, axis=1)
+    low, middle, high = np.quantile(size, [0.25, 0.5, 0.75])
+    if not middle > 0 or (high - low) / middle > MOST_MAGNITUDE_SPREAD:
+        return False
+    directions = away / np.maximum(size, np.finfo(float).tiny)[:, None]
+    return bool(np.linalg.eigvalsh(directions.T @ directions / len(outputs))[0] > LEAST_DIRECTION_SHARE)
+
+
+def _doubt(name: str, values: Array, stated: bool) -> Doubt | None:
+    return _impossible(name, values) or (None if stated else _unlikely(name, values))
+
+
+def _impossible(name: str, values: Array) -> Doubt | None:
+    limit = {"alpha_deg": LARGEST_ALPHA_DEG, "beta_deg": LARGEST_BETA_DEG}.get(name)
+    largest = float(np.max(np.abs(values)))
+    if limit is not None and largest > limit:
+        return f"reaches {largest:.6g} deg; no stage turns beyond {limit:g} deg", ""
+    return None
+
+
+def _unlikely(name: str, values: Array) -> Doubt | None:
+    ask = UNIT_CHECKS.get(column_unit(name)) if name in NUMBERS else None
+    return ask(values) if ask else None
+
+
+def _angle(values: Array) -> Doubt | None:
+    if not looks_like_radians(values):
+        return None
+    return f"runs from {values.min():.4g} to {values.max():.4g}, not on whole degrees: it looks like radians", "rad"
+
+
+def _voltage(values: Array) -> Doubt | None:
+    largest = float(np.max(np.abs(values)))
+    if largest <= HIGHEST_V:
+        return None
+    unit = "mV" if largest <= 1e3 * HIGHEST_V else "uV" if largest <= 1e6 * HIGHEST_V else ""
+    return f"reaches {largest:.6g} V; no sensor output exceeds {HIGHEST_V:g} V", unit
+
+
+def _length(values: Array) -> Doubt | None:
+    longest = float(np.max(np.abs(values)))
+    return (f"reaches {longest:.6g} m; no stage travels so far", "um") if longest > LONGEST_M else None
+
+
+def _temperature(values: Array) -> Doubt | None:
+    low, high = float(values.min()), float(values.max())
+    if low >= COLDEST_C and high <= HOTTEST_C:
+        return None
+    unit = "K" if low - 273.15 >= COLDEST_C and high - 273.15 <= HOTTEST_C else ""
+    return f"runs from {low:.6g} to {high:.6g} degC; no sensor survives that", unit
+
+
+UNIT_CHECKS: Mapping[str, Callable[[Array], Doubt | None]] = {
+    "deg": _angle,
+    "V": _voltage,
+    "degC": _temperature,
+    "m": _length,
+}
+
+
+def check_at_rest(table: Table) -> None:
+    """Check that an accelerometer at rest shows gravity. Raises DataError. Counts and magnetometers pass."""
+    one_g = {"g": 1.0, "m/s2": table.gravity_m_s2}.get(table.unit)
+    if one_g is None or table.content != "positions":
+        return
+    size = float(np.median(np.linalg.norm(table.outputs, axis=1)))
+    if STILL_G[0] <= size / one_g <= STILL_G[1]:
+        return
+    unit = gravity_unit(table.outputs)
+    fits = f"they look like {unit}: give --column ax=...:{unit}, likewise ay and az" if unit != "counts" else ""
+    other = "import outputs of an unknown scale as counts: --column ax=...:counts, likewise ay and az"
+    raise DataError(
+        f"{table.source}: ax, ay, az have the magnitude {size:.4g} {table.unit}; a sensor at rest shows "
+        f"{one_g:.4g}; {fits or other}"
+    )

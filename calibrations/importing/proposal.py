@@ -1,0 +1,332 @@
+"""Proposed column mappings of a file, from its column names, units and values.
+
+A person confirms a proposal: `rig import` asks for each column at a terminal; elsewhere the message about a missing
+column ends with the command to copy. That import has been tried: the columns are converted and averaged as `rig import`
+does it. A constant that only a person knows is tried with an example value, and is a placeholder in the command.
+"""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calibrations.errors import DataError, MissingConstant
+from calibrations.importing.plausible import covers_all_directions, field_unit, gravity_unit, likely_unit
+from calibrations.importing.raw_logs import average_raw_log
+from calibrations.importing.sheet import Sheet, is_number, parse_number
+from calibrations.importing.units import UNITS, ColumnMapping, column_unit, split_unit
+from calibrations.table import AXES, KINDS, NUMBERS, OUTPUTS, Array, Constant, Table
+
+AXIS = r"(?:^|[^a-z])(?P<axis>[xyz])(?:[^a-z]|$)"
+SCATTER = r"std|stdev|sigma|noise|scatter|deviation"
+# what a name says, the first that fits; {axis} is the letter x, y or z in it
+NAME_PATTERNS: Mapping[str, Sequence[tuple[str, str]]] = {
+    "poses": (
+        (r"alpha|inclin|tilt|pitch|polar|elevation", "alpha_deg"),
+        (r"beta|table|azimuth|yaw|rotary|rotation|turn(?!ing)", "beta_deg"),
+        (r"^dir|direction|turning|sense", "direction"),
+        (r"mount", "mount_deg"),
+        (r"flip|face", "flip"),
+        (r"suppl|vdd|vcc|excitation", "supply_v"),
+        (r"temp|thermo", "temperature_c"),
+        (r"^t(_?s)?$|time|elapsed|seconds", "t_s"),
+        (r"^n$|count|samples|averag", "n"),
+    ),
+    "positions": (
+        (r"temp|thermo", "temperature_c"),
+        (r"^t(_?s)?$|time|elapsed|seconds", "t_s"),
+        (r"^n$|samples|averag", "n"),
+        (r"gyr|omega|rate|^g[xyz]$", "g{axis}"),
+        (r"mag|^m[xyz]$", "m{axis}"),
+    ),
+    "rates": (
+        (r"temp|thermo", "temperature_c"),
+        (r"^t(_?s)?$|time|elapsed|seconds", "t_s"),
+        (r"^n$|samples|averag", "n"),
+        (r"acc|^a[xyz]$", "a{axis}"),
+        (r"gyr|omega|^g[xyz]$", "g{axis}"),
+        (r"rate|speed|velocity", "rate_deg_s"),
+    ),
+    "motion": (
+        (r"displac|distance|position|stroke", "displacement_m"),
+        (r"suppl|vdd|vcc|excitation", "supply_v"),
+        (r"temp|thermo", "temperature_c"),
+        (r"^t(_?s)?$|time|elapsed|seconds", "t_s"),
+    ),
+}
+SECTION = r"part|section|segment|phase|activity|label|step|^path$"  # of a session by hand, in a column of words
+STD_COLUMNS = {"poses": "v{axis}_std_v", "positions": "a{axis}_std", "rates": "g{axis}_std"}
+
+
+def propose_mapping(laid: Sheet, kind: str | None = None, mapped: Sequence[ColumnMapping] = ()) -> list[ColumnMapping]:
+    """`mapped`, and a mapping for the other columns; each of our names once."""
+    kind = kind or likely_kind(laid, mapped)
+    if kind not in NAME_PATTERNS:
+        return list(mapped)
+    found = list(mapped)
+    left = [name for name in laid.header if name not in {m.theirs for m in mapped} | NUMBERS]
+    values = {name: numbers for name in left if len(numbers := sample_values(laid, name))}
+    guesses = guess_by_names(laid, values, kind) if laid.named else guess_by_values(values, kind)
+    for name, ours in guesses:
+        if ours not in {m.name for m in found} and ours not in laid.header and (ours != "n" or _counts(values[name])):
+            found.append(ColumnMapping(ours, name, _unit(laid, name, ours, values[name])))
+    if kind == "rates":
+        return _with_sections(found, laid)
+    return _with_gravity(found, values) if kind == "positions" else _with_scatter(found)
+
+
+def likely_kinds(laid: Sheet, mapped: Iterable[ColumnMapping] = ()) -> list[str]:
+    """The likely kinds, most likely first; samples of a gyroscope in named sections may contain no turn."""
+    kind = likely_kind(laid, mapped)
+    return ["rates", "positions"] if kind == "rates" and _section(laid) else [kind]
+
+
+def likely_kind(laid: Sheet, mapped: Iterable[ColumnMapping] = ()) -> str:
+    """`rates` with a gyroscope's outputs and a rate or named sections; `poses` with a stage angle; `motion` with a
+    displacement; `positions` with three outputs; else `poses`.
+    """
+    names = {*(m.name for m in mapped), *laid.bare, *(_by_name(bare, "poses") for bare in laid.bare)}
+    turned = {*names, *(_by_name(bare, "rates") for bare in laid.bare)}
+    if {"rate_deg_s", "gx"} <= turned or (_section(laid) and {"gx", "gy", "gz"} <= turned):
+        return "rates"
+    if {"alpha_deg", "beta_deg"} & names:
+        return "poses"
+    if "displacement_m" in {*names, *(_by_name(bare, "motion") for bare in laid.bare)}:
+        return "motion"
+    if laid.named:
+        return "positions" if names.issuperset(OUTPUTS["poses"]) or names & set(OUTPUTS["positions"]) else "poses"
+    angles = [name for name in laid.header if _is_angle(sample_values(laid, name))]
+    return "poses" if len(angles) == 2 else "positions"
+
+
+def missing_columns(kind: str | None, laid: Sheet, mapped: Iterable[ColumnMapping]) -> list[str]:
+    """The columns that a table of this kind needs and that neither header nor mapping gives."""
+    given = {m.name for m in mapped} | set(laid.bare)
+    if kind == "rates" and "path" in given:
+        given.add("rate_deg_s")  # the sections of a session tell it
+    return [name for name in required_columns(kind, given) if name not in given]
+
+
+def required_columns(kind: str | None, given: Collection[str]) -> tuple[str, ...]:
+    """The columns that a table of this kind needs; of several sets the one nearest to `given`."""
+    return min(KINDS[kind], key=lambda wanted: len(set(wanted) - set(given))) if kind else ()
+
+
+def import_command(
+    laid: Sheet, kind: str | None, mapped: Sequence[ColumnMapping], constants: Sequence[str] = ()
+) -> str:
+    """The `rig import` command with this mapping."""
+    words = ["rig", "import", laid.name, *(["--kind", kind] if kind else [])]
+    words += [word for m in mapped for word in ("--column", replace(m, theirs=_shortest(laid, m.theirs)).text)]
+    words += [word for constant in constants for word in ("--constant", constant)]
+    return shlex.join(words)
+
+
+def _shortest(laid: Sheet, theirs: str) -> str:
+    """The file's column name without its unit, where that is unique."""
+    bare = split_unit(theirs)[0]
+    return bare if laid.bare.count(bare) == 1 else theirs
+
+
+def guess_by_names(laid: Sheet, values: Mapping[str, Array], kind: str) -> list[tuple[str, str]]:
+    """(their name, our name) for the columns with a meaningful name."""
+    bare = dict(zip(laid.header, laid.bare, strict=True))
+    units = dict(zip(laid.header, laid.units, strict=True))
+    said = [(name, _by_name(bare[name], kind) or _by_unit(bare[name], units[name])) for name in values]
+    named = {ours for _, ours in said}
+    nameless = iter(name for name in OUTPUTS[kind] if name not in named)
+    plain = {name: next(nameless, "") for name, ours in said if not ours and _is_output(bare[name])}
+    return [(name, ours or plain.get(name, "")) for name, ours in said if ours or plain.get(name)]
+
+
+def guess_by_values(values: Mapping[str, Array], kind: str) -> list[tuple[str, str]]:
+    """(their name, our name) for columns without names: time grows, angles lie on a grid, the others are outputs in
+    order.
+    """
+    left = dict(values)
+    found = []
+    clock = next((name for name, v in left.items() if len(v) > 2 and np.all(np.diff(v) > 0)), None)
+    if clock is not None and len(left) > 3:
+        found.append((clock, "t_s"))
+        left.pop(clock)
+    if kind == "poses":
+        angles = sorted((name for name, v in left.items() if _is_angle(v)), key=lambda name: len(np.unique(left[name])))
+        found += list(zip(angles[:2], ("alpha_deg", "beta_deg"), strict=False))
+        left = {name: v for name, v in left.items() if name not in angles[:2]}
+    return [*found, *zip(left, OUTPUTS[kind], strict=False)]
+
+
+def sample_values(laid: Sheet, name: str) -> Array:
+    """The first values of a column; none for a column of words."""
+    cells = [row[laid.header.index(name)] for row in laid.sample]
+    return np.array([parse_number(cell) for cell in cells]) if all(map(is_number, cells)) else np.zeros(0)
+
+
+def _by_name(bare: str, kind: str) -> str:
+    """Our name for theirs, "" for a name without a known meaning."""
+    words = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", bare)
+    axis = next((m["axis"] for m in re.finditer(AXIS, re.sub(r"[^a-z]", " ", words.lower()))), "")
+    lower = words.lower()
+    if bare in ("T", "Temp"):
+        return "temperature_c"
+    if axis and kind in STD_COLUMNS and re.search(SCATTER, lower):
+        return STD_COLUMNS[kind].format(axis=axis)
+    ours = next((ours for pattern, ours in NAME_PATTERNS[kind] if re.search(pattern, lower)), None)
+    if ours is not None:
+        return "" if "{axis}" in ours and not axis else ours.format(axis=axis)
+    last = re.search(r"(?:^|[_\W]|^v|^u|^a|acc|out)(?P<axis>[xyz])\d*$", lower)
+    axis = axis or (last["axis"] if last else "")
+    return dict(zip(AXES, OUTPUTS[kind], strict=False)).get(axis, "")
+
+
+def _by_unit(bare: str, unit: str) -> str:
+    """Our name by the unit alone: a temperature or a time."""
+    own = UNITS[unit][0] if unit else ""
+    return {"degC": "temperature_c", "s": "t_s"}.get(own, "") if bare else ""
+
+
+def _is_output(bare: str) -> bool:
+    return re.search(r"v?out|volt|signal|sensor|^v$|^u$|^ch|channel|ain|adc|acc", bare.lower()) is not None
+
+
+def _is_angle(values: Array) -> bool:
+    """Whether numbers lie on a grid of degrees within a turn either way, and some exceed a turn in rad."""
+    on_grid = np.all(np.abs(values * 4 - np.round(values * 4)) < 1e-6)
+    return bool(len(values) and on_grid and 2 * np.pi < np.max(np.abs(values)) <= 360)
+
+
+def _unit(laid: Sheet, name: str, ours: str, values: Array) -> str:
+    """The unit that the file states, if it fits; else the one that fits the values."""
+    stated, own = laid.units[laid.header.index(name)], column_unit(ours)
+    if stated:
+        return stated if not own or UNITS[stated][0] == own else ""
+    return likely_unit(ours, values)
+
+
+def _counts(values: Array) -> bool:
+    """Whether numbers can count averaged samples: whole, 1 or more, and not a running row number."""
+    running = len(values) > 2 and float(np.mean(np.diff(values) == 1)) > 0.5
+    return bool(np.all(values >= 1) and np.all(values % 1 == 0)) and not running
+
+
+def _section(laid: Sheet) -> str:
+    """The column of words that names each row's section; "" without one."""
+    words = [name for name in laid.header if laid.named and not len(sample_values(laid, name))]
+    return next((name for name in words if re.search(SECTION, name.lower())), "")
+
+
+def _with_sections(found: list[ColumnMapping], laid: Sheet) -> list[ColumnMapping]:
+    """The mapping with the section column, where no column gives the rate."""
+    given, section = {m.name for m in found} | set(laid.bare), _section(laid)
+    lacks = section and not {"rate_deg_s", "path"} & given
+    return [ColumnMapping("path", section), *found] if lacks else found
+
+
+def _with_scatter(found: list[ColumnMapping]) -> list[ColumnMapping]:
+    """The mapping in which a standard deviation has its output's unit."""
+    units = {m.name.replace("_v", "_std_v"): m.unit for m in found if m.name in OUTPUTS["poses"]}
+    return [replace(m, unit=m.unit or units.get(m.name, "")) for m in found]
+
+
+def _with_gravity(found: list[ColumnMapping], values: Mapping[str, Array]) -> list[ColumnMapping]:
+    """The mapping in which axes have the unit that gives 1 g, else counts; axes of a magnetometer uT, where it fits."""
+    for names, unit_of_all in ((OUTPUTS["positions"], gravity_unit), (OUTPUTS["fields"], field_unit)):
+        axes = {m.name: m.theirs for m in found if m.name in names and not m.unit and m.theirs in values}
+        if len(axes) == len(AXES):
+            unit = unit_of_all(np.column_stack([values[theirs] for theirs in axes.values()]))
+            found = [replace(m, unit=unit) if m.name in axes else m for m in found]
+    return found
+
+
+# The import that may be meant, which has been tried: the tail of a message about a column that is missing.
+#
+# The columns are those that names and values speak for (`proposal.py`). The file is taken by them and averaged as
+# `rig import` does it; a constant that only a person knows is tried with an example, and left open in the command.
+
+PLACEHOLDER = "YOURS"
+EXAMPLES = {  # of constants: a value to try with, and what it is
+    "sample_rate_hz": (100.0, "the sample rate in Hz"),
+    "turn_deg": (360.0, "the angle of each turn in deg"),
+}
+FEWEST_POSITIONS = 4  # the smallest model has as many parameters
+ImportSheet = Callable[[str, Sequence[ColumnMapping], Mapping[str, Constant]], Table]
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """A tried import: `lacking` columns, `unknown` constants, and the reason if it was refused."""
+
+    kind: str
+    columns: tuple[ColumnMapping, ...]
+    constants: Mapping[str, Constant]
+    lacking: tuple[str, ...] = ()
+    unknown: tuple[str, ...] = ()
+    refused: str = ""
+
+
+def suggest_import(
+    laid: Sheet, kind: str | None, mapped: Sequence[ColumnMapping], constants: Mapping[str, Constant], take: ImportSheet
+) -> str:
+    """The end of an error message: a likely import command. `import_sheet` raises DataError."""
+    kinds = [kind] if kind else likely_kinds(laid, mapped)
+    attempts = [_attempt(laid, each, mapped, constants, take) for each in kinds]
+    return _suggestion(laid, next((a for a in attempts if not a.refused), attempts[0]))
+
+
+def _attempt(
+    laid: Sheet, kind: str, mapped: Sequence[ColumnMapping], constants: Mapping[str, Constant], take: ImportSheet
+) -> Attempt:
+    columns = tuple(propose_mapping(laid, kind, mapped))
+    if lacking := missing_columns(kind, laid, columns):
+        return Attempt(kind, columns, constants, tuple(lacking))
+    known, unknown = dict(constants), []
+    while True:
+        try:
+            table = average_raw_log(take(kind, columns, known))
+            why = _objection(table, laid)
+        except MissingConstant as error:
+            if error.name in known:
+                why = str(error)
+            else:
+                known[error.name] = error.likely or EXAMPLES[error.name][0]
+                unknown += [] if error.likely else [error.name]
+                continue
+        except DataError as error:
+            why = str(error)
+        return Attempt(kind, columns, known, (), tuple(unknown), why)
+
+
+def _objection(table: Table, laid: Sheet) -> str:
+    """The reason why the tried table is implausible; "" for none."""
+    if table.kind == "positions" and table.n < FEWEST_POSITIONS:
+        return f"{table.source}: {table.n} positions; no model has fewer than {FEWEST_POSITIONS} parameters"
+    if table.kind == "positions" and not laid.named and not covers_all_directions(table.outputs):
+        return f"{table.source}: no three columns keep their magnitude over many directions"
+    return ""
+
+
+def _suggestion(laid: Sheet, tried: Attempt) -> str:
+    free = [name for name in laid.header if name not in {m.theirs for m in tried.columns}]
+    cannot = len(tried.lacking) == len(required_columns(tried.kind, ())) or len(tried.lacking) > len(free)
+    if not tried.columns or (not laid.named and (tried.lacking or tried.refused)) or (laid.named and cannot):
+        theirs = "such as vx_v=Vout:mV" if laid.named else "by its number, such as vx_v=2:mV"
+        return f"; name a column with --column, {theirs}"
+    columns = [*tried.columns, *(ColumnMapping(name, PLACEHOLDER) for name in tried.lacking)]
+    said = {k: PLACEHOLDER if k in tried.unknown else v for k, v in tried.constants.items()}
+    words = [f"{key}={value:.15g}" if isinstance(value, float) else f"{key}={value}" for key, value in said.items()]
+    line = f"\n\n    {import_command(laid, tried.kind, columns, words)}\n"
+    if tried.refused:
+        return f"\nThe most likely import fails: {tried.refused}{line}"
+    fill = f" (put {'; '.join(_placeholders(tried, free))})" if tried.lacking or tried.unknown else ""
+    return f"\nBy names and values, this import is likely{fill}:{line}"
+
+
+def _placeholders(tried: Attempt, free: Sequence[str]) -> list[str]:
+    """What a person has to fill in."""
+    if tried.lacking:
+        return [f"your column's name for {PLACEHOLDER}: {', '.join(free)}"]
+    return [f"{EXAMPLES[name][1]} for {PLACEHOLDER} in {name}" for name in tried.unknown]

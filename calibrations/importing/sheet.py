@@ -1,0 +1,368 @@
+"""A text as a sheet: its layout, and its rows as numbers and texts.
+
+numpy parses all rows in one pass, so that only the numbers take memory. Where numpy fails, rows are parsed one by one:
+this accepts texts and quoted decimal commas, and names a cell that is wrong.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import re
+from array import array
+from collections import Counter
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import chain, islice
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+from calibrations.errors import DataError
+from calibrations.importing.files import Source, text_source
+from calibrations.importing.units import parse_unit, split_unit
+from calibrations.table import Array, Constant
+
+# A JSON file of measurements as the lines of a table: named arrays of equal length, or a list of named values.
+#
+#     {"mag": [[-17.2, -2.1, 47.0], ...], "t_s": [0.0, ...], "unit": "uT"}      mag_x, mag_y, mag_z, t_s; # unit: uT
+#     [{"mx": -17.2, "my": -2.1, "mz": 47.0}, ...]
+#
+# An array of triples is three columns, by axis; of other lists, columns by number from 1. What is no array is a
+# constant.
+
+LONGEST_JSON = 1 << 26  # characters: a whole document is held in memory
+AXES = ("x", "y", "z")
+JSON_FORM = 'give arrays of equal length, {"mag": [[1, 2, 3], ...]}, or [{"mx": 1, ...}, ...]'
+
+
+def json_as_lines(source: Source) -> Source:
+    """The source itself, or its JSON document as comma-separated lines. Raises DataError."""
+    with source.lines() as lines:
+        first = next((line for line in lines if line.strip()), "").lstrip()
+        if not first.startswith(("{", "[")):
+            return source
+    with source.lines() as lines:
+        whole = "".join(_bounded(lines, source.name))
+    try:
+        document = json.loads(whole)
+    except (ValueError, RecursionError):
+        if source.name.endswith(".json"):
+            raise DataError(f"{source.name}: is not valid JSON; {JSON_FORM}") from None
+        return source
+    return text_source(_written(document, source.name), source.name)
+
+
+def _bounded(lines: Iterator[str], name: str) -> Iterator[str]:
+    size = 0
+    for line in lines:
+        size += len(line)
+        if size > LONGEST_JSON:
+            raise DataError(f"{name}: has more than {LONGEST_JSON >> 20} million characters of JSON; save it as CSV")
+        yield line
+
+
+def _written(document: Any, name: str) -> str:
+    if isinstance(document, list) and document and all(isinstance(row, dict) for row in document):
+        document = {key: [row.get(key) for row in document] for key in document[0]}
+    arrays = {k: v for k, v in document.items() if isinstance(v, list) and v} if isinstance(document, dict) else {}
+    if not arrays:
+        raise DataError(f"{name}: holds no arrays of measurements; {JSON_FORM}")
+    lengths = {key: len(values) for key, values in arrays.items()}
+    if len(set(lengths.values())) > 1:
+        raise DataError(f"{name}: arrays of different length: {lengths}")
+    columns = dict(chain.from_iterable(_columns(key, values, name) for key, values in arrays.items()))
+    out = io.StringIO()
+    out.writelines(
+        f"# {key}: {value}\n" for key, value in document.items() if isinstance(value, (str, int, float)) and value != ""
+    )
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(zip(*columns.values(), strict=True))
+    return out.getvalue()
+
+
+def _columns(key: str, values: list[Any], name: str) -> Iterator[tuple[str, list[Any]]]:
+    """The columns of one array. Raises DataError for rows of different length."""
+    if not isinstance(values[0], list):
+        yield key, values
+        return
+    width = len(values[0])
+    bad = next((k for k, row in enumerate(values) if not isinstance(row, list) or len(row) != width), None)
+    if bad is not None:
+        raise DataError(
+            f'{name}: row {bad + 1} of "{key}" does not have {width} numbers like the first row; {JSON_FORM}'
+        )
+    names = AXES if width == len(AXES) else [str(k + 1) for k in range(width)]
+    for place, end in enumerate(names):
+        yield f"{key}_{end}", [row[place] for row in values]
+
+
+# How a separated text is laid out, as its first lines show: separator, header, units, constants above the header.
+#
+# Any separator, or JSON (`json_arrays.py`); a header or none, units in the header's names or in a row below it,
+# decimal commas. The rows themselves are read by `calibrations/importing/cells.py`.
+
+HEAD_LINES = 200  # lines that the layout is taken from
+BLANK = " \t\r\n\x1a"
+_COMMA = re.compile(r",(?=\d+([eE]|$))")
+NAME = re.compile(r"[^\W\d][\w .()\[\]/°%^*+-]{0,39}|")  # of a column: words and a unit, or nothing
+NO_UNIT = ("", "-", "1", "n/a")
+Row = tuple[int, list[str]]  # the number of a line, from 1, and its cells
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """Layout of a text. `header` and `units` have one entry per column; `line` is the header's line, `first` the first
+    line of
+    data.
+
+    Without a header (`named` is false) columns are called "1", "2", ... `width` counts the cells of a row; it
+    exceeds the
+    number of columns where a spreadsheet appended empty cells. `sample` holds the first rows.
+    """
+
+    source: Source
+    separator: str | None
+    header: tuple[str, ...]
+    units: tuple[str, ...]
+    named: bool
+    width: int
+    line: int
+    first: int
+    sample: tuple[tuple[str, ...], ...]
+    constants: dict[str, Constant]
+
+    @property
+    def name(self) -> str:
+        """The name in messages."""
+        return self.source.name
+
+    @property
+    def bare(self) -> tuple[str, ...]:
+        """The header's names without units."""
+        return tuple(split_unit(name)[0] for name in self.header)
+
+    def rows(self) -> Iterator[Row]:
+        """Iterate over the rows of data. Raises DataError for a row of another width."""
+        with self.source.lines() as lines:
+            for number, cells in split_rows(islice(lines, self.first - 1, None), self.separator, self.name, self.first):
+                if len(cells) != self.width:
+                    raise DataError(_another_width(self.name, number, cells, self.header))
+                yield number, cells
+
+
+def read_sheet(source: Source) -> Sheet:
+    """The layout of `source`. Raises DataError with file and line."""
+    source = json_as_lines(source)
+    constants, start, head = _head(source)
+    separator = _separator(head)
+    rows = list(split_rows(head, separator, source.name, start + 1))
+    if not rows:
+        raise DataError(f"{source.name}: the file is empty: a header line with column names is missing")
+    width = _width(rows)
+    rows = _without_titles(rows, width, constants)
+    (line, header), named = rows[0], not all(map(is_number, rows[0][1]))
+    if named and len(header) != width and len(rows) > 1:
+        raise DataError(_another_width(source.name, *rows[1], header))
+    columns = width - _empty_behind([cells for _, cells in rows if len(cells) == width])
+    header = _checked(header[:columns], f"{source.name}, line {line}") if named else list(map(str, range(1, width + 1)))
+    below, units = _units(header, rows[1 if named else 0 :], named)
+    if not below:
+        raise DataError(f"{source.name}: there are no rows below the header")
+    sample = tuple(tuple(cells[:columns]) for _, cells in below if len(cells) == width)
+    if not sample:
+        raise DataError(_another_width(source.name, *below[0], header))
+    if not any(is_number(cell) for cells in sample for cell in cells):
+        raise DataError(
+            f"{source.name}: holds no numbers in its first {len(sample)} rows; a table of measurements has a header "
+            "line with column names, and rows of numbers below it"
+        )
+    return Sheet(
+        source, separator, tuple(header[:columns]), tuple(units), named, width, line, below[0][0], sample, constants
+    )
+
+
+def split_rows(lines: Iterable[str], separator: str | None, name: str, first: int) -> Iterator[Row]:
+    """The rows that are not blank; `first` is the number of the first line. Raises DataError."""
+    if separator is None:
+        yield from ((k, line.split()) for k, line in enumerate(lines, first) if line.strip(BLANK))
+        return
+    reader = csv.reader(lines, delimiter=separator)
+    try:
+        for row in reader:
+            cells = [cell.strip(BLANK) for cell in row]
+            if any(cells):
+                yield first + reader.line_num - 1, cells
+    except csv.Error as error:
+        raise DataError(f"{name}: cannot be split into columns: {error}") from None
+
+
+def parse_number(cell: str) -> float:
+    """The number in a cell, with decimal point or decimal comma. Raises ValueError."""
+    if "_" in cell:
+        raise ValueError(cell)  # float() would take 1_000
+    return float(_COMMA.sub(".", cell) if "," in cell else cell)
+
+
+def is_number(cell: str) -> bool:
+    """Whether a cell holds a finite number."""
+    return isinstance(value := number_or_text(cell), float) and abs(value) != float("inf") and value == value
+
+
+def number_or_text(cell: str) -> Constant:
+    """The cell as a number, or else as it is."""
+    try:
+        return parse_number(cell)
+    except ValueError:
+        return cell
+
+
+def _head(source: Source) -> tuple[dict[str, Constant], int, list[str]]:
+    """The `# key: value` lines, their count, and the first lines below them."""
+    constants: dict[str, Constant] = {}
+    with source.lines() as lines:
+        for start, line in enumerate(lines):
+            plain = line.strip(BLANK)
+            if plain and not plain.startswith("#"):
+                return constants, start, [line, *islice(lines, HEAD_LINES)]
+            key, colon, value = plain.lstrip("#").rstrip(";,\t ").partition(":")
+            if colon and key.strip():
+                constants[key.strip()] = number_or_text(value.strip())
+    raise DataError(f"{source.name}: the file is empty: a header line with column names is missing")
+
+
+def _separator(head: Sequence[str]) -> str | None:
+    """The separator in a line from the middle of the head; None for blanks."""
+    filled = [line for line in head if line.strip(BLANK)]
+    return next((s for s in (";", "\t", ",") if s in filled[len(filled) // 2].strip(" \r\n")), None)
+
+
+def _width(rows: Sequence[Row]) -> int:
+    return Counter(len(cells) for _, cells in rows).most_common(1)[0][0]
+
+
+def _without_titles(rows: list[Row], width: int, constants: dict[str, Constant]) -> list[Row]:
+    """The rows without titles above the header; pairs such as `Fs,100` go to `constants`."""
+    first = next((k for k, (_, cells) in enumerate(rows) if not _is_title(cells, width)), 0)
+    for _, cells in rows[:first]:
+        filled = [cell for cell in cells if cell]
+        if len(filled) == 2:
+            constants[filled[0].rstrip(":")] = number_or_text(filled[1])
+    return rows[first:]
+
+
+def _is_title(cells: list[str], width: int) -> bool:
+    """Whether a row is narrower than the table, or filled up with empty cells by a spreadsheet."""
+    if len(cells) != width:
+        return len(cells) < 3 or any(map(is_number, cells)) or not all(cells)
+    if width < 3 or any(cells[2:]):
+        return False
+    return width > 3 or not cells[1] or is_number(cells[1])
+
+
+def _empty_behind(rows: Sequence[list[str]]) -> int:
+    """Number of empty columns at the right end, header included."""
+    ends = (next((k for k, cell in enumerate(reversed(cells)) if cell), len(cells)) for cells in rows)
+    return min(ends, default=0)
+
+
+def _checked(header: list[str], where: str) -> list[str]:
+    if "" in header:
+        raise DataError(f"{where}: a column has no name" + _names(header, ": {}") + "; name every column")
+    if twice := next((name for name in header if header.count(name) > 1), None):
+        raise DataError(f'{where}: the column "{twice}" occurs twice; rename one')
+    return header
+
+
+def _units(header: Sequence[str], rows: list[Row], named: bool) -> tuple[list[Row], list[str]]:
+    """The rows of data, and a unit for each column: from the header, or from a row of units below it."""
+    units = [split_unit(name)[1] for name in header]
+    if named and rows and len(rows[0][1]) >= len(header) and _is_units(rows[0][1]):
+        below = map(parse_unit, rows[0][1])
+        return rows[1:], [unit or other for unit, other in zip(units, below, strict=False)]
+    return rows, units
+
+
+def _is_units(cells: Sequence[str]) -> bool:
+    """Whether cells hold no numbers, and most of the filled ones are units."""
+    said = [cell for cell in cells if cell not in NO_UNIT]
+    return bool(said) and not any(map(is_number, said)) and 2 * sum(map(bool, map(parse_unit, said))) >= len(said)
+
+
+def _another_width(name: str, line: int, cells: Sequence[str], header: Sequence[str]) -> str:
+    return f"{name}, line {line}: {len(cells)} values for {len(header)} columns{_names(header)}"
+
+
+def _names(header: Sequence[str], form: str = " ({})") -> str:
+    """The columns' names for a message; "" where they do not look like names, so that no binary text is printed."""
+    return form.format(", ".join(header)) if look_like_names(header) else ""
+
+
+def look_like_names(header: Iterable[str]) -> bool:
+    """Whether the header consists of words, as column names do."""
+    return all(NAME.fullmatch(name) for name in header)
+
+
+def read_cells(sheet: Sheet, texts: Collection[str]) -> tuple[Mapping[str, Array], Mapping[str, tuple[str, ...]]]:
+    """Every column by its name in the header: columns of numbers, and the columns in `texts`.
+
+    Raises DataError with file, line and column.
+    """
+    if not texts and (numbers := _at_once(sheet)) is not None:
+        return dict(zip(sheet.header, numbers.T, strict=True)), {}
+    return _one_by_one(sheet, texts)
+
+
+def _at_once(sheet: Sheet) -> Array | None:
+    """All cells as numbers, shape (rows, columns); None if a cell is not a number."""
+    if len(sheet.header) != sheet.width:
+        return None
+    comma = sheet.separator != "," and any("," in cell for row in sheet.sample for cell in row)
+    with sheet.source.lines() as lines:
+        for _ in range(sheet.first - 1):
+            next(lines)
+        given = (line.replace(",", ".") for line in lines) if comma else lines
+        try:
+            first = next(given)  # numpy warns of an iterator without any
+            numbers = np.loadtxt(
+                chain([first], given), delimiter=sheet.separator, ndmin=2, comments=None, quotechar='"'
+            )
+        except UnicodeError:
+            raise
+        except ValueError:
+            return None
+    return numbers if numbers.shape[1] == sheet.width and np.isfinite(numbers).all() else None
+
+
+def _one_by_one(sheet: Sheet, texts: Collection[str]) -> tuple[Mapping[str, Array], Mapping[str, tuple[str, ...]]]:
+    numbers = {name: array("d") for name in sheet.header if name not in texts}
+    words: dict[str, list[str]] = {name: [] for name in sheet.header if name in texts}
+    places = list(enumerate(sheet.header))
+    for row in sheet.rows():
+        for k, name in places:
+            if name in words:
+                words[name].append(row[1][k])
+            else:
+                numbers[name].append(_number(sheet, row, k))
+    return (
+        {name: np.frombuffer(values, dtype=np.float64) for name, values in numbers.items()},
+        {name: tuple(values) for name, values in words.items()},
+    )
+
+
+def _number(sheet: Sheet, row: Row, k: int) -> float:
+    """The number in cell `k`. Raises DataError with line and column."""
+    line, cells = row
+    try:
+        value = parse_number(cells[k])
+    except ValueError:
+        what = f'"{cells[k]}" where a number belongs' if cells[k] else "empty where a number belongs"
+    else:
+        if isfinite(value):
+            return value
+        what = f'"{cells[k]}" is not a finite number'
+    where = f'{sheet.name}, line {line}, column "{sheet.header[k]}"'
+    raise DataError(f"{where}: {what}; correct the cell or remove the row")

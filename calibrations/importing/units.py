@@ -1,0 +1,84 @@
+"""Units of foreign columns and their conversion to V, deg, degC and s; outputs of positions keep their unit."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibrations.errors import DataError
+
+# unit -> (unit of the target column, factor, offset)
+UNITS: Mapping[str, tuple[str, float, float]] = {
+    "V": ("V", 1.0, 0.0), "mV": ("V", 1e-3, 0.0), "uV": ("V", 1e-6, 0.0),
+    "deg": ("deg", 1.0, 0.0), "rad": ("deg", 180 / np.pi, 0.0), "mrad": ("deg", 0.18 / np.pi, 0.0),
+    "degC": ("degC", 1.0, 0.0), "K": ("degC", 1.0, -273.15), "degF": ("degC", 5 / 9, -160 / 9),
+    "s": ("s", 1.0, 0.0), "ms": ("s", 1e-3, 0.0), "us": ("s", 1e-6, 0.0),
+    "min": ("s", 60.0, 0.0), "h": ("s", 3600.0, 0.0),
+    "m": ("m", 1.0, 0.0), "mm": ("m", 1e-3, 0.0), "um": ("m", 1e-6, 0.0),
+    "g": ("g", 1.0, 0.0), "mg": ("g", 1e-3, 0.0), "m/s2": ("m/s2", 1.0, 0.0),
+    "count": ("count", 1.0, 0.0), "counts": ("count", 1.0, 0.0), "uT": ("uT", 1.0, 0.0),
+    "deg/s": ("deg/s", 1.0, 0.0), "rad/s": ("deg/s", 180 / np.pi, 0.0),
+}  # fmt: skip
+SUFFIXES = {"_deg_s": "deg/s", "_v": "V", "_deg": "deg", "_c": "degC", "_s": "s", "_m": "m"}
+SPELLINGS = {
+    "volt": "V", "volts": "V", "millivolt": "mV", "millivolts": "mV", "°": "deg", "degree": "deg", "degrees": "deg",
+    "radian": "rad", "radians": "rad", "°c": "degC", "c": "degC", "celsius": "degC", "kelvin": "K", "°f": "degF",
+    "f": "degF", "fahrenheit": "degF", "sec": "s", "second": "s", "seconds": "s", "minute": "min", "minutes": "min",
+    "hour": "h", "hours": "h", "hr": "h", "µs": "us", "µv": "uV", "µm": "um", "µt": "uT", "m/s^2": "m/s2",
+    "m/s²": "m/s2", "m/s**2": "m/s2", "ms^-2": "m/s2", "lsb": "counts", "raw": "counts", "cnt": "counts",
+    "°/s": "deg/s", "dps": "deg/s", "milli-g": "mg",
+}  # fmt: skip
+_IN_NAME = re.compile(r"^(?P<name>.*?)\s*(?:\((?P<round>[^()]*)\)|\[(?P<square>[^\[\]]*)\]|/\s*(?P<slash>[^\s/()]+))$")
+
+
+def parse_unit(text: str) -> str:
+    """The unit that `text` spells (`°C`, `m/s²`, `volts`, `mV`) in this program's spelling; "" for no known unit."""
+    plain = text.strip().strip("()[]").strip().replace("\N{GREEK SMALL LETTER MU}", "\N{MICRO SIGN}")
+    if plain in UNITS:
+        return plain
+    lower = plain.lower()
+    once = {unit.lower(): unit for unit in UNITS if unit.lower() != "k"}  # a k alone is kilo more often than kelvin
+    return SPELLINGS.get(lower) or once.get(lower, "")
+
+
+def split_unit(header: str) -> tuple[str, str]:
+    """`Vx (mV)`, `Vx [mV]` or `Vx / mV` as ("Vx", "mV"); (header, "") for a header without a unit."""
+    found = _IN_NAME.match(header)
+    if found and found["name"]:
+        unit = parse_unit(found["round"] or found["square"] or found["slash"] or "")
+        if unit:
+            return found["name"].strip(), unit
+    return header, ""
+
+
+def column_unit(name: str) -> str:
+    """The unit of our column `name`, such as V for `vx_v`; "" where the table states it, or for a bare number."""
+    return next((unit for suffix, unit in SUFFIXES.items() if name.endswith(suffix)), "")
+
+
+@dataclass(frozen=True)
+class ColumnMapping:
+    """One column: our name, the file's name, and the file's unit ("" where it is ours)."""
+
+    name: str
+    theirs: str
+    unit: str = ""
+
+    @property
+    def text(self) -> str:
+        """The mapping as `--column` takes it: `vx_v=Vout:mV`."""
+        return f"{self.name}={self.theirs}{f':{self.unit}' if self.unit else ''}"
+
+    @staticmethod
+    def parse(text: str) -> ColumnMapping:
+        """Parse `vx_v=Vout:mV` or `vx_v=Vout`. Raises DataError."""
+        name, equals, rest = text.partition("=")
+        bare, _, last = rest.rpartition(":")
+        unit = parse_unit(last) if bare else ""
+        theirs = bare if unit else rest
+        if not equals or not name.strip() or not theirs.strip() or (not bare and ":" in rest and parse_unit(last)):
+            raise DataError(f'"{text}": write a column as NAME=THEIRS or NAME=THEIRS:UNIT, such as vx_v=Vout:mV')
+        return ColumnMapping(name.strip(), theirs.strip(), unit)

@@ -1,0 +1,71 @@
+"""The loop of model and measurement, the same for every kind of data: compare, diagnose, discover, add."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, overload
+
+from calibrations.discovery.dataset import Dataset
+from calibrations.discovery.results import Comparison, Diagnosis, Discovery
+from calibrations.discovery.rows import Rows
+from calibrations.effects import Effect
+from calibrations.effects.catalogue import catalogue
+from calibrations.fit import Fit
+from calibrations.model import Model
+from calibrations.table import Table
+
+if TYPE_CHECKING:
+    from calibrations.noise.dataset import StillRecord
+    from calibrations.noise.fit import NoiseFit
+    from calibrations.noise.record import Still
+
+Effects = Mapping[str, Effect]
+
+
+@overload
+def dataset(data: Table) -> Rows: ...
+@overload
+def dataset(data: Still) -> StillRecord: ...
+def dataset(data: Table | Still) -> Dataset[Any]:
+    """The data as the loop sees them."""
+    if isinstance(data, Table):
+        return Rows(data)
+    from calibrations.noise.dataset import StillRecord  # a table needs no noise engine
+
+    return StillRecord(data)
+
+
+@overload
+def compare(data: Table, model: Model) -> Comparison[Fit]: ...
+@overload
+def compare(data: Still, model: Model) -> Comparison[NoiseFit]: ...
+def compare(data: Table | Still, model: Model) -> Comparison[Any]:
+    """The model as it is, or fitted first where it has no values yet. Raises what `fit` raises."""
+    return dataset(data).compare(model)
+
+
+@overload
+def diagnose(data: Table, model: Model, effects: Effects | None = None) -> Diagnosis[Fit]: ...
+@overload
+def diagnose(data: Still, model: Model, effects: Effects | None = None) -> Diagnosis[NoiseFit]: ...
+def diagnose(data: Table | Still, model: Model, effects: Effects | None = None) -> Diagnosis[Any]:
+    """What `model` misses on the data. Raises what `fit` raises."""
+    return dataset(data).diagnose(model, catalogue() if effects is None else effects)
+
+
+@overload
+def discover(data: Table, model: Model, effects: Effects | None = None) -> Discovery[Fit]: ...
+@overload
+def discover(data: Still, model: Model, effects: Effects | None = None) -> Discovery[NoiseFit]: ...
+def discover(data: Table | Still, model: Model, effects: Effects | None = None) -> Discovery[Any]:
+    """`model` with all effects that it misses on the data. Raises what `fit` raises."""
+    return dataset(data).discover(model, catalogue() if effects is None else effects)
+
+
+@overload
+def add(effect: Effect, model: Model, data: Table, effects: Effects | None = None) -> Discovery[Fit]: ...
+@overload
+def add(effect: Effect, model: Model, data: Still, effects: Effects | None = None) -> Discovery[NoiseFit]: ...
+def add(effect: Effect, model: Model, data: Table | Still, effects: Effects | None = None) -> Discovery[Any]:
+    """`model` with one effect more, both fitted to the data. Raises ModelError, and what `fit` raises."""
+    return dataset(data).add(effect, model, catalogue() if effects is None else effects)

@@ -1,0 +1,150 @@
+"""The signal chain: from stage angles to the output, and back from the output to the specific force.
+
+    pose -> force -> transduction -> output
+
+Forward for `poses`, where the orientation is known, and for samples of `motion`, where the reference acceleration adds
+to gravity and the output filter and the converter's skew stand behind the transduction; backward for `positions`, where
+only the magnitude of gravity is known. The backward way solves the same functions, so that an effect is written once.
+What is a specific force for an accelerometer is the angular rate for a gyroscope, in deg/s, and for a magnetometer the
+field as a share of its strength.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+
+from calibrations.effects import Effect, Values
+from calibrations.geometry.orientation import nominal_pose, specific_force
+from calibrations.geometry.rate_table import rate_deg_s
+from calibrations.motion.spectrum import sample_output
+from calibrations.table import Array, Table
+
+Step = tuple[Effect, Values]
+
+
+def force(table: Table, steps: Sequence[Step]) -> Array:
+    """Specific force along the sensing axes, g, shape (n, 3); of a gyroscope the angular rate, deg/s."""
+    return sensed(static_force(table, steps), table, steps)
+
+
+def static_force(table: Table, steps: Sequence[Step]) -> Array:
+    """The same along the reference axes."""
+    if table.kind == "rates":
+        return rate_deg_s(table)
+    pose = nominal = nominal_pose(table)
+    for effect, p in steps:
+        pose = effect.pose(pose, table, p)
+    a = _reported(table).copy() if pose is nominal else specific_force(pose)
+    if table.kind == "motion":  # along the sensor's reference edge x, Ang V
+        a[:, 0] += table.column("acceleration_m_s2") / table.gravity_m_s2
+    return a
+
+
+@lru_cache(maxsize=2)
+def _reported(table: Table) -> Array:
+    """Static specific force at the poses that the stages report, g, shape (n, 3)."""
+    return specific_force(nominal_pose(table))
+
+
+def sensed(a: Array, table: Table, steps: Sequence[Step]) -> Array:
+    """Specific force along the sensing axes from that along the reference axes, g, shape (n, 3)."""
+    for effect, p in steps:
+        a = effect.force(a, table, p)
+    return a
+
+
+def respond(a: Array, table: Table, steps: Sequence[Step]) -> Array:
+    """Output of all three axes to the specific force `a` along the sensing axes, shape (n, 3)."""
+    return converted(added(a, table, steps), len(a), table, steps)
+
+
+def added(a: Array, table: Table, steps: Sequence[Step]) -> list[Array]:
+    """What each effect adds to the output of all three axes, shape (n, 3) each; zeros, (1, 3), where nothing."""
+    return [effect.transduction(a, table, p) for effect, p in steps]
+
+
+def converted(parts: Sequence[Array], n: int, table: Table, steps: Sequence[Step]) -> Array:
+    """The sum of the parts as it is read out, shape (n, 3)."""
+    v = np.zeros((n, 3))
+    for part in parts:
+        v += part
+    if table.kind == "motion":
+        v = sample_output(v, table)
+    for effect, p in steps:
+        v = effect.output(v, table, p)
+    return v
+
+
+def forward(table: Table, steps: Sequence[Step]) -> Array:
+    """Predicted output of the measured axes, in the table's unit, shape (n, axes)."""
+    return respond(force(table, steps), table, steps)[:, : len(table.axes)]
+
+
+def backward(table: Table, steps: Sequence[Step], tolerance: float = 1e-12) -> Array:
+    """Specific force along the reference axes that gives the measured output, g, shape (n, 3): Newton's method."""
+
+    def output(a: Array) -> Array:
+        return respond(sensed(a, table, steps), table, steps)
+
+    a = np.zeros((table.n, 3))
+    for _ in range(20):
+        error = table.outputs - output(a)
+        step = _solved(_slope(output, a), error)
+        a = a + step
+        if not np.max(np.abs(step)) > tolerance:
+            break
+    return a
+
+
+def _solved(slope: Array, error: Array) -> Array:
+    """Steps (n, 3) that take off errors (n, 3); none along what a row's slope (3, 3) does not show."""
+    try:
+        return np.asarray(np.linalg.solve(slope, error[:, :, None])[:, :, 0])
+    except np.linalg.LinAlgError:
+        return np.asarray((np.linalg.pinv(slope) @ error[:, :, None])[:, :, 0])
+
+
+def _slope(output: Callable[[Array], Array], a: Array, h: float = 1e-4) -> Array:
+    """d output / d a at each row, shape (n, 3, 3)."""
+    columns = [(output(a + h * e) - output(a - h * e)) / (2 * h) for e in np.eye(3)]
+    return np.stack(columns, axis=2)
+
+
+@dataclass(frozen=True)
+class Near:
+    """The chain with the values of `steps`."""
+
+    table: Table
+    steps: Sequence[Step]
+
+    @cached_property
+    def _static(self) -> Array:
+        return static_force(self.table, self.steps)
+
+    @cached_property
+    def _sensed(self) -> Array:
+        return sensed(self._static, self.table, self.steps)
+
+    @cached_property
+    def _added(self) -> list[Array]:
+        return added(self._sensed, self.table, self.steps)
+
+    def output(self, term: int, values: Values) -> Array:
+        """Output of the measured axes with other `values` of one effect, up to a constant, shape (n, axes).
+
+        Where an effect only adds to the output, that is what it adds: beside the sum of all, digits would be lost.
+        """
+        effect = self.steps[term][0]
+        steps = [*self.steps[:term], (effect, values), *self.steps[term + 1 :]]
+        if effect.places & {"pose", "force"}:
+            static = static_force(self.table, steps) if "pose" in effect.places else self._static
+            parts = added(sensed(static, self.table, steps), self.table, steps)
+        elif not any("output" in other.places for other, _ in steps):
+            parts = added(self._sensed, self.table, [steps[term]])
+        else:
+            parts = [*self._added[:term], *added(self._sensed, self.table, [steps[term]]), *self._added[term + 1 :]]
+        return converted(parts, self.table.n, self.table, steps)[:, : len(self.table.axes)]

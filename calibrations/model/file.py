@@ -1,0 +1,214 @@
+"""Models as YAML: the shipped ones by name, and files that keep values, uncertainties and provenance."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from calibrations.effects import Effect
+from calibrations.effects.catalogue import catalogue, find
+from calibrations.effects.expression_effect import own_effect
+from calibrations.errors import ModelError, UnknownName, nearest
+from calibrations.importing.files import load_yaml
+from calibrations.model import Estimate, Model, Term
+from calibrations.table import NUMBERS
+
+SHIPPED = Path(__file__).parents[1] / "models"
+SCHEMA = "rig.model/1"
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", populate_by_name=True)
+
+
+class _Parameter(_Strict):
+    name: str
+    axis: Literal["x", "y", "z"] | None = None
+    value: float = Field(allow_inf_nan=False)
+    std: float | None = Field(default=None, allow_inf_nan=False)
+    unit: str = ""
+    identified: bool = True
+    why: str | None = None
+
+
+class _Effect(_Strict):
+    effect: str
+    expression: str | None = None
+    columns: list[str] = []
+    tied: bool = False
+    constants: dict[str, float] = {}
+    parameters: list[_Parameter] = []
+
+
+class _File(_Strict):
+    schema_: Literal["rig.model/1"] = Field(alias="schema")
+    name: str
+    unit: str = ""
+    effects: list[_Effect] = Field(min_length=1)
+    provenance: dict[str, str | float] = {}
+    covered: dict[str, tuple[float, float]] = {}
+
+
+def shipped_names() -> tuple[str, ...]:
+    """Names of the models that come with the program."""
+    return tuple(sorted(path.stem for path in SHIPPED.glob("*.yaml")))
+
+
+def read_model(name_or_path: str | Path, effects: Mapping[str, Effect] | None = None) -> Model:
+    """A shipped model by name, or a model file. Raises UnknownName or ModelError naming file and key."""
+    path = SHIPPED / f"{name_or_path}.yaml"
+    if str(name_or_path) not in shipped_names():
+        path = Path(name_or_path)
+        if path.suffix not in (".yaml", ".yml") and not path.exists():
+            raise UnknownName(
+                f'no shipped model and no file is called "{name_or_path}"{nearest(str(name_or_path), shipped_names())}'
+            )
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise ModelError(f"{path}: the model file cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError as error:
+        raise ModelError(f"{path}: is not text (byte {error.start}); is it really a model file?") from None
+    return parse_model(text, str(path), effects)
+
+
+def parse_model(text: str, source: str, effects: Mapping[str, Effect] | None = None) -> Model:
+    """The model in YAML `text`. Raises ModelError or UnknownName."""
+    try:
+        document = load_yaml(text)
+    except ValueError as error:
+        raise ModelError(f"{source}: is not YAML: {error}") from None
+    if not isinstance(document, dict):
+        raise ModelError(f"{source}: is not a model: a model file is a mapping that begins with `schema: {SCHEMA}`")
+    try:
+        content = _File.model_validate(document)
+    except ValidationError as error:
+        # a misspelt key is also a missing one: the key that is there is what the person can find
+        first = min(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
+        key = ".".join(str(part) for part in first["loc"])
+        raise ModelError(f"{source}, key {key}: {_fault(first)}") from None
+    known = catalogue() if effects is None else effects
+    terms = tuple(_term(entry, source, known, content.unit) for entry in content.effects)
+    names = [term.name for term in terms]
+    if len(set(names)) < len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise ModelError(f'{source}: the effect "{twice}" stands in the model twice')
+    return Model(content.name, terms, content.unit, content.provenance, content.covered)
+
+
+def _fault(error: Any) -> str:
+    if error["type"] == "missing":
+        return "is missing"
+    if error["type"] != "extra_forbidden":
+        return f"{error['msg']}, is {error['input']!r}"
+    places: Mapping[int, type[BaseModel]] = {1: _File, 3: _Effect}  # such as effects, 0, parameters, 1, axis
+    place = places.get(len(error["loc"]), _Parameter)
+    return f"no such key{nearest(str(error['loc'][-1]), [field.strip('_') for field in place.model_fields])}"
+
+
+def _term(entry: _Effect, source: str, known: Mapping[str, Effect], unit: str) -> Term:
+    """`unit` is that of the model's outputs, "" where the file gives none."""
+    effect = _written(entry, source, known) if entry.expression is not None else _known(entry, source, known)
+    _check_parameters(entry, effect, f"{source}: {entry.effect}")
+    units = {p.name: _unit(p, effect, unit, f"{source}: {entry.effect}") for p in entry.parameters}
+    for name in entry.constants:
+        if name not in effect.constants:
+            raise ModelError(f'{source}: {entry.effect} has no constant "{name}"{nearest(name, effect.constants)}')
+    given = tuple(
+        Estimate(p.name, p.axis or "", p.value, p.std, units[p.name], p.identified, p.why) for p in entry.parameters
+    )
+    return Term(effect, entry.tied, given, entry.constants)
+
+
+def _known(entry: _Effect, source: str, known: Mapping[str, Effect]) -> Effect:
+    if entry.columns:
+        raise ModelError(f"{source}: {entry.effect} has columns, and no expression that they stand in")
+    try:
+        return find(entry.effect, known)
+    except UnknownName as error:
+        raise UnknownName(
+            f"{source}: {error}; your own effects are found with --bench (its key folders.effects)"
+        ) from None
+
+
+def _written(entry: _Effect, source: str, known: Mapping[str, Effect]) -> Effect:
+    """The effect of an expression: all of it is in the file, and nothing in the file is run."""
+    if entry.effect in known:
+        raise ModelError(f"{source}: {entry.effect} is known already; an expression needs a name of its own")
+    try:
+        return own_effect(entry.effect, entry.expression or "", tuple(entry.columns))
+    except ModelError as error:
+        raise type(error)(f"{source}: {entry.effect}: {error}") from None
+
+
+def _check_parameters(entry: _Effect, effect: Effect, where: str) -> None:
+    declared = {p.name: p.per_axis and not entry.tied for p in effect.parameters}
+    for p in entry.parameters:
+        if p.name not in declared:
+            raise ModelError(f'{where} has no parameter "{p.name}"{nearest(p.name, declared)}')
+        if declared[p.name] and p.axis is None:
+            raise ModelError(f'{where}: "{p.name}" has one value for each axis; it needs `axis: x`, y or z')
+        if not declared[p.name] and p.axis is not None:
+            raise ModelError(f'{where}: "{p.name}" has one value and no axis; it stands for axis {p.axis}')
+    given = [(p.name, p.axis) for p in entry.parameters]
+    if twice := next((key for key in given if given.count(key) > 1), None):
+        raise ModelError(f"{where}: {' '.join(filter(None, twice))} is given twice")
+
+
+def _unit(given: _Parameter, effect: Effect, unit: str, where: str) -> str:
+    """The unit of a parameter: the declared one, for outputs in `unit`. Raises ModelError where the file gives another.
+
+    A file that gives a parameter's unit in terms of the output's must give the output's unit too.
+    """
+    declared = next(p.unit for p in effect.parameters if p.name == given.name)
+    known, own = bool(unit) or "{out}" not in declared, declared.replace("{out}", unit)
+    if not given.unit:
+        return own if known else ""
+    if known and given.unit == own:
+        return own
+    parameter = " ".join(filter(None, (f'the unit of "{given.name}"', given.axis)))
+    if not known:
+        raise ModelError(f"{where}: {parameter} is {given.unit}; give the unit of the outputs too, such as `unit: V`")
+    condition = f" in a model with `unit: {unit}`" if "{out}" in declared else ""
+    raise ModelError(
+        f"{where}: {parameter} is {given.unit}, and must be {own}{condition}; "
+        "values are not converted: correct the unit, or convert value and std by hand"
+    )
+
+
+def dump_model(model: Model) -> str:
+    """The model as YAML text; `parse_model` gives it back, to the last bit."""
+    content = {
+        "schema": SCHEMA,
+        "name": model.name,
+        "unit": model.unit,
+        "effects": [_dump_term(term) for term in model.terms],
+        "provenance": dict(model.provenance),
+    }
+    if model.covered:
+        content["covered"] = {name: list(span) for name, span in model.covered.items()}
+    return yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=100)
+
+
+def _dump_term(term: Term) -> dict[str, Any]:
+    entry: dict[str, Any] = {"effect": term.name}
+    if term.effect.expression:
+        entry["expression"] = term.effect.expression
+        if columns := [name for name in term.effect.needs if name not in NUMBERS]:
+            entry["columns"] = columns
+    if term.tied:
+        entry["tied"] = True
+    if term.constants:
+        entry["constants"] = {name: float(value) for name, value in term.constants.items()}
+    if term.estimates:
+        entry["parameters"] = [_dump_estimate(e) for e in term.estimates]
+    return entry
+
+
+def _dump_estimate(e: Estimate) -> dict[str, Any]:
+    entry: dict[str, Any] = {"name": e.name, "axis": e.axis or None, "value": e.value, "std": e.std, "unit": e.unit}
+    return entry if e.identified else entry | {"identified": False, "why": e.why}

@@ -1,0 +1,161 @@
+"""A model: an ordered list of effects, with the values, uncertainties and provenance of their parameters.
+
+A model is a frozen value. Fitting or adding an effect makes a new one; the old one stays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+from calibrations.effects import Effect
+from calibrations.errors import UnknownParameter, nearest
+from calibrations.presentation.result import Shown
+from calibrations.presentation.text import columns, concise
+from calibrations.table import Table
+
+NOT_FITTED = 'the model has no values yet, and none for "{}"; fit it to data first'
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One parameter's value and standard uncertainty (GUM), in `unit`. `axis` is "" if it has none."""
+
+    name: str
+    axis: str
+    value: float
+    std: float | None
+    unit: str
+    identified: bool = True
+    why: str | None = None  # why it is not identified
+
+    @property
+    def text(self) -> str:
+        """Value, uncertainty and unit for people; the reason, where the data does not identify it."""
+        return concise(self.value, self.std, self.unit) if self.identified else f"not identified: {self.why}"
+
+    def __repr__(self) -> str:
+        return f"<{' '.join(filter(None, (self.name, self.axis)))}: {self.text}>"
+
+
+@dataclass(frozen=True)
+class Term:
+    """One effect in a model. `tied`: one value serves all axes."""
+
+    effect: Effect
+    tied: bool = False
+    estimates: tuple[Estimate, ...] = ()
+    constants: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        """The effect's name."""
+        return self.effect.name
+
+
+class Parameters(Mapping[str, Estimate]):
+    """The estimates of a model by key, in order.
+
+    A key is EFFECT.PARAMETER.AXIS. PARAMETER is missing where the effect has only one, AXIS where one value serves all
+    axes: "bias.x", "z-axis-scale.slope.x", "axis-misalignment.z". Also accepted are the whole form, "bias.bias.x", and
+    the beginning of a single key, such as "scale-factor" in the model `common-scale`.
+    """
+
+    def __init__(self, terms: tuple[Term, ...]) -> None:
+        self._by_key: dict[str, Estimate] = {}
+        self._whole: dict[str, str] = {}
+        for term in terms:
+            for e in term.estimates:
+                key = _key(term.name, e.name if len(term.effect.parameters) > 1 else "", e.axis)
+                self._by_key[key] = e
+                self._whole[_key(term.name, e.name, e.axis)] = key
+
+    def __getitem__(self, key: str) -> Estimate:
+        """The estimate of `key`. Raises UnknownParameter, with the keys that begin with it or the nearest one."""
+        whole = self._whole.get(key, key)
+        if whole in self._by_key:
+            return self._by_key[whole]
+        begun = [known for known in self._by_key if known.startswith(f"{key}.")]
+        if len(begun) == 1:
+            return self._by_key[begun[0]]
+        hint = f"; it has {', '.join(begun)}" if begun else nearest(key, self._by_key)
+        raise UnknownParameter(f'the model has no parameter "{key}"{hint}' if self._by_key else NOT_FITTED.format(key))
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._by_key)
+
+    def __len__(self) -> int:
+        return len(self._by_key)
+
+    def __repr__(self) -> str:
+        return columns(("parameter", "value"), [(key, e.text) for key, e in self.items()])
+
+
+def _key(*parts: str) -> str:
+    return ".".join(part for part in parts if part)
+
+
+@dataclass(frozen=True, repr=False)
+class Model(Shown):
+    """An ordered list of effects. `unit` is that of the output, "" before the first fit.
+
+    `covered`: lowest and highest value of each influence in the data that the values come from, as far as it is known.
+    """
+
+    name: str
+    terms: tuple[Term, ...]
+    unit: str = ""
+    provenance: Mapping[str, str | float] = field(default_factory=dict)
+    covered: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+    @cached_property
+    def params(self) -> Parameters:
+        """The estimates by key: `params["bias.x"].value`."""
+        return Parameters(self.terms)
+
+    def __getitem__(self, key: str) -> Estimate:
+        """The estimate of `key`, such as "bias.x". Raises UnknownParameter with the nearest key."""
+        return self.params[key]
+
+    def report(self) -> str:
+        """The parameters as a table for people; the effects, where the model has no values yet."""
+        rows = [(key, e.text) for key, e in self.params.items()]
+        head = f"{self.name}: {', '.join(self.effects)}"
+        return f"{head}\n{columns(('parameter', 'value'), rows)}" if rows else f"{head}; not fitted yet"
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Names of the effects, in order."""
+        return tuple(term.name for term in self.terms)
+
+    def holds(self, name: str) -> bool:
+        """Whether the effect is in the model with a value of its own for every axis."""
+        return any(term.name == name and not term.tied for term in self.terms)
+
+    def with_effect(self, effect: Effect) -> Model:
+        """The model with one effect more; a tied effect of that name is untied instead."""
+        if any(term.name == effect.name for term in self.terms):
+            terms = tuple(_untied(term) if term.name == effect.name else term for term in self.terms)
+        else:
+            terms = (*self.terms, Term(effect))
+        return replace(self, name=f"{self.name}+{effect.name}", terms=terms)
+
+    def without(self, name: str) -> Model:
+        """The model with one effect less."""
+        terms = tuple(term for term in self.terms if term.name != name)
+        return replace(self, name=self.name.replace(f"+{name}", ""), terms=terms)
+
+    def for_table(self, table: Table) -> Model:
+        """The model without the effects that this kind of table cannot have, with its constants set."""
+        terms = tuple(_with_constants(t, table) for t in self.terms if t.effect.excluded(table) is None)
+        return replace(self, terms=terms)
+
+
+def _untied(term: Term) -> Term:
+    return replace(term, tied=False, estimates=())
+
+
+def _with_constants(term: Term, table: Table) -> Term:
+    missing = {name: make(table) for name, make in term.effect.constants.items() if name not in term.constants}
+    return replace(term, constants={**term.constants, **missing})

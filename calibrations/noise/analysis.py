@@ -1,0 +1,304 @@
+"""The noise of a still record as `rig noise` reports it: coefficients with bounds, and their JSON document.
+
+The processes, lines and disturbances are those of `search`, so that every command gives the same answer. A process that
+is identified has the estimate of the final fit. Any other process has an upper bound: the coefficient at which twice
+the log-likelihood falls by BOUND below its maximum, all other processes refitted (profile likelihood).
+
+Source  Cox and Hinkley, Theoretical Statistics, 7.2: intervals from the profile likelihood.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.special import chdtri
+
+from calibrations.criteria import SPOILT_BY
+from calibrations.effects.catalogue import catalogue
+from calibrations.effects.effect import Effect
+from calibrations.model import Estimate
+from calibrations.model.file import read_model
+from calibrations.noise.allan import deviation, variance_parts
+from calibrations.noise.channel_spectrum import Line
+from calibrations.noise.deviations import COVERAGE, OCTAVE_KINDS, OVERLAPPING, Curve
+from calibrations.noise.disturbances import MISFITS, Disturbance, disturbance_document, disturbances
+from calibrations.noise.fit import fit_effects
+from calibrations.noise.likelihood import ChannelFit, effect_spectrum, log_likelihood, maximise
+from calibrations.noise.record import Channel, Still
+from calibrations.noise.samples import CONSTANT, WILD, Hidden, hidden_in
+from calibrations.noise.search import Search, search
+from calibrations.table import Array
+
+MODEL = "still"  # the search begins with white noise alone
+ORDER = (
+    "white-noise", "flicker-noise", "rate-random-walk", "quantisation-noise", "sinusoidal-noise", "gauss-markov-noise",
+)  # fmt: skip
+SLOW = ("flicker-noise", "rate-random-walk")  # a weak one may be present beside any process, and widens its bound
+TO_BOUND = 1.96  # standard deviations
+BOUND = 3.84  # fall of twice the log-likelihood at the ends of a 95 % interval
+SPOILT = {WILD: ("white-noise", "quantisation-noise")}  # wild samples change fast noise alone
+
+
+@dataclass(frozen=True)
+class Coefficient:
+    """One process: its estimate and standard uncertainty.
+
+    A process that is not identified may be absent; it is below `upper` with 95 %, infinite where nothing is known.
+    `alternatives` are processes that would explain the record as well. Flicker noise and a random walk that cannot be
+    separated are not identified: a coefficient of the wrong one of them means nothing. A Gauss-Markov process has a
+    time constant, a sinusoid a frequency.
+    """
+
+    value: float
+    std: float
+    unit: str
+    upper: float | None = None
+    time_constant_s: float | None = None
+    frequency_hz: float | None = None
+    alternatives: tuple[str, ...] = ()
+
+    @property
+    def identified(self) -> bool:
+        return self.upper is None
+
+
+@dataclass(frozen=True)
+class ChannelNoise:
+    """One channel: its deviations as recorded, and its fit without the disturbances that could be removed."""
+
+    search: Search
+    fit: ChannelFit
+    deviations: Mapping[str, Curve]  # by kind, of the record as it is
+
+    @property
+    def channel(self) -> Channel:
+        return self.fit.channel
+
+    @property
+    def axis(self) -> str:
+        return self.channel.axis
+
+    @property
+    def unit(self) -> str:
+        return self.channel.unit
+
+    @property
+    def allan(self) -> Curve:
+        """The overlapping Allan deviation of the record as it is."""
+        return self.deviations[OVERLAPPING]
+
+    @property
+    def cleaned_allan(self) -> Curve:
+        """The same without the disturbances that were removed."""
+        return self.search.still.allan[self.axis]
+
+    @property
+    def lines(self) -> tuple[Line, ...]:
+        """Sinusoids, strongest first."""
+        return self.fit.lines
+
+    @cached_property
+    def coefficients(self) -> dict[str, Coefficient]:
+        """Every process of the catalogue by its name."""
+        effects = self.search.effects
+        names = (*(name for name in ORDER if name in effects), *(name for name in effects if name not in ORDER))
+        return {name: self._coefficient(effects[name]) for name in names}
+
+    def modelled(self, tau_s: Array) -> Array:
+        """Allan deviation that the processes and lines expect, shape of `tau_s`."""
+        return deviation(self.fit, tau_s)
+
+    def processes(self, tau_s: Array) -> dict[str, Array]:
+        """Allan variance of each process that is present, at averaging times (k,)."""
+        present = {effect.name for effect in self.fit.effects if self.power(effect) > 0}
+        return {name: variance for name, variance in variance_parts(self.fit, tau_s).items() if name in present}
+
+    def power(self, effect: Effect) -> float:
+        """Square of an effect's fitted coefficient."""
+        return self.fit.values[effect.name][effect.parameters[0].name] ** 2
+
+    @property
+    def interval(self) -> tuple[Array, Array]:
+        """Bounds (b,) between which the true densities lie with a probability of COVERAGE each."""
+        tail, freedom = (1 - COVERAGE) / 2, self.fit.freedom
+        low, high = (self.fit.seen * freedom / chdtri(freedom, p) for p in (tail, 1 - tail))
+        return low, high
+
+    def _coefficient(self, effect: Effect) -> Coefficient:
+        hidden = hidden_in(self.channel.oddities)
+        unit = effect.parameters[0].unit.replace("{out}", self.unit)
+        if hidden is not None and hidden.hides(effect.name):
+            return _below_step(hidden, effect.name, unit)
+        if "lines" in effect.places:
+            return self._sinusoid(unit)
+        rivals = self.search.rivals.get(effect.name, ())
+        strength, *shape = self._estimates(effect) or (None,)
+        if strength and strength.identified and not (effect.name in SLOW and set(rivals) & set(SLOW)):
+            time_s = shape[0].value if shape else None
+            return Coefficient(strength.value, strength.std or 0.0, unit, None, time_s, None, rivals)
+        value, upper, values = upper_bound(self.fit, effect, self._beside(effect))
+        time_s = next(iter(list(values.values())[1:]), None)
+        return Coefficient(value, (upper - value) / TO_BOUND, unit, upper, time_s, None, rivals)
+
+    def _estimates(self, effect: Effect) -> list[Estimate]:
+        """Of an effect's parameters in this channel, as every command shows them; none for an effect not in the fit."""
+        model = self.search.end.model
+        terms = (term for term in model.terms if term.name == effect.name)
+        return [each for term in terms for each in term.estimates if each.axis == self.axis]
+
+    def _beside(self, effect: Effect) -> list[Effect]:
+        """The other processes of the fit, and those that may be present beside any."""
+        slow = [self.search.effects[name] for name in SLOW if name in self.search.effects]
+        others = (*self.fit.effects, *(each for each in slow if each not in self.fit.effects))
+        return [each for each in others if each is not effect]
+
+    def _sinusoid(self, unit: str) -> Coefficient:
+        if not self.lines:
+            return Coefficient(0.0, self.fit.line_bound / TO_BOUND, unit, self.fit.line_bound)
+        line = self.lines[0]
+        return Coefficient(line.amplitude, line.std, unit, None, None, line.frequency_hz)
+
+
+@dataclass(frozen=True)
+class NoiseAnalysis:
+    """The noise of a still record: `record` as it was read, and the search on it."""
+
+    record: Still
+    search: Search
+
+    @cached_property
+    def channels(self) -> dict[str, ChannelNoise]:
+        """By axis, without the disturbances that could be removed."""
+        return _channels(self.record, self.search)
+
+    @cached_property
+    def uncleaned(self) -> dict[str, ChannelNoise] | None:
+        """By axis, with the disturbances; None where none was removed."""
+        return _channels(self.record, self.search.uncleaned) if self.search.uncleaned is not None else None
+
+    @cached_property
+    def disturbances(self) -> tuple[Disturbance, ...]:
+        return disturbances(self.search)
+
+    def spoils(self, disturbance: Disturbance) -> tuple[str, ...]:
+        """The coefficients that a disturbance changes, or would change had it not been removed."""
+        after = self.channels[disturbance.axis].coefficients
+        identified = tuple(name for name, each in after.items() if each.identified)
+        if disturbance.pattern is not None and self.uncleaned is not None:
+            before = self.uncleaned[disturbance.axis].coefficients
+            return tuple(name for name in after if _differ(before[name], after[name]))
+        if disturbance.kind in (*MISFITS, CONSTANT):
+            return identified
+        return tuple(name for name in identified if name in SPOILT.get(disturbance.kind, ()))
+
+
+def analyse(still: Still, effects: Mapping[str, Effect] | None = None) -> NoiseAnalysis:
+    """The noise of every channel of a still record."""
+    return NoiseAnalysis(still, search(still, read_model(MODEL), catalogue() if effects is None else effects))
+
+
+def upper_bound(fit: ChannelFit, effect: Effect, beside: Sequence[Effect]) -> tuple[float, float, dict[str, float]]:
+    """(most likely coefficient, its upper bound with 95 %, all its parameters), other effects beside it refitted."""
+    most = fit_effects(fit, (*beside, effect))
+    strength = effect.parameters[0].name
+    column, *others = (
+        effect_spectrum(each, fit.parts, {**most.values[each.name], each.parameters[0].name: 1.0})
+        for each in (effect, *beside)
+    )
+    power = most.values[effect.name][strength] ** 2
+
+    def loss(log_power: float) -> float:
+        base = np.exp(log_power) * column
+        value = (
+            maximise(np.column_stack(others), fit.seen, fit.freedom, base)[1]
+            if others
+            else log_likelihood(base, fit.seen, fit.freedom)
+        )
+        return 2 * (most.log_likelihood - float(value)) - BOUND
+
+    weight = column / most.expected
+    low = float(np.log(max(power, 1e-3 / np.sqrt(np.sum(fit.freedom * weight**2)))))
+    high = low + 1.0
+    while loss(high) < 0:
+        low, high = high, high + 1.0
+    bound = float(brentq(loss, low, high, xtol=0.02)) if loss(low) < 0 else low
+    return float(np.sqrt(power)), float(np.exp(bound / 2)), most.values[effect.name]
+
+
+def _channels(record: Still, found: Search) -> dict[str, ChannelNoise]:
+    return {
+        fit.channel.axis: ChannelNoise(found, fit, record.deviations[fit.channel.axis]) for fit in found.end.channels
+    }
+
+
+def _below_step(hidden: Hidden, name: str, unit: str) -> Coefficient:
+    """What is known of a process where the noise is below one step of the converter."""
+    upper = hidden.white_below if name == "white-noise" else np.inf
+    return Coefficient(0.0, upper / TO_BOUND, unit, upper)
+
+
+def _differ(before: Coefficient, after: Coefficient) -> bool:
+    if before.identified != after.identified:
+        return True
+    return before.identified and abs(after.value - before.value) > SPOILT_BY * before.std
+
+
+# The JSON document of a noise analysis.
+
+Document = dict[str, Any]
+
+
+def noise_document(analysis: NoiseAnalysis) -> Document:
+    """`rig.noise/1`. The fields on deviations, spectrum and coefficients are those of the first channel.
+
+    `allan` is the overlapping Allan deviation of the record as it is, `deviations` holds the other kinds, all with
+    intervals of 95 %; `spectrum` is two-sided, without lines. `coefficients` are those without the disturbances that
+    could be removed; `coefficients_without` repeats them where one was. `channels` has all channels by axis.
+    """
+    channels = {axis: _channel(each) for axis, each in analysis.channels.items()}
+    first = next(iter(channels.values()))
+    return {
+        "schema": "rig.noise/1",
+        "rate_hz": analysis.record.rate_hz,
+        "n": analysis.record.n,
+        "unit": analysis.record.unit,
+        **first,
+        "disturbances": [
+            disturbance_document(each) | {"spoils": list(analysis.spoils(each))} for each in analysis.disturbances
+        ],
+        "coefficients_without": first["coefficients"] if analysis.search.patterns else None,
+        "channels": channels,
+    }
+
+
+def _channel(noise: ChannelNoise) -> Document:
+    order = noise.fit.frequency_hz.argsort()
+    low, high = noise.interval
+    bands = {
+        "frequency_hz": noise.fit.frequency_hz, "density": noise.fit.seen, "low": low, "high": high,
+        "model": noise.fit.expected,
+    }  # fmt: skip
+    return {
+        "allan": _curve(noise.allan),
+        "deviations": {kind: _curve(noise.deviations[kind]) for kind in OCTAVE_KINDS if kind != OVERLAPPING},
+        "spectrum": {name: values[order].tolist() for name, values in bands.items()} | {"unit": f"({noise.unit})^2/Hz"},
+        "lines": [{"frequency_hz": line.frequency_hz, "amplitude": line.amplitude} for line in noise.lines],
+        "coefficients": {name: _coefficient(each) for name, each in noise.coefficients.items()},
+    }
+
+
+def _curve(curve: Curve) -> dict[str, list[float]]:
+    columns = {"tau_s": curve.tau_s, "deviation": curve.deviation, "low": curve.low, "high": curve.high}
+    return {name: values.tolist() for name, values in columns.items()}
+
+
+def _coefficient(coefficient: Coefficient) -> Document:
+    """Value, uncertainty, unit, whether it is identified; and those of the other fields that it has."""
+    given = {name: value for name, value in asdict(coefficient).items() if value is not None}
+    unknown = {name: None for name in ("std", "upper") if np.isinf(given.get(name, 0.0))}
+    return {**given, **unknown, "alternatives": list(coefficient.alternatives), "identified": coefficient.identified}

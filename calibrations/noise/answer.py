@@ -1,0 +1,231 @@
+"""From a search on a still record to a verdict: what is in doubt, why, and which experiment decides it.
+
+Two noise processes are separated by a longer record. Its bands are computed as one explanation expects them, and the
+other explanation is fitted to them; the deviance of that fit is twice the information between the two. Both directions
+are computed, and the smaller information counts. A disturbance is separated from noise by a run that changes its cause,
+or by a second record.
+
+White noise behind a single pole is a Gauss-Markov process, so a still record cannot separate the two. If all fast noise
+is from that process, or its corner is a usual corner of an output filter, the low-pass is named as an alternative.
+
+Source  Kullback and Leibler, Ann. Math. Statist. 22 (1951).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from calibrations.criteria import LEAST_WHITE, SLOWEST_FILTER_HZ
+from calibrations.design.expected import CERTAIN_PROBABILITY, Expected, pairs_separated
+from calibrations.design.experiment import TWO_HZ, Experiment, experiment_by_physics
+from calibrations.noise.disturbances import MISFITS, disturbances
+from calibrations.noise.fit import fit_effects
+from calibrations.noise.likelihood import ChannelFit
+from calibrations.noise.patterns import DRIFT, FOLLOWS, SETTLING, STEP, Pattern
+from calibrations.noise.processes import GAUSS_MARKOV
+from calibrations.noise.record import Channel
+from calibrations.noise.samples import hidden_in
+from calibrations.noise.search import Search
+from calibrations.noise.spectrum import Bands, slow_bands
+
+# The experiment that tells what a still record does not.
+#
+# Two noise processes take a longer record. A record of any length is foreseen as its bands with what the one
+# explanation
+# expects in them; the other is fitted to these as well as it can be, and the deviance that it leaves is twice the
+# information between the two. Both ways are asked, and the worse one counts. What no noise is takes what changes its
+# cause, or the same record again.
+#
+# Source  Kullback and Leibler, Ann. Math. Statist. 22 (1951).
+
+LONGER = (2, 4, 8, 16, 32, 64)  # times the record at hand
+MEANS = 1 << 14  # of a record that is foreseen
+NIGHTS_S = 7 * 86400.0  # beyond which nobody waits
+PROCEDURE = "noise-floor"
+LONGER_SEPARATES = "a longer record holds more periods of what is slow, where the two differ"
+REPEAT_SHOWS = (
+    "what a second record of the same length shows as well belongs to the sensor or the rig, the rest was an event"
+)
+MOTION_SHOWS = "a low-pass weakens an oscillation near its corner; noise of the sensor's own does not"
+OVEN_SHOWS = "what follows the temperature goes up and down with the oven, noise does not"
+CAUSES = {  # what a pattern is in a model of poses, by its kind and the column that it follows
+    (FOLLOWS, "temperature_c"): "temperature-bias",
+    (DRIFT, ""): "bias-drift",
+    (SETTLING, ""): "warm-up-bias",
+}
+TAKEN_FOR = "rate-random-walk"  # what each of them looks like to a spectrum
+
+
+def repeat_record(length_s: float) -> Experiment:
+    """The same record once more."""
+    return Experiment(PROCEDURE, {"duration_s": _round_up_to_tens(length_s)}, (), REPEAT_SHOWS)
+
+
+def experiment_for_pattern(pattern: Pattern, length_s: float) -> Experiment | None:
+    """What tells the cause of a pattern from its rivals, or from noise; None where the rig cannot change the cause."""
+    if pattern.kind == STEP:
+        return repeat_record(length_s)
+    cause, *others = (CAUSES.get((each.kind, each.cause)) for each in (pattern, *pattern.rivals))
+    if cause is None:
+        return None
+    rivals = [name for name in others if name is not None] or [TAKEN_FOR]
+    procedure, settings, why = experiment_by_physics({cause, *rivals} - {TAKEN_FOR})
+    why = OVEN_SHOWS if pattern.kind == FOLLOWS and rivals == [TAKEN_FOR] else why
+    return Experiment(procedure, settings, tuple((cause, rival) for rival in rivals), why)
+
+
+def experiment_for_filter(name: str, corner_hz: float) -> Experiment | None:
+    """What tells a process from white noise behind a low-pass; None where the corner is beyond what the rig shakes."""
+    if not TWO_HZ[1] / 2 <= corner_hz <= 10 * TWO_HZ[0]:
+        return None
+    return Experiment("motion", {"frequency_hz": TWO_HZ}, ((name, "output-filter"),), MOTION_SHOWS)
+
+
+def _round_up_to_tens(seconds: float) -> float:
+    return float(10 * np.ceil(seconds / 10))
+
+
+def separating_record(found: Search, named: tuple[str, ...]) -> Experiment | None:
+    """The shortest record that is certain to tell the first of them that is in doubt from its rivals, or else the
+    longest that one would wait for."""
+    name, rivals = next(((name, found.rivals[name]) for name in named if found.rivals.get(name)), ("", ()))
+    if not rivals:
+        return None
+    pairs = tuple((name, rival) for rival in rivals)
+    lengths = [k * found.still.length_s for k in LONGER if k * found.still.length_s <= NIGHTS_S]
+    lengths = lengths or [2 * found.still.length_s]
+    foreseen = [(length_s, _information(found, name, rivals, length_s)) for length_s in lengths]
+    chosen = next((each for each in foreseen if pairs_separated(each[1]) >= CERTAIN_PROBABILITY), foreseen[-1])
+    return Experiment(
+        PROCEDURE,
+        {"duration_s": _round_up_to_tens(chosen[0])},
+        pairs,
+        LONGER_SEPARATES,
+        expected=Expected(chosen[1], chosen[1]),
+    )
+
+
+def _information(found: Search, name: str, rivals: tuple[str, ...], length_s: float) -> float:
+    """Lambda of the pair that is hardest to tell apart, the harder way."""
+    effects = {effect.name: effect for effect in found.mixtures.others}
+    rest = [effect for effect in found.mixture.effects if effect.name != name]
+    each = []
+    for rival in rivals:
+        sides = (found.mixture, effects[name]), (found.mixtures.of([*rest, effects[rival]]), effects[rival])
+        each += [
+            sum(_deviance_of_wrong(*pair, length_s) for pair in zip(right.channels, wrong.channels, strict=True))
+            for (right, own), (wrong, other) in (sides, sides[::-1])
+            if own.name not in other.contains  # what contains it can always take its form, and is then the less plain
+        ]
+    return min(each)
+
+
+def _deviance_of_wrong(right: ChannelFit, wrong: ChannelFit, length_s: float) -> float:
+    """Deviance of the wrong effects on what the right ones expect of a record of this length."""
+    there = longer_channel(right.channel, length_s)
+    truth = replace(right, channel=there, parts=(_slow(there),), lines=())
+    bands = replace(truth.parts[0], density=truth.expected)
+    return fit_effects(replace(truth, parts=(bands,)), wrong.effects).deviance
+
+
+def longer_channel(channel: Channel, length_s: float) -> Channel:
+    """A record of another length of the same channel, with means of a size that keeps them few."""
+    n = int(length_s * channel.rate_hz)
+    size = max(channel.size, -(-n // MEANS))
+    return replace(channel, n=n, size=size, means=np.zeros(n // size))
+
+
+def _slow(channel: Channel) -> Bands:
+    return slow_bands(channel.means, channel.sampling, channel.corner_hz)
+
+
+# White noise behind a low-pass that nobody stated: a single pole on white noise is a Gauss-Markov process.
+#
+# No still record tells the two apart. Where all that is fast comes from the one process, or its corner is where
+# outputs
+# are filtered, the low-pass is named beside it.
+
+OUTPUT_FILTER = "output-filter"
+WHITE = "white-noise"
+
+
+def possible_corner_hz(found: Search, name: str) -> float | None:
+    """The corner that a low-pass would have, were it what makes the process `name`; None where that is no question."""
+    if name != GAUSS_MARKOV:
+        return None
+    jumping = {telegraph.axis for telegraph in found.telegraphs}  # no filter makes two levels
+    free = (each for each in found.mixture.channels if not np.isfinite(each.channel.corner_hz))
+    corners = [_channel_corner_hz(each) for each in free if each.channel.axis not in jumping]
+    return next((corner for corner in corners if corner is not None), None)
+
+
+def filter_text(name: str, corner: float) -> str:
+    """Both explanations, and two ways to decide without an experiment of the rig."""
+    return (
+        f"{name} cannot be separated from white noise behind a first-order low-pass of {corner:.3g} Hz "
+        f"({OUTPUT_FILTER}): if the output has one, write `# filter_corner_hz: {corner:.3g}` above the table; or "
+        "record with another filter capacitor: the corner of a filter changes with it"
+    )
+
+
+def _channel_corner_hz(found: ChannelFit) -> float | None:
+    sigma, time_s = found.values[GAUSS_MARKOV].values()
+    if sigma == 0:
+        return None
+    white = sum(value**2 for value in found.values.get(WHITE, {}).values())
+    corner = 1 / (2 * np.pi * time_s)
+    alone = white < LEAST_WHITE * 2 * sigma**2 * time_s
+    return float(corner) if alone or corner > SLOWEST_FILTER_HZ else None
+
+
+def structure_of(found: Search) -> str | None:
+    """The disturbances that matter, in words; None where there are none."""
+    return "; ".join(each.text for each in disturbances(found) if each.matters) or None
+
+
+def alternatives(found: Search, named: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
+    """What each of the named effects cannot be told from; a low-pass that the data do not state goes by its effect."""
+    behind = {name: (OUTPUT_FILTER,) for name in named if possible_corner_hz(found, name) is not None}
+    each = {name: (*found.rivals.get(name, ()), *behind.get(name, ())) for name in named}
+    return {name: rivals for name, rivals in each.items() if rivals}
+
+
+def reason_of(found: Search, doubts: Mapping[str, tuple[str, ...]], structure: str | None) -> str | None:
+    """Why something is in doubt, in words."""
+    said = []
+    for name, rivals in doubts.items():
+        if processes := [rival for rival in rivals if rival != OUTPUT_FILTER]:
+            said.append(f"this record cannot tell {name} from {' or '.join(processes)}")
+        if (corner := possible_corner_hz(found, name)) is not None:
+            said.append(filter_text(name, corner))
+    if structure is not None and found.still.hidden:
+        said.append(structure)
+    elif structure is not None:
+        said.append(f"there is something that no noise of the catalogue is: {structure}")
+    return "; ".join(said) or None
+
+
+def next_of(found: Search, doubts: Mapping[str, tuple[str, ...]], structure: str | None) -> Experiment | None:
+    """The experiment for the first doubt that one can settle."""
+    if any(hidden_in(channel.oddities) for channel in found.still.channels):
+        return None  # what is to be done about it is said, and no run does it
+    if any(rival != OUTPUT_FILTER for rivals in doubts.values() for rival in rivals):
+        return separating_record(found, tuple(doubts))
+    shaken = (
+        experiment_for_filter(name, corner)
+        for name in doubts
+        if (corner := possible_corner_hz(found, name)) is not None
+    )
+    if (first := next(filter(None, shaken), None)) is not None:
+        return first
+    if found.patterns:
+        return experiment_for_pattern(found.patterns[0], found.still.length_s)
+    return repeat_record(found.still.length_s) if structure is not None else None
+
+
+def disturbed(found: Search) -> bool:
+    """Whether there is a disturbance with a place or a cause of its own: a pattern, or odd samples."""
+    return any(each.matters and each.kind not in MISFITS for each in disturbances(found))

@@ -1,0 +1,341 @@
+"""Still records in the loop: a noise model, its spectrum by Whittle's likelihood, and what is not noise.
+
+In the documents `rmse` is the rms mismatch of the spectrum, as a share of it, each band weighted by its degrees of
+freedom; `noise_floor` is what chance alone leaves of that, and `excess` their ratio. There is no `slow_noise`: the
+model itself describes it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from calibrations.criteria import MOST_UNEXPLAINED
+from calibrations.discovery.dataset import Cells, Dataset
+from calibrations.discovery.results import Candidate, Comparison, Diagnosis, Discovery, Findings, Place, Step
+from calibrations.discovery.verdict import Verdict
+from calibrations.effects import Effect
+from calibrations.effects.catalogue import catalogue
+from calibrations.errors import ModelError
+from calibrations.model import Model
+from calibrations.noise.allan import compare_deviations
+from calibrations.noise.answer import (
+    alternatives,
+    disturbed,
+    filter_text,
+    next_of,
+    possible_corner_hz,
+    reason_of,
+    structure_of,
+)
+from calibrations.noise.disturbances import disturbance_document, disturbances
+from calibrations.noise.fit import NoiseFit, fit
+from calibrations.noise.places import evaluate, places
+from calibrations.noise.record import Still
+from calibrations.noise.search import Search, candidates, search
+from calibrations.noise.words import of_record, sentence
+from calibrations.presentation.text import plain, quantity
+
+HEAD = (
+    "model", "log-likelihood gained", "lost without it alone", "mismatch / chance", "other half",
+    "mismatch of the Allan deviation",
+)  # fmt: skip
+LOST = 2  # a column that one step alone does not need
+CLEANED = "without non-noise signals"
+
+
+@dataclass(frozen=True, kw_only=True)
+class NoiseFindings(Findings[NoiseFit]):
+    """Findings with the search that they come from."""
+
+    search: Search
+
+
+@dataclass(frozen=True, eq=False)
+class StillRecord(Dataset[NoiseFit]):
+    """The samples of a still sensor, reduced to what a likelihood needs."""
+
+    still: Still
+
+    form = "samples"
+    default_model = "still"
+    floor = "chance"
+    unseen = "the other half of the record"
+    complete = "The model fails nowhere: the differences are chance."
+    most_left = MOST_UNEXPLAINED  # the form of a process is known; what it leaves is a process of another form
+
+    @property
+    def source(self) -> str:
+        """File or run."""
+        return self.still.source
+
+    @property
+    def content(self) -> str:
+        """The kind of data, as models are defined for it."""
+        return "still"
+
+    @property
+    def n(self) -> int:
+        """Samples of a channel."""
+        return self.still.n
+
+    @property
+    def unit(self) -> str:
+        """Unit of the outputs."""
+        return self.still.unit
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Channels."""
+        return self.still.axes
+
+    @property
+    def description(self) -> str:
+        """Samples, source, rate and length."""
+        return of_record(self.still)
+
+    def fit(self, model: Model) -> NoiseFit:
+        """Whittle's likelihood. Raises ModelError for a model without noise."""
+        return fit(model, self.still)
+
+    def evaluate(self, model: Model) -> NoiseFit | None:
+        """The model with its values. Raises DataError for a channel without values."""
+        return evaluate(model, self.still)
+
+    def places(self, found: NoiseFit) -> tuple[Place, ...]:
+        """Averaging times and frequencies."""
+        return places(found)
+
+    def search(self, model: Model, effects: Mapping[str, Effect]) -> NoiseFindings:
+        """Lines, disturbances and every mixture of processes."""
+        return self._found(fit(model, self.still), effects)
+
+    def search_on(self, start: NoiseFit, origin: NoiseFit, effects: Mapping[str, Effect]) -> NoiseFindings:
+        """The same from a fitted model."""
+        return self._found(fit(start.model, self.still), effects, origin)
+
+    def candidates(
+        self, before: NoiseFit, plan: Findings[NoiseFit], effects: Mapping[str, Effect]
+    ) -> tuple[Candidate, ...]:
+        """Every process alone."""
+        return candidates(search(before.still, before.model, effects), before, plan.alternatives)
+
+    def figures(self, found: NoiseFit) -> dict[str, str]:
+        """Mismatch of the spectrum, also on the other half, and of the Allan deviation."""
+        return {
+            "mismatch / chance": f"{plain(found.pooled_excess)} ×",
+            "on the other half": f"{plain(found.held_out_excess)} ×",
+            "Allan deviation is off by": ", ".join(f"{100 * value:.2g} %" for value in mismatch(found).values()),
+        }
+
+    def facts(self, candidate: Candidate, result: Diagnosis[NoiseFit]) -> dict[str, str]:
+        """Mismatch of the spectrum, and the gain in log-likelihood."""
+        before, held_out = result.excess_before, result.held_out_before
+        return {
+            "Mismatch of the spectrum": f"{plain(before)} → {plain(candidate.excess_after)} × chance",
+            "On the other half": f"{plain(held_out)} → {plain(candidate.held_out_after)} × chance",
+            "Log-likelihood": f"+{plain(candidate.gain / 2)}",
+        }
+
+    def _found(self, start: NoiseFit, effects: Mapping[str, Effect], origin: NoiseFit | None = None) -> NoiseFindings:
+        found = search(self.still, start.model, effects)
+        baseline = fit(start.model, found.still) if found.patterns else start
+        structure = structure_of(found)
+        names = () if found.still.hidden else tuple(found.gains)
+        doubts = alternatives(found, names)
+        spoilt = structure is not None and (found.still.hidden or disturbed(found))
+        result = NoiseFindings(
+            data=self,
+            start=start,
+            origin=origin or start,
+            baseline=baseline,
+            steps=tuple(_steps(baseline, found, names)),
+            candidates=candidates(found, baseline, alternatives(found, tuple(found.gains))),
+            causes=names,
+            alternatives=doubts,
+            left=structure,
+            spoilt=spoilt,
+            reason=reason_of(found, doubts, structure),
+            disturbances=tuple(disturbance_document(each) for each in disturbances(found)),
+            further=next_of(found, {} if spoilt else doubts, structure),
+            remarks=(
+                *(
+                    sentence(filter_text(name, corner))
+                    for name in doubts
+                    if (corner := possible_corner_hz(found, name))
+                ),
+                *(sentence(each.text) for each in found.telegraphs),
+            ),
+            search=found,
+        )
+        if names and not spoilt and result.given.verdict is Verdict.UNEXPLAINED:
+            return result.without_steps()
+        return result
+
+    def addition(self, effect: Effect, model: Model, effects: Mapping[str, Effect]) -> NoiseFindings:
+        """One process, with what the record cannot separate from it, and what is missing beside it."""
+        before = fit(model, self.still)
+        step = self.step(effect, before)
+        first = search(self.still, before.model, effects)
+        more = search(self.still, step.after.model, {**effects, effect.name: effect})
+        doubts = alternatives(first, (effect.name,)) if effect.name in first.gains else {}
+        structure = structure_of(more)
+        missing = f"{' and '.join(more.gains)} would explain more" if more.gains else None
+        return NoiseFindings(
+            data=self,
+            start=before,
+            origin=before,
+            baseline=before,
+            steps=(step,),
+            causes=(effect.name,),
+            alternatives=doubts,
+            left=structure or missing,
+            spoilt=bool(structure or missing),
+            reason=reason_of(first, doubts, structure) or missing,
+            further=next_of(first, doubts, structure),
+            search=more,
+        )
+
+    def step(self, effect: Effect, before: NoiseFit) -> Step[NoiseFit]:
+        """The effect added."""
+        after = fit(before.model.with_effect(effect), before.still)
+        return Step(effect.name, before, after, after.log_likelihood - before.log_likelihood)
+
+    def require_allowed(self, effect: Effect) -> None:
+        """Raises ModelError for an effect that is not noise."""
+        if "still" not in effect.kinds:
+            known = ", ".join(sorted(name for name, each in catalogue().items() if "still" in each.kinds))
+            raise ModelError(
+                f"{effect.name} is not noise, and a still record shows noise alone; effects of noise: {known}"
+            )
+
+    def errors_document(self, found: NoiseFit) -> dict[str, Any]:
+        """Mismatch of the spectrum by axis, and of the Allan deviation."""
+        each = {channel.channel.axis: channel for channel in found.channels}
+        return {
+            "rmse": {axis: channel.mismatch for axis, channel in each.items()},
+            "noise_floor": {axis: channel.floor for axis, channel in each.items()},
+            "excess": {axis: channel.excess for axis, channel in each.items()},
+            "log_likelihood": {axis: channel.log_likelihood for axis, channel in each.items()},
+            "allan_mismatch": mismatch(found),
+        }
+
+    def comparison_fields(self, result: Comparison[NoiseFit]) -> dict[str, Any]:
+        """The Allan deviations that are compared."""
+        curves = {}
+        for each in result.fit.channels:
+            curve = compare_deviations(each, self.still.allan[each.channel.axis])
+            curves[each.channel.axis] = {
+                "tau_s": curve.tau_s.tolist(),
+                "deviation": curve.measured.tolist(),
+                "low": curve.low.tolist(),
+                "high": curve.high.tolist(),
+                "model": curve.modelled.tolist(),
+            }
+        return {"allan": curves}
+
+    def step_fields(self, step: Step[NoiseFit]) -> dict[str, Any]:
+        """Log-likelihoods and mismatches of the Allan deviation."""
+        return {
+            "log_likelihood_before": step.before.log_likelihood,
+            "log_likelihood_after": step.after.log_likelihood,
+            "log_likelihood_alone": step.alone,
+            "allan_mismatch_before": mismatch(step.before),
+            "allan_mismatch_after": mismatch(step.after),
+        }
+
+    def candidate_fields(self, candidate: Candidate) -> dict[str, Any]:
+        """The gain in log-likelihood."""
+        return {"log_likelihood_gain": candidate.gain / 2}
+
+    def error_table(self, found: NoiseFit) -> Cells:
+        """Mismatch of the spectrum and of the Allan deviation, beside those by chance."""
+        rows = []
+        for each in found.channels:
+            curve = compare_deviations(each, found.still.allan[each.channel.axis])
+            shares = (each.mismatch, each.floor), (curve.mismatch, curve.by_chance)
+            (spectrum, by_chance), (allan, allan_by_chance) = (
+                (f"{100 * a:.3g} %", f"{100 * b:.3g} %") for a, b in shares
+            )
+            rows.append((each.channel.axis, spectrum, by_chance, f"{each.excess:.2f}", allan, allan_by_chance))
+        head = ("axis", "mismatch of the spectrum", "by chance", "ratio", "of the Allan deviation", "by chance")
+        return head, rows
+
+    def comparison_table(self, result: Comparison[NoiseFit]) -> Cells:
+        """Measured and modelled Allan deviations."""
+        unit, rows = self.unit, []
+        for each in result.fit.channels:
+            curve = compare_deviations(each, self.still.allan[each.channel.axis])
+            for k, tau in enumerate(curve.tau_s):
+                shown = [quantity(float(x[k]), unit) for x in (curve.measured, curve.low, curve.high, curve.modelled)]
+                off = f"{curve.deviations[k]:+.1f}" if abs(curve.deviations[k]) >= 0.05 else "0"
+                rows.append((each.channel.axis, f"{tau:.4g}", shown[0], f"{shown[1]} .. {shown[2]}", shown[3], off))
+        return ("axis", "time (s)", "Allan deviation", "95 % interval", "model", "deviations off"), rows
+
+    def step_table(self, found: Discovery[NoiseFit]) -> Cells:
+        """Gains that add up, and the mismatch after each step."""
+        several = len(found.steps) > 1
+        chosen = [k for k in range(len(HEAD)) if k != LOST or several]
+        rows = [[row[k] for k in chosen] for row in _rows(found, several)]
+        return tuple(HEAD[k] for k in chosen), [tuple(row) for row in rows]
+
+    def candidate_table(self, result: Diagnosis[NoiseFit], candidates: Sequence[Candidate]) -> Cells:
+        """Held-out mismatch, gain, chance and probability of each candidate."""
+        rows = [
+            (
+                c.name,
+                f"{result.held_out_before:.3g} -> {c.held_out_after:.3g}",
+                f"{c.gain / 2:.4g}" if c.gain > 1e-6 else "0",
+                f"{c.p_value:.1g}",
+                f"{c.probability:.3f}",
+                ", ".join(c.indistinguishable_from) or "-",
+            )
+            for c in candidates
+        ]
+        head = (
+            "candidate", f"mismatch on {self.unseen} / chance", "log-likelihood", "p-value", "probability",
+            "cannot be separated from",
+        )  # fmt: skip
+        return head, rows
+
+    def remarks(self, found: NoiseFit) -> list[str]:
+        """Lines that the log-likelihood does not include."""
+        if any(line.frequency_hz > each.channel.highest_hz for each in found.channels for line in each.lines):
+            return ["Lines above half the corner of the low-pass are not fitted, and gain no likelihood."]
+        return []
+
+
+def mismatch(found: NoiseFit) -> dict[str, float]:
+    """Rms of the logarithm of measured over modelled Allan deviation, by axis."""
+    return {
+        each.channel.axis: compare_deviations(each, found.still.allan[each.channel.axis]).mismatch
+        for each in found.channels
+    }
+
+
+def _steps(start: NoiseFit, found: Search, names: tuple[str, ...]) -> Iterator[Step[NoiseFit]]:
+    """The effects one after another, the last fit being that of the search."""
+    present = start
+    for k, name in enumerate(names):
+        last = k == len(found.gains) - 1
+        after = found.end if last else fit(present.model.with_effect(found.effects[name]), found.still)
+        yield Step(name, present, after, found.gains[name] / 2)
+        present = after
+
+
+def _rows(found: Discovery[NoiseFit], several: bool) -> Iterator[tuple[str, ...]]:
+    start, baseline = found.start, found.findings.baseline
+    yield _row(start.model.name, start)
+    if baseline is not start:
+        yield _row(CLEANED, baseline, baseline.log_likelihood - start.log_likelihood)
+    for s in found.steps:
+        gained = s.after.log_likelihood - s.before.log_likelihood
+        yield _row(f"+ {s.name}", s.after, gained, s.alone if several else None)
+
+
+def _row(name: str, found: NoiseFit, gained: float | None = None, lost: float | None = None) -> tuple[str, ...]:
+    """In the order of HEAD. A gain depends on the rows above, and gains add up; losses do not."""
+    off = ", ".join(f"{100 * value:.3g} %" for value in mismatch(found).values())
+    shown = ["" if value is None else f"{value:+.5g}" for value in (gained, None if lost is None else -lost)]
+    return name, *shown, f"{found.pooled_excess:.2f}", f"{found.held_out_excess:.2f}", off

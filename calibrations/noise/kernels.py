@@ -1,0 +1,253 @@
+"""Compiled loops: a tree of bins that double in size from level to level, and the differences that are squared on each.
+
+A bin holds the sum of its samples less an offset, and the sum of the phase (their running sum, from the bin's start)
+over its samples. Both of a pair give both of the bin on the next level, so that modified deviations need no more than
+that. Differences of the second and third order do not depend on the offset, nor on where a running sum begins: each
+stretch of a buffer has a running sum of its own, which stays small and so exact.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from calibrations.table import Array
+
+LEVELS = 48
+OVERLAP = 32  # bins to an averaging time, above the first level
+FACTORS = 6  # averaging times of the first level: 1, 2, 4 ... OVERLAP bins
+TAIL = 3 * OVERLAP  # bins that later windows need
+STEP = 2048
+ROOM = TAIL + 2 * STEP
+ALLAN, HADAMARD, MODIFIED = 0, 1, 2
+Counts = NDArray[np.int64]
+
+
+class Tree(NamedTuple):
+    """What is kept of all samples seen: of fixed size."""
+
+    sums: Array  # (LEVELS, ROOM) bins that are still needed
+    phases: Array  # (LEVELS, ROOM)
+    filled: Counts  # (LEVELS,) bins in the buffers, of which
+    measured: Counts  # were in windows before, and
+    paired: Counts  # were given to the next level
+    heads: Array  # (LEVELS, 2 OVERLAP) the first bins
+    seen: Counts  # (LEVELS,) bins in all
+    squares: Array  # (LEVELS, FACTORS, 3) sums of squared differences: second order, third, third of summed phase
+    windows: Counts  # (LEVELS, FACTORS, 3) how many
+    moments: Array  # (LEVELS, 5) of bins z, and their differences w: z, z^2, z z', w^2, w w'
+
+
+def empty_tree() -> Tree:
+    """A tree that has seen nothing."""
+
+    def floats(*shape: int) -> Array:
+        return np.zeros((LEVELS, *shape))
+
+    def counts(*shape: int) -> Counts:
+        return np.zeros((LEVELS, *shape), dtype=np.int64)
+
+    return Tree(
+        floats(ROOM), floats(ROOM), counts(), counts(), counts(), floats(2 * OVERLAP), counts(),
+        floats(FACTORS, 3), counts(FACTORS, 3), floats(5),
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True)
+def absorb(tree: Tree, samples: Array, offset: float, third: bool) -> None:
+    """Take in more samples, less `offset`, the same each time; `third`: with differences of the third order."""
+    place = 0
+    while place < len(samples):
+        have = tree.filled[0]
+        taken = min(TAIL + STEP - have, len(samples) - place)
+        tree.sums[0, have : have + taken] = samples[place : place + taken] - offset
+        _noted(tree, 0, taken)
+        place += taken
+        level = 0
+        while level < LEVELS - 1 and tree.filled[level] >= TAIL + STEP:
+            _hand_up(tree, level, third)
+            level += 1
+
+
+@njit(cache=True, nogil=True)
+def finish(tree: Tree, third: bool) -> None:
+    """Measure what is left in the buffers; samples that fill no bin of a level are not used there."""
+    for level in range(LEVELS - 1):
+        _hand_up(tree, level, third)
+
+
+@njit(cache=True, nogil=True)
+def _noted(tree: Tree, level: int, taken: int) -> None:
+    """Count bins that were put into a buffer, and keep the very first."""
+    have = tree.filled[level]
+    seen = tree.seen[level]
+    lacks = max(0, min(taken, 2 * OVERLAP - seen))
+    tree.heads[level, seen : seen + lacks] = tree.sums[level, have : have + lacks]
+    tree.filled[level] += taken
+    tree.seen[level] += taken
+
+
+@njit(cache=True, nogil=True)
+def _hand_up(tree: Tree, level: int, third: bool) -> None:
+    """Measure a level, give the next one its pairs, and keep the tail."""
+    n, size = tree.filled[level], 2.0**level
+    b, p = tree.sums[level], tree.phases[level]
+    if n == tree.measured[level]:
+        return
+    _measure_second(tree, level)
+    if third:
+        _measure_third(tree, level)
+    first, above = tree.paired[level], tree.filled[level + 1]
+    pairs = (n - first) // 2
+    b0, b1 = b[first : first + 2 * pairs : 2], b[first + 1 : first + 2 * pairs : 2]
+    p0, p1 = p[first : first + 2 * pairs : 2], p[first + 1 : first + 2 * pairs : 2]
+    tree.sums[level + 1, above : above + pairs] = b0 + b1
+    tree.phases[level + 1, above : above + pairs] = p0 + p1 + size * b0
+    _noted(tree, level + 1, pairs)
+    kept = min(TAIL, n)
+    b[:kept] = b[n - kept : n].copy()
+    p[:kept] = p[n - kept : n].copy()
+    tree.filled[level] = tree.measured[level] = kept
+    tree.paired[level] = kept - (n - first - 2 * pairs)
+
+
+@njit(cache=True, nogil=True)
+def _measure_second(tree: Tree, level: int) -> None:
+    """Add up the squares over all windows of two that end in a bin that is new, and the moments of new bins."""
+    n, old = tree.filled[level], tree.measured[level]
+    b = tree.sums[level][:n]
+    phase = running_sum(b, b.mean())
+    for f in range(FACTORS if level == 0 else 1):
+        k = 2**f if level == 0 else OVERLAP
+        first = max(0, old - 2 * k + 1)
+        tree.squares[level, f, ALLAN] += second_order(phase, k, first)
+        tree.windows[level, f, ALLAN] += max(0, n - 2 * k + 1 - first)
+    _add_moments(b, old, tree.moments[level])
+
+
+@njit(cache=True, nogil=True)
+def _measure_third(tree: Tree, level: int) -> None:
+    """The same for windows of three."""
+    n, old = tree.filled[level], tree.measured[level]
+    phase, summed = integrals(tree.sums[level][:n], tree.phases[level][:n], 2.0**level)
+    for f in range(FACTORS if level == 0 else 1):
+        k = 2**f if level == 0 else OVERLAP
+        first = max(0, old - 3 * k + 1)
+        tree.squares[level, f, HADAMARD] += third_order(phase, k, first)
+        tree.squares[level, f, MODIFIED] += third_order(summed, k, first)
+        tree.windows[level, f, HADAMARD] += max(0, n - 3 * k + 1 - first)
+        tree.windows[level, f, MODIFIED] += max(0, n - 3 * k + 1 - first)
+
+
+@njit(cache=True, nogil=True)
+def running_sum(b: Array, mean: float) -> Array:
+    """Of bins less their mean, shape (n + 1,) from 0."""
+    phase = np.zeros(len(b) + 1)
+    x = 0.0
+    for i in range(len(b)):
+        x += b[i] - mean
+        phase[i + 1] = x
+    return phase
+
+
+@njit(cache=True, nogil=True)
+def integrals(b: Array, p: Array, size: float) -> tuple[Array, Array]:
+    """Running sums of bins less their mean, and of the phase over all samples, each shape (n + 1,) from 0."""
+    n = len(b)
+    mean = b.mean()
+    inside = mean * (size - 1.0) / 2.0  # what the mean adds to the phase within a bin
+    phase, summed = np.zeros(n + 1), np.zeros(n + 1)
+    x = c = 0.0
+    for i in range(n):
+        c += p[i] - inside + size * x
+        x += b[i] - mean
+        phase[i + 1] = x
+        summed[i + 1] = c
+    return phase, summed
+
+
+@njit(cache=True, nogil=True, fastmath={"reassoc", "contract"})
+def second_order(x: Array, k: int, first: int) -> float:
+    """Sum of (x[i + 2k] - 2 x[i + k] + x[i])^2 over i from `first`."""
+    total, n = 0.0, max(0, len(x) - 2 * k - first)
+    x0, x1, x2 = x[first : first + n], x[first + k : first + k + n], x[first + 2 * k : first + 2 * k + n]
+    for i in range(n):
+        d = x2[i] - 2.0 * x1[i] + x0[i]
+        total += d * d
+    return total
+
+
+@njit(cache=True, nogil=True, fastmath={"reassoc", "contract"})
+def third_order(x: Array, k: int, first: int) -> float:
+    """Sum of (x[i + 3k] - 3 x[i + 2k] + 3 x[i + k] - x[i])^2 over i from `first`."""
+    total, n = 0.0, max(0, len(x) - 3 * k - first)
+    x0, x1 = x[first : first + n], x[first + k : first + k + n]
+    x2, x3 = x[first + 2 * k : first + 2 * k + n], x[first + 3 * k : first + 3 * k + n]
+    for i in range(n):
+        d = (x3[i] - x0[i]) - 3.0 * (x2[i] - x1[i])
+        total += d * d
+    return total
+
+
+@njit(cache=True, nogil=True, fastmath={"reassoc", "contract"})
+def _add_moments(z: Array, old: int, to: Array) -> None:
+    """Sums over the bins from `old` on and their differences w, with their neighbours before."""
+    a = b = c = d = e = 0.0
+    new = z[old:]
+    for i in range(len(new)):
+        a += new[i]
+        b += new[i] * new[i]
+    start = max(old, 1)
+    here, before = z[start:], z[start - 1 : -1]
+    for i in range(len(here)):
+        c += here[i] * before[i]
+        d += (here[i] - before[i]) ** 2
+    start = max(old, 2)
+    here, before, earlier = z[start:], z[start - 1 : -1], z[start - 2 : -2]
+    for i in range(len(here)):
+        e += (here[i] - before[i]) * (before[i] - earlier[i])
+    to += np.array((a, b, c, d, e))
+
+
+@njit(cache=True, nogil=True)
+def modified_squares(values: Array, m: int) -> tuple[float, int]:
+    """Sum and number of squared differences of neighbouring means of the phase over `m` steps, at every step.
+
+    Stretch by stretch, as the running sum of a running sum over a whole record would lose its digits.
+    """
+    step, total = max(STEP, 3 * m), 0.0
+    none = np.zeros(step + 3 * m)
+    for start in range(0, len(values) - 3 * m + 1, step):
+        part = values[start : start + step + 3 * m - 1]
+        _, summed = integrals(part, none[: len(part)], 1.0)
+        total += third_order(summed, m, 0)
+    return total, max(0, len(values) - 3 * m + 1)
+
+
+@njit(cache=True, nogil=True)
+def reflected_squares(b: Array, k: int) -> float:
+    """Sum of squared differences of sums over `k` bins around each of the first k - 1 inner points.
+
+    Before the first bin the record goes on as its own mirror image: the total deviation's extension. b (2k,) or more.
+    """
+    total = 0.0
+    right, left = np.sum(b[1 : k + 1]), b[0] + np.sum(b[: k - 1])
+    for i in range(1, k):  # `right` is the sum of b[i : i + k], `left` that of the k bins before i
+        total += (right - left) ** 2
+        right += b[i + k] - b[i]
+        left += b[i] - b[k - 1 - i]
+    return total
+
+
+@njit(cache=True, nogil=True)
+def first_order_lag(values: Array, steps: float) -> Array:
+    """Values (n,) through a first-order lag with a time constant of so many steps, settled at the first value."""
+    share = 1.0 - np.exp(-1.0 / steps)
+    lagged, state = np.empty_like(values), values[0]
+    for i in range(len(values)):
+        state += share * (values[i] - state)
+        lagged[i] = state
+    return lagged

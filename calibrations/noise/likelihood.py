@@ -1,0 +1,196 @@
+"""Whittle's likelihood of a noise model on the spectrum of one channel, and its maximum.
+
+    log L = -1/2 sum nu (log S + I/S)        S = G theta: expected, I: measured with nu degrees of freedom
+
+The coefficients theta of the known shapes G are not negative. A few multiplicative steps, each of which raises the
+likelihood, come near the maximum from any start. Fisher scoring follows: a least-squares fit with the weights
+nu / (2 S^2), repeated. A step that does not raise the likelihood is halved.
+
+Source  Whittle, Ark. Mat. 2 (1953); Fevotte, Bertin and Durrieu, Neural Comput. 21 (2009): multiplicative steps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numba import njit
+from scipy.special import chdtri, digamma
+
+from calibrations.effects import Effect
+from calibrations.effects import Values as EffectValues
+from calibrations.noise.channel_spectrum import Line, Lines
+from calibrations.noise.record import Channel
+from calibrations.noise.spectrum import Bands
+from calibrations.table import Array
+
+# Coefficients of a spectrum that is a sum of known shapes, none of them negative, by maximum likelihood.
+#
+#     log L = -1/2 sum nu (log S + I/S)        S = G theta: expected, I: seen with nu degrees of freedom
+#
+# Fisher's scoring is a least-squares fit with the weights nu / (2 S^2), repeated; a step that does not raise the
+# likelihood is halved. A few multiplicative steps before, each of which raises it from anywhere, come near enough.
+#
+# Source  Whittle, Ark. Mat. 2 (1953); Fevotte, Bertin and Durrieu, Neural Comput. 21 (2009): multiplicative steps.
+
+MULTIPLICATIVE_STEPS, SCORING_STEPS, SWEEPS = 20, 100, 200
+CONVERGED = 1e-9
+
+
+@njit(cache=True, nogil=True)
+def log_likelihood(expected: Array, seen: Array, freedom: Array) -> float:
+    """But for a constant."""
+    return -0.5 * float(np.sum(freedom * (np.log(expected) + seen / expected)))
+
+
+@njit(cache=True, nogil=True)
+def maximise(G: Array, seen: Array, freedom: Array, base: Array) -> tuple[Array, float]:
+    """(theta, log L) of S = base + G theta; G (b, p) with p of 1 or more, all others (b,)."""
+    p = G.shape[1]
+    theta = np.zeros(p)
+    for j in range(p):
+        theta[j] = np.exp(np.sum(freedom * np.log(seen / G[:, j])) / np.sum(freedom)) / p
+    for _ in range(MULTIPLICATIVE_STEPS):
+        S = base + G @ theta
+        for j in range(p):
+            theta[j] *= np.sqrt(np.sum(freedom * G[:, j] * seen / S**2) / np.sum(freedom * G[:, j] / S))
+    value = log_likelihood(base + G @ theta, seen, freedom)
+    for _ in range(SCORING_STEPS):
+        step = _scoring_step(G, seen, freedom, base, theta) - theta
+        length = 1.0
+        while length > 1e-4:
+            there = theta + length * step
+            S = base + G @ there
+            if S.min() > 0.0:
+                better = log_likelihood(S, seen, freedom)
+                if better >= value:
+                    break
+            length /= 2
+        if length <= 1e-4:
+            break
+        gained = better - value
+        theta, value = there, better
+        if gained < CONVERGED:
+            break
+    return theta, value
+
+
+@njit(cache=True, nogil=True)
+def _scoring_step(G: Array, seen: Array, freedom: Array, base: Array, theta: Array) -> Array:
+    """Where the weighted least squares without negative coefficients has its minimum: coordinate by coordinate."""
+    p = len(theta)
+    S = base + G @ theta
+    weighted = G / (S**2 / freedom).reshape(-1, 1)
+    A, r = G.T @ weighted, weighted.T @ (seen - base)
+    found = theta.copy()
+    for _ in range(SWEEPS):
+        change = 0.0
+        for j in range(p):
+            best = max(0.0, found[j] + (r[j] - np.dot(A[j], found)) / A[j, j])
+            change = max(change, abs(best - found[j]) * np.sqrt(A[j, j]))
+            found[j] = best
+        if change < 1e-8:
+            break
+    return found
+
+
+def information(columns: Array, expected: Array, freedom: Array) -> Array:
+    """Fisher's information on the coefficients of columns (b, p) of the spectrum's derivative, shape (p, p)."""
+    scaled = columns * np.sqrt(freedom / 2)[:, None] / expected[:, None]
+    return scaled.T @ scaled
+
+
+Values = dict[str, float]
+LEAST_DENSITY = 1e-18  # of the greatest density: rounding
+
+
+@dataclass(frozen=True)
+class ChannelFit:
+    """One channel beside a model: the lines taken off, and the values of every effect. Arrays over all bands (b,)."""
+
+    channel: Channel
+    parts: tuple[Bands, ...]
+    lines: Lines
+    effects: tuple[Effect, ...]  # those with a spectrum
+    values: Mapping[str, Values]
+    line_bound: float = 0.0  # amplitude that one more line might have
+
+    @cached_property
+    def seen(self) -> Array:
+        """Density; no band is quite without power."""
+        seen = np.concatenate([part.density for part in self.parts])
+        return np.asarray(np.maximum(seen, LEAST_DENSITY * seen.max()))
+
+    @cached_property
+    def freedom(self) -> Array:
+        """Degrees of freedom of each band."""
+        return np.concatenate([part.freedom for part in self.parts])
+
+    @cached_property
+    def frequency_hz(self) -> Array:
+        """Of each band."""
+        return np.concatenate([part.frequency_hz for part in self.parts])
+
+    def part_of(self, effect: Effect, values: Values | None = None) -> Array:
+        """What is expected of one effect."""
+        return effect_spectrum(effect, self.parts, self.values[effect.name] if values is None else values)
+
+    @cached_property
+    def expected(self) -> Array:
+        """The model's density."""
+        total = sum((self.part_of(effect) for effect in self.effects), np.zeros(len(self.seen)))
+        return np.asarray(np.maximum(total, LEAST_DENSITY * self.seen.max()))
+
+    def interval(self, coverage: float) -> tuple[Array, Array]:
+        """(lowest, highest) density: between them the model expects this part of what is seen."""
+        low, high = (chdtri(self.freedom, (1 + side * coverage) / 2) for side in (1, -1))
+        return self.expected * low / self.freedom, self.expected * high / self.freedom
+
+    def level(self, frequency_hz: Array) -> Array:
+        """The model's density of the means, read off between the bands."""
+        at, level = self.parts[0].frequency_hz, self.expected[: len(self.parts[0].density)]
+        return np.asarray(np.exp(np.interp(np.log(frequency_hz), np.log(at), np.log(level))))
+
+    @cached_property
+    def log_likelihood(self) -> float:
+        """Up to a constant of the bands."""
+        return float(log_likelihood(self.expected, self.seen, self.freedom))
+
+    @cached_property
+    def deviance(self) -> float:
+        """Twice the log-likelihood that a spectrum of its own in each band would gain."""
+        ratio = self.seen / self.expected
+        return float(np.sum(self.freedom * (ratio - 1 - np.log(ratio))))
+
+    @cached_property
+    def by_chance(self) -> float:
+        """The deviance that a complete model is expected to leave."""
+        return float(np.sum(self.freedom * (np.log(self.freedom / 2) - digamma(self.freedom / 2))))
+
+    @property
+    def excess(self) -> float:
+        """Rms mismatch over that which chance alone leaves: 1 for a complete model."""
+        return float(np.sqrt(self.deviance / self.by_chance))
+
+    @property
+    def mismatch(self) -> float:
+        """Rms difference of the spectrum from the model's, as a share of it, bands weighted by what they tell."""
+        return float(np.sqrt(2 * self.deviance / np.sum(self.freedom)))
+
+    @property
+    def floor(self) -> float:
+        """The mismatch that chance alone leaves."""
+        return float(np.sqrt(2 * self.by_chance / np.sum(self.freedom)))
+
+
+def effect_spectrum(effect: Effect, parts: Sequence[Bands], values: Values) -> Array:
+    """Two-sided density that an effect makes in all bands."""
+    p = EffectValues.of(values)
+    return np.concatenate([np.asarray(effect.spectrum(part, p), dtype=float) for part in parts])
+
+
+def effect_lines(effect: Effect, values: Values) -> tuple[Line, ...]:
+    """The sinusoids of an effect, of phase 0."""
+    return tuple(Line(f_hz, amplitude, 0.0) for f_hz, amplitude in effect.lines(EffectValues.of(values)))

@@ -1,0 +1,325 @@
+"""The noise of a table's means with the greatest restricted likelihood.
+
+The model and any smooth function of the angles are set aside first, so that a misfit that repeats with the angles does
+not count as slow noise. Time constants are at most a third of the record, and slow noise is at most a few times the
+white noise, so that it does not replace a trend.
+
+Loops over the grid of noises are compiled: matrices have a few columns, and calls would cost more than the sums.
+
+Source  Patterson and Thompson, Biometrika 58 (1971): restricted likelihood.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from calibrations.kernels import whiten
+from calibrations.noise.means import Noise, Processes, processes, rms
+from calibrations.table import Array
+
+# Compiled loops over a grid of noises: on matrices of a few columns each, calls would cost more than the sums.
+
+LEVEL_ROUNDS = 3  # in which levels settle
+RIDGE = 1e-13  # of each diagonal element
+TINY = np.finfo(np.float64).tiny
+
+
+@njit(cache=True, nogil=True)
+def products(
+    columns: Array, gap_s: Array, white: Array, slow: Array, tau_s: Array, processes: Array
+) -> tuple[Array, Array]:
+    """Products (g, k, k) of columns with each other, made white under each noise, and log-determinants (g,).
+
+    slow, tau_s  (g, m) as in `whiten`, of which the first `processes` (g,) count
+    """
+    k = columns.shape[1]
+    found, logdets = np.zeros((len(slow), k, k)), np.empty(len(slow))
+    for g in range(len(slow)):
+        m = processes[g]
+        out, logdets[g] = whiten(columns, gap_s, white, slow[g, :m].copy(), tau_s[g, :m].copy())
+        found[g] = out.T @ out
+    return found, logdets
+
+
+@njit(cache=True, nogil=True)
+def profiled(grams: Array, rest: Array, free: int, least: float) -> tuple[Array, Array, Array, Array]:
+    """Each noise's level, found in rounds beside `rest`, what that leaves of the sums of squares, log-determinants.
+
+    grams   (g, p + 1, p + 1) of one channel, its residual last; rest (p + 1, p + 1) of the other channels
+    free    rows; parameters that this channel bears are taken off
+    least   level
+
+    Returns levels, squares left in this channel (before the level) and in the others, log det of the normal matrix.
+    """
+    n, p = len(grams), len(rest) - 1
+    levels, own_left, other_left, logdets = np.ones(n), np.zeros(n), np.zeros(n), np.zeros(n)
+    for g in range(n):
+        gram = grams[g].copy()
+        for _ in range(LEVEL_ROUNDS):
+            own = gram / levels[g] ** 2
+            normal = own[:p, :p] + rest[:p, :p]
+            sides = np.hstack((own[:p, p:] + rest[:p, p:], own[:p, :p]))
+            solved, logdets[g] = eliminated(normal, sides)
+            theta = np.append(-solved[:, 0], 1.0)
+            own_left[g], other_left[g] = theta @ gram @ theta, theta @ rest @ theta
+            variance = max(own_left[g], 0.0) / max(free - np.trace(solved[:, 1:]), 1.0)
+            levels[g] = max(np.sqrt(variance), least)
+    return levels, own_left, other_left, logdets
+
+
+@njit(cache=True, nogil=True)
+def eliminated(A: Array, B: Array) -> tuple[Array, float]:
+    """A^-1 B (p, k) and log |det A| of a positive definite A (p, p), which needs no pivots.
+
+    Rows and columns are brought to one size first: channels may differ in noise by as much as numbers can tell.
+    """
+    p, k = B.shape
+    size = np.sqrt(np.maximum(np.diag(A), TINY))
+    U, X = A / np.outer(size, size) + RIDGE * np.eye(p), B / size.reshape(p, 1)
+    logdet = 2 * np.sum(np.log(size))
+    for i in range(p):
+        logdet += np.log(abs(U[i, i]))
+        for r in range(i + 1, p):
+            share = U[r, i] / U[i, i]
+            for j in range(i + 1, p):
+                U[r, j] -= share * U[i, j]
+            for j in range(k):
+                X[r, j] -= share * X[i, j]
+    for i in range(p - 1, -1, -1):
+        for j in range(k):
+            for r in range(i + 1, p):
+                X[i, j] -= U[i, r] * X[r, j]
+            X[i, j] /= U[i, i]
+    return X / size.reshape(p, 1), logdet
+
+
+Point = tuple[float, tuple[float, ...]]  # slow noise over white and scatter, and its time constants
+NO_SLOW: Point = (0.0, (1.0,))
+
+RATIOS = (0.2, 0.3, 0.45, 0.7, 1.0, 1.4, 2.0)  # slow noise over white and scatter; more is a drift
+FLICKER_RATIOS = (*RATIOS, 2.8, 4.0)  # flicker spreads over all times, and less of it is drift
+TIME_CONSTANTS = 4
+FLICKER_PROCESSES = 6
+INSEPARABLE = 6.0  # of twice the log-likelihood: odds of less than 20 to 1
+FEWEST_FOR_SLOW = 20  # rows below which slow noise cannot be told from white
+ROUNDS = 3
+LEAST_STEP = 1e-9  # of the noise: less than this in one round is an exact fit, and no noise
+EXACT = 1e-12  # of a parameter's effect: noise below this is rounding
+NEARLY_SMOOTH = 1e-2  # of a column's length: less beside the smooth columns is taken as none
+
+
+def estimate(start: Noise, residual: Array, jacobian: Array, smooth: Array) -> Noise:
+    """The noise, given residual (channels, n), jacobian (channels, n, p) and smooth columns (n, k).
+
+    Scatter adds to the white noise of each row, so that rows of unequal white noise change their weights: the factor
+    found is turned into scatter, and the search repeated.
+    """
+    noise = start
+    for _ in range(ROUNDS):
+        best = NoiseSearch(noise, residual, (jacobian,), smooth, candidate_noises(noise)).best()
+        variance = best.scale**2 * np.mean(noise.fast**2, axis=1) - np.mean(noise.white**2, axis=1)
+        scatter = np.sqrt(np.maximum(variance, 0.0))
+        noise = replace(noise, scatter=scatter, ratio=best.ratio, taus_s=best.taus_s)
+        if np.all(np.abs(best.scale - 1) < 1e-2):
+            break
+    return noise
+
+
+def rounding_of(jacobian: Array) -> Array:
+    """What may be left of each channel by rounding alone, shape (channels,); 0 without parameters."""
+    if not jacobian.size:
+        return np.zeros(len(jacobian))
+    return np.asarray(EXACT * rms(jacobian.swapaxes(1, 2)).max(axis=1))
+
+
+def gains(noise: Noise, residual: Array, jacobian: Array, extras: Sequence[Array], smooth: Array) -> list[float]:
+    """Twice the gain in log-likelihood by each of `extras` (channels, n, k), the noise fitted anew with it.
+
+    Smooth columns are set aside: this is what each explains beside them. Gram matrices are made once for all.
+    """
+    search = NoiseSearch(noise, residual, (jacobian, *extras), smooth, candidate_noises(noise))
+    without = search.best().deviance
+    return [
+        max(0.0, without - search.best(k).deviance) if k in search.beside[1] else 0.0 for k in range(1, len(extras) + 1)
+    ]
+
+
+def candidate_noises(noise: Noise) -> list[Point]:
+    """Slow noise to try beside what is known: none where a still record has told it."""
+    return [NO_SLOW] if noise.given else grid(noise.gap_s)
+
+
+def grid(gap_s: Array) -> list[Point]:
+    """Slow noise to try on rows so far apart: none, one process, flicker."""
+    if not long_enough(gap_s):
+        return [NO_SLOW]
+    span, gap = float(np.sum(gap_s)), float(np.median(gap_s[1:]))
+    single = [(float(tau),) for tau in np.geomspace(3 * gap, span / 3, TIME_CONSTANTS)]
+    flicker = tuple(np.geomspace(gap / 2, span / 3, FLICKER_PROCESSES).tolist())
+    return [
+        NO_SLOW,
+        *((ratio, taus) for taus in single for ratio in RATIOS),
+        *((ratio, flicker) for ratio in FLICKER_RATIOS),
+    ]
+
+
+def long_enough(gap_s: Array) -> bool:
+    """Whether rows so far apart can tell slow noise from white."""
+    gap = float(np.median(gap_s[1:])) if len(gap_s) > 1 else 0.0
+    return len(gap_s) >= FEWEST_FOR_SLOW and gap > 0 and float(np.sum(gap_s)) >= 20 * gap
+
+
+def deviance(noise: Noise, residual: Array, jacobian: Array, smooth: Array) -> float:
+    """-2 log restricted likelihood up to a constant of the data, under the noise of greatest likelihood."""
+    return NoiseSearch(noise, residual, (jacobian,), smooth, candidate_noises(noise)).best().deviance
+
+
+@dataclass(frozen=True)
+class Best:
+    """The point of greatest likelihood: per channel ratio, time constants and the factor on all noise."""
+
+    ratio: Array
+    taus_s: tuple[tuple[float, ...], ...]
+    scale: Array
+    deviance: float
+    picks: tuple[int, ...]  # of the grid
+
+
+@dataclass(frozen=True)
+class NoiseSearch:
+    """Likelihood over a grid of slow noise, for the first group of columns alone or with one of the others."""
+
+    noise: Noise
+    residual: Array
+    groups: tuple[Array, ...]
+    smooth: Array
+    grid: list[Point]
+
+    @cached_property
+    def beside(self) -> tuple[Array, tuple[int, ...]]:
+        """Orthonormal columns (channels, n, rank) for what each group adds beside the smooth columns and the first.
+
+        Also the number of the group that each comes from.
+        """
+        channels, n = self.residual.shape
+        fast = self.noise.fast[:, :, None]
+        Q = [np.linalg.qr(self.smooth / fast[c])[0] for c in range(channels)]
+        first = self._freed(self.groups[0], Q, np.zeros((channels * n, 0)))
+        others = [self._freed(group, Q, first) for group in self.groups[1:]]
+        origin = np.repeat(np.arange(len(self.groups)), [first.shape[1], *(other.shape[1] for other in others)])
+        columns = np.hstack([first, *others]).reshape(channels, n, -1)
+        return columns * fast, tuple(origin.tolist())
+
+    def _freed(self, group: Array, smooth: list[Array], first: Array) -> Array:
+        """Orthonormal columns (channels * n, rank) for what a group adds."""
+        free, shape = group / self.noise.fast[:, :, None], (self.residual.size, group.shape[2])
+        size = np.linalg.norm(free.reshape(shape), axis=0)
+        free = np.stack([free[c] - Q @ (Q.T @ free[c]) for c, Q in enumerate(smooth)]).reshape(shape)
+        kept = first
+        for k in range(free.shape[1]):
+            column = free[:, k] - kept @ (kept.T @ free[:, k])
+            column -= kept @ (kept.T @ column)
+            if np.linalg.norm(column) > NEARLY_SMOOTH * size[k] > 0:
+                kept = np.column_stack([kept, column / np.linalg.norm(column)])
+        return kept[:, first.shape[1] :]
+
+    @cached_property
+    def least(self) -> Array:
+        """The least level of each channel's noise, (channels,): what is known to be white, or rounding."""
+        known = rms(self.noise.white)
+        floor = known if self.noise.known else np.maximum(known, rounding_of(self.groups[0]))
+        return np.asarray(np.maximum(floor / rms(self.noise.fast), LEAST_STEP))
+
+    @cached_property
+    def grams(self) -> list[Grams]:
+        """Per channel, over the grid."""
+        basis, _ = self.beside
+        smooth = np.broadcast_to(self.smooth, (len(basis), *self.smooth.shape))
+        columns = np.concatenate([smooth, basis, self.residual[:, :, None]], axis=2)
+        fast, gap_s, k = self.noise.fast, self.noise.gap_s, self.smooth.shape[1]
+        given = self.noise.given or ((),) * len(basis)
+        return [_grams(gap_s, fast[c], columns[c], self.grid, k, given[c]) for c in range(len(basis))]
+
+    @cached_property
+    def _flickers(self) -> NDArray[np.bool_]:
+        """Which points of the grid are flicker noise, or none."""
+        return np.array([len(taus) > 1 or ratio == 0 for ratio, taus in self.grid])
+
+    def _choose(self, score: Array) -> int:
+        """The best point; flicker noise where the data cannot tell it from the best.
+
+        Electronics flickers, and has more to say at long times than one process: steps and trends are then judged
+        with caution.
+        """
+        best = int(np.argmin(score))
+        flicker = int(np.argmin(np.where(self._flickers, score, np.inf)))
+        return flicker if score[flicker] - score[best] < INSEPARABLE else best
+
+    def best(self, group: int = 0) -> Best:
+        """The noise of greatest likelihood with the first group in the model, and another; channels in turn."""
+        channels, n = self.residual.shape
+        chosen = np.flatnonzero([origin in (0, group) for origin in self.beside[1]])
+        rank = len(chosen)
+        grams = [g.of(chosen) for g in self.grams]
+        free = n - self.smooth.shape[1]
+        pick, scale = [0] * channels, np.ones(channels)
+        for _ in range(4 if channels > 1 else 1):
+            before = list(pick)
+            for c in range(channels):
+                others = (grams[d].gram[pick[d]] / scale[d] ** 2 for d in range(channels) if d != c)
+                rest = sum(others, np.zeros((rank + 1, rank + 1)))
+                score, scales = scores(grams[c], rest, free, float(self.least[c]))
+                pick[c] = self._choose(score)
+                scale[c] = scales[pick[c]]
+            if pick == before:
+                break
+        deviance = sum(float(grams[c].logdet[pick[c]] + 2 * n * np.log(scale[c])) for c in range(channels))
+        total = sum((grams[c].gram[pick[c]] / scale[c] ** 2 for c in range(channels)), np.zeros((rank + 1, rank + 1)))
+        size = np.sqrt(np.maximum(np.diag(total)[:-1], np.finfo(float).tiny))  # channels may differ by many decades
+        theta = np.linalg.lstsq(total[:-1, :-1] / np.outer(size, size), total[:-1, -1] / size, rcond=1e-10)[0]
+        ratio, taus_s = zip(*(self.grid[k] for k in pick), strict=True)
+        left = float(total[-1, -1] - total[:-1, -1] / size @ theta)
+        return Best(np.array(ratio), taus_s, scale, deviance + left, tuple(pick))
+
+
+@dataclass(frozen=True)
+class Grams:
+    """One channel's [J r]^T Sigma^-1 [J r], (grid, p + 1, p + 1), smooth columns set aside, and determinants."""
+
+    gram: Array
+    logdet: Array  # of Sigma, (grid,)
+    information: Array  # log det S^T Sigma^-1 S of the smooth columns, (grid,)
+
+    def of(self, columns: NDArray[np.intp]) -> Grams:
+        """The same with some of the columns, and the residual."""
+        keep = np.append(columns, self.gram.shape[1] - 1)
+        return replace(self, gram=np.ascontiguousarray(self.gram[:, keep[:, None], keep]))
+
+
+def _grams(gap_s: Array, fast: Array, columns: Array, grid: list[Point], k: int, given: Processes) -> Grams:
+    """Gram matrices over the grid; the first `k` columns are set aside (Schur complement)."""
+    w = float(rms(fast))
+    each = [processes(ratio * w, taus, given) for ratio, taus in grid]
+    counts = np.array([len(of) for of in each])
+    padded = np.array([(*of, *((0.0, 1.0),) * (counts.max() - len(of))) for of in each])
+    gram, logdet = products(np.ascontiguousarray(columns), gap_s, fast, padded[..., 0], padded[..., 1], counts)
+    if not k:
+        return Grams(gram, logdet, np.zeros(len(grid)))
+    S, cross = gram[:, :k, :k], gram[:, :k, k:]
+    reduced = gram[:, k:, k:] - np.swapaxes(cross, 1, 2) @ np.linalg.solve(S, cross)
+    return Grams(np.ascontiguousarray(reduced), logdet, np.linalg.slogdet(S)[1])
+
+
+def scores(g: Grams, rest: Array, free: int, least: float) -> tuple[Array, Array]:
+    """-2 log restricted likelihood up to a constant, and the factor on all noise (profiled), along the grid.
+
+    `free` rows less smooth columns; the parameters that this channel bears, and not the others, are taken off here.
+    """
+    scale, own, other, logdet = profiled(g.gram, rest, free, least)
+    return own / scale**2 + other + g.logdet + g.information + logdet + 2 * free * np.log(scale), scale

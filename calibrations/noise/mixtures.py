@@ -1,0 +1,163 @@
+"""Every mixture of noise effects added to a model, and the mixture that the record supports best for its price.
+
+The price of an effect is a gain in log-likelihood that noise alone rarely reaches, so that over the whole search
+nothing is named by chance. Mixtures are few, and all are tried: what is named does not depend on the order.
+
+A power is not negative: where an effect is absent, twice its gain in log-likelihood is 0 or, half of the time,
+chi-squared. If its shape is searched for, the gain is the maximum of many correlated gains along a curve on the unit
+sphere; a curve of length L adds L / (2 pi) exp(-gain / 2), a chi-squared term of two degrees of freedom. Gains of
+channels add up.
+
+Source  Self and Liang, J. Am. Statist. Assoc. 82 (1987): likelihood ratios at a bound; Hotelling, Am. J. Math. 61
+        (1939), and Davies, Biometrika 74 (1987): tubes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.special import chdtrc
+
+from calibrations.criteria import LEAST_GAINS, SIGNIFICANT
+from calibrations.effects import Effect
+from calibrations.noise.fit import fit_effects, shape_grid
+from calibrations.noise.likelihood import ChannelFit, effect_spectrum
+from calibrations.table import Array
+
+STEPS_PER_SHAPE = 4  # steps along the curve to one that is tried
+MOST_GAIN = 1e3
+
+
+def chance(gain: float, tubes: Sequence[float]) -> float:
+    """Of such a gain, summed over channels, where nothing is there; `tubes` has L / (2 pi) of each channel."""
+    weights = np.ones(1)  # of chi-square with 0, 1, 2 ... degrees of freedom
+    for tube in tubes:
+        weights = np.convolve(weights, [0.5, 0.5, tube])
+    if gain <= 0:
+        return 1.0
+    return float(min(1.0, sum(w * chdtrc(k, gain) for k, w in enumerate(weights) if k)))
+
+
+def least_gain(of_chance: float, tubes: Sequence[float]) -> float:
+    """The gain that noise alone makes with this chance."""
+    return float(brentq(lambda gain: chance(gain, tubes) - of_chance, 1e-3, MOST_GAIN))
+
+
+def tube(beside: ChannelFit, effect: Effect) -> float:
+    """L / (2 pi) of an effect's shapes beside the effects of a fit; 0 for one that has no shape to be searched for."""
+    if len(effect.parameters) < 2:
+        return 0.0
+    strength, shape = (p.name for p in effect.parameters[:2])
+    ends = shape_grid(effect, shape, beside.channel)
+    shapes = np.geomspace(ends[0], ends[-1], STEPS_PER_SHAPE * len(ends)).tolist()
+    columns = np.column_stack(
+        [effect_spectrum(effect, beside.parts, {strength: 1.0, shape: value}) for value in shapes]
+    )
+    unit = _orthogonal_units(columns, beside)
+    steps = np.clip(np.sum(unit[:, 1:] * unit[:, :-1], axis=0), -1.0, 1.0)
+    return float(np.sum(np.arccos(steps)) / (2 * np.pi))
+
+
+def _orthogonal_units(columns: Array, fit: ChannelFit) -> Array:
+    """Columns (b, k) of spectra as unit vectors of what they tell beside the fit's own effects."""
+    weight = (np.sqrt(fit.freedom / 2) / fit.expected)[:, None]
+    own = np.column_stack(
+        [effect_spectrum(e, fit.parts, {**fit.values[e.name], e.parameters[0].name: 1.0}) for e in fit.effects]
+    )
+    basis, _ = np.linalg.qr(own * weight / np.linalg.norm(own * weight, axis=0))
+    free = columns * weight
+    free = free - basis @ (basis.T @ free)
+    return np.asarray(free / np.linalg.norm(free, axis=0))
+
+
+# Every mixture of noise effects beside a model, and the one that the record makes most likely for its price.
+#
+# The price of an effect is the gain in log-likelihood that noise alone would make so rarely that over the whole
+# search
+# nothing is named by chance. Mixtures are few, and all are tried: what is named does not depend on the order.
+
+
+@dataclass(frozen=True)
+class Mixture:
+    """Effects beside a model, fitted to each channel; the gain over the model, and that less the effects' prices."""
+
+    effects: tuple[Effect, ...]
+    channels: tuple[ChannelFit, ...]
+    gain: float
+    worth: float
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the effects beside the model."""
+        return tuple(effect.name for effect in self.effects)
+
+
+@dataclass(frozen=True)
+class Mixtures:
+    """What is seen in each channel, the effects of the model, and those that might be missing."""
+
+    seen: tuple[ChannelFit, ...]
+    given: tuple[Effect, ...]
+    others: tuple[Effect, ...]
+
+    @cached_property
+    def base(self) -> tuple[ChannelFit, ...]:
+        """The model alone."""
+        return self._fitted(())
+
+    @cached_property
+    def tubes(self) -> dict[str, tuple[float, ...]]:
+        """Of each of the others, per channel."""
+        return {effect.name: tuple(tube(each, effect) for each in self.base) for effect in self.others}
+
+    @cached_property
+    def prices(self) -> dict[str, float]:
+        """Of each of the others."""
+        chance = SIGNIFICANT / max(1, len(self.others))
+        return {name: max(LEAST_GAINS.get(name, 0.0), least_gain(chance, tubes)) for name, tubes in self.tubes.items()}
+
+    def of(self, effects: Iterable[Effect]) -> Mixture:
+        """The model with some of the others."""
+        effects = tuple(effects)
+        channels = self._fitted(effects)
+        gain = 2 * (likelihood(channels) - likelihood(self.base))
+        return Mixture(effects, channels, gain, gain - sum(self.prices[effect.name] for effect in effects))
+
+    @cached_property
+    def best(self) -> Mixture:
+        """The one that is worth most.
+
+        No mixture gains more than all effects together, so that a mixture whose price leaves too little is not fitted.
+        """
+        most = self.of(self.others).gain
+        best = self.of(())
+        for subset in (subset for k in range(1, len(self.others) + 1) for subset in combinations(self.others, k)):
+            if most - sum(self.prices[effect.name] for effect in subset) > best.worth:
+                best = max(best, self.of(subset), key=lambda mixture: mixture.worth)
+        return best
+
+    def lost_without(self, mixture: Mixture, name: str) -> float:
+        """Twice the log-likelihood that a mixture loses without one of its effects."""
+        rest = self.of(effect for effect in mixture.effects if effect.name != name)
+        return mixture.gain - rest.gain
+
+    def _fitted(self, effects: Sequence[Effect]) -> tuple[ChannelFit, ...]:
+        names = frozenset(effect.name for effect in effects)
+        if names not in self._fits:
+            self._fits[names] = tuple(fit_effects(each, (*self.given, *effects)) for each in self.seen)
+        return self._fits[names]
+
+    @cached_property
+    def _fits(self) -> dict[frozenset[str], tuple[ChannelFit, ...]]:
+        """The fits so far by the names of their effects: a search returns to many of them."""
+        return {}
+
+
+def likelihood(channels: Iterable[ChannelFit]) -> float:
+    """Logarithm, of all channels together."""
+    return sum(each.log_likelihood for each in channels)

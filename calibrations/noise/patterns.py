@@ -1,0 +1,192 @@
+"""What no noise process makes: a step, a drift, a settling, what follows a column that was logged beside.
+
+Each looks like a random walk to a spectrum. In the cosine transform of the means each has a form of its own, and its
+coefficients are independent there: the amplitude that fits best, and what it gains, are those of a matched filter, for
+a step at every place at once. Of two columns that both wander, one explains the other by what it gains beside noise
+that wanders as well, so that it takes no chance likeness for a cause.
+
+Source  Van Trees, Detection, Estimation, and Modulation Theory, part I, 4.3: a known signal in coloured noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+from scipy.fft import dct, dst
+
+from calibrations.criteria import INSEPARABLE, PATTERN_AMPLITUDE, PATTERN_CERTAIN
+from calibrations.noise.channel_spectrum import means_without
+from calibrations.noise.kernels import first_order_lag
+from calibrations.noise.likelihood import ChannelFit
+from calibrations.noise.record import Channel
+from calibrations.noise.samples import hidden_in
+from calibrations.table import Array
+
+STEP, DRIFT, SETTLING, FOLLOWS = "step", "drift", "settling", "follows"
+TIMES = np.geomspace(1 / 50, 1 / 2, 16)  # time constants of a settling that are tried, of the record
+LAGS = (0.0, *np.geomspace(1 / 400, 1 / 5, 10))  # of an output behind a column, of the record
+EDGE = 8  # means from either end within which a step would be one odd value
+PER = {"temperature_c": "K", "supply_v": "V"}  # units of columns
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """A part of one channel's means that is no noise: a `form` (m,), its amount, and how uncertain that is.
+
+    `words` has a place for that amount. `gain`: twice the log-likelihood; `price`: of its search. `cause` is the logged
+    column that it follows; `rivals` are the other patterns that explain as much. `doubt`: how uncertain the form leaves
+    the amount, of the amount.
+    """
+
+    kind: str
+    axis: str
+    words: str
+    form: Array
+    size: float
+    std: float
+    gain: float
+    price: float
+    cause: str = ""
+    doubt: float = 0.0
+    rivals: tuple[Pattern, ...] = ()
+
+    @property
+    def worth(self) -> float:
+        """What it gains beyond its price."""
+        return self.gain - self.price
+
+    @property
+    def plain(self) -> str:
+        """In words."""
+        return self.words.replace("{}", f"{self.size:+.4g} +- {self.std:.1g}")
+
+    @property
+    def certain(self) -> bool:
+        """Whether it is no chance beside whatever was fitted."""
+        return self.worth > (0.0 if self.kind == FOLLOWS else PATTERN_CERTAIN)
+
+    @property
+    def text(self) -> str:
+        """In words, with what it cannot be told from."""
+        others = " or ".join(each.plain for each in self.rivals)
+        return f"{self.plain} (on this record it cannot be told from {others})" if others else self.plain
+
+    def taken_off(self, channel: Channel) -> Channel:
+        """The record without it."""
+        return replace(channel, means=channel.means - self.size * self.form) if channel.axis == self.axis else channel
+
+
+def pattern_of(found: ChannelFit) -> Pattern | None:
+    """The pattern that explains most of what one channel does, where it is no chance."""
+    spectrum, unit = _Ordinates.of(found), found.channel.unit
+    every = [
+        _step(found.channel, spectrum, unit), *_courses(found.channel, spectrum, unit),
+        *_followed(found.channel, spectrum, unit),
+    ]  # fmt: skip
+    kinds = {(each.kind, each.cause) for each in every}
+    best, *others = sorted((_best(every, *kind) for kind in kinds), key=lambda each: -each.worth)
+    if best.worth <= 0 or hidden_in(found.channel.oddities) is not None:  # rounding makes steps and slopes of its own
+        return None
+    return replace(best, rivals=tuple(each for each in others if best.worth - each.worth < INSEPARABLE))
+
+
+def _best(every: Iterable[Pattern], kind: str, cause: str) -> Pattern:
+    """Of one kind."""
+    return max((each for each in every if (each.kind, each.cause) == (kind, cause)), key=lambda each: each.worth)
+
+
+@dataclass(frozen=True)
+class _Ordinates:
+    """Cosine coefficients of the means below the filter, (k,), and their variances by the model."""
+
+    seen: Array
+    variance: Array
+    n: int
+
+    @classmethod
+    def of(cls, found: ChannelFit) -> _Ordinates:
+        channel = found.channel
+        n, step_s = len(channel.means), channel.sampling.interval_s
+        last = min(n, 2 + int(channel.corner_hz * n * step_s)) if np.isfinite(channel.corner_hz) else n
+        f = np.arange(1, last) / (2 * n * step_s)
+        seen = dct(means_without(channel, found.lines), type=2, norm="ortho")[1:last]
+        return cls(seen, found.level(f) / step_s, n)
+
+    def coefficients(self, form: Array) -> Array:
+        """Of a form of the means (n,), shape (k,)."""
+        return np.asarray(dct(form, type=2, norm="ortho")[1 : len(self.seen) + 1])
+
+    def matched(self, form: Array) -> tuple[float, float, float]:
+        """(amplitude, its standard deviation, gain) of a form of the means (n,)."""
+        c = self.coefficients(form)
+        weight = float(np.sum(c * c / self.variance))
+        amplitude = float(np.sum(c * self.seen / self.variance)) / weight
+        return amplitude, weight**-0.5, amplitude**2 * weight
+
+
+def _step(channel: Channel, by: _Ordinates, unit: str) -> Pattern:
+    """The step that explains most, at whatever mean."""
+    n, k = by.n, np.arange(1, len(by.seen) + 1)
+    per_step = -np.sqrt(2 / n) / (2 * np.sin(np.pi * k / (2 * n)))  # of a step at m: times sin(pi k m / n)
+    along, power = np.zeros(n - 1), np.zeros(n + 1)
+    along[: min(len(k), n - 1)] = (by.seen * per_step / by.variance)[: n - 1]
+    power[1 : len(k) + 1] = per_step**2 / by.variance
+    top = dst(along, type=1) / 2
+    turned = (dct(power, type=1) + power[0] + (-1.0) ** np.arange(n + 1) * power[-1]) / 2
+    twice = 2 * np.arange(1, n)
+    bottom = (power.sum() - turned[np.where(twice <= n, twice, 2 * n - twice)]) / 2
+    gain = np.where(bottom > 0, top**2 / np.maximum(bottom, np.finfo(float).tiny), 0.0)
+    gain[: EDGE - 1] = gain[n - EDGE :] = 0.0
+    at = int(np.argmax(gain))
+    text = f"a step of {{}} {unit} of {channel.axis} at t = {(at + 1) * channel.sampling.interval_s:.6g} s"
+    form = np.asarray(np.arange(n) > at, dtype=float)
+    return _matched(STEP, channel, text, form, by, PATTERN_AMPLITUDE + 2 * float(np.log(n)))
+
+
+def _matched(
+    kind: str, channel: Channel, words: str, form: Array, by: _Ordinates, price: float, cause: str = ""
+) -> Pattern:
+    form = form - form.mean()
+    size, std, gain = by.matched(form)
+    return Pattern(kind, channel.axis, words, form, size, std, gain, price, cause)
+
+
+def _courses(channel: Channel, by: _Ordinates, unit: str) -> Iterator[Pattern]:
+    """A drift in a straight line, and settlings."""
+    hours = (np.arange(by.n) + 0.5) * channel.sampling.interval_s / 3600
+    yield _matched(DRIFT, channel, f"a drift of {channel.axis} by {{}} {unit}/h", hours, by, PATTERN_AMPLITUDE)
+    price = PATTERN_AMPLITUDE + 2 * float(np.log(len(TIMES)))
+    for share in TIMES.tolist():
+        left = -np.exp(-(np.arange(by.n) + 0.5) / by.n / share)
+        text = f"{channel.axis} settles by {{}} {unit}, with a time constant of about {share * channel.length_s:.2g} s"
+        yield _matched(SETTLING, channel, text, left, by, price)
+
+
+def _followed(channel: Channel, by: _Ordinates, unit: str) -> Iterator[Pattern]:
+    """What follows a column, as it was read or without its scatter, at once or some time behind it."""
+    price = PATTERN_AMPLITUDE + 2 * float(np.log(len(LAGS) * max(1, len(channel.logged))))
+    for name, column in channel.logged.items():
+        readings = ((column.read, 0.0), (column.level, column.doubt))
+        for (values, doubt), (share, behind) in product(readings, _lags(channel.length_s)):
+            form = values if share == 0 else first_order_lag(values, share * len(values))
+            text = f"{channel.axis} follows {name} by {{}} {unit}/{PER.get(name, name)}{behind}"
+            yield replace(_matched(FOLLOWS, channel, text, form, by, price, name), doubt=doubt)
+
+
+def _lags(length_s: float) -> Iterator[tuple[float, str]]:
+    """Shares of the record, and how they are told."""
+    for share in LAGS:
+        yield share, f", {share * length_s:.2g} s behind it" if share else ""
+
+
+def refitted(patterns: tuple[Pattern, ...], found: ChannelFit, whole: Channel) -> tuple[Pattern, ...]:
+    """The patterns of one channel with their amounts fitted together to the `whole` record, beside a fit's effects."""
+    by = _Ordinates.of(replace(found, channel=whole))
+    forms = np.column_stack([by.coefficients(each.form) for each in patterns]) / np.sqrt(by.variance)[:, None]
+    size, *_ = np.linalg.lstsq(forms, by.seen / np.sqrt(by.variance), rcond=None)
+    std = np.sqrt(np.diag(np.linalg.pinv(forms.T @ forms)))
+    std = np.hypot(std, [each.doubt * a for each, a in zip(patterns, size, strict=True)])
+    return tuple(replace(p, size=float(a), std=float(s)) for p, a, s in zip(patterns, size, std, strict=True))

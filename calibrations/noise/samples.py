@@ -1,0 +1,328 @@
+"""Samples that are not noise, and noise that the samples do not show.
+
+    hidden      noise below one step of the converter
+    wild        single samples far from their neighbours: a bad packet, a spark, a knock
+    stuck       a stretch of equal samples: a cable that came off, a converter that stopped
+    clipped     a channel at the limit of its range
+
+Rounding adds an error of a twelfth of a squared step to noise of half a step or more, whatever the mean. With less
+noise, what is seen depends on where the mean lies between two steps. So noise is hidden where it and that error, as
+they reach the converter, amount to less than for noise of half a step.
+
+A sample is wild if it is off on the same side from the median of the three samples before it and of the three after it,
+which the edge of a step is not. The scale of the noise is the ninth decile of these distances, which a few wild samples
+do not move.
+
+The lengths of runs of equal samples are compared with those that chance makes: of R runs of geometric lengths, the
+longest is near their mean length times log R. A slow sensor with coarse steps has long runs everywhere.
+
+Source  Widrow and Kollar, Quantization Noise: the quantising theorem, and dither of half a step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrations.criteria import (
+    CLIPPED,
+    CLIPPED_BEYOND_USUAL,
+    MOST_WILD,
+    SHORTEST_STUCK,
+    STUCK_BEYOND_CHANCE,
+    WILD_SAMPLE,
+)
+from calibrations.errors import DataError
+from calibrations.noise.deviations import Curve
+from calibrations.table import Array
+
+HALF = 0.5  # of a step: noise that rounding leaves as it is
+LEAST = HALF**2 + 1 / 12  # of a step's square: such noise, and what rounding adds
+SOON = 64  # samples within which noise has to come to that
+BEHIND = 4.0  # periods of a low-pass after which noise averages as if there were none
+FASTEST = ("white-noise", "quantisation-noise")  # what is hidden at least
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """Noise below a converter's `step`, over so many `levels`; white noise is below the coefficient `white_below`.
+
+    `all`: whether what is slow is hidden too.
+    """
+
+    step: float
+    levels: int
+    white_below: float
+    all: bool
+
+    @property
+    def text(self) -> str:
+        """In words, with what to do."""
+        at = f"{self.levels} values" if self.all else "values"
+        slow = "" if self.all else "; slow noise is larger, and its coefficients are given"
+        fast = "" if self.all else ", from sample to sample,"
+        return (
+            f"the noise{fast} is below the converter's step: the samples are at {at} {self.step:.4g} apart, so that "
+            f"its level is not known{slow}: amplify the output, take a smaller range or a finer converter, or add "
+            "noise of half a step or more (dither)"
+        )
+
+    def hides(self, process: str) -> bool:
+        """Whether a process of the catalogue cannot be told."""
+        return self.all or process in FASTEST
+
+
+class Steps:
+    """The step and the range of the values so far; blocks are added in order, `hidden` is asked at the end."""
+
+    def __init__(self) -> None:
+        self._last, self._step = np.nan, np.inf
+        self._low, self._high = np.inf, -np.inf
+
+    def add(self, samples: Array) -> None:
+        """The next samples, shape (n,)."""
+        if not len(samples):
+            return
+        between = np.abs(np.diff(samples, prepend=self._last))
+        self._step = float(np.min(between, where=between > 0, initial=self._step))
+        self._low, self._high = min(self._low, float(samples.min())), max(self._high, float(samples.max()))
+        self._last = float(samples[-1])
+
+    def hidden(self, curve: Curve, rate_hz: float, corner_hz: float) -> Hidden | None:
+        """By the Allan deviations of the samples, behind a first-order low-pass; None where noise is not hidden."""
+        limit = LEAST * self._step**2
+        if not np.isfinite(self._step) or _reaching(curve, rate_hz, corner_hz) >= limit:
+            return None
+        below = HALF * self._step / float(np.sqrt(min(rate_hz, np.pi * corner_hz)))
+        levels = round((self._high - self._low) / self._step) + 1
+        return Hidden(self._step, levels, below, bool(np.max(curve.deviation**2) < limit))
+
+
+def hidden_step(values: Array) -> float | None:
+    """The step that hides the noise of values (n,), whatever is slow in it; None where none does."""
+    between = np.abs(np.diff(values))
+    step = float(np.min(between, where=between > 0, initial=np.inf))
+    return step if np.isfinite(step) and np.mean(between**2) / 2 < LEAST * step**2 else None
+
+
+def _reaching(curve: Curve, rate_hz: float, corner_hz: float) -> float:
+    """The variance of noise, as it reaches the converter within some samples, or behind its low-pass."""
+    variance = curve.deviation**2
+    soon = float(np.max(variance[curve.tau_s <= SOON / rate_hz]))
+    if not np.isfinite(corner_hz):
+        return soon
+    at = min(int(np.searchsorted(curve.tau_s, BEHIND / corner_hz)), len(variance) - 1)
+    return max(soon, float(variance[at] * curve.tau_s[at]) * min(rate_hz, np.pi * corner_hz))
+
+
+PART = 4096  # samples whose scale is common
+SIDE = 3  # samples to each side
+FEWEST = 256  # samples that have a scale of their own
+DECILE, NORMAL = 0.9, 1.6449  # and where it is in a normal distribution, in standard deviations
+
+
+@dataclass(frozen=True)
+class Wild:
+    """How many samples are wild, the first and the wildest of them (numbers from 0), by how many standard deviations
+    that one is off, and what their squares come to, in the square of the values' unit."""
+
+    count: int = 0
+    first: int = 0
+    wildest: int = 0
+    deviations: float = 0.0
+    power: float = 0.0
+
+
+class Outliers:
+    """What was seen so far; blocks are added in order, `found` is asked at the end."""
+
+    def __init__(self) -> None:
+        self._waiting = np.empty(0)
+        self._before = 0  # number of the first sample that waits
+        self._judged = 0
+        self._scale = 0.0
+        self._wild = Wild()
+
+    def add(self, samples: Array) -> None:
+        """The next samples, shape (n,)."""
+        waiting = np.concatenate([self._waiting, samples])
+        while len(waiting) >= PART + 2 * SIDE:
+            if not self._judged:  # the record goes on as its mirror image, at both ends
+                waiting = np.concatenate([waiting[SIDE:0:-1], waiting])
+                self._before = -SIDE
+            self._judge(waiting[: PART + 2 * SIDE])
+            waiting, self._before = waiting[PART:], self._before + PART
+        self._waiting = waiting
+
+    def found(self) -> Wild:
+        """Of all samples."""
+        rest = self._waiting
+        if len(rest) > 2 * SIDE:
+            head = rest[SIDE:0:-1] if not self._judged else rest[:0]
+            self._before -= len(head)
+            self._judge(np.concatenate([head, rest, rest[-2 : -2 - SIDE : -1]]))
+            self._waiting = rest[:0]
+        return self._wild if self._wild.count <= max(1, int(MOST_WILD * self._judged)) else Wild()
+
+    def _judge(self, part: Array) -> None:
+        """All but the outer samples of a part."""
+        middle = part[SIDE:-SIDE]
+        left, right = middle - _median(part, 0), middle - _median(part, SIDE + 1)
+        if len(middle) >= FEWEST or not self._scale:
+            self._scale = float(np.quantile(np.abs(left), DECILE)) / NORMAL
+        off = np.where(np.sign(left) == np.sign(right), np.minimum(np.abs(left), np.abs(right)), 0.0)
+        wild = np.flatnonzero(off > WILD_SAMPLE * self._scale)
+        if len(wild) and self._scale > 0:
+            self._note(self._before + SIDE + wild, off[wild])
+        self._judged += len(middle)
+
+    def _note(self, at: NDArray[np.intp], off: Array) -> None:
+        was, worst = self._wild, int(np.argmax(off))
+        deviations = float(off[worst]) / self._scale
+        wildest = (int(at[worst]), deviations) if deviations > was.deviations else (was.wildest, was.deviations)
+        first = was.first if was.count else int(at[0])
+        self._wild = Wild(was.count + len(at), first, *wildest, was.power + float(np.sum(off**2)))
+
+
+def _median(part: Array, start: int) -> Array:
+    """Of the three samples from `start` on, for each of the middle ones."""
+    n = len(part) - 2 * SIDE
+    a, b, c = (part[start + k : start + k + n] for k in range(SIDE))
+    return np.asarray(np.maximum(np.minimum(a, b), np.minimum(np.maximum(a, b), c)))
+
+
+@dataclass(frozen=True)
+class Run:
+    """Equal samples: the number of the first, from 0, and how many."""
+
+    start: int
+    length: int
+
+
+class Stuck:
+    """The runs so far; blocks are added in order, `found` is asked at the end."""
+
+    def __init__(self) -> None:
+        self._n, self._runs = 0, 0  # samples, and runs that have ended
+        self._longest, self._present = Run(0, 0), Run(0, 0)
+        self._last = np.nan
+
+    def add(self, samples: Array) -> None:
+        """The next samples, shape (n,)."""
+        if not len(samples):
+            return
+        begins = np.flatnonzero(np.diff(samples, prepend=self._last) != 0)
+        if len(begins):
+            self._end(int(begins[0]))
+            lengths = np.diff(begins)
+            if len(lengths):
+                best = int(np.argmax(lengths))
+                self._keep(Run(self._n + int(begins[best]), int(lengths[best])))
+            self._runs += len(lengths) + (self._n > 0)
+            self._present = Run(self._n + int(begins[-1]), 0)
+        self._present = Run(self._present.start, self._n + len(samples) - self._present.start)
+        self._n, self._last = self._n + len(samples), float(samples[-1])
+
+    def found(self) -> Run | None:
+        """The longest run, where chance makes none like it."""
+        longest = max(self._longest, self._present, key=lambda run: run.length)
+        others = max(1, self._runs)
+        by_chance = (self._n - longest.length) / others * (1 + np.log(others))
+        return longest if longest.length > max(SHORTEST_STUCK, STUCK_BEYOND_CHANCE * by_chance) else None
+
+    def _end(self, more: int) -> None:
+        """The present run ends after `more` samples."""
+        self._keep(Run(self._present.start, self._n + more - self._present.start))
+
+    def _keep(self, run: Run) -> None:
+        if run.length > self._longest.length:
+            self._longest = run
+
+
+class Ends:
+    """The highest and the lowest value so far, and how many samples have them."""
+
+    def __init__(self) -> None:
+        self._n = 0
+        self._alike = 1.0  # share of samples that have one value
+        self._ends: dict[str, tuple[float, int]] = {}
+
+    def add(self, samples: Array) -> None:
+        """The next samples, shape (n,)."""
+        if not len(samples):
+            return
+        if not self._n:
+            self._alike = 1 / len(np.unique(samples))
+        self._n += len(samples)
+        for name, value in (("highest", float(samples.max())), ("lowest", float(samples.min()))):
+            before, count = self._ends.get(name, (value, 0))
+            beyond = value > before if name == "highest" else value < before
+            if beyond or value == before:
+                count = int(np.count_nonzero(samples == value)) + (0 if beyond else count)
+                self._ends[name] = value, count
+
+    def check(self, source: str) -> None:
+        """Raises DataError where the channel is at a limit, or does not change at all."""
+        if len({value for value, _ in self._ends.values()}) == 1:
+            raise DataError(
+                f"{source}: every sample is the same; is the sensor connected, powered and not at its limit?"
+            )
+        for name, (value, count) in self._ends.items():
+            if count > max(CLIPPED * self._n, CLIPPED_BEYOND_USUAL * self._alike * self._n, 3):
+                raise DataError(
+                    f"{source}: {count} of {self._n} samples are at the {name} value, {value:g}: the channel is "
+                    "clipped; choose a wider range of the converter, or a part of the record within it"
+                )
+
+
+WILD, CONSTANT, COARSE = "wild-samples", "constant-stretch", "coarse-steps"
+
+
+@dataclass(frozen=True)
+class Oddity:
+    """`kind`, a text, and whether it moves the level of white noise by more than that is uncertain; `hidden`: the noise
+    below a converter's steps, where that is what is odd."""
+
+    kind: str
+    text: str
+    matters: bool
+    hidden: Hidden | None = None
+
+
+def hidden_in(found: Iterable[Oddity]) -> Hidden | None:
+    """The noise that a converter's steps hide; None where they hide none."""
+    return next((each.hidden for each in found if each.hidden is not None), None)
+
+
+def oddities(
+    wild: Wild, stuck: Run | None, hidden: Hidden | None, n: int, rate_hz: float, variance: float
+) -> tuple[Oddity, ...]:
+    """Of a record of n samples, whose neighbours have the Allan variance `variance`."""
+    found = []
+    if wild.count:
+        found.append(_wild(wild, n, rate_hz, variance))
+    if stuck is not None and hidden is None:  # below a step, samples are the same for long
+        start_s, length_s = stuck.start / rate_hz, stuck.length / rate_hz
+        text = f"{stuck.length} samples from t = {start_s:.6g} s on are all the same, for {length_s:.4g} s"
+        found.append(Oddity(CONSTANT, text, stuck.length / n > _uncertain(n)))
+    if hidden is not None:
+        found.append(Oddity(COARSE, hidden.text, True, hidden))
+    return tuple(found)
+
+
+def _wild(wild: Wild, n: int, rate_hz: float, variance: float) -> Oddity:
+    share = min(1.0, wild.power / (n * variance))
+    many = "a single sample is" if wild.count == 1 else f"{wild.count} single samples are"
+    text = (
+        f"{many} far from the neighbours, by {wild.deviations:.3g} standard deviations at "
+        f"t = {wild.wildest / rate_hz:.6g} s (sample {wild.wildest + 1}): {100 * share:.2g} % of the noise's power"
+    )
+    return Oddity(WILD, text, share > _uncertain(n))
+
+
+def _uncertain(n: int) -> float:
+    """Relative standard uncertainty of the power of white noise, of n samples."""
+    return float(np.sqrt(2 / n))

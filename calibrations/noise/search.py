@@ -1,0 +1,288 @@
+"""What a noise model is missing on a record: lines, a mixture of processes, and disturbances that are not noise.
+
+1. Lines that exceed the widest mixture are removed, if an effect of the catalogue describes lines.
+2. Every mixture of processes is fitted to the remaining spectrum (`mixtures`).
+3. A step, a drift or an output that follows a logged column is removed if it makes a process unnecessary. This repeats
+   until no such pattern remains.
+
+`candidates` ranks every process alone, added to the model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from calibrations.criteria import AT_LONGEST_TIME, INSEPARABLE
+from calibrations.discovery.results import Candidate
+from calibrations.effects import Effect
+from calibrations.model import Model
+from calibrations.noise.channel_spectrum import Lines
+from calibrations.noise.deviations import Curve, octaves
+from calibrations.noise.fit import (
+    NoiseFit,
+    find_lines,
+    fit,
+    most_lines,
+    noise_fit,
+    noise_terms,
+    shape_grid,
+    without_effects,
+)
+from calibrations.noise.likelihood import ChannelFit
+from calibrations.noise.mixtures import Mixture, Mixtures, chance, likelihood, tube
+from calibrations.noise.patterns import FOLLOWS, Pattern, pattern_of, refitted
+from calibrations.noise.record import Channel, Still
+from calibrations.noise.telegraph import Telegraph, telegraph_of
+
+# What a noise model is missing on a record: lines, a mixture of processes, and what is no process at all.
+#
+# 1. lines that stand out above the widest mixture are taken off, if the catalogue can name them;
+# 2. every mixture beside the model is fitted to what is left (`mixtures`);
+# 3. a step, a drift, or what follows a logged column is taken off as well where it makes needless a process that
+# would
+#    stand for it; and once more, as long as there is one.
+
+MOST_PATTERNS = 3  # of a channel
+
+
+@dataclass(frozen=True)
+class Search:
+    """What was found beside a model: lines and patterns, taken off `still`, and mixtures of processes on the rest."""
+
+    still: Still
+    model: Model
+    effects: Mapping[str, Effect]  # of noise, by name
+    lines: tuple[Lines, ...]  # per channel
+    patterns: tuple[Pattern, ...]
+    mixtures: Mixtures
+    telegraphs: tuple[Telegraph, ...] = ()
+    uncleaned: Search | None = None  # the same search before patterns were removed, where some were
+
+    @property
+    def mixture(self) -> Mixture:
+        """The one that is worth most."""
+        return self.mixtures.best
+
+    @cached_property
+    def liner(self) -> Effect | None:
+        """The effect that lines are named by, where the model does not hold it and there are some."""
+        missing = (e for e in self.effects.values() if "lines" in e.places and e.name not in self.model.effects)
+        return next(missing, None) if any(self.lines) else None
+
+    @cached_property
+    def gains(self) -> dict[str, float]:
+        """The effects that are missed, and twice the log-likelihood that the whole loses without each.
+
+        In the order in which each gains most beside those before it: so the error falls at once where it can.
+        """
+        each = {name: self.mixtures.lost_without(self.mixture, name) for name in self.mixture.names}
+        if self.liner is not None:
+            each[self.liner.name] = max(self._of_lines(), sum(map(_gain_of_lines, self.lines)))
+        return {name: each[name] for name in self._in_order(each)}
+
+    def _of_lines(self) -> float:
+        """What the bands lose where lines are left in the record; of what is faster than the bands, nothing."""
+        model = self.model
+        for name in self.mixture.names:
+            model = model.with_effect(self.effects[name])
+        return 2 * (likelihood(self.mixture.channels) - fit(model, self.still).log_likelihood)
+
+    def _in_order(self, each: Mapping[str, float]) -> Iterator[str]:
+        """Lines stand by themselves, and gain the same wherever they are added."""
+        left, level = list(each), 0.0
+        present: list[Effect] = []
+        while left:
+            rest = [effect for effect in self.mixture.effects if effect.name in left]
+            tried = {effect.name: self.mixtures.of([*present, effect]).gain - level for effect in rest}
+            best = max(left, key=lambda name: tried.get(name, each[name]))
+            yield best
+            left.remove(best)
+            present += [effect for effect in rest if effect.name == best]
+            level += tried.get(best, 0.0)
+
+    @cached_property
+    def rivals(self) -> dict[str, tuple[str, ...]]:
+        """Of each process that is missed, those that would do as well in its place."""
+        return {effect.name: tuple(self._rivals(effect)) for effect in self.mixture.effects}
+
+    @cached_property
+    def end(self) -> NoiseFit:
+        """The model with all that it misses."""
+        model = self.model
+        for name in self.gains:
+            model = model.with_effect(self.effects[name])
+        return noise_fit(model, self.still, self.mixture.channels)
+
+    def _rivals(self, effect: Effect) -> list[str]:
+        rest = [e for e in self.mixture.effects if e is not effect]
+        found = []
+        for other in self.mixtures.others:
+            if other in self.mixture.effects:
+                continue
+            swapped = self.mixtures.of([*rest, other])
+            if effect.name in other.contains and _at_longest_shape(swapped, other):
+                continue
+            if self.mixture.gain - swapped.gain < INSEPARABLE and not _is_absent(swapped, other):
+                found.append(other.name)
+        return found
+
+
+def _gain_of_lines(lines: Lines) -> float:
+    """Twice the log-likelihood that lines gain where they are, by their amplitudes."""
+    return float(sum((line.amplitude / line.std) ** 2 for line in lines))
+
+
+def _is_absent(mixture: Mixture, effect: Effect) -> bool:
+    """Whether an effect of a mixture adds nothing in any channel."""
+    return all(each.values[effect.name][effect.parameters[0].name] == 0 for each in mixture.channels)
+
+
+def _at_longest_shape(mixture: Mixture, effect: Effect) -> bool:
+    """Whether an effect's shape is the longest that a record shows: it then is what it contains, by another name."""
+    shape = effect.parameters[1].name
+    return all(
+        each.values[effect.name][shape] > AT_LONGEST_TIME * shape_grid(effect, shape, each.channel)[-1]
+        for each in mixture.channels
+    )
+
+
+def search(still: Still, model: Model, effects: Mapping[str, Effect]) -> Search:
+    """Raises ModelError for a model without noise."""
+    given = tuple(term.effect for term in noise_terms(model))
+    known = {name: effect for name, effect in effects.items() if "still" in effect.kinds}
+    known |= {effect.name: effect for effect in given}
+    found = _search_once(still, model, known, given)
+    if found.mixture.effects:
+        found = replace(found, telegraphs=tuple(filter(None, map(telegraph_of, found.mixture.channels))))
+    first = found
+    while len(found.patterns) < MOST_PATTERNS * len(still.channels):
+        more = _remove_next_pattern(found, given)
+        if more is found:
+            break
+        found = more
+    return replace(_with_common_amounts(still, found, given), uncleaned=first) if found.patterns else found
+
+
+def _with_common_amounts(whole: Still, found: Search, given: tuple[Effect, ...]) -> Search:
+    """With the amounts of all patterns fitted at once, beside the processes that are left."""
+    patterns: list[Pattern] = []
+    for channel, beside in zip(whole.channels, found.mixture.channels, strict=True):
+        own = tuple(pattern for pattern in found.patterns if pattern.axis == channel.axis)
+        patterns += refitted(own, beside, channel) if own else ()
+    left = _search_once(without_patterns(whole, tuple(patterns)), found.model, found.effects, given)
+    return replace(left, patterns=tuple(patterns), telegraphs=found.telegraphs)
+
+
+def _remove_next_pattern(found: Search, given: tuple[Effect, ...]) -> Search:
+    """The search without the patterns that stand out, if that explains the record better; otherwise `found`.
+
+    A form that is searched for in the record itself must also make a process unnecessary, or be no chance beside the
+    best mixture: noise that jumps has steps and slopes of its own. A logged column is independent of the noise.
+    """
+    sure, likely = (_patterns(found, channels) for channels in (found.mixture.channels, found.mixtures.base))
+    tried = [_search_without(found, each, given) for each in (sure, likely) if each]
+    best = max(tried, key=_worth, default=found)
+    logged = any(pattern.kind == FOLLOWS for pattern in best.patterns[len(found.patterns) :])
+    least = _worth(found) + (0.0 if logged else INSEPARABLE)
+    if _worth(best) <= least or likelihood(best.mixtures.base) < likelihood(found.mixtures.base):
+        return found  # what the model explains less well without was a part of the noise
+    fewer = len(best.gains) < len(found.gains)
+    return best if fewer or logged or any(pattern.certain for pattern in sure) else found
+
+
+def _search_without(found: Search, patterns: tuple[Pattern, ...], given: tuple[Effect, ...]) -> Search:
+    """What is found without more patterns."""
+    rest = _search_once(without_patterns(found.still, patterns), found.model, found.effects, given)
+    return replace(rest, patterns=found.patterns + patterns, telegraphs=found.telegraphs)
+
+
+def _patterns(found: Search, channels: tuple[ChannelFit, ...]) -> tuple[Pattern, ...]:
+    """The pattern that stands out in each channel, where one does. Between two levels there are steps enough."""
+    jumping = {telegraph.axis for telegraph in found.telegraphs}
+    return tuple(filter(None, (pattern_of(each) for each in channels if each.channel.axis not in jumping)))
+
+
+def without_patterns(still: Still, patterns: tuple[Pattern, ...]) -> Still:
+    """The record less the patterns; its Allan deviations from a mean's length on, where they show."""
+    channels, curves = still.channels, dict(still.allan)
+    for pattern in patterns:
+        channels = tuple(pattern.taken_off(channel) for channel in channels)
+    for channel in channels:
+        if channel.axis in {pattern.axis for pattern in patterns}:
+            curves[channel.axis] = _cleaned_curve(curves[channel.axis], channel)
+    return replace(still, channels=channels, allan=curves)
+
+
+def _cleaned_curve(curve: Curve, channel: Channel) -> Curve:
+    """The curve of a channel whose means have changed."""
+    slow = octaves([channel.means], 1 / channel.sampling.interval_s)
+    fast = np.arange(len(curve.tau_s)) < len(curve.tau_s) - len(slow.tau_s)
+    parts = ((getattr(curve, name)[fast], getattr(slow, name)) for name in ("tau_s", "deviation", "low", "high", "edf"))
+    tau_s, deviation, low, high, edf = map(np.concatenate, parts)
+    return Curve(curve.kind, tau_s, deviation, low, high, (*np.array(curve.alpha)[fast].tolist(), *slow.alpha), edf)
+
+
+def _worth(found: Search) -> float:
+    """Twice the log-likelihood of the best mixture, less the prices of its effects and of the patterns."""
+    price = sum(found.mixtures.prices[name] for name in found.mixture.names)
+    price += sum(pattern.price for pattern in found.patterns)
+    return 2 * sum(each.log_likelihood for each in found.mixture.channels) - price
+
+
+def _search_once(still: Still, model: Model, known: Mapping[str, Effect], given: tuple[Effect, ...]) -> Search:
+    smooth = tuple(effect for effect in given if "spectrum" in effect.places)
+    others = tuple(e for e in known.values() if "spectrum" in e.places and e not in smooth)
+    plain = tuple(effect for effect in (*smooth, *others) if len(effect.parameters) == 1)
+    most = most_lines(known.values())
+    each = [find_lines(channel, plain, most) if most else ((), 0.0) for channel in still.channels]
+    shown = tuple(
+        replace(without_effects(channel, lines), line_bound=bound)
+        for channel, (lines, bound) in zip(still.channels, each, strict=True)
+    )
+    return Search(still, model, known, tuple(lines for lines, _ in each), (), Mixtures(shown, smooth, others))
+
+
+def candidates(found: Search, before: NoiseFit, doubts: Mapping[str, tuple[str, ...]]) -> tuple[Candidate, ...]:
+    """Every effect that the model does not hold, each alone on top of it; those that are missed come first."""
+    others = [effect for name, effect in found.effects.items() if name not in before.model.effects]
+    after = {effect.name: fit(before.model.with_effect(effect), found.still) for effect in others}
+    gains = {name: 2 * (each.log_likelihood - before.log_likelihood) for name, each in after.items()}
+    if found.liner is not None:
+        gains[found.liner.name] = max(gains[found.liner.name], found.gains[found.liner.name])
+    bands = sum(len(each.seen) for each in before.channels)
+    worth = np.array([_schwarz(effect, gains[effect.name], before, bands) for effect in others])
+    odds = np.exp(np.minimum(np.append(worth, 0.0) - max([*worth, 0.0]), 0.0) / 2)
+    probability = odds / odds.sum()
+    made = [
+        Candidate(
+            effect=effect,
+            gain=gains[effect.name],
+            p_value=_p_value(effect, gains[effect.name], before, len(others)),
+            probability=float(probability[k]),
+            excess_after=after[effect.name].pooled_excess,
+            held_out_after=after[effect.name].held_out_excess,
+            indistinguishable_from=doubts.get(effect.name, ()),
+        )
+        for k, effect in enumerate(others)
+    ]
+    order = {name: k for k, name in enumerate(found.gains)}
+    made.sort(key=lambda c: (order.get(c.name, len(order)), -_schwarz(c.effect, c.gain, before, bands)))
+    return tuple(made)
+
+
+def _schwarz(effect: Effect, gain: float, before: NoiseFit, bands: int) -> float:
+    """Gain less the price of the parameters, log(bands) each; of lines, those that it takes for one."""
+    count = 2 if "lines" in effect.places else len(effect.parameters)
+    return gain - len(before.channels) * count * float(np.log(bands))
+
+
+def _p_value(effect: Effect, gain: float, before: NoiseFit, tried: int) -> float:
+    """Chance of such a gain anywhere in the search where nothing is missing."""
+    if "lines" in effect.places:
+        ordinates = sum(each.channel.n / 2 for each in before.channels)
+        return float(min(1.0, tried * ordinates * np.exp(-gain / 2)))
+    return min(1.0, tried * chance(gain, [tube(each, effect) for each in before.channels]))

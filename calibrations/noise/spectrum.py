@@ -1,0 +1,237 @@
+"""The spectrum of a record as averages over narrow bands, each distributed as chi-square over its degrees of freedom.
+
+Slow bands come from the cosine transform of the means of the record, of which there are 2^17 at most. The functions of
+the transform are the principal components of any mixture of white noise and a random walk, so that its coefficients are
+independent, and there is no leakage as in a periodogram; a window, which would cost half of the information, is not
+needed. The coefficients of 1/f noise are nearly independent, with known variances.
+
+Fast bands come from periodograms of short stretches under a Hann window, averaged in a few dozen parts of the record.
+Stretches overlap by half; ordinates of neighbouring stretches then have a correlation of 1/36.
+
+Source  Strang, SIAM Review 41 (1999): the transform; Whittle, Ark. Mat. 2 (1953): the likelihood;
+        Welch, IEEE Trans. Audio Electroacoust. 15 (1967).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import dct
+from scipy.special import sici
+
+from calibrations.noise.processes import LINEAR, Sampling, flicker, gauss_markov
+from calibrations.table import Array
+
+SINGLE = 16  # lowest coefficients, that stand for themselves
+RATIO = 1.05  # of a band's ends
+
+
+@dataclass(frozen=True)
+class Bands:
+    """Two-sided densities of b bands, all of one sampling, before a low-pass of a known corner (or none)."""
+
+    frequency_hz: Array  # (b,)
+    density: Array  # (b,) in unit^2/Hz
+    freedom: Array  # (b,)
+    sampling: Sampling
+    number: Array  # (b,) number of the coefficient; 0: not of a cosine transform
+    corner_hz: float
+
+    @cached_property
+    def _columns(self) -> dict[str, Array]:
+        """Columns of processes without a shape, which every fit needs again."""
+        return {}
+
+    def column(self, process: str, time_constant_s: float = 0.0) -> Array:
+        """What is expected of a process, for a coefficient of 1, shape (b,).
+
+        What a filter lets through of white noise is a Gauss-Markov process, and none of it folds back as white noise
+        would; what is slow is so far below the corner that the filter's gain is enough.
+        """
+        if process not in LINEAR:
+            return self._column(process, time_constant_s)
+        if process not in self._columns:
+            self._columns[process] = self._column(process)
+        return self._columns[process]
+
+    def _column(self, process: str, time_constant_s: float = 0.0) -> Array:
+        f = self.frequency_hz
+        if process == "quantisation-noise":
+            return np.asarray(LINEAR[process].spectrum(f, self.sampling) + self._of_the_ends())
+        if process == "flicker-noise":
+            return np.asarray(flicker(f, self.sampling, self.corner_hz) * flickering(self.number))
+        if process == "white-noise" and np.isfinite(self.corner_hz):
+            filter_s = 1 / (2 * np.pi * self.corner_hz)
+            return gauss_markov(f, self.sampling, filter_s) / (2 * filter_s)
+        kept = 1 / (1 + (f / self.corner_hz) ** 2)
+        if process not in LINEAR:
+            return np.asarray(kept * gauss_markov(f, self.sampling, time_constant_s))
+        return np.asarray(kept * LINEAR[process].spectrum(f, self.sampling))
+
+    def _of_the_ends(self) -> Array:
+        """What the first and the last error of quantisation add to every cosine coefficient."""
+        half_turn = np.pi * self.frequency_hz * self.sampling.interval_s
+        n = self.number / (2 * self.frequency_hz * self.sampling.interval_s)
+        return (
+            np.where(self.number > 0, 4 * np.cos(half_turn) ** 2 / np.maximum(n, 1.0), 0.0) / self.sampling.interval_s
+        )
+
+
+def flickering(number: Array) -> Array:
+    """Variance of a cosine coefficient of 1/f noise over the spectrum at its frequency.
+
+    From the generalised covariance -2 log(t): (2 / pi) (Si(pi k) - (1 - cos(pi k)) / (pi k)), 0.774 for the first.
+    """
+    a = np.pi * np.where(number > 0, number, 1.0)
+    return np.where(number > 0, 2 / np.pi * (sici(a)[0] - (1 - np.cos(a)) / a), 1.0)
+
+
+def slow_bands(means: Array, sampling: Sampling, corner_hz: float = np.inf) -> Bands:
+    """Of a record's means, shape (n,), up to half the corner of the output's filter."""
+    n = len(means)
+    highest = min(n, 2 + int(corner_hz * n * sampling.interval_s) if np.isfinite(corner_hz) else n)
+    power = dct(means, type=2, norm="ortho")[1:highest] ** 2 * sampling.interval_s
+    edges = _edges(len(power))
+    count = np.diff(edges).astype(float)
+    number = (edges[1:] + edges[:-1] + 1) / 2
+    density = np.add.reduceat(power, edges[:-1]) / count
+    return Bands(number / (2 * n * sampling.interval_s), density, count, sampling, number, corner_hz)
+
+
+def fast_bands(frequency_hz: Array, density: Array, freedom: float, rate_hz: float, corner_hz: float) -> Bands:
+    """Of ordinates (f,) with so many degrees of freedom each, up to half the corner of the output's filter.
+
+    Under a Hann window neighbours have a correlation of 4/9, and their neighbours 1/36.
+    """
+    chosen = frequency_hz <= corner_hz / 2
+    edges = _edges(int(chosen.sum()))
+    count = np.diff(edges).astype(float)
+    alike = 1 + 2 * (np.maximum(count - 1, 0) * 4 / 9 + np.maximum(count - 2, 0) / 36) / np.maximum(count, 1)
+
+    def mean(values: Array) -> Array:
+        return np.add.reduceat(values[chosen], edges[:-1]) / count if len(count) else np.empty(0)
+
+    none = np.zeros(len(count))
+    return Bands(mean(frequency_hz), mean(density), freedom * count / alike, Sampling(rate_hz), none, corner_hz)
+
+
+def _edges(n: int) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+    """Where bands of n ordinates begin, and n."""
+    edges = [*range(min(n, SINGLE) + 1)]
+    while edges[-1] < n:
+        edges.append(min(n, max(edges[-1] + 1, int(edges[-1] * RATIO))))
+    return np.array(edges, dtype=np.int64)
+
+
+LENGTH = 4096  # samples to a stretch
+ALIKE = 1 + 2 / 36
+WINDOW = np.sin(np.pi * (np.arange(LENGTH) + 0.5) / LENGTH) ** 2
+MOST_PARTS = 32  # parts, of equally many stretches: of twice as many when they are full
+
+
+@dataclass(frozen=True, eq=False)
+class Segments:
+    """Periodograms summed over the stretches of each part, without 0 and Nyquist; (parts, ordinates) and (parts,)."""
+
+    power: Array
+    stretches: NDArray[np.int64]
+    rate_hz: float
+
+    @property
+    def frequency_hz(self) -> Array:
+        """Of the ordinates."""
+        return np.arange(1, LENGTH // 2) * self.rate_hz / LENGTH
+
+    @property
+    def density(self) -> Array:
+        """Two-sided, over all parts, unit^2/Hz."""
+        scale = self.rate_hz * np.sum(WINDOW**2) * max(int(self.stretches.sum()), 1)
+        return np.asarray(self.power.sum(axis=0) / scale)
+
+    @property
+    def freedom(self) -> float:
+        """Degrees of freedom to each ordinate."""
+        return 2 * max(int(self.stretches.sum()), 1) / ALIKE
+
+    def part(self, first: int, end: int) -> Segments:
+        """Some of the parts."""
+        return Segments(self.power[first:end], self.stretches[first:end], self.rate_hz)
+
+
+class Welch:
+    """The sums of periodograms so far."""
+
+    def __init__(self, rate_hz: float) -> None:
+        self._rate_hz = rate_hz
+        self._rest = np.empty(0)
+        self._power = np.zeros((MOST_PARTS, LENGTH // 2 - 1))
+        self._stretches = np.zeros(MOST_PARTS, dtype=np.int64)
+        self._part, self._full = 0, 1  # the part that is filled now, and how many stretches fill one
+
+    def add(self, samples: Array) -> None:
+        """The next samples, shape (n,)."""
+        waiting = np.concatenate([self._rest, samples])
+        starts = range(0, len(waiting) - LENGTH + 1, LENGTH // 2)
+        for start in starts:
+            if self._stretches[self._part] == self._full:
+                self._begin_another()
+            stretch = waiting[start : start + LENGTH]
+            self._power[self._part] += np.abs(np.fft.rfft((stretch - stretch.mean()) * WINDOW))[1:-1] ** 2
+            self._stretches[self._part] += 1
+        self._rest = waiting[len(starts) * LENGTH // 2 :]
+
+    def segments(self) -> Segments:
+        """By time."""
+        count = self._part + 1
+        return Segments(self._power[:count].copy(), self._stretches[:count].copy(), self._rate_hz)
+
+    def _begin_another(self) -> None:
+        self._part += 1
+        if self._part < MOST_PARTS:
+            return
+        for each in (self._power, self._stretches):
+            each[: MOST_PARTS // 2] = each[0::2] + each[1::2]
+            each[MOST_PARTS // 2 :] = 0
+        self._part, self._full = MOST_PARTS // 2, 2 * self._full
+
+
+MOST_MEANS = 1 << 17
+
+
+class Means:
+    """Means of the samples so far, in order."""
+
+    def __init__(self) -> None:
+        self.size = 1  # samples to a mean
+        self._sums = np.empty(MOST_MEANS)
+        self._filled = 0
+        self._rest = np.empty(0)  # samples that fill no mean yet
+        self._offset: float | None = None  # taken off before sums, so that they keep their digits
+
+    def add(self, samples: Array) -> None:
+        """The next samples, shape (n,)."""
+        samples = np.asarray(samples, dtype=np.float64)
+        if self._offset is None and len(samples):
+            self._offset = float(samples.mean())
+        waiting = np.concatenate([self._rest, samples - (self._offset or 0.0)])
+        while len(waiting) >= self.size:
+            taken = min(len(waiting) // self.size, MOST_MEANS - self._filled)
+            sums = waiting[: taken * self.size].reshape(-1, self.size).sum(axis=1)
+            self._sums[self._filled : self._filled + taken] = sums
+            self._filled += taken
+            waiting = waiting[taken * self.size :]
+            if self._filled == MOST_MEANS:
+                self._halve()
+        self._rest = waiting
+
+    def values(self) -> Array:
+        """The means less their mean, shape (n,)."""
+        means = self._sums[: self._filled] / self.size
+        return means - means.mean() if len(means) else means
+
+    def _halve(self) -> None:
+        self._sums[: MOST_MEANS // 2] = self._sums[0::2] + self._sums[1::2]
+        self._filled, self.size = MOST_MEANS // 2, 2 * self.size

@@ -1,0 +1,133 @@
+"""Noise of a table that its own samples do not give: slow noise by a noise model, scatter by the widest form.
+
+Slow noise    A noise model, fitted to a still record of the same sensor, gives Gauss-Markov processes: several per
+              decade of time constants for flicker noise, one much slower than the record for a random walk. White
+              noise, quantisation noise and what is faster than a row are in the scatter of the samples; a sinusoid
+              averages out in a dwell.
+Scatter       The rows of a magnetometer or gyroscope may come without the scatter of their samples. Then the residual
+              of the widest form is their noise: an ellipsoid for fields; for rates, outputs linear in the rates and, if
+              measured, in the specific forces. Otherwise a model's own residual would be its noise, and no effect could
+              be missing. Errors beyond the widest form count as noise, so that the noise is rather overestimated.
+
+Source  Machlup, J. Appl. Phys. 25 (1954); McWhorter: 1/f noise as a sum of relaxations evenly spaced in log time;
+        Draper and Smith, Applied Regression Analysis, on lack of fit: pure error by the widest model.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from calibrations.errors import DataError, ModelError
+from calibrations.geometry.rate_table import rate_deg_s, specific_force_g
+from calibrations.geometry.sphere import SOFT_IRON, coverage_fault
+from calibrations.model import Model
+from calibrations.noise.mean_noise import white_std
+from calibrations.noise.means import BEYOND, Processes
+from calibrations.table import AXES, Array, Table
+
+PER_DECADE = 2.0  # processes of flicker
+KINDS = ("poses", "rates")  # whose residual is in the output's unit
+
+
+def with_noise(table: Table, model: Model) -> Table:
+    """The table, its slow noise known. Raises DataError, ModelError where the model does not know its channels.
+
+    The noise of its outputs is then no longer guessed from what a model leaves.
+    """
+    if table.kind not in KINDS:
+        raise DataError(f"{table.source}: a noise model is for {' and '.join(KINDS)}, and this is of {table.content}")
+    if "t_s" not in table:
+        raise DataError(f"{table.source}: slow noise needs the column t_s: when each row was measured")
+    if model.unit != table.unit:
+        raise ModelError(
+            f"{model.name}: its values are {f'in {model.unit}' if model.unit else 'not fitted'}, and {table.source} is "
+            f"in {table.unit}; fit it to a still record of the same output: rig fit RUN --model still --out FILE"
+        )
+    return replace(table, noise={axis: slow_processes(model, axis, table) for axis in table.axes})
+
+
+def slow_processes(model: Model, axis: str, table: Table) -> Processes:
+    """Those of one axis on the times of a table."""
+    values = {(term.name, e.name): e.value for term in model.terms for e in term.estimates if e.axis == axis}
+    if not values:
+        raise ModelError(f"{model.name}: has no values for the axis {axis} of {table.source}")
+    gaps_s = np.diff(np.sort(table.time_s))
+    gap_s, span_s = float(np.median(gaps_s)), float(np.sum(gaps_s))
+    walk = values.get(("rate-random-walk", "coefficient"), 0.0)
+    slowest_s = BEYOND * span_s
+    found = [*_flicker(values.get(("flicker-noise", "coefficient"), 0.0), gap_s / 2, slowest_s)]
+    found += [(walk * np.sqrt(slowest_s / 2), slowest_s)]
+    found += [
+        (values.get(("gauss-markov-noise", "sigma"), 0.0), values.get(("gauss-markov-noise", "time_constant"), 1.0))
+    ]
+    return tuple((float(std), float(tau_s)) for std, tau_s in found if std > 0)
+
+
+def _flicker(coefficient: float, fastest_s: float, slowest_s: float) -> Processes:
+    """B^2 / (2 pi f) as relaxations of equal variance B^2 D / pi, D the logarithmic step of their time constants."""
+    count = int(PER_DECADE * np.log10(slowest_s / fastest_s)) + 1
+    taus_s = np.geomspace(fastest_s, slowest_s, count)
+    std = coefficient * np.sqrt(np.log(taus_s[1] / taus_s[0]) / np.pi)
+    return tuple((std, tau_s) for tau_s in taus_s.tolist())
+
+
+# The noise of magnetometers and gyroscopes whose samples' scatter is not in the table: what the widest form leaves.
+#
+# Without it a model's own residual would be its noise, and nothing could be missing. For fields the form is an
+# ellipsoid,
+# for rates every output as a linear function of the rates and, where they were measured, of the specific forces. What
+# lies beyond these forms counts as noise, so that it is rather taken as too large.
+#
+# Source  Draper and Smith, Applied Regression Analysis, on lack of fit: pure error by the widest model.
+
+FORMS = {"fields": "an ellipsoid", "rates": "outputs linear in rates and specific forces"}
+FEWEST_FREE_ROWS = 2  # rows more than the form has parameters
+
+
+def scatter(table: Table) -> Array | None:
+    """Standard deviation of each row in the residual's unit, shape (channels, n); None where rows are too few."""
+    found = _of_field(table) if table.content == "fields" else _of_rates(table)
+    return None if found is None or not np.all(found > 0) else np.tile(found[:, None], (1, table.n))
+
+
+def scatter_remark(table: Table) -> str | None:
+    """What is taken for the noise of a table that does not say it, in words; None where it does, or is not asked."""
+    if table.content not in FORMS or white_std(table) is not None:
+        return None
+    if scatter(table) is None:
+        return "the noise of its means is not known, and its rows do not show it: what a model leaves is its noise"
+    return (
+        f"the noise of its means is not known: what {FORMS[table.content]} leaves is taken for it, and nothing beyond "
+        f"is looked for; give {table.output_names[0]}_std, and so on, and n"
+    )
+
+
+def _of_field(table: Table) -> Array | None:
+    """Of the magnitude, as a share of the field, shape (1,)."""
+    if table.n < 9 + FEWEST_FREE_ROWS or coverage_fault(table, SOFT_IRON) is not None:
+        return None
+    m = table.outputs - table.outputs.mean(axis=0)
+    m = m / np.abs(m).max()
+    x, y, z = m.T
+    columns = np.column_stack([x * x, y * y, z * z, 2 * x * y, 2 * x * z, 2 * y * z, x, y, z])
+    xx, yy, zz, xy, xz, yz, *linear = np.linalg.lstsq(columns, np.ones(table.n), rcond=None)[0]
+    A = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    away = m + np.linalg.solve(A, linear) / 2
+    size = np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", away, A, away), 0.0))
+    left = size / size.mean() - 1
+    return np.sqrt([left @ left / (table.n - 9)])
+
+
+def _of_rates(table: Table) -> Array | None:
+    """Of each output, in its unit, shape (3,)."""
+    columns = np.column_stack([np.ones(table.n), rate_deg_s(table)])
+    if all(f"a{axis}" in table for axis in AXES):
+        columns = np.column_stack([columns, specific_force_g(table)])
+    columns = columns / np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
+    answer, _, rank, _ = np.linalg.lstsq(columns, table.outputs, rcond=1e-9)
+    free = table.n - int(rank)
+    if free < FEWEST_FREE_ROWS:
+        return None
+    return np.asarray(np.sqrt(np.sum((table.outputs - columns @ answer) ** 2, axis=0) / free))

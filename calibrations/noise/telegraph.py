@@ -1,0 +1,157 @@
+"""Noise that goes between two levels: random telegraph noise (burst noise, popcorn), of one trap of a charge.
+
+Its spectrum is that of a Gauss-Markov process, which has any level. Which of both it is, the samples themselves tell:
+the likeliest path of two levels (Viterbi's) is taken off, and what is left has to be so much more likely beside the
+same processes that it pays for the path, with a surplus, and that one of these is needless. Path and surplus are twice
+the logarithm of a ratio of two likelihoods, which chance makes c with a probability of exp(-c / 2) at most (Markov's
+inequality).
+
+Source  Kirton and Uren, Adv. Phys. 38 (1989), on single traps; Viterbi, IEEE Trans. Inform. Theory 13 (1967).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.special import xlogy
+
+from calibrations.criteria import FEWEST_JUMPS, TWO_LEVELS_BETTER
+from calibrations.noise.channel_spectrum import means_without
+from calibrations.noise.fit import fit_effects, without_effects
+from calibrations.noise.likelihood import ChannelFit
+from calibrations.noise.samples import FASTEST, hidden_in
+from calibrations.table import Array
+
+TWO_LEVELS = "two-levels"
+WIDTHS = (1, 8, 64, 512)  # means over which levels are looked for
+ROUNDS = 6  # of path and levels in turn
+LEAST = 1e-6  # noise beside the levels, as a share of how far they are apart: rounding
+Path = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Telegraph:
+    """One channel's two levels, `apart` in its unit; how often it goes, and how long it stays at each, s."""
+
+    axis: str
+    unit: str
+    apart: float
+    times: int
+    upper_s: float
+    lower_s: float
+
+    @property
+    def text(self) -> str:
+        """In words."""
+        return (
+            f"random telegraph noise (burst noise, popcorn): {self.axis} goes between two levels {self.apart:.3g} "
+            f"{self.unit} apart, {self.times} times, and stays at the upper one for {self.upper_s:.3g} s and at the "
+            f"lower for {self.lower_s:.3g} s on average; its spectrum is that of a Gauss-Markov process"
+        )
+
+
+def telegraph_of(found: ChannelFit) -> Telegraph | None:
+    """The two levels that a channel goes between; None where its processes do without."""
+    if hidden_in(found.channel.oddities) is not None:
+        return None  # rounding makes levels of its own
+    values = means_without(found.channel, found.lines)
+    widths = [width for width in WIDTHS if width <= len(values)]
+    paths = [path for width in widths if (path := _path(values, width)) is not None]
+    if not paths:
+        return None
+    best = min(paths, key=lambda path: _path_price(path) + _path_deviance(values, path))
+    rest = replace(found.channel, means=values - _levels(values, best)[best])
+    left = fit_effects(without_effects(rest, found.lines), found.effects)
+    if 2 * (left.log_likelihood - found.log_likelihood) < _path_price(best) + TWO_LEVELS_BETTER or not _needless(left):
+        return None
+    return _telegraph(found, values, best)
+
+
+def _needless(left: ChannelFit) -> bool:
+    """Whether a slow process is not needed any more: of two levels, nothing of it is left."""
+    slow = [effect for effect in left.effects if effect.name not in FASTEST]
+    rest = ([other for other in left.effects if other is not effect] for effect in slow)
+    return any(2 * (left.log_likelihood - fit_effects(left, each).log_likelihood) < TWO_LEVELS_BETTER for each in rest)
+
+
+def _telegraph(found: ChannelFit, values: Array, path: Path) -> Telegraph:
+    channel, (low, high) = found.channel, _levels(values, path)
+    goes, upper = np.flatnonzero(np.diff(path)), int(path.sum())
+    stays = [np.count_nonzero(path[np.append(goes, -1)] == level) for level in (0, 1)]
+    step_s = channel.sampling.interval_s
+    return Telegraph(
+        channel.axis, channel.unit, float(high - low), len(goes),
+        float(upper * step_s / stays[1]), float((len(path) - upper) * step_s / stays[0]),
+    )  # fmt: skip
+
+
+def _path(values: Array, width: int) -> Path | None:
+    """The likeliest path of two levels that stand out of means over so many values; None where it hardly goes."""
+    at = _two_means(values[: len(values) // width * width].reshape(-1, width).mean(axis=1))
+    spread, goes = float(np.std(np.diff(values))) / 2**0.5, 1 / (16 * width)
+    if not spread > 0 or not len(at):
+        return None
+    path = np.zeros(0, dtype=np.int64)
+    for _ in range(ROUNDS):
+        path = viterbi((values - at.mean()) * (at[1] - at[0]) / spread**2, float(np.log(goes / (1 - goes))))
+        times = int(np.count_nonzero(np.diff(path)))
+        if times < FEWEST_JUMPS:
+            return None
+        at, goes = _levels(values, path), times / len(path)
+        spread = max(float(np.std(values - at[path])), LEAST * float(at[1] - at[0]))
+    return path
+
+
+def _two_means(means: Array) -> Array:
+    """Two levels (2,) in means: those of the nearer ones (two-means)."""
+    at = np.array([means.min(), means.max()])
+    for _ in range(ROUNDS):
+        upper = means > at.mean()
+        if upper.all() or not upper.any():
+            return at[:0]
+        at = np.array([means[~upper].mean(), means[upper].mean()])
+    return at
+
+
+def _levels(values: Array, path: Path) -> Array:
+    """Mean values at either level (2,)."""
+    return np.array([values[path == level].mean() for level in (0, 1)])
+
+
+def _path_price(path: Path) -> float:
+    """Twice the negative logarithm of a path's probability, as one that forgets how long it stayed."""
+    kinds = np.bincount(2 * path[:-1] + path[1:], minlength=4).reshape(2, 2)
+    return float(-2 * np.sum(xlogy(kinds, kinds / np.maximum(kinds.sum(axis=1, keepdims=True), 1))))
+
+
+def _path_deviance(values: Array, path: Path) -> float:
+    """Twice the negative log-likelihood of values about a path in white noise, but for a constant."""
+    low, high = at = _levels(values, path)
+    return float(len(values) * np.log(np.var(values - at[path]) + (LEAST * (high - low)) ** 2))
+
+
+@njit(cache=True, nogil=True)
+def viterbi(upper: Array, goes: float) -> Path:
+    """The likeliest path of 0 and 1, shape (n,).
+
+    upper  (n,) the logarithm of how much more likely each value is at the upper level
+    goes   the logarithm of how much more likely it goes than stays, between two values
+    """
+    n = len(upper)
+    came = np.zeros((n, 2), dtype=np.int64)
+    lower_worth, upper_worth = 0.0, upper[0]
+    for i in range(1, n):
+        came[i, 0] = 1 if upper_worth + goes > lower_worth else 0
+        came[i, 1] = 0 if lower_worth + goes > upper_worth else 1
+        lower_worth, upper_worth = (
+            max(lower_worth, upper_worth + goes),
+            max(upper_worth, lower_worth + goes) + upper[i],
+        )
+    path = np.zeros(n, dtype=np.int64)
+    path[n - 1] = 1 if upper_worth > lower_worth else 0
+    for i in range(n - 1, 0, -1):
+        path[i - 1] = came[i, path[i]]
+    return path

@@ -1,0 +1,369 @@
+"""Whether outputs at known poses can be those of the sensor, mounted and wired as stated.
+
+A model fits some parameters to any numbers. These checks need no model: gravity is known, and a sensor follows it.
+
+no response      an output that is constant, holds noise only, is stuck in many rows, or does not follow gravity
+two groups       rows that belong to two sensors: without a pattern in pose or time, and nothing between them
+wrong geometry   outputs that follow another axis, mirrored axes, angles that are exchanged or reversed
+
+Only tables of poses are checked: elsewhere the orientation is not known.
+
+Source  Wald and Wolfowitz (1940), runs of two kinds of rows; DeSarbo and Cron (1988), regression in two clusters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import fdtrc
+
+from calibrations.discovery.verdict import Verdict
+from calibrations.fit import Fit
+from calibrations.geometry.orientation import Pose, nominal_pose, specific_force
+from calibrations.noise.mean_noise import white_std
+from calibrations.noise.means import rms
+from calibrations.table import AXES, Array, Table
+
+NO_RESPONSE, UNEXPLAINED, DOUBTFUL = Verdict.NO_RESPONSE.value, Verdict.UNEXPLAINED.value, "doubtful"
+
+EXCITED_G = 0.1  # rms of a specific force about its mean: below, offsets of the stages hide a response
+FOLLOWS = 0.5  # share of an output's variance: sensors with 5 % nonlinearity keep 0.99
+WELL = 0.9  # of it: the geometry explains the output, and effects are left
+FAR_BETTER = 0.1  # of the variance that the stated geometry leaves
+BY_CHANCE = 1e-3  # of an F test: a response as weak as noise, but there
+NOISE_ONLY = 2.5  # times the noise floor: more than white and slow noise of a sensor
+FEWEST = 12  # rows: three times the parameters of a response
+STUCK = 0.2  # of the rows at one value, where gravity changes
+STILL = 0.1  # of the expected change: a healthy output changes as expected
+RAIL = 0.1  # of the stuck rows on the other side: a saturated output has none
+ASIDE = 0.1  # of the output's range, off the stuck value: a dead zone is a hundredth of that
+TURNED_DEG = 20.0  # a mount or a zero that is so far off is another one: marks are within some degrees
+SPLIT = 0.05  # of the variance left within two groups: two halves of Gaussian noise leave 0.36, of a sine 0.19
+APART = 10.0  # times the noise floor between the groups: effects and odd rows are below or have a pattern
+SMALLER = 0.1  # of the rows, in the smaller group: fewer are outliers
+PATTERNED = 0.75  # of neighbours in one group: more, and the groups are a pattern of pose, time or direction
+ROUNDS = 20  # of a regression in two clusters
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One reason not to believe the data as stated. `verdict`: NO_RESPONSE, UNEXPLAINED, or DOUBTFUL (a warning)."""
+
+    verdict: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Response:
+    """Outputs as linear functions of the specific force: `slope` (axes, 3) in V/g, `share` (axes,) of the variance that
+    it explains, `residual` (axes, n) in V."""
+
+    slope: Array
+    share: Array
+    residual: Array
+
+
+@lru_cache(maxsize=8)
+def findings(table: Table) -> tuple[Finding, ...]:
+    """What speaks against a table of poses, worst first; () for other kinds and for healthy data."""
+    if table.kind != "poses" or table.n < FEWEST:
+        return ()
+    stated = response(table, specific_force(nominal_pose(table)))
+    geometry = _geometry(table, stated)
+    if geometry is not None and geometry.verdict == UNEXPLAINED:
+        return (geometry,)
+    if dead := tuple(_dead(table, stated)):
+        return dead
+    groups = _two_groups(table)
+    return tuple(finding for finding in (groups, geometry) if finding is not None)
+
+
+def refusal(table: Table) -> Finding | None:
+    """The finding that forbids to use the table; None where there is none, or a warning only."""
+    return next((finding for finding in findings(table) if finding.verdict != DOUBTFUL), None)
+
+
+def doubt(table: Table) -> str | None:
+    """What a person should check although the table can be used; None where there is nothing."""
+    return next((finding.text for finding in findings(table) if finding.verdict == DOUBTFUL), None)
+
+
+def rejection(found: Fit) -> Finding | None:
+    """Why neither the data nor the values of a fit to them can be used; None where they can."""
+    return refusal(found.table) or _implausible_zero(found)
+
+
+def _implausible_zero(found: Fit) -> Finding | None:
+    """A zero of a stage that is off by tens of degrees: angles are assigned wrongly, and no zero is off."""
+    for term in found.model.terms:
+        for e in term.estimates if term.name == "stage-zero-offset" else ():
+            if e.identified and abs(e.value) > TURNED_DEG:
+                return Finding(
+                    UNEXPLAINED,
+                    f"only a zero of {e.name} that is {e.value:+.3g} deg off would explain these poses, and no stage "
+                    f"has that; check the column {e.name}_deg, its zero and its sign, and the channels",
+                )
+    return None
+
+
+def response(table: Table, a: Array) -> Response:
+    """The response to a specific force `a` (n, 3) in g, along the directions in which it changes enough."""
+    about = a - a.mean(axis=0)
+    U, size, Vt = np.linalg.svd(about, full_matrices=False)
+    kept = size > EXCITED_G * np.sqrt(table.n)
+    outputs = table.outputs - table.outputs.mean(axis=0)
+    part = U[:, kept].T @ outputs
+    slope = (Vt[kept].T / size[kept]) @ part
+    residual = outputs - U[:, kept] @ part
+    whole = np.sum(outputs**2, axis=0)
+    share = 1 - np.sum(residual**2, axis=0) / np.where(whole > 0, whole, np.inf)
+    return Response(slope.T, np.where(whole > 0, share, 0.0), residual.T)
+
+
+def _dead(table: Table, stated: Response) -> Iterator[Finding]:
+    """Outputs that do not respond to gravity, or in some rows only."""
+    a = specific_force(nominal_pose(table))
+    white = white_std(table)
+    for k, name in enumerate(table.output_names):
+        if np.std(a[:, k]) < EXCITED_G:
+            continue
+        floor = None if white is None else float(rms(white[:, k]))
+        why = _stuck(table.outputs[:, k], a, name) or _silent(table.outputs[:, k], stated, k, name, floor)
+        if why is not None:
+            yield Finding(NO_RESPONSE, f"{why}; check the sensor's supply, the cable and the channel of {AXES[k]}")
+
+
+def _silent(output: Array, stated: Response, k: int, name: str, floor: float | None) -> str | None:
+    """Why an output as a whole does not respond; None where it does."""
+    swing = float(np.ptp(output))
+    if swing <= 1e-9 * float(np.abs(output).max()):
+        return f"{name} is constant ({output[0]:.6g} V) while gravity along {AXES[k]} changes"
+    share, n = float(stated.share[k]), len(output)
+    if share >= FOLLOWS:
+        return None
+    spread = float(np.std(output))
+    noise = floor is not None and floor > 0 and float(rms(stated.residual[k])) < NOISE_ONLY * floor
+    if noise and fdtrc(3, n - 4, max(share, 0.0) / 3 / ((1 - share) / (n - 4))) < BY_CHANCE:
+        return None
+    if noise:
+        return f"{name} holds noise only ({1e3 * spread:.3g} mV rms) while gravity along {AXES[k]} changes"
+    return f"{name} does not follow the poses: they explain {share:.0%} of its variation of {1e3 * spread:.3g} mV rms"
+
+
+def _stuck(output: Array, a: Array, name: str) -> str | None:
+    """Why an output that responds in some rows does not in others; None where it does in all."""
+    n, count = len(output), max(FEWEST, int(STUCK * len(output)))
+    order = np.sort(output)
+    if count >= n or not np.ptp(output):
+        return None
+    widths = order[count - 1 :] - order[: n - count + 1]
+    start = int(np.argmin(widths))
+    value, width = float(np.median(order[start : start + count])), float(widths[start])
+    rows = np.abs(output - value) <= max(2 * width, 1e-9 * abs(value))
+    others = ~rows
+    if others.sum() < FEWEST:
+        return None
+    columns = np.column_stack([np.ones(n), a])
+    answer, _, rank, _ = np.linalg.lstsq(columns[others], output[others], rcond=EXCITED_G)
+    expected = columns @ answer
+    left = output[others] - expected[others]
+    if rank < 2 or np.var(left) > (1 - WELL) * np.var(output[others]):
+        return None
+    if np.std(output[rows]) > STILL * np.std(expected[rows]):
+        return None
+    away = expected[rows] - value
+    aside = ASIDE * float(np.ptp(expected))
+    if min(np.mean(away > aside), np.mean(away < -aside)) < RAIL:
+        return None
+    return f"{name} is stuck at {value:.5g} V in {rows.sum()} of {n} rows while gravity changes"
+
+
+def _two_groups(table: Table) -> Finding | None:
+    """Rows of two sensors in one table: two linear responses, nothing between them, without a pattern."""
+    table = table.in_order()
+    pose = nominal_pose(table)
+    columns = np.column_stack([np.ones(table.n), specific_force(pose)])
+    labels, left, apart = _clusters(columns, table.outputs)
+    share = float(labels.mean())
+    if left > SPLIT or not SMALLER <= share <= 1 - SMALLER or _patterned(table, labels):
+        return None
+    white = white_std(table)
+    axis = int(np.argmax(apart))
+    if white is not None and apart[axis] < APART * rms(white[:, axis]):
+        return None
+    times = "" if white is None else f", {apart[axis] / 2 / float(rms(white[:, axis])):.0f} times the noise floor"
+    return Finding(
+        UNEXPLAINED,
+        f"scatter without a pattern{times}: two groups of rows ({(~labels).sum()} and {labels.sum()}) differ by "
+        f"{1e3 * apart[axis]:.3g} mV in {table.axes[axis]}, as if two sensors were in one table; separate them",
+    )
+
+
+def _clusters(columns: Array, outputs: Array) -> tuple[NDArray[np.bool_], float, Array]:
+    """(which rows are in the second group, share of the residual's variance left within groups, distance per axis).
+
+    Rows begin in groups by the sign of their residual, as of two biases, or by its sign along the output, as of two
+    scale factors.
+    """
+    basis = np.linalg.qr(columns)[0]
+    residual = outputs - basis @ (basis.T @ outputs)
+    size = rms(residual.T)
+    if not np.all(size > 0):
+        return np.zeros(len(outputs), dtype=bool), 1.0, size
+    main = np.linalg.svd(residual / size, full_matrices=False)[0][:, 0]
+    along = np.sum(residual / size**2 * (outputs - outputs.mean(axis=0)), axis=1)
+    labels, left, apart = min((_settled(start > 0, columns, outputs / size) for start in (main, along)), key=_second)
+    return labels, left, apart * size
+
+
+def _settled(labels: NDArray[np.bool_], columns: Array, scaled: Array) -> tuple[NDArray[np.bool_], float, Array]:
+    """As `_clusters`, of outputs (n, axes) in units of their residual, from these groups on."""
+    errors, fitted = np.zeros((2, len(scaled))), np.zeros((2, *scaled.shape))
+    for _ in range(ROUNDS):
+        for group, rows in enumerate((~labels, labels)):
+            if rows.sum() < 2 * columns.shape[1]:
+                return labels, 1.0, np.zeros(scaled.shape[1])
+            fitted[group] = columns @ np.linalg.lstsq(columns[rows], scaled[rows], rcond=EXCITED_G)[0]
+            errors[group] = np.sum((scaled - fitted[group]) ** 2, axis=1)
+        after = errors[1] < errors[0]
+        if np.array_equal(after, labels):
+            break
+        labels = after
+    left = float(np.mean(np.min(errors, axis=0))) / scaled.shape[1]
+    return labels, left, rms((fitted[1] - fitted[0]).T)
+
+
+def _second(found: tuple[NDArray[np.bool_], float, Array]) -> float:
+    return found[1]
+
+
+def _patterned(table: Table, labels: NDArray[np.bool_]) -> bool:
+    """Whether the groups follow from time, direction, path or angle: then they are an effect of the sensor or rig."""
+    alpha, beta = table.column("alpha_deg"), table.column("beta_deg")
+    orders = [np.arange(table.n)]
+    orders += [np.argsort(table.column(name), kind="stable") for name in ("temperature_c", "supply_v") if name in table]
+    if any(_agreeing(labels, order) > PATTERNED for order in orders):
+        return True
+    if min(_agreeing(labels, *_along(beta, alpha)), _agreeing(labels, *_along(alpha, beta))) > PATTERNED:
+        return True
+    kinds = [table.column(name) for name in ("direction", "flip", "mount_deg") if name in table]
+    return any(
+        sum(max(labels[of == value].sum(), (~labels[of == value]).sum()) for value in np.unique(of))
+        > PATTERNED * table.n
+        for of in kinds
+    )
+
+
+def _agreeing(labels: NDArray[np.bool_], order: NDArray[np.intp], of: NDArray[np.bool_] | None = None) -> float:
+    """Share of neighbours in an order, of the pairs `of`, that are in one group; 1 where there are no neighbours."""
+    same = labels[order][1:] == labels[order][:-1]
+    same = same if of is None else same[of]
+    return float(same.mean()) if len(same) else 1.0
+
+
+def _along(angle: Array, other: Array) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    """Rows in order of an angle where the other one is the same, and which neighbours differ in that angle alone."""
+    order = np.lexsort((angle, other))
+    return order, (np.diff(other[order]) == 0) & (np.diff(angle[order]) != 0)
+
+
+def _geometry(table: Table, stated: Response) -> Finding | None:
+    """What geometry explains the outputs where the stated one does not; None where it does, or nothing does."""
+    explained = bool(np.all(stated.share >= WELL))
+    wrong = _assignment(table, stated, specific_force(nominal_pose(table))) if explained else None
+    if explained and (wrong is None or wrong.verdict == DOUBTFUL):
+        return wrong
+    other = " or if ".join(_other_angles(table, stated, explained))
+    if wrong is not None:
+        return Finding(UNEXPLAINED, f"{wrong.text}; the outputs fit as well if {other}") if other else wrong
+    return Finding(UNEXPLAINED, f"the outputs do not follow the poses as stated; they do if {other}") if other else None
+
+
+def _other_angles(table: Table, stated: Response, explained: bool) -> list[str]:
+    """Readings of the angle columns under which each output follows its own axis, where the stated ones do not."""
+    found = []
+    for text, pose in _readings(nominal_pose(table)).items():
+        a = specific_force(pose)
+        tried = response(table, a)
+        better = np.max(1 - tried.share) <= FAR_BETTER * np.max(1 - stated.share)
+        if np.all(tried.share >= WELL) and (explained or better) and _assignment(table, tried, a) is None:
+            found.append(text)
+    return found
+
+
+def _readings(pose: Pose) -> Mapping[str, Pose]:
+    """Other meanings of the angles, in words."""
+
+    def of(alpha: Array, beta: Array) -> Pose:
+        return Pose(alpha, beta, pose.mount, pose.flip, pose.up)
+
+    return MappingProxyType(
+        {
+            "the columns alpha_deg and beta_deg are exchanged": of(pose.beta, pose.alpha),
+            "beta counts backwards (change the sign of beta_deg)": of(pose.alpha, -pose.beta),
+            "alpha counts backwards (change the sign of alpha_deg)": of(-pose.alpha, pose.beta),
+            "alpha is counted from the horizontal (take 90 - alpha_deg)": of(np.pi / 2 - pose.alpha, pose.beta),
+            "the angles are in radians": of(np.degrees(pose.alpha), np.degrees(pose.beta)),
+        }
+    )
+
+
+def _assignment(table: Table, found: Response, a: Array) -> Finding | None:
+    """Outputs that do not follow their own axes, or follow them backwards; None where there are none."""
+    about = a - a.mean(axis=0)
+    excited = np.linalg.eigh(about.T @ about / table.n)
+    kept = excited[1][:, excited[0] > EXCITED_G**2]
+    own = (kept @ kept.T)[: len(found.slope)]  # each axis, as far as these poses excite it
+    size = np.linalg.norm(found.slope, axis=1)
+    if not size.max() > 0:
+        return None
+    reach = np.linalg.norm(own, axis=1)
+    asked = [k for k in range(len(size)) if found.share[k] >= FOLLOWS and size[k] > 0]
+    cosine = {k: float(found.slope[k] @ own[k] / size[k] / reach[k]) for k in asked if reach[k] > 0.5}
+    off = np.cos(np.radians(TURNED_DEG))
+    astray = [k for k, c in cosine.items() if abs(c) < off]
+    astray += [k for k in asked if k not in cosine and size[k] > 0.5 * size.max()]
+    if astray:
+        return Finding(UNEXPLAINED, _astray(table, found, astray))
+    reversed_ = [k for k, c in cosine.items() if c < 0]
+    if not reversed_:
+        return None
+    names = " and ".join(AXES[k] for k in reversed_)
+    if len(reversed_) == len(cosine) or (len(cosine) > 2 and reversed_ == [0, 1]):
+        return Finding(
+            DOUBTFUL,
+            f"the scale factor of {names} is negative, as of a sensor turned by 180 deg on the stage; if it is, state "
+            "mount_deg = 180; if not, check the sign of alpha_deg and the wiring",
+        )
+    return Finding(
+        DOUBTFUL,
+        f"the scale factor of {names} is negative and that of the others is not, as of a mirrored sensor: beta counts "
+        "backwards (change the sign of beta_deg), the sensor is mounted face down (state flip = 1), or the output of "
+        f"{names} is inverted",
+    )
+
+
+def _astray(table: Table, found: Response, rows: list[int]) -> str:
+    """Which outputs follow which axis, and what to check."""
+    follow = []
+    for k in rows:
+        slope = found.slope[k]
+        axis = int(np.argmax(np.abs(slope)))
+        if abs(slope[axis]) > np.cos(np.radians(TURNED_DEG)) * np.linalg.norm(slope):
+            follow.append(f"{table.output_names[k]} follows gravity along {'-' if slope[axis] < 0 else ''}{AXES[axis]}")
+        else:
+            angle = float(np.degrees(np.arctan2(slope[1 - k], slope[k]))) if k < 2 else 0.0
+            follow.append(f"{table.output_names[k]} follows gravity {abs(angle):.0f} deg away from {AXES[k]}")
+    swapped = len(rows) == 2 and rows == [0, 1] and np.argmax(np.abs(found.slope[:2]), axis=1).tolist() == [1, 0]
+    same = swapped and found.slope[0, 1] * found.slope[1, 0] > 0
+    remedy = (
+        "the channels are exchanged: exchange the columns vx_v and vy_v, or the channels in the bench file"
+        if same
+        else "check how the sensor is turned on the stage (mount_deg) and which channel is which"
+    )
+    return f"{' and '.join(follow)}; {remedy}"

@@ -1,0 +1,256 @@
+"""Figures of a certificate: each parameter with its expanded uncertainty, its budget, and its decisions.
+
+As left: the values of this calibration. As found: the values of the model in use before, and the error of that model on
+the data of this calibration.
+
+The propagation of distributions (GUM Supplement 1) checks the uncertainties of the budget. In each trial the means
+get noise of the kind that the fit identified (white, scatter, slow, enlarged by the Birge ratio), and errors of the
+inputs that are not fitted, normal with their standard uncertainties, each shared by its rows. The parameters are then
+estimated anew, with the weights of the fit and the whole nonlinear model. First-order propagation neglects the
+curvature of the model over its uncertainty and the shape of the result's distribution; the trials include both.
+Inputs enter the residual by first order.
+
+The simulation confirms the budget if both ends of the budget's interval are within half a unit of the first digit of
+the standard uncertainty of the simulated ones. The budget is conservative if its interval is wider: it also counts
+how uncertain the slow noise is. If the simulated interval is wider, the budget's is widened to it.
+
+Source  JCGM 101:2008, 7 (trials), 7.7 (interval), 8.1 (comparison, one significant digit).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from calibrations.discovery.structure import unexplained_scatter
+from calibrations.errors import ModelError, UnusableData
+from calibrations.fit import Fit, cautiously, evaluate
+from calibrations.fitting.budget import SLOW_NOISE, Budget, Line, make_budget, parameter_correlation, row_gains
+from calibrations.fitting.inputs import Contribution, input_contributions
+from calibrations.model import Estimate, Model, Term
+from calibrations.noise.means import Noise, rms
+from calibrations.plausibility import doubt, rejection
+from calibrations.presentation.certificate.content import Error, Figures, Limit, Outcome, Simulated, Source, decide
+from calibrations.presentation.certificate.terms import name, term
+from calibrations.presentation.residual import in_milli, milli_unit
+from calibrations.presentation.text import exponent
+from calibrations.table import Array
+
+TRIALS = 2000
+STEPS = 2  # of the estimate: the model is nearly straight over its uncertainty
+SEED = 101
+LEVEL = 0.95
+CONFIRMED, CONSERVATIVE, WIDENED = "confirmed", "conservative", "widened"
+
+
+def simulate(found: Fit, inputs: Sequence[Contribution], trials: int = TRIALS, seed: int = SEED) -> Array:
+    """Parameters of each trial, shape (trials, p). The same fit gives the same trials."""
+    rng = np.random.default_rng(seed)
+    cautious = cautiously(found)
+    G = row_gains(cautious)
+    disturbed = cautious.birge * _noise(cautious.noise, trials, rng)
+    for c in inputs:
+        if c.std:
+            number = c.shared(found.table)
+            errors = c.std * rng.standard_normal((trials, int(number.max()) + 1))
+            disturbed += c.derivative(found.problem, found.theta) * errors[:, None, number]
+    return np.stack([_estimate(found, G, each) for each in disturbed])
+
+
+def interval(values: Array) -> tuple[Array, Array]:
+    """The probabilistically symmetric 95 % interval of each column."""
+    low, high = np.quantile(values, [(1 - LEVEL) / 2, (1 + LEVEL) / 2], axis=0)
+    return low, high
+
+
+def tolerance(std: float) -> float:
+    """Half a unit of the first digit of a standard uncertainty."""
+    return 0.5 * 10.0 ** exponent(std) if std > 0 else 0.0
+
+
+def verdict(value: float, expanded: float, std: float, low: float, high: float) -> str:
+    """What the simulated interval (low, high) says of value +- expanded: one of the three."""
+    beyond = expanded - (value - low), expanded - (high - value)
+    if min(beyond) < -tolerance(std):
+        return WIDENED
+    return CONSERVATIVE if max(beyond) > tolerance(std) else CONFIRMED
+
+
+def _estimate(found: Fit, G: Array, disturbed: Array) -> Array:
+    """The parameters that the disturbed residual leads to: Newton's way with the fit's own gain."""
+    theta = found.theta
+    for _ in range(STEPS):
+        left = found.problem.residual(theta) - found.residual + disturbed
+        theta = theta - np.einsum("pcn,cn->p", G, left)
+    return theta
+
+
+def _noise(noise: Noise, trials: int, rng: np.random.Generator) -> Array:
+    """Noise of the means, shape (trials, channels, n)."""
+    channels, n = noise.white.shape
+    out = noise.fast * rng.standard_normal((trials, channels, n))
+    for c, (taus_s, slow) in enumerate(zip(noise.taus_s, noise.slow, strict=True)):
+        for tau_s in taus_s if slow > 0 else ():
+            out[:, c] += slow / np.sqrt(len(taus_s)) * _wandering(np.exp(-noise.gap_s / tau_s), trials, rng)
+    return out
+
+
+def _wandering(phi: Array, trials: int, rng: np.random.Generator) -> Array:
+    """Gauss-Markov processes of unit variance, shape (trials, n), `phi` from each row to the next."""
+    x = np.empty((trials, len(phi)))
+    x[:, 0] = rng.standard_normal(trials)
+    for i in range(1, len(phi)):
+        x[:, i] = phi[i] * x[:, i - 1] + np.sqrt(1 - phi[i] ** 2) * rng.standard_normal(trials)
+    return x
+
+
+KINDS = ("poses", "positions", "rates")
+MISFIT = 1.05  # Birge ratio from which on it is told
+CERTAIN_K = 2.0  # coverage factor, where the degrees of freedom ask for no more
+
+
+def figures(found: Fit, before: Model | None, limits: Mapping[str, Limit], trials: int = TRIALS) -> Figures:
+    """All figures of a fit to poses, positions or rates; `before` is the model in use until now, with values.
+
+    Raises ModelError for another kind of table, and where nothing is determined; UnusableData.
+    """
+    require_reference(found.table.source, found.table.kind)
+    if (reason := rejection(found) or unexplained_scatter(found)) is not None:
+        raise UnusableData(f"{found.table.source}: no certificate is drawn up: {reason.verdict}: {reason.text}")
+    inputs = input_contributions(found.table)
+    drawn = make_budget(found, inputs)
+    trial = simulate(found, inputs, trials)
+    weights = _weights(found)
+    earlier = _values(before) if before is not None else {}
+    certified = [k for k, (_, e) in enumerate(_estimates(found.model)) if e.identified and e.std]
+    outcomes = tuple(
+        _outcome(k, each, e, drawn, trial[:, k], weights[k], found, earlier, limits)
+        for k, (each, e) in enumerate(_estimates(found.model))
+        if k in certified
+    )
+    if not outcomes:
+        raise ModelError(
+            f"{found.table.source}: the data determine no parameter of {found.model.name}: nothing to certify"
+        )
+    joint = parameter_correlation(found, drawn, inputs)[np.ix_(certified, certified)]
+    return Figures(
+        found.model.name,
+        outcomes,
+        tuple(_errors(found, before)),
+        drawn.not_given,
+        trials,
+        tuple(_remarks(found)),
+        tuple(map(tuple, joint.tolist())),
+    )
+
+
+def require_reference(source: str, kind: str) -> None:
+    """Raises ModelError for a kind of data whose parameters could be traced to nothing: no reference is known."""
+    if kind not in KINDS:
+        raise ModelError(
+            f"{source}: a certificate is drawn up of poses, positions or rates, whose reference is known, and not "
+            f"of {kind}. Certify a sweep of the sensor (`rig run sweep`); `rig report` has what this one shows"
+        )
+
+
+def _estimates(model: Model) -> Iterator[tuple[Term, Estimate]]:
+    for each in model.terms:
+        for e in each.estimates:
+            yield each, e
+
+
+def _values(model: Model) -> dict[tuple[str, str, str], tuple[float, float | None]]:
+    return {(each.name, e.name, e.axis): (e.value, e.std) for each, e in _estimates(model) if e.identified}
+
+
+def _outcome(
+    k: int,
+    of: Term,
+    e: Estimate,
+    drawn: Budget,
+    trial: Array,
+    weights: Array,
+    found: Fit,
+    earlier: Mapping[tuple[str, str, str], tuple[float, float | None]],
+    limits: Mapping[str, Limit],
+) -> Outcome:
+    std, coverage = float(drawn.combined[k]), max(CERTAIN_K, float(drawn.coverage[k]))
+    low, high = (float(end) for end in interval(trial))
+    said = verdict(e.value, coverage * std, std, low, high)
+    why = _why_further(k, coverage, std, float(trial.std()), drawn) if said == CONSERVATIVE else ""
+    if said == WIDENED:
+        coverage = max(coverage, (e.value - low) / std, (high - e.value) / std)
+    limit = limits.get(own := name(of.effect, e.name, e.axis))
+    order = np.argsort(-weights)
+    numbers = found.table.numbered(np.arange(found.table.n))
+    return Outcome(
+        name=own,
+        term=term(of.effect, next(p for p in of.effect.parameters if p.name == e.name)),
+        effect=of.name,
+        parameter=e.name,
+        axis=e.axis,
+        unit=e.unit,
+        value=e.value,
+        std=std,
+        coverage=coverage,
+        freedom=float(drawn.freedom[k]),
+        sources=tuple(_source(line, k) for line in drawn.given),
+        simulated=Simulated(float(trial.std()), low, high, said, why),
+        found=earlier.get((of.name, e.name, e.axis)),
+        decision=None if limit is None else decide(e.value, std, coverage * std, limit),
+        weights=tuple((int(numbers[i]), float(weights[i])) for i in order),
+    )
+
+
+def _why_further(k: int, coverage: float, std: float, simulated: float, drawn: Budget) -> str:
+    """By what a budget reaches further than the simulation, as far as it is known."""
+    slow = any(line.source == SLOW_NOISE and line.std is not None and line.std[k] > 0 for line in drawn.given)
+    reasons = [
+        "slow noise is not well known" if slow and CERTAIN_K * (std - simulated) > tolerance(std) else "",
+        "few degrees of freedom" if (coverage - CERTAIN_K) * std > tolerance(std) else "",
+    ]
+    return ", ".join(filter(None, reasons))
+
+
+def _source(line: Line, k: int) -> Source:
+    sensitivity = None if line.sensitivity is None else float(line.sensitivity[k])
+    part = 0.0 if line.std is None or np.isnan(line.std[k]) else float(line.std[k])
+    return Source(line.source, line.kind, line.unit, line.input_std, sensitivity, part, line.freedom)
+
+
+def _weights(found: Fit) -> Array:
+    """By what share each row makes up the square of each parameter's sensitivities to the means, shape (p, n)."""
+    squares = np.sum(row_gains(cautiously(found)) ** 2, axis=1)
+    whole = squares.sum(axis=1, keepdims=True)
+    return np.asarray(squares / np.where(whole > 0, whole, 1.0))
+
+
+def _errors(found: Fit, before: Model | None) -> Iterator[Error]:
+    """In thousandths of what is sensed, by channel; as found where the earlier model has every value that is needed."""
+    earlier = None if before is None else evaluate(before, found.table)
+    for c, channel in enumerate(found.channels):
+        as_found = None if earlier is None else _size(earlier, c, found)
+        yield Error(channel, milli_unit(found), as_found, _size(found, c, found))
+
+
+def _size(of: Fit, c: int, unit_of: Fit) -> tuple[float, float]:
+    each = np.zeros((len(of.channels), 2))
+    each[c] = rms(of.residual[c]), np.abs(of.residual[c]).max()
+    return float(in_milli(each[:, 0], unit_of)[c]), float(in_milli(each[:, 1], unit_of)[c])
+
+
+def _remarks(found: Fit) -> Iterator[str]:
+    if (why := doubt(found.table)) is not None:
+        yield f"To be checked: {why}."
+    if found.birge > MISFIT:
+        yield (
+            f"The model leaves more than noise in the data (Birge ratio {found.birge:.2f}); the uncertainties are "
+            "widened by it, and the budget shows it as misfit."
+        )
+    for each, e in _estimates(found.model):
+        if not e.identified:
+            what = f"{each.name} {f'{e.name} {e.axis}'.strip()}"
+            yield f"Not determined by these data, and not certified: {what} ({e.why})."
+    if not found.noise.known:
+        yield "The noise of single means is not known; what they scatter by stands for it."

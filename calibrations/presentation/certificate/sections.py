@@ -1,0 +1,299 @@
+"""A certificate as headings, facts and tables: one text, which HTML and PDF set each in its way."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from calibrations.presentation.certificate.content import RULE, Certificate, Decision, Outcome, Source
+from calibrations.presentation.certificate.results import CONSERVATIVE, WIDENED
+from calibrations.presentation.text import measured, minus, plain, unit
+
+MANY = 1e4  # degrees of freedom, told as no limit
+END_SCATTER = 2.67  # of a normal's 97.5 % quantile, in its standard deviation, times the root of the trials
+ROUNDING = 1e-6  # of a number of degrees of freedom
+NEGLIGIBLE = 1e-3  # of the combined uncertainty
+WIDE = 10  # columns of a correlation matrix side by side
+HEAVIEST = 3  # poses that weigh most, named with a result
+METHOD = (
+    "Terms and symbols as in IEEE Std 1293 (linear single-axis accelerometers) and IEEE Std 2700 (performance "
+    "parameters of sensors). The parameters are estimated jointly, by least squares under the noise that the data "
+    "show."
+)
+EXPANDED = (
+    "As left. U is the expanded uncertainty for a coverage probability of about 95 %: k = 2, or Student's factor "
+    "for the effective degrees of freedom, cut to a whole number, where that is more; where it says widened, k is what "
+    "takes U as far as the check by simulation goes. g is the local gravity."
+)
+BUDGET = (
+    "After the GUM (JCGM 100): type A from the noise of the data themselves, type B from what is stated of inputs "
+    "that no data can show; effective degrees of freedom by Welch and Satterthwaite."
+)
+CORRELATED = (
+    "Results that follow from the same data are correlated: whoever computes something from several of them takes the "
+    "correlation coefficients into account (GUM 5.2.2)."
+)
+TRIALS = (
+    "The propagation of distributions (GUM Supplement 1, JCGM 101) with {trials} trials is set beside the budget. "
+    "Confirmed: both ends of the intervals agree within half a unit of u's first digit. Conservative: the budget "
+    "reaches further, as u is made larger where slow noise is not well known, and k where degrees of freedom are few; "
+    "the simulation has neither. Widened: the simulation reaches further, and U is taken as far. By chance, the ends "
+    "of simulated intervals scatter by {scatter:.2f} u."
+)
+ROWS = (
+    "Every figure follows from the rows below, each the mean of a block of samples in the record. The digest is the "
+    "beginning of the SHA-256 of the block's samples; the machine-readable certificate has it whole, with the "
+    "weight of every row in every result."
+)
+NO_LIMITS = "No limits were given: nothing is said of conformity."
+STATEMENTS = {
+    "pass": "pass",
+    "conditionalPass": "conditional pass",
+    "conditionalFail": "conditional fail",
+    "fail": "fail",
+}
+
+
+@dataclass(frozen=True)
+class Table:
+    """`numbers` are the columns that stand to the right. `long` may be folded where there is room to unfold it."""
+
+    title: str
+    head: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    numbers: tuple[int, ...] = ()
+    long: bool = False
+
+
+@dataclass(frozen=True)
+class Section:
+    """A heading, sentences, facts by name, and tables; in this order."""
+
+    title: str
+    words: tuple[str, ...] = ()
+    facts: tuple[tuple[str, str], ...] = ()
+    tables: tuple[Table, ...] = ()
+
+
+def sections(c: Certificate) -> list[Section]:
+    """Everything that the certificate says, in order."""
+    return [
+        _identification(c),
+        _procedure(c),
+        _environment(c),
+        _results(c),
+        _found(c),
+        _uncertainty(c),
+        _traceability(c),
+    ]
+
+
+def verdict(c: Certificate) -> str:
+    """The worst statement of conformity; nothing where no result has a limit."""
+    stated = {o.decision.statement for o in c.figures.outcomes if o.decision is not None}
+    return next((text for key, text in reversed(STATEMENTS.items()) if key in stated), "")
+
+
+def _identification(c: Certificate) -> Section:
+    lab = c.laboratory
+    place = ", ".join(filter(None, (lab.street, f"{lab.post_code} {lab.city}".strip(), lab.country)))
+    head = ("role", "instrument", "serial number", "firmware", "certificate", "due")
+    rows = tuple(
+        (i.role, i.model, i.serial or "–", i.firmware or "–", i.certificate or "none given",
+         f"{i.due or '–'}{', expired' if i.expired else ''}")
+        for i in c.instruments
+    )  # fmt: skip
+    facts = (
+        ("laboratory", f"{lab.name}, {place}"),
+        ("responsible", f"{lab.person}, {lab.role}"),
+        ("customer", c.customer),
+        ("sensor", c.sensor),
+        ("serial number", c.serial),
+        ("manufacturer", c.manufacturer),
+        ("rig", c.rig),
+    )
+    tables = (
+        (Table("Instruments, and the certificates that their values are traceable by", head, rows),) if rows else ()
+    )
+    return Section("Identification", (), facts, tables)
+
+
+def _procedure(c: Certificate) -> Section:
+    facts = (
+        ("procedure", c.procedure),
+        ("begun", c.began),
+        ("ended", c.ended),
+        ("model", c.figures.model),
+        *c.facts.items(),
+    )
+    return Section("Procedure", (METHOD,), facts)
+
+
+def _environment(c: Certificate) -> Section:
+    rows = tuple(
+        (each.name, *(minus(f"{value:.6g}") for value in (each.low, each.mean, each.high)), unit(each.unit))
+        for each in c.conditions
+    )
+    head = ("influence", "lowest", "mean", "highest", "unit")
+    tables = (Table("During the measurement", head, rows, (1, 2, 3)),) if rows else ()
+    return Section("Environment", (), (("local gravity", f"{c.gravity_m_s2:.6g} m/s²"),), tables)
+
+
+def results_table(c: Certificate) -> Table:
+    """The results as left: what a certificate is asked for first."""
+    rows = tuple(
+        (_name(o), measured(o.value, o.expanded), unit(o.unit), _coverage(o), _freedom(o.freedom),
+         *(("–", "–") if o.decision is None else (_limits(o.decision), _statement(o.decision))))
+        for o in c.figures.outcomes
+    )  # fmt: skip
+    return Table(
+        "Results, as left", ("quantity", "value ± U", "unit", "k", "ν_eff", "limits", "conformity"), rows, (1, 3, 4)
+    )
+
+
+def _results(c: Certificate) -> Section:
+    words = (
+        EXPANDED,
+        *([RULE] if any(o.decision for o in c.figures.outcomes) else [NO_LIMITS]),
+        *c.figures.remarks,
+        *c.remarks,
+    )
+    return Section("Results", words, (), (results_table(c),))
+
+
+def _found(c: Certificate) -> Section:
+    """As found, where an earlier calibration is known; the error of indication in any case."""
+    outcomes = [o for o in c.figures.outcomes if o.found is not None]
+    changes = tuple(
+        (_name(o), _like(o.found[0], o), _like(o.value, o), plain(o.value - o.found[0], 2), unit(o.unit),
+         f"{abs(o.value - o.found[0]) / o.expanded:.1f}")
+        for o in outcomes if o.found is not None
+    )  # fmt: skip
+    errors = tuple(
+        (e.axis, *([plain(x) for x in e.found] if e.found else ["–", "–"]), *(plain(x) for x in e.left), e.unit)
+        for e in c.figures.errors
+    )
+    head = ("axis", "rms as found", "greatest as found", "rms as left", "greatest as left", "unit")
+    tables = [Table("Error of indication over the poses of this calibration", head, errors, (1, 2, 3, 4))]
+    if changes:
+        changed = ("quantity", "as found", "as left", "change", "unit", "change / U")
+        tables.insert(0, Table("Change since the calibration before", changed, changes, (1, 2, 3, 5)))
+    words = f"As found: by {c.before}." if c.before else "As found is not known: no earlier calibration was given."
+    return Section("As found and as left", (words,), (), tuple(tables))
+
+
+def _uncertainty(c: Certificate) -> Section:
+    head = ("source", "type", "its standard uncertainty", "sensitivity", "contribution", "ν")
+    budgets = tuple(
+        Table(
+            f"{_name(o)}, {unit(o.unit) or '1'}", head, tuple(_line(s, o) for s in o.sources), (2, 3, 4, 5), long=True
+        )
+        for o in c.figures.outcomes
+    )
+    trials = tuple(
+        (_name(o), plain(o.std, 2), plain(o.simulated.std, 2), plain(o.expanded, 2),
+         f"{_like(o.simulated.low, o)} to {_like(o.simulated.high, o)}", unit(o.unit),
+         _checked(o))
+        for o in c.figures.outcomes
+    )  # fmt: skip
+    check = ("quantity", "u by the budget", "u simulated", "U", "95 % simulated", "unit", "budget")
+    words = (
+        BUDGET,
+        *(
+            [f"Not given, and so not in these numbers: {', '.join(c.figures.not_given)}."]
+            if c.figures.not_given
+            else []
+        ),
+        TRIALS.format(trials=c.figures.trials, scatter=END_SCATTER / math.sqrt(c.figures.trials)),
+        *([CORRELATED] if len(c.figures.outcomes) > 1 else []),
+    )
+    checked = Table("Check by simulation", check, trials, (1, 2, 3, 4), False)
+    return Section("Uncertainty", words, (), (checked, *_correlations(c), *budgets))
+
+
+def _correlations(c: Certificate) -> Iterator[Table]:
+    """The lower triangles of the correlation matrix, as many columns at a time as a page is wide."""
+    names, r = [_name(o) for o in c.figures.outcomes], c.figures.correlations
+    for first in range(0, len(names) if len(names) > 1 else 0, WIDE):
+        columns = range(first, min(first + WIDE, len(names)))
+        head = ("", "quantity", *(f"{k + 1}" for k in columns))
+        rows = tuple(
+            (f"{i + 1}", names[i], *(minus(f"{r[i][k]:.2f}") if k <= i else "" for k in columns))
+            for i in range(first, len(names))
+        )
+        yield Table(
+            "Correlation coefficients" + (", continued" if first else ""), head, rows, (0, *range(2, 2 + len(columns)))
+        )
+
+
+def _traceability(c: Certificate) -> Section:
+    heavy = tuple(
+        (_name(o), ", ".join(f"{number} ({100 * share:.0f} %)" for number, share in o.weights[:HEAVIEST]))
+        for o in c.figures.outcomes
+    )
+    rows = tuple(
+        (str(s.number), "–" if s.t_s is None else f"{s.t_s:.1f}", s.place,
+         "  ".join(minus(f"{v:.6f}") for v in s.means), str(s.n), s.sha256[:16])
+        for s in c.samples
+    )  # fmt: skip
+    facts = (
+        ("data", c.data),
+        ("SHA-256 of the data", c.data_sha256),
+        ("SHA-256 of the model", c.model_sha256),
+        ("issued by", c.program),
+    )
+    return Section(
+        "Traceability",
+        (ROWS,),
+        facts,
+        (
+            Table("Rows that weigh most in each result", ("quantity", "number of the row (its share)"), heavy),
+            Table("Rows", ("row", "t, s", "pose", "mean outputs", "n", "SHA-256"), rows, (0, 1, 4), long=True),
+        ),
+    )
+
+
+def _name(o: Outcome) -> str:
+    return f"{o.term}{f', {o.axis}' if o.axis else ''}"
+
+
+def _coverage(o: Outcome) -> str:
+    return f"{WIDENED}, {o.coverage:.2f}" if o.simulated.verdict == WIDENED else f"{o.coverage:.2f}"
+
+
+def _checked(o: Outcome) -> str:
+    if o.simulated.verdict == CONSERVATIVE and o.simulated.why:
+        return f"{CONSERVATIVE}: {o.simulated.why}"
+    return f"{WIDENED} to the simulation" if o.simulated.verdict == WIDENED else o.simulated.verdict
+
+
+def _freedom(freedom: float) -> str:
+    """Cut to a whole number, as the coverage factor has it (GUM G.4.1)."""
+    return f"{math.floor(freedom + ROUNDING):d}" if freedom < MANY else "∞"
+
+
+def _like(value: float, o: Outcome) -> str:
+    """A value to as many digits as the result has."""
+    head, _, tail = measured(value, o.expanded).partition(" ±")
+    return head.strip("(") + tail.partition(")")[2]
+
+
+def _limits(d: Decision) -> str:
+    return minus(f"{d.low:g} to {d.high:g}")
+
+
+def _statement(d: Decision) -> str:
+    chance = "over 99.9" if d.probability > 0.999 else f"{100 * d.probability:.1f}"
+    return f"{STATEMENTS[d.statement]} ({chance} %)"
+
+
+def _line(s: Source, o: Outcome) -> tuple[str, ...]:
+    return (
+        s.name,
+        s.kind,
+        "–" if s.std is None else f"{plain(s.std, 2)} {unit(s.unit)}".strip(),
+        "–" if s.sensitivity is None else plain(s.sensitivity, 2),
+        plain(s.contribution, 2) if s.contribution > NEGLIGIBLE * o.std else "negligible",
+        _freedom(s.freedom),
+    )

@@ -1,0 +1,211 @@
+"""Charts of a discovery: the falling error, the curve of each effect, and all charts of its report with captions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import log10
+from typing import Protocol
+
+import numpy as np
+
+from calibrations.discovery.results import Comparison, Discovery, Step
+from calibrations.fit import Fit
+from calibrations.motion.evaluate import MotionResult
+from calibrations.presentation.chart import (
+    GOOD,
+    MEASURED,
+    MODEL,
+    UNSEEN,
+    Axis,
+    Bars,
+    Chart,
+    Panel,
+    Picture,
+    Points,
+    Span,
+    one,
+)
+from calibrations.presentation.charts.columns import choices, first_choices
+from calibrations.presentation.charts.fit import (
+    MOST_ROWS,
+    change_of,
+    drawn_channels,
+    failure_chart,
+    measurement_chart,
+    most_telling,
+    residual,
+    residual_chart,
+    row_height,
+    scale_of,
+)
+from calibrations.presentation.charts.motion import evaluation
+from calibrations.presentation.residual import Shown, milli_unit, pooled_milli, row_name
+from calibrations.presentation.text import plain
+
+BELOW = 0.5  # times the floor: where the logarithmic axis begins
+FEWEST = 4  # bars that there is room for: one alone is no thicker than they
+NEAR = 1.15  # times the floor: as good as noise
+LONG = 0.3  # of the axis: a bar that its text fits into
+ROW = 0.42  # inches
+MOST_CURVES = 4
+DOTS = "Filled markers are clockwise approaches, open ones anticlockwise approaches."
+POSES = (
+    f"Dots are measured, lines are the model {{}}. {DOTS}",
+    "The residual of the model {} at both stage angles; pale is near the noise.",
+)
+MOTION = (
+    "Output over a few periods, less its mean: dots are measured, lines are the model {}.",
+    "Mean residual of the model {} over one period of the motion's strongest line, with the noise of the mean.",
+)
+POSITIONS = (
+    "The magnitude of gravity by the model {} at each position: 1 g if the model is right.",
+    "The residual of the model {} over the direction of gravity; pale is near the noise.",
+)
+RATES = (
+    "Dots are measured, crosses are the model {}.",
+    "The residual of the model {} over the rate of the turn.",
+)
+FIELDS = (
+    "The magnitude of the field by the model {} at each position: 1 if the model is right.",
+    "The residual of the model {} over the direction of the field; pale is near the noise.",
+)
+CAPTIONS = {"poses": POSES, "motion": MOTION, "rates": RATES, "fields": FIELDS}
+
+
+@dataclass(frozen=True)
+class Level:
+    """The error of one model, in multiples of the noise floor (of noise: of chance), on rows of the fit and on others.
+
+    `rms` is the same error in its unit, such as "3.8 mg".
+    """
+
+    name: str
+    seen: float
+    unseen: float
+    rms: str
+
+
+@dataclass(frozen=True)
+class Measure:
+    """Words of the falling error: the label of its axis, and the names of both kinds of rows."""
+
+    axis: str = "rms error / noise floor"
+    over: str = "the noise floor"
+    seen: str = "rows of the fit"
+    unseen: str = "rows not used in the fit"
+
+
+class Falling(Protocol):
+    """A fit, and the steps from there: a discovery, or a model that a person extends."""
+
+    @property
+    def start(self) -> Fit: ...
+
+    @property
+    def steps(self) -> tuple[Step[Fit], ...]: ...
+
+
+def levels(found: Falling) -> list[Level]:
+    """The model as it was, then each effect added."""
+    start = Level(found.start.model.name, found.start.pooled_excess, found.start.held_out_excess, _rms(found.start))
+    after = [Level(f"+ {s.name}", s.after.pooled_excess, s.held_out_after, _rms(s.after)) for s in found.steps]
+    return [start, *after]
+
+
+def _rms(fit: Fit) -> str:
+    return f"{plain(pooled_milli(fit)[0], 2)} {milli_unit(fit)}"
+
+
+def waterfall(steps: Sequence[Level], words: Measure = Measure()) -> Chart:
+    """The falling error: a bar for the model as it was, one more for each effect added; the band is the noise floor.
+
+    Bars are errors on rows of the fit, diamonds on rows that the fit did not use.
+    """
+    seen, unseen = (np.array([getattr(level, name) for level in steps], float) for name in ("seen", "unseen"))
+    reach = 2.2 * max(*seen, *unseen, 3.0)
+    colours = [MODEL, *(GOOD if value < NEAR else MEASURED for value in seen[1:])]
+    texts = [f"{plain(level.seen)} × ({level.rms})" for level in steps]
+    inside = [log10(max(value, BELOW) / BELOW) > LONG * log10(reach / BELOW) for value in seen]
+    hover = [f"{plain(value)} × {words.over} on {words.unseen}" for value in unseen]
+    series = (
+        Span(BELOW, 1.0, "x"),
+        Bars(BELOW, seen, colours, texts, inside),
+        Points(unseen, np.arange(len(steps), dtype=float), colour=UNSEEN, symbol="diamond", size=10, hover=hover),
+    )
+    x = Axis(words.axis, log=True, low=BELOW, high=reach)
+    y = Axis(low=-0.5, high=max(len(steps), FEWEST) - 0.5, names=tuple(level.name for level in steps), reverse=True)
+    return one(Panel(series, x, y), 0.6 + ROW * max(len(steps), FEWEST))
+
+
+def effect_chart(step: Step[Fit]) -> Chart:
+    """A row for each channel: the residual before with the effect's curve through it, and the residual after."""
+    found = choices(step.before)
+    colour, x = found[first_choices(list(found))[1]], most_telling(step)
+    rows = []
+    for k, c in enumerate(drawn_channels(step.before, change_of(step))):
+        titles = (f"before; line: {step.name}", "after") if k == 0 else ("", "")
+        before, after = (Shown(fit, c, False) for fit in (step.before, step.after))
+        rows.append((
+            residual(before, x, colour, step, title=titles[0]),
+            residual(after, x, colour, second=True, title=titles[1]),
+        ))  # fmt: skip
+    bar = None if step.before.table.kind == "motion" else scale_of(colour, 0)
+    return Chart(tuple(rows), row_height(step.before), share_y=True, bar=bar)
+
+
+def album(found: Discovery[Fit], compared: Comparison[Fit], motion: MotionResult | None = None) -> list[Picture]:
+    """The falling error, the given model beside its data, where it fails, and each effect's curve.
+
+    The result of a run of the procedure motion comes first, if it is given.
+    """
+    fit = compared.fit
+    model, rows = fit.model.name, row_name(fit.table)
+    shown, mapped = CAPTIONS.get(fit.table.content, POSITIONS)
+    fall = (
+        "Error of the model before and after each effect, as a multiple of the noise floor (grey): "
+        f"bars on the {rows} of the fit, diamonds on {rows} that the fit did not use."
+    )
+    left = f"Measured less the model {model}. The grey band is the noise floor, one standard deviation each way."
+    if len(fit.channels) > len(drawn_channels(fit, fit.residual)):
+        left += f" Only the {MOST_ROWS} outputs with the largest residual are drawn."
+    return [
+        *(_evaluated(each) for each in (motion,) if each),
+        Picture("waterfall", "The falling error", fall, waterfall(levels(found))),
+        Picture("measurement", "Measurement beside model", shown.format(model), measurement_chart(fit)),
+        Picture("residual", "Residual", left, residual_chart(fit)),
+        Picture("failure", "Where the model fails", mapped.format(model), failure_chart(fit)),
+        *(_curve(step, found) for step in tried(found)),
+    ]
+
+
+def _evaluated(motion: MotionResult) -> Picture:
+    """Fig. 12 of the paper."""
+    caption = (
+        "Above: acceleration along x by the sensor (full line) and by the displacement sensor (dotted), over the first "
+        "half second. Below: the difference; the grey band is the difference by the sensor's noise alone, one standard "
+        "deviation each way. Both are in the paper's band, a second-order low-pass at 20 Hz (Ang, Fig. 12)."
+    )
+    return Picture("evaluation", "Both models beside the displacement sensor", caption, evaluation(motion))
+
+
+def tried(found: Discovery[Fit]) -> tuple[Step[Fit], ...]:
+    """The effects that reduced the error most, in the order added; where none was kept, the best that was tried."""
+    if not found.steps:
+        return found.findings.tried[:1]
+    least = sorted((_fall(step) for step in found.steps), reverse=True)[:MOST_CURVES][-1]
+    return tuple(step for step in found.steps if _fall(step) >= least)
+
+
+def _fall(step: Step[Fit]) -> float:
+    """By which factor the error falls."""
+    return step.before.pooled_excess / step.after.pooled_excess
+
+
+def _curve(step: Step[Fit], found: Discovery[Fit]) -> Picture:
+    kept = "" if found.steps else "This effect was tried and not kept: it does not explain the residual. "
+    caption = (
+        f"{kept}Left: the residual before, and the part explained by {step.name} (full line clockwise, broken "
+        "line anticlockwise). Right: the residual after, on the same scale."
+    )
+    return Picture(f"effect-{step.name}", f"What {step.name} explains", caption, effect_chart(step))

@@ -1,0 +1,317 @@
+"""Charts of a fit: measurement beside model, the residual against a column, and where the model fails.
+
+A panel shows one channel (`Shown`). A filled marker is a clockwise approach, an open one an anticlockwise approach;
+colours are the values of a second column.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrations.discovery.places import scales
+from calibrations.discovery.results import Step
+from calibrations.fit import Fit
+from calibrations.noise.means import rms
+from calibrations.presentation.chart import (
+    CANDIDATE,
+    MODEL,
+    QUIET,
+    Axis,
+    Chart,
+    Line,
+    Panel,
+    Points,
+    Rule,
+    Scale,
+    Second,
+    Symbol,
+    beside,
+    floor_band,
+    stacked,
+)
+from calibrations.presentation.charts import motion
+from calibrations.presentation.charts.columns import (
+    Column,
+    choices,
+    columns,
+    first_choices,
+    specific_force,
+    telling_columns,
+)
+from calibrations.presentation.residual import Shown, residual_unit, zero
+from calibrations.table import MILLI, Array
+
+PALE = 3.0  # times the noise floor: below, noise alone stays pale
+APART = 0.22  # of the step between inclinations, by which both directions of turning are set apart
+SIDES: dict[int, Symbol] = {1: "circle", -1: "circle-open", 0: "circle"}
+PLACES: dict[int, Symbol] = {1: "triangle-up", -1: "triangle-down", 0: "circle"}
+TOWARDS = "towards x; left: z upwards, right: z downwards (equal-area map)"
+HALF_SPHERES = 2.3  # between the centres of both maps
+SMALL_ROW, ROW = 2.0, 3.0  # inches: a motion has many channels
+MOST_ROWS = 4  # channels of a motion that are drawn
+ACROSS_PX, DOWN_PX, LEAST_PX, MOST_PX = 900.0, 330.0, 3.0, 10.0  # of a map of poses: its width, height; its markers
+
+
+def measurement_chart(fit: Fit) -> Chart:
+    """A panel for each output, or one for the magnitude of positions."""
+    if fit.table.kind == "motion":
+        return stacked([motion.measurement(Shown(fit, c, False)) for c in motion.firsts(fit)], 2.6)
+    found, n = choices(fit), 1 if fit.table.kind == "positions" else len(fit.channels)
+    x, colour = (found[name] for name in first_choices(list(found)))
+    if fit.table.kind == "positions":
+        x = columns(fit)[3]
+    panels = [measurement(Shown(fit, c, False), x, colour) for c in range(n)]
+    bar = scale_of(colour, 0)
+    return beside(panels, 4.2, bar=bar) if n < 3 else stacked(panels, ROW, bar=bar)
+
+
+def residual_chart(fit: Fit) -> Chart:
+    """A row of panels for each channel, a column for each thing that the residual may follow."""
+    found = choices(fit)
+    colour = found[first_choices(list(found))[1]]
+    across = columns(fit)
+    rows = tuple(
+        tuple(residual(Shown(fit, c, False), x, colour, second=x is across[-1]) for x in across)
+        for c in drawn_channels(fit, fit.residual)
+    )
+    alike = bool(np.ptp(colour.values) == 0)  # a motion has one inclination
+    bar = None if alike or any(colour is x for x in across) else scale_of(colour, 0)
+    return Chart(rows, row_height(fit), share_x=True, share_y=True, bar=bar)
+
+
+def failure_chart(fit: Fit) -> Chart:
+    """A map for each channel; for a motion the residual over one period."""
+    if fit.table.kind == "motion":
+        return stacked([motion.failure(Shown(fit, c, False)) for c in motion.firsts(fit)], 2.6)
+    panels = [failure(Shown(fit, c, False)) for c in range(len(fit.channels))]
+    reach = max(PALE, float(np.abs(fit.residual / fit.noise.floor[:, None]).max()))
+    return stacked(panels, 4.2 if len(panels) == 1 else ROW, bar=_signed(reach))
+
+
+def drawn_channels(fit: Fit, values: Array) -> list[int]:
+    """All channels; of a motion those with the largest rms of `values`, shape (channels, n), over the noise floor."""
+    every = range(len(fit.channels))
+    if fit.table.kind != "motion":
+        return list(every)
+    size = rms(values) / fit.noise.floor
+    return sorted(sorted(every, key=lambda c: -float(size[c]))[:MOST_ROWS])
+
+
+def row_height(fit: Fit) -> float:
+    """Inches of a channel's row of panels."""
+    return SMALL_ROW if fit.table.kind == "motion" else ROW
+
+
+def measurement(shown: Shown, x: Column, colour: Column) -> Panel:
+    """Dots are measured, the line is the model (crosses where rows share no curve); output over `x`."""
+    c, rows, fit = shown.c, shown.rows, shown.fit
+    measured, model, label = _outputs(shown)
+    hover = [f"{value:.6g}<br>{text}" for value, text in zip(measured[rows], shown.hover, strict=True)]
+    dots = _dots(shown, x.values[c, rows], measured[rows], colour, hover)
+    told = "the model: %{y:.6g}"
+    if x.name == "beta":
+        lines = (Line(*_stretches(shown, x.values[c], model), width=1.2, hover=told),)
+        series = (*lines, dots)
+    elif fit.table.kind == "positions":
+        std = fit.noise.fast[0, rows]
+        dots = replace(dots, low=dots.y - std, high=dots.y + std)
+        series = (Rule(1.0, colour=MODEL, width=1.2), dots)  # type: ignore[assignment] # a tuple of any series
+    else:
+        crosses = Points(x.values[c, rows], model[rows], colour=MODEL, symbol="cross", size=9)
+        series = (dots, crosses)  # type: ignore[assignment]
+    title = "" if fit.table.kind == "positions" else f"axis {fit.channels[c]}"
+    second = None
+    if not shown.in_g and fit.table.kind == "poses":
+        second = Second(float(scales(fit)[c]), zero(fit, c), f"{fit.table.input_unit}, by bias and scale factor")
+    return Panel(series, _axis(x, c), Axis(label), title, second=second)
+
+
+def residual(
+    shown: Shown, x: Column, colour: Column, step: Step[Fit] | None = None, *, second: bool = False, title: str = ""
+) -> Panel:
+    """The residual over `x` and the noise floor; the part that the effect of `step` explains as a line.
+
+    The line is full for clockwise and broken for anticlockwise approaches. `second`: an axis in mg on the right.
+    """
+    c, rows = shown.c, shown.rows
+    dots = _dots(shown, x.values[c, rows], shown.residual, colour, shown.hover)
+    lines = tuple(_explained(step, x, shown)) if step else ()
+    right = None
+    if second and shown.fit.table.kind != "positions" and not shown.in_g:
+        right = Second(shown.scale, 0.0, MILLI[shown.fit.table.input_unit])
+    label = shown.label
+    if shown.fit.table.kind == "motion":
+        label = label.replace(" in ", "\nin ", 1).replace(" with", "\nwith", 1)
+    return Panel((*floor_band(shown.floor), dots, *lines), _axis(x, c), Axis(label), title, second=right)
+
+
+def failure(shown: Shown) -> Panel:
+    """Each row at its place, coloured by its residual over the noise floor."""
+    fit, c, rows = shown.fit, shown.c, shown.rows
+    x, y, axes = _map(shown)
+    over = shown.residual / shown.floor
+    dots = Points(x[rows], y[rows], symbol=[PLACES[int(s)] for s in shown.side], size=_marker_px(shown), values=over,
+                  scale=_signed(max(PALE, float(np.abs(over).max(initial=0.0)))), hover=shown.hover,
+                  keys=range(len(rows)))  # fmt: skip
+    circles: tuple[Line, ...] = ()
+    if fit.table.kind == "positions":
+        turn = np.linspace(0, 2 * np.pi, 121)
+        circles = tuple(Line(np.cos(turn) + at, np.sin(turn), colour=QUIET, width=0.8) for at in (0.0, HALF_SPHERES))
+    title = "" if fit.table.kind == "positions" else f"axis {fit.channels[c]}"
+    return Panel((*circles, dots), *axes, title, equal=fit.table.kind == "positions")
+
+
+def _marker_px(shown: Shown) -> float:
+    """Markers of neighbouring poses, and of both directions of turning, must not overlap."""
+    table = shown.fit.table
+    if table.kind != "poses":
+        return MOST_PX
+    across, down = (len(np.unique(table.column(name))) for name in ("beta_deg", "alpha_deg"))
+    return min(max(min(ACROSS_PX / across, DOWN_PX / (2 * down)), LEAST_PX), MOST_PX)
+
+
+def scale_of(colour: Column, c: int) -> Scale:
+    """Colours by the values of a column."""
+    if colour.names:
+        return Scale(colour.labels[c], 0, len(colour.names) - 1, names=colour.names)
+    values = colour.values[c]
+    return Scale(colour.labels[c], float(values.min()), float(values.max()))
+
+
+def _signed(reach: float) -> Scale:
+    return Scale("residual / noise floor", -reach, reach, signed=True)
+
+
+def _dots(shown: Shown, x: Array, y: Array, colour: Column, hover: Sequence[str]) -> Points:
+    return Points(x, y, symbol=[SIDES[int(s)] for s in shown.side], values=colour.values[shown.c, shown.rows],
+                  scale=scale_of(colour, shown.c), hover=hover, keys=range(len(shown.rows)))  # fmt: skip
+
+
+def _axis(x: Column, c: int) -> Axis:
+    return Axis(x.labels[c], ticks="quarters" if x.name == "beta" else "", names=x.names)
+
+
+def _outputs(shown: Shown) -> tuple[Array, Array, str]:
+    """Measured values, the model's values, and their label, for every row."""
+    fit, c = shown.fit, shown.c
+    if fit.table.kind == "positions":
+        what = "|m| by the model (share of the field)" if fit.table.content == "fields" else "|a| by the model (g)"
+        return 1.0 + fit.residual[0], np.ones(fit.table.n), what
+    measured = fit.table.outputs[:, c]
+    model = measured - fit.residual[c]
+    if not shown.in_g:
+        return measured, model, f"output of {fit.channels[c]} ({fit.table.unit})"
+    offset, unit = zero(fit, c), fit.table.input_unit
+    label = f"{fit.channels[c]} by bias and scale factor ({unit})"
+    return (measured - offset) / shown.scale, (model - offset) / shown.scale, label
+
+
+def _stretches(shown: Shown, x: Array, model: Array) -> tuple[Array, Array]:
+    """The model over x, one stretch for each inclination and direction of turning, with gaps between."""
+    table, at, values = shown.fit.table, [], []
+    groups = np.stack([table.optional("alpha_deg", 0.0), table.optional("direction", 0.0)])[:, shown.rows]
+    _, group = np.unique(groups, axis=1, return_inverse=True)
+    for k in range(int(group.max(initial=-1)) + 1):
+        rows = shown.rows[group.ravel() == k]
+        order = rows[np.argsort(x[rows], kind="stable")]
+        at += [*x[order], np.nan]
+        values += [*model[order], np.nan]
+    return np.array(at), np.array(values)
+
+
+def _explained(step: Step[Fit], x: Column, shown: Shown) -> Iterator[Line]:
+    for side, at, values in curves(step, x, shown.c):
+        turning = {1: " clockwise", -1: " anticlockwise"}.get(int(side), "")
+        yield Line(at, shown.factor * values, colour=CANDIDATE, width=3, dash="solid" if side >= 0 else "dash",
+                   halo=True, hover=f"explained by {step.name}{turning}")  # fmt: skip
+
+
+def _map(shown: Shown) -> tuple[Array, Array, tuple[Axis, Axis]]:
+    """The place of each row, and the axes."""
+    fit = shown.fit
+    if fit.table.kind == "poses":
+        alpha, side = fit.table.column("alpha_deg"), np.sign(fit.table.optional("direction", 0.0))
+        steps = np.diff(np.unique(alpha))
+        apart = APART * float(np.median(steps)) if len(steps) else 1.0
+        label = "β (deg); ▲ turning clockwise, ▼ anticlockwise"
+        return fit.table.column("beta_deg"), alpha + apart * side, (Axis(label, ticks="quarters"), Axis("α (deg)"))
+    if fit.table.kind == "positions":
+        a = specific_force(fit)
+        flat = a[:, :2] / np.sqrt(np.linalg.norm(a, axis=1, keepdims=True) + np.abs(a[:, 2:]))
+        right = np.where(a[:, 2] < 0, HALF_SPHERES, 0.0)
+        unit = "share of the field" if fit.table.content == "fields" else "g"
+        return flat[:, 0] + right, flat[:, 1], (Axis(f"{TOWARDS} ({unit})"), Axis(f"towards y ({unit})"))
+    first = columns(fit)[0]
+    over = fit.residual[shown.c] / fit.noise.floor[shown.c]
+    return first.values[shown.c], over, (Axis(first.labels[shown.c]), Axis("residual / noise floor"))
+
+
+# The column that an effect's curve is drawn over: the change of the residual is nearest to a function of it
+
+
+MOST_PARTS = 24  # of a column, for each direction
+ROWS_IN_A_PART = 6
+TELLING = 0.8  # part of the change's variance that a function of the column must give
+EQUAL = 0.02  # columns closer than this tell the same: the plainer cause is drawn
+
+
+def change_of(step: Step[Fit]) -> Array:
+    """What adding the effect takes off the residual, the other parameters refitted, shape (channels, n)."""
+    return step.before.residual - step.after.residual
+
+
+def most_telling(step: Step[Fit]) -> Column:
+    """The plainest column that the change follows; the change itself where it follows none."""
+    change, sides = change_of(step) / step.before.noise.floor[:, None], _sides(step)
+    effect = next(term.effect for term in step.after.model.terms if term.name == step.name)
+    found = telling_columns(step.before, effect)
+    told = np.array([explained(change, column.values, sides) for column in found])
+    if step.before.table.kind == "motion":
+        return found[0]
+    if told.max() < TELLING:
+        label = f"change made by {step.name} ({residual_unit(step.before)})"
+        return Column("change", (label,) * len(change), 1e3 * change_of(step))
+    return found[int(np.argmax(told >= told.max() - EQUAL))]
+
+
+def explained(change: Array, values: Array, sides: Array) -> float:
+    """Part of the change's variance that is a function of the column, for each side apart; shapes (channels, n)."""
+    left = 0.0
+    for y, x in zip(change, values, strict=True):
+        part = _parts(x, sides)
+        mean = np.bincount(part, y) / np.bincount(part)
+        left += float(np.sum((y - mean[part]) ** 2))
+    total = float(np.sum((change - change.mean(axis=1, keepdims=True)) ** 2))
+    return 1 - left / total if total > 0 else 0.0
+
+
+def curves(step: Step[Fit], column: Column, c: int) -> Iterator[tuple[float, Array, Array]]:
+    """The change as a function of the column: (direction of turning, column, change), means in parts of the column."""
+    change, sides = change_of(step)[c], _sides(step)
+    if column.name == "change":
+        ends = np.array([change.min(), change.max()])
+        yield 1.0, 1e3 * ends, ends
+        return
+    part = _parts(column.values[c], sides)
+    count = np.bincount(part)
+    x, y, side = (np.bincount(part, values) / count for values in (column.values[c], change, sides))
+    for s in np.unique(side):
+        at = np.flatnonzero(side == s)
+        at = at[np.argsort(x[at], kind="stable")]
+        yield float(s), x[at], y[at]
+
+
+def _sides(step: Step[Fit]) -> Array:
+    return step.before.table.optional("direction", 0.0)
+
+
+def _parts(x: Array, sides: Array) -> NDArray[np.intp]:
+    """Number of the part that each row is in: stretches of the column with equal numbers of rows, each side apart."""
+    most = min(MOST_PARTS, max(len(x) // ROWS_IN_A_PART, 2))
+    edges = np.unique(np.quantile(x, np.linspace(0, 1, most + 1)[1:-1]))
+    both = np.stack([np.searchsorted(edges, x, side="right"), sides])
+    return np.asarray(np.unique(both, axis=1, return_inverse=True)[1]).ravel()

@@ -1,0 +1,97 @@
+"""Charts of a fleet: effects of each batch, errors of the rigs, and the spread of parameters over a batch."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrations.fleet.batch import Population
+from calibrations.fleet.rigs import RigError
+from calibrations.presentation.chart import (
+    BLUE,
+    VERMILION,
+    Axis,
+    Band,
+    Cells,
+    Chart,
+    Note,
+    Panel,
+    Points,
+    Rule,
+    one,
+    stacked,
+)
+from calibrations.presentation.text import percent
+from calibrations.table import Array
+
+ROW = 0.32  # inches, of an effect or a rig
+WIDE = 0.28  # of a batch's place that its sensors are strewn over
+MOST_DOTS = 400  # of a batch
+MOST_NAMED = 6  # sensors of a batch
+
+
+def shares(found: Population) -> Chart:
+    """Share of each batch's sensors that have each effect."""
+    effects = list(dict.fromkeys(name for batch in found.batches for name in batch.shares))
+    share = np.array([[batch.shares.get(name, 0.0) for batch in found.batches] for name in effects])
+    texts = [[percent(float(value)) if value else "" for value in row] for row in share]
+    x = Axis(names=tuple(batch.batch or "no batch" for batch in found.batches))
+    y = Axis(low=-0.5, high=len(effects) - 0.5, names=tuple(effects), reverse=True)
+    return one(Panel((Cells(share, texts),), x, y), ROW * len(effects) + 0.4)
+
+
+def rigs(errors: Sequence[RigError]) -> Chart:
+    """Every rig's errors about the median of the rigs, with expanded uncertainties."""
+    names = list(dict.fromkeys((e.effect, e.parameter, e.unit) for e in errors))
+    of = list(dict.fromkeys(e.rig for e in errors))
+    panels = []
+    for effect, parameter, unit in names:
+        mine = [e for e in errors if (e.effect, e.parameter, e.unit) == (effect, parameter, unit)]
+        place, value = np.array([float(of.index(e.rig)) for e in mine]), np.array([e.value for e in mine])
+        colours = [VERMILION if e.beyond else BLUE for e in mine]
+        dots = Points(value, place, colour=colours, reach=np.array([2 * e.std for e in mine]))
+        y = Axis(low=-0.5, high=len(of) - 0.5, names=tuple(of), reverse=True)
+        panels.append(Panel((Rule(0.0, "x", width=0.7), dots), Axis(), y, f"{effect}, {parameter} in {unit}"))
+    return stacked(panels, max(0.16 * len(of), 0.9) + 0.4, share_x=False)
+
+
+@dataclass(frozen=True)
+class Spread:
+    """One quantity over a batch: value, expanded uncertainty, name of every sensor, and which are unlike the rest."""
+
+    batch: str
+    values: Array
+    expanded: Array
+    sensors: Sequence[str]
+    apart: NDArray[np.bool_]
+    band: tuple[float, float] | None  # the range of 95 % of the batch's sensors
+
+
+def spreads(quantities: Mapping[str, Sequence[Spread]]) -> Chart:
+    """A panel for each quantity, in which every batch has its place."""
+    batches = list(dict.fromkeys(each.batch for of in quantities.values() for each in of))
+    x = Axis(low=-0.6, high=len(batches) - 0.4, names=tuple(batch or "no batch" for batch in batches))
+    panels = [
+        Panel(tuple(part for each in of for part in _spread(batches.index(each.batch), each)), x, Axis(), name)
+        for name, of in quantities.items()
+    ]
+    return stacked(panels, 1.7)
+
+
+def _spread(place: int, each: Spread) -> Iterator[Band | Points | Note]:
+    rng = np.random.default_rng(place)
+    shown = np.sort(rng.permutation(len(each.values))[:MOST_DOTS])
+    shown = np.union1d(shown, np.flatnonzero(each.apart))
+    x = place + WIDE * rng.uniform(-1, 1, len(each.values))
+    if each.band is not None:
+        low, high = (np.full(2, end) for end in each.band)
+        yield Band(np.array([place - 0.4, place + 0.4]), low, high)
+    values, expanded = each.values[shown], each.expanded[shown]
+    colours = [VERMILION if apart else BLUE for apart in each.apart[shown]]
+    hover = [each.sensors[k] for k in shown]
+    yield Points(x[shown], values, colour=colours, size=4, low=values - expanded, high=values + expanded, hover=hover)
+    for k in np.flatnonzero(each.apart)[:MOST_NAMED]:
+        yield Note(each.sensors[k], float(x[k]), float(each.values[k]), vertical="middle")

@@ -1,0 +1,153 @@
+"""Charts of a sensor's life: calibrations with uncertainty, drift, limits and due date; and control charts."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calibrations.analyses.control_chart import Chart as ControlChart
+from calibrations.analyses.stability import COVERAGE, Stability
+from calibrations.presentation.chart import (
+    CANDIDATE,
+    MEASURED,
+    Axis,
+    Band,
+    Chart,
+    Line,
+    Note,
+    Panel,
+    Points,
+    Rule,
+    Symbol,
+    stacked,
+)
+from calibrations.presentation.text import labelled, plain, prefixed, unit
+from calibrations.table import Array
+
+POINTS = 200
+AHEAD = 0.5  # of the time from first to last calibration: how far the drift is drawn beyond the last
+MARGIN = 0.03  # of the time shown, at both ends
+ALONE_DAYS = 30.0  # around calibrations of one moment
+INDIVIDUALS, EWMA, RANGES = "Individuals: a jump", "EWMA: a slow drift", "Moving ranges"
+
+
+@dataclass(frozen=True)
+class Life:
+    """One quantity over n calibrations: days since 1970, values, standard uncertainties; hover texts and keys.
+
+    `signals` are the numbers of those that a control chart signals.
+    """
+
+    name: str
+    unit: str
+    t_days: Sequence[float]
+    values: Sequence[float]
+    stds: Sequence[float]
+    line: Stability | None = None
+    allowed: tuple[float, float] | None = None
+    due_days: float | None = None
+    due: str = ""
+    signals: Collection[int] = ()
+    hover: Sequence[str] = ()
+    keys: Sequence[str] | None = None
+
+
+def lives(quantities: Sequence[Life]) -> Chart:
+    """A panel for each quantity, over the time of all of them."""
+    ends = [_ends(each) for each in quantities]
+    x = Axis(low=min(start for start, _ in ends), high=max(end for _, end in ends), ticks="dates")
+    return stacked([replace(life(each), x=x) for each in quantities], 2.2)
+
+
+def life(q: Life) -> Panel:
+    """Dots are calibrations with two standard uncertainties each way, diamonds those that a chart signals.
+
+    The band is the 95 % interval of the value at that time, without the uncertainty of a calibration.
+    """
+    factor, spelt = prefixed(unit(q.unit), max(map(abs, q.values)))
+    values, expanded = factor * np.array(q.values), COVERAGE * factor * np.array(q.stds)
+    start, end = _ends(q)
+    signals = [k in q.signals for k in range(len(values))]
+    series: list[Band | Line | Rule | Note | Points] = list(_drift(q, start, end, factor))
+    for limit, text, place in zip(q.allowed or (), ("lowest allowed", "highest allowed"), ("bottom", "top"),
+                                  strict=False):  # fmt: skip
+        series.append(Rule(factor * limit, colour=CANDIDATE, width=1.4, dash="dash"))
+        series.append(Note(text, 0.01, factor * limit, "x", vertical=place))  # type: ignore[arg-type] # as above
+    if q.due_days is not None:
+        series += [Rule(q.due_days, "x", CANDIDATE, 1.6), Note(q.due, q.due_days, 1, "y", "right")]
+    series.append(
+        Points(np.array(q.t_days), values, colour=[CANDIDATE if s else MEASURED for s in signals],
+               symbol=["diamond" if s else "circle" for s in signals], size=8, low=values - expanded,
+               high=values + expanded, hover=q.hover, keys=q.keys)
+    )  # fmt: skip
+    room = MARGIN * (end - start)
+    return Panel(tuple(series), Axis(low=start - room, high=end + room, ticks="dates"), Axis(labelled(q.name, spelt)),
+                 q.name)  # fmt: skip
+
+
+def _ends(q: Life) -> tuple[float, float]:
+    """First and last day of the chart: some way ahead, and until the next calibration is due."""
+    first, last = q.t_days[0], q.t_days[-1]
+    end = max(last + AHEAD * (last - first), q.due_days or last)
+    return (first, end) if end - first > 1 else (first - ALONE_DAYS, last + ALONE_DAYS)
+
+
+def _drift(q: Life, start: float, end: float, factor: float) -> tuple[Band | Line, ...]:
+    if q.line is None:
+        return ()
+    days = np.linspace(max(start, q.line.t_days[0]), end, POINTS)
+    value, std = q.line.predict(days)
+    reach = q.line.coverage * std
+    return Band(days, factor * (value - reach), factor * (value + reach)), Line(days, factor * value, width=1.6)
+
+
+def control_charts(charts: Mapping[str, ControlChart], units: Mapping[str, str]) -> Chart:
+    """A row for each quantity: individuals, EWMA and moving ranges."""
+    rows = tuple(tuple(control_panels(name, chart, units[name]).values()) for name, chart in charts.items())
+    return Chart(rows, 2.3, share_x=True)
+
+
+def control_panels(
+    name: str, chart: ControlChart, of: str, hover: Sequence[str] = (), keys: Sequence[str] | None = None
+) -> dict[str, Panel]:
+    """The three charts of one quantity by title, less the centre.
+
+    Open dots are the baseline, which sets the limits (the band); diamonds are beyond the limits.
+    """
+    reach, limit = np.full(len(chart.values), chart.reach), np.full(len(chart.ranges), chart.range_limit)
+    slow, since, less = chart.ewma_reach, chart.judged, f"{name} less {chart.centre:.6g} {unit(of)}".rstrip()
+    parts = {
+        INDIVIDUALS: (1, chart.values - chart.centre, -reach, reach, chart.jumps, since, less),
+        EWMA: (1, chart.ewma - chart.centre, -slow, slow, chart.drifts, since, less),
+        RANGES: (2, chart.ranges, 0 * limit, limit, (), since - 1, "range"),
+    }
+    made = {}
+    for title, (first, values, low, high, beyond, judged, label) in parts.items():
+        factor, spelt = prefixed(unit(of), float(np.abs([values, high]).max()))
+        numbers = np.arange(first, first + len(values), dtype=float)
+        mine = None if keys is None else keys[first - 1 :]
+        told = [f"{text}: {plain(v)} {spelt}" for text, v in zip(hover[first - 1 :], factor * values, strict=False)]
+        dots = _control_points(numbers, factor * values, beyond, judged, told, mine)
+        band = Band(numbers, factor * low, factor * high, steps=True)
+        y = Axis(labelled(label, spelt))
+        series = (band, Rule(0.0, width=0.7), Line(numbers, factor * values, colour=MEASURED, width=1), dots)
+        remark = chart.verdict if title == EWMA else ""
+        made[title] = Panel(series, Axis("calibration", ticks="integers"), y, title, remark)
+    return made
+
+
+def _control_points(
+    x: Array, y: Array, beyond: Collection[int], judged: int, hover: Sequence[str], keys: Sequence[str] | None
+) -> Points:
+    """Signals differ by form and colour."""
+    symbols: list[Symbol] = []
+    for k in range(len(x)):
+        baseline = k < judged
+        if k in beyond:
+            symbols.append("diamond-open" if baseline else "diamond")
+        else:
+            symbols.append("circle-open" if baseline else "circle")
+    colours = [CANDIDATE if k in beyond else MEASURED for k in range(len(x))]
+    return Points(x, y, colour=colours, symbol=symbols, size=8, hover=hover, keys=keys)

@@ -1,0 +1,165 @@
+"""Charts of acceleration against a reference: the paper's Fig. 12, waveform, period of a motion; compensation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibrations.compensation.inverse import Residual
+from calibrations.fit import Fit
+from calibrations.model.chain import forward
+from calibrations.motion.evaluate import MotionResult, Quantity
+from calibrations.motion.stretches import Stretches, make_stretches
+from calibrations.noise.means import rms
+from calibrations.presentation.chart import (
+    BLUE,
+    CANDIDATE,
+    INK,
+    VERMILION,
+    Axis,
+    Chart,
+    Line,
+    Panel,
+    Points,
+    Rule,
+    floor_band,
+)
+from calibrations.presentation.residual import Shown
+from calibrations.presentation.text import measured as written
+from calibrations.presentation.text import plain
+from calibrations.table import Array
+
+SHOWN_S = 0.5  # of the record: five periods of the paper's motion
+BINS = 40  # of a period
+
+
+def evaluation(result: MotionResult) -> Chart:
+    """Fig. 12 of the paper: each model's acceleration beside the reference above, and its error below."""
+    first = result.t_s[0]
+    shown = (result.t_s - first) < SHOWN_S
+    t = result.t_s[shown] - first
+    above, below = [], []
+    for k, (name, values, error) in enumerate(_models(result)):
+        colour = (VERMILION, BLUE)[k]
+        sensor = Line(t, values[shown], f"sensor, {name} model", colour, 1.8)
+        reference = Line(t, result.reference[shown], "displacement sensor", INK, 1.8, "dot")
+        reach = 1.5 * float(np.abs(values[shown]).max())
+        title = f"{'ab'[k]}  {name} model: rmse {written(error.value, error.std)} mm/s²"
+        axis = Axis("acceleration (mm/s²)", low=-reach, high=reach)
+        above.append(Panel((sensor, reference), Axis(), axis, title, legend="upper right"))
+        error_line = Line(t, (values - result.reference)[shown], colour=colour)
+        series = (*floor_band(result.noise_limit.value), error_line)
+        below.append(Panel(series, Axis("time (s)"), Axis("sensor less reference (mm/s²)")))
+    return Chart((tuple(above), tuple(below)), 2.8, share_x=True, share_y=True)
+
+
+def _models(result: MotionResult) -> tuple[tuple[str, Array, Quantity], ...]:
+    return (
+        ("linear", result.linear, result.rmse_linear),
+        ("physical", result.physical, result.rmse_physical),
+    )
+
+
+def measurement(shown: Shown) -> Panel:
+    """Output less its mean over a few periods; dots are measured, the line is the model."""
+    axis = _axis(shown)
+    found = waveform(shown.fit, axis)
+    told = [f"{y:.5g} at {x:.3f} s" for x, y in zip(found.at, shown.factor * found.measured, strict=True)]
+    line = Line(found.at, shown.factor * found.model, "model", hover="the model: %{y:.5g}")
+    dots = Points(found.at, shown.factor * found.measured, "measured", size=5, hover=told)
+    return Panel((line, dots), Axis("time (s)"), Axis(f"{axis} less its mean ({shown.unit})"), f"axis {axis}")
+
+
+def failure(shown: Shown) -> Panel:
+    """Mean residual over one period of the strongest line; the band is the noise of a mean."""
+    axis = _axis(shown)
+    found = over_a_period(shown.fit, axis)
+    told = "%{y:.3g} at %{x:.0f} deg"
+    line = Line(found.phase_deg, shown.factor * found.residual, colour=CANDIDATE, hover=told, markers=True)
+    x = Axis(f"phase of the motion {found.line} (deg)", ticks="quarters")
+    series = (*floor_band(shown.factor * found.floor), line)
+    return Panel(series, x, Axis(f"mean residual of {axis} ({shown.unit})"), f"axis {axis}")
+
+
+def firsts(fit: Fit) -> list[int]:
+    """The first channel of each axis: `x mean` of `x mean`, `x in phase at 10 Hz` and so on."""
+    axes = [name.partition(" ")[0] for name in fit.channels]
+    return [axes.index(axis) for axis in dict.fromkeys(axes)]
+
+
+def _axis(shown: Shown) -> str:
+    """The axis of the channel: `x` of `x in phase at 10 Hz`."""
+    return shown.fit.channels[shown.c].partition(" ")[0]
+
+
+@dataclass(frozen=True)
+class Waveform:
+    """A few periods of one axis: time (s), and outputs less the model's mean, in the table's unit."""
+
+    at: Array
+    measured: Array
+    model: Array
+
+
+def waveform(fit: Fit, axis: str) -> Waveform:
+    """Those in the middle of the record."""
+    table = _stretches(fit)
+    c, t = table.axes.index(axis), table.samples.time_s
+    start = int(np.searchsorted(t, table.time_s[len(table.time_s) // 2]))
+    rows = slice(start, int(np.searchsorted(t, t[start] + SHOWN_S)))
+    model = _predicted(fit)[rows, c]
+    return Waveform(t[rows], table.samples.outputs[rows, c] - model.mean(), model - model.mean())
+
+
+@dataclass(frozen=True)
+class Period:
+    """Mean residual of one axis over the phase of the strongest `line`, and the noise of a mean."""
+
+    phase_deg: Array
+    residual: Array
+    floor: float
+    line: str
+
+
+def over_a_period(fit: Fit, axis: str) -> Period:
+    """All periods laid over each other, in BINS parts."""
+    table = _stretches(fit)
+    phase, line = _phase(table)
+    part = np.minimum((phase * BINS / 360).astype(int), BINS - 1)
+    count = np.bincount(part, minlength=BINS)
+    c, there = table.axes.index(axis), count > 0
+    residual = table.samples.outputs[:, c] - _predicted(fit)[:, c]
+    mean = np.bincount(part, residual, minlength=BINS) / np.maximum(count, 1)
+    # a part of the period comes once in a period: by then the output filter has forgotten
+    floor = float(rms(residual - mean[part])) / np.sqrt(np.median(count))
+    return Period(((np.arange(BINS) + 0.5) * 360 / BINS)[there], mean[there], float(floor), line)
+
+
+def _stretches(fit: Fit) -> Stretches:
+    return make_stretches(fit.table)  # itself, by its own kind
+
+
+def _predicted(fit: Fit) -> Array:
+    """The model's output at each sample, shape (samples, axes)."""
+    return forward(_stretches(fit).samples, fit.problem.layout.steps(fit.theta))
+
+
+def _phase(table: Stretches) -> tuple[Array, str]:
+    """Phase of the strongest line at each sample, deg, and its name; zero at its greatest output."""
+    line = table.lines[0]
+    return np.degrees(np.arctan2(-line.in_quadrature, line.in_phase)) % 360, line.name
+
+
+def compensated(found: Residual) -> Chart:
+    """A row for each axis: the linear model's error on the left, the compensated one on the same scale."""
+    poses = np.arange(found.table.n, dtype=float)
+    rows = []
+    for k, axis in enumerate(found.axes):
+        sides = ((found.linear, VERMILION, "linear model"), (found.compensated, BLUE, "compensated"))
+        rows.append(tuple(
+            Panel((Rule(0.0, width=0.7), Points(poses, errors[:, k], colour=colour, size=5)), Axis("pose"),
+                  Axis("sensor less reference (mm/s²)"), f"{axis}, {name}: rmse {plain(rmse)} mm/s²")
+            for (errors, colour, name), rmse in zip(sides, found.rmse[axis], strict=True)
+        ))  # fmt: skip
+    return Chart(tuple(rows), 2.6, share_x=True, share_y=True)

@@ -1,0 +1,339 @@
+"""Charts of noise: how it averages (Allan deviation), its spectrum, each beside a model, and the record over time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calibrations.discovery.results import Discovery, Step
+from calibrations.noise.allan import DeviationComparison, deviation, variance_parts
+from calibrations.noise.analysis import ChannelNoise, NoiseAnalysis
+from calibrations.noise.dataset import mismatch
+from calibrations.noise.deviations import COVERAGE, Curve
+from calibrations.noise.fit import NoiseFit
+from calibrations.noise.likelihood import ChannelFit
+from calibrations.noise.processes import GAUSS_MARKOV
+from calibrations.noise.record import Channel, Still
+from calibrations.presentation.chart import (
+    AMBER,
+    BLUE,
+    CANDIDATE,
+    GREEN,
+    INK,
+    MEASURED,
+    MODEL,
+    PURPLE,
+    QUIET,
+    VERMILION,
+    Axis,
+    Band,
+    Chart,
+    Dash,
+    Line,
+    Note,
+    Panel,
+    Picture,
+    Points,
+    Rule,
+    beside,
+    one,
+)
+from calibrations.presentation.charts.columns import in_time
+from calibrations.presentation.charts.discovery import Level, Measure
+from calibrations.presentation.text import plain
+from calibrations.table import MILLI, Array
+
+POINTS = 160
+HEIGHT = 3.8
+ROOM = 4.0  # above and below a spectrum
+MOST = 2000  # points of a record over time: more cannot be told apart across a page
+LESS = "after removing non-noise signals"
+SUM = "sum of the processes"
+TIME = "averaging time (s)"
+FREQUENCY = "frequency (Hz)"
+MEASURE = Measure("mismatch of the spectrum / chance", "chance", "the record", "the other half")
+COLOURS = {
+    "white-noise": BLUE,
+    "flicker-noise": AMBER,
+    "rate-random-walk": VERMILION,
+    "quantisation-noise": GREEN,
+    GAUSS_MARKOV: QUIET,
+}
+
+
+@dataclass(frozen=True)
+class Scaled:
+    """Values of a channel are drawn `factor` times as large, in `unit`."""
+
+    factor: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """One model's curve: its fit, label and look."""
+
+    fit: ChannelFit
+    label: str
+    colour: str = MODEL
+    width: float = 1.8
+    dash: Dash = "solid"
+
+
+def scaled(still: Still, axis: str, in_sensed: bool) -> Scaled:
+    """The output's own unit; or thousandths of what is sensed, as noise is small."""
+    sensed = still.sensed.get(axis)
+    if sensed is None or not in_sensed:
+        return Scaled(1.0, still.unit)
+    if sensed.unit not in MILLI:
+        return Scaled(sensed.factor, sensed.unit)
+    return Scaled(1e3 * sensed.factor, MILLI[sensed.unit])
+
+
+def units(still: Still) -> dict[bool, str]:
+    """Units that all of its axes can be drawn in: False the output's, True that of what is sensed."""
+    names = {each.unit for each in still.sensed.values()}
+    known = set(still.sensed) == set(still.axes) and len(names) == 1
+    return {False: still.unit} | ({True: names.pop()} if known else {})
+
+
+# One channel beside noise models
+
+
+def allan(curve: Curve | DeviationComparison, into: Scaled, models: Sequence[Drawn], raw: Curve | None = None) -> Panel:
+    """Dots are measured, bars intervals of 95 %; lines are the models, thin lines the parts of the first.
+
+    `raw` is the curve of the record before non-noise signals were removed.
+    """
+    by = into.factor
+    values = curve.deviation if isinstance(curve, Curve) else curve.measured
+    series: list[Line | Points] = []
+    if raw is not None:
+        series.append(Points(raw.tau_s, by * raw.deviation, "measured", QUIET, "circle-open", 5))
+    dots = measured_points(curve.tau_s, by * values, by * curve.low, by * curve.high, into.unit,
+                           "measured" if raw is None else f"measured, {LESS}")  # fmt: skip
+    first = models[0].fit
+    rate_hz = first.channel.rate_hz
+    tau_s = whole_steps(1 / rate_hz, float(curve.tau_s[-1]), rate_hz)
+    if len(first.effects) + len(first.lines) > 1:
+        variances = variance_parts(first, tau_s)
+        series += [_part(name, tau_s, by * np.sqrt(variance)) for name, variance in variances.items()]
+    series += [_model(each, tau_s, by * deviation(each.fit, tau_s)) for each in models]
+    sure = curve.edf > 1
+    low, high = by * float(curve.low.min()), by * float(curve.high[sure].max() if sure.any() else curve.high.max())
+    y = Axis(f"Allan deviation ({into.unit})", log=True, low=low / 2, high=3 * high)
+    return Panel((*series, dots), Axis(TIME, log=True), y, legend="upper center")
+
+
+def ratio(curve: DeviationComparison) -> Panel:
+    """Measured over modelled deviation: where the interval leaves 1, the model fails."""
+    hover = [f"{abs(d):.1f} standard deviations off at {t:.4g} s"
+             for d, t in zip(curve.deviations, curve.tau_s, strict=True)]  # fmt: skip
+    dots = Points(curve.tau_s, curve.ratio, low=curve.low / curve.modelled, high=curve.high / curve.modelled,
+                  hover=hover)  # fmt: skip
+    return Panel((Rule(1.0, colour=MODEL, width=1.4), dots), Axis(TIME, log=True), Axis("measured / model", log=True))
+
+
+def spectrum(found: ChannelFit, into: Scaled, models: Sequence[Drawn]) -> Panel:
+    """Dots are measured; 95 % of them should be in the grey band by the model `found`; lines are the models."""
+    order, by = np.argsort(found.frequency_hz), into.factor
+    f = found.frequency_hz[order]
+    low, high = (by * root(each[order]) for each in found.interval(COVERAGE))
+    density = by * root(found.seen[order])
+    series: list[Band | Points | Line | Rule] = [Band(f, low, high), _density_points(f, density, into.unit)]
+    for effect in found.effects if len(found.effects) > 1 else ():
+        series.append(_part(effect.name, f, by * root(found.part_of(effect)[order])))
+    for each in models:
+        there = np.argsort(each.fit.frequency_hz)
+        series.append(_model(each, each.fit.frequency_hz[there], by * root(each.fit.expected[there])))
+    series += [Rule(line.frequency_hz, "x", VERMILION, 0.9, "dot") for line in found.lines]
+    expected = by * root(found.expected)
+    bottom = min(float(expected.min()) / ROOM, float(density.min()) / 2)  # no measured point is cut off
+    top = max(ROOM * float(expected.max()), 2 * float(density.max()))
+    y = Axis(f"density ({into.unit}/√Hz)", log=True, low=bottom, high=top)
+    return Panel(tuple(series), Axis(FREQUENCY, log=True), y, legend="upper right")
+
+
+def record(channel: Channel, into: Scaled) -> Panel:
+    """A still record over time: means of its samples, less the mean of all."""
+    together = max(1, -(-len(channel.means) // MOST))
+    whole = len(channel.means) // together * together
+    values = into.factor * channel.means[:whole].reshape(-1, together).mean(axis=1)
+    each_s = together * channel.size / channel.rate_hz
+    size, unit = in_time(channel.length_s)
+    hover = f"%{{y:.4g}} {into.unit} at %{{x:.4g}} {unit}"
+    at = np.asarray((np.arange(len(values)) + 0.5) * each_s / size)
+    line = Line(at, np.asarray(values), colour=MEASURED, width=1, hover=hover)
+    x, y = f"time ({unit}); means of {plain(each_s, 2)} s", f"{channel.axis} less its mean ({into.unit})"
+    return Panel((line,), Axis(x), Axis(y))
+
+
+def levels(start: NoiseFit, steps: Sequence[Step[NoiseFit]]) -> list[Level]:
+    """The falling error of a noise model: the mismatch of its spectrum, and that of its Allan deviation."""
+    first = Level(start.model.name, start.pooled_excess, start.held_out_excess, _off(start))
+    return [first, *(Level(f"+ {s.name}", s.after.pooled_excess, s.held_out_after, _off(s.after)) for s in steps)]
+
+
+def _off(found: NoiseFit) -> str:
+    return " and ".join(f"{100 * value:.2g} %" for value in mismatch(found).values())
+
+
+def still_album(found: Discovery[NoiseFit], given: NoiseFit) -> list[Picture]:
+    """Both charts of a report on a noise model. `given` is the model as it was given."""
+    end = found.end
+    name, cleaned = end.model.name, end.still is not given.still
+    averaging = (
+        "Difference of neighbouring means over the time of a mean. Dots are measured, bars are intervals of 95 %. The "
+        f"broken grey line is the model {given.model.name}, the full line {name}; thin lines are its parts."
+    )
+    if cleaned:
+        averaging += " Rings are the record as measured; dots are the record after removing non-noise signals."
+    power = (
+        "Power over frequency, one-sided, without the lines that were found. Dots are averages over narrow bands; the "
+        f"grey band holds 95 % of them by the model {name}, the broken grey line is the model {given.model.name}."
+    )
+    curves, densities = [], []
+    into = Scaled(1.0, end.still.unit)
+    for after, before in zip(end.channels, given.channels, strict=True):
+        axis = after.channel.axis
+        models = [Drawn(after, _name(end, given), INK)]
+        if not _alike(end, given):
+            models.append(Drawn(before, given.model.name, dash="dash"))
+        raw = given.still.allan[axis] if cleaned else None
+        curves.append(allan(end.still.allan[axis], into, models, raw))
+        densities.append(spectrum(after, into, models))
+    return [
+        Picture("allan", "Allan deviation beside the model", averaging, _named(curves, end)),
+        Picture("spectrum", "Spectrum beside the model", power, _named(densities, end)),
+    ]
+
+
+def _named(panels: Sequence[Panel], end: NoiseFit) -> Chart:
+    if len(panels) == 1:
+        return one(panels[0], HEIGHT)
+    titles = [f"axis {each.channel.axis}" for each in end.channels]
+    return beside([replace(panel, title=title) for panel, title in zip(panels, titles, strict=True)], HEIGHT)
+
+
+def _alike(end: NoiseFit, given: NoiseFit) -> bool:
+    """Whether both are one curve: the same effects with the same values, on the same record."""
+    same = [after.values == before.values for after, before in zip(end.channels, given.channels, strict=True)]
+    return all(same) and end.model.effects == given.model.effects
+
+
+def _name(end: NoiseFit, given: NoiseFit) -> str:
+    """Of the final model: the given one may have its name and other values, or another record."""
+    if end.model.name != given.model.name or _alike(end, given):
+        return end.model.name
+    return f"{end.model.name}, {LESS if end.still is not given.still else 'fitted'}"
+
+
+# Coefficients of `rig noise`
+
+
+def noise_album(analysis: NoiseAnalysis) -> list[Picture]:
+    """Two charts of each channel; the names of all but the first channel have its axis."""
+    averaging = (
+        "Difference of neighbouring means over the averaging time. Dots are measured, bars are intervals of 95 %; the "
+        "full line is the sum of the processes, broken lines are the single processes. On the right the other "
+        "deviations, with their intervals."
+    )
+    power = (
+        "Power over frequency, one-sided. Dots are averages over narrow bands with intervals of 95 %, the grey band "
+        "should hold 95 % of them; the full line is the sum of the processes, marks on top are lines that were removed."
+    )
+    album = []
+    for k, (axis, noise) in enumerate(analysis.channels.items()):
+        end, of = (f"-{axis}", f" of {axis}") if k else ("", "")
+        album.append(Picture(f"allan{end}", f"Allan deviation{of}", averaging, _deviations(noise)))
+        album.append(Picture(f"spectrum{end}", f"Spectrum{of}", power, _density(noise)))
+    return album
+
+
+def _deviations(noise: ChannelNoise) -> Chart:
+    """The overlapping deviation with its interval, the processes and their sum; on the right the other deviations."""
+    curve = noise.allan
+    dots = measured_points(curve.tau_s, curve.deviation, curve.low, curve.high, noise.unit, "measured")
+    tau_s = whole_steps(float(curve.tau_s[0]), float(curve.tau_s[-1]), noise.channel.rate_hz)
+    processes = noise.processes(tau_s)
+    several = len(processes) + len(noise.lines) > 1
+    thin = tuple(_part(name, tau_s, np.sqrt(v)) for name, v in processes.items()) if several else ()
+    whole = Line(tau_s, noise.modelled(tau_s), SUM if several else next(iter(processes), SUM), INK, 1.8)
+    y = Axis(f"deviation ({noise.unit})", log=True, low=curve.low.min() / 2, high=3 * curve.high.max())
+    left = Panel((*thin, whole, dots), Axis(TIME, log=True), y, "Allan deviation, overlapping", legend="upper center")
+    others = [part for kind, colour in (("modified", BLUE), ("hadamard", GREEN), ("total", VERMILION))
+              for part in _other(noise.deviations[kind], kind, colour)]  # fmt: skip
+    line = Line(curve.tau_s, curve.deviation, "Allan", QUIET)
+    right = Panel((*others, line), Axis(TIME, log=True), y, "other deviations", legend="upper center")
+    return beside([left, right], 4.0, share_y=True)
+
+
+def _other(curve: Curve, kind: str, colour: str) -> tuple[Band, Line]:
+    band = Band(curve.tau_s, curve.low, curve.high, colour=colour, opacity=0.18)
+    return band, Line(curve.tau_s, curve.deviation, kind, colour, markers=True)
+
+
+def _density(noise: ChannelNoise) -> Chart:
+    """Measured and expected one-sided amplitude densities."""
+    fit, order = noise.fit, np.argsort(noise.fit.frequency_hz)
+    f, expected, seen = (values[order] for values in (fit.frequency_hz, fit.expected, fit.seen))
+    low, high = (root(bound[order]) for bound in fit.interval(COVERAGE))
+    bars, density = [root(bound[order]) for bound in noise.interval], root(seen)
+    present = [effect for effect in fit.effects if noise.power(effect) > 0]
+    series = (
+        Band(f, low, high),
+        Points(f, density, "measured", size=4, low=bars[0], high=bars[1], hover=_told(f, density, noise.unit)),
+        *(_part(e.name, f, root(fit.part_of(e)[order])) for e in (present if len(present) > 1 else ())),
+        Line(f, root(expected), present[0].name if len(present) == 1 else SUM, INK, 1.8),
+        *(part for line in noise.lines for part in _marked(line.frequency_hz)),
+    )
+    y = Axis(f"density ({noise.unit}/√Hz)", log=True, low=low.min() / 2, high=2 * max(high.max(), density.max()))
+    return one(Panel(series, Axis(FREQUENCY, log=True), y, legend="best"), 4.0)
+
+
+def _marked(frequency_hz: float) -> Iterator[Rule | Note]:
+    yield Rule(frequency_hz, "x", VERMILION, 0.9, "dot")
+    yield Note(f"{frequency_hz:.4g} Hz", frequency_hz, 1, "y", "right", "top", upright=True)
+
+
+# Parts of these charts
+
+
+def measured_points(tau_s: Array, values: Array, low: Array, high: Array, unit: str, label: str) -> Points:
+    """Measured deviations with their intervals."""
+    hover = [f"{value:.3g} {unit} at {tau:.4g} s, measured" for tau, value in zip(tau_s, values, strict=True)]
+    return Points(tau_s, values, label, low=low, high=high, hover=hover)
+
+
+def whole_steps(first_s: float, last_s: float, rate_hz: float) -> Array:
+    """Averaging times in whole samples, evenly spaced on a logarithmic axis."""
+    steps = np.geomspace(first_s * rate_hz, last_s * rate_hz, POINTS)
+    return np.unique(np.round(steps)).astype(np.float64) / rate_hz
+
+
+def root(two_sided: Array) -> Array:
+    """One-sided amplitude density."""
+    return np.asarray(np.sqrt(2 * two_sided))
+
+
+def candidate(fit: ChannelFit, name: str) -> Drawn:
+    """The curve of a model with an effect that is considered."""
+    return Drawn(fit, f"with {name}", CANDIDATE, 2.6)
+
+
+def _density_points(f: Array, density: Array, unit: str) -> Points:
+    return Points(f, density, "measured", size=4, hover=_told(f, density, unit))
+
+
+def _told(f: Array, density: Array, unit: str) -> list[str]:
+    return [f"{value:.3g} {unit}/√Hz at {at:.4g} Hz" for at, value in zip(f, density, strict=True)]
+
+
+def _part(name: str, x: Array, values: Array) -> Line:
+    return Line(x, values, name, COLOURS.get(name, PURPLE), 1.0, "dash", hover=f"{name}: %{{y:.3g}}")
+
+
+def _model(each: Drawn, x: Array, values: Array) -> Line:
+    return Line(x, values, each.label, each.colour, each.width, each.dash, hover=f"{each.label}: %{{y:.3g}}")

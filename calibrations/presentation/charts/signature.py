@@ -1,0 +1,269 @@
+"""An effect's signature: what the linear model leaves where the effect acts, over the column that shows it best.
+
+Made by the effect's own functions, without noise, on a sensor of 1 V/g: a sweep of full turns each way at five
+inclinations while the room warms and cools, or, for an effect that only motion shows, oscillations beside a rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from itertools import groupby
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrations.effects import Effect, Parameter, Values
+from calibrations.effects.catalogue import catalogue
+from calibrations.geometry.orientation import other_in_plane
+from calibrations.geometry.rate_table import rate_deg_s
+from calibrations.model.chain import Step, force, forward, respond, sensed
+from calibrations.presentation.chart import BLUE, GREEN, INK, VERMILION, Axis, Chart, Dash, Line, Panel, Rule
+from calibrations.table import AXES, Array, Table
+
+INCLINATIONS_DEG = (90.0, 30.0, 150.0, 60.0, 120.0)
+STEP_DEG = 9.0
+SMOOTH = 1.0  # von Neumann's ratio of a residual that is a function of a force; 2 where it is none
+SAME = 0.02  # of its range
+DIGITS = 4  # decimals of mV: what lies beyond depends on the machine
+INCLINATIONS = ("#440154", "#3b528b", "#21918c", "#5ec962", "#c9d614")  # colours of 30 to 150 deg
+SMALL = 7.2  # inches: the width of a page of the catalogue
+CLOSE_S = (3.0, 4.0)  # of a motion, where its waves are to be seen
+LABELS = {"t_s": "time (min)", "temperature_c": "temperature (°C)", "supply_v": "supply voltage (V)"}
+
+
+def signature_chart(effect: Effect) -> Chart:
+    """A panel for each axis that the effect reaches; lines are coloured by inclination, and broken on the way back."""
+    parts = signature(effect)
+    many = len(parts[0].curves) > 1
+    panels = [_drawn(part, legend=many and k == 0) for k, part in enumerate(parts)]
+    return Chart((tuple(panels),), 1.95, SMALL, share_y=True)
+
+
+def _drawn(part: Part, *, legend: bool) -> Panel:
+    lines = []
+    for label, mine in groupby(part.curves, lambda curve: curve.label):
+        for k, curve in enumerate(mine):
+            name = label if legend and k == 0 else ""
+            dash: Dash = "dash" if curve.style == "--" else "solid"
+            lines.append(Line(part.over[curve.rows], part.left[curve.rows], name, curve.colour, 1.6, dash))
+    if legend and any(curve.style == "--" for curve in part.curves):
+        lines.append(Line(part.over[:0], part.left[:0], "turning back", INK, 1.6, "dash"))
+    title = f"{part.axis} axis" if len(part.axis) == 1 else part.axis
+    x = Axis(part.label, ticks="quarters" if part.label.startswith("β") else "")
+    return Panel((Rule(0.0, width=0.7), *lines), x, Axis(f"residual ({part.unit})"), remark=title,
+                 legend="outside" if legend else "")  # fmt: skip
+
+
+def signature(effect: Effect) -> list[Part]:
+    """What the linear model leaves of the effect, axis by axis."""
+    if effect.kinds == ("fields",):
+        return [of_field(effect)]
+    if effect.kinds == ("rates",):
+        return of_rates(effect)
+    known = catalogue()
+    linear: list[Step] = [
+        (known["bias"], Values(bias=np.full(3, 2.5))),
+        (known["scale-factor"], Values(scale=np.ones(3))),
+    ]
+    table = sweep() if "poses" in effect.kinds else motion()
+    v, a = forward(table, linear), force(table, linear)
+    table = replace(table, columns={**table.columns, "vx_v": v[:, 0], "vy_v": v[:, 1]})
+    change = forward(table, [*linear, (effect, shown(effect, table))]) - v
+    lefts = [(k, _left(table, change[:, k], v[:, k], effect.name)) for k in range(v.shape[1])]
+    return [_panel(effect, table, a, k, left) for k, left in lefts if left.any()]
+
+
+def _left(table: Table, change: Array, v: Array, name: str) -> Array:
+    """The change of an output, V, less the straight line in that output that follows it best; mV.
+
+    Bias and scale factor are beside a model that has all but them.
+    """
+    once = table.optional("beta_deg", 0.0) < 360.0  # the end of a turn is its beginning
+    line = np.column_stack([np.ones(len(v)), v])
+    line = {"bias": line[:, :0], "scale-factor": line[:, :1]}.get(name, line)
+    left = change - line @ np.linalg.lstsq(line[once], change[once], rcond=None)[0]
+    return np.asarray(np.round(1e3 * left, DIGITS) + 0.0)
+
+
+def _panel(effect: Effect, table: Table, a: Array, k: int, left: Array) -> Part:
+    """Over what the effect needs beside the angles, a force that what is left is a function of, or beta."""
+    axis, other = "xyz"[k], "yxx"[k]
+    if table.kind == "motion":
+        close = (table.time_s >= CLOSE_S[0]) & (table.time_s <= CLOSE_S[1])
+        rows = np.flatnonzero(close) if "output" in effect.places else np.arange(0, table.n, 8)
+        return Part(axis, left, table.time_s, "time (s)", (Curve("", BLUE, "-", rows),))
+    if needed := [name for name in effect.needs if name in LABELS]:
+        over = table.column(needed[0]) / (60.0 if needed[0] == "t_s" else 1.0)
+        return Part(axis, left, over, LABELS[needed[0]], tuple(_by_inclination(table, ("-", "-"))))
+    for name, felt in ((axis, a[:, k]), (other, other_in_plane(a)[:, k])):
+        _, rows, each = np.unique(np.round(felt, 6), return_index=True, return_inverse=True)
+        if np.max(np.abs(left - left[rows][each])) < SAME * np.ptp(left) and _smooth(left[rows]):
+            return Part(axis, left, felt, f"specific force along {name} (g)", (Curve("", BLUE, "-", rows),))
+    styles = ("-", "--") if "direction" in effect.needs else ("-",)
+    return Part(axis, left, table.column("beta_deg"), "β (deg)", tuple(_by_inclination(table, styles)))
+
+
+def _smooth(values: Array) -> bool:
+    """Whether neighbours are alike (von Neumann, 1941)."""
+    steps, away = np.diff(values), values - values.mean()
+    return float(steps @ steps) < SMOOTH * float(away @ away)
+
+
+def _by_inclination(table: Table, styles: tuple[str, ...]) -> Iterator[Curve]:
+    """The rows of each inclination, one line for each direction that has a style."""
+    alpha, direction = table.column("alpha_deg"), table.column("direction")
+    for inclination in sorted(INCLINATIONS_DEG):
+        colour = INCLINATIONS[int((inclination - 30.0) / 30.0)]
+        for side, style in zip((1.0, -1.0), styles, strict=False):
+            rows = np.flatnonzero((alpha == inclination) & (direction == side))
+            yield Curve(f"α = {inclination:g}°", colour, style, rows)
+
+
+def sweep() -> Table:
+    """Full turns each way at each inclination from power-on, while room and supply rise and fall."""
+    up = np.arange(0.0, 361.0, STEP_DEG)
+    beta = np.tile(np.concatenate([up, up[::-1]]), len(INCLINATIONS_DEG))
+    t = 2600.0 * np.linspace(0.0, 1.0, len(beta))
+    columns = {
+        "alpha_deg": np.repeat(INCLINATIONS_DEG, 2 * len(up)),
+        "beta_deg": beta,
+        "direction": np.tile(np.repeat([1.0, -1.0], len(up)), len(INCLINATIONS_DEG)),
+        "t_s": t,
+        "temperature_c": 25.0 + 4.0 * np.sin(2 * np.pi * t / 1300.0),
+        "supply_v": 5.0 + 0.02 * np.sin(2 * np.pi * t / 900.0),
+        "vx_v": 2.5 + np.sin(t),  # only its range counts, until the model has made it
+        "vy_v": 2.5 + np.cos(t),
+    }
+    return Table.from_columns("poses", columns, source="a sweep")
+
+
+def motion() -> Table:
+    """Oscillation along x at 10 and 4 Hz, between rests."""
+    t = np.arange(0.0, 8.0, 0.005)
+    on = np.clip(np.minimum(t - 2.0, 6.0 - t) / 0.2, 0.0, 1.0)
+    a = on * (0.12 * np.sin(2 * np.pi * 10 * t) + 0.05 * np.sin(2 * np.pi * 4 * t))
+    columns = {"t_s": t, "displacement_m": np.zeros(len(t)), "vx_v": 2.5 + a, "vy_v": 2.5 + a}
+    columns |= {"acceleration_m_s2": a, "alpha_deg": np.full(len(t), 45.0), "beta_deg": np.full(len(t), 90.0)}
+    return Table.from_columns("motion", columns, source="a motion")
+
+
+# Values of the effect; turns of magnetometers and gyroscopes
+
+
+ACROSS = np.array([1.0, 0.6, 1.0])  # parameters of each axis, times those of x: no two are alike
+
+# values for all axes that show an effect, where a parameter's typical one is only a step or a level
+SHOWN: Mapping[str, Mapping[str, float]] = {
+    "bias": {"bias": 0.02},
+    "scale-factor": {"scale": 0.02},
+    "quantisation": {"step": 0.5, "noise": 0.01, "offset": 0.07},
+    "saturation": {"high": 3.3, "low": 1.6},
+    "adc-nonlinearity": {"bend": -0.004},
+    "stage-zero-offset": {"beta": 0.5},
+    "stage-eccentricity": {"cosine": 0.1},
+    "base-tilt": {"y": 0.5},
+    "axis-misalignment": {"y": 1.0, "z": 0.5},
+    "temperature-hysteresis": {"play": 1.0},
+    "field-strength": {"total": 1.1},
+    "hard-iron": {"offset": 0.2},
+    "soft-iron": {"xx": 0.05, "yy": -0.02, "xy": 0.03, "xz": 0.0, "yz": -0.02},
+    "gyro-bias": {"bias": 1.0},
+    "gyro-scale-factor": {"scale": 1.02},
+    "gyro-misalignment": {"xy": 0.5, "xz": 1.0, "yx": -0.5, "yz": 0.3, "zx": 0.0, "zy": -1.0},
+    "gyro-g-sensitivity": {"x": 0.1, "y": 0.0, "z": -0.05},
+}
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Rows that one line joins."""
+
+    label: str
+    colour: str
+    style: str
+    rows: NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class Part:
+    """What is left of one axis, in `unit`, shape (n,), over a column of that shape, and the rows that lines join."""
+
+    axis: str
+    left: Array
+    over: Array
+    label: str
+    curves: tuple[Curve, ...]
+    unit: str = "mV"
+
+
+def shown(effect: Effect, table: Table) -> Values:
+    """The values that are shown, and the effect's constants."""
+    constants = {name: make(table) for name, make in effect.constants.items()}
+    return Values.of(constants | {p.name: shown_value(p, effect) for p in effect.parameters})
+
+
+def shown_value(p: Parameter, effect: Effect) -> Array:
+    """What a sensor may typically show, of shape (3,) if per axis."""
+    typical = p.typical if p.starts == (0.0,) else p.starts[-1]
+    chosen = SHOWN.get(effect.name, {})
+    across = np.ones(3) if p.name in chosen else ACROSS
+    value = chosen.get(p.name, typical)
+    return value * across if p.per_axis else np.asarray(value)
+
+
+COLOURS = (VERMILION, GREEN, BLUE)
+TURN_DEG = np.arange(0.0, 361.0, 5.0)
+RATES_DEG_S = np.linspace(-100.0, 100.0, 21)
+
+
+def of_field(effect: Effect) -> Part:
+    """What a magnetometer without error leaves of the field's magnitude, in parts per thousand, over full turns."""
+    known = catalogue()["field-strength"]
+    table = _turned_in_a_field()
+    steps: list[Step] = [] if effect.name == known.name else [(known, Values(total=np.asarray(1.0)))]
+    steps.append((effect, shown(effect, table)))
+    output = respond(sensed(table.outputs, table, steps), table, steps)
+    left = np.asarray(np.round(1e3 * (np.linalg.norm(output, axis=1) - 1.0), 4) + 0.0)
+    curves = tuple(_curves(len(TURN_DEG)))
+    return Part("|m|", left, np.tile(TURN_DEG, 3), "angle of the turn (deg)", curves, "‰ of the field")
+
+
+def of_rates(effect: Effect) -> list[Part]:
+    """What a gyroscope without error leaves of each output, in deg/s, over the rate of turns about each edge."""
+    known = catalogue()["gyro-scale-factor"]
+    table = _turned_at_rates()
+    rate = rate_deg_s(table)
+    whole = Values({**shown(known, table), "scale": np.ones(3)})
+    steps: list[Step] = [] if effect.name == known.name else [(known, whole)]
+    steps.append((effect, shown(effect, table)))
+    left = respond(sensed(rate, table, steps), table, steps) - rate
+    curves = tuple(_curves(len(RATES_DEG_S)))
+    over = table.column("rate_deg_s")
+    return [
+        Part(axis, np.asarray(np.round(left[:, k], 4) + 0.0), over, "rate (deg/s)", curves, "deg/s")
+        for k, axis in enumerate(AXES)
+    ]
+
+
+def _curves(n: int) -> Iterator[Curve]:
+    """One for each edge that is turned about."""
+    for k, (axis, colour) in enumerate(zip(AXES, COLOURS, strict=True)):
+        yield Curve(f"about {axis}", colour, "-", np.arange(k * n, (k + 1) * n))
+
+
+def _turned_in_a_field() -> Table:
+    """Full turns about x, y and z across a field of 1."""
+    c, s, none = np.cos(np.radians(TURN_DEG)), np.sin(np.radians(TURN_DEG)), np.zeros(len(TURN_DEG))
+    turns = [np.column_stack(each) for each in ((none, c, s), (s, none, c), (c, s, none))]
+    m: Array = np.vstack(turns)
+    return Table.from_columns("positions", dict(zip(("mx", "my", "mz"), m.T, strict=True)), source="turns")
+
+
+def _turned_at_rates() -> Table:
+    """Turns about x, y and z, each upright in its turn."""
+    up = np.repeat(np.eye(3), len(RATES_DEG_S), axis=0)
+    rate = np.tile(RATES_DEG_S, 3)
+    columns = dict(zip(("ax", "ay", "az"), up.T, strict=True)) | {"rate_deg_s": rate}
+    columns |= dict(zip(("gx", "gy", "gz"), (up * rate[:, None]).T, strict=True))
+    return Table.from_columns("rates", columns, {"unit": "deg/s"}, "turns")

@@ -1,0 +1,218 @@
+"""Pictures of a soak: bias and scale factor over the hours, what surrounded them, and the still record's noise."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from types import MappingProxyType
+
+import numpy as np
+
+from calibrations.analyses.forecast import ForecastHistory
+from calibrations.analyses.soak import HOUR_S, Course, Soak
+from calibrations.presentation.chart import (
+    AMBER,
+    BLUE,
+    GREEN,
+    INK,
+    QUIET,
+    VERMILION,
+    Axis,
+    Band,
+    Chart,
+    Line,
+    Note,
+    Panel,
+    Picture,
+    Points,
+    Rule,
+    Series,
+    Span,
+    one,
+    stacked,
+)
+from calibrations.presentation.text import measured, plain
+from calibrations.table import Array
+
+COLOURS = {"x": BLUE, "y": VERMILION}
+GREY = "#b4bbc3"
+TIME = "time since power-on (h)"
+SHOWN = 600  # means of the still record that a line is drawn through, at most
+CURVE = 400  # points of a fitted curve
+COVERAGE = 2.0
+WINDOW = 1.6  # times the whole drift: what is shown of bounds that are far wider in the beginning
+FORESEEN = (
+    "Final values of bias and scale factor by the Kalman filters' forecasts at each time: a line within its 95 % "
+    "bounds, less the last forecast. The dotted line is the drift at that time. The broken line is the time from which "
+    "the final value was known: from then on the bounds are narrow compared with the whole drift."
+)
+
+
+def soak_album(found: Soak, foreseen: Mapping[str, ForecastHistory] = MappingProxyType({})) -> list[Picture]:
+    """All pictures of a soak, and of what was foreseen of it, with words for a page."""
+    course = (
+        "Dots are reversals, with their standard errors; the line is the exponential approach with its standard error. "
+        "The grey band is the expanded uncertainty of one reversal about the final value: within it no measurement can "
+        "separate the remaining drift from noise. The broken line is the time from which the drift stays within it. "
+        "The thin grey line is the record of the level sensor between reversals, shifted onto the bias."
+    )
+    around = (
+        "Conditions during the soak: the sensor's temperature, its supply, and the noise of single samples hour by "
+        "hour."
+    )
+    noise = (
+        "Difference of neighbouring means of the still record over the time of a mean: white noise falls with the "
+        "square root of time, drift rises with it."
+    )
+    pictures = [
+        Picture("drift", "Bias and scale factor since power-on", course, drift(found)),
+        Picture("night", "Temperature, supply and noise", around, surroundings(found)),
+    ]
+    if foreseen:
+        pictures.insert(1, Picture("foreseen", "Forecasts of the final values", FORESEEN, forecasts(found, foreseen)))
+    times_s, _ = found.allan(found.axes[0])
+    return [*pictures, Picture("allan", "Allan deviation", noise, allan(found))] if len(times_s) else pictures
+
+
+def drift(found: Soak) -> Chart:
+    """A column for each axis: bias above, scale factor below, as change from the final value."""
+    above, below = [], []
+    for axis in found.axes:
+        above.append(_course(found, found.courses[f"bias-{axis}"], 1e3, "bias less final value (mV)", f"axis {axis}"))
+        scale = found.courses[f"scale-{axis}"]
+        below.append(_course(found, scale, 1e6 / _final(scale), "scale factor less final value (ppm)"))
+    return Chart((tuple(above), tuple(below)), 2.9, share_x=True)
+
+
+def forecasts(found: Soak, foreseen: Mapping[str, ForecastHistory]) -> Chart:
+    """A column for each axis: forecasts of the final bias and scale factor, less the last forecast."""
+    rows = []
+    for quantity, name, factor, unit in (("bias", "bias", 1e3, "mV"), ("scale", "scale factor", 1e6, "ppm")):
+        panels = []
+        for axis in found.axes:
+            course = foreseen.get(f"{quantity}-{axis}")
+            title, y = f"axis {axis}" if quantity == "bias" else "", f"{name} forecast ({unit})"
+            if course is None:
+                panels.append(Panel((), Axis(TIME), Axis(y), title))
+                continue
+            whole = 1.0 if quantity == "bias" else course.last.final.value
+            panels.append(_forecast(course, factor / whole, COLOURS[axis], y, title))
+        rows.append(tuple(panels))
+    return Chart(tuple(rows), 2.6, share_x=True)
+
+
+def _forecast(course: ForecastHistory, factor: float, colour: str, label: str, title: str) -> Panel:
+    """Bounds of the final value, and the drift, against the time of the forecast."""
+    hours = np.array([each.t_s for each in course.forecasts]) / HOUR_S
+    low, value, high = (factor * (np.array(column) - course.last.final.value)
+                        for column in zip(*(each.final for each in course.forecasts), strict=True))  # fmt: skip
+    now = factor * (np.array([each.present.value for each in course.forecasts]) - course.last.final.value)
+    reach = WINDOW * max(np.abs(now).max(), (high[-1] - low[-1]) / 2)
+    series: list[Series] = [
+        Band(hours, low, high, colour=colour, opacity=0.25),
+        Line(hours, value, colour=colour, width=1.8),
+        Line(hours, now, colour=INK, width=1.1, dash="dot"),
+    ]
+    words = "not known at the end"
+    if course.known_s is not None:
+        series.append(Rule(course.known_s / HOUR_S, "x", INK, 1.1, "dash"))
+        words = f"known after {plain(course.known_s / HOUR_S)} h"
+    series.append(Note(words, 1, 1, "xy", "right", "top"))
+    return Panel(tuple(series), Axis(TIME, low=0.0), Axis(label, low=-reach, high=reach), title)
+
+
+def surroundings(found: Soak) -> Chart:
+    """Temperature, supply and noise over the hours, as far as they were measured."""
+    holds, begin = found.holds, Axis(TIME, low=_begin_h(found))
+    panels = []
+    for name, label, colour in (("temperature_c", "sensor (°C)", AMBER), ("supply_v", "supply (V)", GREEN)):
+        if name in holds:
+            line = Line(*_thinned(holds.time_s / HOUR_S, holds.column(name)), colour=colour)
+            panels.append(Panel((*_gaps(found), line), begin, Axis(label)))
+    lines = []
+    for axis in found.axes:
+        times_s, rms = found.noise_of_hours(axis)
+        lines.append(Line(times_s / HOUR_S, 1e3 * rms, f"axis {axis}", COLOURS[axis], markers=True))
+    panels.append(Panel((*_gaps(found), *lines), begin, Axis("noise, rms (mV)"), legend="upper right"))
+    return stacked(panels, 1.7)
+
+
+def allan(found: Soak) -> Chart:
+    """Allan deviation of each axis on logarithmic axes, and the slope of white noise."""
+    lines = []
+    for axis in found.axes:
+        times_s, deviations = found.allan(axis)
+        lines.append(Line(times_s, 1e6 * deviations, f"axis {axis}", COLOURS[axis], markers=True))
+    slope = 1e6 * deviations[0] * np.sqrt(times_s[0] / times_s)
+    lines.append(Line(times_s, slope, "white noise", QUIET, dash="dot"))
+    return one(Panel(tuple(lines), Axis("averaging time (s)", log=True), Axis("Allan deviation (µV)", log=True),
+                     legend="best"), 3.0)  # fmt: skip
+
+
+def _course(found: Soak, course: Course, factor: float, label: str, title: str = "") -> Panel:
+    """One quantity as change from its final value, times `factor`."""
+    state, final, colour = course.state, _final(course), COLOURS[course.axis]
+    series: list[Series] = list(_gaps(found))
+    if course.quantity == "bias":
+        t_s, volts = _still(found, course)
+        series.append(Line(t_s / HOUR_S, factor * (volts - final), colour=GREY, width=0.8))
+    if state is not None:
+        series.append(Span(-factor * state.tolerance, factor * state.tolerance))
+        t_s = np.linspace(*state.span_s, CURVE)
+        curve, std = factor * (state.at(t_s) - final), factor * state.std_at(t_s)
+        series.append(Band(t_s / HOUR_S, curve - std, curve + std, colour=colour, opacity=0.25))
+        series.append(Line(t_s / HOUR_S, curve, colour=colour, width=1.8))
+    values, stds = factor * (course.values - final), factor * course.stds
+    series.append(Points(course.t_s / HOUR_S, values, colour=INK, symbol="circle-open", size=5, low=values - stds,
+                         high=values + stds))  # fmt: skip
+    seen = np.append(values, 0.0)
+    room = 0.12 * np.ptp(seen) + factor * (state.tolerance if state else 0.0)
+    y = Axis(label, low=seen.min() - room, high=seen.max() + room)
+    return Panel((*series, *_steady(course)), Axis(TIME, low=_begin_h(found)), y, title)
+
+
+def _steady(course: Course) -> Iterator[Rule | Note]:
+    """The time from which the quantity is steady."""
+    time, words = course.time_s, "steady state not reached"
+    if time is not None:
+        yield Rule(time[0] / HOUR_S, "x", INK, 1.1, "dash")
+    if course.state and not course.state.terms and time:
+        words = "steady from the first reversal on"
+    elif time is not None:
+        words = f"steady after {measured(*(each / HOUR_S for each in time))} h"
+    up = course.values[0] > course.values[-1]
+    yield Note(words, 1, 1 if up else 0, "xy", "right", "top" if up else "bottom")
+
+
+def _gaps(found: Soak) -> tuple[Span, ...]:
+    """Gaps of the record as shaded time."""
+    ends = [(gap.start_s / HOUR_S, (gap.start_s + gap.length_s) / HOUR_S) for gap in found.gaps]
+    return tuple(Span(*each, "x", VERMILION, 0.25) for each in ends)
+
+
+def _begin_h(found: Soak) -> float | None:
+    """Left end of the axes of time: power-on, unless the record began long after it."""
+    first, last = (t / HOUR_S for t in _span_s(found))
+    return 0.0 if first < last - first else None
+
+
+def _span_s(found: Soak) -> tuple[float, float]:
+    """First and last time of the table, since power-on, s."""
+    times_s = found.table.time_s
+    return float(times_s.min()), float(times_s.max())
+
+
+def _final(course: Course) -> float:
+    return course.state.final[0] if course.state else float(course.values[-1])
+
+
+def _still(found: Soak, course: Course) -> tuple[Array, Array]:
+    """The still record at 0 g, shifted onto the bias: what differs there is load along z."""
+    t_s, volts = _thinned(found.holds.time_s, found.holds.column(f"v{course.axis}_v"))
+    return t_s, volts - np.median(volts - np.interp(t_s, course.t_s, course.values))
+
+
+def _thinned(t: Array, values: Array) -> tuple[Array, Array]:
+    """Means of neighbours, SHOWN at most."""
+    step = 1 + len(t) // SHOWN
+    n = len(t) // step * step
+    return t[:n].reshape(-1, step).mean(axis=1), values[:n].reshape(-1, step).mean(axis=1)

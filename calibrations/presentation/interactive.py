@@ -1,0 +1,307 @@
+"""Charts as plain mappings that Plotly draws in a page; `keep` names what keeps its zoom when the chart is redrawn.
+
+Text and grid take the page's colours (`workbench.css`), which knows whether it is dark.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from datetime import UTC, datetime
+from functools import singledispatch
+from typing import Any, Literal
+
+import numpy as np
+
+from calibrations.presentation import chart as c
+from calibrations.presentation.text import exponent, plain
+
+Figure = dict[str, Any]
+Trace = dict[str, Any]
+
+EDGE = "rgba(105,115,125,0.9)"  # tells pale and dark markers from white and dark paper
+CONFIG = {
+    "displaylogo": False,
+    "responsive": True,
+    "scrollZoom": False,
+    "modeBarButtonsToRemove": ["toImage", "autoScale2d", "zoomIn2d", "zoomOut2d"],
+}
+SIZE = 11.5  # of the letters, px
+MARGIN = {"l": 62, "r": 12, "t": 8, "b": 44}
+ROW_GAP = 56  # px below a row of panels: its axis
+SYMBOLS = {"cross": "cross-thin-open"}
+DAY_S = 86400.0
+FEW_DECADES = 2.5
+ROUNDING = 1e-9
+INCH_PX = 96
+BAR_STEP = 0.12  # of the width of the panels, from one colour bar to the next
+BAR = {"thickness": 10, "outlinewidth": 0, "xpad": 4, "exponentformat": "none"}
+
+
+def figure(chart: c.Chart, keep: str, drag: Literal["select", "zoom", False] = "zoom") -> Figure:
+    """Data, layout and configuration for Plotly. `drag`: what drawing a box does."""
+    data: list[Trace] = []
+    layout: dict[str, Any] = {
+        "margin": dict(MARGIN),
+        "showlegend": False,
+        "hovermode": "closest",
+        "dragmode": drag,
+        "paper_bgcolor": "rgba(0,0,0,0)",
+        "plot_bgcolor": "rgba(0,0,0,0)",
+        "font": {"family": "inherit", "size": SIZE},
+        "uirevision": keep,
+        "shapes": [],
+        "annotations": [],
+    }
+    for number, (panel, x_domain, y_domain) in enumerate(_places(chart), 1):
+        _panel(panel, "" if number == 1 else str(number), x_domain, y_domain, data, layout)
+    _one_bar_a_scale(data)
+    return {"data": data, "layout": layout, "config": CONFIG}
+
+
+def _one_bar_a_scale(data: Sequence[Trace]) -> None:
+    """Panels with the same scale share a colour bar; bars of other scales follow to the right."""
+    bars: list[str] = []
+    for marker in (trace["marker"] for trace in data if "colorbar" in trace.get("marker", {})):
+        label = marker["colorbar"]["title"]["text"]
+        marker["showscale"] = label not in bars
+        if marker["showscale"]:
+            marker["colorbar"] = marker["colorbar"] | {"x": 1.02 + BAR_STEP * len(bars)}
+            bars.append(label)
+
+
+def height_px(chart: c.Chart) -> int:
+    """How high a chart of several rows should be."""
+    heights = [chart.height] if isinstance(chart.height, (int, float)) else chart.height
+    rows = len(chart.panels) if isinstance(chart.height, (int, float)) else 1
+    return round(rows * sum(heights) * INCH_PX + ROW_GAP)
+
+
+def _places(chart: c.Chart) -> Iterator[tuple[c.Panel, list[float] | None, list[float] | None]]:
+    rows = len(chart.panels)
+    heights = [chart.height] * rows if isinstance(chart.height, (int, float)) else list(chart.height)
+    whole, top = sum(heights), 1.0
+    gap = ROW_GAP / (whole * INCH_PX)
+    for row, height in zip(chart.panels, heights, strict=True):
+        bottom = top - height / whole
+        for j, panel in enumerate(row):
+            x = None if len(row) == 1 else [j / len(row) + 0.05 * (j > 0), (j + 1) / len(row)]
+            yield panel, x, None if rows == 1 else [min(max(bottom, 0.0) + gap * (bottom > 1e-9), top), top]
+        top = bottom
+
+
+def _panel(panel: c.Panel, number: str, x: Any, y: Any, data: list[Trace], layout: dict[str, Any]) -> None:
+    axes = {"xaxis": f"x{number}", "yaxis": f"y{number}"}
+    for series in panel.series:
+        traces, shapes, notes = _series(series, panel)
+        data += [{**trace, **axes, "legend": f"legend{number}"} if number else trace for trace in traces]
+        layout["shapes"] += [_referred(each, number) for each in shapes]
+        layout["annotations"] += [_referred(each, number) for each in notes]
+    for side, axis, domain, other in (("x", panel.x, x, "y"), ("y", panel.y, y, "x")):
+        made = _axis(axis) | ({"domain": domain} if domain else {})
+        layout[f"{side}axis{number}"] = made | ({"anchor": f"{other}{number}"} if number else {})
+    if panel.equal:
+        layout[f"yaxis{number}"]["scaleanchor"] = f"x{number}"
+    if panel.legend:
+        layout["showlegend"] = True
+        layout[f"legend{number}"] = {"orientation": "h", "x": (x or [0.0])[0], "xanchor": "left", "yanchor": "bottom",
+                                     "y": (y or [0.0, 1.0])[1], "bgcolor": "rgba(0,0,0,0)"}  # fmt: skip
+    if panel.x.ticks == "dates":
+        layout["margin"] |= {"t": 20, "b": 24}
+
+
+def _referred(shape: dict[str, Any], number: str) -> dict[str, Any]:
+    """The shape or annotation on the axes of its panel."""
+    return {
+        name: f"{value}{number}" if value in ("x", "y") else f"{value[0]}{number} domain" if value in DOMAINS else value
+        for name, value in shape.items()
+    }
+
+
+DOMAINS = ("x domain", "y domain")
+
+
+def _axis(axis: c.Axis) -> dict[str, Any]:
+    made: dict[str, Any] = {"zeroline": False, "automargin": True, "exponentformat": "none"}
+    made["title"] = {"text": axis.label, "standoff": 6, "font": {"size": SIZE}}
+    ends = (axis.low, axis.high)
+    if axis.log:
+        made |= {"type": "log", "exponentformat": "power", "dtick": 1, "tickfont": {"size": SIZE - 2}}
+        made |= _marks(axis)
+        ends = tuple(None if end is None else float(np.log10(end)) for end in ends)  # type: ignore[assignment]
+    if axis.names:
+        made |= {"tickvals": list(range(len(axis.names))), "ticktext": list(axis.names), "showgrid": False}
+    if axis.ticks == "quarters":
+        made["dtick"] = 90
+    if axis.ticks == "integers":
+        made["tickformat"] = "d"
+    if axis.ticks == "dates":
+        made["type"] = "date"
+        ends = tuple(None if end is None else _dates([end])[0] for end in ends)  # type: ignore[assignment]
+    if ends != (None, None):
+        made["range"] = list(reversed(ends)) if axis.reverse else list(ends)
+    elif axis.reverse:
+        made["autorange"] = "reversed"
+    return made
+
+
+def _marks(axis: c.Axis) -> dict[str, Any]:
+    """Marks at 1, 2 and 5 times powers of ten, where the axis has few of these powers."""
+    if axis.low is None or axis.high is None or np.log10(axis.high / axis.low) >= FEW_DECADES:
+        return {}
+    powers = range(exponent(axis.low), exponent(axis.high) + 1)
+    values = [digit * 10.0**power for power in powers for digit in (1, 2, 5)]
+    shown = [value for value in values if axis.low <= value * (1 + ROUNDING) and value <= axis.high * (1 + ROUNDING)]
+    return {"tickmode": "array", "tickvals": shown, "ticktext": [plain(value, 1) for value in shown]}
+
+
+Parts = tuple[list[Trace], list[dict[str, Any]], list[dict[str, Any]]]  # traces, shapes, annotations
+
+
+@singledispatch
+def _series(series: c.Series, panel: c.Panel) -> Parts:  # noqa: ARG001 the arguments of all kinds
+    raise TypeError(series)
+
+
+@_series.register
+def _points(s: c.Points, panel: c.Panel) -> Parts:
+    trace = _trace(s, panel, "markers") | {"marker": _marker(s)}
+    if s.low is not None and s.high is not None:
+        above, below = np.asarray(s.high) - s.y, np.asarray(s.y) - s.low
+        bars = {"type": "data", "symmetric": False, "array": _list(above), "arrayminus": _list(below)}
+        trace["error_y"] = bars | {"width": 0, "thickness": 1}
+    if s.reach is not None:
+        trace["error_x"] = {"type": "data", "array": _list(s.reach), "width": 4, "thickness": 1.6}
+    if s.keys is not None:
+        trace["customdata"] = list(s.keys)
+    if len(s.hover):
+        trace |= {"text": list(s.hover), "hovertemplate": "%{text}<extra></extra>"}
+    return [trace], [], []
+
+
+def _marker(s: c.Points) -> dict[str, Any]:
+    symbols = s.symbol if isinstance(s.symbol, str) else list(s.symbol)
+    names = SYMBOLS.get(symbols, symbols) if isinstance(symbols, str) else [SYMBOLS.get(n, n) for n in symbols]
+    marker: dict[str, Any] = {"symbol": names, "size": s.size, "line": {"width": 0.6, "color": EDGE}}
+    if isinstance(symbols, str) and not symbols.endswith("-open") and s.values is None:
+        marker["line"] = {"width": 0}
+    if s.values is None or s.scale is None:
+        return marker | {"color": _visible(s.colour) if isinstance(s.colour, str) else list(s.colour)}
+    scale = s.scale
+    colours: tuple[str, ...] = c.SIGNED if scale.signed else c.VALUES
+    bar = BAR | {"title": {"text": scale.label, "side": "right", "font": {"size": SIZE}}}
+    if scale.names:
+        colours = (c.BLUE, c.VERMILION, c.GREEN)[: max(len(scale.names), 2)]
+        bar |= {"tickvals": list(range(len(scale.names))), "ticktext": list(scale.names)}
+    stops = [[k / (len(colours) - 1), colour] for k, colour in enumerate(colours)]
+    return marker | {"color": _list(s.values), "colorscale": stops, "cmin": scale.low, "cmax": scale.high,
+                     "colorbar": bar}  # fmt: skip
+
+
+@_series.register
+def _line(s: c.Line, panel: c.Panel) -> Parts:
+    look = {"color": _visible(s.colour), "width": s.width, "dash": s.dash}
+    trace = _trace(s, panel, "lines+markers" if s.markers else "lines") | {"line": look}
+    trace |= {"hovertemplate": f"{s.hover}<extra></extra>"} if s.hover else {"hoverinfo": "skip"}
+    halo = {**trace, "line": {"color": "rgba(255,255,255,0.85)", "width": 2 * s.width}, "hoverinfo": "skip",
+            "showlegend": False}  # fmt: skip
+    return ([halo, trace] if s.halo else [trace]), [], []
+
+
+@_series.register
+def _band(s: c.Band, panel: c.Panel) -> Parts:
+    shape = "hvh" if s.steps else "linear"
+    edge = {"type": "scatter", "mode": "lines", "line": {"width": 0, "shape": shape}, "hoverinfo": "skip",
+            "x": _list(s.x, panel.x), "showlegend": False}  # fmt: skip
+    fill = {"fill": "tonexty", "fillcolor": _clear(s.colour, s.opacity), "name": s.label, "showlegend": bool(s.label)}
+    return [edge | {"y": _list(s.low)}, edge | {"y": _list(s.high)} | fill], [], []
+
+
+@_series.register
+def _span(s: c.Span, panel: c.Panel) -> Parts:
+    across: c.Along = "x" if s.along == "y" else "y"
+    shape = {"type": "rect", "layer": "below", "fillcolor": _clear(s.colour, s.opacity), "line": {"width": 0}}
+    ends = _list(np.array([s.low, s.high]), panel.x if s.along == "x" else None)
+    sides = {f"{s.along}0": ends[0], f"{s.along}1": ends[1], f"{s.along}ref": s.along}
+    return [], [shape | _across(across) | sides], []
+
+
+@_series.register
+def _rule(s: c.Rule, panel: c.Panel) -> Parts:
+    across: c.Along = "x" if s.along == "y" else "y"
+    at = _list(np.array([s.at]), panel.x if s.along == "x" else None)[0]
+    look = {"color": _visible(s.colour), "width": s.width, "dash": s.dash}
+    shape = {"type": "line", "layer": "below", "line": look, f"{s.along}0": at, f"{s.along}1": at}
+    return [], [shape | _across(across) | {f"{s.along}ref": s.along}], []
+
+
+@_series.register
+def _bars(s: c.Bars, panel: c.Panel) -> Parts:
+    trace = {
+        "type": "bar",
+        "orientation": "h",
+        "y": list(range(len(s.ends))),
+        "x": [max(float(end) - s.base, 0.0) for end in s.ends],
+        "base": s.base,
+        "marker": {"color": list(s.colours)},
+        "width": 0.6,
+        "text": [f"\u2003{text}\u2003" for text in s.texts],
+        "textposition": ["inside" if inside else "outside" for inside in s.inside],
+        "insidetextanchor": "start",
+        "hovertemplate": [f"{name}: {text}" for name, text in zip(panel.y.names, s.texts, strict=True)],
+        "name": s.label,
+    }
+    return [trace], [], []
+
+
+@_series.register
+def _cells(s: c.Cells, panel: c.Panel) -> Parts:  # noqa: ARG001
+    stops = [[k / (len(c.SIGNED) - 1), colour] for k, colour in enumerate(c.SIGNED)]
+    trace = {"type": "heatmap", "z": np.asarray(s.values).tolist(), "zmin": -1, "zmax": 1, "colorscale": stops,
+             "showscale": False, "text": [list(row) for row in s.texts], "texttemplate": "%{text}"}  # fmt: skip
+    return [trace], [], []
+
+
+@_series.register
+def _note(s: c.Note, panel: c.Panel) -> Parts:
+    x = s.x if "x" in s.shares else _list(np.array([s.x]), panel.x)[0]
+    note = {"text": s.text, "x": _power(x, panel.x, "x" in s.shares), "y": _power(s.y, panel.y, "y" in s.shares),
+            "showarrow": False, "xanchor": s.horizontal, "yanchor": s.vertical, "textangle": -90 if s.upright else 0,
+            "xref": "x domain" if "x" in s.shares else "x", "yref": "y domain" if "y" in s.shares else "y"}  # fmt: skip
+    return [], [], [note]
+
+
+def _power(value: Any, axis: c.Axis, share: bool) -> Any:
+    """An annotation's place on a logarithmic axis is the logarithm."""
+    return float(np.log10(value)) if axis.log and not share else value
+
+
+def _trace(s: c.Points | c.Line, panel: c.Panel, mode: str) -> Trace:
+    return {"type": "scatter", "mode": mode, "x": _list(s.x, panel.x), "y": _list(s.y), "name": s.label,
+            "showlegend": bool(s.label)}  # fmt: skip
+
+
+def _across(along: c.Along) -> dict[str, Any]:
+    return {f"{along}ref": f"{along} domain", f"{along}0": 0, f"{along}1": 1}
+
+
+def _list(values: Any, axis: c.Axis | None = None) -> list[Any]:
+    """Numbers as JSON has them: None where there is none; dates as Plotly reads them."""
+    numbers = np.asarray(values, float).tolist()
+    if axis is not None and axis.ticks == "dates":
+        return _dates(numbers)
+    return [None if number != number else number for number in numbers]
+
+
+def _dates(days: Sequence[float]) -> list[str]:
+    """Days since 1970 as Plotly reads times."""
+    return [datetime.fromtimestamp(day * DAY_S, tz=UTC).strftime("%Y-%m-%d %H:%M:%S") for day in days]
+
+
+def _visible(colour: str) -> str:
+    """Ink would vanish on dark paper."""
+    return c.QUIET if colour == c.INK else colour
+
+
+def _clear(colour: str, opacity: float) -> str:
+    red, green, blue = (int(colour[k : k + 2], 16) for k in (1, 3, 5))
+    return f"rgba({red},{green},{blue},{opacity:g})"

@@ -1,0 +1,157 @@
+"""The fleet's report: one HTML page on what batches miss, what rigs add, and which sensors need a person."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from calibrations.fleet.batch import BatchVerdict, Population, SensorVerdict
+from calibrations.presentation.chart import Picture
+from calibrations.presentation.charts.fleet import Spread, rigs, shares, spreads
+from calibrations.presentation.report.page import figure, page
+from calibrations.presentation.text import chance, joined, measured, plain
+
+MOST = 200  # sensors in a table of those that need a person
+ONE_RIG = "All were measured on one rig: an error of its stages cannot be told from one that all sensors have."
+SHARED = (
+    "What all sensors of a rig share, and those of other rigs do not, is the rig's. Values are told from the median of "
+    "the rigs: an error that all rigs share looks like one of the sensors' design."
+)
+Section = dict[str, Any]
+
+
+def population_report(found: Population, model: str, facts: Mapping[str, str]) -> str:
+    """The page of a discovery as HTML text; `facts` its provenance."""
+    persons = [each for each in found.sensors if each.needs_a_person]
+    beyond = {error.rig for error in found.rigs if error.beyond}
+    missing = [batch for batch in found.batches if batch.effects]
+    return page(
+        "fleet.html",
+        headline=_headline(missing, beyond, persons),
+        verdict="nothing missing" if not (missing or beyond or persons) else "found",
+        state="adequate" if not (missing or beyond or persons) else "found",
+        what=f"Fleet, {len(found.sensors)} sensors",
+        summary=f"Each sensor was held against the model {model}, then against that of its batch, on poses corrected "
+        "by what its rig was found to be off. Who stood out from its batch was diagnosed in full.",
+        figures=[
+            ("sensors", str(len(found.sensors)), f"of {len(found.batches)} batches"),
+            ("batches that miss an effect", str(len(missing)), "in all their sensors"),
+            ("rigs in error", str(len(beyond)), "against the median of the rigs"),
+            ("sensors for a person", str(len(persons)), "unlike their siblings, or not judged"),
+        ],
+        sections=[_of_batches(found), *_of_rigs(found), *_of_persons(persons)],
+        provenance=facts,
+    )
+
+
+def calibration_report(quantities: Mapping[str, Sequence[Spread]], tables: Section, what: str, facts: Any) -> str:
+    """The page of a calibration: `quantities` by name over the batches, `tables` of means and spreads."""
+    caption = (
+        "Each sensor's value with its 95 % interval, in the light of its siblings; the grey band holds 95 % of the "
+        "batch. Sensors that are unlike all others of their batch stand alone, and are named."
+    )
+    drawn = Picture("spreads", "The sensors of each batch", caption, spreads(quantities))
+    unlike = sum(int(each.apart.sum()) for of in quantities.values() for each in of)
+    return page(
+        "fleet.html",
+        headline=f"{what}: calibrated, each in the light of its batch",
+        verdict="calibrated",
+        state="adequate",
+        what="Fleet",
+        summary="The parameters of a batch's sensors are taken as drawn from one population, whose mean and spread are "
+        "estimated with them. What that adds to a sensor's own data is largest where its data say least.",
+        figures=[
+            ("batches", str(len(tables["tables"][0]["batches"])), ""),
+            ("values unlike the rest", str(unlike), ""),
+        ],
+        sections=[{"title": "Parameters", "words": [], "pictures": [figure(drawn)], "tables": []}, tables],
+        provenance=facts,
+    )
+
+
+def _headline(missing: list[BatchVerdict], beyond: set[str], persons: list[SensorVerdict]) -> str:
+    parts = []
+    if missing:
+        effects = joined(list(dict.fromkeys(e.effect for batch in missing for e in batch.effects)))
+        parts.append(f"{effects} missing in {_count(len(missing), 'batch', 'batches')}")
+    if beyond:
+        parts.append(f"{_count(len(beyond), 'rig', 'rigs')} in error")
+    if persons:
+        parts.append(f"{_count(len(persons), 'sensor', 'sensors')} for a person to look at")
+    text = joined(parts) or "nothing is missing in any sensor"
+    return f"{text[:1].upper()}{text[1:]}."
+
+
+def _count(number: int, one: str, many: str) -> str:
+    return f"{number} {one if number == 1 else many}"
+
+
+def _of_batches(found: Population) -> Section:
+    pictures = []
+    if any(batch.shares for batch in found.batches):
+        caption = "Share of a batch's sensors that have the effect: 100 % where the batch as a whole shows it."
+        pictures.append(figure(Picture("shares", "Effects and batches", caption, shares(found))))
+    rows = [
+        (
+            batch.batch or "no batch",
+            batch.sensors,
+            each.effect,
+            "one value for all" if each.common else "each its own",
+            f"{each.sensors} of {each.of}",
+            chance(each.p_value),
+            ", ".join(each.rivals) or "-",
+        )
+        for batch in found.batches
+        for each in batch.effects
+    ]
+    words = "An effect is a batch's where its sensors show it together, though perhaps none of them does alone."
+    head = ("batch", "sensors", "effect", "values", "show it alone", "chance", "not told apart from")
+    return {"title": "Batches", "words": [words], "pictures": pictures, "tables": _table(head, rows)}
+
+
+def _of_rigs(found: Population) -> Iterable[Section]:
+    words = []
+    measured_on = {rig for group in found.unconnected for rig in group}
+    if len(measured_on) == 1:
+        words.append(ONE_RIG)
+    elif len(found.unconnected) > 1:
+        groups = "; ".join(joined(list(group)) for group in found.unconnected)
+        words.append(f"No batch was measured on two of these groups of rigs, which cannot be compared: {groups}.")
+    if not found.rigs and not words:
+        words.append("No rig differs from the others by more than chance.")
+    pictures = []
+    if found.rigs:
+        words.append(SHARED)
+        caption = "Every rig's error with its expanded uncertainty (k = 2); vermilion where it is more than chance."
+        pictures.append(figure(Picture("rigs", "Errors of the rigs", caption, rigs(found.rigs))))
+    rows = [
+        (e.rig, e.effect, e.parameter, f"{measured(e.value, e.std)} {e.unit}", chance(e.p_value), e.sensors)
+        for e in found.rigs
+        if e.beyond
+    ]
+    head = ("rig", "effect", "parameter", "value", "chance", "sensors")
+    yield {"title": "Rigs", "words": words, "pictures": pictures, "tables": _table(head, rows)}
+
+
+def _of_persons(persons: list[SensorVerdict]) -> Iterable[Section]:
+    if not persons:
+        return
+    rows = [
+        (
+            each.sensor,
+            each.batch or "-",
+            each.rig or "-",
+            each.verdict,
+            ", ".join(each.own) or "-",
+            "-" if each.excess is None else plain(each.excess),
+            each.remark or "-",
+        )
+        for each in persons[:MOST]
+    ]
+    head = ("sensor", "batch", "rig", "verdict", "effects of its own", "error / floor", "remark")
+    more = f"{len(persons) - MOST} more are in the JSON document." if len(persons) > MOST else ""
+    yield {"title": "Sensors that need a person", "words": [], "pictures": [], "tables": _table(head, rows, more)}
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[object]], more: str = "") -> list[dict[str, Any]]:
+    return [{"head": head, "rows": rows, "more": more}] if rows else []

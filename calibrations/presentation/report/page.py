@@ -1,0 +1,34 @@
+"""What every report is made on: one page that needs no network, with a verdict, a headline, figures and provenance."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from calibrations.presentation.chart import Picture
+from calibrations.presentation.static import inline
+
+
+def page(template: str, **said: Any) -> str:
+    """The page as HTML text: what is said, in the words of `template`, which extends `page.html`."""
+    return _templates().get_template(template).render(said)
+
+
+def figure(picture: Picture) -> dict[str, Any]:
+    """A picture as a page takes it: drawn, with title and caption."""
+    drawn = Markup(inline(picture.chart, picture.name, f"{picture.title}. {picture.caption}"))  # noqa: S704 made here
+    return {"svg": drawn, "title": picture.title, "caption": picture.caption}
+
+
+@cache
+def _templates() -> Environment:
+    return Environment(
+        loader=PackageLoader("calibrations.presentation", "report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )

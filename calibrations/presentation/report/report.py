@@ -1,0 +1,278 @@
+"""The report: one HTML page that needs no network, with verdict, falling error, candidates, model, noise, provenance.
+
+Every uncertain number has its uncertainty, or states that it is unknown. The template has the layout; this file makes
+its texts and numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import PurePath, PureWindowsPath
+from typing import Any
+
+import numpy as np
+
+from calibrations.criteria import SIGNIFICANT
+from calibrations.design.experiment import Experiment
+from calibrations.discovery.results import Candidate, Comparison, Discovery, Step
+from calibrations.fit import Fit
+from calibrations.model import Estimate, Model
+from calibrations.motion.evaluate import MotionResult, Quantity
+from calibrations.motion.reference import Bias
+from calibrations.presentation.chart import Picture
+from calibrations.presentation.charts.discovery import album
+from calibrations.presentation.report import parameters
+from calibrations.presentation.report.page import figure, page
+from calibrations.presentation.report.words import VERDICTS, key_figures, next_takes, next_words, state, summary
+from calibrations.presentation.residual import in_milli, milli_unit, pooled_milli, row_name
+from calibrations.presentation.text import capital, chance, measured, minus, plain, unbroken, unit
+
+EXPLAINED = 6  # candidates shown with formula and symptom, at most; the others in numbers only
+SHOWS = 1e-3  # share of the noise floor from which on a part of the noise is told
+SURE = 0.999  # probabilities beyond, on either side, are not told to more digits
+
+
+def report(
+    found: Discovery[Fit],
+    beside: Comparison[Fit],
+    date: str,
+    program: str,
+    pictures: Iterable[Picture] | None = None,
+    motion: MotionResult | None = None,
+) -> str:
+    """The page as HTML text. `beside` sets the model that was given beside the data; `pictures` are those of `album`.
+
+    `motion` is what a run of that procedure found beside the displacement sensor.
+    `date` and `program` (name and version) stand in the provenance: the same arguments give the same page.
+    """
+    shown = {p.name: figure(p) for p in (album(found, beside, motion) if pictures is None else pictures)}
+    discovery = _head(found, beside.fit.model.name)
+    return page(
+        "report.html",
+        **(motion_head(motion) if motion else discovery),
+        discovery=discovery,
+        kind=row_name(found.start.table),
+        steps=[_first(found), *(_step(step, found) for step in found.steps)],
+        chance_of_excess=unbroken(f"1 ± {spread_of_excess(found.end)}"),
+        fails=[capital(minus(place.text)).replace("x the noise", "× the noise") for place in beside.fails],
+        given=beside.fit.model.name,
+        given_errors=_errors(beside.fit),
+        candidates=[_candidate(c, k, found.start.table.unit) for k, c in enumerate(found.findings.candidates)],
+        before=(plain(found.start.pooled_excess), plain(found.start.held_out_excess)),
+        model=found.end.model.name,
+        parameters=_parameters(found.end.model, {s.name for s in found.steps}),
+        general=parameters.matrices(found.end),
+        budget=parameters.budget(found.end),
+        birge=f"{found.end.birge:.2f}" if found.end.birge > 1.05 else "",
+        end_errors=_errors(found.end),
+        known=found.end.noise.known,
+        next=_next(found.next_experiment) if found.next_experiment else None,
+        structure=found.residual_structure,
+        provenance=_provenance(found, date, program),
+        motion=motion_section(motion) if motion else None,
+        pictures=shown,
+        curves=[drawn for name, drawn in shown.items() if name.startswith("effect-")],
+    )
+
+
+def _next(e: Experiment) -> dict[str, str]:
+    return {"words": next_words(e), "command": e.command, "takes": next_takes(e)}
+
+
+def _head(found: Discovery[Fit], model: str) -> dict[str, Any]:
+    """The head of the page, or of its part on models that were fitted to a motion."""
+    return {
+        "headline": found.judgement.headline,
+        "verdict": VERDICTS[state(found)],
+        "state": state(found),
+        "what": f"Calibration report, model {model}",
+        "summary": unbroken(summary(found)),
+        "figures": key_figures(found),
+    }
+
+
+def spread_of_excess(fit: Fit) -> str:
+    """Standard uncertainty that chance alone gives the pooled excess of a complete model."""
+    return plain(1 / np.sqrt(2 * max(fit.residual.size - len(fit.theta), 1)), 2)
+
+
+def _error_of(fit: Fit) -> str:
+    """The rms error with its unit."""
+    return f"{plain(pooled_milli(fit)[0], 2)} {milli_unit(fit)}"
+
+
+def _first(found: Discovery[Fit]) -> dict[str, str]:
+    level = {"seen": plain(found.start.pooled_excess), "unseen": plain(found.start.held_out_excess)}
+    return {"name": found.start.model.name, "error": _error_of(found.start), "role": "as given", **level}
+
+
+def _step(step: Step[Fit], found: Discovery[Fit]) -> dict[str, str]:
+    level = {"seen": plain(step.after.pooled_excess), "unseen": plain(step.held_out_after)}
+    role = "cause" if step.name in found.causes else "refines the form of a cause"
+    return {"name": f"+ {step.name}", "error": _error_of(step.after), "role": role, **level}
+
+
+def _candidate(c: Candidate, rank: int, out: str) -> dict[str, Any]:
+    return {
+        "name": c.name,
+        "explained": rank == 0 or (rank < EXPLAINED and c.p_value < SIGNIFICANT),
+        "summary": capital(c.effect.summary),
+        "formula": c.effect.formula.replace("{out}", out),
+        "symptom": capital(c.effect.symptom),
+        "seen": plain(c.excess_after),
+        "unseen": plain(c.held_out_after),
+        "p": chance(c.p_value),
+        "probability": _probability(c.probability),
+        "rivals": ", ".join(c.indistinguishable_from) or "–",
+    }
+
+
+def _probability(p: float) -> str:
+    """Only approximate: neither certain nor impossible."""
+    return f"above {SURE:g}" if p > SURE else f"below {1 - SURE:g}" if p < 1 - SURE else f"{p:.2g}"
+
+
+def _errors(fit: Fit) -> list[dict[str, str]]:
+    """One row for each channel: error, floor, scatter and slow noise, in the residual's unit and in mg."""
+    posed = fit.table.kind == "poses"
+    noise = {"rmse": fit.rmse, "floor": fit.noise.floor, "scatter": fit.noise.scatter, "slow": fit.noise.slow}
+    rows = []
+    for c, channel in enumerate(fit.channels):
+        row = {"channel": channel, "excess": plain(fit.excess[c]), "tau": _time_constant(fit.noise.taus_s[c])}
+        for name, values in noise.items():
+            volts = f"{plain(1e3 * values[c])} m{fit.table.unit} = " if posed else ""
+            shows = values[c] > SHOWS * fit.noise.floor[c]
+            row[name] = f"{volts}{plain(in_milli(values, fit)[c])} {milli_unit(fit)}" if shows else "none found"
+        if row["slow"] == "none found":
+            row["tau"] = "–"
+        rows.append(row)
+    return rows
+
+
+def _time_constant(taus_s: tuple[float, ...]) -> str:
+    if len(taus_s) == 1:
+        return f"{plain(taus_s[0], 2)} s"
+    return f"flicker noise, {plain(min(taus_s), 2)} to {plain(max(taus_s), 2)} s"
+
+
+def _parameters(model: Model, added: set[str]) -> list[dict[str, Any]]:
+    return [
+        {
+            "effect": term.name,
+            "added": term.name in added,
+            "tied": term.tied,
+            "rows": [_estimate(e) for e in term.estimates],
+            "constants": {name: plain(value, 6) for name, value in term.constants.items()},
+        }
+        for term in model.terms
+    ]
+
+
+def _estimate(e: Estimate) -> dict[str, str]:
+    row = {"name": e.name, "axis": e.axis or "–", "remark": "" if e.std else "uncertainty not known"}
+    if not e.identified:
+        return row | {"value": f"not identified: {e.why}", "unit": "", "remark": ""}
+    return row | {"value": measured(e.value, e.std), "unit": unit(e.unit)}
+
+
+def _provenance(found: Discovery[Fit], date: str, program: str) -> dict[str, str]:
+    table, model = found.start.table, found.start.model
+    facts: dict[str, object] = {
+        "data": _name(table.source),
+        "kind and size": f"{table.n} {row_name(table)}; columns {', '.join(table.columns)}",
+        "SHA-256 of the data": table.digest,
+        "local gravity": f"{table.gravity_m_s2:g} m/s²",
+        **{f"constant {name}": value for name, value in table.constants.items() if name != "gravity_m_s2"},
+        "model given": model.name,
+        **{f"model given: {name}": value for name, value in _named(model.provenance).items()},
+        "program": program,
+        "date": date,
+    }
+    return {name: str(value) for name, value in facts.items()}
+
+
+def _named(provenance: Mapping[str, str | float]) -> dict[str, str | float]:
+    return {name: _name(value) if isinstance(value, str) else value for name, value in provenance.items()}
+
+
+def _name(source: str) -> str:
+    """A file by its name alone: where it lies on this machine is nobody else's business."""
+    if PurePath(source).is_absolute() or PureWindowsPath(source).is_absolute():
+        return PureWindowsPath(source).name
+    return source
+
+
+# A run of the procedure motion
+
+
+NAMES = {
+    "rmse-linear-x": "rms error of the linear model",
+    "rmse-physical-x": "rms error of the physical model",
+    "improvement-x": "by how much the physical model's is less",
+    "noise-limit-x": "error due to the sensor's noise alone, in this band",
+    "amplitude": "peak acceleration, by the displacement sensor",
+    "frequency": "frequency, by the displacement sensor",
+}
+LEAST = 1e-8
+
+
+def motion_head(found: MotionResult) -> dict[str, Any]:
+    """The head of the page."""
+    linear, physical, limit = (
+        f"{plain(q.value)} mm/s²" for q in (found.rmse_linear, found.rmse_physical, found.noise_limit)
+    )
+    return {
+        "headline": f"In motion, the physical model errs by {physical}, the linear model by {linear}.",
+        "verdict": "measured",
+        "state": "found",
+        "what": f"Calibration report, motion at {found.frequency.value:.4g} Hz",
+        "summary": unbroken(_summary(found)),
+        "figures": [
+            ("linear model of the sweep", linear, "rms error beside the displacement sensor"),
+            ("physical model of the sweep", physical, f"{plain(found.excess)} × the noise limit"),
+            ("noise limit", limit, "error due to the sensor's noise alone, in this band"),
+        ],
+    }
+
+
+def motion_section(found: MotionResult) -> dict[str, Any]:
+    """What the page says of the motion, in rows."""
+    return {
+        "quantities": [(NAMES[name], *_written(quantity)) for name, quantity in found.results.items()],
+        "biases": [_bias(bias) for bias in found.biases],
+    }
+
+
+def _summary(found: MotionResult) -> str:
+    before, after, limit = (plain(q.value) for q in (found.rmse_linear, found.rmse_physical, found.noise_limit))
+    return (
+        f"Shaken at {found.frequency.value:.4g} Hz with {plain(found.amplitude.value, 4)} mm/s² peak, the linear model "
+        f"errs by {before} mm/s² (rms), the physical model by {after} mm/s², "
+        f"{100 * found.improvement.value:.1f} % less. The sensor's noise alone leaves {limit} mm/s² in this band: the "
+        f"physical model is at {plain(found.excess)} × that limit. Both models were fitted to the sweep of this run "
+        "and have not seen the motion. Models that are fitted to the motion itself leave a smaller error, given below: "
+        "the fit takes up what changed since the sweep."
+    )
+
+
+def _written(q: Quantity) -> tuple[str, str]:
+    if q.unit == "1":
+        return measured(100 * q.value, 100 * q.std), "%"
+    return measured(q.value, q.std), unit(q.unit)
+
+
+def _bias(bias: Bias) -> dict[str, str]:
+    low, high = bias.band_hz
+    return {
+        "name": bias.name,
+        "at": f"{bias.at_hz:.4g} Hz",
+        "amplitude": f"{_small(100 * bias.amplitude)} %",
+        "phase": f"{_small(float(np.degrees(bias.phase_rad)))}°",
+        "band": f"{low:.4g} to {high:.4g} Hz",
+        "edge": f"{bias.edge_s:.2g} s",
+    }
+
+
+def _small(value: float) -> str:
+    """To two digits; what is below the rounding of a computation is nothing."""
+    return plain(value, 2) if abs(value) > LEAST else "0"

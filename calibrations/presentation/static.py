@@ -1,0 +1,372 @@
+"""Charts drawn by matplotlib: PNG and SVG files, and SVG inside a report. The same chart gives the same bytes."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections import Counter
+from collections.abc import Callable, Mapping
+from functools import singledispatch
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Colormap, LinearSegmentedColormap, ListedColormap, Normalize
+from matplotlib.figure import Figure
+from matplotlib.patheffects import Normal, Stroke
+from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator, NullFormatter
+
+from calibrations.errors import CalibrationError
+from calibrations.presentation import chart as c
+from calibrations.presentation.text import plain
+
+RC: Any = {
+    "font.family": ["DejaVu Sans"],
+    "font.size": 9.0,
+    "axes.titlesize": 10.0,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.titlepad": 8.0,
+    "axes.labelcolor": c.INK,
+    "axes.titlecolor": c.INK,
+    "axes.edgecolor": c.QUIET,
+    "axes.linewidth": 0.7,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.formatter.useoffset": False,
+    "grid.color": c.FAINT,
+    "grid.linewidth": 0.7,
+    "xtick.color": c.QUIET,
+    "ytick.color": c.QUIET,
+    "xtick.labelcolor": c.INK,
+    "ytick.labelcolor": c.INK,
+    "text.color": c.INK,
+    "text.parse_math": False,  # names are given by users: a dollar sign is a dollar sign
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "figure.facecolor": "white",
+    "figure.constrained_layout.use": True,
+    "savefig.facecolor": "white",
+    "savefig.dpi": 150,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "rig",
+    "path.simplify": False,
+}
+PX = 0.6  # points of a printed marker for one pixel on a screen
+LINE = 0.8
+DASHES = {"solid": "-", "dash": "--", "dot": ":"}
+SYMBOLS = {"circle": "o", "diamond": "D", "triangle-up": "^", "triangle-down": "v", "cross": "+"}
+FEW_DECADES = 2.5
+MOST_LEVEL = 8  # names on a horizontal axis; more are written aslant
+DROPPED = (r"<metadata>.*?</metadata>", r"<style.*?</style>", r' xmlns(:\w+)?="[^"]*"', r' (width|height)="[\d.]+pt"')
+
+
+class PictureError(CalibrationError):
+    """A picture cannot be written: its format, or its place."""
+
+
+def draw(chart: c.Chart) -> Figure:
+    """The chart as a matplotlib figure."""
+    rows, columns = len(chart.panels), max(map(len, chart.panels))
+    heights = [chart.height] * rows if isinstance(chart.height, (int, float)) else list(chart.height)
+    with rc_context(RC):
+        figure = Figure(figsize=(chart.width, sum(heights) + 0.5))
+        share: Any = {"sharex": "col" if chart.share_x else False, "sharey": "row" if chart.share_y else False}
+        axes = figure.subplots(rows, columns, squeeze=False, height_ratios=heights, **share)
+        for k, row in enumerate(chart.panels):
+            for j in range(columns):
+                if j < len(row):
+                    _panel(axes[k, j], row[j], k == rows - 1 or not chart.share_x, j == 0 or not chart.share_y)
+                else:
+                    axes[k, j].set_visible(False)
+        if any(panel.equal for row in chart.panels for panel in row):
+            figure.set_layout_engine("compressed")
+        if chart.bar is not None:
+            _colour_bar(figure, axes, chart.bar)
+    return figure
+
+
+def svg(chart: c.Chart) -> bytes:
+    """The chart as an SVG document; its text stays text, in a font that is as wide where the first is not there."""
+    text = _bytes(chart, "svg", {"Date": None, "Creator": None}).decode()
+    return compact(text.replace("'DejaVu Sans'", "'DejaVu Sans', Verdana, sans-serif")).encode()
+
+
+def png(chart: c.Chart) -> bytes:
+    """The chart as a PNG, 150 dots an inch."""
+    return _bytes(chart, "png", {"Software": None})
+
+
+def inline(chart: c.Chart, name: str, words: str) -> str:
+    """The chart as an SVG element for a page: it loads nothing, and its ids begin with `name`.
+
+    `words` describe it for those who cannot see it.
+    """
+    text = svg(chart).decode()
+    text = text[text.index("<svg") :].strip()
+    for pattern in DROPPED:
+        text = re.sub(pattern, "", text, flags=re.DOTALL)
+    text = re.sub(r'\bid="', f'id="{name}-', text)
+    text = text.replace("url(#", f"url(#{name}-").replace("xlink:href", "href").replace('href="#', f'href="#{name}-')
+    return text.replace("<svg", f'<svg role="img" aria-label="{escape(words)}"', 1)
+
+
+def save(chart: c.Chart, path: Path) -> None:
+    """Write the chart to `path`, whole or not at all, in the format of its ending.
+
+    Raises PictureError for another ending than .png and .svg, or where the file cannot be written.
+    """
+    formats: dict[str, Callable[[c.Chart], bytes]] = {".png": png, ".svg": svg}
+    make = formats.get(path.suffix.lower())
+    if make is None:
+        raise PictureError(f'{path}: pictures end in .png or .svg, not in "{path.suffix}"; rename it')
+    draft = path.with_name(f".{path.name}.part")
+    try:
+        draft.write_bytes(make(chart))
+        draft.replace(path)
+    except OSError as error:
+        draft.unlink(missing_ok=True)
+        raise PictureError(f"{path}: the picture cannot be written: {error.strerror}") from None
+
+
+def save_all(charts: Mapping[str, c.Chart], folder: Path, form: str) -> list[Path]:
+    """Write charts by name into `folder`, which is made if needed; returns their paths. Raises PictureError."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise PictureError(f"{folder}: the folder cannot be made: {error.strerror}") from None
+    paths = {folder / f"{name}.{form}": chart for name, chart in charts.items()}
+    for path, chart in paths.items():
+        save(chart, path)
+    return list(paths)
+
+
+def _bytes(chart: c.Chart, form: str, metadata: dict[str, None]) -> bytes:
+    page = io.BytesIO()
+    with rc_context(RC):
+        draw(chart).savefig(page, format=form, metadata=metadata)
+    return page.getvalue()
+
+
+def _panel(ax: Axes, panel: c.Panel, last: bool, first: bool) -> None:
+    for series in panel.series:
+        _series(series, ax)
+    _axis(ax, panel.x, "x", last)
+    _axis(ax, panel.y, "y", first)
+    ax.set_title(panel.title)
+    if panel.remark:
+        ax.set_title(panel.remark, loc="right", fontweight="normal", fontsize=9)
+    if panel.equal:
+        ax.set_aspect("equal")
+    if panel.legend == "outside":
+        ax.figure.legend(loc="outside upper left", ncols=7, handlelength=1.4)
+    elif panel.legend:
+        ax.legend(loc=panel.legend, ncols=2 if panel.legend != "best" else 1)
+    if panel.second is not None:
+        _second(ax, panel.second)
+
+
+def _axis(ax: Axes, axis: c.Axis, along: c.Along, labelled: bool) -> None:
+    side = ax.xaxis if along == "x" else ax.yaxis
+    if axis.log:
+        (ax.set_xscale if along == "x" else ax.set_yscale)("log")
+    if axis.names:
+        side.set_ticks(range(len(axis.names)), axis.names)
+        ax.grid(visible=False, axis=along)
+        if along == "x" and len(axis.names) > MOST_LEVEL:
+            ax.tick_params(axis="x", rotation=30)
+    elif axis.ticks == "quarters":
+        side.set_major_locator(MultipleLocator(90))
+    elif axis.ticks == "integers":
+        side.set_major_locator(MaxNLocator(integer=True))
+    elif axis.ticks == "dates":
+        ax.xaxis_date()
+    limits: Any = (axis.low, axis.high)
+    if limits != (None, None):
+        (ax.set_xlim if along == "x" else ax.set_ylim)(*limits)
+    if axis.reverse:
+        (ax.invert_xaxis if along == "x" else ax.invert_yaxis)()
+    if axis.log:
+        _mark_powers(ax, along)
+    if labelled and axis.label:
+        (ax.set_xlabel if along == "x" else ax.set_ylabel)(axis.label)
+
+
+def _mark_powers(ax: Axes, along: c.Along) -> None:
+    """Marks of a logarithmic axis in plain text: powers of ten, and 2 and 5 where there are few of these."""
+    side, (low, high) = (ax.xaxis, ax.get_xlim()) if along == "x" else (ax.yaxis, ax.get_ylim())
+    side.set_major_formatter(FuncFormatter(lambda value, _: plain(value, 1)))
+    few = abs(np.log10(high / low)) < FEW_DECADES
+    side.set_minor_formatter(FuncFormatter(_of_two_and_five) if few else NullFormatter())
+
+
+def _of_two_and_five(value: float, _: int | None = None) -> str:
+    return plain(value, 1) if f"{value:.0e}"[0] in "25" else ""
+
+
+def _second(ax: Axes, second: c.Second) -> None:
+    def there(value: c.Array) -> c.Array:
+        return (value - second.zero) / second.scale
+
+    def back(value: c.Array) -> c.Array:
+        return value * second.scale + second.zero
+
+    right = ax.secondary_yaxis("right", functions=(there, back))  # type: ignore[arg-type] # stubs want any array-like
+    right.set_ylabel(second.label)
+    right.spines["right"].set_visible(True)
+
+
+def _map(scale: c.Scale) -> tuple[Colormap, Normalize]:
+    if scale.names:
+        colours = (c.BLUE, c.VERMILION, c.GREEN)[: len(scale.names)]
+        return ListedColormap(colours), Normalize(-0.5, len(scale.names) - 0.5)
+    colours = c.SIGNED if scale.signed else c.VALUES
+    return LinearSegmentedColormap.from_list("values", colours), Normalize(scale.low, scale.high)
+
+
+def _colour_bar(figure: Figure, axes: Any, scale: c.Scale) -> None:
+    colours, norm = _map(scale)
+    bar = figure.colorbar(ScalarMappable(norm, colours), ax=axes, label=scale.label, aspect=40, pad=0.01)
+    if scale.names:
+        bar.set_ticks(range(len(scale.names)), labels=list(scale.names))
+
+
+@singledispatch
+def _series(series: c.Series, ax: Axes) -> None:  # noqa: ARG001 the arguments of all kinds
+    raise TypeError(series)
+
+
+@_series.register
+def _points(s: c.Points, ax: Axes) -> None:
+    x, y = np.asarray(s.x), np.asarray(s.y)
+    edges = _edges(s, len(x))
+    if s.low is not None and s.high is not None:
+        ax.vlines(x, s.low, s.high, colors=edges if s.values is None else c.QUIET, lw=LINE, zorder=1.8)
+    if s.reach is not None:
+        ax.hlines(y, x - s.reach, x + s.reach, colors=edges, lw=LINE, zorder=1.8)
+    symbols = np.array([s.symbol] * len(x) if isinstance(s.symbol, str) else list(s.symbol))
+    label = s.label
+    for symbol in dict.fromkeys(symbols.tolist()):
+        rows = np.flatnonzero(symbols == symbol)
+        shape, hollow = symbol.removesuffix("-open"), symbol.endswith("-open")
+        mine = [edges[k] for k in rows]
+        colours: dict[str, Any] = {"facecolors": "none" if hollow else mine}
+        if shape != "cross":  # a cross has no edge, and matplotlib warns of one
+            colours["edgecolors"] = mine
+        ax.scatter(x[rows], y[rows], s=(PX * s.size) ** 2, marker=SYMBOLS[shape], **colours,
+                   linewidths=LINE, zorder=2, label=label or None)  # fmt: skip
+        label = ""
+
+
+def _edges(s: c.Points, n: int) -> list[Any]:
+    if s.values is not None and s.scale is not None:
+        colours, norm = _map(s.scale)
+        return list(colours(norm(np.asarray(s.values, float))))
+    return [s.colour] * n if isinstance(s.colour, str) else list(s.colour)
+
+
+@_series.register
+def _line(s: c.Line, ax: Axes) -> None:
+    halo = [Stroke(linewidth=s.width + 2, foreground="white"), Normal()] if s.halo else None
+    ax.plot(s.x, s.y, DASHES[s.dash], color=s.colour, lw=LINE * s.width, label=s.label or None, path_effects=halo,
+            marker="o" if s.markers else None, ms=3.0, zorder=4 if s.halo else 1.5)  # fmt: skip
+
+
+@_series.register
+def _band(s: c.Band, ax: Axes) -> None:
+    ax.fill_between(s.x, s.low, s.high, color=s.colour, alpha=s.opacity, lw=0, label=s.label or None, zorder=0.5,
+                    step="mid" if s.steps else None)  # fmt: skip
+
+
+@_series.register
+def _span(s: c.Span, ax: Axes) -> None:
+    (ax.axhspan if s.along == "y" else ax.axvspan)(s.low, s.high, color=s.colour, alpha=s.opacity, lw=0, zorder=0.4)
+
+
+@_series.register
+def _rule(s: c.Rule, ax: Axes) -> None:
+    place: Any = ax.axhline if s.along == "y" else ax.axvline
+    place(s.at, color=s.colour, lw=LINE * s.width, ls=DASHES[s.dash], label=s.label or None, zorder=0.6)
+
+
+@_series.register
+def _bars(s: c.Bars, ax: Axes) -> None:
+    places = np.arange(len(s.ends))
+    ax.barh(places, np.asarray(s.ends) - s.base, 0.6, s.base, color=list(s.colours), zorder=1, label=s.label or None)
+    for k, (end, text, inside) in enumerate(zip(s.ends, s.texts, s.inside, strict=True)):
+        place, right = (s.base, 6) if inside else (end, 12)
+        ax.annotate(text, (place, k), (right, 0), textcoords="offset points", va="center", zorder=3,
+                    color="white" if inside else c.INK)  # fmt: skip
+
+
+@_series.register
+def _cells(s: c.Cells, ax: Axes) -> None:
+    colours = LinearSegmentedColormap.from_list("signed", c.SIGNED)
+    ax.imshow(s.values, cmap=colours, vmin=-1, vmax=1, aspect="auto")
+    for (row, column), value in np.ndenumerate(np.asarray(s.values)):
+        dark = "white" if value > 0.5 else c.INK
+        ax.text(column, row, s.texts[row][column], ha="center", va="center", color=dark)
+    ax.tick_params(length=0)
+
+
+@_series.register
+def _note(s: c.Note, ax: Axes) -> None:
+    places: Any = tuple("axes fraction" if along in s.shares else "data" for along in "xy")
+    right = {"left": 4, "center": 0, "right": -4}[s.horizontal]
+    up = {"bottom": 3, "middle": 0, "top": -3}[s.vertical]
+    ax.annotate(s.text, (s.x, s.y), (right, up), xycoords=places, textcoords="offset points", ha=s.horizontal,
+                va="center" if s.vertical == "middle" else s.vertical, color=s.colour, fontsize=8.5,
+                rotation=90 if s.upright else 0, zorder=5)  # fmt: skip
+
+
+# Smaller SVG: fewer digits, each style once, no indentation
+
+
+MARKERS = re.compile(r'<g([^>]*)>\s*((?:<use [^>]*? style="([^"]*)"/>\s*)(?:<use [^>]*? style="\3"/>\s*)*)</g>')
+COORDINATES = re.compile(r' (?:x|y|d|width|height)="[^"]*"')
+OFTEN = 3  # times the same style
+FINE = re.compile(r"(\.\d\d)\d+")
+
+
+def compact(text: str) -> str:
+    """The same drawing in about a third of the bytes."""
+    text = MARKERS.sub(_hoisted, text)
+    text = COORDINATES.sub(_rounded, text)
+    return re.sub(r">\n\s+<", ">\n<", text)
+
+
+def _hoisted(found: re.Match[str]) -> str:
+    """The markers of one line, their common style given once."""
+    attributes, markers, style = found.groups()
+    repeated = f' style="{style}"'
+    return f"<g{attributes}{repeated}>{markers.replace(repeated, '')}</g>"
+
+
+def _rounded(found: re.Match[str]) -> str:
+    """One attribute with its numbers cut to two decimals, on one line."""
+    return " " + " ".join(FINE.sub(r"\1", found[0]).split())
+
+
+def sparing(text: str) -> str:
+    """The same drawing for a page that holds many: digits beyond 0.1 pt, names and words for machines left out."""
+    text = re.sub(r"<!DOCTYPE.*?>\s*|<metadata>.*?</metadata>\s*|<\?xml.*?\?>\s*", "", text, flags=re.DOTALL)
+    text = re.sub(r'<g id="[^"]*"', "<g", text).replace("font-family: 'DejaVu Sans', Verdana, sans-serif; ", "")
+    text = re.sub(r' transform="rotate\(-0 [^"]*"', "", text)
+    text = COORDINATES.sub(lambda found: re.sub(r"\.0(?=[ \"])", "", re.sub(r"(\.\d)\d+", r"\1", found[0])), text)
+    text = re.sub(r' d="M [-\d. L]*"', lambda path: path[0].replace(" L ", " "), text)
+    text = text.replace("<svg ", "<svg font-family=\"'DejaVu Sans', Verdana, sans-serif\" ", 1)
+    return re.sub(r">\n(?=</?[a-z])", ">", _classes(text)) + "\n"
+
+
+def _classes(text: str) -> str:
+    """Styles that stand there often are written once."""
+    often = [s for s, n in Counter(re.findall(r' style="([^"]*)"', text)).items() if n >= OFTEN]
+    for k, style in enumerate(often):
+        text = text.replace(f' style="{style}"', f' class="s{k}"')
+    return text.replace("</style>", "".join(f".s{k}{{{style}}}" for k, style in enumerate(often)) + "</style>", 1)

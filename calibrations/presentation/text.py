@@ -1,0 +1,190 @@
+"""Numbers, units and lists as text, for terminal, page and report alike.
+
+An uncertainty has two significant digits (GUM 7.2.6). A standard uncertainty is given in the concise form,
+`2.500123(45) V` (GUM 7.2.2), in terminals; with a sign `±` in tables of pages and for expanded uncertainties.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Sequence
+from typing import TypeGuard
+
+SMALL, LARGE = -4, 6  # powers of ten beyond which a number is written with one
+SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+PREFIXED = ("V", "g", "deg", "K", "h", "s")  # units that take a prefix
+PREFIXES = ((1.0, ""), (1e3, "m"), (1e6, "µ"), (1e9, "n"))
+MOST_DECIMALS = 12  # of the concise form; smaller uncertainties are written out
+LARGE_STD = 100.0  # from here on the digits in brackets would stand before the decimal point
+
+
+# Values with their uncertainty
+
+
+def measured(value: float, std: float | None) -> str:
+    """`2.50013 ± 0.00024`, or `(-1.23 ± 0.11) × 10⁻⁸`; six digits where the uncertainty is not known."""
+    if not _known(std):
+        return minus(f"{value:.6g}")
+    decimals = 1 - exponent(float(f"{std:.1e}"))
+    power = exponent(max(abs(value), std))
+    if SMALL < power <= LARGE:
+        shown = max(decimals, 0)
+        return minus(f"{round(value, decimals):.{shown}f} ± {round(std, decimals):.{shown}f}")
+    shown = decimals + power
+    return minus(f"({value / 10.0**power:.{shown}f} ± {std / 10.0**power:.{shown}f})") + times_ten_to(power)
+
+
+def concise(value: float, std: float | None, of: str = "") -> str:
+    """`2.500123(45) V` in ASCII: the digits in brackets are the standard uncertainty of the last digits."""
+    if not _known(std):
+        return f"{value:.6g} {of}".rstrip()
+    decimals = max(0, 1 - exponent(float(f"{std:.1e}")))  # of the rounded one: 0.0998 is 0.10
+    if decimals > MOST_DECIMALS or std >= LARGE_STD:
+        return f"{value:.6g} +- {std:.2g} {of}".rstrip()
+    return f"{value:.{decimals}f}({round(std * 10**decimals)}) {of}".rstrip()
+
+
+def _known(std: float | None) -> TypeGuard[float]:
+    return std is not None and math.isfinite(std) and std > 0
+
+
+# Values alone
+
+
+def plain(value: float, digits: int = 3) -> str:
+    """A value to so many significant digits, with a power of ten only where it is very small or large."""
+    if value == 0 or not math.isfinite(value):
+        return f"{value:g}"
+    power = exponent(float(f"{value:.{digits - 1}e}"))
+    if SMALL <= power <= LARGE:
+        return minus(f"{round(value, digits - 1 - power):.{max(digits - 1 - power, 0)}f}")
+    return minus(f"{value / 10.0**power:.{digits - 1}f}") + times_ten_to(power)
+
+
+def quantity(value: float, of: str) -> str:
+    """A value with the prefix that reads best, in ASCII: `51.2 uV`, `0.1 mg`, `3 per mille` of a field."""
+    if of == "field":
+        return f"{1e3 * value:.3g} per mille"
+    if of not in ("V", "g") or value == 0:
+        return f"{value:.3g} {of}"
+    factor, prefix = next((f, p) for f, p in PREFIXES if abs(value) * f >= 0.1 or p == "µ")
+    return f"{value * factor:.3g} {prefix.replace('µ', 'u')}{of}"
+
+
+def as_written(value: str | float) -> str:
+    """A constant as a person wrote it: `17` for 17.0, such as a serial number that a file's header holds."""
+    return f"{value:.15g}" if isinstance(value, float) else str(value)
+
+
+def chance(p: float) -> str:
+    """A p-value or a probability: `0.02`, `7 × 10⁻¹¹`, `below 10⁻³⁰⁰`."""
+    if p < 1e-300:
+        return f"below{times_ten_to(-300)}".replace(" ×", "")
+    if p < 1e-3:
+        power = exponent(float(f"{p:.0e}"))
+        return f"{p / 10.0**power:.0f}{times_ten_to(power)}"
+    return f"{p:.2g}"
+
+
+def percent(share: float) -> str:
+    """`3.3 %`, `100 %`."""
+    return f"{100 * share:.0f} %" if share >= 0.1 else f"{100 * share:.2g} %"
+
+
+def duration(seconds: float) -> str:
+    """A length of time: 0:05, 12:30, 1:02:30."""
+    minutes, s = divmod(round(seconds), 60)
+    hours, m = divmod(minutes, 60)
+    return f"{hours}:{m:02}:{s:02}" if hours else f"{m}:{s:02}"
+
+
+def size(count: int) -> str:
+    """A number of bytes: 1.2 kB, 3.4 MB."""
+    if count >= 1e9:
+        return f"{count / 1e9:.1f} GB"
+    return f"{count / 1e6:.1f} MB" if count >= 1e5 else f"{count / 1e3:.1f} kB"
+
+
+# Intervals and limits
+
+
+def stretch(low: float, high: float) -> str:
+    """An interval, to a hundredth of its length: `22.32 to 23.13`, `30 to 150`."""
+    decimals = max(1, 1 - exponent(high - low)) if high > low else 6
+    return f"{round(low, decimals):.10g} to {round(high, decimals):.10g}"
+
+
+def bound(value: float, limit: float | Sequence[float]) -> str:
+    """A limit for `value`: `0 to 12`; of a magnitude the side of `value`, `at most 3` or `at least −3`."""
+    if isinstance(limit, Sequence):
+        return minus(f"{limit[0]:g} to {limit[1]:g}")
+    return f"at most {limit:g}" if value >= 0 else minus(f"at least {-limit:g}")
+
+
+# Units
+
+
+def unit(text: str) -> str:
+    """`V/g^2/sqrt(Hz)` as `V/g²/√Hz`, `degC` as `°C`; nothing for a pure number."""
+    text = text.replace("degC", "°C").replace("sqrt(Hz)", "√Hz").replace("sqrt(s)", "√s")
+    head, *powers = text.split("^")
+    return "" if text == "1" else head + "".join(p[:1].translate(SUPERSCRIPT) + p[1:] for p in powers)
+
+
+def prefixed(of: str, reach: float) -> tuple[float, str]:
+    """(factor, unit with prefix) for values up to `reach` in the unit `of`, as `unit` writes it."""
+    if not of.startswith(PREFIXED):
+        return 1.0, of
+    factor, prefix = next(((f, p) for f, p in PREFIXES if reach * f >= 1), PREFIXES[-1])
+    return factor, f"{prefix}{of}"
+
+
+def labelled(name: str, of: str) -> str:
+    """An axis label: the name with its unit, where it has one."""
+    return f"{name} ({of})" if of else name
+
+
+# Words
+
+
+def joined(names: Iterable[str], word: str = "and") -> str:
+    """`a`, `a and b`, `a, b and c`."""
+    names = list(names)
+    return f" {word} ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+
+
+def capital(text: str) -> str:
+    """The text with a capital first letter."""
+    return text[:1].upper() + text[1:]
+
+
+def unbroken(text: str) -> str:
+    """The text with no line break between a number and its unit."""
+    return re.sub(r"(?<=\d) (?=mg|×|±)|(?<=[×±]) (?=\d)", "\u00a0", text)
+
+
+def columns(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """A table for a terminal: columns aligned to the left, two spaces apart."""
+    cells = [tuple(head), *[tuple(str(cell) for cell in row) for row in rows]]
+    widths = [max(len(row[i]) for row in cells) for i in range(len(head))]
+    lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) for row in cells]
+    return "\n".join(line.rstrip() for line in lines)
+
+
+# Parts of numbers
+
+
+def exponent(value: float) -> int:
+    """The power of ten of the first digit."""
+    return math.floor(math.log10(abs(value)))
+
+
+def times_ten_to(power: int) -> str:
+    """` × 10⁻⁸`."""
+    return f" × 10{str(power).translate(SUPERSCRIPT)}"
+
+
+def minus(text: str) -> str:
+    """The text with true minus signs."""
+    return text.replace("-", "−")

@@ -1,1 +1,0 @@
-"""Anybody's files as our tables: columns named, units converted, doubts told."""

@@ -1,0 +1,187 @@
+"""MEAS/TE DPG2: digital level with two axes, at 9600 8N1.
+
+After power-on it talks unasked: `X=+01.234` CR LF `Y=-00.007` CR LF, in deg, again and again. Commands are single
+letters without an end of line: `s` stop (echoed), `S` start; when stopped `R` one reading, `V` version and serial.
+
+The driver stops it and asks for readings one by one. It takes the next whole pair of lines whatever comes before it,
+so a line joined in the middle, an echo inside one, or a level that did not hear the stop do no harm.
+
+Source: instruction manual of the DPG series, July 2015, 6.1 and 6.2. Beyond its range it shows `+++++++` or `-------`:
+so the manual of the same maker's P series, 5.7.4.2; for the DPG2 this is from memory, like its range.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivers.errors import BadFrame, InstrumentError, LinkTimeout, NotSettled
+from drivers.instrument import Check, Identity
+from drivers.transport import Address, Links
+from drivers.transport.link import Link
+
+STOP, ONE_READING, VERSION = b"s", b"R", b"V"
+PAIR = re.compile(rb"X=([+-]\d\d\.\d{2,3}|\+{6,7}|-{6,7})\r\nY=([+-]\d\d\.\d{2,3}|\+{6,7}|-{6,7})\r\n")
+NAMED = re.compile(rb"([A-Z][ -~]*)\r\nSN:([ -~]+)\r\n")
+RESOLUTION_DEG = 0.001
+QUIET_S = 0.3  # a free-running level is never silent for so long
+TIMEOUT_S = 0.5  # for one answer
+ATTEMPTS = 3  # every command of ours may be repeated
+REMEDY = "Check power and cable, and that the line has 9600 baud, 8 data bits and no parity"
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a reading is taken, and how far the level can be trusted. Raises ValueError for what cannot be."""
+
+    readings: int = 10  # that are averaged
+    interval_s: float = 0.1  # from one to the next
+    accuracy_deg: float = 0.1  # of the rig's level (Ang V)
+    unrest_deg: float = 0.02  # standard deviation of the readings above which the level still swings
+    patience_s: float = 10.0  # for it to come to rest
+    frozen: int = 30  # so many equal readings are one that has stuck
+    range_deg: float = 30.0  # each way; of the model NS-30 [M]
+
+    def __post_init__(self) -> None:
+        positive = ("interval_s", "accuracy_deg", "unrest_deg", "patience_s", "range_deg")
+        if wrong := [name for name in positive if not 0 < getattr(self, name) < math.inf]:
+            raise ValueError(f"{', '.join(wrong)} must be positive")
+        if not 1 <= self.readings < self.frozen:
+            raise ValueError("readings must be at least 1, and frozen more than readings")
+
+
+@dataclass(frozen=True)
+class Reading:
+    """Inclination of the level's axes, in deg, positive where the axis' positive end is up.
+
+    `std_deg` is the standard deviation of either mean, of `n` readings: from their scatter, and never less than that
+    of the last digit's rounding. `accuracy_deg` is what the level is trusted to beside it.
+    """
+
+    x_deg: float
+    y_deg: float
+    std_deg: float
+    n: int
+    accuracy_deg: float
+
+
+class Level:
+    """The level, silent except when it is asked."""
+
+    def __init__(self, link: Link, settings: Settings, name: str) -> None:
+        self.name = name
+        self.settings = settings
+        self._link, self._clock = link, link.clock
+        self._silence()
+
+    def identify(self) -> Identity:
+        """Version and serial number, as it tells them. Raises LinkTimeout, BadFrame."""
+        self._silence()
+        version, serial = self._ask(VERSION, NAMED, "version")
+        return Identity("MEAS DPG2", serial, version)
+
+    def self_test(self) -> list[Check]:
+        """Whether it shows an angle, at rest."""
+        try:
+            reading = self.read()
+        except InstrumentError as fault:
+            return [Check("reading", False, fault.what)]
+        shown = f"x {reading.x_deg:+.3f}, y {reading.y_deg:+.3f} deg, standard deviation {reading.std_deg:.4f} deg"
+        return [Check("reading", True, shown)]
+
+    def close(self) -> None:
+        """Nothing to release: the wire belongs to the bench."""
+
+    def read(self) -> Reading:
+        """The mean of `settings.readings` readings, once they agree.
+
+        Raises:
+            NotSettled: the level still swings when the patience is over.
+            InstrumentError: it is beyond its range, or its reading has stuck.
+            LinkTimeout, BadFrame: it is silent, or what comes are no readings.
+        """
+        self._silence()
+        deadline, taken = self._clock.now() + self.settings.patience_s, [self._one()]
+        while not self._settled(taken, deadline):
+            self._clock.sleep(self.settings.interval_s)
+            taken.append(self._one())
+        return self._mean(taken[-self.settings.readings :])
+
+    def _mean(self, taken: list[tuple[float, float]]) -> Reading:
+        x_deg, y_deg = np.mean(taken, axis=0)
+        std_deg = max(_std_deg(taken) / math.sqrt(len(taken)), RESOLUTION_DEG / math.sqrt(12))
+        return Reading(float(x_deg), float(y_deg), std_deg, len(taken), self.settings.accuracy_deg)
+
+    def _settled(self, taken: list[tuple[float, float]], deadline: float) -> bool:
+        """Whether the last readings make a mean; raises once they should. One and the same is not settled but stuck."""
+        recent = taken[-self.settings.readings :]
+        if len(recent) < self.settings.readings:
+            return False
+        if (scatter_deg := _std_deg(recent)) > self.settings.unrest_deg:
+            if self._clock.now() <= deadline:
+                return False
+            raise NotSettled(
+                f"{self.name}: after {self.settings.patience_s:g} s readings still scatter by {scatter_deg:.3f} deg",
+                "Wait until the plate stands still, and keep machines that shake it away",
+            )
+        if len(taken) >= self.settings.frozen and len(set(taken[-self.settings.frozen :])) == 1:
+            raise self._stuck(*taken[-1])
+        return len(recent) == 1 or len(set(recent)) > 1
+
+    def _stuck(self, x_deg: float, y_deg: float) -> InstrumentError:
+        return InstrumentError(
+            f"{self.name}: x {x_deg:+.3f}, y {y_deg:+.3f} deg came {self.settings.frozen} times in a row",
+            "Switch the level off and on; if it is a quiet one, set `frozen` higher in the bench file",
+        )
+
+    def _one(self) -> tuple[float, float]:
+        """One reading. Raises InstrumentError beyond the range."""
+        shown = self._ask(ONE_READING, PAIR, "reading")
+        for axis, text in zip("xy", shown, strict=True):
+            if not text[-1].isdigit():
+                raise InstrumentError(
+                    f"{self.name}: the {axis} axis is beyond its range of {self.settings.range_deg:g} deg ({text})",
+                    "Turn alpha to 0, and see that the level lies flat on the table",
+                )
+        return float(shown[0]), float(shown[1])
+
+    def _silence(self) -> None:
+        """Stop it, and throw away what it was saying. Whether it heard that, the next answer tells."""
+        self._link.write(STOP)
+        self._link.discard(QUIET_S)
+
+    def _ask(self, command: bytes, answer: re.Pattern[bytes], what: str) -> tuple[str, str]:
+        """The two parts of the first whole `answer`. Raises LinkTimeout after silence, BadFrame after other bytes."""
+        heard = b""
+        for _ in range(ATTEMPTS):
+            self._link.discard()  # a late answer, or what a level says that did not hear the stop
+            self._link.write(command)
+            heard, found = self._listen(answer)
+            if found:
+                return found[1].decode(), found[2].decode()
+        where = f"{self.name}: asking for its {what} ({command.decode()}) on {self._link.url}"
+        if heard:
+            raise BadFrame(f"{where}: {len(heard)} bytes came that are none ({heard[:24]!r})", REMEDY)
+        raise LinkTimeout(f"{where}: no answer within {TIMEOUT_S:g} s, {ATTEMPTS} times", REMEDY)
+
+    def _listen(self, answer: re.Pattern[bytes]) -> tuple[bytes, re.Match[bytes] | None]:
+        """What is heard until the whole answer is there, or time is over."""
+        heard, deadline = b"", self._clock.now() + TIMEOUT_S
+        while (left_s := deadline - self._clock.now()) > 0 and (more := self._link.read(left_s)):
+            heard += more
+            if found := answer.search(heard):
+                return heard, found
+        return heard, None
+
+
+def _std_deg(taken: list[tuple[float, float]]) -> float:
+    """Standard deviation of single readings, both axes pooled; 0 for one reading."""
+    return float(np.sqrt(np.var(taken, axis=0, ddof=1).mean())) if len(taken) > 1 else 0.0
+
+
+def connect(address: Address, links: Links, settings: Settings, name: str) -> Level:
+    """The level at `address`, which falls silent. Raises LinkRefused when its wire cannot be opened."""
+    return Level(links.link(address.url, name), settings, name)

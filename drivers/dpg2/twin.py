@@ -1,0 +1,129 @@
+"""The simulated DPG2: talks unasked until it is stopped, and shows what the world's level does."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+from drivers.dpg2.driver import ONE_READING, STOP, VERSION, Settings
+from drivers.transport.address import Address
+from drivers.transport.faults import Faults, Kind
+from drivers.transport.server import Connection, Port, Server
+
+LISTEN = "pty:?baud=9600"
+FAULTS = {
+    "lies": Kind("shows this much more along x", 1.0, "deg"),
+    "stale": Kind("shows again and again what it showed"),
+    "out-of-range": Kind("shows that it is beyond its range"),
+    "deaf": Kind("talks on when it is told to stop"),
+    "restart": Kind("is without power for a moment: talks unasked, once"),
+}
+INTERVAL_S = 0.1  # from one pair of lines to the next [M]
+THINKING_S = 0.002  # [M]
+START = b"S"
+WHO = b"DPL2 V1.8.0\r\nSN:123456789\r\n"
+
+
+class World(Protocol):
+    """What a level knows of physics."""
+
+    @property
+    def now_s(self) -> float: ...
+
+    def advance(self, t_s: float) -> None: ...
+
+    def level_deg(self) -> tuple[float, float]: ...
+
+
+class Inclinometer:
+    """One level on a line of its own. Wakes talking; nobody hears what it says into an open line, or a full one."""
+
+    def __init__(self, world: World, settings: Settings, port: Port) -> None:
+        self.faults = Faults()
+        self._world, self._range_deg, self._port = world, settings.range_deg, port
+        self._running, self._next_s = True, 0.0
+        port.answer = self._answer
+
+    def advance(self, now_s: float) -> None:
+        """The level is the world's; it looks at it only when it speaks, since the converter may still be sampling."""
+        if strike := self.faults.once("restart", now_s):
+            self._running, self._next_s = True, max(strike.at_s, self._next_s)
+
+    def speak(self, now_s: float) -> None:
+        """Say what is due by `now_s`."""
+        while self._running and self._next_s <= now_s:
+            if listeners := [c for c in self._port.connections.values() if self._heard_all(c)]:
+                lines = self._reading(self._next_s)
+                for connection in listeners:
+                    self._say(connection, lines, self._next_s)
+            self._next_s += INTERVAL_S
+
+    def due_s(self) -> float:
+        return self._next_s if self._running else math.inf
+
+    def state(self) -> dict[str, Any]:
+        return {"running": self._running, "next_s": self._next_s}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        self._running, self._next_s = state["running"], state["next_s"]
+
+    def _answer(self, connection: Connection, now_s: float) -> None:
+        """Obey letter by letter; it does not know most of them, and but two of them while it talks."""
+        for letter in bytes(connection.inbox):
+            self._obey(bytes([letter]), connection, now_s)
+        connection.inbox.clear()
+
+    def _obey(self, letter: bytes, connection: Connection, now_s: float) -> None:
+        began_s = now_s + self._port.timing.character_s + THINKING_S
+        if letter == STOP:
+            self._running = self.faults.size("deaf", now_s) is not None
+            self._say(connection, [STOP], began_s)
+        elif letter == START:
+            self._running, self._next_s = True, began_s
+        elif letter == ONE_READING and not self._running:
+            self._say(connection, self._reading(now_s), began_s)
+        elif letter == VERSION and not self._running:
+            self._say(connection, WHO.splitlines(keepends=True), began_s)
+
+    def _reading(self, t_s: float) -> list[bytes]:
+        """Both lines at `t_s`, or as soon after it as the world still can."""
+        self._world.advance(max(t_s, self._world.now_s))
+        x_deg, y_deg = self.faults.held("stale", t_s, list(self._world.level_deg()))
+        x_deg += self.faults.size("lies", t_s) or 0.0
+        if self.faults.size("out-of-range", t_s) is not None:
+            x_deg = 2 * self._range_deg
+        return [f"{axis}={self._shown(deg)}\r\n".encode() for axis, deg in (("X", x_deg), ("Y", y_deg))]
+
+    def _shown(self, deg: float) -> str:
+        return f"{deg:+07.3f}" if abs(deg) <= self._range_deg else 7 * "+-"[deg < 0]
+
+    def _heard_all(self, connection: Connection) -> bool:
+        """Whether what was said before has gone out by now."""
+        connection.emit(self._next_s)
+        return not connection.is_behind(self._next_s)
+
+    def _say(self, connection: Connection, lines: list[bytes], began_s: float) -> None:
+        """Send line by line, each when its last character is through."""
+        for line in lines:
+            began_s += len(line) * self._port.timing.character_s
+            connection.send(line, began_s)
+
+
+class LevelServer(Server):
+    """A server whose twins speak when all others have caught up with the time."""
+
+    def __init__(self, ports: Mapping[str, Port], twins: Mapping[str, Inclinometer]) -> None:
+        super().__init__(list(ports.values()), twins, {role: Address(port.url) for role, port in ports.items()})
+        self._levels = twins
+
+    def emit(self, now_s: float) -> None:
+        for level in self._levels.values():
+            level.speak(now_s)
+        super().emit(now_s)
+
+
+def serve(world: World, roles: Mapping[str, tuple[int, Settings]], listen: str = LISTEN) -> LevelServer:
+    """A line with a level for each role: role -> (unit id, which such a level has not, settings)."""
+    ports = {role: Port(listen) for role in roles}
+    return LevelServer(ports, {role: Inclinometer(world, roles[role][1], port) for role, port in ports.items()})

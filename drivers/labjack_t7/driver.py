@@ -1,0 +1,297 @@
+"""LabJack T7: 16 bit converter, up to ten channels in turn, streamed. Modbus TCP and a raw stream port.
+
+A record comes as a stream, clocked by the device; never sample by sample. Every record is checked for
+lost scans and turned into volts with the calibration that the device carries.
+Source: T-series datasheet; see labjack_t7_table and labjack_t7_stream.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Generator, Mapping, Sequence
+from copy import copy
+from dataclasses import dataclass, field, replace
+from typing import TypeVar
+from urllib.parse import urlsplit
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.errors import DriverError, Interlocked, LimitError, OverRange, Refused, StreamError
+from drivers.instrument import Check, Identity
+from drivers.labjack_t7 import registers as t7
+from drivers.labjack_t7.stream import Calibration, Reception
+from drivers.transport import Address, Links
+from drivers.transport.link import Link
+from drivers.transport.modbus import Register, Unit
+
+Read = TypeVar("Read")
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Channels as {name: AIN number}, in the order of the scan; one range for all.
+
+    Those `on_request` are wired too, and are sampled only for who asks for them, see `T7.only`.
+    `interchannel_s` is from one channel of a scan to the next [M: measure it with one signal on two channels].
+    `interlocks` are the digital lines of contacts that must be closed while anything moves, as {name: DIO number}. A
+    closed contact pulls its line to ground; an open one, or a broken wire, lets it go high.
+    Raises ValueError for what no T7 has or can do.
+    """
+
+    channels: Mapping[str, int] = field(default_factory=lambda: {"vx": 0, "vy": 1, "supply": 2})
+    on_request: Mapping[str, int] = field(default_factory=dict)
+    rate_hz: float = 1000.0
+    range_v: float = 10.0
+    power_dio: int | None = None  # the digital line that switches the sensor's power
+    interchannel_s: float = t7.INTERCHANNEL_S
+    interlocks: Mapping[str, int] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not self.channels or not set(self.wired.values()) <= set(range(t7.INPUTS)):
+            raise ValueError(f"channels must name analog inputs, 0 to {t7.INPUTS - 1}, and at least one")
+        if twice := self.channels.keys() & self.on_request.keys():
+            raise ValueError(f"{', '.join(sorted(twice))} is a channel anyway; leave it out of on_request")
+        if not 0 < self.rate_hz * len(self.channels) <= t7.MOST_SAMPLES_PER_S:
+            raise ValueError(f"rate_hz must give at most {t7.MOST_SAMPLES_PER_S} samples a second in all")
+        if self.range_v not in t7.RANGES_V:
+            raise ValueError(f"range_v must be one of {', '.join(f'{r:g}' for r in t7.RANGES_V)} V")
+        if self.power_dio is not None and self.power_dio not in range(t7.LINES):
+            raise ValueError(f"power_dio must be a digital line, 0 to {t7.LINES - 1}")
+        lines = [*self.interlocks.values(), *([] if self.power_dio is None else [self.power_dio])]
+        if not set(lines) <= set(range(t7.LINES)) or len(set(lines)) < len(lines):
+            raise ValueError(f"interlocks must be digital lines, 0 to {t7.LINES - 1}, each with one purpose")
+        if not self.interchannel_s >= 0:
+            raise ValueError("interchannel_s must be a time of 0 s or more")
+
+    @property
+    def wired(self) -> Mapping[str, int]:
+        """All inputs by name: the channels, and those on request."""
+        return {**self.channels, **self.on_request}
+
+    def only(self, name: str, outputs: Sequence[str]) -> Settings:
+        """Settings of a converter `name` whose channels are these; of a batch `a1.mx`, `a2.mx` are both `mx`.
+
+        Raises LimitError for an output that no input is wired to.
+        """
+        chosen = {each: k for each, k in self.wired.items() if each.rpartition(".")[2] in outputs}
+        if missing := [each for each in outputs if each not in {key.rpartition(".")[2] for key in chosen}]:
+            raise LimitError(
+                f"{name}: no input is wired to {', '.join(missing)}; there are {', '.join(self.wired)}",
+                "Name the inputs in the bench file, under channels or on_request of the converter's settings",
+            )
+        return replace(self, channels=chosen, on_request={})
+
+    def lag_s(self, channel: str) -> float:
+        """How long after the beginning of a scan this channel is sampled."""
+        return list(self.channels).index(channel) * self.interchannel_s
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """A record: `volts` of shape (n, channels), the first scan at `start_s` of the clock."""
+
+    volts: NDArray[np.float64]
+    channels: tuple[str, ...]
+    rate_hz: float
+    start_s: float
+
+
+class T7:
+    """The converter. Its calibration is read once, when it is connected."""
+
+    def __init__(self, unit: Unit, stream: Link, settings: Settings) -> None:
+        self.name = unit.name
+        self.settings = settings
+        self._unit, self._stream, self._clock = unit, stream, stream.clock
+        self._prepare_inputs()
+        self._calibration = self._read_calibration()
+        self._volts = self._calibration.table()
+
+    def identify(self) -> Identity:
+        """Product, serial number and firmware out of the device."""
+        product = self._unit.read(t7.PRODUCT_ID)
+        serial, firmware = self._unit.read(t7.SERIAL_NUMBER), self._unit.read(t7.FIRMWARE)
+        return Identity(f"LabJack T{product:.0f}", f"{serial:.0f}", f"{firmware:.4f}")
+
+    def self_test(self) -> list[Check]:
+        """The test register, the model, the calibration."""
+        test, product = int(self._unit.read(t7.TEST)), self._unit.read(t7.PRODUCT_ID)
+        c, contacts = self._calibration, self._open_interlocks() if self.settings.interlocks else None
+        told = f"open: {', '.join(contacts)}" if contacts else "closed"
+        return [
+            Check("registers", test == t7.TEST_VALUE, f"TEST reads 0x{test:08X}"),
+            Check("model", product == 7.0, f"product {product:g}"),
+            Check("calibration", c.plausible, f"{c.positive_slope * 1e6:.3f} uV a code, center {c.center:.1f}"),
+            *([] if contacts is None else [Check("interlocks", not contacts, told)]),
+        ]
+
+    def close(self) -> None:
+        """Nothing to release: the wires belong to the bench."""
+
+    def read_volts(self, name: str) -> float:
+        """One reading of one channel, in V."""
+        return self._unit.read(t7.ain(self._input(name)))
+
+    def power(self, on: bool) -> None:
+        """Switch the sensor's power by the digital line of the settings."""
+        if self.settings.power_dio is None:
+            raise LimitError(f"{self.name}: no line switches the power", "Set power_dio in the bench file")
+        self._unit.write(t7.dio(self.settings.power_dio), int(on))
+
+    def look(self) -> None:
+        """Raises Interlocked where a contact that must be closed is open: what others look at while they wait."""
+        if self.settings.interlocks and (contacts := self._open_interlocks()):
+            lines = ", ".join(f"{name} (DIO{self.settings.interlocks[name]})" for name in contacts)
+            raise Interlocked(
+                f"{self.name}: the interlock {lines} is open",
+                "Pull out the emergency stop and close the guards; when nobody is near, resume the run",
+            )
+
+    def _open_interlocks(self) -> list[str]:
+        state = int(self._unit.read(t7.LINES_STATE))
+        return [name for name, line in self.settings.interlocks.items() if state >> line & 1]
+
+    def only(self, *outputs: str) -> T7:
+        """The same device with these channels and no others. Raises LimitError for one that is not wired."""
+        chosen = copy(self)
+        chosen.settings = self.settings.only(self.name, outputs)
+        return chosen
+
+    def acquire(self, duration_s: float) -> Samples:
+        """Record all channels for `duration_s`, rounded to whole scans; raises as `stream`."""
+        (samples,) = self.stream(duration_s, duration_s)
+        return samples
+
+    def acquire_with(self, duration_s: float, reading: Callable[[], Read]) -> tuple[Samples, Read]:
+        """The same, and what `reading` gives in the middle of it, while the device records on."""
+        with contextlib.closing(self.stream(duration_s, duration_s / 2)) as stream:
+            blocks = [next(stream)]
+            read = reading()
+            blocks += stream
+        return _joined(blocks), read
+
+    def acquire_watched(self, duration_s: float, watch: Callable[[], object], every_s: float) -> Samples:
+        """The same as `acquire`; `watch` is called about every `every_s`, and at the end. What it raises ends it."""
+        blocks = []
+        with contextlib.closing(self.stream(duration_s, every_s)) as stream:
+            for block in stream:
+                watch()
+                blocks.append(block)
+        return _joined(blocks)
+
+    def stream(self, duration_s: float, block_s: float) -> Generator[Samples, None, None]:
+        """Record all channels for `duration_s` without a gap, and hand it out in blocks of `block_s`.
+
+        Both are rounded to whole scans; the last block holds what is left. The device takes one record, so the
+        samples are the same whatever `block_s` is. Take the next block within a few seconds, before the
+        buffers of network and device are full. Closing the iterator ends the stream.
+
+        Raises StreamError when scans were lost, OverRange when a channel was at an end of its range, LinkTimeout,
+        Refused when the device declines the settings.
+        """
+        channels, scans, block = tuple(self.settings.channels), self._scans(duration_s), self._scans(block_s)
+        per_packet = _scans_per_packet(scans, len(channels))
+        self._configure(per_packet * len(channels))
+        self._stream.discard()
+        start_s = self._clock.now()
+        self._write_block((t7.ENABLE, 1))
+        try:
+            rate_hz = self._unit.read(t7.ACTUAL_RATE)
+            reception = Reception(self._stream, self.name, start_s, rate_hz, len(channels), per_packet)
+            for first in range(0, scans, block):
+                codes = reception.take(min(block, scans - first))
+                self._require_in_range(codes, channels)
+                yield Samples(self._volts[codes], channels, rate_hz, start_s + first / rate_hz)
+        except BaseException:
+            with contextlib.suppress(DriverError):  # what went wrong first is to be told
+                self._stop()
+            raise
+        self._stop()
+
+    def _require_in_range(self, codes: NDArray[np.uint16], channels: tuple[str, ...]) -> None:
+        """A sample at an end of the range stands for any voltage beyond it, and its mean for none at all."""
+        if codes.min() > 0 and codes.max() < t7.HIGHEST_CODE:
+            return
+        count = np.count_nonzero((codes == 0) | (codes == t7.HIGHEST_CODE), axis=0)
+        name, clipped = channels[int(np.argmax(count))], int(count.max())
+        raise OverRange(
+            f"{self.name}: {name} (AIN{self.settings.channels[name]}) was beyond its range of "
+            f"{self.settings.range_v:g} V in {clipped} of {len(codes)} samples",
+            "Check the sensor's supply and wiring, or set a wider range_v in the bench file",
+        )
+
+    def _scans(self, duration_s: float) -> int:
+        return max(1, round(duration_s * self.settings.rate_hz))
+
+    def _configure(self, samples_per_packet: int) -> None:
+        inputs = list(self.settings.channels.values())
+        self._write_block(
+            (t7.SCAN_RATE, self.settings.rate_hz),
+            (t7.NUM_ADDRESSES, len(inputs)),
+            (t7.SAMPLES_PER_PACKET, samples_per_packet),
+            (t7.SETTLING, 0),
+            (t7.RESOLUTION, 0),
+            (t7.BUFFER_SIZE, t7.LARGEST_BUFFER),
+            (t7.CLOCK_SOURCE, 0),
+            (t7.AUTO_TARGET, t7.TO_ETHERNET),
+            (t7.DATATYPE, 0),
+            (t7.NUM_SCANS, 0),
+        )
+        self._write_block(*((t7.scan_list(k), t7.ain(number).address) for k, number in enumerate(inputs)))
+
+    def _stop(self) -> None:
+        """Stop the stream. What is still on its way comes before the next one is set up, and is dropped then."""
+        with contextlib.suppress(Refused):  # it has stopped by itself
+            self._unit.write(t7.ENABLE, 0)
+
+    def _write_block(self, *values: tuple[Register, float]) -> None:
+        """As the unit's, but a refusal is explained in the device's own words."""
+        try:
+            self._unit.write_block(*values)
+        except Refused as refused:
+            detail = int(self._unit.read(t7.LAST_ERROR))
+            why = t7.ERRORS.get(detail, "see the list of error codes in its datasheet")
+            raise Refused(f"{refused.what}; device error {detail}: {why}", refused.remedy, refused.code) from refused
+
+    def _prepare_inputs(self) -> None:
+        """End a stream that a dead program left behind; ranges and ground of all that is wired."""
+        self._stop()
+        for number in self.settings.wired.values():
+            self._unit.write(t7.ain_range(number), self.settings.range_v)
+            self._unit.write(t7.ain_negative(number), t7.SINGLE_ENDED)
+
+    def _read_calibration(self) -> Calibration:
+        self._unit.write(t7.FLASH_POINTER, t7.CALIBRATION_ADDRESS)
+        words = self._unit.read_words(t7.FLASH, t7.CALIBRATION_WORDS, "the calibration in flash")
+        calibration = Calibration.from_flash(words, self.settings.range_v)
+        if not calibration.plausible:
+            raise StreamError(f"{self.name}: its calibration is {calibration}", "Have the device calibrated")
+        return calibration
+
+    def _input(self, name: str) -> int:
+        if name not in self.settings.channels:
+            known = ", ".join(self.settings.channels)
+            raise LimitError(f"{self.name}: no channel {name!r}; there are {known}", "Correct the name")
+        return self.settings.channels[name]
+
+
+def _joined(blocks: Sequence[Samples]) -> Samples:
+    first = blocks[0]
+    volts = np.concatenate([block.volts for block in blocks])
+    return Samples(volts, first.channels, first.rate_hz, first.start_s)
+
+
+def _scans_per_packet(scans: int, channels: int) -> int:
+    """Large packets, of a size that lets the last one end with the record or soon after: nobody waits for more."""
+    most = min(scans, t7.MOST_SAMPLES_PER_PACKET // channels)
+    return min(range(most, most // 2, -1), key=lambda size: -scans % size)
+
+
+def connect(address: Address, links: Links, settings: Settings, name: str) -> T7:
+    """The converter at `address`; its stream is on port 702 of the same host unless `stream_url` says else.
+
+    Raises LinkRefused when a port cannot be opened, and the errors of a first exchange.
+    """
+    stream_url = address.stream_url or f"tcp://{urlsplit(address.url).hostname}:{t7.STREAM_PORT}"
+    return T7(links.unit(address, name), links.link(stream_url, name), settings)

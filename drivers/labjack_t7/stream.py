@@ -1,0 +1,207 @@
+"""LabJack T7: the receiving end of a running stream. Bytes are fetched as they fall due, scans come out.
+
+It waits in bounded time: bytes are due at the rate of the stream, and a device that is late by PATIENCE_S is silent.
+One whose last bytes come late, though none is missing, has not sampled all the time: its clock stood still, or it left
+out scans and did not tell. So the end of what is asked for is compared with the computer's own clock.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.errors import LinkTimeout, StreamError
+from drivers.labjack_t7.registers import RANGES_V
+from drivers.transport.link import Link
+
+# LabJack T7: stream packets, and volts out of codes by the device's own calibration.
+#
+# Packet  `>HHHBBBBHHH`: transaction, 0, length (10 + data bytes), unit 1, function 76, type 16, reserved,
+#         backlog in bytes, status, additional information; then the samples as U16.
+# Source  T-series datasheet, stream mode and analog input calibration.
+
+HEADER_BYTES = 16
+UNIT, FUNCTION, KIND = 1, 76, 16
+RECOVERING, RECOVERED, OVERLAP, SKIP_OVERFLOW, BURST_COMPLETE, BUFFER_FULL = range(2940, 2946)
+STATUS = {
+    RECOVERING: "its buffer ran over and it began to skip scans",
+    RECOVERED: "its buffer ran over and it skipped {additional} scans",
+    OVERLAP: "scans overlapped: the channels take longer than one scan",
+    SKIP_OVERFLOW: "it lost count of the scans it skipped",
+    BUFFER_FULL: "its buffer ran over and the stream stopped",
+}
+REMEDY = "Lower the rate or the number of channels, or free the network between device and computer"
+
+
+def packet_type(samples: int) -> np.dtype[np.void]:
+    """The layout of one packet of `samples` samples."""
+    header = [("transaction", ">u2"), ("protocol", ">u2"), ("length", ">u2"), ("unit", "u1"), ("function", "u1")]
+    rest = [("kind", "u1"), ("reserved", "u1"), ("backlog", ">u2"), ("status", ">u2"), ("additional", ">u2")]
+    return np.dtype([*header, *rest, ("samples", ">u2", (samples,))])
+
+
+class Packets:
+    """The packets of one stream, `samples` samples in each: bytes in, codes out, and nothing missing in between."""
+
+    def __init__(self, samples: int, name: str) -> None:
+        self.layout = packet_type(samples)
+        self._name = name
+        self._seen = 0
+        self._rest = b""
+        self._last = np.empty(0, np.int64)  # transaction number of the last packet seen
+
+    def codes(self, data: bytes | bytearray) -> NDArray[np.uint16]:
+        """The samples of all packets that `data` completes, one after the other.
+
+        Raises StreamError when the device reports lost scans, a packet is missing, or one is not of this stream.
+        """
+        data = self._rest + data
+        packets = np.frombuffer(data, self.layout, count=len(data) // self.layout.itemsize)
+        self._rest = bytes(data[len(packets) * self.layout.itemsize :])
+        self._require_ours(packets)
+        self._require_no_loss(packets)
+        self._require_all(packets["transaction"].astype(np.int64))
+        self._seen += len(packets)
+        return packets["samples"].astype(np.uint16).ravel()
+
+    def _require_ours(self, packets: NDArray[np.void]) -> None:
+        expected = (0, self.layout.itemsize - 6, UNIT, FUNCTION, KIND)
+        fields = ("protocol", "length", "unit", "function", "kind")
+        for field, value in zip(fields, expected, strict=True):
+            if (wrong := np.flatnonzero(packets[field] != value)).size:
+                found = f"packet {self._seen + wrong[0]} has {field} {packets[field][wrong[0]]} instead of {value}"
+                raise StreamError(f"{self._name}: {found}", "Let no other program use the device's stream, then repeat")
+
+    def _require_no_loss(self, packets: NDArray[np.void]) -> None:
+        status = packets["status"]
+        if (bad := np.flatnonzero((status != 0) & (status != BURST_COMPLETE))).size:
+            packet = packets[bad[-1]]
+            words = STATUS.get(int(packet["status"]), "it reports status {status}")
+            raise StreamError(
+                f"{self._name}: {words.format(additional=packet['additional'], status=packet['status'])} "
+                f"(status {packet['status']} in packet {self._seen + bad[-1]})",
+                REMEDY,
+            )
+
+    def _require_all(self, transactions: NDArray[np.int64]) -> None:
+        numbers = np.concatenate([self._last, transactions])
+        steps = np.mod(np.diff(numbers), 65536)
+        if (gaps := np.flatnonzero(steps != 1)).size:
+            step, before = int(steps[gaps[0]]), self._seen - len(self._last) + gaps[0]
+            wrong = "are missing" if 1 < step < 32768 else "come twice or out of order"
+            raise StreamError(f"{self._name}: packets {wrong} after packet {before} of the record", REMEDY)
+        self._last = numbers[-1:]
+
+
+def codes_of(data: bytes | bytearray, samples: int, name: str) -> NDArray[np.uint16]:
+    """The samples of all whole packets in `data`; raises StreamError as `Packets.codes`."""
+    return Packets(samples, name).codes(data)
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """One range of the converter: slopes in V per code above and below the center."""
+
+    positive_slope: float
+    negative_slope: float
+    center: float
+    offset: float
+
+    @classmethod
+    def from_flash(cls, words: Sequence[int], range_v: float) -> Calibration:
+        """Of the fast converter, out of the words read from flash."""
+        constants = struct.unpack(f">{len(words) // 2}f", struct.pack(f">{len(words)}H", *words))
+        first = 4 * RANGES_V.index(range_v)
+        return cls(*constants[first : first + 4])
+
+    @property
+    def plausible(self) -> bool:
+        """Whether slopes and center are those of a sound device: equal within 1 %, mid-scale within 5 %."""
+        slopes = self.positive_slope > 0 and abs(self.negative_slope / self.positive_slope + 1) < 0.01
+        return slopes and abs(self.center / 33523 - 1) < 0.05
+
+    def table(self) -> NDArray[np.float64]:
+        """Volts of every code, shape (65536,)."""
+        distance = np.arange(65536) - self.center
+        return np.where(distance < 0, -distance * self.negative_slope, distance * self.positive_slope)
+
+
+GATHER_BYTES = 32768  # let this much arrive before it is read: well within any receive buffer
+PATIENCE_S = 1.0  # beyond the time at which the bytes were due
+LATE_S = 0.25  # what network and computer may hold up bytes that are on their way
+CLOCKS_APART = 1e-4  # how much faster one of two quartz clocks may run
+
+
+class Reception:
+    """Scans of `channels` samples of a stream that was started at `start_s`, in packets of `per_packet` scans."""
+
+    def __init__(
+        self, link: Link, name: str, start_s: float, rate_hz: float, channels: int, per_packet: int
+    ) -> None:  # fmt: skip
+        self._link, self._name, self._start_s, self._channels = link, name, start_s, channels
+        self._per_packet, self._packet_s = channels * per_packet, per_packet / rate_hz
+        self._packets = Packets(self._per_packet, name)
+        self._size = self._packets.layout.itemsize
+        self._data = bytearray()  # fetched, not yet decoded
+        self._decoded = 0  # packets
+        self._codes = np.empty(0, np.uint16)  # decoded, not yet taken
+        self._late_s = 0.0  # how much later the last bytes came than they were due
+
+    def take(self, scans: int) -> NDArray[np.uint16]:
+        """The codes of the next `scans` scans, shape (scans, channels).
+
+        Raises LinkTimeout when they do not come, StreamError when some were lost or are not of their time.
+        """
+        samples = scans * self._channels
+        if (missing := samples - len(self._codes)) > 0:
+            self._codes = np.concatenate([self._codes, self._decode(-(-missing // self._per_packet))])
+            self._require_in_time()
+        taken, self._codes = self._codes[:samples], self._codes[samples:]
+        return taken.reshape(scans, self._channels)
+
+    def _decode(self, packets: int) -> NDArray[np.uint16]:
+        """The samples of the next `packets` packets, fetched a good many at a time."""
+        at_once = max(1, GATHER_BYTES // self._size)
+        for done in range(0, packets, at_once):
+            self._fetch(min(packets, done + at_once))
+        end = packets * self._size
+        data, self._data = self._data[:end], self._data[end:]
+        self._decoded += packets
+        return self._packets.codes(data)
+
+    def _fetch(self, packets: int) -> None:
+        """Wait until `packets` packets are there."""
+        clock, wanted = self._link.clock, packets * self._size
+        due_s = self._start_s + (self._decoded + packets) * self._packet_s
+        clock.sleep(due_s - clock.now())
+        asked_s = max(due_s, clock.now())  # who asks late has not been kept waiting
+        deadline = clock.now() + PATIENCE_S + self._drift_s()
+        while len(self._data) < wanted:
+            more = self._link.read(deadline - clock.now())
+            if not more:
+                self._complain(wanted)
+            self._data += more
+            self._late_s = clock.now() - asked_s
+
+    def _drift_s(self) -> float:
+        """How far the clocks of device and computer may have run apart since the start."""
+        return CLOCKS_APART * (self._link.clock.now() - self._start_s)
+
+    def _require_in_time(self) -> None:
+        if self._late_s > LATE_S + self._drift_s():
+            raise StreamError(
+                f"{self._name}: scans came {self._late_s:.2f} s later than the rate of the stream says",
+                "Find out whether its clock stood still or it left out scans, and what keeps network or computer busy",
+            )
+
+    def _complain(self, wanted: int) -> None:
+        self._packets.codes(self._data)  # the status of what came may say why
+        before = self._decoded * self._size
+        raise LinkTimeout(
+            f"{self._name}: the stream fell silent after {before + len(self._data)} of {before + wanted} bytes",
+            "Check network and power of the device, and that no other program uses its stream",
+        )

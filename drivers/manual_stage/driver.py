@@ -1,0 +1,139 @@
+"""A rotary stage that is turned by hand to an angle on its dial: the stages of Ang V, resolution 5 arcmin.
+
+A person is its motor and its encoder: they are asked to set an angle, and confirm it, or type what the dial shows
+instead. What they read is what counts. A dial is absolute, so there is no homing; and a hand that is told nothing
+turns nothing, so there is nothing to stop.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NoReturn
+
+from drivers.errors import LimitError, LinkRefused, NotSettled
+from drivers.instrument import Check, Identity
+from drivers.manual_stage.person import PERSON, PersonLink
+from drivers.transport import Address, Links
+
+UNIT = "deg"
+
+
+@dataclass(frozen=True)
+class Settings:
+    """One stage: its dial, how near to the asked angle a reading must be, its limits, how long a move takes a person.
+
+    Raises ValueError for what no stage can be.
+    """
+
+    resolution_deg: float = 5 / 60  # of the dial
+    tolerance_deg: float = 0.5
+    limits_deg: tuple[float, float] = (-400.0, 400.0)
+    seconds_per_move: float = 20.0
+
+    def __post_init__(self) -> None:
+        positive = ("resolution_deg", "tolerance_deg", "seconds_per_move")
+        if wrong := [name for name in positive if not 0 < getattr(self, name) < math.inf]:
+            raise ValueError(f"{', '.join(wrong)} must be positive")
+        if self.tolerance_deg < self.resolution_deg:
+            raise ValueError("tolerance_deg must not be less than resolution_deg")
+        if not self.limits_deg[0] < self.limits_deg[1]:
+            raise ValueError("limits_deg must be the lower limit, then the upper one")
+
+    def move_s(self, distance_deg: float) -> float:  # noqa: ARG002 a hand is as quick on any way
+        """How long a move takes."""
+        return self.seconds_per_move
+
+    def rate_deg_s(self, asked_deg_s: float) -> float:
+        """The rate asked for: `way_of_turn` refuses it."""
+        return asked_deg_s
+
+    def way_of_turn(self, name: str, rate_deg_s: float, first_deg: float, last_deg: float) -> NoReturn:
+        """Raises LimitError: no hand turns at a constant rate."""
+        raise LimitError(
+            f"{name}: is turned by hand, not at a constant {rate_deg_s:g} deg/s from {first_deg:g} to {last_deg:g} deg",
+            "Use a stage with a motor for this procedure",
+        )
+
+
+class ManualStage:
+    """A stage that stands where a person says it stands."""
+
+    def __init__(self, person: PersonLink, settings: Settings, name: str) -> None:
+        self.name = name
+        self.settings = settings
+        self._person = person
+        self._set_deg = math.nan
+        self.read_deg: float | None = None  # what the dial showed last
+
+    def identify(self) -> Identity:
+        """Nobody is asked: a dial has no name."""
+        return Identity("stage turned by hand")
+
+    def self_test(self) -> list[Check]:
+        """What there is to know without asking anybody."""
+        return [Check("dial", True, f"read by a person to {60 * self.settings.resolution_deg:g} arcmin")]
+
+    def close(self) -> None:
+        """Nothing to release."""
+
+    def angle_deg(self) -> float:
+        """What the dial showed last; a person is asked where nobody has read it yet."""
+        if self.read_deg is None:
+            low, high = self.settings.limits_deg
+            text = f"What does the dial of {self.name} show?"
+            self.read_deg = self._person.ask(f"{self.name}-dial", text, UNIT, low, high)
+        return self.read_deg
+
+    def referenced(self) -> bool:
+        """A dial knows where zero is."""
+        return True
+
+    def home(self) -> None:
+        """There is nothing to seek."""
+
+    def move_to(self, angle_deg: float) -> None:
+        """Have a person turn it to `angle_deg`; nobody is asked where it was set to that already.
+
+        Raises LimitError before anybody is asked, NotSettled for a reading elsewhere, and what comes from the person.
+        """
+        self._require_within_limits(angle_deg)
+        if angle_deg == self._set_deg:
+            return
+        self._set_deg, self.read_deg = math.nan, None  # half done, it stands anywhere
+        reach = self.settings.tolerance_deg
+        text = f"Turn {self.name} to {angle_deg:g} deg. What does its dial show?"
+        name = f"{self.name}-{angle_deg:g}"
+        read_deg = self._person.ask(name, text, UNIT, angle_deg - reach, angle_deg + reach, angle_deg)
+        if not abs(read_deg - angle_deg) <= reach:
+            raise NotSettled(
+                f"{self.name}: its dial was read as {read_deg:g} deg, {angle_deg:g} deg was asked for",
+                f"Set it to within {reach:g} deg, and read it again",
+            )
+        self._set_deg, self.read_deg = angle_deg, read_deg
+
+    def rate_deg_s(self, asked_deg_s: float) -> float:
+        """The rate asked for: `turning` refuses it."""
+        return asked_deg_s
+
+    def turning(self, rate_deg_s: float, first_deg: float, last_deg: float) -> NoReturn:
+        """Raises LimitError: no hand turns at a constant rate."""
+        self.settings.way_of_turn(self.name, rate_deg_s, first_deg, last_deg)
+
+    def stop(self) -> None:
+        """It turns only while a person turns it."""
+
+    def _require_within_limits(self, angle_deg: float) -> None:
+        low, high = self.settings.limits_deg
+        if not low <= angle_deg <= high:  # NaN is outside as well
+            raise LimitError(
+                f"{self.name}: {angle_deg:g} deg is outside its limits {low:g} .. {high:g} deg; nobody was asked",
+                "Ask for an angle within the limits, or change them in the bench file after looking at the cables",
+            )
+
+
+def connect(address: Address, links: Links, settings: Settings, name: str) -> ManualStage:
+    """The stage that the person at the rig turns; asks nothing. Raises LinkRefused for any other address."""
+    if address.url != PERSON:
+        raise LinkRefused(f"{name}: {address.url!r} leads to no person", f"Write `url: {PERSON}` in the bench file")
+    return ManualStage(links.person, settings, name)

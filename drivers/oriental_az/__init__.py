@@ -1,0 +1,1 @@
+"""Oriental Motor AZ: drive of a rotary stage. The driver is `driver.py`, its simulated instrument `twin.py`."""

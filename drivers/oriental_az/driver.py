@@ -1,0 +1,363 @@
+"""Oriental Motor AZ drive (AZD) turning a hollow rotary stage (DGII), by Modbus RTU.
+
+Safe by design: limits are checked before anything is sent, arrival is measured and not assumed, an alarm
+is never cleared silently, and a stop can always be sent. Source: AZ function manual, see oriental_az_table.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
+
+from drivers.errors import DriverError, Interlocked, LimitError, NotSettled, StageAlarm, StageLost
+from drivers.instrument import Check, Identity
+from drivers.oriental_az import registers as az
+from drivers.oriental_az.registers import Alarm
+from drivers.oriental_az.settings import LEAD_S, Settings
+from drivers.transport import Address, Links
+from drivers.transport.modbus import Unit
+
+__all__ = ["RotaryStage", "Settings", "Turn", "connect"]
+
+POLL_S = 0.02
+PATIENCE_S = 2.0  # beyond the expected end of a move
+HOMING_S = 120.0  # a full turn at a drive's slowest usual homing speed
+STOPPING_S = 10.0
+READY_S = 0.5  # for a drive to be ready again after a move [M]
+BEATS = 4  # in a communication time-out, so that one lost answer is no silence
+OFF_RATE = 0.01  # of a constant rate; a step a second of rounding comes on top
+UNWATCHED_S = 1.0  # between two looks at a turn of a drive that does not watch over its controller
+WARM_C = 85.0  # the drive's own alarm limit [M]
+
+
+@dataclass(frozen=True)
+class Turn:
+    """A turn that goes on: its rate as the drive makes it, and how often `require` has to be called meanwhile.
+
+    `require` raises StageAlarm, StageLost, or NotSettled where the stage does not turn at the rate.
+    """
+
+    rate_deg_s: float
+    beat_s: float
+    require: Callable[[], None]
+
+
+class RotaryStage:
+    """A stage that is told angles in deg and stands at them."""
+
+    def __init__(self, unit: Unit, links: Links, settings: Settings) -> None:
+        self.name = unit.name
+        self.settings = settings
+        self._unit, self._clock = unit, links.clock
+        self._target_deg = math.nan
+        self._holds_target = False  # no command since power-on, homing or a stop
+        self._expected_end_s = 0.0
+        self._limited = not settings.own_limits  # whether the drive has its limits, where it is to have them
+
+    def identify(self) -> Identity:
+        """The drive has no register that names it: that it answers is all there is to know."""
+        self._unit.read(az.OUTPUTS)
+        return Identity("Oriental Motor AZ")
+
+    def self_test(self) -> list[Check]:
+        """Alarm, line, coordinates, temperatures. A stage that is not homed yet is in order, and says so."""
+        alarm, error = self.alarm(), int(self._unit.read(az.COMMUNICATION_ERROR))
+        driver_c, motor_c = self._unit.read_block(az.DRIVER_TEMPERATURE, az.MOTOR_TEMPERATURE)
+        referenced = self.referenced()
+        return [
+            Check("alarm", alarm is None, f"{alarm.code:02X} {alarm.text}" if alarm else "none"),
+            Check("communication", error == 0, f"error {error:02X}" if error else "no error"),
+            Check("coordinates", True, "set" if referenced else "not set: home first"),
+            Check("temperature", max(driver_c, motor_c) < WARM_C, f"drive {driver_c:.1f} C, motor {motor_c:.1f} C"),
+        ]
+
+    def close(self) -> None:
+        """Nothing to release: the wire belongs to the bench."""
+
+    def angle_deg(self) -> float:
+        """Motor angle measured by the drive, in deg."""
+        return self._unit.read(az.FEEDBACK_POSITION) / self.settings.steps_per_turn * 360
+
+    def referenced(self) -> bool:
+        """Whether the drive knows where zero is."""
+        return bool(self._outputs() & az.HOME_END)
+
+    def alarm(self) -> Alarm | None:
+        """The present alarm, in words."""
+        return az.alarm_of(int(self._unit.read(az.ALARM)))
+
+    def reset_alarm(self) -> None:
+        """Clear the alarm, once a person has removed its cause. Raises StageAlarm if it stays."""
+        self._unit.write(az.RESET_ALARM, 0)
+        self._unit.write(az.RESET_ALARM, 1)
+        self._require_no_alarm(self.alarm())
+
+    def move_to(self, angle_deg: float) -> None:
+        """Turn to `angle_deg` and return when it stands there.
+
+        Raises LimitError before anything is sent, StageAlarm, StageLost, NotSettled, and the errors of the link.
+        """
+        if self.start(angle_deg):
+            self.wait()
+
+    def start(self, angle_deg: float) -> bool:
+        """Start turning to `angle_deg` and return at once; False where it stands there already.
+
+        With a communication time-out, `wait` must follow within it. Raises LimitError before anything is sent,
+        StageAlarm, StageLost, Interlocked.
+        """
+        self._require_within_limits(angle_deg)
+        return self._start(angle_deg, self.settings) is not None
+
+    def wait(self) -> None:
+        """Return when the move that was started has ended where it should.
+
+        Raises StageAlarm, StageLost, Interlocked, NotSettled.
+        """
+        self._until(self._expected_end_s)
+        outputs = self._poll_until(az.IN_POSITION, PATIENCE_S, "is still moving, or not in position,")
+        self._require_coordinates(outputs)
+        self._require_ready(outputs)
+        self._watch(False)
+        self._require_at_target("Free the stage of what holds it, check the load's balance, then repeat the move")
+
+    def rate_deg_s(self, asked_deg_s: float) -> float:
+        """The rate nearest to the one asked for that the drive can have: a whole number of steps a second."""
+        return self.settings.rate_deg_s(asked_deg_s)
+
+    @contextmanager
+    def turning(self, rate_deg_s: float, first_deg: float, last_deg: float) -> Iterator[Turn]:
+        """Turn from `first_deg` to `last_deg` at a constant rate, which it has when the body begins.
+
+        The body has the turn's time, and half a second more; it must call the turn's `require`. A stage with limits
+        is sent to an angle within them at that speed, where it ends by itself, whatever becomes of this program; one
+        without turns on until it is stopped, and watches over its controller. However the body ends, the stage stands
+        afterwards. Raises LimitError before anything is sent, StageAlarm, StageLost, NotSettled.
+        """
+        start_deg, end_deg = self.settings.way_of_turn(self.name, rate_deg_s, first_deg, last_deg)
+        rate = math.copysign(self.settings.rate_deg_s(abs(rate_deg_s)), last_deg - first_deg)
+        self.move_to(start_deg)
+        try:
+            begun_s = self._begin_turn(rate, end_deg)
+            self._until(begun_s + abs(rate) / self.settings.acceleration_deg_s2 + LEAD_S)
+            yield Turn(rate, min(self._beat_s, UNWATCHED_S), lambda: self._require_turning(rate))
+            if self.settings.endless:
+                self.stop()
+            else:
+                self.wait()
+        except BaseException:
+            with suppress(DriverError):  # what went wrong first is to be told
+                self.stop()
+            raise
+
+    def require_steady(self) -> None:
+        """Compare the drive's status and the encoder's angle with the last command; a stage without one passes.
+
+        Raises StageAlarm, StageLost, Interlocked, or NotSettled for a stage that moves or is off by more than
+        `settle_deg`: the tolerance of every arrival, less than the 5 arcmin to which a pose's angle is known.
+        """
+        outputs = self._status()
+        self._require_coordinates(outputs)
+        if not _stands(outputs, az.IN_POSITION):
+            remedy = "Find out what moves it: the load's balance, a hand, the drive's current; then resume the run"
+            raise NotSettled(f"{self.name}: has not stood still", remedy)
+        self._require_ready(outputs)
+        if not self._holds_target:
+            return
+        self._require_at_target(
+            "Find out what moves it: another program, a hand, the load; then `rig resume` measures this pose again"
+        )
+
+    def look(self) -> None:
+        """Raises StageAlarm: what others do not wait for, while they wait."""
+        self._status()
+
+    def halt(self) -> None:
+        """Let it brake, whatever it is doing, and return at once; `stop` must follow."""
+        self._holds_target = False
+        self._unit.write(az.INPUTS, az.STOP, retries=0)  # others wait to be told
+
+    def stop(self) -> None:
+        """Brake to a standstill, whatever the stage is doing. An alarm is no reason to doubt a standstill."""
+        self._holds_target = False
+        self._unit.write(az.INPUTS, az.STOP)
+        try:
+            self._poll_until(0, STOPPING_S, "has not stopped", self._outputs)
+        finally:
+            self._unit.write(az.INPUTS, 0)
+        self._watch(False)
+
+    def home(self) -> None:
+        """Seek the zero of the angle; needed once after power-on. Raises StageAlarm, NotSettled."""
+        self._require_no_alarm(self.alarm())
+        self._holds_target = False
+        self._watch(True)
+        self._unit.write(az.INPUTS, az.ZHOME)
+        self._unit.write(az.INPUTS, 0)
+        self._poll_until(az.HOME_END, HOMING_S, "has not found its home")
+        self._watch(False)
+
+    def _require_within_limits(self, angle_deg: float) -> None:
+        low, high = self.settings.limits_deg
+        if not low <= angle_deg <= high:  # NaN is outside as well
+            raise LimitError(
+                f"{self.name}: {angle_deg:g} deg is outside its limits {low:g} .. {high:g} deg; nothing was sent",
+                "Ask for an angle within the limits, or change them in the bench file after looking at the cables",
+            )
+
+    def _require_at_target(self, remedy: str) -> None:
+        """Raises NotSettled where the encoder's angle is not that of the last move's command."""
+        angle_deg = self.angle_deg()
+        if abs(angle_deg - self._target_deg) > self.settings.settle_deg:
+            raise NotSettled(
+                f"{self.name}: stands at {angle_deg:.3f} deg instead of {self._target_deg:.3f} deg, "
+                f"more than {self.settings.settle_deg:g} deg away",
+                remedy,
+            )
+
+    def _require_coordinates(self, outputs: int) -> None:
+        if not outputs & az.HOME_END:
+            raise StageLost(
+                f"{self.name}: does not know where it is, and is not sent anywhere",
+                "Find out whether it was without power or was stopped while homing; it is homed when the run resumes",
+            )
+
+    def _require_movable(self) -> int:
+        """The outputs of a drive that can be sent somewhere; raises why it cannot. It keeps its limits from now on."""
+        outputs = self._status()
+        self._require_coordinates(outputs)
+        self._require_ready(outputs)
+        self._limit()
+        return outputs
+
+    def _require_ready(self, outputs: int) -> None:
+        """A drive that stands without an alarm and yet is not ready is kept from moving."""
+        deadline = self._clock.now() + READY_S
+        while not outputs & az.READY:
+            if self._clock.now() >= deadline:
+                raise Interlocked(
+                    f"{self.name}: stands without an alarm and is not ready to move: its stop input is on, "
+                    "or its motor is without current",
+                    "Pull out the emergency stop and close the guards; when nobody is near, resume the run",
+                )
+            self._clock.sleep(POLL_S)
+            outputs = self._status()
+
+    def _limit(self) -> None:
+        """Have the drive keep the limits too, once; what it does not take is found when it is read back."""
+        if self._limited:
+            return
+        low, high = (round(deg * self.settings.steps_per_turn / 360) for deg in self.settings.limits_deg)
+        wanted = (az.BRAKE_AND_ALARM, high, low)
+        self._unit.write_block(*zip(az.OWN_LIMITS, wanted, strict=True))
+        if (found := self._unit.read_block(*az.OWN_LIMITS)) != list(wanted):
+            told = ", ".join(f"{value:g} in {register}" for register, value in zip(az.OWN_LIMITS, found, strict=True))
+            raise Interlocked(
+                f"{self.name}: has not taken its own limits of {low} .. {high} steps: it shows {told}",
+                "Compare the addresses with the drive's manual, or take own_limits out of the bench file",
+            )
+        self._limited = True
+
+    def _require_no_alarm(self, alarm: Alarm | None) -> None:
+        if alarm is not None:
+            how = (
+                "then reset the alarm, or switch the drive off and on"
+                if alarm.resettable
+                else "the alarm needs a power cycle"
+            )
+            raise StageAlarm(
+                f"{self.name}: stands still with alarm {alarm.code:02X}, {alarm.text}",
+                f"{alarm.remedy}; {how}",
+                alarm.code,
+            )
+
+    def _start(self, angle_deg: float, settings: Settings) -> float | None:
+        """Start turning to an angle within the limits, with the speed of `settings`: when it began; see `start`."""
+        outputs = self._require_movable()
+        distance_deg = abs(angle_deg - self.angle_deg())
+        self._target_deg, self._expected_end_s = angle_deg, self._clock.now()
+        self._holds_target = True
+        if _stands(outputs, az.IN_POSITION) and distance_deg < 180 / settings.steps_per_turn:
+            return None
+        self._watch(True)
+        begun_s = self._operate(az.ABSOLUTE, angle_deg, settings.speed_deg_s)
+        self._expected_end_s = begun_s + settings.move_s(distance_deg)
+        return begun_s
+
+    def _begin_turn(self, rate_deg_s: float, end_deg: float) -> float:
+        """Start turning at a rate, to `end_deg` or on and on; when it began."""
+        if self.settings.endless:
+            self._require_movable()
+            self._watch(True)
+            return self._operate(az.CONTINUOUS, 0.0, rate_deg_s)
+        return self._start(end_deg, replace(self.settings, speed_deg_s=abs(rate_deg_s))) or self._clock.now()
+
+    def _operate(self, kind: int, angle_deg: float, speed_deg_s: float) -> float:
+        """Write the direct operation, speeds in steps per second, which are its counts; when it began, s."""
+        per_deg = self.settings.steps_per_turn / 360
+        rate, percent = self.settings.acceleration_deg_s2 * per_deg, self.settings.current_percent
+        values = (0, kind, angle_deg * per_deg, speed_deg_s * per_deg, rate, rate, percent, az.TRIGGER_ALL)
+        asked_s = self._clock.now()
+        self._unit.write_block(*zip(az.DIRECT, values, strict=True))
+        return (asked_s + self._clock.now()) / 2  # it starts when it has the request, and then answers
+
+    def _require_turning(self, rate_deg_s: float) -> None:
+        self._require_coordinates(self._status())
+        per_deg = self.settings.steps_per_turn / 360
+        speed = self._unit.read(az.FEEDBACK_SPEED) / per_deg
+        if abs(speed - rate_deg_s) > OFF_RATE * abs(rate_deg_s) + 1 / per_deg:
+            raise NotSettled(
+                f"{self.name}: turns at {speed:.3f} deg/s instead of {rate_deg_s:.3f} deg/s",
+                "Free the stage of what holds it, check the load's balance, then resume the run",
+            )
+
+    def _watch(self, on: bool) -> None:
+        """Have the drive watch over its controller, or not: while it stands, nobody needs to talk to it."""
+        if self.settings.communication_timeout_s:
+            self._unit.write(self.settings.communication_timeout, on * self.settings.communication_timeout_s)
+
+    @property
+    def _beat_s(self) -> float:
+        """How often a drive has to hear of its controller if it watches over it."""
+        return self.settings.communication_timeout_s / BEATS or math.inf
+
+    def _until(self, end_s: float) -> None:
+        """Let a move take its time until `end_s`, and let the drive hear of its controller meanwhile."""
+        while (left_s := end_s - self._clock.now()) > self._beat_s:
+            self._clock.sleep(self._beat_s)
+            self._status()
+        self._clock.sleep(left_s)
+
+    def _outputs(self) -> int:
+        return int(self._unit.read(az.OUTPUTS))
+
+    def _status(self) -> int:
+        """The outputs, and the alarm in the same exchange. Raises StageAlarm."""
+        outputs, code = map(int, self._unit.read_block(az.OUTPUTS, az.ALARM))
+        self._require_no_alarm(az.alarm_of(code))
+        return outputs
+
+    def _poll_until(
+        self, wanted: int, timeout_s: float, complaint: str, outputs: Callable[[], int] | None = None
+    ) -> int:
+        """The outputs at a standstill with the `wanted` ones on; an alarm ends it unless `outputs` passes over it."""
+        deadline = self._clock.now() + timeout_s
+        while True:
+            if _stands(now := (outputs or self._status)(), wanted):
+                return now
+            if self._clock.now() >= deadline:
+                remedy = "Look at the stage: is it blocked? Then home it and repeat"
+                raise NotSettled(f"{self.name}: {complaint} after {timeout_s:g} s", remedy)
+            self._clock.sleep(POLL_S)
+
+
+def _stands(outputs: int, wanted: int) -> bool:
+    """Whether it stands still with the `wanted` outputs on."""
+    return not outputs & az.MOVE and outputs & wanted == wanted
+
+
+def connect(address: Address, links: Links, settings: Settings, name: str) -> RotaryStage:
+    """The stage at `address`. Raises LinkRefused when its wire cannot be opened; sends nothing."""
+    return RotaryStage(links.unit(address, name), links, settings)

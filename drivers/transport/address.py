@@ -1,0 +1,119 @@
+"""Where an instrument is found."""
+
+from __future__ import annotations
+
+import ipaddress
+import os
+import re
+from dataclasses import dataclass
+from urllib.parse import parse_qs, urlsplit
+
+from drivers.errors import LinkRefused
+
+
+@dataclass(frozen=True)
+class Address:
+    """A wire and the place on it.
+
+    `url` is one of
+        tcp://host:port                             Modbus TCP, GCS
+        rtu+tcp://host:port                         Modbus RTU frames through a converter on TCP
+        serial:/dev/ttyUSB0?baud=115200&parity=E    a serial line (parity N, E or O): Modbus RTU, GCS, text
+    `unit` is the Modbus unit id; instruments with the same url share the wire.
+    `stream_url` is the second port of an instrument that has one.
+    """
+
+    url: str
+    unit: int = 1
+    stream_url: str | None = None
+
+
+# The urls of wires, and how long a byte takes on each.
+
+SCHEMES = ("tcp", "rtu+tcp", "serial", "pty")
+TCP_LATENCY_S = 150e-6  # one way through a switch and a small embedded stack
+USER = re.compile("//.*@")
+REMEDY = "Write tcp://host:port, rtu+tcp://host:port or serial:/dev/ttyUSB0?baud=115200&parity=E"
+
+
+@dataclass(frozen=True)
+class Url:
+    """A wire's address, taken apart. `pty:` asks a server for a new pseudo-terminal.
+
+    It has no user and no password, so that none comes into a record.
+    """
+
+    text: str
+    scheme: str
+    host: str = ""
+    port: int = 0
+    path: str = ""
+    baud: int = 115200
+    parity: str = "N"
+    stop_bits: int = 1
+
+    @classmethod
+    def parse(cls, text: str) -> Url:
+        """Take `text` apart; raises LinkRefused when it is not a wire's address."""
+        try:
+            parts = urlsplit(text)
+            options = {
+                key: values[-1] for key, values in parse_qs(parts.query, strict_parsing=bool(parts.query)).items()
+            }
+            url = cls(
+                text,
+                parts.scheme,
+                parts.hostname or "",
+                parts.port or 0,
+                parts.path,
+                int(options.pop("baud", "115200")),
+                options.pop("parity", "N"),
+                int(options.pop("stop", "1")),
+            )
+        except ValueError as error:
+            raise LinkRefused(f"{_shown(text)} is not the address of a wire ({error})", REMEDY) from error
+        if "@" in parts.netloc:
+            raise LinkRefused(f"{_shown(text)} has a user, whom no wire asks for", REMEDY)
+        if options or not url._complete():
+            raise LinkRefused(f"{_shown(text)} is not the address of a wire", REMEDY)
+        return url
+
+    def _complete(self) -> bool:
+        place = {"serial": bool(self.path), "pty": True}.get(self.scheme, bool(self.host))
+        return self.scheme in SCHEMES and place and self.parity in ("N", "E", "O") and self.baud > 0
+
+    @property
+    def line(self) -> str:
+        """The wire's name, the same for every spelling of its address: the device's real path, or host:port."""
+        if self.scheme in ("serial", "pty"):
+            return os.path.realpath(self.path)
+        host = self.host.rstrip(".")
+        try:
+            address = ipaddress.ip_address("127.0.0.1" if host == "localhost" else host)
+        except ValueError:  # a name, which is not looked up
+            return f"{host}:{self.port}"
+        return f"{'127.0.0.1' if address == ipaddress.IPv6Address('::1') else address}:{self.port}"
+
+    @property
+    def rtu(self) -> bool:
+        """Whether the frames on the wire are those of Modbus RTU."""
+        return self.scheme != "tcp"
+
+    @property
+    def character_s(self) -> float:
+        """Time of one character on the serial line: start, 8 data, parity and stop bits."""
+        return (9 + (self.parity != "N") + self.stop_bits) / self.baud
+
+    @property
+    def gap_s(self) -> float:
+        """Silence that ends an RTU frame: 3.5 characters, and 1.75 ms above 19200 baud (Modbus over serial line)."""
+        return 1.75e-3 if self.baud > 19200 else 3.5 * self.character_s
+
+    def line_s(self, count: int) -> float:
+        """How long `count` bytes are under way."""
+        return count * self.character_s + self.gap_s if self.rtu else TCP_LATENCY_S
+
+
+def _shown(text: str) -> str:
+    """As it may be printed: who and by which password is left out."""
+    return repr(USER.sub("//***@", text))

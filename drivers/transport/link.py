@@ -1,0 +1,224 @@
+"""Byte links: TCP and serial, opened by url, read only by way of the clock.
+
+    tcp://host:port                           a socket
+    rtu+tcp://host:port                       a socket; the frames on it are RTU's
+    serial:/dev/ttyUSB0?baud=115200&parity=E  a serial line, 8 data bits; parity N, E or O; stop=1 or 2
+
+A link counts its bytes, so that a simulated clock knows what is still under way.
+"""
+
+from __future__ import annotations
+
+import socket
+import termios
+from collections.abc import Callable
+from typing import Literal, Protocol
+
+import serial
+
+from drivers.clock import Clock, Wire
+from drivers.errors import LinkRefused
+from drivers.transport.address import Url
+
+CONNECT_TIMEOUT_S = 5.0
+DISCARD_S = 1.0
+Tap = Callable[[float, str, Literal["sent", "heard"], bytes], None]  # told of every message: when, on whose wire, what
+LOST = (OSError, termios.error, serial.SerialException)  # what a dead connection raises
+
+
+class Port(Protocol):
+    """What a link needs of a socket or a serial line; a dead one raises one of LOST.
+
+    `chunk` is the most that one read takes, and less than the kernel can hold.
+    """
+
+    chunk: int
+
+    @property
+    def key(self) -> str:
+        """Names the connection."""
+
+    def fileno(self) -> int: ...
+
+    def read(self) -> bytes:
+        """What is there now, at least one byte; empty at the end."""
+
+    def write(self, data: bytes) -> None: ...
+
+    def close(self) -> None: ...
+
+
+class Connected(Wire):
+    """An open connection. `key` names it, the same at both ends."""
+
+    def __init__(self, port: Port) -> None:
+        self.port, self.key, self.chunk = port, port.key, port.chunk
+        self.sent = self.received = 0
+
+    def fileno(self) -> int:
+        return self.port.fileno()
+
+
+class Link:
+    """The controller's end of a wire.
+
+    A connection that is lost is an error once; what is sent after that opens it anew, so that a stop can be sent.
+    """
+
+    def __init__(self, url: Url, clock: Clock, name: str = "", tap: Tap | None = None) -> None:
+        """`name` is the instrument's, for its errors. Raises LinkRefused when nobody is there."""
+        self.url, self.clock = url.text, clock
+        self._parsed, self._place = url, f"{name}: {url.text}" if name else url.text
+        self.users, self._tap = [name] if name else [], tap  # instruments whose wire it is
+        self._closed = False
+        self._line: Connected | None = self._opened()
+
+    def write(self, data: bytes) -> None:
+        """Send all of `data`; raises LinkRefused when the connection is gone."""
+        line = self._connected()
+        try:
+            line.port.write(data)
+        except LOST as error:
+            raise self._lost(error) from error
+        line.sent += len(data)
+        if self._tap:
+            self._tap(self.clock.now(), self._names, "sent", data)
+
+    def read(self, timeout_s: float) -> bytes:
+        """What arrives first, or nothing when `timeout_s` is over. Raises LinkRefused at the end."""
+        line = self._connected()
+        if not self.clock.wait_readable(line, timeout_s):
+            return b""
+        try:
+            data = line.port.read()
+        except LOST as error:
+            raise self._lost(error) from error
+        if not data:
+            raise self._lost("the other side closed it")
+        line.received += len(data)
+        if self._tap:
+            self._tap(self.clock.now(), self._names, "heard", data)
+        return data
+
+    def discard(self, quiet_s: float = 0.0) -> int:
+        """Throw away what arrives until it has been quiet for `quiet_s`; the number of bytes.
+
+        Gives up on a line that babbles for DISCARD_S: the next answer will tell.
+        """
+        count, deadline = 0, self.clock.now() + DISCARD_S
+        while self.clock.now() <= deadline and (data := self.read(quiet_s)):
+            count += len(data)
+        return count
+
+    def close(self) -> None:
+        """For good."""
+        self._closed = True
+        self._drop()
+
+    @property
+    def _names(self) -> str:
+        return ", ".join(dict.fromkeys(self.users)) or self.url
+
+    def _connected(self) -> Connected:
+        if self._closed:
+            raise LinkRefused(f"{self._place}: is closed", "Connect again")
+        if self._line is None:
+            self._line = self._opened()
+        return self._line
+
+    def _drop(self) -> None:
+        if self._line is not None:
+            self._line.port.close()
+            self._line = None
+
+    def _opened(self) -> Connected:
+        try:
+            line = Connected(_open_port(self._parsed))
+        except (*LOST, ValueError) as error:
+            raise LinkRefused(f"{self._place}: cannot be opened ({error})", _remedy(self._parsed)) from error
+        self.clock.wait_readable(line, 0.0)  # a simulated clock takes its bearings before the first byte
+        return line
+
+    def _lost(self, why: object) -> LinkRefused:
+        self._drop()
+        return LinkRefused(
+            f"{self._place}: the connection is lost ({why})", "Check cable and power, then connect again"
+        )
+
+
+class SocketPort:
+    """A connected TCP socket, without Nagle's delay."""
+
+    chunk = 1 << 15
+
+    def __init__(self, host: str, number: int) -> None:
+        self._socket = socket.create_connection((host, number), CONNECT_TIMEOUT_S)
+        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+    @property
+    def key(self) -> str:
+        return connection_key(self._socket.getsockname(), self._socket.getpeername())
+
+    def fileno(self) -> int:
+        return self._socket.fileno()
+
+    def read(self) -> bytes:
+        return self._socket.recv(self.chunk)
+
+    def write(self, data: bytes) -> None:
+        self._socket.sendall(data)
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+class SerialPort:
+    """A serial line, 8 data bits, opened for one program alone."""
+
+    chunk = 4095
+
+    def __init__(self, path: str, baud: int, parity: str, stop_bits: int) -> None:
+        self._path = path
+        self._serial = serial.Serial(
+            path, baud, parity=parity, stopbits=stop_bits, timeout=0, write_timeout=CONNECT_TIMEOUT_S, exclusive=True
+        )
+
+    @property
+    def key(self) -> str:
+        return self._path
+
+    def fileno(self) -> int:
+        return int(self._serial.fileno())
+
+    def read(self) -> bytes:
+        return bytes(self._serial.read(self.chunk))
+
+    def write(self, data: bytes) -> None:
+        self._serial.write(data)
+
+    def close(self) -> None:
+        self._serial.close()
+
+
+def connection_key(client: tuple[str, int], server: tuple[str, int]) -> str:
+    """The name of a TCP connection, the same seen from both ends."""
+    return f"{client[0]}:{client[1]} > {server[0]}:{server[1]}"
+
+
+def open_link(url: str, clock: Clock, name: str = "", tap: Tap | None = None) -> Link:
+    """Open a wire. Raises LinkRefused when nobody is there, or the url is not one."""
+    return Link(Url.parse(url), clock, name, tap)
+
+
+def _open_port(url: Url) -> SocketPort | SerialPort:
+    if url.scheme == "serial":
+        return SerialPort(url.path, url.baud, url.parity, url.stop_bits)
+    return SocketPort(url.host, url.port)
+
+
+def _remedy(url: Url) -> str:
+    if url.scheme != "serial":
+        return "Check the address, the network cable and that no other program holds the instrument"
+    if url.path.startswith("/dev/pts/") and url.parity != "N":
+        return "A pseudo-terminal has no parity: write parity=N"
+    return "Check the device's path, your right to open it and that no other program holds it"

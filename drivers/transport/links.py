@@ -1,0 +1,41 @@
+"""The open wires of one bench."""
+
+from __future__ import annotations
+
+from drivers.clock import Clock
+from drivers.manual_stage.person import PersonLink
+from drivers.transport.address import Address
+from drivers.transport.link import Link, Tap, open_link
+from drivers.transport.modbus import Bus, Unit
+
+
+class Links:
+    """Opens every wire once: instruments with the same url share it, as two drives share their RS-485 line."""
+
+    def __init__(self, clock: Clock, tap: Tap | None = None) -> None:
+        """`tap` is told of every message."""
+        self.clock = clock
+        self._tap = tap
+        self.person = PersonLink()
+        self._buses: dict[str, Bus] = {}
+        self._links: list[Link] = []
+
+    def unit(self, address: Address, name: str) -> Unit:
+        """The Modbus instrument at `address`. Raises LinkRefused when its wire cannot be opened."""
+        if address.url not in self._buses:
+            self._buses[address.url] = Bus(self.link(address.url))
+        bus = self._buses[address.url]
+        bus.link.users.append(name)
+        return Unit(bus, address.unit, name)
+
+    def link(self, url: str, name: str = "") -> Link:
+        """A wire of bytes that is not shared; `name` is the instrument's."""
+        self._links.append(open_link(url, self.clock, name, self._tap))
+        return self._links[-1]
+
+    def close(self) -> None:
+        """Close every wire."""
+        for link in self._links:
+            link.close()
+        self._links.clear()
+        self._buses.clear()

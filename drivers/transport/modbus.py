@@ -1,0 +1,245 @@
+"""Modbus master: one request, one answer, in bounded time. Frames and PDUs are pymodbus'; wire, time, retries ours.
+
+`Bus` is the wire, shared by the instruments on it; `Unit` is one instrument of a bus.
+Every failure is raised with the instrument, the register and a remedy (see drivers.errors).
+"""
+
+from __future__ import annotations
+
+import logging
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from pymodbus.exceptions import ModbusException
+from pymodbus.framer import FramerRTU, FramerSocket
+from pymodbus.pdu import DecodePDU, ModbusPDU
+from pymodbus.pdu.bit_message import ReadCoilsRequest, ReadDiscreteInputsRequest, WriteSingleCoilRequest
+from pymodbus.pdu.register_message import (
+    ReadHoldingRegistersRequest,
+    WriteMultipleRegistersRequest,
+    WriteSingleRegisterRequest,
+)
+
+from drivers.errors import BadFrame, LinkError, LinkRefused, LinkTimeout, Refused, WrongUnit
+from drivers.transport.address import Url
+from drivers.transport.link import Link
+
+# A register, declared: where it is, how its words are read, and what one count is worth.
+
+Kind = Literal["int16", "uint16", "int32", "uint32", "float32"]
+CODES: dict[Kind, str] = {"int16": ">h", "uint16": ">H", "int32": ">i", "uint32": ">I", "float32": ">f"}
+
+
+@dataclass(frozen=True)
+class Register:
+    """One value in an instrument's table; 32-bit values take two words, the high word first.
+
+    `scale` is the value of one count in `unit`; a value is always in `unit`, words are as on the wire.
+    """
+
+    address: int
+    kind: Kind
+    doc: str
+    unit: str = ""
+    scale: float = 1.0
+
+    def __str__(self) -> str:
+        return f"register 0x{self.address:04X} ({self.doc})"
+
+    @property
+    def count(self) -> int:
+        """Number of 16-bit words."""
+        return struct.calcsize(CODES[self.kind]) // 2
+
+    def decode(self, words: Sequence[int]) -> float:
+        """The value of `words`, in `unit`."""
+        raw = struct.unpack(CODES[self.kind], struct.pack(f">{self.count}H", *words))[0]
+        return float(raw) * self.scale
+
+    def encode(self, value: float) -> list[int]:
+        """The words of `value`, rounded to the nearest count. Raises ValueError when it does not fit."""
+        raw = value / self.scale
+        try:
+            packed = struct.pack(CODES[self.kind], raw if self.kind == "float32" else round(raw))
+        except (struct.error, OverflowError) as error:
+            raise ValueError(f"{value:g} {self.unit} does not fit into {self}") from error
+        return list(struct.unpack(f">{self.count}H", packed))
+
+
+logging.getLogger("pymodbus").addHandler(logging.NullHandler())  # what it says of a bad frame, our errors say better
+
+TIMEOUT_S = 0.5  # for one answer; the slowest instrument needs a tenth of it
+LATE_S = 2 * TIMEOUT_S  # of quiet, after which no answer to an earlier request comes any more
+RETRIES = 2  # after silence, a bad frame or a wrong unit; every request of ours may be repeated
+ON_A_LINE = (  # what to look at after silence, and after noise
+    "that baud rate and parity are the instrument's",
+    "shielding, termination, baud rate and parity of the line",
+)
+ON_A_NETWORK = (
+    "that nothing else has the instrument's address",
+    "that this address and port are the instrument's, and speak Modbus TCP",
+)
+WRITES = (WriteSingleCoilRequest, WriteSingleRegisterRequest, WriteMultipleRegistersRequest)
+REFUSALS = {
+    1: ("it does not know the function", "Check that the model of the instrument is the one in the bench file"),
+    2: ("it has no such register", "Check that the model of the instrument is the one in the bench file"),
+    3: ("the value is not allowed", "Check the settings in the bench file against the instrument's manual"),
+    4: ("it failed to do so", "Look at the instrument's display or alarm, clear the cause, then try again"),
+    6: ("it is busy", "Wait until it has finished, then try again"),
+}
+
+
+class Bus:
+    """One wire with Modbus on it: RTU frames, or TCP frames with transaction numbers."""
+
+    def __init__(self, link: Link) -> None:
+        self.link = link
+        self._url = Url.parse(link.url)
+        decoder = DecodePDU(is_server=False)
+        self._framer = FramerRTU(decoder) if self._url.rtu else FramerSocket(decoder)
+        self._look_at = ON_A_LINE if self._url.rtu else ON_A_NETWORK
+        self._transaction = 0
+        self._owed = False  # whether answers may still come to what was asked before
+
+    def ask(self, request: ModbusPDU, unit: int, what: str, retries: int = RETRIES) -> ModbusPDU:
+        """The answer of `unit`; `what` begins every error, as in 'alpha: reading register 0x0080 (alarm)'.
+
+        Raises Refused, or after the retries LinkTimeout, BadFrame or WrongUnit.
+        """
+        request.dev_id = unit
+        self._let_late_answers_pass(request)
+        try:
+            for _ in range(retries):
+                try:
+                    return self._attempt(request, what)
+                except (LinkTimeout, BadFrame, WrongUnit):
+                    self.link.discard(self._url.gap_s)
+            return self._attempt(request, what)
+        except LinkRefused as lost:
+            raise LinkRefused(f"{what}: {lost.what}", lost.remedy) from lost
+
+    def _let_late_answers_pass(self, request: ModbusPDU) -> None:
+        """RTU frames do not tell what they answer: one that comes too late must not be taken for the next question's.
+
+        The echo of a write names its register, so a write, which may be a stop, need not wait.
+        """
+        if self._owed and not isinstance(request, WRITES):
+            self.link.discard(LATE_S)
+            self._owed = False
+
+    def _attempt(self, request: ModbusPDU, what: str) -> ModbusPDU:
+        self._transaction = request.transaction_id = self._transaction % 0xFFFF + 1
+        self.link.discard()
+        self.link.write(self._framer.buildFrame(request))
+        answer = self._receive(what)
+        if self._url.scheme == "serial":  # a converter keeps the silence between frames itself
+            self.link.clock.sleep(self._url.gap_s)
+        if answer.dev_id != request.dev_id:
+            raise WrongUnit(
+                f"{what}: unit {answer.dev_id} answered instead of unit {request.dev_id}",
+                "Give every instrument on the bus a unit id of its own",
+            )
+        if answer.isError() and answer.function_code & 0x7F == request.function_code:
+            raise _refused(what, answer.exception_code)
+        if not _fits(request, answer):
+            raise self._bad_frame(what, "the answer to another request came")
+        return answer
+
+    def _receive(self, what: str) -> ModbusPDU:
+        clock = self.link.clock
+        deadline = clock.now() + TIMEOUT_S
+        data = b""
+        while (left_s := deadline - clock.now()) > 0 and (more := self.link.read(left_s)):
+            data += more
+            used, answer = self._decode(data, what)
+            if answer is not None:
+                return answer
+            data = data[used:]
+        self._owed = self._url.rtu
+        if data:
+            raise self._bad_frame(what, f"{len(data)} bytes came that are no answer ({data[:16].hex(' ')})")
+        raise LinkTimeout(
+            f"{what}: no answer within {TIMEOUT_S:g} s on {self.link.url}",
+            f"Check power, cable and unit id, and {self._look_at[0]}",
+        )
+
+    def _decode(self, data: bytes, what: str) -> tuple[int, ModbusPDU | None]:
+        """Bytes used up, and the answer if there is one; a TCP frame of an earlier request is passed over."""
+        expected = 0 if self._url.rtu else self._transaction
+        try:
+            used, answer = self._framer.handleFrame(data, 0, expected)
+        except ModbusException as error:
+            raise self._bad_frame(what, str(error)) from error
+        if self._url.rtu and used and answer is None:
+            raise self._bad_frame(what, f"the checksum of {data[:16].hex(' ')} is wrong")
+        return used, answer
+
+    def _bad_frame(self, what: str, why: str) -> LinkError:
+        return BadFrame(f"{what}: {why}", f"Check {self._look_at[1]}")
+
+
+class Unit:
+    """One instrument on a bus: its registers read and written as values in their units."""
+
+    def __init__(self, bus: Bus, unit: int, name: str) -> None:
+        self._bus, self._unit, self.name = bus, unit, name
+
+    def read(self, register: Register) -> float:
+        """The value of one register."""
+        return self.read_block(register)[0]
+
+    def read_block(self, *registers: Register) -> list[float]:
+        """The values of neighbouring registers, lowest address first, in one exchange."""
+        first, last = registers[0], registers[-1]
+        words = self.read_words(first.address, last.address + last.count - first.address, str(first))
+        return [r.decode(words[r.address - first.address :][: r.count]) for r in registers]
+
+    def read_words(self, address: int, count: int, doc: str) -> Sequence[int]:
+        """`count` words as they are on the wire."""
+        request = ReadHoldingRegistersRequest(address=address, count=count)
+        return self._bus.ask(request, self._unit, f"{self.name}: reading {doc}").registers
+
+    def write(self, register: Register, value: float, retries: int = RETRIES) -> None:
+        """Set one register; one word goes as function 06, two as 10h."""
+        words = register.encode(value)
+        if len(words) > 1:
+            self.write_words(register.address, words, str(register), retries)
+        else:
+            request = WriteSingleRegisterRequest(address=register.address, registers=words)
+            self._bus.ask(request, self._unit, f"{self.name}: writing {register}", retries)
+
+    def write_block(self, *values: tuple[Register, float]) -> None:
+        """Set registers that follow each other without a gap, in one exchange."""
+        words = [word for register, value in values for word in register.encode(value)]
+        self.write_words(values[0][0].address, words, str(values[0][0]))
+
+    def write_words(self, address: int, words: Sequence[int], doc: str, retries: int = RETRIES) -> None:
+        """Set neighbouring words as they are on the wire."""
+        request = WriteMultipleRegistersRequest(address=address, registers=words)
+        self._bus.ask(request, self._unit, f"{self.name}: writing {doc}", retries)
+
+    def read_bit(self, address: int, doc: str, coil: bool = False) -> bool:
+        """One discrete input (function 02), or one coil (01)."""
+        request = (ReadCoilsRequest if coil else ReadDiscreteInputsRequest)(address=address, count=1)
+        return bool(self._bus.ask(request, self._unit, f"{self.name}: reading bit 0x{address:04X} ({doc})").bits[0])
+
+    def write_bit(self, address: int, on: bool, doc: str) -> None:
+        """Set one coil (function 05)."""
+        request = WriteSingleCoilRequest(address=address, bits=[on])
+        self._bus.ask(request, self._unit, f"{self.name}: writing bit 0x{address:04X} ({doc})")
+
+
+def _fits(request: ModbusPDU, answer: ModbusPDU) -> bool:
+    """Whether the answer is that of this request: a late one of another may come first on a serial line."""
+    if answer.function_code != request.function_code:
+        return False
+    if isinstance(request, ReadHoldingRegistersRequest):
+        return len(answer.registers) == request.count
+    return isinstance(request, ReadCoilsRequest) or answer.address == request.address
+
+
+def _refused(what: str, code: int) -> Refused:
+    why, remedy = REFUSALS.get(code, ("it declined", "Look the code up in the instrument's manual"))
+    return Refused(f"{what}: exception {code}, {why}", remedy, code)

@@ -1,0 +1,301 @@
+"""The servers of the simulated instruments: passive, without threads, on TCP ports and pseudo-terminals.
+
+A `Port` listens and holds its connections; a `Server` is one instrument's (or one bus') ports together with
+the twins behind them. It acts only when the clock tells it the time, so one and the same server is
+deterministic under a simulated clock and serves anybody's client in real time.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import heapq
+import itertools
+import math
+import os
+import pty
+import socket
+import tty
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, Protocol
+
+from drivers.transport.address import Address, Url
+from drivers.transport.faults import Faults
+from drivers.transport.link import connection_key
+from drivers.transport.wire_faults import END, Said, Wire, disturbed
+
+NO_FAULTS = Faults()
+FAULTS_OF = "faults of"
+SILENCE_S = 0.05  # ends an RTU frame: generous, since a computer sends a frame in pieces
+
+
+class Twin(Protocol):
+    """What a server needs of a simulated instrument beside its answers."""
+
+    def advance(self, now_s: float) -> None:
+        """Compute what happened up to `now_s`."""
+
+    def due_s(self) -> float:
+        """When it has something to say unasked; infinity for never."""
+
+    def state(self) -> dict[str, Any]:
+        """What a resumed run needs, JSON-able."""
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Continue from `state`."""
+
+
+class Connection:
+    """One client: bytes that came, and bytes that go out when they are due."""
+
+    def __init__(
+        self, fileno: int, key: str, close: Callable[[], None], leaving: Callable[[Said], Iterable[Said]]
+    ) -> None:
+        self.fileno, self.key, self.close = fileno, key, close
+        self.inbox = bytearray()
+        self.received = self.emitted = 0
+        self._leaving = leaving  # what becomes of a message on its way
+        self._outbox: list[tuple[float, int, bytes]] = []  # a heap: when, in which order, what
+        self._order = itertools.count()
+        self._last_s = -math.inf
+        self._full = False
+        self._heard_s = -math.inf
+        self.ended = False  # whether it is to be closed
+
+    def read(self, now_s: float, patience_s: float) -> bool:
+        """Take in what is there; False at the end of the connection.
+
+        What came more than `patience_s` before it is half a request that nobody will complete.
+        """
+        if now_s - self._heard_s > patience_s:
+            self.inbox.clear()
+        self._heard_s = now_s
+        try:
+            data = os.read(self.fileno, 1 << 16)
+        except BlockingIOError:
+            return True
+        except OSError:
+            return False
+        self.inbox += data
+        self.received += len(data)
+        return bool(data)
+
+    def send(self, data: bytes, due_s: float) -> None:
+        """Send `data` at `due_s`, after all that was sent before; a fault of the wire may make it other data, later."""
+        if not data:
+            return
+        self._last_s = max(self._last_s, due_s)
+        pieces = list(self._leaving(Said(data, self._last_s)))
+        for piece in pieces:
+            heapq.heappush(self._outbox, (piece.due_s, next(self._order), piece.data))
+        if pieces and b"".join(piece.data for piece in pieces) == data:  # what is only late is not overtaken
+            self._last_s = pieces[-1].due_s
+
+    def emit(self, now_s: float) -> None:
+        """Write what is due, as far as the kernel takes it."""
+        self._full = False
+        while self._outbox and not self._full and self._outbox[0][0] <= now_s:
+            due_s, order, data = heapq.heappop(self._outbox)
+            self.ended = self.ended or data == END
+            written = self._write(data)
+            self.emitted += written
+            if written < len(data):
+                self._full = True
+                heapq.heappush(self._outbox, (due_s, order, data[written:]))
+
+    def due_s(self) -> float:
+        """When it must write next; never while the client does not read."""
+        return self._outbox[0][0] if self._outbox and not self._full else math.inf
+
+    def is_behind(self, now_s: float) -> bool:
+        """Whether something that was due by `now_s` has not been written yet."""
+        return bool(self._outbox) and self._outbox[0][0] <= now_s
+
+    def _write(self, data: bytes) -> int:
+        try:
+            return os.write(self.fileno, data)
+        except BlockingIOError:
+            return 0
+        except OSError:  # the client is gone: what it does not read is lost
+            return len(data)
+
+
+class Port:
+    """A place to connect to. `answer` is called with a connection whenever bytes have come in on it.
+
+    `wire` is what faults have to know of it.
+    """
+
+    def __init__(self, listen: str, answer: Callable[[Connection, float], None] | None = None) -> None:
+        self.timing = Url.parse(listen)
+        self.wire = Wire(mends=self.timing.scheme == "tcp")
+        self._faults: dict[int, Faults] = {}  # by unit
+        self.connections: dict[int, Connection] = {}
+        self.answer = answer or _ignore
+        self._socket: socket.socket | None = None
+        if self.timing.scheme == "pty":
+            self.url = self._open_pty()
+        else:
+            self.url = self._listen()
+
+    def filenos(self) -> list[int]:
+        own = [self._socket.fileno()] if self._socket else []
+        return [*own, *self.connections]
+
+    def emit(self, now_s: float) -> None:
+        for connection in list(self.connections.values()):
+            connection.emit(now_s)
+            if connection.ended:
+                self._drop(connection)
+
+    def receive(self, fileno: int, now_s: float) -> None:
+        if self._socket and fileno == self._socket.fileno():
+            self._accept()
+            return
+        connection = self.connections[fileno]
+        if not connection.read(now_s, SILENCE_S if self.timing.rtu else math.inf):
+            self._drop(connection)
+        elif self._hears(connection, now_s):
+            self.answer(connection, now_s)
+
+    def afflict(self, unit: int, faults: Faults) -> None:
+        """Let the instrument of this number have `faults` of its wire."""
+        self._faults[unit] = faults
+
+    def hang_up(self) -> None:
+        """Close all connections."""
+        for connection in list(self.connections.values()):
+            self._drop(connection)
+
+    def close(self) -> None:
+        self.hang_up()
+        if self._socket:
+            self._socket.close()
+            self._socket = None
+
+    def _drop(self, connection: Connection) -> None:
+        del self.connections[connection.fileno]
+        connection.close()
+
+    def _hears(self, connection: Connection, now_s: float) -> bool:
+        """Whether a request reaches the instrument."""
+        if not (faults := self._faults_of(bytes(connection.inbox))):
+            return True
+        faults.asked()
+        if faults.size("disconnect", now_s) is not None:
+            self._drop(connection)
+            return False
+        if faults.size("silence", now_s) is not None:
+            connection.inbox.clear()
+        return bool(connection.inbox)
+
+    def _leaving(self, said: Said) -> list[Said]:
+        return disturbed(said, self._faults_of(said.data), self.wire)
+
+    def _faults_of(self, message: bytes) -> Faults:
+        """Those of the unit that a message is to or from; on a wire of one instrument, its own."""
+        unit = self.wire.unit_of(message) if self._faults and message else None
+        if unit is None:
+            return next(iter(self._faults.values()), NO_FAULTS)
+        return self._faults.get(unit, NO_FAULTS)
+
+    def _listen(self) -> str:
+        self._socket = socket.create_server((self.timing.host, self.timing.port))
+        self._socket.setblocking(False)
+        return f"{self.timing.scheme}://{self.timing.host}:{self._socket.getsockname()[1]}"
+
+    def _accept(self) -> None:
+        assert self._socket  # noqa: S101 - only a listening port accepts
+        with contextlib.suppress(BlockingIOError):
+            client, peer = self._socket.accept()
+            client.setblocking(False)
+            client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            key = connection_key(peer, client.getsockname())
+            self.connections[client.fileno()] = Connection(client.fileno(), key, client.close, self._leaving)
+
+    def _open_pty(self) -> str:
+        """A raw pseudo-terminal; its far end is kept open, so that clients may come and go."""
+        near, far = pty.openpty()
+        tty.setraw(far)
+        os.set_blocking(near, False)
+        path = os.ttyname(far)
+
+        def close() -> None:
+            os.close(near)
+            os.close(far)
+
+        self.connections[near] = Connection(near, path, close, self._leaving)
+        return f"serial:{path}"
+
+
+class Server:
+    """One wire's worth of simulated instruments, by role."""
+
+    def __init__(self, ports: Sequence[Port], twins: Mapping[str, Twin], addresses: Mapping[str, Address]) -> None:
+        self.addresses = dict(addresses)
+        self._ports, self._twins = list(ports), dict(twins)
+        self._faults: dict[str, Faults] = {}
+
+    @property
+    def url(self) -> str:
+        """Where its first port listens."""
+        return self._ports[0].url
+
+    def afflict(self, role: str, faults: Faults) -> None:
+        """Let the instrument in `role` have `faults` from now on, of its wires and of its own."""
+        self._faults[role] = faults
+        address, twin = self.addresses[role], self._twins[role]
+        for port in self._ports:
+            if port.url in (address.url, address.stream_url):
+                port.afflict(address.unit, faults)
+        if hasattr(twin, "faults"):
+            twin.faults = faults
+
+    def filenos(self) -> list[int]:
+        return [fileno for port in self._ports for fileno in port.filenos()]
+
+    def advance(self, now_s: float) -> None:
+        for twin in self._twins.values():
+            twin.advance(now_s)
+
+    def receive(self, fileno: int, now_s: float) -> None:
+        for port in self._ports:
+            if fileno in port.filenos():
+                port.receive(fileno, now_s)
+
+    def emit(self, now_s: float) -> None:
+        for port in self._ports:
+            port.emit(now_s)
+
+    def due_s(self) -> float:
+        twins = [twin.due_s() for twin in self._twins.values()]
+        return min([c.due_s() for port in self._ports for c in port.connections.values()] + twins, default=math.inf)
+
+    def progress(self, key: str) -> tuple[int, int] | None:
+        for port in self._ports:
+            for connection in port.connections.values():
+                if connection.key == key:
+                    return connection.received, connection.emitted
+        return None
+
+    def state(self) -> dict[str, Any]:
+        """The twins' states by role, and those of their faults, JSON-able; taken between exchanges."""
+        twins = {role: twin.state() for role, twin in self._twins.items()}
+        faults = {f"{FAULTS_OF} {role}": faults.state() for role, faults in self._faults.items()}
+        return twins | faults
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Put every twin back into the `state` it had; faults that are new since then have not happened yet."""
+        for role, twin in self._twins.items():
+            twin.restore(state[role])
+        for role, faults in self._faults.items():
+            if (kept := state.get(f"{FAULTS_OF} {role}")) is not None:
+                faults.restore(kept)
+
+    def close(self) -> None:
+        """Close all ports; clients see the end of their connections."""
+        for port in self._ports:
+            port.close()
+
+
+def _ignore(connection: Connection, now_s: float) -> None:  # noqa: ARG001 - a port that only talks
+    connection.inbox.clear()

@@ -1,0 +1,133 @@
+"""Several sensors on one table: a world for each, alike in all that they share.
+
+Stages, room, oven, supply, carriage and level are the same in every world, since they follow the same commands and the
+same chance; what a sensor has of its own differs. Inputs are named by sensor and output: `a1.vx`.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from drivers.errors import did_you_mean
+from drivers.world.config import WorldConfig
+from drivers.world.errors import BadSetting, UnknownInput
+from drivers.world.kernel import Floats
+from drivers.world.positioner import Command
+from drivers.world.stage import Trajectory
+from drivers.world.world import World
+
+OWN = ("sensor", "noise", "magnetometer", "gyroscope")  # what may differ from sensor to sensor
+
+
+class Batch:
+    """Sensors by name on one table, each with its own changes to `config`. Stands for a `World`.
+
+    Raises what `with_own` raises.
+    """
+
+    def __init__(self, config: WorldConfig, seed: int, sensors: Mapping[str, Mapping[str, Any]]) -> None:
+        self._worlds = {
+            name: World(with_own(config, name, changes), seed, place)
+            for place, (name, changes) in enumerate(sensors.items())
+        }
+        self._first = next(iter(self._worlds.values()))
+
+    @property
+    def now_s(self) -> float:
+        return self._first.now_s
+
+    def advance(self, t_s: float) -> None:
+        """Let time pass until `t_s`."""
+        for world in self._worlds.values():
+            world.advance(t_s)
+
+    def move_stage(self, axis: str, trajectory: Trajectory) -> None:
+        """Let the motor of `axis` follow `trajectory`."""
+        for world in self._worlds.values():
+            world.move_stage(axis, trajectory)
+
+    def motor_angle_deg(self, axis: str) -> float:
+        """Where the motor of `axis` stands now."""
+        return self._first.motor_angle_deg(axis)
+
+    def move_positioner(self, axis: str, command: Command) -> float:
+        """Let the carriage, which carries all sensors, follow `command`; when it will stand still."""
+        return max(world.move_positioner(axis, command) for world in self._worlds.values())
+
+    def positioner_um(self, axis: str, times_s: ArrayLike | None = None) -> Floats:
+        """What the position sensor of `axis` shows."""
+        return self._first.positioner_um(axis, times_s)
+
+    def mount_sensor(self, mount_deg: float = 0.0, flip: int = 0, up: str = "z") -> None:
+        """Put the plate with all sensors on the table."""
+        for world in self._worlds.values():
+            world.mount_sensor(mount_deg, flip, up)
+
+    def power(self, on: bool) -> None:
+        """Switch the supply of all sensors."""
+        for world in self._worlds.values():
+            world.power(on)
+
+    def powered_s(self) -> float:
+        """Seconds since the sensors were powered."""
+        return self._first.powered_s()
+
+    def oven_set(self, set_point_c: float, running: bool) -> None:
+        """Give the oven a set point, and run it or not."""
+        for world in self._worlds.values():
+            world.oven_set(set_point_c, running)
+
+    def thermometer_c(self) -> float:
+        """What the thermocouple, on the first sensor, shows."""
+        return self._first.thermometer_c()
+
+    def level_deg(self) -> tuple[float, float]:
+        """What a level on the turntable shows."""
+        return self._first.level_deg()
+
+    def adc_volts(self, inputs: Sequence[str], start_s: float, interval_s: float, n: int) -> Floats:
+        """Volts at the converter's inputs, shape (n, len(inputs)), as `World.adc_volts`; all in turn in one scan.
+
+        Raises UnknownInput for a sensor that is not there, and what the world raises.
+        """
+        places: dict[str, list[int]] = defaultdict(list)
+        for place, name in enumerate(inputs):
+            places[self._sensor(name)].append(place)
+        volts = np.empty((n, len(inputs)))
+        for sensor, world in self._worlds.items():
+            mine = places[sensor]
+            outputs = [inputs[place].rpartition(".")[2] for place in mine]
+            volts[:, mine] = world.adc_volts(outputs, start_s, interval_s, n, mine)
+        return volts
+
+    def state(self) -> dict[str, Any]:
+        """All that the worlds remember, as JSON."""
+        return {name: world.state() for name, world in self._worlds.items()}
+
+    def restore(self, kept: Mapping[str, Any]) -> None:
+        """Continue from what `state` gave."""
+        for name, world in self._worlds.items():
+            world.restore(kept[name])
+
+    def _sensor(self, wired: str) -> str:
+        """Whose output an input is wired to; what belongs to no sensor is seen by the first."""
+        sensor, dot, _ = wired.partition(".")
+        if dot and sensor not in self._worlds:
+            raise UnknownInput(
+                f"The table has no sensor {sensor!r} for the input {wired!r}", did_you_mean(sensor, self._worlds)
+            )
+        return sensor if dot else next(iter(self._worlds))
+
+
+def with_own(config: WorldConfig, name: str, changes: Mapping[str, Any]) -> WorldConfig:
+    """The settings of one sensor's world. Raises BadSetting for a change of something that all sensors share."""
+    if shared := [key for key in changes if key not in OWN]:
+        raise BadSetting(
+            f"{', '.join(shared)} of sensor {name}'s world is shared by all", f"Change {' and '.join(OWN)}"
+        )
+    return config.changed(changes)

@@ -1,0 +1,170 @@
+"""Noise of one output in front of its filter, a resistor and a capacitor.
+
+    white noise     of air and amplifier: behind the filter an Ornstein-Uhlenbeck process, exact over any interval
+    traps           that catch and release charge, one kind per decade of release time: together flicker noise, whose
+                    one-sided spectrum is flicker_v^2 / (f ln 10)
+    walk            the sum of small steps that nothing takes back
+    wander          with a memory of its own
+    ramp            what leaks or creeps at a constant rate
+
+All but the white noise is slow, and advances in ticks (see mechanics). What is faster, or comes from the leads, is
+picked up behind the filter (see pickup). A wander that is off draws no chance.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.random import Generator
+
+from drivers.world.kernel import Floats, kernel, shared, wandered
+
+FLICKER_S = (1.0, 10.0, 100.0, 1e3, 1e4)  # release times of traps
+TICKED_S = 0.5  # a wander of a longer memory advances in ticks
+NEARLY = 1 - 1e-9  # of a time that is compared
+HOUR_S = 3600.0
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Amplitudes at one output, in V; each is off where it is 0."""
+
+    white_v: float = 0.775e-3  # rms behind the filter
+    flicker_v: float = 0.0  # rms of each decade of traps
+    flicker_fastest_s: float = 1.0  # release time of the fastest traps, 0.01 at the least
+    walk_v_per_sqrt_h: float = 0.0  # random walk of the output
+    wander_v: float = 0.0  # rms
+    wander_s: float = 300.0  # its correlation time
+    ramp_v_per_h: float = 0.0
+    hum_v: float = 0.0  # amplitude of a sinusoid picked up by the leads
+    hum_hz: float = 50.0
+    pulse_v_s: float = 0.0  # size of a pulse of the output
+    filter_ohm: float = 32e3
+    filter_farad: float = 0.33e-6
+
+
+@dataclass(frozen=True)
+class Noises:
+    """Noise of both outputs. A bench file sets both, `white_v: 1e-3`, or one by its name, `x: {white_v: 1e-3}`."""
+
+    x: Noise = field(default_factory=Noise)
+    y: Noise = field(default_factory=Noise)
+
+
+def zeros(*shape: int) -> Callable[[], Any]:
+    """What makes an array of zeros."""
+    return lambda: np.zeros(shape)
+
+
+@dataclass
+class Fluctuation:
+    """Where the noise of one output stands, and what its filter holds. Times in ns of world time."""
+
+    flicker_v: Floats = field(default_factory=zeros(len(FLICKER_S)))
+    walk_v: float = 0.0
+    wander_v: float = 0.0
+    slow_v: float = 0.0  # sum of these and the ramp
+    filtered_v: float = 0.0  # on the capacitor, without white noise
+    filtered_ns: int = 0
+    white: float = 0.0  # behind the filter, in units of its rms
+    white_ns: int = 0
+    kept_ns: int = 0  # the filter's last step, and its answers
+    kept: float = 1.0  # share of the old
+    fresh: float = 0.0  # share of new white noise, in rms
+
+
+@shared
+def filter_s(noise: Noise) -> float:
+    """Time constant of the filter."""
+    return noise.filter_ohm * noise.filter_farad
+
+
+@shared
+def trap_v(noise: Noise, release_s: float) -> float:
+    """Rms of the traps of one release time."""
+    return noise.flicker_v if release_s > NEARLY * noise.flicker_fastest_s else 0.0
+
+
+@shared
+def ticked_v(noise: Noise) -> float:
+    """Rms of the wander where it advances in ticks, else 0."""
+    return noise.wander_v if noise.wander_s >= TICKED_S else 0.0
+
+
+def begin(own: Fluctuation, noise: Noise, random: Generator) -> None:
+    """Draw where the traps and the wander stand; white noise is drawn beside it."""
+    traps_v = np.array([trap_v(noise, release_s) for release_s in FLICKER_S])
+    own.flicker_v = traps_v * random.standard_normal(len(FLICKER_S))
+    if ticked_v(noise):
+        own.wander_v = ticked_v(noise) * random.standard_normal()
+    settle(own, noise, 0.0)
+
+
+@kernel
+def tick(x: Fluctuation, y: Fluctuation, noise: Noises, t_s: float, step_s: float, random: Generator) -> None:
+    """Advance what is slow in both outputs by one tick that ends at `t_s`."""
+    release(x, noise.x, step_s, random)
+    release(y, noise.y, step_s, random)
+    stray(x, noise.x, step_s, random)
+    stray(y, noise.y, step_s, random)
+    settle(x, noise.x, t_s)
+    settle(y, noise.y, t_s)
+
+
+@kernel
+def release(own: Fluctuation, noise: Noise, step_s: float, random: Generator) -> None:
+    """Let slow traps catch and release."""
+    for k in range(len(FLICKER_S)):
+        rms, release_s = trap_v(noise, FLICKER_S[k]), FLICKER_S[k]
+        own.flicker_v[k] = wandered(own.flicker_v[k], rms, release_s, step_s, random.standard_normal())
+
+
+@kernel
+def stray(own: Fluctuation, noise: Noise, step_s: float, random: Generator) -> None:
+    """Let the walk walk and the wander wander."""
+    own.walk_v += noise.walk_v_per_sqrt_h * math.sqrt(step_s / HOUR_S) * random.standard_normal()
+    if ticked_v(noise) != 0:
+        own.wander_v = wandered(own.wander_v, noise.wander_v, noise.wander_s, step_s, random.standard_normal())
+
+
+@kernel
+def settle(own: Fluctuation, noise: Noise, t_s: float) -> None:
+    """Add up what is slow at `t_s`."""
+    own.slow_v = own.flicker_v.sum() + own.walk_v + own.wander_v + noise.ramp_v_per_h * t_s / HOUR_S
+
+
+@kernel
+def remember(own: Fluctuation, noise: Noise, gap_ns: int) -> None:
+    """Work out what the filter keeps over `gap_ns`, unless that was asked last."""
+    if gap_ns != own.kept_ns:
+        own.kept_ns = gap_ns
+        own.kept = math.exp(-1e-9 * gap_ns / filter_s(noise))
+        own.fresh = math.sqrt(1 - own.kept * own.kept)
+
+
+@kernel
+def charge(own: Fluctuation, noise: Noise, volts: float, t_ns: int) -> None:
+    """Let the capacitor follow the `volts` and the slow noise that have stood at its input until `t_ns`."""
+    gap_ns = t_ns - own.filtered_ns
+    if gap_ns > 0:
+        remember(own, noise, gap_ns)
+        target = volts + own.slow_v
+        own.filtered_v = target + own.kept * (own.filtered_v - target)
+        own.filtered_ns = t_ns
+
+
+@kernel
+def output_v(own: Fluctuation, noise: Noise, volts: float, t_ns: int, normal: float) -> float:
+    """What the capacitor holds at `t_ns`, noise included, where `volts` have stood in front of the filter."""
+    charge(own, noise, volts, t_ns)
+    gap_ns = t_ns - own.white_ns
+    if gap_ns > 0:
+        remember(own, noise, gap_ns)
+        own.white = own.kept * own.white + own.fresh * normal
+        own.white_ns = t_ns
+    held: float = own.filtered_v + noise.white_v * own.white
+    return held

@@ -1,0 +1,172 @@
+"""The nano-positioner's carriage: what the servo makes of a command, in um along each axis.
+
+The carriage stands on the turning table and carries the sensor's mount: its axes x, y, z are the table's,
+which are the sensor's own at mount 0. A closed loop around a piezo on its flexure is a lag of second order,
+
+    x'' + 2 d w x' + w^2 x = w^2 u(t)        w = 2 pi servo_hz, d the damping, u the command
+
+and all commands are straight lines and sinusoids. So the motion is known in closed form for all times: what the
+loop settles to, and an exponential that remembers how it began. Nothing is stepped, nothing depends on how time
+is cut, and a carriage at rest costs nothing. `Positioner` is handed over as its record (see kernel).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from drivers.world.errors import BadSetting
+from drivers.world.kernel import Floats, Ints, kernel
+
+Bits = NDArray[np.uint64]
+
+AXES = ("x", "y", "z")
+PIECES = 2  # a command, and standing where it ended
+TERMS = 8  # of a piece: start, place, rate, amplitude, angular frequency, phase, and both parts of the exponential
+FOREVER_S = 1e9
+FORGOTTEN = 25.0  # time constants after which nothing is left of a beginning: 1e-11 of it
+
+
+@dataclass(frozen=True)
+class Positioner:
+    """Flexure stage and servo loop of one axis; the travel and the speed are the controller's."""
+
+    servo_hz: float = 120.0  # natural frequency of the closed loop
+    damping_fraction: float = 0.8  # relative to critical; below 1
+    noise_nm: float = 1.0  # rms of one reading of the position sensor
+
+    def __post_init__(self) -> None:
+        if not (self.servo_hz > 0 and 0 < self.damping_fraction < 1):
+            raise BadSetting(
+                f"No servo loop has {self}", "Give a positive servo_hz and a damping_fraction between 0 and 1"
+            )
+
+
+@dataclass(frozen=True)
+class Command:
+    """What the controller asks for from `start_s` to `end_s`; then the place that it has reached.
+
+    at_um + rate_um_s t + amplitude_um sin(2 pi frequency_hz t + phase_rad), with t from `start_s` on.
+    """
+
+    start_s: float
+    at_um: float
+    rate_um_s: float = 0.0
+    amplitude_um: float = 0.0
+    frequency_hz: float = 0.0
+    phase_rad: float = 0.0
+    end_s: float = FOREVER_S
+
+    def um(self, t_s: float) -> float:
+        """The commanded place at `t_s`."""
+        t = min(max(t_s, self.start_s), self.end_s) - self.start_s
+        swing = self.amplitude_um * math.sin(2 * math.pi * self.frequency_hz * t + self.phase_rad)
+        return self.at_um + self.rate_um_s * t + swing
+
+    def moving(self, t_s: float) -> bool:
+        """Whether the commanded place changes at `t_s`."""
+        return self.start_s <= t_s < self.end_s and (self.rate_um_s != 0 or self.amplitude_um != 0)
+
+
+def standing(at_um: float, since_s: float = 0.0) -> Command:
+    """The command to be at one place."""
+    return Command(since_s, at_um, end_s=since_s)
+
+
+def at_rest(at_um: float = 0.0) -> Floats:
+    """The motion of a carriage that has always stood at `at_um`; shape (PIECES, TERMS)."""
+    pieces = np.zeros((PIECES, TERMS))
+    pieces[:, 1] = at_um
+    return pieces
+
+
+def following(positioner: Positioner, pieces: Floats, command: Command) -> tuple[Floats, float]:
+    """The motion from the command's start on, given the motion until then; and when nothing of it is left, in s."""
+    new = np.zeros((PIECES, TERMS))
+    new[0, :6] = _settled(positioner, command)
+    _begin(positioner, new[0], pieces)
+    new[1, :2] = command.end_s, command.um(command.end_s)
+    _begin(positioner, new[1], new[:1])
+    return new, command.end_s + FORGOTTEN / (2 * math.pi * positioner.servo_hz * positioner.damping_fraction)
+
+
+def _settled(positioner: Positioner, command: Command) -> tuple[float, ...]:
+    """What the loop follows a command with, once its beginning is forgotten: later, weaker, turned in phase."""
+    own, asked = 2 * math.pi * positioner.servo_hz, 2 * math.pi * command.frequency_hz
+    answer = own**2 / complex(own**2 - asked**2, 2 * positioner.damping_fraction * own * asked)
+    late_s = 2 * positioner.damping_fraction / own
+    phase = command.phase_rad + math.atan2(answer.imag, answer.real)
+    place = command.at_um - late_s * command.rate_um_s
+    return command.start_s, place, command.rate_um_s, command.amplitude_um * abs(answer), asked, phase
+
+
+def _begin(positioner: Positioner, piece: Floats, before: Floats) -> None:
+    """Set the exponential of `piece` so that place and speed go on where `before` is at its start."""
+    decay, swing = _poles(positioner)
+    there, here = (motion(positioner, pieces, piece[0]) for pieces in (before, piece[None, :]))
+    piece[6] = there[0] - here[0]
+    piece[7] = (there[1] - here[1] + decay * piece[6]) / swing
+
+
+@kernel
+def _poles(positioner: Positioner) -> tuple[float, float]:
+    """Decay and angular frequency of the loop's own motion, in 1/s."""
+    own = 2 * math.pi * positioner.servo_hz
+    return positioner.damping_fraction * own, own * math.sqrt(1 - positioner.damping_fraction**2)
+
+
+@kernel
+def motion(positioner: Positioner, pieces: Floats, t_s: float) -> tuple[float, float, float]:
+    """Place in um, speed in um/s and acceleration in um/s^2 of a carriage at `t_s`."""
+    k = len(pieces) - 1
+    while k > 0 and t_s < pieces[k, 0]:
+        k -= 1
+    start, place, rate, amplitude, asked, phase, a, b = pieces[k]
+    decay, swing = _poles(positioner)
+    t = max(0.0, t_s - start)
+    turned = asked * t + phase
+    left = math.exp(-decay * t)
+    c, s = left * math.cos(swing * t), left * math.sin(swing * t)
+    a1, b1 = swing * b - decay * a, -swing * a - decay * b  # of the first derivative of a c + b s
+    a2, b2 = swing * b1 - decay * a1, -swing * a1 - decay * b1
+    return (
+        place + rate * t + amplitude * math.sin(turned) + a * c + b * s,
+        rate + amplitude * asked * math.cos(turned) + a1 * c + b1 * s,
+        -amplitude * asked**2 * math.sin(turned) + a2 * c + b2 * s,
+    )
+
+
+@kernel
+def places_um(positioner: Positioner, pieces: Floats, times_s: Floats) -> Floats:
+    """Places at many times."""
+    places = np.empty(len(times_s))
+    for i in range(len(times_s)):
+        places[i] = motion(positioner, pieces, times_s[i])[0]
+    return places
+
+
+def read_um(positioner: Positioner, pieces: Floats, times_s: ArrayLike, salt: int) -> Floats:
+    """What the position sensor shows at `times_s`: the place, and noise that depends on time and `salt` alone."""
+    times = np.atleast_1d(np.asarray(times_s, dtype=np.float64))
+    noise = normal_at(np.rint(1e9 * times).astype(np.int64), salt)
+    read: Floats = places_um(positioner, pieces, times) + 1e-3 * positioner.noise_nm * noise
+    return read
+
+
+def normal_at(times_ns: Ints, salt: int) -> Floats:
+    """Standard normal numbers that belong to instants: asked twice, the same. Box-Muller on mixed bits."""
+    bits = times_ns.astype(np.uint64) * np.uint64(2) + _mixed(np.array([salt], dtype=np.uint64))
+    first, second = (1.0 - _mixed(bits + np.uint64(k)) / 2.0**64 for k in range(2))
+    return np.asarray(np.sqrt(-2 * np.log(first)) * np.cos(2 * math.pi * second))
+
+
+def _mixed(bits: Bits) -> Bits:
+    """SplitMix64 (Steele, Lea and Flood 2014): neighbouring numbers become unrelated ones."""
+    bits = bits + np.uint64(0x9E3779B97F4A7C15)
+    bits = (bits ^ (bits >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    bits = (bits ^ (bits >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    mixed: Bits = bits ^ (bits >> np.uint64(31))
+    return mixed

@@ -1,0 +1,216 @@
+"""The connected instruments of a bench: drivers by role, on real wires or on twins in this process.
+
+With twins only, `state` and `restore` continue a simulated rig at the same sample.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from typing import Any, cast
+
+from drivers.clock import SimulatedClock
+from drivers.errors import DriverError
+from drivers.instrument import Check, Identity
+from drivers.instrument import Instrument as Driver
+from drivers.manual_stage.driver import ManualStage
+from drivers.manual_stage.person import PersonLink
+from drivers.transport.link import Tap
+from drivers.transport.server import Server
+from drivers.world.batch import Batch
+from drivers.world.world import World
+from procedures.errors import ProcedureError
+from procedures.questions import Dial
+from procedures.session import Dwell, Host, Session
+from rig.bench import ROLES, Bench
+from rig.errors import InstrumentFailed
+from rig.instruments.guard import NOW_AND_THEN_S, GuardedClock, Look
+from rig.instruments.wiring import Wiring, wired
+
+
+@dataclass(frozen=True)
+class Technician:
+    """The person at the rig, for drivers that ask one. Its questions are questions of the run.
+
+    So a file of answers, the simulated technician and `--unattended` also answer them, and the record keeps the answer.
+    """
+
+    host: Host
+
+    def ask(self, name: str, text: str, unit: str, low: float, high: float, expected: float | None = None) -> float:
+        """The number that the person reads. Raises NoAnswer, BadAnswer."""
+        stage = name.partition("-")[0]
+        return float(self.host.ask(Dial(name, text, unit=unit, low=low, high=high, stage=stage, expected=expected)))
+
+
+OVEN_TAKES_S = 0.5  # an answer of the oven, with a margin
+MOVING = ("alpha", "beta", "positioner")
+
+
+class Absent:
+    """The place of an instrument that is not in the bench file. Every use raises ProcedureError."""
+
+    def __init__(self, role: str) -> None:
+        self._role = role
+
+    def referenced(self) -> bool:
+        """An absent stage needs no homing."""
+        return True
+
+    def __getattr__(self, what: str) -> Any:
+        raise ProcedureError(f"the bench has no {self._role}, but this procedure needs it; add it to the bench file")
+
+
+class NoOven(Absent):
+    """A bench without oven and thermometer: the temperature is unknown. Every other use raises ProcedureError."""
+
+    def temperature_c(self) -> None:
+        return None
+
+
+def absent(role: str) -> Absent | None:
+    """The object for a role without an instrument; None for the level, because a person can read one."""
+    if role == "level":
+        return None
+    return NoOven(role) if role == "oven" else Absent(role)
+
+
+@dataclass(frozen=True)
+class Rig:
+    """A connected bench."""
+
+    bench: Bench
+    drivers: Mapping[str, Driver]
+    clock: GuardedClock
+    world: World | Batch | None  # of the simulated instruments
+    servers: tuple[Server, ...]
+    person: PersonLink
+
+    def session(self, host: Host) -> Session:
+        """The session of a procedure. From now on `host` answers the questions to the person at the rig."""
+        self.person.attended_by = Technician(host)
+        parts: dict[str, Any] = {role: self.drivers.get(role) or absent(role) for role in ROLES}
+        return Session(**parts, clock=self.clock, host=host, limits=self.bench.limits, steady=_at_rest)
+
+    def read_deg(self) -> dict[str, float]:
+        """The last readings of the dials of manual stages, by role."""
+        dials = {role: driver.read_deg for role, driver in self.drivers.items() if isinstance(driver, ManualStage)}
+        return {role: read_deg for role, read_deg in dials.items() if read_deg is not None}
+
+    def power_on_s(self) -> float | None:
+        """The clock's time when the sensor was powered; None if unknown."""
+        return self.clock.now() - self.world.powered_s() if self.world and self.bench.simulated else None
+
+    def identities(self) -> dict[str, Identity]:
+        """The identity of the instrument in each role."""
+        return {role: driver.identify() for role, driver in self.drivers.items()}
+
+    def state(self) -> dict[str, Any] | None:
+        """The state of a simulated bench; None if an instrument is real."""
+        if self.world is None or not self.bench.simulated:
+            return None
+        servers = [server.state() for server in self.servers]
+        return {"clock_s": self.clock.now(), "world": self.world.state(), "servers": servers}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Restore a simulated bench from `state`."""
+        clock = self.clock.inner
+        if self.world is None or not isinstance(clock, SimulatedClock):
+            return
+        self.world.restore(state["world"])
+        for server, kept in zip(self.servers, state["servers"], strict=True):
+            server.restore(kept)
+        clock.restore(state["clock_s"])
+
+    def require_steady(self) -> None:
+        """Raises the error of a stage that has left its position, or of an oscillation that has ended."""
+        for driver in self._moving():
+            getattr(driver, "require_steady", _nothing)()
+
+    def look(self) -> None:
+        """Raises the error of an open interlock or an alarm."""
+        for driver in self._watched():
+            driver.look()
+
+    def guarded(self, session: Session) -> AbstractContextManager[None]:
+        """Inside the context every wait checks interlocks, alarms and the oven, and raises their errors."""
+        looks = [Look(driver.look) for driver in self._watched()]
+        if "oven" in self.drivers:
+            looks.append(
+                Look(lambda: session.check_temperature(session.oven.temperature_c()), NOW_AND_THEN_S, OVEN_TAKES_S)
+            )
+        return self.clock.guarded(looks)
+
+    def _watched(self) -> list[Any]:
+        """Drivers with a check.
+
+        Without interlocks there is none in simulated time: there the end of a move is early enough for an alarm.
+        """
+        adc = self.bench.instruments.get("adc")
+        if self.bench.simulated and not (adc and adc.typed_settings().interlocks):
+            return []
+        return [driver for driver in self.drivers.values() if hasattr(driver, "look")]
+
+    def stop(self) -> list[str]:
+        """Stop all motion at once, then the oven. Returns a sentence for each instrument that does not stop.
+
+        Every instrument gets its stop command before the first wait. The oven is switched off, because only a run
+        checks its temperature.
+        """
+        movers, oven = self._moving(), cast(Any, self.drivers.get("oven"))
+        for mover in movers:
+            _failure(getattr(mover, "halt", _nothing))
+        failed = [(f"{mover.name} may still move", _failure(mover.stop)) for mover in movers]
+        if oven is not None:
+            failed.append((f"{oven.name} may still heat", _failure(lambda: oven.run(False))))
+        return [f"{what}: {failure}" for what, failure in failed if failure is not None]
+
+    def _moving(self) -> list[Any]:
+        return [self.drivers[role] for role in MOVING if role in self.drivers]
+
+
+def _failure(act: Callable[[], object]) -> Exception | None:
+    """The error of `act`. Every error is caught, so that the other instruments are stopped as well."""
+    try:
+        act()
+    except Exception as failure:
+        return failure
+    return None
+
+
+def _nothing() -> None:
+    """For an instrument without this method."""
+
+
+def _at_rest(dwells: Sequence[Dwell], oven_c: float) -> bool:
+    from rig.results.soak import steady  # slow to import, and only a soak needs it
+
+    return steady(dwells, oven_c)
+
+
+@contextmanager
+def connected(bench: Bench, tap: Tap | None = None) -> Iterator[Rig]:
+    """The bench with every instrument connected. All wires and servers are closed at the end.
+
+    `tap` is called for every message.
+    Raises InstrumentFailed with role, address and remedy; Busy if another process uses a real instrument.
+    """
+    with wired(bench, tap) as wiring:
+        drivers = {role: wiring.connect(role) for role in bench.instruments}
+        servers = tuple(wiring.servers.values())
+        yield Rig(bench, drivers, wiring.clock, wiring.world if servers else None, servers, wiring.links.person)
+
+
+def checked(bench: Bench) -> dict[str, tuple[Identity | None, list[Check]]]:
+    """Identity and self-test of every instrument. One that does not answer has no identity and a failed check."""
+    with wired(bench) as wiring:
+        return {role: _check(wiring, role) for role in bench.instruments}
+
+
+def _check(wiring: Wiring, role: str) -> tuple[Identity | None, list[Check]]:
+    try:
+        driver = wiring.connect(role)
+        return driver.identify(), driver.self_test()
+    except (DriverError, InstrumentFailed) as error:
+        return None, [Check("answers", False, str(error))]

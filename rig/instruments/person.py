@@ -1,0 +1,79 @@
+"""The simulated technician: does the work of a question in the simulated world, and answers.
+
+There is none on a bench with a real instrument: `answer` returns None.
+"""
+
+from __future__ import annotations
+
+from functools import singledispatch
+
+from drivers.manual_stage.twin import Hand
+from drivers.world.batch import Batch
+from drivers.world.world import World
+from procedures.questions import Choice, Confirm, Dial, Mounting, Number, PowerCycle, Question, Remount
+from rig.instruments.instruments import Rig
+
+
+def answer(question: Question, rig: Rig) -> str | None:
+    """The answer of the simulated technician; None on a real bench, and for a question without a known answer."""
+    if rig.world is None or not rig.bench.simulated:
+        return None
+    rig.world.advance(max(rig.clock.now(), rig.world.now_s))
+    return _done(question, rig, rig.world)
+
+
+@singledispatch
+def _done(question: Question, rig: Rig, world: World | Batch) -> str | None:  # noqa: ARG001
+    """Do the work, and answer. Each kind of question has its own function."""
+    return None
+
+
+@_done.register
+def _(question: Confirm, rig: Rig, world: World | Batch) -> str:  # noqa: ARG001
+    return "yes"
+
+
+@_done.register
+def _(question: Choice, rig: Rig, world: World | Batch) -> str:  # noqa: ARG001
+    return question.choices[0]
+
+
+@_done.register
+def _(question: Mounting, rig: Rig, world: World | Batch) -> str:  # noqa: ARG001
+    world.mount_sensor(question.mount_deg, question.flip, question.up)
+    return "yes"
+
+
+@_done.register
+def _(question: Remount, rig: Rig, world: World | Batch) -> str:  # noqa: ARG001
+    world.mount_sensor()
+    return "yes"
+
+
+@_done.register
+def _(question: PowerCycle, rig: Rig, world: World | Batch) -> str:
+    world.power(False)
+    rig.clock.sleep(question.off_s)
+    world.advance(rig.clock.now())
+    world.power(True)
+    return "yes"
+
+
+@_done.register
+def _(question: Number, rig: Rig, world: World | Batch) -> str | None:  # noqa: ARG001
+    if not question.name.startswith("level-"):
+        return None
+    x_deg, y_deg = world.level_deg()
+    return f"{x_deg if question.name.endswith('-x') else y_deg:.2f}"
+
+
+@_done.register
+def _(question: Dial, rig: Rig, world: World | Batch) -> str:
+    """Turn the stage if needed, which takes time, and read the dial."""
+    settings = rig.bench.instruments[question.stage].typed_settings()
+    hand = Hand(world, question.stage, settings, rig.bench.seed)
+    turn = None if question.expected is None else hand.turn_to(question.expected)
+    if turn is not None:
+        rig.clock.sleep(max(settings.seconds_per_move, turn.end_s - world.now_s))
+        world.advance(rig.clock.now())
+    return f"{hand.read_deg():.4f}"

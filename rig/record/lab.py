@@ -1,0 +1,167 @@
+"""The lab's record on a PostgreSQL server: its URL, connection and preparation.
+
+The URL is postgresql://USER@HOST:PORT/DATABASE?sslmode=verify-full. Its password is never shown.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+
+from sqlalchemy import URL, Connection, Engine, ExceptionContext, create_engine, event, make_url, text
+from sqlalchemy.exc import ArgumentError, InterfaceError, OperationalError
+
+from rig.errors import LabAway, RecordError
+from rig.record.schema import MIGRATIONS, SCHEMA, metadata
+
+SECRET = ("password", "sslpassword")  # query keys of libpq
+# The message does not quote a refused URL, because it may contain a password.
+NO_URL = (
+    "is not the URL of a lab's record; write postgresql://USER@HOST/DATABASE, and in a password %40 for @, %2F for /; "
+    "or put the password into ~/.pgpass or PGPASSWORD"
+)
+
+
+def lab_url(given: str, what: str = "what was given") -> URL:
+    """The parsed URL. Raises RecordError, which begins with `what` and does not quote the URL."""
+    try:
+        url = make_url(given)
+    except (ArgumentError, ValueError):
+        raise RecordError(f"{what} {NO_URL}") from None
+    scheme = url.drivername.partition("+")[0]
+    if scheme not in ("postgresql", "postgres") or not url.database or "@" in f"{url.host}{url.database}":
+        raise RecordError(f"{what} {NO_URL}")
+    return url.set(drivername="postgresql+psycopg")
+
+
+def shown(url: URL) -> str:
+    """The URL for messages and logs, with stars for a password."""
+    return url.set(drivername="postgresql").difference_update_query(SECRET).render_as_string()
+
+
+def has_password(url: URL) -> bool:
+    """Whether the URL contains a password."""
+    return bool(url.password) or any(url.query.get(name) for name in SECRET)
+
+
+# libpq also uses PGPASSWORD, ~/.pgpass and PGSSLROOTCERT. A connection to another machine is encrypted, unless the user
+# sets another sslmode. LabAway: the network or the server fails. RecordError: a missing permission, a wrong server, or
+# a record of another version.
+
+PREPARE = "`rig push --prepare --to URL`, run by the owner of the database,"
+# Timeouts for an absent lab; the URL can set others.
+PATIENCE = {"connect_timeout": "5", "keepalives_idle": "10", "keepalives_interval": "5", "keepalives_count": "3"}
+PATIENCE |= {"tcp_user_timeout": "20000", "application_name": "rig"}
+ENCRYPTED = {"sslmode": "require"}  # by default; the default of libpq would fall back to plain text
+HERE = ("/", "@", "127.", "localhost", "::1")  # prefixes of this machine; the first two are sockets
+TLS = ("SSL", "certificate")  # words in libpq's messages on encryption
+FORBIDDEN, READ_ONLY = "42501", "25006"  # SQLSTATE: insufficient privilege, read-only transaction
+
+for _name in ("psycopg", "sqlalchemy"):  # our own message reports a lost connection
+    logging.getLogger(_name).addHandler(logging.NullHandler())
+
+
+def connected(url: URL) -> Engine:
+    """The engine of the server. It does not connect yet."""
+    engine = create_engine(url, connect_args=options(url))
+    event.listen(engine, "handle_error", lambda context: _tell(context, url))
+    return engine
+
+
+def options(url: URL) -> dict[str, str]:
+    """The options for libpq that the URL does not set."""
+    stated = {"service", "sslmode"} & set(url.query) or "PGSSLMODE" in os.environ or _is_here(url)
+    return {k: v for k, v in PATIENCE.items() if k not in url.query} | ({} if stated else ENCRYPTED)
+
+
+def _is_here(url: URL) -> bool:
+    """Whether every host of the URL is this machine."""
+    named = url.query.get("host") or url.host or os.environ.get("PGHOST", "")
+    hosts = named.split(",") if isinstance(named, str) else named
+    return all(not host or host.startswith(HERE) for host in hosts)
+
+
+def open_server(url: URL) -> Engine:
+    """The engine of a record with the tables of this program. Raises LabAway, RecordError."""
+    engine = connected(url)
+    with engine.connect() as at:
+        require_current(version(at), shown(url))
+    return engine
+
+
+def version(at: Connection) -> int:
+    """The schema of the tables; 0 without tables."""
+    found = at.execute(text("SELECT obj_description(to_regclass('runs'), 'pg_class')")).scalar_one()
+    return int(found.removeprefix("schema ")) if found else 0
+
+
+def require_current(found: int, where: str) -> None:
+    """Raises RecordError for tables of another version of this program, and without tables."""
+    if found > SCHEMA:
+        raise RecordError(f"{where}: the record is of a newer version of this program (schema {found}, this one knows "
+                          f"{SCHEMA}); get the new version")  # fmt: skip
+    if not found:
+        raise RecordError(f"{where}: there is no record yet; {PREPARE} makes one")
+    if found < SCHEMA:
+        raise RecordError(f"{where}: this record has an older schema ({found} of {SCHEMA}); {PREPARE} updates it")
+
+
+def _tell(context: ExceptionContext, url: URL) -> None:
+    """Raises LabAway or RecordError for an error of the server. A defect of this program passes."""
+    error = context.original_exception
+    if getattr(error, "sqlstate", None) in (FORBIDDEN, READ_ONLY):
+        role = url.username or "this role"
+        raise RecordError(f"{shown(url)}: {role} has no permission for this ({_first_line(error)}); the owner can "
+                          "grant it rig_writer, or rig_reader for reading") from None  # fmt: skip
+    if context.connection is None and any(word in (reason := _first_line(error)) for word in TLS):
+        raise RecordError(f"{shown(url)}: there is no encrypted connection to a trusted server ({reason}); nothing was "
+                          "sent. Give the certificate of the server's signer in sslrootcert, and set `ssl = on` in the "
+                          "server's postgresql.conf (docs/lab.md)") from None  # fmt: skip
+    if context.is_disconnect or isinstance(context.sqlalchemy_exception, OperationalError | InterfaceError):
+        raise LabAway(f"{shown(url)}: no connection to the lab's record ({_first_line(error)}); nothing is lost, "
+                      "the next `rig push` continues") from None  # fmt: skip
+    if context.connection is None:  # libpq refuses the URL
+        raise RecordError(f"{shown(url)}: {_first_line(error)}; correct the URL") from None
+
+
+def _first_line(error: BaseException) -> str:
+    return str(error).strip().partition("\n")[0].rstrip(".") or type(error).__name__
+
+
+# Preparation of a database as the lab's record: the tables, and two roles. All users are members of one of them.
+
+READER, WRITER = "rig_reader", "rig_writer"
+ONE_AT_A_TIME = 0x52494700  # key of the advisory lock for the preparation
+MAY = {READER: "SELECT", WRITER: "SELECT, INSERT, UPDATE"}  # rows are never deleted
+
+
+def prepare(url: URL) -> int:
+    """Make or migrate the tables, and grant permissions to the roles. Returns the schema before, 0 without tables.
+
+    Existing rows stay, so it can be repeated. Raises LabAway; RecordError if the role in `url` has no permission, or
+    the record belongs to a newer program.
+    """
+    engine = connected(url)
+    try:
+        with engine.begin() as to:
+            to.execute(text(f"SELECT pg_advisory_xact_lock({ONE_AT_A_TIME})"))
+            before = version(to)
+            if before > SCHEMA:
+                require_current(before, shown(url))
+            metadata.create_all(to)
+            for statement in (each for old in range(before or SCHEMA, SCHEMA) for each in MIGRATIONS[old]):
+                to.execute(text(statement))
+            to.execute(text(f"COMMENT ON TABLE runs IS 'schema {SCHEMA:d}'"))
+            _grant(to)
+    finally:
+        engine.dispose()
+    return before
+
+
+def _grant(to: Connection) -> None:
+    tables = ", ".join(to.dialect.identifier_preparer.format_table(table) for table in metadata.sorted_tables)
+    for role, may in MAY.items():
+        if not to.execute(text("SELECT 1 FROM pg_roles WHERE rolname = :role"), {"role": role}).scalar():
+            to.execute(text(f"CREATE ROLE {role} NOLOGIN"))
+        to.execute(text(f"GRANT {may} ON {tables} TO {role}"))
+    to.execute(text(f"GRANT USAGE ON SEQUENCE events_event_seq, log_line_seq TO {WRITER}"))

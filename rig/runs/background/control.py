@@ -1,0 +1,187 @@
+"""Control of background runs: start, pause, stop, answer. A run in a terminal publishes its status here as well."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack, suppress
+from pathlib import Path
+from types import TracebackType
+from typing import ParamSpec, Self
+
+from procedures.questions import Question
+from procedures.session import Reading
+from rig.bench import Bench
+from rig.errors import RigError
+from rig.files import home
+from rig.lease import lease
+from rig.planning.plan import Plan
+from rig.record import Kept, Record
+from rig.runs.background.status import (
+    Order,
+    Seat,
+    Status,
+    Teller,
+    asked_of,
+    file,
+    folder,
+    keys,
+    lock,
+    new_key,
+    read,
+    tidy,
+)
+from rig.runs.observer import Outcome, Watch, Wish
+
+P = ParamSpec("P")
+
+
+class Beside:
+    """An observer that forwards all events to `watch`, and publishes the status of the run.
+
+    An error of the status file is ignored: it must not disturb the run.
+    """
+
+    def __init__(self, watch: Watch, procedure: str, bench: Bench, seat: Seat) -> None:
+        self._watch, self._procedure = watch, procedure
+        self._key, self._run = new_key(), ""
+        self._teller = Teller(self._key, procedure, bench, seat)
+        self._held = ExitStack()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._run:
+            with suppress(RigError, OSError):
+                self._end()
+        self._held.close()
+
+    def planned(self, plan: Plan) -> None:
+        self._watch.planned(plan)
+        self._teller.planned(plan)
+
+    def begun(self, run: str) -> None:
+        if not self._run:
+            with suppress(RigError, OSError):
+                folder().mkdir(parents=True, exist_ok=True)
+                tidy()
+                self._held.enter_context(lease(home(), lock(self._key), f"an order, {self._procedure}"))
+        self._run = run
+        self._watch.begun(run)
+        self._tell(self._teller.begun, run)
+
+    def doing(self, text: str) -> None:
+        self._watch.doing(text)
+        self._tell(self._teller.doing, text)
+
+    def expect(self, total: int, done: int) -> None:
+        self._watch.expect(total, done)
+        self._tell(self._teller.expect, total, done)
+
+    def kept(self, kept: Kept) -> None:
+        self._watch.kept(kept)
+        self._tell(self._teller.kept, kept)
+
+    def read(self, reading: Reading) -> None:
+        self._watch.read(reading)
+        self._tell(self._teller.read, reading)
+
+    def ask(self, question: Question, instead: str | None) -> str:
+        self._tell(self._teller.tell, phase="asking", asked=asked_of(question, instead or ""))
+        given = self._watch.ask(question, instead)
+        self._tell(self._teller.tell, phase="running", asked=None)
+        return given
+
+    def interrupted(self, outcome: Outcome) -> Wish:
+        self._tell(self._teller.tell, phase="paused", error=str(outcome.error), moving=outcome.moving)
+        return self._watch.interrupted(outcome)
+
+    def _tell(self, what: Callable[P, None], *args: P.args, **kwargs: P.kwargs) -> None:
+        if self._run:
+            with suppress(RigError, OSError):
+                what(*args, **kwargs)
+
+    def _end(self) -> None:
+        with Record() as record:
+            run = record.run(self._run)
+        self._teller.tell(phase="ended", state=run.state, asked=None, error=run.message or "")
+
+
+# Control of background runs. Every process can control every run.
+
+UNATTENDED = "the run is unattended, so it cannot pause; stop it, and resume it later"
+IN_ITS_TERMINAL = "the run began in a terminal; answer there"
+_children: list[subprocess.Popen[bytes]] = []  # to collect the processes that have ended
+
+
+def begin(procedure: str, settings: Mapping[str, str], bench_file: Path | None, attended: bool) -> str:
+    """Start `procedure` in the background. Returns its key. Its status has the error, if there is one."""
+    return _begin(Order(new_key(), procedure, dict(settings), str(bench_file or ""), attended=attended))
+
+
+def go_on(run: str, procedure: str, bench_file: Path | None, attended: bool) -> str:
+    """Resume a run in the background. Returns its key."""
+    return _begin(Order(new_key(), procedure, {}, str(bench_file or ""), run, attended))
+
+
+def _begin(order: Order) -> str:
+    file(order.key, "log").parent.mkdir(parents=True, exist_ok=True)
+    tidy()
+    os.mkfifo(file(order.key, "answers"))
+    with file(order.key, "log").open("wb") as log:
+        words = [sys.executable, "-m", "rig.runs.background.process", order.text()]
+        child = subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True)  # noqa: S603
+    _children.append(child)
+    return order.key
+
+
+def latest() -> Status | None:
+    """The status of the newest background run in progress, else of the newest; None without any."""
+    _children[:] = [child for child in _children if child.poll() is None]
+    found = [status for key in reversed(keys()) if (status := read(key)) is not None]
+    return next((status for status in found if status.phase != "ended"), found[0] if found else None)
+
+
+def pause(status: Status) -> None:
+    """Stop the stages at once; the run waits for a decision. Raises RigError for an unattended run."""
+    if status.seat == "nobody":
+        raise RigError(UNATTENDED)
+    _signal(status, signal.SIGINT)
+
+
+def stop(status: Status) -> None:
+    """Stop the stages at once and end the run; `rig resume` can continue it."""
+    if status.phase == "paused" and status.seat == "page":
+        answer(status, "end")
+    else:
+        _signal(status, signal.SIGTERM)
+
+
+def answer(status: Status, text: str) -> None:
+    """Answer the question of a run. Raises RigError without a question, or if another process asks."""
+    if status.seat == "terminal":
+        raise RigError(IN_ITS_TERMINAL)
+    if status.asked is None:
+        raise RigError("the run has no question; look at its status")
+    try:
+        pipe = os.open(file(status.key, "answers"), os.O_WRONLY | os.O_NONBLOCK)
+    except OSError as error:
+        if error.errno == errno.ENXIO:
+            raise RigError(f"the run does not wait for an answer to {status.asked.text!r} any more") from None
+        raise
+    with os.fdopen(pipe, "w", encoding="utf-8") as writer:
+        json.dump({"name": status.asked.name, "text": text}, writer)
+
+
+def _signal(status: Status, number: signal.Signals) -> None:
+    if status.phase != "ended":
+        with suppress(ProcessLookupError):
+            os.kill(status.pid, number)

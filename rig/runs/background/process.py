@@ -1,0 +1,119 @@
+"""The background process: `python -m rig.runs.background.process ORDER` runs a procedure as `rig run` does."""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import cast
+
+from procedures.catalogue import find
+from procedures.errors import BadAnswer
+from procedures.questions import Choice, Question
+from procedures.settings import parse
+from rig.bench import Bench, read_bench
+from rig.errors import Stopped
+from rig.files import home
+from rig.lease import lease
+from rig.record import Record
+from rig.record.push import push_after
+from rig.runs.background.status import Order, Teller, asked_of, file, lock
+from rig.runs.runner import Outcome, Wish, resume, start
+
+LONGEST = 4096  # bytes of an answer, which a pipe hands over in one piece
+WISHES = Choice("interrupted", "What now?", choices=("resume", "repeat", "end"))
+
+
+class Attendant(Teller):
+    """The observer of a background run, which asks through a pipe."""
+
+    def __init__(self, order: Order, bench: Bench) -> None:
+        super().__init__(order.key, order.procedure, bench)
+        self._order = order
+        self.tell()
+
+    def ask(self, question: Question, instead: str | None) -> str:
+        """The answer of a person, or of the simulated technician if nobody attends the run."""
+        if instead is not None and not self._order.attended:
+            return instead
+        return self._answer(question, instead or "", "asking")
+
+    def interrupted(self, outcome: Outcome) -> Wish:
+        """Wait at rest for the decision of a person."""
+        by_a_person = isinstance(outcome.error, Stopped)
+        self.tell(error="" if by_a_person else str(outcome.error), moving=outcome.moving)
+        return cast(Wish, self._answer(WISHES, "resume", "paused"))
+
+    def _answer(self, question: Question, proposed: str, phase: str) -> str:
+        """Ask until the question accepts the answer."""
+        asked = asked_of(question, proposed)
+        with _pipe(self._order.key) as heard:  # open before the status shows the question
+            while True:
+                self.tell(phase=phase, asked=asked)
+                given = heard()
+                try:
+                    checked = question.checked(given["text"]) if given.get("name") == question.name else None
+                except BadAnswer as refused:
+                    asked = replace(asked, refused=str(refused))
+                    continue
+                if checked is not None:
+                    self.tell(phase="running", asked=None)
+                    return checked
+
+
+@contextmanager
+def _pipe(key: str) -> Iterator[Callable[[], Mapping[str, str]]]:
+    """A function that waits for the next answer; a signal interrupts it."""
+    pipe = os.open(file(key, "answers"), os.O_RDONLY | os.O_NONBLOCK)
+
+    def heard() -> Mapping[str, str]:
+        select.select([pipe], [], [])
+        try:
+            document = json.loads(os.read(pipe, LONGEST))
+        except ValueError:
+            return {}
+        return document if isinstance(document, dict) else {}
+
+    try:
+        yield heard
+    finally:
+        os.close(pipe)
+
+
+def main(text: str) -> None:
+    """Execute an order. The status has its end in any case."""
+    order = Order.read(text)
+    with lease(home(), lock(order.key), f"an order, {order.procedure}"), Record() as record:
+        teller = Attendant(order, read_bench(order.bench_path))
+        try:
+            outcome = _carried_out(order, record, teller)
+        except KeyboardInterrupt as signal:  # before the run began, or between its parts
+            teller.tell(phase="ended", state="stopped", asked=None, error=f"stopped by {signal}")
+            return
+        except Exception as error:
+            teller.tell(phase="ended", state="failed", asked=None, error=str(error))
+            raise
+        teller.tell(
+            phase="ended",
+            state=outcome.run.state,
+            asked=None,
+            error=str(outcome.error or outcome.run.message or ""),
+            moving=outcome.moving,
+        )
+        push_after(record, outcome.run, Bench.model_validate(outcome.run.bench).lab, print)
+
+
+def _carried_out(order: Order, record: Record, teller: Attendant) -> Outcome:
+    if order.resume:
+        return resume(record, order.resume, teller)
+    bench = read_bench(order.bench_path)
+    procedure = find(order.procedure, bench.folders.procedures)
+    return start(record, bench, procedure, parse(procedure, order.settings), teller)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

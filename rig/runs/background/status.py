@@ -1,0 +1,213 @@
+"""The order of a background run (a procedure, or a run to resume), and its status as one small file."""
+
+from __future__ import annotations
+
+import json
+import os
+import secrets
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Literal
+
+from procedures.questions import Choice, Confirm, Question
+from procedures.session import Reading
+from rig.bench import Bench
+from rig.drawings import drawing_of
+from rig.files import home, write_whole
+from rig.lease import is_held
+from rig.planning.plan import Plan
+from rig.record import Kept
+from rig.runs.observer import Sight, values
+
+FOLDER = "apart"
+
+
+@dataclass(frozen=True)
+class Order:
+    """`settings` are texts, as on a command line. `resume` is the id of a run, or "" for a new run of `procedure`.
+
+    `attended`: questions go to a person, even if the simulated technician can answer them.
+    """
+
+    key: str
+    procedure: str
+    settings: Mapping[str, str] = field(default_factory=dict)
+    bench_file: str = ""
+    resume: str = ""
+    attended: bool = False
+
+    @property
+    def bench_path(self) -> Path | None:
+        """The bench file; None for the simulated rig."""
+        return Path(self.bench_file) if self.bench_file else None
+
+    def text(self) -> str:
+        """The order as text for a command line."""
+        return json.dumps(asdict(self))
+
+    @staticmethod
+    def read(text: str) -> Order:
+        """The order from the text of a command line."""
+        return Order(**json.loads(text))
+
+
+def new_key() -> str:
+    """A name for a process; names sort by time."""
+    return f"{datetime.now(UTC):%Y%m%d-%H%M%S-%f}-{secrets.token_hex(2)}"
+
+
+def file(key: str, ending: str) -> Path:
+    """One of the files of a process."""
+    return home() / FOLDER / f"{key}.{ending}"
+
+
+# The status of a background run, as one small file.
+
+KEPT = 20
+Phase = Literal["starting", "running", "asking", "paused", "ended"]
+Seat = Literal["page", "terminal", "nobody"]
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A question to a person. `proposed`: answer of the simulated technician. `refused`: fault of the last answer.
+
+    `attitude`: the mounting, for a question about it; keywords of `rig.drawings.Attitude`.
+    """
+
+    name: str
+    text: str
+    accepts: str
+    choices: Sequence[str] = ()
+    proposed: str = ""
+    refused: str = ""
+    attitude: Mapping[str, Any] | None = None
+
+
+@dataclass(frozen=True)
+class Status:
+    """`values` are keywords of `rig.runs.observer.Value`, with `near`. `state` is the state of the run after its end.
+
+    `seat`: where a person answers: a page, the terminal of the run, or nobody: then it cannot pause. `error`: why it is
+    paused or not complete. `moving`: instruments that did not stop.
+    """
+
+    key: str
+    pid: int
+    procedure: str
+    bench: str
+    phase: Phase = "starting"
+    run: str = ""
+    now: str = "starting"
+    done: int = 0
+    total: int = 0
+    left: str = ""
+    values: Sequence[Mapping[str, Any]] = ()
+    asked: Asked | None = None
+    error: str = ""
+    moving: Sequence[str] = ()
+    state: str = ""
+    attitude: Mapping[str, Any] = field(default_factory=dict)
+    seat: Seat = "page"
+
+    def write(self) -> None:
+        """Write the status into its file."""
+        write_whole(file(self.key, "json"), json.dumps(asdict(self)))
+
+
+def read(key: str) -> Status | None:
+    """The status of the process `key`; None before its first status. A killed process has ended."""
+    try:
+        document = json.loads(file(key, "json").read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return None
+    asked = document.pop("asked")
+    status = Status(**document, asked=Asked(**asked) if asked else None)
+    if status.phase == "ended" or is_held(home(), lock(key)):
+        return status
+    error = f"its process ended: {_last_words(key)}"
+    return replace(status, phase="ended", state="stopped", asked=None, error=error)
+
+
+def lock(key: str) -> str:
+    """The name of the lock of a running process."""
+    return f"{FOLDER}-{key}"
+
+
+def keys() -> list[str]:
+    """All known processes, newest last."""
+    return sorted(path.stem for path in folder().glob("*.json"))
+
+
+def folder() -> Path:
+    """The folder of the files."""
+    return home() / FOLDER
+
+
+def tidy() -> None:
+    """Remove the files of old processes, except the last KEPT. Their runs stay in the record."""
+    for key in keys()[:-KEPT]:
+        if not is_held(home(), lock(key)):
+            for ending in ("answers", "log", "json"):
+                file(key, ending).unlink(missing_ok=True)
+
+
+def _last_words(key: str) -> str:
+    """The last line of its standard error."""
+    path = file(key, "log")
+    log = path.read_text(encoding="utf-8", errors="replace").strip() if path.exists() else ""
+    return log.splitlines()[-1] if log else "it was killed; `rig resume` continues its run"
+
+
+class Teller:
+    """Publishes the events of a run in its status file. `seat`: where a person answers."""
+
+    def __init__(self, key: str, procedure: str, bench: Bench, seat: Seat = "page") -> None:
+        self._sight = Sight(procedure, bench)
+        self._status = Status(key, os.getpid(), procedure, bench.name, seat=seat)
+
+    def tell(self, **changes: Any) -> None:
+        """Write the present status."""
+        seen = self._sight.seen
+        way, left = seen.way, seen.left(time.monotonic())
+        self._status = replace(self._status, now=seen.now, done=way.done, total=way.total, left=left, **changes)
+        self._status.write()
+
+    def planned(self, plan: Plan) -> None:
+        self._sight.planned(plan)
+
+    def begun(self, run: str) -> None:
+        self._sight.begun(run)
+        self.tell(phase="running", run=run, error="", moving=())
+
+    def doing(self, text: str) -> None:
+        self._sight.doing(text)
+        self.tell()
+
+    def expect(self, total: int, done: int) -> None:
+        self._sight.expect(total, done)
+        self.tell()
+
+    def kept(self, kept: Kept) -> None:
+        self._sight.kept(kept)
+        stands = ("alpha_deg", "beta_deg", "mount_deg", "flip")
+        self.tell(values=self._values(), attitude={name: getattr(kept.pose, name) for name in stands})
+
+    def read(self, reading: Reading) -> None:
+        self._sight.read(reading)
+        self.tell(values=self._values())
+
+    def _values(self) -> list[dict[str, Any]]:
+        return [{**asdict(value), "near": value.near} for value in values(self._sight.seen)]
+
+
+def asked_of(question: Question, proposed: str) -> Asked:
+    """A question in the form of the status."""
+    drawn = drawing_of(question)
+    yes_or_no = ("yes", "no") if isinstance(question, Confirm) else ()
+    choices = question.choices if isinstance(question, Choice) else yes_or_no
+    attitude = asdict(drawn) if drawn else None
+    return Asked(question.name, question.text, question.accepts, choices, proposed, attitude=attitude)

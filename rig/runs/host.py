@@ -1,0 +1,138 @@
+"""The host of a run's session: it records the measurements and asks the observer the questions of the procedure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from typing import Any
+
+from procedures.questions import Question
+from procedures.session import Dwell, Pose, Reading, Samples
+from rig.errors import RunMismatch
+from rig.instruments.instruments import Rig
+from rig.instruments.person import answer
+from rig.record import Kept, Record, Run
+from rig.record.measured import Measured, of_sensor
+from rig.runs.observer import Watch
+
+
+def leave_as(rig: Rig, record: Record, run: str) -> None:
+    """Restore a simulated `rig` to the end of `run`: at rest, the oven off, the sensor face up.
+
+    A real rig is in this state already.
+    """
+    state = record.state(run)
+    if state is None or rig.world is None:
+        return
+    rig.restore(state["rig"])
+    rig.stop()
+    if any(reading.value for reading in record.readings(run) if reading.name in ("mount", "flip")):
+        rig.world.advance(max(rig.clock.now(), rig.world.now_s))
+        rig.world.mount_sensor()
+
+
+class RunHost:
+    """The host of a session that records the measurements."""
+
+    def __init__(self, record: Record, rig: Rig, run: Run, watch: Watch, state: Mapping[str, Any] | None) -> None:
+        self._record, self._rig, self._run, self._watch = record, rig, run.run, watch
+        self._poses = record.poses(run.run)
+        self._next = record.next_number(run.run)
+        self._measured = Measured(record, run, rig.bench.first_sensor)
+        self._dwells: list[Dwell] | None = None  # read from the record if the procedure needs them
+        self._answers = {e.what: e.text for e in record.events(run.run) if e.what.startswith("answer ")}
+        self._zero_s = state["zero_s"] if state else _zero_s(rig, run)
+        if state is None:  # a restored clock is right
+            _require_rising_time(rig.clock.now() - self._zero_s, record, run)
+
+    def kept(self) -> Sequence[Pose]:
+        return self._poses
+
+    def measured(self) -> Sequence[Dwell]:
+        if self._dwells is None:
+            self._dwells = [kept.dwell for kept in self._measured.kept()]
+        return self._dwells
+
+    def readings(self) -> Sequence[Reading]:
+        return self._record.readings(self._run)
+
+    def expect(self, missing: int) -> None:
+        self._watch.expect(missing + len(self._poses), len(self._poses))
+
+    def keep(self, pose: Pose, samples: Samples, temperature_c: float | None) -> None:
+        middle_s = samples.start_s + len(samples.volts) / samples.rate_hz / 2
+        dials = self._rig.read_deg()
+        kept = Kept(
+            pose,
+            samples,
+            middle_s - self._zero_s,
+            temperature_c,
+            alpha_read_deg=dials.get("alpha"),
+            beta_read_deg=dials.get("beta"),
+        )
+        state = self._state()
+        self._log("kept", f"pose {self._next}: {len(samples.volts)} samples")
+        self._record.keep(self._run, self._next, kept, state)
+        self._next += 1
+        self._poses.append(pose)
+        if self._dwells is not None:
+            self._dwells.append(of_sensor(kept, self._measured.sensor).dwell)
+        self._watch.kept(kept)
+
+    def keep_readings(self, *readings: Reading) -> None:
+        for reading in readings:
+            self._log("read", f"{reading.name} = {reading.value:g} {reading.unit}".rstrip())
+        self._record.keep_readings(self._run, readings, self._state())
+        for reading in readings:
+            self._watch.read(reading)
+
+    def keep_state(self) -> None:
+        """Record the state of the bench before the first measurement."""
+        if (state := self._state()) is not None:
+            self._record.keep_state(self._run, state)
+
+    def ask(self, question: Question) -> str:
+        key = f"answer {question.name}"
+        if key in self._answers and not question.repeated:
+            return self._answers[key]
+        given = question.checked(self._watch.ask(question, answer(question, self._rig)))
+        if given != "no":  # a resumed run asks again after a no
+            self._answers[key] = given
+            self._record.note(self._run, key, given)
+        self._log("asked", f"{question.name}: {given}")
+        return given
+
+    def doing(self, text: str) -> None:
+        self._log("doing", text)
+        self._watch.doing(text)
+
+    def _log(self, what: str, text: str) -> None:
+        self._record.log(self._run, self._rig.clock.now(), "run", what, text)
+
+    def _state(self) -> dict[str, Any] | None:
+        """The state to record with a pose. Raises the error of a stage that has left its position."""
+        self._rig.require_steady()
+        rig = self._rig.state()
+        return None if rig is None else {"rig": rig, "zero_s": self._zero_s}
+
+
+def _zero_s(rig: Rig, run: Run) -> float:
+    """The clock's time at t = 0: the time of power-on or, if unknown, the begin of the run."""
+    powered_s = rig.power_on_s()
+    if powered_s is not None:
+        return powered_s
+    age = datetime.now(UTC) - datetime.fromisoformat(run.created)
+    return rig.clock.now() - age.total_seconds()
+
+
+def _require_rising_time(t_s: float, record: Record, run: Run) -> None:
+    """Raises RunMismatch if the computer's clock was set back between two parts of a run.
+
+    Within one part of a run a change of the computer's clock has no effect.
+    """
+    last_s = record.last_t_s(run.run)
+    if last_s is not None and t_s < last_s:
+        raise RunMismatch(
+            f"by the computer's clock the run began {t_s:.0f} s ago, but its last pose was at {last_s:.0f} s; "
+            "correct the clock, then resume the run"
+        )

@@ -1,0 +1,120 @@
+"""The loop of `rig discover --live`: measure, diagnose, choose the next experiment, until an explanation is confirmed.
+
+An explanation is confirmed if new data do not change it. If the data cannot separate several explanations, the loop
+runs the experiment that separates them (`next_experiment.py`). Otherwise it measures poses between the known ones: they
+show effects that the first poses are blind to. All data are analysed together. The loop also ends when time is up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from calibrations.design.experiment import ADDITIONS, MENU, Experiment
+from calibrations.discovery.results import Discovery
+from calibrations.effects import Effect
+from calibrations.fit import Fit
+from calibrations.loop import discover
+from calibrations.model import Model
+from calibrations.table import Table
+from rig.bench import Bench
+from rig.planning.next_experiment import TOGETHER, Dispute, chosen, gives_poses, planned_experiment, possible
+
+STANDARD = Experiment("sweep", {}, (), "the sweep with its default settings")
+FIRST = Experiment("sweep", {"step_deg": 45.0, "inclinations_deg": [90.0, 30.0, 150.0]}, (), "a short first sweep")
+IN_BETWEEN = "poses between the known ones, to confirm the explanation"
+BETWEEN = tuple(
+    Experiment("sweep", {"step_deg": step, "inclinations_deg": list(inclinations)}, (), IN_BETWEEN)
+    for step, inclinations in (
+        (60.0, (60.0, 120.0, 45.0, 135.0)),
+        (20.0, (75.0, 105.0, 90.0)),
+        (30.0, (30.0, 150.0, 60.0, 120.0)),
+        (30.0, (45.0, 135.0, 90.0, 75.0)),
+    )
+)
+FEW = 1 / 3  # of the time of an experiment: shorter sweeps between the known poses come first
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """One experiment, the discovery on all data so far, and the following experiment: None at the end."""
+
+    experiment: Experiment
+    run: str
+    found: Discovery[Fit]
+    used_s: float  # rig time so far, as planned
+    following: Experiment | None = None
+
+
+@dataclass(frozen=True)
+class Live:
+    """The loop. `measure` runs an experiment, and returns the name of its run and all data so far as one table."""
+
+    bench: Bench
+    bench_file: Path | None
+    model: Model
+    effects: Mapping[str, Effect]
+    time_s: float
+    measure: Callable[[Experiment], tuple[str, Table]]
+
+    def measurements(self) -> Iterator[Measurement]:
+        """The measurements in order. Raises the errors of `plan` and of `measure`."""
+        done: list[Measurement] = []
+        following: Experiment | None = self.planned(FIRST)
+        while following is not None:
+            run, table = self.measure(following)
+            used_s = (done[-1].used_s if done else 0.0) + (following.duration_s or 0.0)
+            done.append(Measurement(following, run, discover(table, self.model, self.effects), used_s))
+            telling = self._telling(done)
+            following = None if stands(done) else self._following(telling, done)
+            found = replace(done[-1].found, next_experiment=telling)
+            done[-1] = replace(done[-1], found=found, following=following)
+            yield done[-1]
+
+    def planned(self, experiment: Experiment) -> Experiment:
+        """The experiment with its duration on the bench."""
+        return planned_experiment(experiment, self.bench, self.bench_file)[0]
+
+    def _telling(self, done: Sequence[Measurement]) -> Experiment | None:
+        """The experiment that separates the explanations, with or without time for it; None for one explanation."""
+        found = done[-1].found
+        if found.next_experiment is None:
+            return None
+        dispute = Dispute.of(found.end, found.next_experiment.separates, self.effects)
+        menu = _new((*ADDITIONS, *MENU), done)
+        return chosen(dispute, found.next_experiment, self.bench, self.bench_file, menu, (TOGETHER,))
+
+    def _following(self, telling: Experiment | None, done: Sequence[Measurement]) -> Experiment | None:
+        """The next experiment: `telling` if its poses fit the other data, else poses in between; None without time.
+
+        A short sweep comes before a much longer experiment: the room may show the same as the oven.
+        """
+        left_s = self.time_s - done[-1].used_s
+        between = next((self.planned(e) for e in possible(_new(BETWEEN, done), self.bench, left_s)), None)
+        if telling is None or telling.duration_s is None or telling.duration_s > left_s:
+            return between
+        if between is not None and (between.duration_s or 0.0) < FEW * telling.duration_s:
+            return between
+        return telling if _new([telling], done) and gives_poses(telling, self.bench) else between
+
+
+def stands(done: Sequence[Measurement]) -> bool:
+    """Whether the last data have confirmed the explanation of the data before, or one of its alternatives."""
+    if len(done) < 2 or done[-1].found.undecided:
+        return False
+    before, now = done[-2].found, done[-1].found
+    known = {*before.causes, *(name for names in before.alternatives.values() for name in names)}
+    same = before.verdict in (now.verdict, "ambiguous") and _kind(before) == _kind(now)
+    return same and set(now.causes) <= known and len(now.causes) == len(before.causes)
+
+
+def _kind(found: Discovery[Fit]) -> list[str]:
+    """The first words of the remaining pattern, without its place, which more data can change."""
+    return (found.residual_structure or "").split()[:2]
+
+
+def _new(experiments: Sequence[Experiment], done: Sequence[Measurement]) -> list[Experiment]:
+    """The experiments that were not run yet: a repetition gives no new information."""
+    known = [(m.experiment.procedure, m.experiment.settings) for m in done]
+    return [e for e in experiments if (e.procedure, e.settings) not in known]

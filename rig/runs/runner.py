@@ -1,0 +1,235 @@
+"""Runs a procedure on a bench, records it, and resumes it after an interruption.
+
+A procedure is a function of its settings and of the record, so there is one way to resume it after any interruption:
+run it again over the missing poses. On a simulated bench the state after each pose is committed with it, so a resumed
+run is equal to an undisturbed run, bit for bit.
+
+An observer may continue an interrupted run at once. This is the same: all instruments are released, then connected
+again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager, suppress
+from dataclasses import asdict, replace
+from datetime import UTC, datetime
+from typing import Any
+
+from drivers.errors import DriverError, Interlocked
+from procedures.catalogue import Procedure, find
+from procedures.errors import Declined, NoAnswer, ProcedureError, SafetyLimit
+from procedures.settings import parse
+from rig.bench import Bench
+from rig.bench.certificates import EXPIRED, expired
+from rig.errors import RecordError, RigError, RunMismatch, Stopped
+from rig.instruments.instruments import Rig, connected
+from rig.lease import lease
+from rig.planning.plan import plan
+from rig.record import Record, Run
+from rig.results import Result, documents, judged, returned
+from rig.runs.host import RunHost, leave_as
+from rig.runs.observer import Outcome, Watch, Wish
+from rig.runs.signals import Trace, stoppable
+
+__all__ = ["REPEATED", "Outcome", "RunHost", "Watch", "Wish", "resume", "start"]
+
+REPEATED = "repeated by hand"
+
+
+def start(
+    record: Record,
+    bench: Bench,
+    procedure: Procedure,
+    settings: Mapping[str, Any],
+    watch: Watch,
+    after: str | None = None,
+    trace: bool = False,
+) -> Outcome:
+    """Run `procedure` from the beginning. An error before its first move does not change the record.
+
+    With `trace`, the log of the run has every message to and from instruments. A simulated bench begins in its initial
+    state, or in the state at the end of the run `after`.
+
+    Raises the errors of settings, plan and connection, and Declined. An error of the run itself is in the outcome.
+    """
+    planned = plan(bench, procedure, settings)  # raises an error for a move outside the limits
+    with stoppable():
+        watch.planned(planned)
+        trail = Trace(record) if trace else None
+        return _as_wished(record, _begun(record, bench, procedure, settings, watch, after, trail), watch, trace)
+
+
+def _begun(
+    record: Record,
+    bench: Bench,
+    procedure: Procedure,
+    settings: Mapping[str, Any],
+    watch: Watch,
+    after: str | None,
+    trace: Trace | None,
+) -> Outcome:
+    with stoppable(), connected(bench, trace) as rig:
+        identities = {role: asdict(identity) for role, identity in rig.identities().items()}
+        faults = expired(bench, datetime.now(UTC).date())
+        run = record.begin(
+            procedure.name,
+            _plain(settings),
+            bench=bench.document(),
+            configuration=bench.configuration(procedure.name, _plain(settings)),
+            constants=bench.constants | ({EXPIRED: "; ".join(faults)} if faults else {}),
+            source=bench.name,
+            identities=identities,
+            kind=procedure.kind,
+        )
+        if trace is not None:
+            trace.begin(run)
+        for fault in faults:
+            record.note(run, EXPIRED, fault)
+        if after is not None:
+            leave_as(rig, record, after)
+        with _held(record, run):
+            return _carry_out(record, rig, record.run(run), procedure, watch)
+
+
+def resume(record: Record, run_id: str, watch: Watch, bench: Bench | None = None, trace: bool = False) -> Outcome:
+    """Continue a run at its first missing pose, on the same bench.
+
+    Raises Busy, RunMismatch if `bench` or an instrument is another one, and the errors of connection.
+    """
+    with stoppable():
+        return _as_wished(record, _resumed(record, run_id, watch, bench, trace), watch, trace)
+
+
+def _resumed(record: Record, run_id: str, watch: Watch, bench: Bench | None = None, trace: bool = False) -> Outcome:
+    run = record.run(run_id)
+    if run.state == "complete":
+        return Outcome(run)
+    if bench is not None and bench.configuration(run.procedure, run.settings) != run.configuration:
+        raise RunMismatch(f"run {run_id} began with another bench; resume it without --bench, or with the same file")
+    own = bench or Bench.model_validate(run.bench)  # the same, except for repaired faults
+    procedure = find(run.procedure, own.folders.procedures)
+    trail = Trace(record) if trace else None
+    with stoppable(), _held(record, run_id), connected(own, trail) as rig:
+        if trail is not None:
+            trail.begin(run_id)
+        _same_instruments(run, rig)
+        return _carry_out(record, rig, run, procedure, watch)
+
+
+def _as_wished(record: Record, outcome: Outcome, watch: Watch, trace: bool) -> Outcome:
+    """Continue an interrupted run as long as the observer wants it."""
+    while outcome.error is not None and (wish := _wish(outcome, watch)) != "end":
+        run = outcome.run.run
+        if wish == "repeat" and outcome.run.rows:
+            record.exclude(run, record.next_number(run) - 1, REPEATED)
+        try:
+            outcome = _resumed(record, run, watch, trace=trace)
+        except (DriverError, RigError) as error:  # such as an instrument that still does not answer
+            outcome = Outcome(record.run(run), error)
+    return outcome
+
+
+def _wish(outcome: Outcome, watch: Watch) -> Wish:
+    """The decision of a person. SIGTERM and SIGHUP end the run, and every signal during the question does."""
+    if isinstance(outcome.error, Stopped) and outcome.error.by != "SIGINT":
+        return "end"
+    try:
+        with stoppable():
+            return watch.interrupted(outcome)
+    except KeyboardInterrupt:
+        return "end"
+
+
+def _held(record: Record, run: str) -> AbstractContextManager[None]:
+    return lease(record.folder, run, f"run {run}")
+
+
+def _carry_out(record: Record, rig: Rig, run: Run, procedure: Procedure, watch: Watch) -> Outcome:
+    """The run itself. At its end the stages are at rest, and the record has its state, whatever happens."""
+
+    def log(what: str, text: str) -> None:
+        record.log(run.run, rig.clock.now(), "run", what, text)
+
+    log("begun", f"{procedure.name} at pose {run.rows}")
+    record.set_state(run.run, "running")
+    try:
+        watch.begun(run.run)  # a person may end it from now on
+        own = _perform(record, rig, run, procedure, watch)
+        results, why = (documents(own, rig.bench.result_limits), None) if own else judged(record, run)
+    except BaseException as failure:
+        error = _error_of(failure, run)
+        log("error", f"{type(error).__name__}: {error}")
+        complaints = _stop(rig)
+        log("stopped", " ".join(complaints) or "all instruments are at rest")
+        with suppress(RecordError):  # the record itself may have failed, and `error` has the reason
+            for complaint in complaints:
+                record.note(run.run, "not stopped", complaint)
+            record.set_state(run.run, _state(error), str(error))
+        if isinstance(failure, Exception) and error is not failure:
+            raise  # a defect of the program
+        return _interrupted(record, run, error, complaints)
+    log("complete", why or f"{len(results)} results")
+    record.set_state(run.run, "complete", why and f"results: {why}", results)
+    return Outcome(record.run(run.run))
+
+
+def _interrupted(record: Record, run: Run, error: Exception, complaints: Sequence[str]) -> Outcome:
+    """The outcome of an interrupted run, even if the record cannot be read any more."""
+    try:
+        return Outcome(record.run(run.run), error, tuple(complaints))
+    except RecordError:
+        return Outcome(replace(run, state=_state(error), message=str(error)), error, tuple(complaints))
+
+
+def _error_of(failure: BaseException, run: Run) -> Exception:
+    """The error that ended a run, with one message."""
+    if isinstance(failure, (DriverError, ProcedureError, RigError)):
+        return failure
+    if isinstance(failure, KeyboardInterrupt):
+        by = str(failure) or "SIGINT"
+        return Stopped(f"stopped by {by}; `rig resume {run.run}` continues the run", by)
+    return RuntimeError(f"{type(failure).__name__}: {failure}")
+
+
+def _perform(record: Record, rig: Rig, run: Run, procedure: Procedure, watch: Watch) -> Mapping[str, Result]:
+    """Execute the procedure in the last recorded state of the bench. Returns the results of the procedure."""
+    state = record.state(run.run)
+    host = RunHost(record, rig, run, watch, state)
+    session = rig.session(host)
+    settings = parse(procedure, run.settings)
+    rig.look()
+    if state is not None:
+        rig.restore(state["rig"])
+    with rig.guarded(session):
+        if state is None:
+            session.reference()
+            host.keep_state()
+        results = procedure.function(session, **settings) or {}
+    return {name: returned(name, result) for name, result in results.items()}
+
+
+def _same_instruments(run: Run, rig: Rig) -> None:
+    """Raises RunMismatch if an instrument was exchanged since the begin of the run."""
+    for role, identity in rig.identities().items():
+        if asdict(identity) != run.identities.get(role):
+            raise RunMismatch(
+                f"{role} is now {identity}, but the run began with {run.identities.get(role)}; connect that instrument"
+            )
+
+
+def _stop(rig: Rig) -> list[str]:
+    """Stop the stages. Returns a sentence for each instrument that does not stop."""
+    try:
+        return rig.stop()
+    except KeyboardInterrupt:
+        return ["a second signal interrupted the stop of the stages; check that they are at rest"]
+
+
+def _state(error: Exception) -> str:
+    return "stopped" if isinstance(error, (Stopped, SafetyLimit, Interlocked, NoAnswer, Declined)) else "failed"
+
+
+def _plain(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings as in JSON, so that those of a resumed run have the same hash."""
+    return {name: list(value) if isinstance(value, tuple) else value for name, value in settings.items()}

@@ -1,0 +1,111 @@
+"""Signals: Ctrl-C, SIGTERM and a closed terminal stop a run in the same way. Also the trace of all messages."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import Literal
+
+from rig.record import Record
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+COMPILED = "drivers.world"  # its compiled code calls Python generators; an exception there would break it
+SCREEN = "rich"  # an exception while its console writes would block the console
+AGAIN_S = 0.001
+
+
+@contextmanager
+def stoppable() -> Iterator[None]:
+    """Inside the context the first signal raises KeyboardInterrupt with its name. Later signals are ignored.
+
+    A signal during a computation of the simulated world or a write to the screen waits a moment. If Python discards the
+    exception, as in a finaliser, it is raised again.
+    """
+
+    put_off: list[int] = []
+    raised: list[int] = []
+
+    def later(number: int) -> None:
+        put_off[:] = [number]
+        signal.setitimer(signal.ITIMER_REAL, AGAIN_S)  # not a thread: the interrupted code may hold its locks
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        if _indivisible(frame):
+            later(number)
+            return
+        for each in SIGNALS:
+            signal.signal(each, signal.SIG_IGN)
+        raised[:] = [number]
+        raise KeyboardInterrupt(signal.Signals(number).name)
+
+    def again(_: int, frame: FrameType | None) -> None:
+        if put_off:
+            stop(put_off.pop(), frame)
+
+    def lost(what: sys.UnraisableHookArgs) -> None:
+        if raised and isinstance(what.exc_value, KeyboardInterrupt):
+            later(raised.pop())
+        else:
+            hook(what)
+
+    hook, sys.unraisablehook = sys.unraisablehook, lost
+    ignored = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN  # by nohup: a closed terminal must not stop the run
+    before = {each: signal.signal(each, stop) for each in SIGNALS if not (ignored and each == signal.SIGHUP)}
+    before[signal.SIGALRM] = signal.signal(signal.SIGALRM, again)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        sys.unraisablehook = hook
+        for each, handler in before.items():
+            signal.signal(each, handler)
+
+
+def _indivisible(frame: FrameType | None) -> bool:
+    """Whether an exception here would break the interrupted code."""
+    while frame is not None:
+        module = str(frame.f_globals.get("__name__"))
+        if module.startswith(COMPILED):
+            return True
+        if module.partition(".")[0] == SCREEN:
+            return frame.f_code.co_name != "input"  # here it waits for a person
+        frame = frame.f_back
+    return False
+
+
+SHOWN_BYTES = 64  # of one message: of a stream packet, the header and the first samples
+
+
+class Trace:
+    """Writes every message to and from instruments into the log of the run, also messages before its begin."""
+
+    def __init__(self, record: Record) -> None:
+        self._record = record
+        self._run = ""
+        self._early: list[tuple[float, str, str, str]] = []
+
+    def __call__(self, clock_s: float, wire: str, way: Literal["sent", "heard"], data: bytes) -> None:
+        line = (clock_s, wire, way, shown(data))
+        if self._run:
+            self._record.log(self._run, *line)
+        else:
+            self._early.append(line)
+
+    def begin(self, run: str) -> None:
+        """Write to the log of `run` from now on."""
+        self._run = run
+        for line in self._early:
+            self._record.log(run, *line)
+        self._early.clear()
+
+
+def shown(data: bytes) -> str:
+    """A message as text if it is printable, else in hexadecimal. A long message is cut."""
+    rest = f" ... {len(data)} bytes" if len(data) > SHOWN_BYTES else ""
+    begin = data[:SHOWN_BYTES]
+    text = begin.decode("ascii", "replace")
+    readable = all(character.isprintable() or character in "\r\n" for character in text) and "\ufffd" not in text
+    return (repr(text) if readable else begin.hex(" ")) + rest

@@ -1,0 +1,234 @@
+"""Data, a model and the effects of a request: a table of rows, or a still record."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import nullcontext, suppress
+from dataclasses import dataclass, replace
+from itertools import takewhile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrations.discovery.dataset import Dataset
+from calibrations.discovery.rows import Rows
+from calibrations.effects import Effect
+from calibrations.effects.catalogue import catalogue
+from calibrations.errors import DataError, ModelError
+from calibrations.geometry.rate_table import earth_rate_warning
+from calibrations.importing.units import UNITS, parse_unit
+from calibrations.model import Model
+from calibrations.model.file import read_model
+from calibrations.noise import table_noise
+from calibrations.noise.mean_noise import correlation_known
+from calibrations.noise.table_noise import with_noise
+from calibrations.plausibility import doubt
+from calibrations.table import Table
+from rig.analysis.data import BESIDE, load
+from rig.errors import UnknownRun
+from rig.services.request import Request
+
+if TYPE_CHECKING:
+    from calibrations.noise.record import Samples, Still
+    from rig.analysis.stream import Stream
+
+Tell = Callable[[str], None]
+CHANNELS = {f"{what}{axis}{end}" for what in ("v", "a", "g", "m", "") for axis in "xyz" for end in ("", "_v")}
+LONGEST_BEGINNING = 1 << 16  # characters
+TRIADS = ({"ax", "ay", "az"}, {"mx", "my", "mz"})  # with times: a raw log of positions, unless a noise model is named
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """Data, the model to hold against them, and the effects that may be missing."""
+
+    data: Dataset[Any]
+    model: Model
+    effects: Mapping[str, Effect]
+
+
+def effects_of(bench_file: Path | None) -> Mapping[str, Effect]:
+    """The catalogue, with the effects in the folder that the bench file names."""
+    if bench_file is None:
+        return catalogue()
+    from rig.bench import read_bench
+
+    return catalogue(read_bench(bench_file).folders.effects)
+
+
+def loaded(request: Request, tell: Tell) -> Loaded:
+    """Data, model (by default that of the kind of data) and effects; `tell` hears what a person should know.
+
+    Data are a still record where their kind is still, they are an array, or a noise model is named.
+    Raises DataError, RecordError, ModelError, UnknownName.
+    """
+    effects = effects_of(request.bench_file)
+    chosen = read_model(request.model, effects) if request.model is not None else None
+    data = (
+        _still(request, chosen, tell) if is_noise(chosen) or is_still(request.data) else _rows(request, effects, tell)
+    )
+    if chosen is not None:
+        check_unit(chosen, data.unit, data.source)
+    return Loaded(data, chosen or read_model(data.default_model, effects), effects)
+
+
+def loaded_table(request: Request, tell: Tell) -> tuple[Table, Model, Mapping[str, Effect]]:
+    """As `loaded`, for questions that only a table of rows can answer."""
+    effects = effects_of(request.bench_file)
+    rows = _rows(request, effects, tell)
+    model = read_model(request.model or rows.default_model, effects)
+    check_unit(model, rows.unit, rows.source)
+    return rows.table, model, effects
+
+
+def with_known_noise(table: Table, noise: str | None, effects: Mapping[str, Effect]) -> Table:
+    """The table with the slow noise that a noise model gives its outputs, where one is named."""
+    return table if noise is None else with_noise(table, read_model(noise, effects))
+
+
+def rows_of(request: Request, effects: Mapping[str, Effect], tell: Tell) -> Table:
+    """The table of a request, with remarks on its noise."""
+    if request.channel or request.rate_hz:
+        raise DataError(
+            f"{request.data}: --channel and --rate are for still records, and this is none (or name --model still)"
+        )
+    table = with_known_noise(load(request.data, tell=tell), request.noise, effects)
+    if table.kind == "poses" and not correlation_known(table):
+        tell(
+            f"{table.source}: how the samples of a mean correlate is not known, and they are taken as independent; "
+            "scatter of the poses beyond that counts as noise. Give the constants filter_corner_hz and sample_rate_hz."
+        )
+    for why in filter(None, (earth_rate_warning(table), table_noise.scatter_remark(table), doubt(table))):
+        tell(f"{table.source}: {why}.")
+    return table
+
+
+def _rows(request: Request, effects: Mapping[str, Effect], tell: Tell) -> Rows:
+    return Rows(rows_of(request, effects, tell))
+
+
+def _still(request: Request, chosen: Model | None, tell: Tell) -> Dataset[Any]:
+    from calibrations.noise.dataset import StillRecord  # a table needs no noise engine
+    from calibrations.noise.fit import noise_terms
+
+    if request.noise is not None:
+        raise ModelError("--noise is for poses and rates; the model of a still record is named with --model")
+    if chosen is not None:
+        noise_terms(chosen)
+    return StillRecord(still_of(request, tell))
+
+
+def still_of(
+    request: Request,
+    tell: Tell,
+    every_deviation: bool = False,
+    keep: dict[str, list[NDArray[Any]]] | None = None,
+) -> Still:
+    """The still record of a request, each channel read once.
+
+    `every_deviation`: with the modified, Hadamard and total deviations. `keep` takes all blocks by axis, if given.
+    Raises DataError, RecordError, TooFewRows.
+    """
+    from calibrations.noise.record import reduce_record
+    from rig.analysis.still import axes
+    from rig.analysis.stream import repairs
+    from rig.record.store import Record
+
+    data = request.data
+    with nullcontext() if Path(data).exists() or data.endswith(".npy") else Record.to_find(data) as record:
+        streams = axes(record, data, request.channel, request.rate_hz)
+        first = next(iter(streams.values()))
+        samples = (_samples(axis, each, keep) for axis, each in streams.items())
+        still = reduce_record(samples, first.source, first.constants, every_deviation)
+    sensed = {axis: found for axis, each in streams.items() if (found := each.sensed) is not None}  # known when read
+    taken = {each.channel for each in streams.values()}
+    if others := [name for name in first.others if name not in taken]:
+        tell(f"{still.source}: {', '.join(taken)}; --channel takes another: {', '.join(others)}.")
+    for text in repairs(first, still.n):
+        tell(text)
+    if np.isfinite(first.corner_hz):
+        tell(
+            f"Coefficients are those before the {first.corner_hz:g} Hz low-pass of the output, "
+            f"fitted below {first.corner_hz / 2:.3g} Hz."
+        )
+    return replace(still, sensed=sensed)
+
+
+def _samples(axis: str, stream: Stream, keep: dict[str, list[NDArray[Any]]] | None) -> Samples:
+    from calibrations.noise.record import Samples
+
+    blocks = stream.blocks if keep is None else _kept(stream.blocks, keep.setdefault(axis, []))
+    hint = f" (--channel takes another: {', '.join(stream.others)})" if stream.others else ""
+    return Samples(
+        axis, blocks, stream.rate_hz, stream.unit, stream.corner_hz, stream.logged, f"{stream.channel}{hint}"
+    )
+
+
+def _kept(blocks: Iterator[NDArray[Any]], keep: list[NDArray[Any]]) -> Iterator[NDArray[Any]]:
+    for block in blocks:
+        keep.append(block)
+        yield block
+
+
+def is_still(data: str) -> bool:
+    """Whether `data` names a still record: an array, a run of that kind, a table with its columns."""
+    path = Path(data)
+    if path.suffix == ".npy":
+        return True
+    if path.exists():
+        return path.is_file() and _has_channels_alone(path)
+    from rig.record.measured import Measured
+    from rig.record.store import Record  # a file needs no database
+
+    with suppress(UnknownRun), Record.to_find(data) as record:
+        return Measured.named(record, data).run.kind == "still"
+    return False
+
+
+def is_noise(model: Model | None) -> bool:
+    """Whether a model is one of noise. Raises ModelError for one of noise and of effects on samples."""
+    if model is None:
+        return False
+    noise = [term.name for term in model.terms if "still" in term.effect.kinds]
+    if noise and len(noise) < len(model.terms):
+        raise ModelError(
+            f"{model.name}: {', '.join(noise)} is noise of a still record, and the other effects act on samples; "
+            "keep them in models of their own"
+        )
+    return bool(noise)
+
+
+def _has_channels_alone(path: Path) -> bool:
+    """No more of a file is read than its header."""
+    with path.open(encoding="utf-8", errors="replace") as file:
+        return channels_alone(file.read(LONGEST_BEGINNING))
+
+
+def channels_alone(beginning: str) -> bool:
+    """Whether the text of a table has times or a rate, outputs of a sensor, and no column on how it was held."""
+    stated, names = _beginning(beginning.splitlines())
+    given = set(names)
+    timed = "t_s" in given or "sample_rate_hz" in stated
+    channels = given - set(BESIDE)
+    return timed and bool(channels) and channels <= CHANNELS and not any(each <= given for each in TRIADS)
+
+
+def _beginning(lines: list[str]) -> tuple[set[str], list[str]]:
+    """(constants above a table's header, names in the header)."""
+    above = list(takewhile(lambda line: line.startswith("#"), lines))
+    header = lines[len(above)] if len(lines) > len(above) else ""
+    names = [name.strip().strip('"') for name in header.replace(";", ",").replace("\t", ",").split(",")]
+    return {line.lstrip("# ").partition(":")[0].strip() for line in above}, names
+
+
+def check_unit(model: Model, unit: str, source: str) -> None:
+    """Raises ModelError where the values of a model are for outputs in another unit: counts or mV, not V."""
+    fitted = any(term.estimates for term in model.terms)
+    ours, theirs = (UNITS.get(parse_unit(own), own) for own in (model.unit, unit))
+    if fitted and ours and ours != theirs:
+        raise ModelError(
+            f"{model.name}: its values are for outputs in {model.unit}, and {source} is in {unit}; "
+            "take a model that was fitted to data in this unit, or a shipped one (`rig models`)"
+        )

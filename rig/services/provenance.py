@@ -1,0 +1,55 @@
+"""Where a result comes from: the program, the day, and what a model file says of its making."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import UTC, datetime
+from importlib.metadata import version
+
+from calibrations.discovery.results import FittedModel
+from calibrations.errors import UnusableData
+from calibrations.model import Model
+from calibrations.plausibility import NO_RESPONSE, refusal
+from calibrations.table import NUMBERS, Table
+
+OF_THE_SENSOR = ("sensor", "serial", "gravity_m_s2")  # constants of the data that a model file keeps
+
+INFLUENCES = ("temperature_c", "supply_v", "t_s")  # that a product may know
+
+
+def program() -> str:
+    """Name and version of this program, as results carry it."""
+    return f"inertial-rig {version('inertial-rig')}"
+
+
+def today() -> str:
+    """The date, for a page that a person reads."""
+    return datetime.now(UTC).date().isoformat()
+
+
+def with_provenance(found: FittedModel, parent: Model) -> Model:
+    """The fitted model with its data, the model before it and the program. Raises UnusableData."""
+    data = found.measured
+    if isinstance(data, Table) and (reason := refusal(data)) is not None and reason.verdict == NO_RESPONSE:
+        raise UnusableData(f"{data.source}: no model is written: {reason.text}")
+    return replace(
+        found.model,
+        provenance={
+            "data": data.source,
+            "data_sha256": data.digest,
+            "rows": data.n,
+            **{name: data.constants[name] for name in OF_THE_SENSOR if name in data.constants},
+            "parent": parent.name,
+            "program": program(),
+            "created": datetime.now(UTC).isoformat(timespec="seconds"),
+            "excess": round(found.pooled_excess, 4),
+        },
+        covered=covered(found.model, data) if isinstance(data, Table) else {},
+    )
+
+
+def covered(model: Model, table: Table) -> dict[str, tuple[float, float]]:
+    """Lowest and highest value of each influence that was measured: those of every sensor, and the model's own."""
+    own = {name for term in model.terms for name in term.effect.needs if name not in NUMBERS}
+    there = [name for name in (*INFLUENCES, *sorted(own)) if name in table and table.n]
+    return {name: (float(table.column(name).min()), float(table.column(name).max())) for name in there}

@@ -1,0 +1,130 @@
+"""A model session: data, a model, and effects added one by one, which can be undone.
+
+The search for missing effects runs once and is a plan. As long as a person adds what the plan proposes, the session
+follows it, proposes what `discover` would add next, and ends where `discover` ends. After another effect it searches
+again from there; shares of the error stay those of the model that the session began with.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from calibrations.discovery.dataset import Dataset
+from calibrations.discovery.results import Comparison, Diagnosis, Findings, Step
+from calibrations.effects import Effect
+from calibrations.errors import ModelError
+from calibrations.model import Model
+from rig.services.load import loaded
+from rig.services.next_experiment import planned
+from rig.services.provenance import with_provenance
+from rig.services.request import Request
+
+Names = tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class ModelSession:
+    """`model` on `data`, and the `steps` taken from there.
+
+    `kept` are the data without gross outliers, `start` the fit to them. `effects` are those that may be added, `notes`
+    is what a person should know of the data, `plans` are the searches so far by the effects added before them.
+    """
+
+    request: Request
+    model: Model
+    data: Dataset[Any]
+    kept: Dataset[Any]
+    effects: Mapping[str, Effect]
+    notes: tuple[str, ...]
+    start: Any  # a fit of these data
+    steps: tuple[Step[Any], ...] = ()
+    plans: dict[Names, Findings[Any]] = field(default_factory=dict, compare=False)
+
+    @property
+    def end(self) -> Any:
+        """The fit of the model as it is now."""
+        return self.steps[-1].after if self.steps else self.start
+
+    @property
+    def unit(self) -> str:
+        """Unit of the outputs."""
+        return self.data.unit
+
+    @property
+    def names(self) -> Names:
+        """The effects added."""
+        return tuple(step.name for step in self.steps)
+
+    def among(self, effects: Mapping[str, Effect]) -> ModelSession:
+        """The same with other effects to be added."""
+        return replace(self, effects=effects)
+
+    def tried(self, effect: Effect) -> Step[Any]:
+        """The present model with one effect more, fitted. Raises ModelError where that says nothing new."""
+        if self.end.model.holds(effect.name):
+            raise ModelError(f"{effect.name} is in the model already")
+        plan = self._plan()
+        if plan is not None and plan.names[:1] == (effect.name,):
+            return plan.steps[0]
+        self.data.require_allowed(effect)
+        return self.data.step(effect, self.end)
+
+    def written(self, name: str, text: str) -> Effect:
+        """An effect of one's own, as an expression. Raises ModelError, ExpressionError with the place in the text."""
+        if name in self.effects:
+            raise ModelError(f"{name} is in the catalogue already; give yours another name")
+        return self.data.expression(name, text)
+
+    def with_step(self, step: Step[Any]) -> ModelSession:
+        """One step further."""
+        return self._with((*self.steps, step))
+
+    def undone(self) -> ModelSession:
+        """One step back; the beginning stays as it is."""
+        return self._with(self.steps[:-1])
+
+    def _with(self, steps: tuple[Step[Any], ...]) -> ModelSession:
+        start, steps = self.data.in_one_floor(self.start, steps)
+        return replace(self, start=start, steps=steps)
+
+    def complete_model(self) -> Model:
+        """The present model as a file keeps it, with its provenance."""
+        return with_provenance(self.end, self.model)
+
+    def compared(self) -> Comparison[Any]:
+        """The present model beside the data: as given, where it came with values."""
+        return self.kept.compare(self.end.model if self.steps else self.model)
+
+    def diagnosed(self) -> Diagnosis[Any]:
+        """What the present model misses."""
+        found = self._plan() or self._search()
+        self.plans[self.names] = found
+        return Diagnosis.of(found)
+
+    def _plan(self) -> Findings[Any] | None:
+        """The rest of the longest earlier search that the steps have followed; None where they left all of them."""
+        for k in range(len(self.names), -1, -1):
+            plan = self.plans.get(self.names[:k])
+            rest = self.names[k:]
+            if plan is not None and plan.names[: len(rest)] == rest:
+                return plan if not rest else self.data.followed(plan, len(rest), self.effects)
+        return None
+
+    def _search(self) -> Findings[Any]:
+        if not self.steps:
+            return self.data.search(self.model, self.effects)
+        return self.data.search_on(self.end, self.start, self.effects)
+
+    def with_next(self, result: Diagnosis[Any], tell: Callable[[str], None]) -> Diagnosis[Any]:
+        """The diagnosis with its next experiment planned on the bench; `tell` hears where that is another bench."""
+        return planned(result, self.request, self.effects, tell)
+
+
+def model_session(request: Request) -> ModelSession:
+    """The beginning: data (a file or a run) and a model by name or file. Raises what `loaded` and `fit` raise."""
+    notes: list[str] = []
+    found = loaded(request, notes.append)
+    kept, start = found.data.beginning(found.model)
+    return ModelSession(request, found.model, found.data, kept, found.effects, tuple(notes), start)

@@ -1,0 +1,340 @@
+"""What the page of a sensor's life is asked. Its address says it by the options of `rig history`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from datetime import date
+from urllib.parse import urlencode
+
+from nicegui import events, ui
+from starlette.datastructures import QueryParams
+
+from calibrations.analyses.control_chart import BASELINE_RUNS, FEWEST_RUNS
+from calibrations.analyses.stability import YEAR_DAYS
+from calibrations.presentation.chart import Chart, Panel, one
+from calibrations.presentation.charts.history import EWMA, INDIVIDUALS, RANGES, control_panels, life
+from calibrations.presentation.interactive import figure
+from calibrations.presentation.text import measured, minus, plain, unit
+from rig.analysis.charts import life_of
+from rig.analysis.history import Calibration, History, Quantity, closest, stale
+from rig.analysis.history_compared import Compared, compare_days, compare_rigs, compare_sensors
+from rig.analysis.history_limits import changes
+from rig.analysis.history_words import agreements, but_stale, chart_verdict, near, next_due, significance, summary
+from rig.errors import RigError
+from rig.services.provenance import today
+from rig.web.parts import Link, box, div, failed, for_page, message, off_loop, redraw, table, words
+
+MODEL = "linear"
+
+
+@dataclass(frozen=True)
+class Asked:
+    """`sensor` "" is none, `quantity` "" the first; `limits` are greatest changes, `at` the day that is asked for."""
+
+    sensor: str = ""
+    model: str = MODEL
+    quantity: str = ""
+    limits: Mapping[str, float] = field(default_factory=dict)
+    baseline: int = BASELINE_RUNS
+    at: date = field(default_factory=lambda: date.fromisoformat(today()))
+
+    @property
+    def address(self) -> str:
+        """Of the page; what is as by default is left out."""
+        said = {
+            "sensor": self.sensor,
+            "model": self.model if self.model != MODEL else "",
+            "quantity": self.quantity,
+            "limit": [f"{name}={change:g}" for name, change in self.limits.items()],
+            "baseline": str(self.baseline) if self.baseline != BASELINE_RUNS else "",
+            "at": str(self.at) if str(self.at) != today() else "",
+        }
+        given = urlencode({name: value for name, value in said.items() if value}, doseq=True)
+        return f"/history?{given}" if given else "/history"
+
+
+def asked(query: QueryParams) -> Asked:
+    """What an address asks. Raises RigError."""
+    return Asked(
+        query.get("sensor", ""),
+        query.get("model", "") or MODEL,
+        query.get("quantity", ""),
+        changes(query.getlist("limit")),
+        _baseline(query.get("baseline", str(BASELINE_RUNS))),
+        day(query.get("at", today())),
+    )
+
+
+def day(text: str) -> date:
+    """A day as it is written. Raises RigError."""
+    try:
+        return date.fromisoformat(text)
+    except ValueError:
+        raise RigError(f"{text!r} is no day: write it as {today()}") from None
+
+
+def _baseline(text: str) -> int:
+    if not text.isdecimal() or int(text) < FEWEST_RUNS:
+        raise RigError(f"baseline={text}: write how many calibrations set the charts, {FEWEST_RUNS} at least")
+    return int(text)
+
+
+# Two calibrations beside each other: of two days, with another sensor, of two rigs.
+
+DAYS, SENSOR, RIGS = "two days", "another sensor", "two rigs"
+NOTHING = "There is one calibration, on one rig, and no other sensor in the record: nothing to compare with yet."
+E_N = "U: expanded uncertainty of the difference (k = 2). They agree where E_n, the difference over U, is at most 1."
+
+
+class Beside:
+    """Asks what to compare with what; `last_of` is the last calibration of another sensor, `model` the one of all."""
+
+    def __init__(
+        self, life: History, sensors: Sequence[str], model: str, last_of: Callable[[str], Calibration]
+    ) -> None:
+        self.life, self.model, self.last_of = life, model, last_of
+        self.two: list[ui.date_input] | list[ui.select] = []
+        self.others = [sensor for sensor in sensors if sensor != life.sensor]
+        self.rigs = list(dict.fromkeys(each.rig for each in life.calibrations))
+        possible = {DAYS: len(life.calibrations) > 1, SENSOR: bool(self.others), RIGS: len(self.rigs) > 1}
+        kinds = [kind for kind, can in possible.items() if can]
+        with box("stack"):
+            words("Compare", "title")
+            if not kinds:
+                words(NOTHING, "quiet small")
+                return
+            with div("row-of"):
+                self.kind = ui.toggle(kinds, value=kinds[0], on_change=self._fields).props("dense no-caps")
+                self.fields = div("row-of")
+                ui.button("Compare", icon="compare_arrows", on_click=self.compare).props("dense outline")
+            self.result = div("stack").props("role=status")
+        self._fields()
+
+    def _fields(self) -> None:
+        """Those of what is chosen."""
+        of = self.life.calibrations
+        self.fields.clear()
+        self.result.clear()
+        with self.fields:
+            if self.kind.value == DAYS:
+                named = (("One day", of[0]), ("Another", of[-1]))
+                self.two = [ui.date_input(name, value=each.day).props("dense") for name, each in named]
+            elif self.kind.value == SENSOR:
+                self.two = [_select("Sensor", self.others, 0)]
+            else:
+                self.two = [_select(name, self.rigs, k) for k, name in enumerate(("One rig", "Another"))]
+
+    async def compare(self) -> None:
+        """The difference of every quantity that both have."""
+        said = [str(each.value) for each in self.two]
+        try:
+            found = await off_loop(self._compared, said)
+        except Exception as error:
+            self.result.clear()
+            with self.result:
+                failed("These cannot be compared", message(error))
+            return
+        self.result.clear()
+        with self.result:
+            _show(found, self.model)
+
+    def _compared(self, said: Sequence[str]) -> Compared:
+        if self.kind.value == SENSOR:
+            return compare_sensors(self.life, said[0], self.last_of(said[0]))
+        if self.kind.value == RIGS:
+            return compare_rigs(self.life.calibrations, said[0], said[1])
+        return compare_days(self.life, day(said[0]), day(said[1]))
+
+
+def _show(found: Compared, model: str) -> None:
+    """What the difference is, in numbers; two runs lead to one model fitted to both, in pictures."""
+    apart = [name for name, (_, each) in found.rows.items() if not each.agrees]
+    with div("row-of"):
+        words("do not agree" if apart else "agree", f"chip {'bad' if apart else 'good'}")
+        words(", ".join(apart) or "in every quantity", "small grow")
+        if found.data is not None:
+            first, second = found.data
+            given = urlencode({"first": first, "second": second, "model": model})
+            ui.link("One model fitted to both, in pictures", f"/compare?{given}").classes("small")
+    head, rows = agreements(found, plain)
+    table(head, [(*row[:5], unit(row[5]), minus(row[6]), row[7]) for row in rows])
+    words(E_N, "quiet small")
+
+
+def _select(name: str, of: Sequence[str], first: int) -> ui.select:
+    return ui.select(list(of), label=name, value=of[first]).props("dense options-dense").style("min-width: 130px")
+
+
+# The pictures of a sensor's life: one quantity over time, and its control charts. A click on a point opens its run.
+
+LIFE = "Its life"
+CLICKED = "(e) => { const k = e && e.points && e.points[0].customdata; if (k) emit(k) }"
+FEW = "Control charts show from two calibrations on, a drift from three: measure this sensor again."
+
+
+def model_of(data: str, model: str) -> str:
+    """The address of a run on the page Model."""
+    return f"/?{urlencode({'data': data, 'model': model})}"
+
+
+class LifePictures:
+    """Draws one quantity. `model` is that of the life, to which a point leads."""
+
+    def __init__(self, model: str) -> None:
+        self.model = model
+        with div("pictures three"):
+            with box("picture wide"):
+                self.title = words(LIFE, "title")
+                self.life = self._plot(LIFE)
+                self.told = words("", "quiet small")
+            self.few = box("wide state")
+            with self.few:
+                words(FEW, "quiet")
+            self.boxes = []
+            self.charts: dict[str, ui.plotly] = {}
+            for title in (INDIVIDUALS, EWMA, RANGES):
+                with box("picture") as place:
+                    words(title, "title")
+                    self.charts[title] = self._plot(title)
+                self.boxes.append(place)
+
+    def show(self, q: Quantity) -> None:
+        """All of them anew."""
+        redraw(self.life, figure(_bare(life(life_of(q))), f"life {q.name}"))
+        self.told.set_text(_legend(q))
+        self.few.set_visibility(q.chart is None)
+        for place in self.boxes:
+            place.set_visibility(q.chart is not None)
+        if q.chart is not None:
+            days, keys = [each.day for each in q.of], [each.data for each in q.of]
+            for title, panel in control_panels(q.name, q.chart, q.unit, days, keys).items():
+                redraw(self.charts[title], figure(_bare(panel), f"{title} {q.name}"))
+
+    def _plot(self, title: str) -> ui.plotly:
+        plot = ui.plotly({"data": [], "layout": {}}).classes("plot").props(f'aria-label="{title}"')
+        plot.on("plotly_click", self._clicked, js_handler=CLICKED)
+        return plot
+
+    def _clicked(self, event: events.GenericEventArguments) -> None:
+        ui.navigate.to(model_of(str(event.args), self.model))
+
+
+def _bare(panel: Panel) -> Chart:
+    """The panel without its title, which is above the picture."""
+    return one(replace(panel, title="", remark=""))
+
+
+def _legend(q: Quantity) -> str:
+    """What the signs mean that are there."""
+    signs = ["● a calibration, with two standard uncertainties each way"]
+    if q.chart is not None and q.chart.signals:
+        signs.append("◆ one beyond the limits of a chart")
+    if q.line is None:
+        signs.append("a drift shows from three calibrations on, at different times")
+    else:
+        signs.append("line and band: the drift, and the 95 % interval of the value then")
+    if q.allowed is not None:
+        signs.append("broken lines: what is allowed")
+    return f"{'; '.join(signs)}. A click on a point opens its model."
+
+
+# What the page of a sensor's life says: how it stands, which calibration is closest to a day, and the tables.
+
+LIMIT_IS_GIVEN = "the greatest change, in its field above"
+OUT = "out of control"
+
+
+def standing(found: History, q: Quantity) -> None:
+    """When the next calibration is due, what is out of control, and the numbers of the quantity that is shown."""
+    out = [each.name for each in found.quantities if each.chart is not None and each.chart.verdict == OUT]
+    overdue = found.due is not None and str(found.due) < today()
+    good = found.due is not None and not out and not overdue
+    with box(f"verdict {'bad' if out or overdue else 'good' if good else ''}").props("role=status aria-live=polite"):
+        with div("grow standing"):
+            with div("row-of"):
+                words(for_page(next_due(found, LIMIT_IS_GIVEN)), "headline")
+                if overdue:
+                    words("overdue", "chip bad")
+            words(for_page(f"{summary(found)}."), "quiet small")
+            if out:
+                words(f"{OUT.capitalize()}: {', '.join(out)}.", "small")
+        with div("row-of numbers"):
+            for what, value in (("drift a year", _drift(q)), ("control charts", chart_verdict(q) or "—")):
+                with div("figure"):
+                    words(value, "value")
+                    words(f"{what}, {q.name}", "quiet small")
+
+
+class Closest:
+    """The calibration closest to a day, and whether it is stale then."""
+
+    def __init__(self, wanted: Asked, changed: Callable[[], None]) -> None:
+        self.model = wanted.model
+        with box("stack"):
+            words("Closest to a day", "title")
+            self.input = ui.date_input("Day", value=str(wanted.at), on_change=changed).props("dense debounce=300")
+            self.told = div("stack").props("role=status")
+
+    @property
+    def day(self) -> date | None:
+        """None while it is being written."""
+        try:
+            return day(str(self.input.value))
+        except RigError:
+            return None
+
+    def focus(self) -> None:
+        """Write a day."""
+        self.input.run_method("focus")
+
+    def show(self, found: History) -> None:
+        """By the limits as they are."""
+        self.told.clear()
+        if self.day is None:
+            return
+        calibration, age_days = closest(found.calibrations, self.day)
+        why = stale(found, calibration, age_days)
+        with self.told:
+            words(near(calibration, age_days, self.day), "small")
+            if why is not None:
+                with box("note"):
+                    words(for_page(but_stale(why)), "small")
+            ui.link("Its model", model_of(calibration.data, self.model)).classes("small")
+
+
+def quantities_table(found: History) -> None:
+    """Every quantity: its last value, drift, scatter, charts, limits, due date."""
+    head = ("quantity", "last", "drift a year", "scatter", "control charts", "allowed", "due")
+    with box("stack wide-table"):
+        words("All quantities", "title")
+        table(head, [_row(q) for q in found.quantities])
+
+
+def calibrations_table(found: History, model: str) -> None:
+    """Every calibration: its run, which leads to its model, its rig, its values."""
+    titles = [f"{q.name} ({unit(q.unit)})" if q.unit != "1" else q.name for q in found.quantities]
+    with box("stack wide-table"):
+        words("All calibrations", "title")
+        table(("date", "run", "rig", *titles, ""), [_calibration(each, found, model) for each in found.calibrations])
+
+
+def _row(q: Quantity) -> tuple[str, ...]:
+    spelt = unit(q.unit)
+    allowed = "—" if q.allowed is None else minus(f"{q.allowed[0]:.6g} to {q.allowed[1]:.6g} {spelt}")
+    scatter = "—" if q.line is None else f"{plain(q.line.scatter, 2)} {spelt}"
+    last = f"{measured(q.last.value, q.last.std)} {spelt}"
+    return q.name, last, _drift(q), scatter, chart_verdict(q) or "—", allowed, str(q.due or "—")
+
+
+def _drift(q: Quantity) -> str:
+    if q.line is None:
+        return "—"
+    slope = measured(YEAR_DAYS * q.line.slope, YEAR_DAYS * q.line.slope_std)
+    return f"{slope} {unit(q.unit)}{significance(q.line)}"
+
+
+def _calibration(each: Calibration, found: History, model: str) -> tuple[str | Link, ...]:
+    values = (each.values.get(q.name) for q in found.quantities)
+    shown = ("—" if value is None else measured(value.value, value.std) for value in values)
+    return each.day, Link(each.data, model_of(each.data, model)), each.rig, *shown, each.expired or ""

@@ -1,0 +1,167 @@
+"""Outputs that cannot be those of the sensor as stated: no response, two sensors, exchanged channels and angles."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from calibrations.documents import comparison_document, diagnosis_document, discovery_document, fit_document
+from calibrations.effects.catalogue import catalogue
+from calibrations.errors import UnusableData
+from calibrations.fit import fit
+from calibrations.loop import add, compare, dataset, diagnose, discover
+from calibrations.model.file import read_model
+from calibrations.plausibility import NO_RESPONSE, UNEXPLAINED, doubt, findings, refusal
+from calibrations.presentation.certificate.results import figures
+from calibrations.table import Array, Table
+from tests.calibrations.synthetic import NOISE_V, components, turns
+
+
+@dataclass(frozen=True)
+class Data:
+    """Angles in deg and outputs in V, with white noise."""
+
+    alpha: Array
+    beta: Array
+    vx: Array
+    vy: Array
+    samples: bool = True
+
+    def table(self) -> Table:
+        base = {name: values for name, values in turns().items() if name in ("direction", "t_s")}
+        noise = {"vx_std_v": NOISE_V * np.sqrt(500), "vy_std_v": NOISE_V * np.sqrt(500), "n": 500.0}
+        known = {name: np.full(len(self.vx), value) for name, value in noise.items()} if self.samples else {}
+        columns = {"alpha_deg": self.alpha, "beta_deg": self.beta, "vx_v": self.vx, "vy_v": self.vy, **base, **known}
+        return Table.from_columns("poses", columns, source="made")
+
+
+def healthy() -> Data:
+    base = turns()
+    ax, ay, _ = components(base)
+    noise = NOISE_V * np.random.default_rng(5).standard_normal((2, len(ax)))
+    return Data(base["alpha_deg"], base["beta_deg"], 2.5 + ax + noise[0], 2.5 + 1.02 * ay + noise[1])
+
+
+def stuck(d: Data) -> Data:
+    rows = np.random.default_rng(6).random(len(d.vx)) < 0.8
+    return replace(d, vx=np.where(rows, 2.5, d.vx))
+
+
+def two_sensors(d: Data) -> Data:
+    offset = 0.02 * (np.arange(len(d.vx)) % 2)
+    return replace(d, vx=d.vx + offset, vy=d.vy + offset)
+
+
+def two_scales(d: Data) -> Data:
+    factor = 1 + 0.02 * (np.arange(len(d.vx)) % 2)
+    return replace(d, vx=2.5 + (d.vx - 2.5) * factor, vy=2.5 + (d.vy - 2.5) * factor)
+
+
+DEAD: dict[str, tuple[Callable[[Data], Data], str]] = {
+    "constant": (lambda d: replace(d, vx=0 * d.vx + 2.5), "vx_v is constant"),
+    "noise": (
+        lambda d: replace(d, vy=2.5 + NOISE_V * np.random.default_rng(7).standard_normal(len(d.vy))),
+        "vy_v holds noise only",
+    ),
+    "noise of unknown level": (
+        lambda d: replace(d, vy=2.5 + np.random.default_rng(7).standard_normal(len(d.vy)), samples=False),
+        "vy_v does not follow the poses",
+    ),
+    "stuck": (stuck, "vx_v is stuck at 2.5 V"),
+    "shuffled": (lambda d: replace(d, vx=np.random.default_rng(8).permutation(d.vx)), "vx_v does not follow the poses"),
+}
+WRONG: dict[str, tuple[Callable[[Data], Data], str]] = {
+    "two sensors": (two_sensors, "two groups of rows"),
+    "two scale factors": (two_scales, "two groups of rows"),
+    "two sensors, noise unknown": (lambda d: replace(two_sensors(d), samples=False), "differ by 20 mV"),
+    "channels": (lambda d: replace(d, vx=d.vy, vy=d.vx), "the channels are exchanged"),
+    "angles": (lambda d: replace(d, alpha=d.beta, beta=d.alpha), "alpha_deg and beta_deg are exchanged"),
+    "horizontal": (lambda d: replace(d, alpha=90 - d.alpha), "alpha is counted from the horizontal"),
+    "radians": (lambda d: replace(d, alpha=np.radians(d.alpha), beta=np.radians(d.beta)), "in radians"),
+    "turned": (lambda d: replace(d, beta=d.beta - 40), "40 deg away"),
+}
+MIRRORED = {
+    "beta backwards": lambda d: replace(d, beta=-d.beta),
+    "turned by 180 deg": lambda d: replace(d, vx=5 - d.vx, vy=5 - d.vy),
+}
+
+
+def test_healthy_data_show_nothing() -> None:
+    assert findings(healthy().table()) == ()
+    assert findings(replace(healthy(), samples=False).table()) == ()
+
+
+@pytest.mark.parametrize("name", DEAD)
+def test_an_output_without_response(name: str) -> None:
+    spoil, reason = DEAD[name]
+    found = refusal(spoil(healthy()).table())
+    assert found is not None
+    assert (found.verdict, reason in found.text) == (NO_RESPONSE, True), found.text
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_wrong_assignment(name: str) -> None:
+    spoil, reason = WRONG[name]
+    found = refusal(spoil(healthy()).table())
+    assert found is not None
+    assert (found.verdict, reason in found.text) == (UNEXPLAINED, True), found.text
+
+
+@pytest.mark.parametrize("name", MIRRORED)
+def test_a_mirrored_or_turned_sensor_is_a_warning_only(name: str) -> None:
+    table = MIRRORED[name](healthy()).table()
+    assert refusal(table) is None
+    assert "is negative" in (doubt(table) or "")
+    assert diagnose(table, read_model("linear")).verdict == "adequate"
+
+
+def test_saturation_and_a_pattern_in_time_or_direction_are_effects() -> None:
+    d = healthy()
+    half = 0.02 * (np.arange(len(d.vx)) > len(d.vx) / 2)
+    side = 0.01 * turns()["direction"]
+    for spoiled in (
+        replace(d, vx=np.minimum(d.vx, 3.0)),
+        replace(d, vx=d.vx + half, vy=d.vy + half),
+        replace(d, vx=d.vx + side, vy=d.vy + side),
+    ):
+        assert findings(spoiled.table()) == ()
+
+
+@pytest.mark.parametrize("spoil", [DEAD["noise"][0], two_sensors])
+def test_every_command_gives_the_same_verdict(spoil: Callable[[Data], Data]) -> None:
+    table, model = spoil(healthy()).table(), read_model("linear")
+    expected = refusal(table)
+    assert expected is not None
+    effect = catalogue()["cubic-nonlinearity"]
+    documents = (
+        fit_document(dataset(table), fit(model, table), None),
+        comparison_document(compare(table, model), "linear"),
+        diagnosis_document(diagnose(table, model), "linear"),
+        discovery_document(discover(table, model), None),
+        discovery_document(add(effect, model, table), None),
+    )
+    for document in documents:
+        assert (document["verdict"], document["residual_structure"]) == (expected.verdict, expected.text)
+    assert not compare(table, model).adequate
+    with pytest.raises(UnusableData, match="no certificate"):
+        figures(fit(model, table), None, {}, trials=10)
+
+
+def test_scatter_beyond_the_samples_is_unexplained_everywhere() -> None:
+    d = healthy()
+    wild = 0.02 * np.random.default_rng(9).standard_normal((2, len(d.vx)))
+    table = replace(d, vx=d.vx + wild[0], vy=d.vy + wild[1]).table()
+    assert diagnose(table, read_model("linear")).verdict == "unexplained"
+    with pytest.raises(UnusableData, match="scatter without a pattern"):
+        figures(fit(read_model("linear"), table), None, {}, trials=10)
+
+
+def test_no_stage_zero_is_off_by_tens_of_degrees() -> None:
+    d = healthy()
+    found = discover(replace(d, alpha=d.alpha - 30).table(), read_model("linear"))
+    assert found.verdict == "unexplained"
+    assert "alpha that is +30 deg off" in (found.residual_structure or "")
+    assert "stage-zero-offset" not in found.causes

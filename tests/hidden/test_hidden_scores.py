@@ -1,0 +1,47 @@
+"""The scores of answers on sets with hidden causes, and the prototype of free forms on two of these sets."""
+
+import json
+
+import pytest
+
+from tests.benchmark.free_forms.__main__ import free_forms
+from tests.benchmark.hidden import FOLDER, Answer, score, summary, timed
+
+
+def test_a_named_cause_replaces_a_hidden_one_only_if_the_answer_lists_it() -> None:
+    truth = ["stage-backlash"]
+    listed = Answer("ambiguous", ["hysteresis"], {"hysteresis": ["stage-backlash"]}, 1.0)
+    assert score("set", truth, listed, 1.0).exact
+    assert not score("set", truth, Answer("adequate", ["hysteresis"], {}, 1.0), 1.0).exact
+    unlike = Answer("ambiguous", ["quantisation"], {"quantisation": ["stage-backlash"]}, 1.0)
+    assert not score("set", truth, unlike, 1.0).exact
+
+
+def test_a_cause_too_many_lowers_the_precision_and_a_missing_one_the_recall() -> None:
+    more = score("set", ["hysteresis"], Answer("adequate", ["hysteresis", "dead-zone"], {}, 1.0), 1.0)
+    less = score("set", ["hysteresis", "saturation"], Answer("adequate", ["hysteresis"], {}, 2.0), 3.0)
+    assert not more.exact
+    assert not less.exact
+    line = summary("pair", [more, less])
+    assert "exact 0%, recall 67%, precision 67%" in line
+    assert "held-out error <= 1.15: 50%, 1.5: 50%, 3: 100%" in line
+    assert "median 2.0 s, longest 3.0 s" in line
+
+
+def test_an_exception_of_the_search_is_an_error_and_no_answer() -> None:
+    def fails(path: object) -> Answer:
+        raise ArithmeticError("no fit")
+
+    answer, _ = timed(fails, FOLDER, 10)
+    assert answer.verdict == "error"
+    assert "no fit" in answer.note
+    assert "errors: 1" in summary("single", [score("set", ["hysteresis"], answer, 0.0)])
+
+
+@pytest.mark.parametrize("name", ["single-010", "null-154"])
+def test_free_forms_find_one_cause_and_name_none_on_a_clean_sensor(name: str) -> None:
+    truth = json.loads((FOLDER / "truth.json").read_text())[name]["causes"]
+    answer = free_forms(FOLDER / "sets" / f"{name}.csv.gz")
+    assert list(answer.causes) == truth
+    assert answer.held_out is not None
+    assert answer.held_out < 1.15
