@@ -26,10 +26,13 @@ class Choice:
     def __init__(self, page: Workbench) -> None:
         self.page = page
         with box("chosen"):
-            self.data = ui.select(
-                _data(page.data), label="Data: a run, or a file's path", value=page.data or None, with_input=True,
-                new_value_mode="add-unique", on_change=lambda e: self._chose(e.value, page.model),
-            ).classes("data").props("dense options-dense")  # fmt: skip
+            self.data = ui.input("Data: a run, or a file's path", value=page.data).classes("data").props("dense")
+            self.data.on("keydown.enter", lambda: self._chose(str(self.data.value).strip(), page.model))
+            with self.data.add_slot("append"):
+                ui.button(icon="arrow_drop_down").props("flat dense round aria-label='Runs of the record'")
+                with ui.menu(), ui.element("div").classes("runs"):
+                    for run, label in _runs().items():
+                        ui.menu_item(label, on_click=lambda run=run: self._chose(run, page.model))
             self.model = ui.select(
                 models(page.model),
                 label="Model",
@@ -54,8 +57,7 @@ class Choice:
 
     def opened(self, session: ModelSession) -> None:
         """What lies open has a name, even where the address has none."""
-        data = self.page.data
-        self.data.set_options({**_data(data)}, value=data)
+        self.data.set_value(self.page.data)
         if not self.page.model:
             self.model.set_options(models(default=f"{session.model.name} (by default)"), value="")
         self.save.enable()
@@ -142,14 +144,14 @@ class Choice:
             hint.dismiss()
 
 
-def _data(chosen: str) -> dict[str, str]:
-    """Runs by id, each with what it is; what is chosen is among them."""
-    found = {chosen: Path(chosen).name} if chosen else {}
+def _runs() -> dict[str, str]:
+    """Runs of the record by id, each with its extent and state."""
     try:
         listed = runs()
     except RigError:
         listed = []
-    for run in listed:
-        for name in [f"{run.run}/{sensor}" for sensor in run.bench.get("sensors", {})] or [run.run]:
-            found[name] = f"{name}  ({run.extent}, {run.state})"
-    return found
+    return {
+        name: f"{name}  ({run.extent}, {run.state})"
+        for run in listed
+        for name in [f"{run.run}/{sensor}" for sensor in run.bench.get("sensors", {})] or [run.run]
+    }
