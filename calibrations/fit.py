@@ -124,7 +124,9 @@ class Fit(Result):
     def held_out_with(self, extra: Array) -> float:
         """The same when columns (channels, n, k) join the fit."""
         jacobian = np.concatenate([self.jacobian, extra], axis=2)
-        return held_out(self.residual, jacobian, self.noise, folds(self.table))
+        theta = np.append(self.theta, np.zeros(extra.shape[2]))
+        prior = np.append(self.problem.layout.prior, np.full(extra.shape[2], np.inf))
+        return held_out(self.residual, jacobian, self.noise, folds(self.table), theta, prior)
 
     def share_left(self, start: Fit) -> float:
         """Part of the excess variance of `start` that this fit does not explain."""
@@ -146,6 +148,11 @@ class Fit(Result):
     def whitened(self) -> Array:
         """[residual, jacobian] made white, shape (channels * n, 1 + p)."""
         return self.noise.whiten(np.concatenate([self.residual[:, :, None], self.jacobian], axis=2))
+
+    @property
+    def information(self) -> Array:
+        """Whitened jacobian, errors widened by the Birge ratio, and the priors below it, shape (rows, p)."""
+        return np.vstack([self.whitened[:, 1:] / self.birge, self.problem.layout.prior_rows])
 
     @cached_property
     def birge(self) -> float:
@@ -203,12 +210,14 @@ def _minimise(problem: Problem, noise: Noise, start: Array) -> tuple[Array, floa
     if at_once is not None:
         return at_once
 
+    rows = problem.layout.prior_rows
+
     def residual(theta: Array) -> Array:
-        return noise.whiten(problem.residual(theta)[:, :, None])[:, 0]
+        return np.append(noise.whiten(problem.residual(theta)[:, :, None])[:, 0], rows @ theta)
 
     def descended(start: Array, stairs: bool) -> OptimizeResult:
         def jacobian(theta: Array) -> Array:
-            return noise.whiten(problem.jacobian(theta, stairs=stairs))
+            return np.vstack([noise.whiten(problem.jacobian(theta, stairs=stairs)), rows])
 
         return least_squares(
             residual,
@@ -232,11 +241,12 @@ def _at_once(problem: Problem, noise: Noise, start: Array) -> tuple[Array, float
     """As `_minimise`, where one step of Gauss and Newton's gets there: the model is linear. None where it is not."""
     typical, (low, high) = problem.layout.typical, problem.layout.bounds
     columns = np.concatenate([problem.residual(start)[:, :, None], problem.jacobian(start)], axis=2)
-    white = noise.whiten(columns)
+    rows = problem.layout.prior_rows
+    white = np.vstack([noise.whiten(columns), np.column_stack([rows @ start, rows])])
     J, before = white[:, 1:] * typical, white[:, 0]
     step = np.linalg.lstsq(J, -before, rcond=None)[0]
     theta = start + typical * step
-    left = noise.whiten(problem.residual(theta)[:, :, None])[:, 0]
+    left = np.append(noise.whiten(problem.residual(theta)[:, :, None])[:, 0], rows @ theta)
     linear = np.linalg.norm(before + J @ step - left) <= STRAIGHT * np.linalg.norm(left)
     if not linear or np.any(theta < low) or np.any(theta > high):
         return None
@@ -250,12 +260,14 @@ def _determined(problem: Problem, noise: Noise, start: Array) -> tuple[Array, fl
     """
     typical, (low, high) = problem.layout.typical, problem.layout.bounds
 
+    rows = problem.layout.prior_rows
+
     def white(theta: Array) -> Array:
-        return noise.whiten(problem.residual(theta)[:, :, None])[:, 0]
+        return np.append(noise.whiten(problem.residual(theta)[:, :, None])[:, 0], rows @ theta)
 
     theta, left = start, white(start)
     for _ in range(NEWTON_STEPS):
-        J = noise.whiten(problem.jacobian(theta)) * typical
+        J = np.vstack([noise.whiten(problem.jacobian(theta)), rows]) * typical
         size = np.linalg.norm(J, axis=0).max() or 1.0
         step = typical * np.linalg.lstsq(J / size, -left / size, rcond=RELATIVE_RANK)[0]
         tried = [(t, white(t)) for t in (np.clip(theta + share * step, low, high) for share in (1.0, 0.25))]
@@ -274,9 +286,8 @@ def _result(problem: Problem, theta: Array, noise: Noise) -> Fit:
     model = replace(problem.layout.model, unit=problem.table.unit)
     found = Fit(model, problem, theta, noise, residual, jacobian)
     cautious = cautiously(found)
-    informative = np.asarray(cautious.whitened[:, 1:] / cautious.birge)
-    wider = _wider(cautious)
-    return replace(found, model=estimates(model, problem.layout, theta, informative, wider), all_noise=cautious.noise)
+    known = estimates(model, problem.layout, theta, cautious.information, _wider(cautious))
+    return replace(found, model=known, all_noise=cautious.noise)
 
 
 def _wider(cautious: Fit) -> Array:
@@ -284,7 +295,8 @@ def _wider(cautious: Fit) -> Array:
     if cautious.table.kind == "motion":
         return np.ones(len(cautious.theta))
     layout = cautious.problem.layout
-    return widening(cautious.noise, cautious.residual, cautious.jacobian, layout.typical)
+    wider = widening(cautious.noise, cautious.residual, cautious.jacobian, layout.typical)
+    return np.where(np.isfinite(layout.prior), 1.0, wider)
 
 
 def cautiously(found: Fit) -> Fit:

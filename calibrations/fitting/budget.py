@@ -109,7 +109,8 @@ def make_budget(found: Fit, inputs: Iterable[Contribution]) -> Budget:
 def row_gains(found: Fit) -> Array:
     """How far each error of a row moves each parameter, shape (p, channels, n)."""
     channels, n = found.residual.shape
-    inverse = gain(found.whitened[:, 1:], found.problem.layout.typical).reshape(-1, channels, n)
+    rows = np.vstack([found.whitened[:, 1:], found.problem.layout.prior_rows])
+    inverse = gain(rows, found.problem.layout.typical)[:, : channels * n].reshape(-1, channels, n)
     G = np.empty_like(inverse)
     for first in range(0, n, CHUNK):
         unit = np.eye(n)[:, first : first + CHUNK]
@@ -205,7 +206,7 @@ def parameter_correlation(found: Fit, drawn: Budget, inputs: Iterable[Contributi
     """Shape (p, p), 1 on the diagonal, for the budget `drawn` of `found`; NaN where a parameter is not determined."""
     cautious = cautiously(found)
     G = row_gains(cautious)
-    by_noise, _ = covariance(cautious.whitened[:, 1:], found.problem.layout.typical)
+    by_noise, _ = covariance(cautious.information, found.problem.layout.typical)
     own = np.sqrt(sum((line.std**2 for line in drawn.given if line.kind == "A" and line.std is not None), np.zeros(1)))
     joint = _normalised(by_noise) * np.outer(own, own)
     for c in inputs:

@@ -26,22 +26,27 @@ def folds(table: Table) -> NDArray[np.intp]:
     return np.asarray(number[group.ravel()])
 
 
-def held_out(residual: Array, jacobian: Array, noise: Noise, fold: NDArray[np.intp]) -> float:
+def held_out(
+    residual: Array, jacobian: Array, noise: Noise, fold: NDArray[np.intp], theta: Array, prior: Array
+) -> float:
     """Pooled rms of the error on unseen rows over the noise floor.
 
-    From residual (channels, n), jacobian (channels, n, p), and the fold of each row (n,).
+    From residual (channels, n), jacobian (channels, n, p), the fold of each row (n,), the parameters (p,) and the
+    standard deviation of their priors (p,), inf where there is none.
     """
     channels, n, p = jacobian.shape
     size = np.linalg.norm(jacobian.reshape(channels * n, p), axis=0)
     J = jacobian / np.where(size > 0, size, 1.0)
     white = noise.whiten(np.concatenate([J, residual[:, :, None]], axis=2)).reshape(channels, n, p + 1)
     total = np.einsum("cni,cnj->ij", white, white)
-    ridge = 1e-12 * np.trace(total[:p, :p]) / max(p, 1) * np.eye(p)
+    precision = 1 / (prior * np.where(size > 0, size, 1.0)) ** 2
+    ridge = 1e-12 * np.trace(total[:p, :p]) / max(p, 1) * np.eye(p) + np.diag(precision)
+    pulled = precision * theta * size  # towards the mean of the prior
     error = np.empty_like(residual)
     for k in range(int(fold.max()) + 1):
         rows = fold == k
         part = white[:, rows].reshape(-1, p + 1)
         G = total - part.T @ part
-        change = np.linalg.solve(G[:p, :p] + ridge, G[:p, p])
+        change = np.linalg.solve(G[:p, :p] + ridge, G[:p, p] + pulled)
         error[:, rows] = residual[:, rows] - J[:, rows] @ change
     return float(np.sqrt(np.mean((rms(error) / noise.floor) ** 2)))

@@ -82,7 +82,7 @@ def _parts(stacked: Array) -> tuple[Array, Array, Array]:
 def _covariance(found: Fit) -> Array:
     """Covariance of the parameters with the standard uncertainties that the model states; NaN where it has none."""
     cautious = cautiously(found)
-    cov, _ = covariance(cautious.whitened[:, 1:] / cautious.birge, found.problem.layout.typical)
+    cov, _ = covariance(cautious.information, found.problem.layout.typical)
     stated = [e.std for term in found.model.terms for e in term.estimates]
     std = np.array([np.nan if s is None else s for s in stated])
     size = np.sqrt(np.diag(cov))

@@ -244,7 +244,7 @@ def _unit(found: Fit, unit: str) -> str:
 def information(found: Fit) -> Array:
     """Inverse covariance (p, p) of the parameters, with the standard uncertainties that the fit states."""
     cautious = cautiously(found)
-    white = cautious.whitened[:, 1:] / cautious.birge
+    white = cautious.information
     own = np.sqrt(np.diag(covariance(white, found.problem.layout.typical)[0]))
     stated = np.array([e.std or 0.0 for term in found.model.terms for e in term.estimates])
     wider = np.where((own > 0) & (stated > 0), stated / np.where(own > 0, own, 1.0), 1.0)

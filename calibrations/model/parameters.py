@@ -47,7 +47,18 @@ class Layout:
     @cached_property
     def typical(self) -> Array:
         """Typical magnitude of each entry, in its own unit, shape (p,)."""
-        return np.array([self._size(s.parameter) * s.parameter.typical * self._scale(s) for s in self.slots])
+        sizes = np.array([self._size(s.parameter) * s.parameter.typical * self._scale(s) for s in self.slots])
+        return np.where(np.isfinite(self.prior), self.prior, sizes)
+
+    @cached_property
+    def prior(self) -> Array:
+        """Standard deviation of each entry's Gaussian prior, shape (p,); inf where it has none."""
+        return np.array([s.parameter.prior[s.axis] if s.parameter.prior else np.inf for s in self.slots])
+
+    @cached_property
+    def prior_rows(self) -> Array:
+        """The priors as whitened rows of a jacobian, shape (entries with a prior, p)."""
+        return np.asarray(np.diag(1 / self.prior)[np.isfinite(self.prior)])
 
     @cached_property
     def bounds(self) -> tuple[Array, Array]:
@@ -164,5 +175,7 @@ def _slots(i: int, term: Term, table: Table) -> list[Slot]:
         if (p.measured and p.measured not in table.axes) or not _exists(p.where, term):
             continue
         axes = table.axes if p.per_axis and not term.tied else ("",)
+        if p.prior is not None:
+            axes = tuple(axis for axis in axes if axis in p.prior)
         slots += [Slot(i, p, axis) for axis in axes if _exists(f"{p.where}_{axis}", term)]
     return slots

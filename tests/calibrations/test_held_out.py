@@ -34,7 +34,9 @@ def test_equals_a_refit_without_the_fold(square: float) -> None:
             error[c, out] = found.table.outputs[out, c] - X[out] @ kept
     explicit = np.sqrt(np.mean(np.mean(error**2, axis=1) / found.noise.floor**2))
     white = white_only(found.problem.white, found.noise.gap_s, 2)
-    assert held_out(found.residual, found.jacobian, white, number) == pytest.approx(explicit, rel=1e-8)
+    assert held_out(
+        found.residual, found.jacobian, white, number, found.theta, found.problem.layout.prior
+    ) == pytest.approx(explicit, rel=1e-8)
 
 
 def test_extra_columns_join_the_fit() -> None:
