@@ -55,9 +55,9 @@ class Parameter:
     uncertainty is not identified. A fit starts from `starts`, or from `guess`: a function of the table that gives
     (axes,) or (starts, axes). `measured` names an axis without which the parameter does not exist, `where` a constant
     of the effect that is 0 where it does not (for one axis, with the axis behind it: `turned_x`), and `scale` a
-    constant that `typical` is a multiple of, where only data can tell. `prior` holds, by axis ("" for one value of all axes),
-    the standard deviation of a Gaussian prior of mean 0; an axis without one does not have the parameter. An effect's
-    class sets `name`.
+    constant that `typical` is a multiple of, where only data can tell. `prior` holds the standard deviation of a
+    Gaussian prior of mean 0 by axis ("" for one value of all axes); an axis without one does not have the parameter.
+    An effect's class sets `name`.
     """
 
     unit: str
