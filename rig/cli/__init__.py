@@ -1,8 +1,8 @@
-"""The command line. `rig COMMAND` is the module `rig/cli/COMMAND.py`, imported only when it is called.
+"""The command line. `rig COMMAND` is the module `rig/cli/commands/COMMAND.py`, imported only when it is called.
 
 A command module holds a click command named `command`; the first line of its docstring is its line in
-`rig --help`. A hyphen in the name is an underscore in the file; `import` is `import_.py`. Adding a command
-is adding a file. A command returns nothing, or the exit status (1: done, and a limit or check was not met).
+`rig --help`. A hyphen in the name is an underscore in the file; `import` is `import_.py`. To add a command,
+add a file. A command returns nothing, or the exit status (1: done, and a limit or check was not met).
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from typing import Any, cast
 
 import click
 
-from rig.cli.failure import exit_status
-from rig.cli.record_option import with_record
+from rig.cli.terminal.failure import exit_status
+from rig.cli.terminal.record_option import with_record
 
-FOLDER = Path(__file__).parent
+FOLDER = Path(__file__).parent / "commands"
 # The sections of `rig --help`. A command that is in none of them is listed under "Other".
 GROUPS = {
     "Start": ("demo", "web"),
@@ -37,16 +37,16 @@ GROUPS = {
 
 
 class Commands(click.Group):
-    """The commands found beside this file, by name."""
+    """The commands, found by the names of their files."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 click calls it so
-        return sorted(name for path in FOLDER.glob("*.py") if (name := _name(path)) and _defines_command(path))
+        return sorted(name for path in FOLDER.glob("*.py") if (name := _name(path)))
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
         path = _path(cmd_name)
-        if not path.is_file() or _name(path) != cmd_name or not _defines_command(path):
+        if not path.is_file() or _name(path) != cmd_name:
             return None
-        return with_record(cast(click.Command, importlib.import_module(f"{__name__}.{path.stem}").command))
+        return with_record(cast(click.Command, importlib.import_module(f"{__name__}.commands.{path.stem}").command))
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
@@ -75,10 +75,6 @@ def _path(name: str) -> Path:
 
 def _name(path: Path) -> str:
     return path.stem.strip("_").replace("_", "-") if path.stem != "__init__" else ""
-
-
-def _defines_command(path: Path) -> bool:
-    return any(line.startswith("def command(") for line in path.read_text(encoding="utf-8").splitlines())
 
 
 def _short_help(path: Path) -> str:

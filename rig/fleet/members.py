@@ -22,9 +22,9 @@ from calibrations.errors import DataError
 from calibrations.importing.files import open_text_file
 from calibrations.presentation.text import as_written
 from calibrations.table import NUMBERS
-from rig.analysis.sensors import CALIBRATING, members
 from rig.errors import RigError, UnknownRun
 from rig.record import Record, Run
+from rig.services.sensors import CALIBRATING, members
 
 INDEX = "fleet.csv"
 COLUMNS = ("sensor", "batch", "rig", "file", "data")

@@ -27,11 +27,11 @@ from calibrations.model import Model
 from calibrations.model.file import parse_model
 from calibrations.presentation.text import joined
 from calibrations.table import Table
-from rig.analysis.data import averaged
-from rig.analysis.sensors import CALIBRATING
 from rig.errors import RigError
 from rig.fleet.own_effects import Own, effects_of
+from rig.services.data import averaged
 from rig.services.load import LONGEST_BEGINNING, channels_alone, check_unit
+from rig.services.sensors import CALIBRATING
 
 # A look as a document of plain values, and back.
 

@@ -26,13 +26,13 @@ from calibrations.noise.mean_noise import correlation_known
 from calibrations.noise.table_noise import with_noise
 from calibrations.plausibility import doubt
 from calibrations.table import Table
-from rig.analysis.data import BESIDE, load
 from rig.errors import UnknownRun
+from rig.services.data import BESIDE, load
 from rig.services.request import Request
 
 if TYPE_CHECKING:
     from calibrations.noise.record import Samples, Still
-    from rig.analysis.stream import Stream
+    from rig.services.stream import Stream
 
 Tell = Callable[[str], None]
 CHANNELS = {f"{what}{axis}{end}" for what in ("v", "a", "g", "m", "") for axis in "xyz" for end in ("", "_v")}
@@ -132,9 +132,9 @@ def still_of(
     Raises DataError, RecordError, TooFewRows.
     """
     from calibrations.noise.record import reduce_record
-    from rig.analysis.still import axes
-    from rig.analysis.stream import repairs
     from rig.record.store import Record
+    from rig.services.still import axes
+    from rig.services.stream import repairs
 
     data = request.data
     with nullcontext() if Path(data).exists() or data.endswith(".npy") else Record.to_find(data) as record:

@@ -6,12 +6,12 @@ from collections.abc import Callable
 
 from calibrations.discovery.verdict import Verdict
 from calibrations.errors import UnusableData
-from rig.analysis.night import Page, night_of
-from rig.analysis.shaken import shaken_of
 from rig.services.load import loaded
 from rig.services.next_experiment import planned
+from rig.services.night import Page, night_of
 from rig.services.provenance import program, today
 from rig.services.request import Request
+from rig.services.shaken import shaken_of
 
 
 def reported(request: Request, tell: Callable[[str], None]) -> Page:

@@ -10,9 +10,9 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from calibrations.model.file import read_model
-from rig.analysis.history import History, closest, history, stale
-from rig.analysis.history_words import but_stale, near, next_due, summary
 from rig.record import Record
+from rig.services.history import History, closest, history, stale
+from rig.services.history_words import but_stale, near, next_due, summary
 from rig.web.pages.history_results import LIMIT_IS_GIVEN
 from tests.browser.conftest import Workbench
 from tests.rig.lives import calibrated

@@ -15,7 +15,7 @@ from calibrations.model.file import read_model
 from procedures.catalogue import find
 from procedures.settings import parse
 from rig.bench import read_bench
-from rig.cli.watch import Quiet
+from rig.cli.terminal.watch import Quiet
 from rig.record import Record
 from rig.runs.runner import start
 from tests.browser.conftest import Workbench

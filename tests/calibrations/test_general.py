@@ -13,7 +13,7 @@ from calibrations.fit import fit
 from calibrations.fitting.matrices import CalibrationMatrices, calibration_matrices
 from calibrations.model.file import read_model
 from calibrations.table import Array, Table
-from rig.cli import calibrated
+from rig.cli.terminal import calibrated
 from tests.calibrations import synthetic, turned
 
 AXES = np.array([[1.0, 0.0, 0.0], [0.02, 1.0, 0.0], [-0.01, 0.03, 1.0]])

@@ -21,11 +21,11 @@ from calibrations.importing.sheet import read_sheet
 from calibrations.model.file import SHIPPED, parse_model
 from drivers.philtec_d63 import Curve
 from procedures.session import Pose
-from rig.analysis.still import stream
 from rig.bench import DEFAULT, read_bench
 from rig.errors import RigError
 from rig.record import Kept, Record, codec
 from rig.record.recover import recover
+from rig.services.still import stream
 from tests.fuzz.target import Target
 from tests.rig.test_store import begin, block
 

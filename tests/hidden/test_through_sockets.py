@@ -17,7 +17,7 @@ from drivers.world.world import World
 from procedures.catalogue import find
 from procedures.settings import parse
 from rig.bench import read_bench
-from rig.cli.watch import Quiet
+from rig.cli.terminal.watch import Quiet
 from rig.record import Record
 from rig.record.measured import table_of
 from rig.runs.runner import start

@@ -18,7 +18,7 @@ from procedures.catalogue import paths
 from procedures.errors import ProcedureError
 from procedures.session import Reading
 from rig.bench import Bench
-from rig.cli.failure import status_of
+from rig.cli.terminal.failure import status_of
 from rig.record import Kept, Record
 from rig.runs.runner import Outcome, resume
 from tests.rig.misbehaving import (

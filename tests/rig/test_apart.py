@@ -14,7 +14,7 @@ from procedures.catalogue import find
 from procedures.errors import SettingError
 from procedures.settings import parse
 from rig.bench import read_bench
-from rig.cli.watch import Quiet
+from rig.cli.terminal.watch import Quiet
 from rig.errors import RigError
 from rig.files import home
 from rig.lease import lease

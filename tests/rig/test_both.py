@@ -12,8 +12,8 @@ from calibrations.fit import Fit, fit
 from calibrations.importing.foreign import write_csv
 from calibrations.model.file import read_model
 from calibrations.table import Table
-from rig.analysis.both import again, both
 from rig.errors import RecordError
+from rig.services.both import again, both
 from rig.services.load import still_of
 from rig.services.request import Request
 

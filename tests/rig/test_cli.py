@@ -13,9 +13,9 @@ import pytest
 from calibrations.errors import DataError
 from drivers.errors import LimitError, LinkTimeout
 from procedures.errors import SafetyLimit, UnknownProcedure
-from rig.cli import FOLDER, GROUPS, Commands
+from rig.cli import GROUPS, Commands
 from rig.cli import rig as group
-from rig.cli.failure import BROKEN_PIPE, PROGRAM_FAULT, exit_status, status_of
+from rig.cli.terminal.failure import BROKEN_PIPE, PROGRAM_FAULT, exit_status, status_of
 from rig.errors import BenchError, InstrumentFailed, Stopped
 
 COMMANDS = Commands().list_commands(click.Context(group))
@@ -36,12 +36,12 @@ def test_help_groups_every_command_once() -> None:
 def test_help_lists_every_command_and_imports_none() -> None:
     out, modules = loaded("from rig.cli import main; main(['--help'])")
     assert all(f"  {name} " in out for name in COMMANDS)
-    assert not {"numpy", "sqlalchemy", "rich", "yaml", "rig.cli.run"} & modules
+    assert not {"numpy", "sqlalchemy", "rich", "yaml", "rig.cli.commands.run"} & modules
 
 
 def test_a_run_begins_without_what_only_reports_and_motions_need() -> None:
     """These take as long to load as all the rest."""
-    _, modules = loaded("import rig.cli.run")
+    _, modules = loaded("import rig.cli.commands.run")
     assert "rig.runs.runner" in modules
     assert not {"matplotlib", "scipy.signal", "scipy.stats", "scipy.interpolate"} & modules
 
@@ -51,11 +51,6 @@ def test_every_command_explains_itself(name: str, rig: Callable[..., Any]) -> No
     ended = rig(name, "--help")
     assert ended.status == 0
     assert f"Usage: rig {name}" in ended.out
-
-
-def test_modules_that_define_no_command_are_none() -> None:
-    assert not {"output", "failure", "watch", "guide", "settings"} & set(COMMANDS)
-    assert (FOLDER / "output.py").exists()
 
 
 @pytest.mark.parametrize(

@@ -12,9 +12,9 @@ import pytest
 
 from procedures.session import Pose, Reading
 from rig.errors import RecordError
-from rig.health import without_secrets
 from rig.record import Kept, Record
 from rig.record.recover import recover
+from rig.services.health import without_secrets
 from tests.rig.test_store import begin, block
 
 PAGE = 4096

@@ -9,11 +9,11 @@ from typing import Any
 
 import pytest
 
-from rig.analysis.exclusion import RESULTS, exclude
 from rig.lease import lease
 from rig.record import Record
 from rig.record.measured import table_of
 from rig.runs.runner import resume, start
+from rig.services.exclusion import RESULTS, exclude
 from tests.rig.rigging import POSES, Onlooker, sigterm_at, small_sweep
 
 Rig = Callable[..., Any]

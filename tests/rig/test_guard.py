@@ -12,7 +12,7 @@ from drivers.errors import DriverError, OverTemperature
 from drivers.oriental_az import registers as az
 from drivers.oriental_az.twin import Drive
 from drivers.transport.faults import Fault
-from rig.cli.failure import status_of
+from rig.cli.terminal.failure import status_of
 from rig.instruments.guard import AT_ONCE_S, GuardedClock, Look
 from rig.record import Record
 from rig.runs.runner import resume

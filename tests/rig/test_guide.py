@@ -19,11 +19,11 @@ from procedures.errors import Declined, NoAnswer
 from procedures.questions import Choice, Confirm, Mounting, Number
 from procedures.session import Limits, Pose, Reading
 from rig.bench import Bench, read_bench
-from rig.cli.before import before, checks, mounting
-from rig.cli.gauge import WIDTH, gauge
-from rig.cli.guide import Guide
-from rig.cli.screen import screen
-from rig.cli.watch import watching
+from rig.cli.terminal.before import before, checks, mounting
+from rig.cli.terminal.gauge import WIDTH, gauge
+from rig.cli.terminal.guide import Guide
+from rig.cli.terminal.screen import screen
+from rig.cli.terminal.watch import watching
 from rig.drawings import Attitude, page
 from rig.errors import Stopped
 from rig.files import free_bytes

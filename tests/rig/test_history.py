@@ -14,10 +14,10 @@ from calibrations.fit import Fit, fit
 from calibrations.model import Model
 from calibrations.model.file import read_model
 from calibrations.table import Table
-from rig.analysis.history import Calibration, Value, history, latest
-from rig.analysis.history_compared import compare_rigs
 from rig.errors import RecordError
 from rig.record import Record
+from rig.services.history import Calibration, Value, history, latest
+from rig.services.history_compared import compare_rigs
 from tests.rig.lives import COLUMNS, calibrated
 
 Rig = Callable[..., Any]
@@ -85,7 +85,7 @@ def test_of_the_other_sensor_the_last_calibration_alone_is_made(years: None, mon
         fitted.append(table.source)
         return fit(model, table)
 
-    monkeypatch.setattr("rig.analysis.history.fit", noted)
+    monkeypatch.setattr("rig.services.history.fit", noted)
     with Record() as record:
         last = latest(record, "17", read_model("linear"))
     assert (last.day, fitted) == ("2024-03-01", [last.data])

@@ -11,11 +11,11 @@ import pytest
 import yaml
 
 from calibrations.model.file import dump_model
-from rig.analysis.several import load_all
 from rig.bench import DEFAULT
 from rig.cli import main
 from rig.files import RECORD
 from rig.record import Record
+from rig.services.several import load_all
 from tests.calibrations.fitted import LINEAR, model
 from tests.rig.conftest import Ended, contents
 from tests.rig.postgres import Server

@@ -21,13 +21,13 @@ from procedures.catalogue import find
 from procedures.errors import ProcedureError, SettingError
 from procedures.motion import KIND, STILL, SWEEP
 from procedures.settings import parse
-from rig.analysis.shaken import shaken_of
 from rig.bench import Bench, read_bench
 from rig.planning.plan import plan
 from rig.record import Kept, Record
 from rig.record.measured import Measured
 from rig.results.evaluate import names
 from rig.runs.runner import Outcome, resume, start
+from rig.services.shaken import shaken_of
 from tests.rig.rigging import Onlooker
 from tests.slow import first_fast
 

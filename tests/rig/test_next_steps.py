@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from rig.analysis.next_steps import REMEDIES, next_steps
-from rig.cli.verdicts import lines
+from rig.cli.terminal.verdicts import lines
 from rig.record import Run
+from rig.services.next_steps import REMEDIES, next_steps
 
 RUN = Run("r1", "poses", "sweep", "complete", {}, {}, {}, "", {}, "", "", None, None, {}, 20)
 
@@ -80,7 +80,7 @@ def test_poses_that_are_left_out_are_named_with_their_reasons() -> None:
 
 def test_every_command_that_a_remedy_names_is_there() -> None:
     named = {name for text in REMEDIES.values() for name in re.findall(r"rig ([a-z]+)", text)}
-    there = {path.stem for path in Path(__file__).parents[2].glob("rig/cli/*.py")}
+    there = {path.stem for path in Path(__file__).parents[2].glob("rig/cli/commands/*.py")}
     assert named <= there
 
 

@@ -13,9 +13,9 @@ import pytest
 from calibrations.noise.deviations import deviations
 from procedures.noise_floor import STILL
 from procedures.session import Pose
-from rig.analysis.still import stream
-from rig.analysis.still_run import coarse
 from rig.record import Block, Kept, Record
+from rig.services.still import stream
+from rig.services.still_run import coarse
 from tests.rig.conftest import Ended
 
 Rig = Callable[..., Ended]

@@ -20,7 +20,7 @@ from drivers.world.stage import Trajectory, at_rest
 from procedures.errors import ProcedureError
 from procedures.session import Limits
 from rig.bench import read_bench
-from rig.cli.failure import status_of
+from rig.cli.terminal.failure import status_of
 from rig.instruments.guard import GuardedClock
 from rig.instruments.instruments import Rig
 from rig.record import Record

@@ -11,7 +11,7 @@ import pytest
 from drivers.clock import SimulatedClock
 from procedures.questions import Question
 from rig.bench import read_bench
-from rig.cli.failure import status_of
+from rig.cli.terminal.failure import status_of
 from rig.record import Record
 from rig.runs.runner import resume, start
 from tests.rig.misbehaving import SHORT, STRETCHES, digest, looking_on, short

@@ -9,8 +9,8 @@ import pytest
 from calibrations.fit import fit
 from calibrations.model.file import read_model
 from calibrations.table import Table
-from rig.analysis.side_by_side import Pair, parameters_of, results_of
 from rig.record import Record, Run
+from rig.services.side_by_side import Pair, parameters_of, results_of
 from tests.hidden.rigs import clean_rig
 
 

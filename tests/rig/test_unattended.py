@@ -12,8 +12,8 @@ from procedures.errors import NoAnswer, SafetyLimit
 from procedures.questions import Question
 from procedures.settings import parse
 from rig.bench import Bench, read_bench
-from rig.cli.failure import status_of
-from rig.cli.watch import Quiet
+from rig.cli.terminal.failure import status_of
+from rig.cli.terminal.watch import Quiet
 from rig.instruments.instruments import Rig
 from rig.planning.plan import plan
 from rig.record import Record

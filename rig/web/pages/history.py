@@ -10,11 +10,11 @@ from nicegui import events, ui
 
 from calibrations.analyses.control_chart import FEWEST_RUNS
 from calibrations.model.file import read_model
-from rig.analysis.history import Calibration, History, Limit, Quantity, history, judged, latest, when
-from rig.analysis.history_limits import limits_of
-from rig.analysis.sensors import calibrating
 from rig.record import Record, Run
+from rig.services.history import Calibration, History, Limit, Quantity, history, judged, latest, when
+from rig.services.history_limits import limits_of
 from rig.services.load import effects_of
+from rig.services.sensors import calibrating
 from rig.web.desk import Desk, models, runs
 from rig.web.frame import Key, frame
 from rig.web.pages.history_results import (

@@ -16,12 +16,12 @@ from calibrations.presentation.chart import Chart, Panel, one
 from calibrations.presentation.charts.history import EWMA, INDIVIDUALS, RANGES, control_panels, life
 from calibrations.presentation.interactive import figure
 from calibrations.presentation.text import measured, minus, plain, unit
-from rig.analysis.charts import life_of
-from rig.analysis.history import Calibration, History, Quantity, closest, stale
-from rig.analysis.history_compared import Compared, compare_days, compare_rigs, compare_sensors
-from rig.analysis.history_limits import changes
-from rig.analysis.history_words import agreements, but_stale, chart_verdict, near, next_due, significance, summary
 from rig.errors import RigError
+from rig.services.charts import life_of
+from rig.services.history import Calibration, History, Quantity, closest, stale
+from rig.services.history_compared import Compared, compare_days, compare_rigs, compare_sensors
+from rig.services.history_limits import changes
+from rig.services.history_words import agreements, but_stale, chart_verdict, near, next_due, significance, summary
 from rig.services.provenance import today
 from rig.web.parts import Link, box, div, failed, for_page, message, off_loop, redraw, table, words
 

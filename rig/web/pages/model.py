@@ -9,8 +9,8 @@ from urllib.parse import urlencode
 
 from nicegui import ui
 
-from rig.analysis.exclusion import numbered_run
 from rig.errors import RecordError
+from rig.services.exclusion import numbered_run
 from rig.web.desk import Desk, runs
 from rig.web.frame import Key, frame
 from rig.web.pages import run_record

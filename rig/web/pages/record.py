@@ -7,8 +7,8 @@ from urllib.parse import urlencode
 
 from nicegui import events, ui
 
-from rig.analysis.sensors import calibrating, members
 from rig.record import Run
+from rig.services.sensors import calibrating, members
 from rig.web.desk import Desk, runs
 from rig.web.frame import frame
 from rig.web.pages.history_results import Asked

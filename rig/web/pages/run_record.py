@@ -13,16 +13,16 @@ from nicegui import ui
 
 from calibrations.presentation.interactive import figure
 from calibrations.presentation.text import bound, joined, measured, unit
-from rig.analysis.charts import course_chart
-from rig.analysis.course import Course, kind_of
-from rig.analysis.exclusion import exclude, numbered_run
-from rig.analysis.next_steps import next_steps
-from rig.analysis.sensors import lives
 from rig.errors import RecordError
-from rig.export import export
 from rig.record import Event, Record, Run
+from rig.services.charts import course_chart
+from rig.services.course import Course, kind_of
+from rig.services.exclusion import exclude, numbered_run
+from rig.services.export import export
+from rig.services.next_steps import next_steps
 from rig.services.report import reported
 from rig.services.request import Request
+from rig.services.sensors import lives
 from rig.web.desk import Desk
 from rig.web.frame import frame
 from rig.web.pages.history_results import Asked

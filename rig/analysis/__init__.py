@@ -1,1 +1,0 @@
-"""What data are asked: by the command line and the workbench alike."""

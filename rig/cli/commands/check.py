@@ -1,0 +1,64 @@
+"""check: connect to every instrument of the bench, identify and test it; when certificates are due."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from datetime import UTC, datetime
+from pathlib import Path
+
+import click
+
+from calibrations.presentation.text import columns
+from drivers.instrument import Check, Identity
+from rig.bench import DEFAULT, read_bench
+from rig.bench.certificates import EXPIRED, certificates, expired
+from rig.cli.terminal.output import bench_option, emit, json_option, notes
+from rig.instruments.instruments import checked
+
+NOT_MET, FAILED = 1, 3
+
+
+@click.command("check")
+@bench_option
+@click.option("--example", is_flag=True, help="Print the simulated rig's bench file, to begin your own with.")
+@json_option
+def command(bench_file: Path | None, example: bool, as_json: bool) -> int:
+    """Connect to every instrument of the bench, identify it and let it test itself.
+
+    Exit status 1: an instrument's certificate has expired. 3: an instrument does not answer, or fails its test.
+    """
+    if example:
+        click.echo(DEFAULT.read_text(encoding="utf-8"), nl=False)
+        return 0
+    bench = read_bench(bench_file)
+    found, due = checked(bench), certificates(bench)
+    late = expired(bench, datetime.now(UTC).date())
+    if as_json:
+        papers = {name: {"number": each.number, "due": each.due.isoformat()} for name, each in due.items()}
+        told = {"instruments": _document(found), "certificates": papers, EXPIRED: late}
+        emit({"schema": "rig.check/1", "bench": bench.name, **told})
+    else:
+        rows = [row for role, (identity, tests) in found.items() for row in _rows(role, identity, tests)]
+        click.echo(columns(("role", "instrument", "check", "result", "detail"), rows))
+        for name, each in due.items():
+            click.echo(f"{name}: certificate {each.number}, due {each.due}")
+        notes(f"{fault}; have it calibrated again" for fault in late)
+    if not all(test.ok for _, tests in found.values() for test in tests):
+        return FAILED
+    return NOT_MET if late else 0
+
+
+def _rows(role: str, identity: Identity | None, tests: list[Check]) -> list[tuple[str, ...]]:
+    who = " ".join(part for part in asdict(identity).values() if part) if identity else "does not answer"
+    heads = [(role, who)] + [("", "")] * (len(tests) - 1)
+    verdicts = ["ok" if test.ok else "FAILED" for test in tests]
+    return [
+        (*head, test.name, verdict, test.detail) for head, test, verdict in zip(heads, tests, verdicts, strict=True)
+    ]
+
+
+def _document(found: dict[str, tuple[Identity | None, list[Check]]]) -> dict[str, object]:
+    return {
+        role: {"identity": asdict(identity) if identity else None, "checks": [asdict(test) for test in tests]}
+        for role, (identity, tests) in found.items()
+    }

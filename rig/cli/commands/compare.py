@@ -1,0 +1,50 @@
+"""compare: the model beside the measurement, and where it fails."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import click
+
+from rig.cli.terminal.output import check_option, emit, model_option, notes
+from rig.cli.terminal.request import request_options
+
+if TYPE_CHECKING:
+    from rig.services.request import Request
+
+
+@click.command("compare")
+@click.argument("data")
+@model_option
+@check_option
+@request_options
+def command(request: Request, check: bool, as_json: bool) -> int:
+    """Set a model beside DATA (a file or a run) and say where it fails. A model without values is fitted first."""
+    from calibrations.discovery.verdict import Verdict
+    from calibrations.documents import comparison_document
+    from rig.cli.terminal.asked import asked
+    from rig.cli.terminal.words import table, warning
+
+    question = asked(request)
+    result = question.data.compare(question.model)
+    name, cautions = request.model or question.model.name, question.data.cautions(result.fit)
+    if as_json:
+        emit(comparison_document(result, name))
+        notes(warning(cautions))
+    else:
+        data = question.data
+        click.echo(f"{question.model.name} on {data.description}\n\n{table(data.error_table(result.fit))}\n")
+        if (more := data.comparison_table(result)) is not None:
+            click.echo(f"{table(more)}\n")
+        if result.rejection is not None:
+            click.echo(f"This data cannot be used: {result.rejection.verdict}: {result.rejection.text}.")
+        elif result.adequate:
+            click.echo(data.complete)
+        else:
+            click.echo("It fails, worst first:\n" + "\n".join(f"  {place.text}" for place in result.fails))
+            click.echo(f"\nWhich effect is missing: rig diagnose {request.data} --model {name}")
+        for line in filter(None, (data.note, *warning(cautions))):
+            click.echo(f"\n{line}")
+    silent = result.rejection is not None and result.rejection.verdict == Verdict.NO_RESPONSE
+    undetermined = question.data.undetermined(result.fit) is not None
+    return int(silent or (check and (not result.adequate or undetermined)))

@@ -1,0 +1,166 @@
+"""compensate: write a model's inverse as source text, for the product that the sensor goes into."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from rig.cli.terminal.output import bench_option, emit, json_option, note
+from rig.errors import OutputError
+
+if TYPE_CHECKING:
+    from calibrations.compensation.inverse import Compensation, Range
+    from calibrations.model import Model
+
+
+@click.command("compensate")
+@click.argument("model")
+@click.option("--language", type=click.Choice(["c", "python", "json"]), required=True)
+@click.option("--out", type=click.Path(file_okay=False, path_type=Path), required=True, help="Write into this folder.")
+@click.option("--name", help="Name of files and functions. Default: that of the model file.")
+@click.option("--precision", type=click.Choice(["double", "float"]), default="double", show_default=True)
+@click.option("--range", "reach", type=float, help="Largest value of each axis, g (deg/s; field as 1). Default: 1.5.")
+@click.option(
+    "--input",
+    "given",
+    multiple=True,
+    metavar="NAME=LOW:HIGH",
+    help="Range of another input, such as temperature_c=0:60.",
+)
+@click.option("--leave-out", "without", multiple=True, metavar="EFFECT", help="Leave an effect out.")
+@click.option("--data", help="Set the compensation beside these unseen poses, and a linear model fitted to them.")
+@click.option("--picture", type=click.Path(dir_okay=False, path_type=Path), help="Draw what --data shows.")
+@bench_option
+@json_option
+def command(
+    model: str,
+    language: str,
+    out: Path,
+    name: str | None,
+    precision: str,
+    reach: float | None,
+    given: Sequence[str],
+    without: Sequence[str],
+    data: str | None,
+    picture: Path | None,
+    bench_file: Path | None,
+    as_json: bool,
+) -> None:
+    """Write the inverse of MODEL: from voltages to acceleration along the reference axes.
+
+    Every effect that can be inverted at run time is; of the others the source says what leaving them out costs. The
+    number of steps is fixed, and proved to be enough over the whole range.
+    """
+    from calibrations.compensation.document import make_vectors, summary
+    from calibrations.compensation.inverse import compensated_residual, invert_model
+    from calibrations.model.file import dump_model, read_model
+    from rig.files import write_whole
+    from rig.services.load import check_unit, effects_of
+    from rig.services.provenance import program, today
+
+    if picture is not None and data is None:
+        raise click.UsageError("--picture draws what --data shows: give --data DATA")
+    effects = effects_of(bench_file)
+    found = read_model(model, effects)
+    made = invert_model(found, _range(found, reach, given), without, precision)
+    origin = _origin(model, name, dump_model(found), program(), today())
+    files = _writer(language)(made, origin, make_vectors(made))
+    beside = None
+    if data is not None:
+        from rig.services.data import load
+
+        table = load(data, tell=note)
+        check_unit(found, table.unit, table.source)
+        beside = compensated_residual(made, table)
+    _folder(out)
+    for file, text in files.items():
+        write_whole(out / file, text)
+    if picture is not None and beside is not None:
+        from calibrations.presentation.charts.motion import compensated
+        from calibrations.presentation.static import save
+
+        save(compensated(beside), picture)
+    paths = [*(str(out / file) for file in files), *([str(picture)] if picture else [])]
+    if as_json:
+        emit(summary(made, origin) | {"files": paths, "residual": beside.document() if beside else None})
+    else:
+        click.echo(
+            "\n".join([*_told(made), *(beside.lines() if beside else []), *(f"written: {path}" for path in paths)])
+        )
+
+
+def _writer(language: str) -> Callable[..., dict[str, str]]:
+    from calibrations.compensation import c99, document, python_source
+
+    return {"c": c99.files, "python": python_source.files, "json": document.files}[language]
+
+
+def _range(model: Model, reach: float | None, given: Sequence[str]) -> Range:
+    from calibrations.compensation.inverse import Range
+
+    if reach is not None and not reach > 0:
+        raise click.UsageError(f"--range is {reach:g}; it must be above 0")
+    return Range.for_model(model, reach, **dict(map(_input, given)))
+
+
+def _input(text: str) -> tuple[str, tuple[float, float]]:
+    parts = re.fullmatch(r"([a-z]\w*)=([^:]+):([^:]+)", text)
+    try:
+        name, low, high = parts.groups() if parts else ("", "", "")
+        ends = float(low), float(high)
+    except ValueError:
+        ends = (1.0, 0.0)
+    if not ends[0] < ends[1]:
+        raise click.UsageError(f"--input {text!r}: write NAME=LOW:HIGH, as in temperature_c=0:60")
+    return name, ends
+
+
+def _origin(model: str, name: str | None, text: str, program: str, date: str) -> Any:
+    from calibrations.compensation.about import Origin
+
+    path = Path(model)
+    digest = hashlib.sha256(path.read_bytes() if path.is_file() else text.encode()).hexdigest()
+    return Origin(_identifier(name or path.stem), path.name, digest, program, date)
+
+
+def _identifier(name: str) -> str:
+    """A name that C and Python take."""
+    made = re.sub(r"\W+", "_", name, flags=re.ASCII).strip("_").lower()
+    return made if made[:1].isalpha() else f"sensor_{made}".rstrip("_")
+
+
+def _folder(out: Path) -> None:
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{out}: the folder cannot be made: {error.strerror}; name another") from None
+
+
+def _told(made: Compensation) -> list[str]:
+    """What it does and what it costs, for people."""
+    from calibrations.compensation.about import coverage_text, error_text, operations_text, steps_text, uncertainty_text
+    from calibrations.compensation.forward import LEFT_OUT
+
+    bound, costs = made.bound, made.costs
+    method = f"{steps_text(made)}, {operations_text(made)}; each comes nearer by {bound.q:.2g} at least"
+    lines = [f"{made.model.name}: {method}, proved within +-{made.range.reach:g} {made.unit}."]
+    for fate in made.forward.fates:
+        if fate.how == LEFT_OUT:
+            size = costs.left_out[fate.effect]
+            cost = (
+                f"costs {error_text(size.rms, made.unit)} rms, {error_text(size.most, made.unit)} at most"
+                if size
+                else "cost not known"
+            )
+            lines.append(f"Left out: {fate.effect}: {fate.why}; {cost}.")
+    if costs.out_of_gravity is not None:
+        lines.append(
+            "az is not measured; found from gravity it costs "
+            f"{error_text(costs.out_of_gravity.most, made.unit)} at most."
+        )
+    return [*lines, uncertainty_text(made), coverage_text(made)]

@@ -1,0 +1,107 @@
+"""control: the control charts of the check standard, and whether the rig is in control."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from calibrations.analyses.control_chart import BASELINE_RUNS, FEWEST_RUNS
+from calibrations.presentation.text import columns, concise
+from rig.cli.terminal.output import emit, json_option
+from rig.record import Record
+from rig.services.control import Controlled, controlled
+
+OUT = "out of control"
+
+
+@click.command("control")
+@click.argument("sensor", required=False)
+@click.option(
+    "--baseline",
+    type=click.IntRange(min=FEWEST_RUNS),
+    default=BASELINE_RUNS,
+    show_default=True,
+    help="Runs that set the limits.",
+)
+@click.option("--since", metavar="RUN", help="Begin with this run, such as the first one after a repair.")
+@click.option("--pictures", "folder", type=click.Path(file_okay=False, path_type=Path), help="Write the charts here.")
+@click.option("--format", "form", type=click.Choice(["png", "svg"]), default="png", show_default=True)
+@json_option
+def command(sensor: str | None, baseline: int, since: str | None, folder: Path | None, form: str, as_json: bool) -> int:
+    """Chart every `rig run check-standard` of SENSOR (its serial number), or of all check standards.
+
+    The first runs set the limits; a later one beyond them is out of control, and so is a slow drift of their weighted
+    mean. Exit status 1: out of control.
+    """
+    with Record.to_read() as record:
+        found = controlled(record.runs(), sensor, baseline, since)
+    written = _write(found, folder, form) if folder else []
+    if as_json:
+        emit({"schema": "rig.control/1", "verdict": _verdict(found), "charts": [_document(each) for each in found]})
+    else:
+        click.echo(columns(("sensor", "quantity", "runs", "centre", "sigma", "last", "verdict"), map(_row, found)))
+        lines = [line for each in found for line in _signals(each)]
+        click.echo("\n".join([*lines, *(f"written: {path}" for path in written), _verdict(found)]))
+    return int(_verdict(found) == OUT)
+
+
+def _verdict(found: list[Controlled]) -> str:
+    """Of all charts: the worst of theirs."""
+    verdicts = {each.chart.verdict for each in found}
+    return next(verdict for verdict in (OUT, "in control", "baseline") if verdict in verdicts)
+
+
+def _row(each: Controlled) -> tuple[str, ...]:
+    chart = each.chart
+    last = concise(float(chart.values[-1]), chart.sigma, each.unit)
+    progress = f"{len(chart.values)} of {chart.judged}" if chart.verdict == "baseline" else str(len(chart.values))
+    centre, sigma = f"{chart.centre:.7g} {each.unit}", f"{chart.sigma:.2g} {each.unit}"
+    return each.sensor, each.quantity, progress, centre, sigma, last, chart.verdict
+
+
+def _signals(each: Controlled) -> list[str]:
+    """A line for every run that is beyond a limit."""
+    chart, name = each.chart, f"{each.sensor} {each.quantity}"
+    jumps = [
+        f"{each.runs[k]}: {name} is {(chart.values[k] - chart.centre) / chart.sigma:+.1f} sigma from the centre"
+        for k in chart.jumps
+    ]
+    first = chart.drifts[:1]
+    return jumps + [f"{each.runs[k]}: {name} has drifted: its weighted mean is beyond its limit" for k in first]
+
+
+def _document(each: Controlled) -> dict[str, Any]:
+    chart = each.chart
+    signals = [("individuals", k) for k in chart.jumps] + [("ewma", k) for k in chart.drifts]
+    return {
+        "sensor": each.sensor,
+        "quantity": each.quantity,
+        "unit": each.unit,
+        "verdict": chart.verdict,
+        "baseline": chart.judged,
+        "centre": chart.centre,
+        "sigma": chart.sigma,
+        "limits": [chart.centre - chart.reach, chart.centre + chart.reach],
+        "range_limit": chart.range_limit,
+        "runs": list(each.runs),
+        "values": chart.values.tolist(),
+        "ewma": chart.ewma.tolist(),
+        "ewma_limits": [[chart.centre - reach, chart.centre + reach] for reach in chart.ewma_reach.tolist()],
+        "signals": [{"chart": name, "run": each.runs[k]} for name, k in signals],
+    }
+
+
+def _write(found: list[Controlled], folder: Path, form: str) -> list[Path]:
+    """One picture for each sensor."""
+    from calibrations.presentation.charts.history import control_charts
+    from calibrations.presentation.static import save_all
+
+    figures = {}
+    for sensor in dict.fromkeys(each.sensor for each in found):
+        mine = [each for each in found if each.sensor == sensor]
+        name = "".join(letter if letter.isalnum() else "-" for letter in sensor)
+        charts, units = {each.quantity: each.chart for each in mine}, {each.quantity: each.unit for each in mine}
+        figures[f"control-{name}"] = control_charts(charts, units)
+    return save_all(figures, folder, form)

@@ -1,0 +1,70 @@
+"""demo: the whole story on the simulated rig: sweep, compare, diagnose, add, the error falls, a report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from rig.cli.terminal.output import emit, json_option, note
+
+
+@click.command("demo")
+@click.option(
+    "--folder",
+    default="rig-demo",
+    show_default=True,
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Where the model and the report are written.",
+)
+@json_option
+def command(folder: Path, as_json: bool) -> None:
+    """Sweep a simulated sensor, find what its linear model misses, add it, and watch the error fall."""
+    from calibrations.documents import discovery_document
+    from calibrations.loop import compare, discover
+    from calibrations.model.file import read_model
+    from calibrations.presentation.charts.discovery import album
+    from calibrations.presentation.report.report import report
+    from procedures.catalogue import find
+    from procedures.settings import parse
+    from rig.bench import read_bench
+    from rig.cli.terminal.asked import write_model
+    from rig.cli.terminal.watch import watching
+    from rig.cli.terminal.words import discovery
+    from rig.cli.terminal.words import table as shown
+    from rig.files import write_whole
+    from rig.record import Record
+    from rig.runs.runner import start
+    from rig.services.data import load
+    from rig.services.provenance import program, today
+
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise click.UsageError(f"{folder}: cannot be made: {error.strerror}") from None
+
+    note("1  Sweep: both stages turn a simulated ADXL203 through 518 poses, every byte over the instruments' wires.")
+    sweep, bench = find("sweep"), read_bench()
+    with watching(sweep, bench, False, None) as watch, Record() as record:
+        outcome = start(record, bench, sweep, parse(sweep, {}), watch)
+    if outcome.error is not None:
+        raise outcome.error
+    run = outcome.run.run
+    table, linear = load(run), read_model("linear")
+
+    note("2  Compare: the manufacturer's linear model beside the measurement.")
+    beside = compare(table, linear)
+    places = "\n".join(f"   {place.text}" for place in beside.fails[:3])
+    note(f"\n{shown(beside.data.error_table(beside.fit))}\n\n{places}\n")
+
+    note("3  Diagnose and add, until nothing is missing.\n")
+    found = discover(table, linear)
+    model, page = folder / "model.yaml", folder / "report.html"
+    write_model(found.end, linear, model)
+    write_whole(page, report(found, beside, today(), program(), album(found, beside)))
+    if as_json:
+        emit({**discovery_document(found, str(model)), "run": run, "report": str(page)})
+        return
+    click.echo(discovery(found))
+    click.echo(f"\n4  Look: {page} shows where the model failed and how the error fell; {model} is the new model.\n")
+    click.echo(f"The run is {run}. Try: rig diagnose {run}, rig effects, rig import YOUR.csv")

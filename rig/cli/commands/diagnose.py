@@ -1,0 +1,64 @@
+"""diagnose: which physical effect the model is missing."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from rig.cli.terminal.output import check_option, emit, model_option, notes
+from rig.cli.terminal.request import request_options
+
+if TYPE_CHECKING:
+    from calibrations.discovery.results import Diagnosis
+    from rig.services.request import Request
+
+SHOWN = 6
+
+
+@click.command("diagnose")
+@click.argument("data")
+@model_option
+@check_option
+@request_options
+def command(request: Request, check: bool, as_json: bool) -> int:
+    """Find the physical effect that a model misses on DATA (a file or a run)."""
+    from calibrations.discovery.verdict import Verdict
+    from calibrations.documents import diagnosis_document
+    from rig.cli.terminal.asked import asked, note_untestable
+    from rig.cli.terminal.own_effect import own_effect, told
+    from rig.cli.terminal.words import planned, warning
+
+    question = asked(request)
+    result = question.data.diagnose(question.model, question.effects)
+    result = planned(result, request, question.effects)
+    note_untestable(question.data, result.fit, question.effects)
+    name = request.model or question.model.name
+    if as_json:
+        own = own_effect(result.pattern, name, request)
+        emit(diagnosis_document(result, name) | {"own_effect": own})
+        notes(warning([result.caution]))
+    else:
+        click.echo("\n".join([_text(result, name, request), *told(result.pattern, name, request)]))
+    return int(result.verdict is Verdict.NO_RESPONSE or (check and result.verdict is not Verdict.ADEQUATE))
+
+
+def _text(result: Diagnosis[Any], model: str, request: Request) -> str:
+    from calibrations.documents import why
+    from rig.cli.terminal.words import experiment, table
+
+    data = result.findings.data
+    lines = [f"{model} on {data.description}", "", result.judgement.text, ""]
+    if shown := result.candidates[:SHOWN]:
+        lines += [table(data.candidate_table(result, shown)), ""]
+    if result.missing:
+        best = result.candidates[0]
+        lines += [f"{best.name}: {why(best, result)}", "", f"    {best.effect.formula.splitlines()[0]}", ""]
+        lines.append(
+            f"Add it: rig add {best.name} --model {model} --data {request.data} --out model.yaml{request.bench_words}"
+        )
+    if data.note:
+        lines += ["", data.note]
+    if result.next_experiment:
+        lines += experiment(result.next_experiment, request.data)
+    return "\n".join(lines).rstrip()

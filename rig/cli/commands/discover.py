@@ -1,0 +1,87 @@
+"""discover: add missing effects until none is missing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from rig.cli.terminal.output import check_option, emit, model_option, note, notes, watch_options
+from rig.cli.terminal.request import request_options
+
+if TYPE_CHECKING:
+    from calibrations.discovery.dataset import Dataset
+    from rig.services.load import Loaded
+    from rig.services.request import Request
+
+
+@click.command("discover")
+@click.argument("data", nargs=-1)
+@model_option
+@click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="Write the final model to this file.")
+@click.option("--live", is_flag=True, help="Measure on the bench, and choose what to measure next.")
+@click.option("--time", "minutes", type=click.FloatRange(min=0, min_open=True), help="Rig time for --live, minutes.")
+@watch_options
+@check_option
+@request_options
+def command(
+    request: Request,
+    several: tuple[str, ...],
+    out: Path | None,
+    live: bool,
+    minutes: float | None,
+    unattended: bool,
+    answers: Path | None,
+    check: bool,
+    as_json: bool,
+) -> int:
+    """Diagnose and add until nothing is missing on DATA (a file or a run; several are judged together).
+
+    With --live there is no DATA: it is measured, little by little, until one explanation stands or the time is used up
+    (without --time: as long as the standard sweep takes).
+    """
+    if live:
+        from rig.cli.terminal.live import discover_live
+
+        if several:
+            raise click.UsageError("--live measures its own data; leave out DATA, or --live")
+        return discover_live(request, out, minutes, unattended, answers, check, as_json)
+    if not several:
+        raise click.UsageError("name DATA (a file or a run), or --live to measure it")
+    return _discover(request, several, out, check, as_json)
+
+
+def _discover(request: Request, several: tuple[str, ...], out: Path | None, check: bool, as_json: bool) -> int:
+    from calibrations.discovery.verdict import Verdict
+    from calibrations.documents import discovery_document
+    from rig.cli.terminal.asked import asked, write_model
+    from rig.cli.terminal.own_effect import own_effect, told
+    from rig.cli.terminal.words import discovery, parameters, planned, warning
+
+    question = asked(request, out)
+    data = question.data if len(several) == 1 else _together(several, request, question)
+    result = planned(data.discover(question.model, question.effects), request, question.effects)
+    written = write_model(result.end, question.model, out)
+    reached = str(written) if written else request.model or question.model.name
+    own = (result.pattern if len(several) == 1 else None, reached, request)
+    if as_json:
+        emit(discovery_document(result, str(written) if written else None) | {"own_effect": own_effect(*own)})
+        notes(warning([result.caution]))
+    else:
+        lines = "\n".join([discovery(result), *told(*own)])
+        click.echo(f"{data.description}\n\n{lines}\n\n{parameters(result.end.model)}")
+        if written is not None:
+            click.echo(f"\nwritten to {written}")
+    return int(result.verdict is Verdict.NO_RESPONSE or (check and result.verdict is not Verdict.ADEQUATE))
+
+
+def _together(several: tuple[str, ...], request: Request, question: Loaded) -> Dataset[Any]:
+    """Several data as one table."""
+    from calibrations.discovery.rows import Rows
+    from rig.services.load import with_known_noise
+    from rig.services.several import load_all
+
+    if question.data.form != "rows":
+        raise click.UsageError("still records are judged one at a time; name one")
+    return Rows(with_known_noise(load_all(several, note), request.noise, question.effects))

@@ -1,0 +1,90 @@
+"""doctor: look after this installation, and collect what a maintainer needs into one archive."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import click
+
+from calibrations.presentation.text import columns
+from rig.bench import read_bench
+from rig.cli.terminal.output import bench_option, emit, json_option
+from rig.errors import OutputError, RecordError
+from rig.files import home
+from rig.record.recover import recover
+from rig.services.health import Finding, findings, last_run, list_runs, versions, without_secrets
+
+
+@click.command("doctor")
+@click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="The archive; else named by the time.")
+@click.option("--run", "run", help="The run whose log goes into it; else the newest.")
+@click.option(
+    "--recover",
+    "folder",
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Copy what can be read of a damaged record into a new one in this folder, and do nothing else.",
+)
+@bench_option
+@json_option
+def command(out: Path | None, run: str | None, folder: Path | None, bench_file: Path | None, as_json: bool) -> int:
+    """Check packages, disk and record (1: something is wrong), and write an archive for a maintainer.
+
+    It holds versions, the checks, the list of runs, the bench, and one run's log; no samples, and no secrets: what a
+    bench file calls a password, a token or a key is left out. Look into it before you send it.
+    """
+    if folder is not None:
+        return _recovered(folder, as_json)
+    found = findings()
+    archive = out or Path(f"rig-doctor-{datetime.now(UTC):%Y%m%d-%H%M%S}.zip")
+    parts = _parts(found, run, bench_file)
+    _write(archive, parts)
+    if as_json:
+        checks = {each.what: {"ok": each.ok, "said": each.detail} for each in found}
+        emit({"schema": "rig.doctor/1", "checks": checks, "archive": str(archive), "files": sorted(parts)})
+    else:
+        rows = [(each.what, "ok" if each.ok else "WRONG", each.detail) for each in found]
+        click.echo(columns(("check", "", ""), rows))
+        click.echo(f"\n{archive}: {', '.join(sorted(parts))}. It has no samples; look into it before you send it.")
+    return int(not all(each.ok for each in found))
+
+
+def _parts(found: list[Finding], run: str | None, bench_file: Path | None) -> Mapping[str, Any]:
+    """The archive's files, as JSON documents by name."""
+    parts: dict[str, Any] = {"versions.json": versions(), "checks.json": [vars(each) for each in found]}
+    parts["runs.json"] = list_runs()
+    try:
+        parts["run.json"] = last_run(run)
+    except RecordError as error:
+        if run is not None:
+            raise
+        parts["run.json"] = {"error": str(error)}
+    if bench_file is not None:
+        parts["bench.json"] = without_secrets(read_bench(bench_file).document())
+    return parts
+
+
+def _write(archive: Path, parts: Mapping[str, Any]) -> None:
+    try:
+        with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as file:
+            for name, document in parts.items():
+                file.writestr(name, json.dumps(document, indent=1, default=str))
+    except OSError as error:
+        raise OutputError(f"{archive}: cannot be written: {error.strerror}; name another with --out") from None
+
+
+def _recovered(folder: Path, as_json: bool) -> int:
+    """Tell what was copied, and what is lost."""
+    done = recover(home() / "record.db", folder)
+    lost = [*(f"some rows of {table}" for table in done.damaged), *(f"the samples of {pose}" for pose in done.spoilt)]
+    if as_json:
+        emit({"schema": "rig.recovered/1", "folder": str(folder), "rows": dict(done.rows), "lost": lost})
+    else:
+        rows = ", ".join(f"{count} {table}" for table, count in done.rows.items() if count)
+        click.echo(f"{folder}: {rows or 'nothing'}")
+        click.echo(f"lost: {'; '.join(lost) or 'nothing'}. RIG_HOME={folder} uses this record.")
+    return int(bool(lost))

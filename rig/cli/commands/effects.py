@@ -1,0 +1,53 @@
+"""effects: the catalogue of physical effects."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from calibrations.presentation.text import columns
+from rig.cli.terminal.output import bench_option, emit, json_option
+
+
+@click.command("effects")
+@click.argument("effect", required=False)
+@bench_option
+@json_option
+def command(effect: str | None, bench_file: Path | None, as_json: bool) -> None:
+    """List the catalogue of physical effects, or show one EFFECT in full."""
+    from calibrations.compensation.forward import known_at_run_time
+    from calibrations.effects import Effect
+    from calibrations.effects.catalogue import find
+    from rig.services.load import effects_of
+
+    known = effects_of(bench_file)
+
+    def document(e: Effect) -> dict[str, object]:
+        return {
+            "effect": e.name,
+            "acts_on": e.acts_on,
+            "summary": e.summary,
+            "formula": e.formula,
+            "parameters": [
+                {"name": p.name, "unit": p.unit, "per_axis": p.per_axis, "doc": p.doc} for p in e.parameters
+            ],
+            "symptom": e.symptom,
+            "excited_by": e.excited_by,
+            "confused_with": e.confused_with,
+            "needs": list(e.needs),
+            "kinds": list(e.kinds),
+            "source": e.source,
+        }
+
+    shown = [find(effect, known)] if effect else list(known.values())
+    if as_json:
+        emit({"schema": "rig.effects/1", "effects": [document(e) for e in shown]})
+    elif effect:
+        e = shown[0]
+        click.echo(f"{e.name}: {e.summary}\n\n    " + e.formula.replace("\n", "\n    ") + "\n")
+        parts = (("Symptom", e.symptom), ("Excited by", e.excited_by), ("Confused with", e.confused_with))
+        more = (("At run time", known_at_run_time(e)), ("Source", e.source))
+        click.echo("\n".join(f"{title}: {text}" for title, text in (*parts, *more) if text))
+    else:
+        click.echo(columns(("effect", "acts on", "what happens"), [(e.name, e.acts_on, e.summary) for e in shown]))

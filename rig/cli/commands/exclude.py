@@ -1,0 +1,39 @@
+"""exclude: leave a pose out of every analysis, with a reason that stays; or take it in again."""
+
+from __future__ import annotations
+
+import click
+
+from rig.cli.terminal.output import emit, json_option
+
+
+@click.command("exclude")
+@click.argument("run")
+@click.argument("pose", type=click.IntRange(min=0))
+@click.option("--reason", metavar="TEXT", help="Why it is left out; it is kept with the run.")
+@click.option("--include", is_flag=True, help="Take the pose in again.")
+@json_option
+def command(run: str, pose: int, reason: str | None, include: bool, as_json: bool) -> None:
+    """Leave pose number POSE of RUN out of every analysis.
+
+    The pose stays in the record, with the reason and the date. The results of a complete run are evaluated again; a
+    run that was stopped measures the pose again when it is resumed. `rig show RUN --poses` has the numbers.
+    """
+    if include == bool(reason and reason.strip()):
+        raise click.UsageError("say why the pose is left out (--reason TEXT), or take it in again (--include)")
+    from rig.cli.terminal.verdicts import lines
+    from rig.record import Record
+    from rig.services.exclusion import RESULTS, exclude
+
+    with Record.to_find(run) as record:
+        found = exclude(record, run, [pose], None if include else reason)
+        told = [event.text for event in record.events(run) if event.what == RESULTS]
+    if as_json:
+        said = None if include else reason
+        emit({"schema": "rig.exclude/1", "run": run, "pose": pose, "excluded": said, "results": found.results})
+        return
+    done = "is taken in again" if include else f"is left out: {reason}"
+    after = [f"results: {told[-1]}", *lines(found.results)] if found.state == "complete" and told else []
+    if found.state != "complete" and not include:
+        after = [f"Next: rig resume {run} measures it again"]
+    click.echo("\n".join([f"{run}: pose {pose} {done}", *after]))

@@ -1,0 +1,111 @@
+"""history: a sensor's calibrations over its life, their stability, and when the next one is due."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import click
+
+from calibrations.analyses.control_chart import BASELINE_RUNS, FEWEST_RUNS
+from rig.cli.terminal.history_words import compared_lines, document, lines, near_lines
+from rig.cli.terminal.output import bench_option, emit, json_option
+from rig.record import Record
+from rig.services.history import History, closest, history, latest, stale
+from rig.services.history_compared import Compared, compare_days, compare_rigs, compare_sensors
+from rig.services.history_limits import changes, limits_of
+
+DAY = click.DateTime(["%Y-%m-%d"])
+
+
+@click.command("history")
+@click.argument("sensor")
+@click.option("--model", default="linear", show_default=True, help="By which every run is calibrated.")
+@click.option("--quantity", "chosen", multiple=True, metavar="NAME", help="Only this one; again for more.")
+@click.option("--limit", "given", multiple=True, metavar="NAME=CHANGE", help="Greatest change from the last one.")
+@click.option(
+    "--baseline", type=click.IntRange(min=FEWEST_RUNS), default=BASELINE_RUNS, help="Calibrations that set the charts."
+)
+@click.option("--at", "on", type=DAY, help="The calibration closest to this day, and whether it is stale.")
+@click.option("--between", nargs=2, type=DAY, help="Compare the calibrations closest to two days.")
+@click.option("--beside", help="Compare with another sensor's last calibration.")
+@click.option("--rigs", nargs=2, help="Compare two rigs, by their names, by all calibrations of this sensor on them.")
+@click.option("--pictures", "folder", type=click.Path(file_okay=False, path_type=Path), help="Draw it here.")
+@click.option("--format", "form", type=click.Choice(["png", "svg"]), default="png", show_default=True)
+@bench_option
+@json_option
+def command(
+    sensor: str,
+    model: str,
+    chosen: Sequence[str],
+    given: Sequence[str],
+    baseline: int,
+    on: Any,
+    between: tuple[Any, Any] | None,
+    beside: str | None,
+    rigs: tuple[str, str] | None,
+    folder: Path | None,
+    form: str,
+    bench_file: Path | None,
+    as_json: bool,
+) -> int:
+    """Show the life of SENSOR (its serial number): every calibration in the record, drift, control charts, due dates.
+
+    The next calibration is due when what the drift may come to leaves its limit: of the bench file (limits.results), or
+    --limit. Exit status 1: stale at --at, or a comparison that does not agree.
+    """
+    from calibrations.model.file import read_model
+    from rig.services.load import effects_of
+
+    read = read_model(model, effects_of(bench_file))
+    said = changes(given)
+    with Record.to_read() as record:
+        found = _only(history(record, sensor, read, limits_of(bench_file) | said, baseline), chosen, said)
+        last = latest(record, beside, read) if beside is not None else None
+    compared = [] if beside is None or last is None else [compare_sensors(found, beside, last)]
+    compared += [compare_days(found, *(day.date() for day in between))] if between else []
+    compared += [compare_rigs(found.calibrations, *rigs)] if rigs else []
+    compared = [_of_chosen(each, found) for each in compared]
+    day = on.date() if on is not None else None
+    near = closest(found.calibrations, day) if day is not None else None
+    why = stale(found, *near) if near is not None else None
+    written = _draw(found, folder, form) if folder is not None else []
+    if as_json:
+        emit(document(found, near, why, compared))
+    else:
+        told = [*lines(found), *near_lines(near, day, why), *compared_lines(compared)]
+        click.echo("\n".join([*told, *(f"written: {path}" for path in written)]))
+    return int(why is not None or not all(each.agree for each in compared))
+
+
+def _only(found: History, chosen: Sequence[str], limited: Iterable[str]) -> History:
+    """With the chosen quantities alone. Raises UsageError for one that is not there, chosen or limited."""
+    from drivers.errors import did_you_mean
+
+    known = [q.name for q in found.quantities]
+    for name in (*chosen, *limited):
+        if name not in known:
+            raise click.UsageError(f"no quantity {name!r} by the model {found.model}.{did_you_mean(name, known)}")
+    kept = tuple(q for q in found.quantities if not chosen or q.name in chosen)
+    return replace(found, quantities=kept)
+
+
+def _of_chosen(compared: Compared, found: History) -> Compared:
+    """The rows of the quantities that are shown."""
+    names = {q.name for q in found.quantities}
+    return replace(compared, rows={name: row for name, row in compared.rows.items() if name in names})
+
+
+def _draw(found: History, folder: Path, form: str) -> list[Path]:
+    """Its life, and a control chart of each quantity."""
+    from calibrations.presentation.charts.history import control_charts, lives
+    from calibrations.presentation.static import save_all
+    from rig.services.charts import life_of
+
+    figures = {"life": lives([life_of(q) for q in found.quantities])}
+    charts = {q.name: q.chart for q in found.quantities if q.chart is not None}
+    if charts:
+        figures["charts"] = control_charts(charts, {q.name: q.unit for q in found.quantities})
+    return save_all(figures, folder, form)

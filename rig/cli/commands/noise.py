@@ -1,0 +1,81 @@
+"""noise: Allan deviation and noise coefficients of a still record."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from rig.cli.terminal.output import Positive, emit, json_option, note, notes
+
+if TYPE_CHECKING:
+    from calibrations.noise.record import Still
+
+
+@click.command("noise")
+@click.argument("data")
+@click.option("--channel", help="Of several channels: vx, vy ... Default: all axes of the first sensor.")
+@click.option("--rate", "rate_hz", type=Positive(), help="Samples a second, for an array.")
+@click.option(
+    "--tau",
+    "tau_s",
+    type=Positive(),
+    multiple=True,
+    help="Averaging time, s, with every overlap; repeatable. Default: octaves.",
+)
+@click.option("--pictures", "folder", type=click.Path(file_okay=False, path_type=Path), help="Write pictures here.")
+@click.option("--format", "form", type=click.Choice(["png", "svg"]), default="png", show_default=True)
+@json_option
+def command(
+    data: str,
+    channel: str | None,
+    rate_hz: float | None,
+    tau_s: tuple[float, ...],
+    folder: Path | None,
+    form: str,
+    as_json: bool,
+) -> None:
+    """Show how the noise of DATA averages, and which processes it is made of.
+
+    DATA is a table of kind still, an array of samples (.npy, with --rate), or a run with a still record: noise-floor or
+    soak. It is read once and is not held in memory, except for averaging times given with --tau. Disturbances that are
+    not noise (a step, an output that follows a logged column) are removed first, as `rig diagnose` does.
+    """
+    from calibrations.noise.analysis import analyse, noise_document
+    from rig.cli.terminal.noise_words import remarks, rounded_times, summary
+
+    analysis = analyse(_record(data, channel, rate_hz, tau_s))
+    notes(remarks(analysis))
+    notes(rounded_times(tau_s, analysis))
+    if as_json:
+        emit(noise_document(analysis))
+    else:
+        click.echo(summary(analysis))
+    if folder is not None:
+        from calibrations.presentation.charts.noise import noise_album
+        from calibrations.presentation.static import save_all
+
+        written = save_all({picture.name: picture.chart for picture in noise_album(analysis)}, folder, form)
+        notes(f"written: {path}" for path in written)
+
+
+def _record(data: str, channel: str | None, rate_hz: float | None, tau_s: tuple[float, ...]) -> Still:
+    """The still record; with Allan deviations at the given averaging times, if there are some."""
+    from dataclasses import replace
+
+    import numpy as np
+
+    from calibrations.noise.deviations import OVERLAPPING, curve_at
+    from rig.services.load import still_of
+    from rig.services.request import Request
+
+    blocks: dict[str, list[Any]] | None = {} if tau_s else None
+    still = still_of(Request(data, channel=channel, rate_hz=rate_hz), note, every_deviation=True, keep=blocks)
+    if blocks is None:
+        return still
+    curves = {}
+    for axis, kept in blocks.items():
+        values = np.concatenate([np.asarray(block, dtype=float) for block in kept])
+        curves[axis] = {**still.deviations[axis], OVERLAPPING: curve_at(values, still.rate_hz, tau_s, still.source)}
+    return replace(still, deviations=curves)

@@ -1,0 +1,101 @@
+"""push: bring finished runs into the lab's record, a PostgreSQL database that many rigs share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+from click.core import ParameterSource
+from sqlalchemy import URL
+
+from rig.bench import read_bench
+from rig.cli.terminal.output import bench_option, emit, json_option, note
+from rig.cli.terminal.record_option import require_no_password
+from rig.files import LAB
+from rig.record import Record
+from rig.record.lab import READER, WRITER, lab_url, prepare, shown
+from rig.record.push import Pushed, push, unsent, verify
+
+
+def _given(context: click.Context, _: click.Parameter, url: str | None) -> str | None:
+    if url is not None and context.get_parameter_source("given") is ParameterSource.COMMANDLINE:
+        require_no_password(url, LAB)
+    return url
+
+
+@click.command("push")
+@click.argument("named", metavar="[RUNS]...", nargs=-1)
+@click.option(
+    "--to", "given", envvar=LAB, callback=_given, metavar="URL", help=f"postgresql://USER@HOST/DATABASE; else {LAB}."
+)
+@click.option("--prepare", "prepares", is_flag=True, help="Make the record and its roles, as the database's owner.")
+@click.option("--verify", "verifies", is_flag=True, help="Compute the digest of every run in the lab again.")
+@bench_option
+@json_option
+def command(
+    named: tuple[str, ...], given: str | None, prepares: bool, verifies: bool, bench_file: Path | None, as_json: bool
+) -> int:
+    """Push RUNS, or all finished runs that the lab does not have as they are here.
+
+    The lab is that of --to, of RIG_LAB, or of the bench file (lab: {url: ...}). What a cut left half is gone on with,
+    and what is there is not sent again. Exit status 1: --verify found a run that has changed since it arrived.
+    """
+    if (prepares or verifies) and named:
+        raise click.UsageError("--prepare and --verify are for the whole record; leave out the runs")
+    url = _lab(given, bench_file)
+    if prepares:
+        _prepare(url, as_json)
+        return 0
+    return _verify(url, as_json) if verifies else _push(url, named, as_json)
+
+
+def _lab(given: str | None, bench_file: Path | None) -> URL:
+    if given is None and bench_file is not None and (lab := read_bench(bench_file).lab) is not None:
+        given = lab.url
+    if given is None:
+        raise click.UsageError(
+            f"no lab is named: give --to postgresql://USER@HOST/DATABASE, set {LAB}, or name a bench file with "
+            "`lab: {url: ...}`"
+        )
+    return lab_url(given)
+
+
+def _push(url: URL, named: tuple[str, ...], as_json: bool) -> int:
+    done: list[Pushed] = []
+    with Record() as own, Record(url) as lab:
+        waiting = unsent(own, lab, named)
+        for number, run in enumerate(waiting, 1):
+            done.append(push(own, lab, run))
+            note(f"{number} of {len(waiting)}: {_told(done[-1])}")
+    if as_json:
+        emit({"schema": "rig.push/1", "to": shown(url), "runs": [vars(each) for each in done]})
+    else:
+        click.echo(f"{len(done)} runs pushed to {shown(url)}" if done else f"{shown(url)} has all finished runs")
+    return 0
+
+
+def _told(pushed: Pushed) -> str:
+    return pushed.run if pushed.name == pushed.run else f"{pushed.run}, in the lab {pushed.name}"
+
+
+def _prepare(url: URL, as_json: bool) -> None:
+    before = prepare(url)
+    if as_json:
+        emit({"schema": "rig.prepared/1", "to": shown(url), "before": before})
+        return
+    how = f"the record, of schema {before}, is up to date" if before else "the record is made"
+    click.echo(f"{shown(url)}: {how}. Give each rig and each reader a role of its own:")
+    click.echo(f"  CREATE ROLE rig7 LOGIN PASSWORD '...' IN ROLE {WRITER};   -- pushes, reads")
+    click.echo(f"  CREATE ROLE anna LOGIN PASSWORD '...' IN ROLE {READER};   -- reads")
+
+
+def _verify(url: URL, as_json: bool) -> int:
+    with Record(url) as lab:
+        found = verify(lab)
+    if as_json:
+        emit({"schema": "rig.verified/1", "record": shown(url), **vars(found)})
+    else:
+        click.echo(f"{len(found.sound)} runs as they arrived, {len(found.on_their_way)} on their way")
+        for run in found.changed:
+            click.echo(f"{run}: has changed since it arrived; `rig show {run} --record URL` tells what was done")
+    return int(bool(found.changed))

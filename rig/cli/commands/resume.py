@@ -1,0 +1,40 @@
+"""resume: go on with a run that was interrupted, at its first missing pose."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from procedures.catalogue import find
+from rig.bench import Bench, read_bench
+from rig.cli.terminal.output import bench_option, json_option, note, watch_options
+from rig.cli.terminal.watch import tell, trace_option, watching
+from rig.record import Record
+from rig.record.push import push_after
+from rig.runs.runner import Outcome, resume
+
+
+@click.command("resume")
+@click.argument("run")
+@watch_options
+@trace_option
+@bench_option
+@json_option
+def command(
+    run: str, unattended: bool, answers: Path | None, trace: bool, bench_file: Path | None, as_json: bool
+) -> int:
+    """Go on with RUN at its first missing pose, on the bench that it was begun with.
+
+    With --bench the run goes on only if that file is still the same.
+    """
+    bench = read_bench(bench_file) if bench_file else None
+    with Record.to_find(run, own=True) as record:
+        found = record.run(run)
+        if found.state == "complete":
+            return tell(record, Outcome(found), as_json)
+        own = Bench.model_validate(found.bench)
+        with watching(find(found.procedure, own.folders.procedures), own, unattended, answers) as watch:
+            outcome = resume(record, run, watch, bench, trace)
+        push_after(record, outcome.run, (bench or own).lab, note)
+        return tell(record, outcome, as_json)

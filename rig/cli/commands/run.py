@@ -1,0 +1,49 @@
+"""run: run a procedure on the bench into the record, guided or --unattended."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from procedures.catalogue import find
+from procedures.settings import parse
+from rig.bench import read_bench
+from rig.cli.terminal.output import bench_option, json_option, note, watch_options
+from rig.cli.terminal.settings import PASS_ON, read_settings, settings_arguments
+from rig.cli.terminal.watch import tell, trace_option, watching
+from rig.record import Record
+from rig.record.push import push_after
+from rig.runs.runner import start
+
+
+@click.command("run", context_settings=PASS_ON)
+@click.argument("procedure")
+@settings_arguments
+@watch_options
+@trace_option
+@bench_option
+@json_option
+def command(
+    procedure: str,
+    given: tuple[str, ...],
+    pairs: tuple[str, ...],
+    unattended: bool,
+    answers: Path | None,
+    trace: bool,
+    bench_file: Path | None,
+    as_json: bool,
+) -> int:
+    """Run PROCEDURE on the bench into the record.
+
+    Settings of the procedure are options: `rig run sweep --step-deg 30`. Ctrl-C stops the stages at once, and asks
+    in a terminal whether to go on; `rig resume` goes on later.
+    """
+    bench = read_bench(bench_file)
+    found = find(procedure, bench.folders.procedures)
+    settings = parse(found, read_settings(given, pairs, found.defaults))
+    with Record() as record:
+        with watching(found, bench, unattended, answers) as watch:
+            outcome = start(record, bench, found, settings, watch, trace=trace)
+        push_after(record, outcome.run, bench.lab, note)
+        return tell(record, outcome, as_json)

@@ -1,0 +1,155 @@
+"""show: one run: how it was made, how it ended, what it measured."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import click
+
+from calibrations.errors import CalibrationError
+from calibrations.presentation.text import columns, duration
+from rig.bench.certificates import EXPIRED
+from rig.cli.terminal.output import emit, json_option
+from rig.cli.terminal.verdicts import lines as results
+from rig.errors import RecordError
+from rig.record import Event, Kept, Line, Record, Run
+from rig.record.codec import digest_of
+from rig.record.measured import Measured, sensors_of
+from rig.services.next_steps import next_steps
+from rig.services.sensors import lives
+
+TURNS = ("begun", "error", "stopped", "complete")  # of a run's log: its beginnings and its ends
+Ranges = Mapping[str, tuple[float, float]]
+
+
+@click.command("show")
+@click.argument("run")
+@click.option("--poses", is_flag=True, help="List every pose with its number, and why it is left out where it is.")
+@click.option("--log", "wants_log", is_flag=True, help="List what happened step by step, and when.")
+@json_option
+def command(run: str, poses: bool, wants_log: bool, as_json: bool) -> None:
+    """Show how RUN was made, how it ended, its results, and the range of each of its columns."""
+    with Record.to_find(run) as record:
+        found, left_out = record.run(run), record.excluded(run)
+        turns = [Event(line.at, line.what, line.text) for line in record.lines(run, TURNS)]
+        events = sorted([*record.events(run), *turns], key=lambda event: event.at)
+        ranges = _ranges(record, found)
+        listed = [_pose(number, kept) for number, kept in enumerate(record.kept(run))] if poses else None
+        lines = record.lines(run) if wants_log else []
+        known = lives(found, record.runs())
+    if as_json:
+        more = ({"kept": listed} if poses else {}) | ({"log": [vars(line) for line in lines]} if wants_log else {})
+        emit(_document(found, events, ranges) | more)
+    else:
+        after = [*results(found.results), *next_steps(found, left_out)]
+        after += [
+            f"{count} runs of the sensor {name} are in the record: rig history {name}" for name, count in known.items()
+        ]
+        told = [_event(event, found.message) for event in events]
+        parts = (_head(found), after, _columns(ranges), told, _listed(listed or []), _logged(lines))
+        click.echo("\n\n".join("\n".join(part) for part in parts if part))
+
+
+def _ranges(record: Record, run: Run) -> Ranges:
+    """The least and greatest value of each column; nothing where the poses make no table yet."""
+    found: dict[str, tuple[float, float]] = {}
+    sensors: list[str | None] = [*sensors_of(run)]
+    for sensor in sensors or [None]:
+        try:
+            table = Measured(record, run, sensor).table()
+        except (RecordError, CalibrationError):
+            continue
+        prefix = f"{sensor}." if sensor else ""
+        found |= {prefix + name: (float(v.min()), float(v.max())) for name, v in table.columns.items()}
+    return found
+
+
+def _pose(number: int, kept: Kept) -> dict[str, Any]:
+    """One pose as JSON; its outputs are means, V."""
+    names = ("alpha_deg", "beta_deg", "direction", "mount_deg", "flip", "up", "rate_deg_s")
+    angles = {name: getattr(kept.pose, name) for name in names}
+    about = {"t_s": kept.t_s, "temperature_c": kept.temperature_c, "excluded": kept.excluded}
+    means = {"means_v": dict(kept.dwell.means), "sha256": digest_of(kept.samples)}
+    return {"pose": number, "path": kept.pose.path, **angles, **about, **means}
+
+
+def _head(run: Run) -> list[str]:
+    ended = f"{run.state} {run.ended or ''}".strip()
+    head = [f"{run.run}: {run.procedure}, {ended}, {run.extent}, a table of {run.kind}", f"from {run.source}"]
+    why = [run.message] if run.message else []
+    why += [f"But {run.constants[EXPIRED]}."] if EXPIRED in run.constants else []
+    return [*head, *why, *_settings(run.settings)]
+
+
+def _settings(settings: Mapping[str, Any]) -> Iterator[str]:
+    """Each setting in a line; of a mapping, such as that of an imported file's columns, each entry."""
+    for name, value in settings.items():
+        if isinstance(value, Mapping):
+            yield from (f"  {name}: {key} = {each}" for key, each in value.items())
+        elif isinstance(value, list) and len(value) > 1 and isinstance(value[0], str):  # those of a file
+            yield f"  {name} = {len(value)} lines: {value[0]} ..."
+        elif isinstance(value, list):
+            yield f"  {name} = {', '.join(f'{each:g}' if isinstance(each, float) else str(each) for each in value)}"
+        else:
+            yield f"  {name} = {value}"
+
+
+def _columns(ranges: Ranges) -> list[str]:
+    return [f"  {name:16}{low:12.6g} .. {high:.6g}" for name, (low, high) in ranges.items()]
+
+
+def _event(event: Event, message: str | None) -> str:
+    """When, what, and its text but for the run's message, which stands above already."""
+    said = f": {event.text}" if event.text and not (message or "").endswith(event.text) else ""
+    return f"  {event.at[:19].replace('T', ' ')}  {event.what}{said}"
+
+
+def _logged(lines: Sequence[Line]) -> Iterator[str]:
+    """Each line with its time of day (UTC) and the rig's clock."""
+    for line in lines:
+        yield f"  {line.at[11:23]}  {line.clock_s:10.3f} s  {line.who}  {line.what}: {line.text}"
+
+
+def _listed(poses: Sequence[Mapping[str, Any]]) -> list[str]:
+    """The poses as a table."""
+    if not poses:
+        return []
+    channels = list(poses[0]["means_v"])
+    rows = [
+        (
+            pose["pose"],
+            f"{pose['alpha_deg']:g}",
+            f"{pose['beta_deg']:g}",
+            pose["path"],
+            duration(pose["t_s"]),
+            *(f"{pose['means_v'][name]:.5f}" if name in pose["means_v"] else "" for name in channels),
+            "" if pose["temperature_c"] is None else f"{pose['temperature_c']:.1f}",
+            pose["excluded"] or "",
+        )
+        for pose in poses
+    ]
+    head = ("pose", "alpha", "beta", "path", "t", *(f"{name} V" for name in channels), "C", "left out because")
+    return columns(head, rows).splitlines()
+
+
+def _document(run: Run, events: list[Event], ranges: Ranges) -> dict[str, object]:
+    return {
+        "schema": "rig.show/1",
+        "run": run.run,
+        "procedure": run.procedure,
+        "state": run.state,
+        "message": run.message,
+        "kind": run.kind,
+        "poses": run.rows,
+        "settings": run.settings,
+        "bench": run.bench,
+        "identities": run.identities,
+        "constants": run.constants,
+        "created": run.created,
+        "ended": run.ended,
+        "columns": {name: {"min": low, "max": high} for name, (low, high) in ranges.items()},
+        "events": [{"at": event.at, "what": event.what, "text": event.text} for event in events],
+        "results": run.results,
+        EXPIRED: run.constants.get(EXPIRED),
+    }

@@ -1,0 +1,1 @@
+"""Options, messages, tables and live screens that the commands share."""

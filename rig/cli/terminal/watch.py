@@ -1,0 +1,121 @@
+"""Looking on while a procedure runs, guided in a terminal or quietly; and telling how it ended."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+import click
+
+from calibrations.importing.files import load_yaml
+from procedures.catalogue import Procedure
+from procedures.errors import BadAnswer, NoAnswer
+from procedures.questions import Question
+from procedures.session import Reading
+from rig.bench import Bench
+from rig.bench.certificates import EXPIRED
+from rig.cli.terminal.output import emit, note, notes
+from rig.cli.terminal.verdicts import lines as results
+from rig.planning.plan import Plan
+from rig.record import Kept, Record
+from rig.runs.background.control import Beside
+from rig.runs.progress import SoFar
+from rig.runs.runner import Outcome, Watch, Wish
+from rig.runs.soak_forecast import SoakWatch, soak_watch
+from rig.services.next_steps import next_steps
+
+trace_option = click.option("--trace", is_flag=True, help="Log every message to and from instruments.")
+
+
+class Quiet:
+    """Nobody looks on. A question takes its answer from the file, or from the technician of a simulated bench.
+
+    What a soak will come to is told on standard error, after every reversal; of other runs, what their poses tell so
+    far, after every path.
+    """
+
+    def __init__(self, answers: Mapping[str, str], follower: SoakWatch | SoFar | None = None) -> None:
+        self._answers, self._follower = answers, follower
+
+    def planned(self, plan: Plan) -> None:
+        """It is done as it is planned."""
+
+    def begun(self, run: str) -> None:
+        note(f"run {run}")
+        if self._follower:
+            self._follower.begun(run)
+
+    def doing(self, text: str) -> None:
+        """Nobody reads it."""
+
+    def expect(self, total: int, done: int) -> None:
+        note(f"{total - done} of {total} poses to come")
+
+    def kept(self, kept: Kept) -> None:
+        """The record has it."""
+        if self._follower and (told := self._follower.told(kept)):
+            note(told)
+
+    def read(self, reading: Reading) -> None:
+        """The record has it."""
+
+    def ask(self, question: Question, instead: str | None) -> str:
+        given = self._answers.get(question.name, instead)
+        if given is None:
+            raise NoAnswer(
+                f'nobody is there to answer "{question.text}"; put `{question.name}: ...` ({question.accepts}) into a '
+                "file for --answers, or run it in a terminal without --unattended"
+            )
+        return given
+
+    def interrupted(self, outcome: Outcome) -> Wish:  # noqa: ARG002
+        """Nobody is there who could put it right."""
+        return "end"
+
+
+@contextmanager
+def watching(procedure: Procedure, bench: Bench, unattended: bool, answers: Path | None) -> Iterator[Watch]:
+    """Who looks on: a person in a terminal, unless the run is unattended or nobody is there; pages beside them."""
+    given = _answers(answers)
+    if unattended or not (sys.stdin.isatty() and sys.stderr.isatty()):
+        with Beside(Quiet(given, soak_watch(procedure.name) or SoFar()), procedure.name, bench, "nobody") as watch:
+            yield watch
+        return
+    from rig.cli.terminal.guide import Guide  # rich is only imported where somebody sees it
+
+    with Guide(procedure, bench, given) as guide, Beside(guide, procedure.name, bench, "terminal") as watch:
+        yield watch
+
+
+def _answers(path: Path | None) -> dict[str, str]:
+    if path is None:
+        return {}
+    try:
+        document = load_yaml(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise BadAnswer(f"{path}: the file of answers cannot be read: {error.strerror}") from None
+    except ValueError as error:
+        raise BadAnswer(f"{path}: is not a YAML file: {error}") from None
+    if not isinstance(document, dict):
+        raise BadAnswer(f"{path}: a file of answers is a mapping, such as `mounting: yes`")
+    return {str(name): str(answer) for name, answer in document.items()}
+
+
+def tell(record: Record, outcome: Outcome, as_json: bool) -> int:
+    """The end of a run, and its exit status: 1 without results, or with one beyond its limit. Raises its error."""
+    run = outcome.run
+    if as_json:
+        head = {"schema": "rig.run/1", "run": run.run, "procedure": run.procedure, "state": run.state}
+        emit({**head, "poses": run.rows, "results": run.results, EXPIRED: run.constants.get(EXPIRED)})
+    else:
+        mark = [f"But {run.constants[EXPIRED]}."] if EXPIRED in run.constants else []
+        after = next_steps(run, record.excluded(run.run))
+        click.echo("\n".join([f"{run.run}: {run.state}, {run.extent}", *results(run.results), *mark, *after]))
+    if outcome.error is not None:
+        notes(outcome.moving)
+        raise outcome.error
+    if run.message:
+        note(run.message)
+    return int(bool(run.message) or any(result["verdict"] == "fail" for result in run.results.values()))

@@ -1,0 +1,105 @@
+"""Results in words, for a terminal: numbers to the digits that their uncertainty leaves them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from calibrations.design.experiment import Experiment
+from calibrations.discovery.dataset import Cells
+from calibrations.discovery.results import Discovery
+from calibrations.discovery.verdict import Verdict
+from calibrations.effects import Effect
+from calibrations.errors import DataError
+from calibrations.model import Estimate, Model
+from calibrations.presentation.text import columns, concise, duration, quantity
+from calibrations.table import Table
+from rig.cli.terminal.output import note
+from rig.services import next_experiment
+from rig.services.next_experiment import Answer
+from rig.services.request import Request
+
+if TYPE_CHECKING:
+    from calibrations.design.expected import Expected
+
+
+def parameters(model: Model) -> str:
+    """The model's parameters as a table."""
+    rows = [(term.name, e.name, e.axis or "-", _value(e)) for term in model.terms for e in term.estimates]
+    return columns(("effect", "parameter", "axis", "value"), rows)
+
+
+def _value(e: Estimate) -> str:
+    return concise(e.value, e.std, e.unit) if e.identified else f"not identified: {e.why}"
+
+
+def table(cells: Cells) -> str:
+    """A table of text."""
+    return columns(*cells)
+
+
+def planned(result: Answer, request: Request, effects: Mapping[str, Effect]) -> Answer:
+    """The answer with its next experiment as a command; remarks go to standard error."""
+    return next_experiment.planned(result, request, effects, note)
+
+
+def discovery(result: Discovery[Any]) -> str:
+    """The error after each step, the verdict, and the next experiment."""
+    data = result.findings.data
+    lines = [table(data.step_table(result)), "", result.judgement.text, *data.remarks(result.end)]
+    if result.next_experiment:
+        lines += experiment(result.next_experiment, data.source)
+    return "\n".join([*lines, *warning([result.caution])])
+
+
+def addition(result: Discovery[Any], data: str, out: Path) -> str:
+    """The error with one effect added, and whether more is missing."""
+    text = discovery(result)
+    if result.verdict not in (Verdict.ADEQUATE, Verdict.NO_RESPONSE):
+        text += f"\nWhich effect is missing: rig diagnose {data} --model {out}"
+    return text
+
+
+def experiment(e: Experiment, data: str) -> list[str]:
+    """Why the next experiment can tell, its command line, what it takes, and what it is expected to bring."""
+    lines = [f"{'To tell them apart' if e.separates else 'What to do next'}: {e.why}."]
+    if e.command:
+        takes = [duration(e.duration_s)] if e.duration_s else []
+        lines += [f"    {e.command}", f"    {', '.join([*takes, _brings(e.expected, data)])}"]
+    return lines
+
+
+def _brings(expected: Expected | None, data: str) -> str:
+    """What an experiment is expected to tell, by its own data where they are enough."""
+    if expected is None:
+        return "what it will tell is not computed"
+    from calibrations.design.expected import CERTAIN_PROBABILITY, pairs_separated  # only a planned experiment has it
+
+    alone = expected.probability_alone >= CERTAIN_PROBABILITY
+    value = expected.alone if alone else expected.together
+    judged = "by its own data" if alone else f"by all together: rig discover {data.replace(' + ', ' ')} ITS-RUN"
+    chance = min(100 * pairs_separated(value), 99.9)
+    return f"{math.sqrt(value):.3g} standard deviations apart, told with a probability of {chance:.3g} %, {judged}"
+
+
+def warning(cautions: Iterable[str | None]) -> list[str]:
+    """Lines that keep a reader from trusting a small error, where there is reason to."""
+    return [f"But {caution}." for caution in cautions if caution]
+
+
+def paper(table: Table) -> str:
+    """The paper's stepwise estimate on the same data, or why there is none."""
+    from calibrations.analyses.stepwise import estimate_stepwise  # of `fit` on poses alone
+
+    try:
+        result = estimate_stepwise(table)
+    except DataError as error:
+        return f"The paper's stepwise estimate cannot be made: {error}"
+    rows = [
+        (axis, quantity(result.linear_rmse_v[k], "V"), quantity(result.rmse_v[k], "V"), f"{tilt.twice_mg:.3g} mg")
+        for k, (axis, tilt) in enumerate(zip("xy", result.tilts, strict=True))
+    ]
+    head = ("axis", "manufacturer (1)-(3)", "paper (4)-(17)", "tilt that (20)-(21) would correct twice")
+    return "The paper's stepwise estimate on the same data, rms error:\n" + columns(head, rows)

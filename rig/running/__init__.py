@@ -1,1 +1,0 @@
-"""A procedure on a bench into the record: who looks on, how far it is, what comes after."""

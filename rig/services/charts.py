@@ -1,0 +1,157 @@
+"""Charts of what the record knows: a run over time, a sensor's life, and two runs compared."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from datetime import date
+
+import numpy as np
+
+from calibrations.noise.allan import DeviationComparison
+from calibrations.presentation.chart import (
+    CANDIDATE,
+    MEASURED,
+    Axis,
+    Band,
+    Chart,
+    Dash,
+    Line,
+    Panel,
+    Points,
+    Rule,
+    Symbol,
+    floor_band,
+    one,
+)
+from calibrations.presentation.charts.columns import Column, in_time
+from calibrations.presentation.charts.history import Life
+from calibrations.presentation.charts.noise import TIME, Scaled, measured_points
+from calibrations.presentation.residual import Shown
+from calibrations.presentation.text import labelled, measured, minus, prefixed, unit
+from rig.services.both import Again
+from rig.services.course import Course
+from rig.services.history import Calibration, Quantity
+from rig.services.side_by_side import DIFFERENT, Pair
+
+DAY_S = 86400.0
+FEW = 400  # parts: as many can be told apart as dots
+ROW, AXIS = 0.27, 0.6  # inches of a difference, and of the axis of a group
+
+
+def course_chart(course: Course, name: str) -> Chart:
+    """One quantity, V or °C, over the time of the run: means of several dwells, with the range of the dwells."""
+    t_s, mean, low, high = course.line(name)
+    size, unit_s = in_time(t_s[-1] - t_s[0] if t_s else 0.0)
+    at, colour = np.array(t_s) / size, CANDIDATE if name == "temperature" else MEASURED
+    band = (Band(at, np.array(low), np.array(high), colour=colour, opacity=0.2),) if course.each > 1 else ()
+    hover = f"%{{y:.6g}} at %{{x:.4g}} {unit_s}"
+    line = Line(at, np.array(mean), colour=colour, hover=hover, markers=len(at) < FEW)
+    label = "temperature (°C)" if name == "temperature" else f"{name} (V)"
+    return one(Panel((*band, line), Axis(f"time ({unit_s})"), Axis(label)))
+
+
+# A sensor's life
+
+
+def life_of(q: Quantity) -> Life:
+    """One quantity over all calibrations of a sensor, as charts show it."""
+    values, signals = [each.values[q.name] for each in q.of], q.chart.signals if q.chart is not None else []
+    due = None if q.due is None else (q.due - date(1970, 1, 1)).days
+    return Life(
+        q.name,
+        q.unit,
+        [each.at.timestamp() / DAY_S for each in q.of],
+        [value.value for value in values],
+        [value.std for value in values],
+        q.line,
+        q.allowed,
+        due,
+        f"due {q.due}",
+        signals,
+        [_told(q, each, k in signals) for k, each in enumerate(q.of)],
+        [each.data for each in q.of],
+    )
+
+
+def _told(q: Quantity, each: Calibration, signals: bool) -> str:
+    """The text of a calibration under the pointer."""
+    value = each.values[q.name]
+    lines = [f"{each.day}: {measured(value.value, value.std)} {unit(q.unit)}", f"{each.data}, rig {each.rig}"]
+    lines += ["beyond the limits of a control chart"] if signals else []
+    lines += [each.expired] if each.expired else []
+    return "<br>".join([*lines, "click: its model"])
+
+
+# Two runs
+
+
+def differences(pairs: Sequence[Pair]) -> Chart:
+    """The second less the first with two standard uncertainties each way, a panel for each unit.
+
+    Diamonds differ by more than that.
+    """
+    groups: dict[str, list[Pair]] = {}
+    for pair in pairs:
+        groups.setdefault(pair.unit, []).append(pair)
+    panels = tuple((_differences(group),) for group in groups.values())
+    return Chart(panels, [ROW * len(group) + AXIS for group in groups.values()])
+
+
+def _differences(pairs: Sequence[Pair]) -> Panel:
+    reach = max(abs(p.difference) + DIFFERENT * (p.std or 0.0) for p in pairs)
+    factor, spelt = prefixed(unit(pairs[0].unit), reach)
+    names = tuple(pair.name for pair in pairs)
+    dots = Points(
+        np.array([factor * pair.difference for pair in pairs]),
+        np.arange(len(pairs), dtype=float),
+        colour=[CANDIDATE if pair.differ else MEASURED for pair in pairs],
+        symbol=["diamond" if pair.differ else "circle" for pair in pairs],
+        size=8,
+        reach=np.array([DIFFERENT * factor * (pair.std or 0.0) for pair in pairs]),
+        hover=[f"{pair.name}: {measured(pair.difference, pair.std)} {unit(pair.unit)}" for pair in pairs],
+    )
+    y = Axis(low=-0.5, high=len(pairs) - 0.5, names=names, reverse=True)
+    return Panel((Rule(0.0, "x", width=1.2), dots), Axis(labelled("difference", spelt)), y)
+
+
+def residuals(first: Shown, second: Shown, x: Column, other_x: Column) -> Chart:
+    """Residuals of both, each fitted by itself, on shared axes; the grey band is the larger noise floor."""
+    looks: tuple[tuple[Shown, Column, str, Symbol, str], ...] = (
+        (first, x, MEASURED, "circle", "first"),
+        (second, other_x, CANDIDATE, "diamond-open", "second"),
+    )
+    dots = [
+        Points(column.values[shown.c, shown.rows], shown.residual, colour=colour, symbol=symbol, size=8,
+               hover=[f"{name}: {each}" for each in shown.hover])
+        for shown, column, colour, symbol, name in looks
+    ]  # fmt: skip
+    axis = Axis(x.labels[first.c], ticks="quarters" if x.name == "beta" else "")
+    return one(Panel((*floor_band(max(first.floor, second.floor)), *dots), axis, Axis(first.label)))
+
+
+def difference(first: Shown, found: Again) -> Chart:
+    """The second measurement less the first, at every pose that both have; the band is its noise floor."""
+    c, values = first.c, first.factor * found.difference[first.c]
+    hover = [f"{minus(f'{value:.4g}')} {first.unit}<br>{first.place(int(row))}"
+             for value, row in zip(values, found.first, strict=True)]  # fmt: skip
+    dots = Points(first.fit.table.column("beta_deg")[found.first], values, hover=hover)
+    y = Axis(f"second − first, {first.fit.channels[c]} ({first.unit})")
+    series = (*floor_band(first.factor * float(found.floor[c])), dots)
+    return one(Panel(series, Axis("β (deg)", ticks="quarters"), y))
+
+
+def deviations(curves: Sequence[DeviationComparison], into: Sequence[Scaled]) -> Chart:
+    """The Allan deviations of two still records, bars intervals of 95 %; lines are the model fitted to each."""
+    series: list[Line | Points] = []
+    looks: tuple[tuple[str, str, Symbol, Dash], ...] = (
+        ("first", MEASURED, "circle", "solid"),
+        ("second", CANDIDATE, "diamond-open", "dash"),
+    )
+    for curve, by, (name, colour, symbol, dash) in zip(curves, into, looks, strict=True):
+        model = Line(curve.tau_s, by.factor * curve.modelled, colour=colour, width=1.2, dash=dash)
+        values, low, high = (by.factor * each for each in (curve.measured, curve.low, curve.high))
+        dots = measured_points(curve.tau_s, values, low, high, by.unit, name)
+        series += [model, replace(dots, colour=colour, symbol=symbol, size=8)]
+    y = Axis(f"Allan deviation ({into[0].unit})", log=True)
+    return one(Panel(tuple(series), Axis(TIME, log=True), y, legend="upper right"))
