@@ -204,7 +204,7 @@ def _minimise(problem: Problem, noise: Noise, start: Array) -> tuple[Array, floa
     """(parameters, cost) of least squares under `noise`."""
     if not len(start):
         return start, 0.0
-    if problem.table.kind == "motion":
+    if problem.keeps_starts:
         return _determined(problem, noise, start)
     at_once = _at_once(problem, noise, start) if problem.adds else None
     if at_once is not None:
@@ -254,10 +254,7 @@ def _at_once(problem: Problem, noise: Noise, start: Array) -> tuple[Array, float
 
 
 def _determined(problem: Problem, noise: Noise, start: Array) -> tuple[Array, float]:
-    """As `_minimise`, by Gauss and Newton's shortest steps: what the data do not determine stays as it began.
-
-    At one attitude an axis that does not move cannot tell its scale factor from its bias.
-    """
+    """As `_minimise`, by Gauss and Newton's shortest steps: what the data do not determine stays as it began."""
     typical, (low, high) = problem.layout.typical, problem.layout.bounds
 
     rows = problem.layout.prior_rows
@@ -291,8 +288,8 @@ def _result(problem: Problem, theta: Array, noise: Noise) -> Fit:
 
 
 def _wider(cautious: Fit) -> Array:
-    """Factors on the standard uncertainties; none in a motion, whose parts tell what is slow from what is not."""
-    if cautious.table.kind == "motion":
+    """Factors on the standard uncertainties."""
+    if not cautious.problem.widens:
         return np.ones(len(cautious.theta))
     layout = cautious.problem.layout
     wider = widening(cautious.noise, cautious.residual, cautious.jacobian, layout.typical)

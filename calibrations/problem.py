@@ -1,16 +1,18 @@
-"""A model and a table as a least-squares problem: residuals and their derivatives.
+"""A model and a table as a least-squares problem: residuals and their derivatives, a class for each kind of table.
 
-For `poses` the residual is measured minus predicted output, one block of rows per axis, in the output's unit.
-For `positions` it is |a| - 1, where a is the specific force that the model makes of the output, in g, or the field as
-a share of its strength (that of the sphere nearest to the outputs). For `rates` it is as for poses.
-For `motion` it is what each stretch of the record holds of measured minus predicted output, part by part.
+poses, rates   measured minus predicted output, one block of rows per axis, in the output's unit
+positions      |a| - 1, where a is the specific force that the model makes of the output, in g
+fields         the same of the field, as a share of its strength (that of the sphere nearest to the outputs)
+motion         what each stretch of the record holds of measured minus predicted output, part by part
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
+from types import MappingProxyType
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,56 +29,71 @@ from calibrations.noise.table_noise import scatter
 from calibrations.table import Array, Table
 
 STRENGTH = "field-strength"
-FITTED = ("poses", "positions", "motion", "rates")  # kinds of tables
-KNOWN = ("poses", "rates")  # kinds of tables whose rows have a known specific force or rate
 
 
 def check_kind(kind: str, source: str) -> None:
     """Raises ModelError for tables to which no model is fitted; known before any sample of theirs is read."""
-    if kind not in FITTED:
+    if kind not in PROBLEMS:
         raise ModelError(f"{source}: models are fitted to poses, positions, motion or rates, not to a table of {kind}")
 
 
 @dataclass(frozen=True)
 class Problem:
-    """Residuals of a model on a table, as functions of the parameter vector. Rows stand in order of time."""
+    """Residuals of a model on a table, as functions of the parameter vector. Rows stand in order of time.
+
+    This class is for rows of known specific force or rate.
+    """
 
     table: Table
     layout: Layout
 
+    keeps_starts: ClassVar[bool] = False  # whether a parameter that the data do not determine keeps its start
+    widens: ClassVar[bool] = True  # whether slow noise widens the standard uncertainties
+
     @staticmethod
     def of(model: Model, table: Table) -> Problem:
         """The problem. Raises ModelError and TooFewRows where there is none to solve."""
-        table = make_stretches(table) if table.kind == "motion" else table.in_order()
         check_kind(table.kind, table.source)
-        if table.kind == "positions":
-            _check_positions(table)
-        if table.kind == "rates":
-            _check_changes(table, "a table that turns changes each output that senses it")
-        _check_fields(model, table)
+        problem = PROBLEMS[table.content]
+        table = problem.prepared(table)
+        problem.check(model, table)
+        _check_effects(model, table)
         model = model.for_table(table)
         if not model.terms:
             raise ModelError(
                 f"{table.source}: no effect of {model.name} is defined for {table.content}; `rig models` lists others"
             )
         layout = Layout.of(model, table)
-        rows = table.n * len(_channels(table))
-        if rows <= len(layout.slots):
+        found = problem(table, layout)
+        if table.n * len(found.channels) <= len(layout.slots):
             raise TooFewRows(
                 f"{table.source}: {table.n} rows cannot determine the {len(layout.slots)} parameters of {model.name}; "
                 "measure more poses, or take a smaller model"
             )
-        return Problem(table, layout)
+        return found
+
+    def on(self, table: Table) -> Problem:
+        """The same model on another table of this kind."""
+        return replace(self, table=table)
+
+    @staticmethod
+    def prepared(table: Table) -> Table:
+        """The rows that are fitted."""
+        return table.in_order()
+
+    @staticmethod
+    def check(model: Model, table: Table) -> None:
+        """Raises DataError, ModelError where the rows, or the model, are not those that this kind needs."""
 
     @property
     def channels(self) -> tuple[str, ...]:
         """Names of the residual's blocks: the measured axes, "norm" for positions, the parts of a motion."""
-        return _channels(self.table)
+        return self.table.axes
 
     @property
     def unit(self) -> str:
         """Unit of the residual."""
-        return self.table.input_unit if self.table.kind == "positions" else self.table.unit
+        return self.table.unit
 
     def residual(self, theta: Array) -> Array:
         """Shape (channels, n)."""
@@ -84,23 +101,16 @@ class Problem:
 
     def residual_by(self, steps: Sequence[Step]) -> Array:
         """As `residual`, of effects with their values: those of the model, and what else one wants to try."""
-        if self.table.kind == "positions":
-            error: Array = np.linalg.norm(backward(self.table, steps), axis=1)[:, None] - 1.0
-            return error.T * self._share(steps)
-        samples = self.table.samples if isinstance(self.table, Stretches) else self.table
-        return self._reduced(samples.outputs - forward(samples, steps))
+        return self._reduced(self._samples.outputs - forward(self._samples, steps))
+
+    @property
+    def _samples(self) -> Table:
+        """The rows whose output the model predicts."""
+        return self.table
 
     def _reduced(self, error: Array) -> Array:
-        """An error of each axis, shape (n, axes), by channel."""
-        return self.table.parts(error) if isinstance(self.table, Stretches) else error.T
-
-    def _share(self, steps: Sequence[Step]) -> float:
-        """What a residual is given in: the field's strength as the outputs show it, whatever the model makes of it.
-
-        By its own measure a field without end would leave nothing of any magnitude.
-        """
-        strengths = [float(p["total"]) for effect, p in steps if effect.name == STRENGTH]
-        return strengths[0] / self.layout.nominal if strengths else 1.0
+        """An error of each axis, shape (samples, axes), by channel."""
+        return error.T
 
     @property
     def rounds(self) -> bool:
@@ -111,7 +121,7 @@ class Problem:
     def adds(self) -> bool:
         """Whether every effect only adds to the output: the model may then be linear in its parameters."""
         effects = [term.effect for term in self.layout.model.terms]
-        return self.table.kind in KNOWN and not any(e.places & {"pose", "force", "output"} for e in effects)
+        return not any(e.places & {"pose", "force", "output"} for e in effects)
 
     def jacobian(self, theta: Array, of: NDArray[np.bool_] | None = None, stairs: bool = False) -> Array:
         """d residual / d theta by central differences, shape (channels, n, p); only the entries `of` where given.
@@ -135,9 +145,7 @@ class Problem:
 
         An entry of an effect that only adds to the output changes that effect's contribution and nothing else.
         """
-        if self.table.kind == "positions":
-            return lambda _, vector: self.residual(vector)
-        samples = self.table.samples if isinstance(self.table, Stretches) else self.table
+        samples = self._samples
         steps = self.layout.steps(theta)
         even = [i for i, (effect, _) in enumerate(steps) if stairs or not effect.rounds]
         near, beside_stairs = Near(samples, steps), Near(samples, [steps[i] for i in even])
@@ -153,14 +161,12 @@ class Problem:
     @cached_property
     def white(self) -> Array | None:
         """Each mean's standard deviation by white noise, in the residual's unit, (channels, n); None if not known."""
-        if isinstance(self.table, Stretches):
-            return self.table.white
         std = white_std(self.table)
-        if std is None and self.table.content in ("fields", "rates"):
-            return scatter(self.table)
-        if self.table.kind in KNOWN or std is None:
-            return None if std is None else std.T
-        return norm_std(self.table, std).T / self.layout.nominal
+        return scatter(self.table) if std is None else self._white(std)
+
+    def _white(self, std: Array) -> Array:
+        """As `white`, from the standard deviations of the outputs' means, shape (n, axes)."""
+        return std.T
 
     @property
     def given(self) -> tuple[Processes, ...]:
@@ -170,7 +176,7 @@ class Problem:
     @cached_property
     def gap_s(self) -> Array:
         """Time between each row and the one before it, s, shape (n,); 0 where no time is given and none is needed."""
-        if self.table.content in ("fields", "rates") and "t_s" not in self.table:
+        if not self.table.type.sequential and "t_s" not in self.table:
             return np.zeros(self.table.n)
         return np.diff(self.table.time_s, prepend=self.table.time_s[0])
 
@@ -180,32 +186,130 @@ class Problem:
         return smooth_columns(self.table)
 
 
-def _channels(table: Table) -> tuple[str, ...]:
-    if isinstance(table, Stretches):
-        return table.channels
-    return table.axes if table.kind in KNOWN else ("norm",)
+class RateProblem(Problem):
+    """Outputs of a gyroscope at known rates."""
+
+    @staticmethod
+    def check(model: Model, table: Table) -> None:  # noqa: ARG004
+        """Raises DataError for an output that never changes."""
+        _check_changes(table, "a table that turns changes each output that senses it")
 
 
-def _check_fields(model: Model, table: Table) -> None:
-    """Raises ModelError for a magnetometer without a field, DataError where the rows cannot show an effect."""
-    if table.content == "fields" and STRENGTH not in model.effects:
-        raise ModelError(
-            f"{table.source}: a model of magnetometers needs the effect {STRENGTH}, and {model.name} has "
-            f"{', '.join(model.effects)}; take the model field or magnetometer"
-        )
+class PositionProblem(Problem):
+    """Magnitudes of what is sensed, of which only the strength is known."""
+
+    @staticmethod
+    def check(model: Model, table: Table) -> None:  # noqa: ARG004
+        """Positions turn each of three axes. Raises DataError."""
+        if len(table.axes) < 3:
+            raise DataError(
+                f"{table.source}: models of positions need the columns ax, ay, az, or mx, my, mz; "
+                f"it has: {', '.join(table.columns)}"
+            )
+        _check_changes(table, "positions turn each axis up and down")
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The magnitude."""
+        return ("norm",)
+
+    @property
+    def unit(self) -> str:
+        """That of what is sensed."""
+        return self.table.input_unit
+
+    def residual_by(self, steps: Sequence[Step]) -> Array:
+        """The magnitude less the known one, shape (1, n)."""
+        error: Array = np.linalg.norm(backward(self.table, steps), axis=1)[:, None] - 1.0
+        return error.T
+
+    @property
+    def adds(self) -> bool:
+        """A magnitude is not linear in any parameter."""
+        return False
+
+    def _errors_near(self, theta: Array, stairs: bool) -> Callable[[int, Array], Array]:  # noqa: ARG002
+        return lambda _, vector: self.residual(vector)
+
+    def _white(self, std: Array) -> Array:
+        return norm_std(self.table, std).T / self.layout.nominal
+
+
+class FieldProblem(PositionProblem):
+    """Magnitudes of a field, whose strength is a parameter."""
+
+    @staticmethod
+    def check(model: Model, table: Table) -> None:
+        """As for positions; raises ModelError for a model without a field."""
+        PositionProblem.check(model, table)
+        if STRENGTH not in model.effects:
+            raise ModelError(
+                f"{table.source}: a model of magnetometers needs the effect {STRENGTH}, and {model.name} has "
+                f"{', '.join(model.effects)}; take the model field or magnetometer"
+            )
+
+    def residual_by(self, steps: Sequence[Step]) -> Array:
+        """In the field's strength as the outputs show it, whatever the model makes of it.
+
+        By its own measure a field without end would leave nothing of any magnitude.
+        """
+        strengths = [float(p["total"]) for effect, p in steps if effect.name == STRENGTH]
+        return super().residual_by(steps) * (strengths[0] / self.layout.nominal if strengths else 1.0)
+
+
+@dataclass(frozen=True)
+class MotionProblem(Problem):
+    """What stretches of a record hold of its motion."""
+
+    table: Stretches
+
+    keeps_starts = True  # at one attitude an axis that does not move cannot tell its scale factor from its bias
+    widens = False  # the parts of a stretch tell what is slow from what is not
+
+    @staticmethod
+    def prepared(table: Table) -> Table:
+        """A row for each stretch."""
+        return make_stretches(table)
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Axis and part, such as "x in phase at 10 Hz"."""
+        return self.table.channels
+
+    @property
+    def adds(self) -> bool:
+        """The parts are fitted by their own steps (`keeps_starts`)."""
+        return False
+
+    @cached_property
+    def white(self) -> Array | None:
+        """From the density beside each line."""
+        return self.table.white
+
+    @property
+    def _samples(self) -> Table:
+        return self.table.samples
+
+    def _reduced(self, error: Array) -> Array:
+        return self.table.parts(error)
+
+
+PROBLEMS: Mapping[str, type[Problem]] = MappingProxyType(
+    {
+        "poses": Problem,
+        "rates": RateProblem,
+        "positions": PositionProblem,
+        "fields": FieldProblem,
+        "motion": MotionProblem,
+    }
+)
+
+
+def _check_effects(model: Model, table: Table) -> None:
+    """Raises DataError where the rows cannot show an effect of the model."""
     for effect in (term.effect for term in model.terms if table.content in term.effect.kinds):
         if why := effect.lacks(table):
             raise DataError(f"{table.source}: {effect.name} is not fitted: {why}")
-
-
-def _check_positions(table: Table) -> None:
-    """Positions turn each of three axes. Raises DataError."""
-    if len(table.axes) < 3:
-        raise DataError(
-            f"{table.source}: models of positions need the columns ax, ay, az, or mx, my, mz; "
-            f"it has: {', '.join(table.columns)}"
-        )
-    _check_changes(table, "positions turn each axis up and down")
 
 
 def _check_changes(table: Table, but: str) -> None:

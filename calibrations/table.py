@@ -17,29 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrations.errors import DataError, MissingColumn, nearest
+from calibrations.tables import FILE_KINDS, KINDS, Kind
 
 Array = NDArray[np.float64]
 Constant = str | float
 
-KINDS: Mapping[str, tuple[tuple[str, ...], ...]] = MappingProxyType(
-    {
-        # each entry: the column sets of which one must be complete
-        "poses": (("alpha_deg", "beta_deg", "vx_v"),),
-        "positions": (("ax", "ay", "az"), ("mx", "my", "mz")),
-        "motion": (("t_s", "vx_v", "displacement_m"),),
-        "still": (("t_s",), ()),
-        "rates": (("rate_deg_s", "gx", "gy", "gz"),),
-    }
-)
-OUTPUTS: Mapping[str, tuple[str, ...]] = MappingProxyType(
-    {
-        "poses": ("vx_v", "vy_v", "vz_v"),
-        "positions": ("ax", "ay", "az"),
-        "fields": ("mx", "my", "mz"),  # positions of a magnetometer
-        "motion": ("vx_v", "vy_v"),
-        "rates": ("gx", "gy", "gz"),
-    }
-)
 # fmt: off
 OPTIONAL = (
     "vy_v", "vz_v", "path", "t_s", "direction", "temperature_c", "supply_v", "mount_deg", "flip",
@@ -48,7 +30,7 @@ OPTIONAL = (
     "alpha_set_deg", "beta_set_deg",
 )
 # fmt: on
-NUMBERS = {name for sets in KINDS.values() for wanted in sets for name in wanted} | set(OPTIONAL) - {"path"}
+NUMBERS = {name for kind in KINDS.values() for wanted in kind.columns for name in wanted} | set(OPTIONAL) - {"path"}
 AXES = ("x", "y", "z")
 MILLI = {"g": "mg", "field": "‰ of the field", "deg/s": "mdeg/s"}  # thousandths of what is sensed
 STANDARD_GRAVITY = 9.80665
@@ -121,14 +103,19 @@ class Table:
         return "fields" if "ax" not in self.columns or self.constants.get("triad") == "m" else self.kind
 
     @property
+    def type(self) -> Kind:
+        """What this kind of data does differently from others."""
+        return KINDS[self.content]
+
+    @property
     def output_names(self) -> tuple[str, ...]:
         """The columns of outputs that an axis each was measured in."""
-        return tuple(name for name in OUTPUTS.get(self.content, ()) if name in self)
+        return tuple(name for name in self.type.outputs if name in self)
 
     @cached_property
     def axes(self) -> tuple[str, ...]:
         """The sensing axes that were measured, of "x", "y", "z"."""
-        return tuple(axis for axis, name in zip(AXES, OUTPUTS.get(self.content, ()), strict=False) if name in self)
+        return tuple(axis for axis, name in zip(AXES, self.type.outputs, strict=False) if name in self)
 
     @cached_property
     def outputs(self) -> Array:
@@ -138,12 +125,12 @@ class Table:
     @property
     def input_unit(self) -> str:
         """Unit of what is sensed: g, the local field as 1, or deg/s."""
-        return {"fields": "field", "rates": "deg/s"}.get(self.content, "g")
+        return self.type.input_unit
 
     @property
     def unit(self) -> str:
         """Unit of the outputs."""
-        return "V" if self.kind in ("poses", "motion") else str(self.constants.get("unit", "count"))
+        return self.type.unit or str(self.constants.get("unit", "count"))
 
     @property
     def gravity_m_s2(self) -> float:
@@ -186,8 +173,8 @@ class Table:
 
 
 def _check(table: Table) -> None:
-    if table.kind not in KINDS:
-        raise DataError(f'{table.source}: unknown kind of table "{table.kind}"{nearest(table.kind, KINDS)}')
+    if table.kind not in FILE_KINDS:
+        raise DataError(f'{table.source}: unknown kind of table "{table.kind}"{nearest(table.kind, FILE_KINDS)}')
     lengths = {name: len(values) for name, values in table.columns.items()}
     lengths |= {name: len(values) for name, values in table.labels.items()}
     if len(set(lengths.values())) > 1:
@@ -252,7 +239,7 @@ def gravity_fault(value: Constant) -> str | None:
 
 
 def _check_columns(table: Table) -> None:
-    sets = KINDS[table.kind]
+    sets = FILE_KINDS[table.kind].columns
     if any(all(name in table.columns for name in names) for names in sets):
         return
     wanted = min(sets, key=lambda names: sum(name not in table.columns for name in names))
@@ -274,14 +261,14 @@ def guess_kind(names: Iterable[str]) -> str:
     """The kind of table that has these columns. Raises MissingColumn when none has."""
     names = list(names)
     for kind in ("motion", "poses", "rates", "positions"):
-        if any(all(name in names for name in wanted) for wanted in KINDS[kind]):
+        if any(all(name in names for name in wanted) for wanted in FILE_KINDS[kind].columns):
             return kind
-    required = {name for sets in KINDS.values() for wanted in sets for name in wanted}
+    required = {name for kind in FILE_KINDS.values() for wanted in kind.columns for name in wanted}
     for name in names:
         close = difflib.get_close_matches(name, required, n=1, cutoff=0.65)
         if name not in required and name not in OPTIONAL and close:
             raise MissingColumn(f'no kind of table has the column "{name}"; did you mean "{close[0]}"?')
-    each = [(kind, wanted) for kind, sets in KINDS.items() for wanted in sets]
+    each = [(kind.name, wanted) for kind in FILE_KINDS.values() for wanted in kind.columns]
     kind, wanted = max(each, key=lambda e: sum(name in names for name in e[1]))
     missing = [name for name in wanted if name not in names]
     if len(missing) < len(wanted):

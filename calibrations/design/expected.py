@@ -29,7 +29,8 @@ from calibrations.model.chain import forward
 from calibrations.model.parameters import Layout
 from calibrations.noise.means import white_only
 from calibrations.problem import Problem
-from calibrations.table import AXES, OUTPUTS, Array, Constant, Table
+from calibrations.table import AXES, Array, Constant, Table
+from calibrations.tables import KINDS
 
 CERTAIN_PROBABILITY = 0.95  # probability of telling two explanations apart with which an experiment is worth its time
 NAMED = 20.0  # a gain of two parameters that has a chance of 0.003 on noise, in a search worth some 60 trials
@@ -89,9 +90,9 @@ def vary_one_way(right: Fit, wrong: Fit, table: Table) -> Expected:
     """As `expected`, where `right` is: predictions come from both fits' own history, the noise from that of `right`."""
     whole = joined([right.table, table])
     known, new = np.arange(whole.n) < right.table.n, np.arange(whole.n) >= right.table.n
-    truth = Problem(whole, right.problem.layout).residual(right.theta)
-    mistaken = Problem(whole, wrong.problem.layout)
-    noise = noise_on_rows(right.noise, Problem(table, right.problem.layout))
+    truth = right.problem.on(whole).residual(right.theta)
+    mistaken = wrong.problem.on(whole)
+    noise = noise_on_rows(right.noise, right.problem.on(table))
 
     def white(columns: Array) -> tuple[Array, Array]:
         """Rows of the data at hand, and of the new; both (channels, n, k) -> (rows, k)."""
@@ -185,7 +186,7 @@ def predict_data(like: Fit, columns: Mapping[str, Array]) -> Table:
     data = like.table
     if data.kind != "poses":
         raise DataError(f"{data.source}: a fit to {data.kind} foresees no poses; fit the model to poses")
-    names = OUTPUTS["poses"][: len(data.axes)]
+    names = KINDS["poses"].outputs[: len(data.axes)]
     given = {name: np.asarray(values, dtype=np.float64) for name, values in columns.items() if name != "dwell_s"}
     rows = len(given["alpha_deg"])
     held = {name: np.full(rows, np.mean(data.column(name))) for name in _needed(like) if name not in given}

@@ -30,7 +30,7 @@ def information(fit: Fit, table: Table) -> Array:
     parameter's unit. White noise is that of the table's means, scatter that of the fit. Slow noise too is as the fit
     found it: correlated over the table's own times or, where it has none, added as if each row had its own.
     """
-    problem = Problem(table.rows(table.order), fit.problem.layout)
+    problem = fit.problem.on(table.rows(table.order))
     return np.asarray(_noise(fit, problem).whiten(problem.jacobian(fit.theta)))
 
 

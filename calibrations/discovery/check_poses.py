@@ -73,7 +73,7 @@ def unseen(model: Model, table: Table) -> Check | None:
         return None
     if found.problem.white is None:
         return None
-    problem = Problem(table.rows(marked), found.problem.layout)
+    problem = found.problem.on(table.rows(marked))
     errors = _standardised(found, problem)
     squares, freedom = repeated(found)
     known = freedom < FEWEST_CHECKS * len(table.axes)

@@ -24,7 +24,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibrations.errors import ExpressionError, nearest
-from calibrations.table import NUMBERS, OUTPUTS, Array, Table
+from calibrations.table import NUMBERS, Array, Table
+from calibrations.tables import KINDS
 
 LONGEST = 400  # characters
 DEEPEST = 40  # operations within one another
@@ -46,7 +47,7 @@ COLUMNS: Mapping[str, str] = {
 }
 ANGLES = ("alpha", "beta", "mount")
 FORCES = ("ax", "ay", "az")
-MEASURED = {name for names in OUTPUTS.values() for name in names} - {*FORCES}
+MEASURED = {name for kind in KINDS.values() for name in kind.outputs} - {*FORCES}
 OF_THE_MEAN = {name for name in NUMBERS if name == "n" or "_std" in name}  # say nothing of the sensor
 KNOWN = {*COLUMNS, *FORCES, *NUMBERS} - OF_THE_MEAN  # without a table at hand
 

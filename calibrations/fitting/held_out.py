@@ -16,8 +16,8 @@ FOLDS = 10
 
 def folds(table: Table) -> NDArray[np.intp]:
     """Fold number of each row, shape (n,); rows at the same angles share one. The same table gives the same folds."""
-    names = [name for name in ("alpha_deg", "beta_deg", "mount_deg", "flip") if name in table]
-    if table.kind != "poses" or not names:
+    names = [name for name in table.type.same_pose if name in table]
+    if not names:
         return np.random.default_rng(0).permutation(table.n) % min(table.n, 60)
     keys = np.column_stack([np.round(table.column(name), 6) for name in names])
     _, group = np.unique(keys, axis=0, return_inverse=True)

@@ -27,10 +27,12 @@ def smooth_columns(table: Table) -> Array:
     For motion, what a sensor could do alike in every stretch at one attitude. No columns for tables of unknown
     orientation, nor for fewer rows than the lowest degree needs.
     """
-    if table.kind == "motion":
-        return _attitudes(table)
-    if table.kind != "poses":
-        return np.zeros((table.n, 0))
+    columns = COLUMNS.get(table.content)
+    return np.zeros((table.n, 0)) if columns is None else columns(table)
+
+
+def _directions(table: Table) -> Array:
+    """Polynomials of the direction of gravity, of the highest degree that the rows allow."""
     a = specific_force(nominal_pose(table))
     most = table.n // ROWS_PER_COLUMN
     for degree in range(DEGREE, 0, -1):
@@ -67,3 +69,6 @@ def _orthonormal(columns: Array) -> Array:
     Q, R, _ = qr(columns, mode="economic", pivoting=True)
     size = np.abs(np.diag(R))
     return np.asarray(Q[:, size > 1e-8 * size[0]])
+
+
+COLUMNS = {"poses": _directions, "motion": _attitudes}

@@ -21,7 +21,8 @@ from calibrations.importing.proposal import import_command, missing_columns, sug
 from calibrations.importing.sessions import RATE, is_session, sample_rates
 from calibrations.importing.sheet import Sheet, is_number, look_like_names, read_cells, read_sheet
 from calibrations.importing.units import UNITS, ColumnMapping, column_unit
-from calibrations.table import KINDS, NUMBERS, Array, Constant, Table, guess_kind
+from calibrations.table import NUMBERS, Array, Constant, Table, guess_kind
+from calibrations.tables import FILE_KINDS
 
 TRIADS = (("ax", "ay", "az"), ("mx", "my", "mz"))
 RATES = ("gx", "gy", "gz")
@@ -126,7 +127,8 @@ def needs_mapping(laid: Sheet, kind: str | None, mapped: Sequence[ColumnMapping]
     names = {m.name for m in chosen} | set(_unmapped_columns(laid, chosen, bool(mapped)))
     if kind == "rates" and PATH in names:
         return bool(missing_columns(kind, laid, chosen))
-    sets = KINDS[kind] if kind else [wanted for wanteds in KINDS.values() for wanted in wanteds if len(wanted) > 1]
+    kinds = [FILE_KINDS[kind]] if kind else FILE_KINDS.values()
+    sets = [wanted for each in kinds for wanted in each.columns if kind or len(wanted) > 1]
     return not any(names.issuperset(wanted) for wanted in sets)
 
 

@@ -19,7 +19,8 @@ from calibrations.importing.plausible import covers_all_directions, field_unit, 
 from calibrations.importing.raw_logs import average_raw_log
 from calibrations.importing.sheet import Sheet, is_number, parse_number
 from calibrations.importing.units import UNITS, ColumnMapping, column_unit, split_unit
-from calibrations.table import AXES, KINDS, NUMBERS, OUTPUTS, Array, Constant, Table
+from calibrations.table import AXES, NUMBERS, Array, Constant, Table
+from calibrations.tables import KINDS
 
 AXIS = r"(?:^|[^a-z])(?P<axis>[xyz])(?:[^a-z]|$)"
 SCATTER = r"std|stdev|sigma|noise|scatter|deviation"
@@ -98,7 +99,11 @@ def likely_kind(laid: Sheet, mapped: Iterable[ColumnMapping] = ()) -> str:
     if "displacement_m" in {*names, *(_by_name(bare, "motion") for bare in laid.bare)}:
         return "motion"
     if laid.named:
-        return "positions" if names.issuperset(OUTPUTS["poses"]) or names & set(OUTPUTS["positions"]) else "poses"
+        return (
+            "positions"
+            if names.issuperset(KINDS["poses"].outputs) or names & set(KINDS["positions"].outputs)
+            else "poses"
+        )
     angles = [name for name in laid.header if _is_angle(sample_values(laid, name))]
     return "poses" if len(angles) == 2 else "positions"
 
@@ -113,7 +118,7 @@ def missing_columns(kind: str | None, laid: Sheet, mapped: Iterable[ColumnMappin
 
 def required_columns(kind: str | None, given: Collection[str]) -> tuple[str, ...]:
     """The columns that a table of this kind needs; of several sets the one nearest to `given`."""
-    return min(KINDS[kind], key=lambda wanted: len(set(wanted) - set(given))) if kind else ()
+    return min(KINDS[kind].columns, key=lambda wanted: len(set(wanted) - set(given))) if kind else ()
 
 
 def import_command(
@@ -138,7 +143,7 @@ def guess_by_names(laid: Sheet, values: Mapping[str, Array], kind: str) -> list[
     units = dict(zip(laid.header, laid.units, strict=True))
     said = [(name, _by_name(bare[name], kind) or _by_unit(bare[name], units[name])) for name in values]
     named = {ours for _, ours in said}
-    nameless = iter(name for name in OUTPUTS[kind] if name not in named)
+    nameless = iter(name for name in KINDS[kind].outputs if name not in named)
     plain = {name: next(nameless, "") for name, ours in said if not ours and _is_output(bare[name])}
     return [(name, ours or plain.get(name, "")) for name, ours in said if ours or plain.get(name)]
 
@@ -157,7 +162,7 @@ def guess_by_values(values: Mapping[str, Array], kind: str) -> list[tuple[str, s
         angles = sorted((name for name, v in left.items() if _is_angle(v)), key=lambda name: len(np.unique(left[name])))
         found += list(zip(angles[:2], ("alpha_deg", "beta_deg"), strict=False))
         left = {name: v for name, v in left.items() if name not in angles[:2]}
-    return [*found, *zip(left, OUTPUTS[kind], strict=False)]
+    return [*found, *zip(left, KINDS[kind].outputs, strict=False)]
 
 
 def sample_values(laid: Sheet, name: str) -> Array:
@@ -180,7 +185,7 @@ def _by_name(bare: str, kind: str) -> str:
         return "" if "{axis}" in ours and not axis else ours.format(axis=axis)
     last = re.search(r"(?:^|[_\W]|^v|^u|^a|acc|out)(?P<axis>[xyz])\d*$", lower)
     axis = axis or (last["axis"] if last else "")
-    return dict(zip(AXES, OUTPUTS[kind], strict=False)).get(axis, "")
+    return dict(zip(AXES, KINDS[kind].outputs, strict=False)).get(axis, "")
 
 
 def _by_unit(bare: str, unit: str) -> str:
@@ -228,13 +233,13 @@ def _with_sections(found: list[ColumnMapping], laid: Sheet) -> list[ColumnMappin
 
 def _with_scatter(found: list[ColumnMapping]) -> list[ColumnMapping]:
     """The mapping in which a standard deviation has its output's unit."""
-    units = {m.name.replace("_v", "_std_v"): m.unit for m in found if m.name in OUTPUTS["poses"]}
+    units = {m.name.replace("_v", "_std_v"): m.unit for m in found if m.name in KINDS["poses"].outputs}
     return [replace(m, unit=m.unit or units.get(m.name, "")) for m in found]
 
 
 def _with_gravity(found: list[ColumnMapping], values: Mapping[str, Array]) -> list[ColumnMapping]:
     """The mapping in which axes have the unit that gives 1 g, else counts; axes of a magnetometer uT, where it fits."""
-    for names, unit_of_all in ((OUTPUTS["positions"], gravity_unit), (OUTPUTS["fields"], field_unit)):
+    for names, unit_of_all in ((KINDS["positions"].outputs, gravity_unit), (KINDS["fields"].outputs, field_unit)):
         axes = {m.name: m.theirs for m in found if m.name in names and not m.unit and m.theirs in values}
         if len(axes) == len(AXES):
             unit = unit_of_all(np.column_stack([values[theirs] for theirs in axes.values()]))

@@ -26,9 +26,9 @@ from calibrations.model import Model
 from calibrations.noise.mean_noise import white_std
 from calibrations.noise.means import BEYOND, Processes
 from calibrations.table import AXES, Array, Table
+from calibrations.tables import KINDS
 
 PER_DECADE = 2.0  # processes of flicker
-KINDS = ("poses", "rates")  # whose residual is in the output's unit
 
 
 def with_noise(table: Table, model: Model) -> Table:
@@ -36,8 +36,9 @@ def with_noise(table: Table, model: Model) -> Table:
 
     The noise of its outputs is then no longer guessed from what a model leaves.
     """
-    if table.kind not in KINDS:
-        raise DataError(f"{table.source}: a noise model is for {' and '.join(KINDS)}, and this is of {table.content}")
+    if not table.type.known_input:
+        known = " and ".join(name for name, kind in KINDS.items() if kind.known_input)
+        raise DataError(f"{table.source}: a noise model is for {known}, and this is of {table.content}")
     if "t_s" not in table:
         raise DataError(f"{table.source}: slow noise needs the column t_s: when each row was measured")
     if model.unit != table.unit:
@@ -87,8 +88,11 @@ FEWEST_FREE_ROWS = 2  # rows more than the form has parameters
 
 
 def scatter(table: Table) -> Array | None:
-    """Standard deviation of each row in the residual's unit, shape (channels, n); None where rows are too few."""
-    found = _of_field(table) if table.content == "fields" else _of_rates(table)
+    """Standard deviation of each row in the residual's unit, shape (channels, n).
+
+    None where rows are too few, and for a kind that has no widest form.
+    """
+    found = WIDEST[table.content](table) if table.content in WIDEST else None
     return None if found is None or not np.all(found > 0) else np.tile(found[:, None], (1, table.n))
 
 
@@ -131,3 +135,6 @@ def _of_rates(table: Table) -> Array | None:
     if free < FEWEST_FREE_ROWS:
         return None
     return np.asarray(np.sqrt(np.sum((table.outputs - columns @ answer) ** 2, axis=0) / free))
+
+
+WIDEST = {"fields": _of_field, "rates": _of_rates}

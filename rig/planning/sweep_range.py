@@ -17,7 +17,6 @@ from calibrations.discovery.check_poses import MARK
 from calibrations.fit import Fit
 from calibrations.geometry.orientation import nominal_pose, specific_force
 from calibrations.model import Model
-from calibrations.problem import Problem
 from calibrations.table import AXES, Array, Table
 from procedures.catalogue import Procedure
 from procedures.session import Pose
@@ -170,8 +169,7 @@ class Range:
     @cached_property
     def _full_scale(self) -> Array:
         """The most that a parameter does to the output within the range, V over its unit, shape (p,)."""
-        problem = Problem(self.fit.table, self.fit.problem.layout)
-        return np.asarray(np.max(np.abs(problem.jacobian(self.fit.theta)), axis=(0, 1)))
+        return np.asarray(np.max(np.abs(self.fit.problem.jacobian(self.fit.theta)), axis=(0, 1)))
 
 
 def _candidates(standard: Sequence[Pose]) -> Iterator[Pose]:

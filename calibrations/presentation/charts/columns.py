@@ -11,7 +11,6 @@ from calibrations.effects import Effect
 from calibrations.fit import Fit
 from calibrations.geometry.orientation import other_in_plane, out_of_plane
 from calibrations.model.chain import backward, force
-from calibrations.problem import KNOWN
 from calibrations.table import Array, Table
 
 LENGTHS = ((7200.0, 3600.0, "h"), (180.0, 60.0, "min"), (-1.0, 1.0, "s"))  # longer than, unit, its name
@@ -44,7 +43,7 @@ class Column:
 def specific_force(fit: Fit) -> Array:
     """Specific force along the sensing axes by the model, g, shape (n, 3)."""
     steps = fit.problem.layout.steps(fit.theta)
-    return force(fit.table, steps) if fit.table.kind in KNOWN else backward(fit.table, steps)
+    return force(fit.table, steps) if fit.table.type.known_input else backward(fit.table, steps)
 
 
 def columns(fit: Fit) -> list[Column]:

@@ -1,0 +1,16 @@
+"""Samples of a sensor in motion along a line, with a displacement sensor beside it."""
+
+from __future__ import annotations
+
+from calibrations.tables.kind import Kind
+
+
+class Motion(Kind):
+    """A record of motion. A model is fitted to what each stretch of it holds of the motion."""
+
+    name = file = "motion"
+    columns = (("t_s", "vx_v", "displacement_m"),)
+    outputs = ("vx_v", "vy_v")
+    unit = "V"
+    rows = "stretches"
+    size_in = "samples"

@@ -1,0 +1,16 @@
+"""The mean of one dwell at known stage angles."""
+
+from __future__ import annotations
+
+from calibrations.tables.kind import Kind
+
+
+class Poses(Kind):
+    """Poses of a rig with stages: gravity along each axis is known."""
+
+    name = file = rows = size_in = "poses"
+    columns = (("alpha_deg", "beta_deg", "vx_v"),)
+    outputs = ("vx_v", "vy_v", "vz_v")
+    unit = "V"
+    known_input = True
+    same_pose = ("alpha_deg", "beta_deg", "mount_deg", "flip")
