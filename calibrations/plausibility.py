@@ -22,6 +22,24 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc
 
+from calibrations.criteria import (
+    EXCITED_G,
+    EXPLAINED_BY_GEOMETRY,
+    FAR_BETTER_GEOMETRY,
+    FEWEST_RESPONSE_ROWS,
+    FOLLOWS_GRAVITY,
+    GROUPS_APART,
+    LEAST_ASIDE,
+    LEAST_OTHER_SIDE,
+    LEFT_WITHIN_GROUPS,
+    MOST_SLOW_NOISE,
+    PATTERNED,
+    SMALLER_GROUP,
+    STUCK_CHANGE,
+    STUCK_ROWS,
+    TURNED_DEG,
+    WEAK_RESPONSE,
+)
 from calibrations.discovery.verdict import Verdict
 from calibrations.fit import Fit
 from calibrations.geometry.orientation import Pose, nominal_pose, specific_force
@@ -31,22 +49,6 @@ from calibrations.table import AXES, Array, Table
 
 NO_RESPONSE, UNEXPLAINED, DOUBTFUL = Verdict.NO_RESPONSE.value, Verdict.UNEXPLAINED.value, "doubtful"
 
-EXCITED_G = 0.1  # rms of a specific force about its mean: below, offsets of the stages hide a response
-FOLLOWS = 0.5  # share of an output's variance: sensors with 5 % nonlinearity keep 0.99
-WELL = 0.9  # of it: the geometry explains the output, and effects are left
-FAR_BETTER = 0.1  # of the variance that the stated geometry leaves
-BY_CHANCE = 1e-3  # of an F test: a response as weak as noise, but there
-NOISE_ONLY = 2.5  # times the noise floor: more than white and slow noise of a sensor
-FEWEST = 12  # rows: three times the parameters of a response
-STUCK = 0.2  # of the rows at one value, where gravity changes
-STILL = 0.1  # of the expected change: a healthy output changes as expected
-RAIL = 0.1  # of the stuck rows on the other side: a saturated output has none
-ASIDE = 0.1  # of the output's range, off the stuck value: a dead zone is a hundredth of that
-TURNED_DEG = 20.0  # a mount or a zero that is so far off is another one: marks are within some degrees
-SPLIT = 0.05  # of the variance left within two groups: two halves of Gaussian noise leave 0.36, of a sine 0.19
-APART = 10.0  # times the noise floor between the groups: effects and odd rows are below or have a pattern
-SMALLER = 0.1  # of the rows, in the smaller group: fewer are outliers
-PATTERNED = 0.75  # of neighbours in one group: more, and the groups are a pattern of pose, time or direction
 ROUNDS = 20  # of a regression in two clusters
 
 
@@ -71,7 +73,7 @@ class Response:
 @lru_cache(maxsize=8)
 def findings(table: Table) -> tuple[Finding, ...]:
     """What speaks against a table of poses, worst first; () for other kinds and for healthy data."""
-    if table.kind != "poses" or table.n < FEWEST:
+    if table.kind != "poses" or table.n < FEWEST_RESPONSE_ROWS:
         return ()
     stated = response(table, specific_force(nominal_pose(table)))
     geometry = _geometry(table, stated)
@@ -144,11 +146,11 @@ def _silent(output: Array, stated: Response, k: int, name: str, floor: float | N
     if swing <= 1e-9 * float(np.abs(output).max()):
         return f"{name} is constant ({output[0]:.6g} V) while gravity along {AXES[k]} changes"
     share, n = float(stated.share[k]), len(output)
-    if share >= FOLLOWS:
+    if share >= FOLLOWS_GRAVITY:
         return None
     spread = float(np.std(output))
-    noise = floor is not None and floor > 0 and float(rms(stated.residual[k])) < NOISE_ONLY * floor
-    if noise and fdtrc(3, n - 4, max(share, 0.0) / 3 / ((1 - share) / (n - 4))) < BY_CHANCE:
+    noise = floor is not None and floor > 0 and float(rms(stated.residual[k])) < MOST_SLOW_NOISE * floor
+    if noise and fdtrc(3, n - 4, max(share, 0.0) / 3 / ((1 - share) / (n - 4))) < WEAK_RESPONSE:
         return None
     if noise:
         return f"{name} holds noise only ({1e3 * spread:.3g} mV rms) while gravity along {AXES[k]} changes"
@@ -157,7 +159,7 @@ def _silent(output: Array, stated: Response, k: int, name: str, floor: float | N
 
 def _stuck(output: Array, a: Array, name: str) -> str | None:
     """Why an output that responds in some rows does not in others; None where it does in all."""
-    n, count = len(output), max(FEWEST, int(STUCK * len(output)))
+    n, count = len(output), max(FEWEST_RESPONSE_ROWS, int(STUCK_ROWS * len(output)))
     order = np.sort(output)
     if count >= n or not np.ptp(output):
         return None
@@ -166,19 +168,19 @@ def _stuck(output: Array, a: Array, name: str) -> str | None:
     value, width = float(np.median(order[start : start + count])), float(widths[start])
     rows = np.abs(output - value) <= max(2 * width, 1e-9 * abs(value))
     others = ~rows
-    if others.sum() < FEWEST:
+    if others.sum() < FEWEST_RESPONSE_ROWS:
         return None
     columns = np.column_stack([np.ones(n), a])
     answer, _, rank, _ = np.linalg.lstsq(columns[others], output[others], rcond=EXCITED_G)
     expected = columns @ answer
     left = output[others] - expected[others]
-    if rank < 2 or np.var(left) > (1 - WELL) * np.var(output[others]):
+    if rank < 2 or np.var(left) > (1 - EXPLAINED_BY_GEOMETRY) * np.var(output[others]):
         return None
-    if np.std(output[rows]) > STILL * np.std(expected[rows]):
+    if np.std(output[rows]) > STUCK_CHANGE * np.std(expected[rows]):
         return None
     away = expected[rows] - value
-    aside = ASIDE * float(np.ptp(expected))
-    if min(np.mean(away > aside), np.mean(away < -aside)) < RAIL:
+    aside = LEAST_ASIDE * float(np.ptp(expected))
+    if min(np.mean(away > aside), np.mean(away < -aside)) < LEAST_OTHER_SIDE:
         return None
     return f"{name} is stuck at {value:.5g} V in {rows.sum()} of {n} rows while gravity changes"
 
@@ -190,11 +192,11 @@ def _two_groups(table: Table) -> Finding | None:
     columns = np.column_stack([np.ones(table.n), specific_force(pose)])
     labels, left, apart = _clusters(columns, table.outputs)
     share = float(labels.mean())
-    if left > SPLIT or not SMALLER <= share <= 1 - SMALLER or _patterned(table, labels):
+    if left > LEFT_WITHIN_GROUPS or not SMALLER_GROUP <= share <= 1 - SMALLER_GROUP or _patterned(table, labels):
         return None
     white = white_std(table)
     axis = int(np.argmax(apart))
-    if white is not None and apart[axis] < APART * rms(white[:, axis]):
+    if white is not None and apart[axis] < GROUPS_APART * rms(white[:, axis]):
         return None
     times = "" if white is None else f", {apart[axis] / 2 / float(rms(white[:, axis])):.0f} times the noise floor"
     return Finding(
@@ -274,7 +276,7 @@ def _along(angle: Array, other: Array) -> tuple[NDArray[np.intp], NDArray[np.boo
 
 def _geometry(table: Table, stated: Response) -> Finding | None:
     """What geometry explains the outputs where the stated one does not; None where it does, or nothing does."""
-    explained = bool(np.all(stated.share >= WELL))
+    explained = bool(np.all(stated.share >= EXPLAINED_BY_GEOMETRY))
     wrong = _assignment(table, stated, specific_force(nominal_pose(table))) if explained else None
     if explained and (wrong is None or wrong.verdict == DOUBTFUL):
         return wrong
@@ -290,8 +292,12 @@ def _other_angles(table: Table, stated: Response, explained: bool) -> list[str]:
     for text, pose in _readings(nominal_pose(table)).items():
         a = specific_force(pose)
         tried = response(table, a)
-        better = np.max(1 - tried.share) <= FAR_BETTER * np.max(1 - stated.share)
-        if np.all(tried.share >= WELL) and (explained or better) and _assignment(table, tried, a) is None:
+        better = np.max(1 - tried.share) <= FAR_BETTER_GEOMETRY * np.max(1 - stated.share)
+        if (
+            np.all(tried.share >= EXPLAINED_BY_GEOMETRY)
+            and (explained or better)
+            and _assignment(table, tried, a) is None
+        ):
             found.append(text)
     return found
 
@@ -323,7 +329,7 @@ def _assignment(table: Table, found: Response, a: Array) -> Finding | None:
     if not size.max() > 0:
         return None
     reach = np.linalg.norm(own, axis=1)
-    asked = [k for k in range(len(size)) if found.share[k] >= FOLLOWS and size[k] > 0]
+    asked = [k for k in range(len(size)) if found.share[k] >= FOLLOWS_GRAVITY and size[k] > 0]
     cosine = {k: float(found.slope[k] @ own[k] / size[k] / reach[k]) for k in asked if reach[k] > 0.5}
     off = np.cos(np.radians(TURNED_DEG))
     astray = [k for k, c in cosine.items() if abs(c) < off]

@@ -23,16 +23,14 @@ from math import pi, sqrt
 import numpy as np
 from scipy.signal import lfilter
 
+from calibrations.criteria import BASELINE_RUNS, EWMA_LIMIT, FEWEST_RUNS, LIMIT_SIGMAS
 from calibrations.errors import TooFewRows
 from calibrations.table import Array
 
 D2 = 2 / sqrt(pi)  # mean range of two normal numbers, in sigma
 D3 = sqrt(2 - 4 / pi)  # its standard deviation
 D4 = 1 + 3 * D3 / D2  # upper limit of a moving range, in mean ranges
-LIMIT_SIGMAS = 3.0
-EWMA_WEIGHT, EWMA_LIMIT = 0.2, 2.962
-BASELINE_RUNS = 20
-FEWEST_RUNS = 2
+EWMA_WEIGHT = 0.2
 
 
 @dataclass(frozen=True)

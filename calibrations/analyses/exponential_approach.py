@@ -22,14 +22,13 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrations.criteria import LEAST_TAU_RATIO, WALK_RATIO
 from calibrations.noise.means import correlated, rms
 from calibrations.table import Array
 
 TAUS = 40  # time constants on the grid
-LEAST_TAU_RATIO = 3.0  # time constants nearer than this factor cannot be separated under noise
 PROCESSES = 6  # in flicker noise; also the number of time constants of the single process
 RATIOS = tuple(np.geomspace(0.5, 60.0, 8).tolist())  # slow noise over fast noise
-WALK_RATIO = 2.0  # slow over fast noise: beyond it, and slower than half of the record, the process is a random walk
 PRIOR = (0.2, 0.2, 0.6)  # probability of white noise, of one process, and of flicker, which electronics has
 STEPS = 30
 LONGEST_STEP = 0.5  # in the logarithm of a time constant

@@ -19,8 +19,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from calibrations.analyses.soak import AXES, COVERAGE, HOLD, LONGEST_MOVE_S, REACHED_K, REVERSAL
+from calibrations.analyses.soak import AXES, HOLD, REVERSAL
 from calibrations.analyses.tumble import estimate_tumbles
+from calibrations.criteria import COVERAGE_FACTOR, LONGEST_MOVE_S, MOST_KNOWN_WIDTH, MOST_SURPRISE, REACHED_K
 from calibrations.errors import DataError
 from calibrations.estimators.approach import HOUR_S, LEVEL, LN_TAU, REST, SLOW, Bank, make_bank
 from calibrations.noise.mean_noise import white_std
@@ -31,8 +32,6 @@ TYPICAL_DRIFT = 4e-3  # of a drift beforehand, over the scale factor: in g, and 
 DEFAULT_NOISE = 2e-5  # white standard error over the scale factor, where it is not known
 DRAWS = 1000
 FORECASTS = 24
-MOST_KNOWN_WIDTH = 0.25  # of the whole change: half the width of the bounds of what is known
-MOST_SURPRISE = 3.0  # mean normalised innovation squared beyond which no filter's model holds
 SMALLEST = 1e-12  # of a unit
 LATEST_STEADY_S = 48 * HOUR_S  # from now: a bound beyond it is none
 HORIZON_S = np.concatenate([[0.0], np.geomspace(60.0, 100 * HOUR_S, 60)])
@@ -108,7 +107,7 @@ class QuantityFilter:
         states = self.bank.drawn(DRAWS)
         rest, taus_s = states[:, REST:LN_TAU], np.exp(states[:, LN_TAU:SLOW])
         final, present = states[:, LEVEL], states[:, LEVEL] + rest.sum(axis=1)
-        tolerance = COVERAGE * self.bank.noise
+        tolerance = COVERAGE_FACTOR * self.bank.noise
         steady_s = self.bank.t_s + _time_to_tolerance_s(rest, taus_s, tolerance)
         median = float(np.median(final))
         return Forecast(

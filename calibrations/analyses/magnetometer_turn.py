@@ -22,6 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calibrations.criteria import FEWEST_TURNS
 from calibrations.table import Array
 
 HIDDEN_IRON = 4.302653 / 2 / np.sqrt(2)  # t of two degrees of freedom, 97.5 %
@@ -96,8 +97,6 @@ def correct_by_extremes(outputs: Array) -> Array:
 # turns.
 #
 # Source  Book 17.4-17.5, (17.6)-(17.15).
-
-FEWEST_TURNS = 2  # turns that tell how well they agree
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,18 @@ from numpy.typing import NDArray
 
 from calibrations.analyses.exponential_approach import Series, model_derivatives, remaining_drift
 from calibrations.analyses.tumble import Tumble, estimate_tumbles
+from calibrations.criteria import (
+    COVERAGE_FACTOR,
+    EXPONENTIAL_GAIN,
+    FEWEST_APPROACH_VALUES,
+    FEWEST_STEADY_VALUES,
+    LIKELY_WALK,
+    LONGEST_HOLD_GAP,
+    LONGEST_MOVE_S,
+    MOST_EXPONENTIALS,
+    REACHED_K,
+    SPARE_VALUES,
+)
 from calibrations.errors import TooFewRows
 from calibrations.noise.deviations import deviations
 from calibrations.noise.means import rms
@@ -33,13 +45,6 @@ from calibrations.table import Array, Table
 # Source  Ang III.B, Fig. 10: about 7 h, 2 to 12 h over eight axes; JCGM 100, 5.1: propagation, 6.2: expanded
 # uncertainty.
 
-COVERAGE = 2.0
-FEWEST_VALUES = 8  # values that tell an approach from noise
-FEWEST_STEADY_VALUES = 20  # values that show that nothing drifts: fewer take a drift for slow noise
-SPARE_VALUES = 4  # values beyond parameters that another exponential needs
-EXPONENTIAL_GAIN = 24.0  # of twice the log-likelihood that another exponential must bring: a random walk seldom does
-MOST_EXPONENTIALS = 2  # exponentials
-LIKELY_WALK = 0.5  # probability of a random walk above which there is no steady state
 TIME_POINTS = 4000  # of time among which the steady state is looked for
 RELATIVE_STEP = 1e-4  # of a parameter, for a slope
 
@@ -93,7 +98,7 @@ class SteadyState:
     @property
     def tolerance(self) -> float:
         """The expanded uncertainty of one value."""
-        return COVERAGE * self.noise
+        return COVERAGE_FACTOR * self.noise
 
     @property
     def drift(self) -> Quantity:
@@ -164,10 +169,10 @@ class SteadyState:
 def fit_steady_state(t_s: Array, values: Array, stds: Array) -> SteadyState:
     """The approach of `values` with white standard errors `stds` (0: not known) at times since power-on, shape (n,).
 
-    Each exponential must bring GAIN. Raises TooFewRows for fewer than FEWEST values.
+    Each exponential must gain EXPONENTIAL_GAIN. Raises TooFewRows for fewer than FEWEST_APPROACH_VALUES.
     """
-    if len(t_s) < FEWEST_VALUES:
-        raise TooFewRows(f"{len(t_s)} reversals tell no drift from noise; at least {FEWEST_VALUES} are needed")
+    if len(t_s) < FEWEST_APPROACH_VALUES:
+        raise TooFewRows(f"{len(t_s)} reversals tell no drift from noise; at least {FEWEST_APPROACH_VALUES} are needed")
     middle, unit = float(values.mean()), float(values.std()) or 1.0
     series = Series(t_s - t_s[0], (values - middle) / unit, stds / unit)
     most = min(MOST_EXPONENTIALS, (len(t_s) - 1 - SPARE_VALUES) // 2)
@@ -191,9 +196,6 @@ def fit_steady_state(t_s: Array, values: Array, stds: Array) -> SteadyState:
 REVERSAL, HOLD = "reversal", "hold"
 AXES = "xy"
 HOUR_S = 3600.0
-LONGEST_MOVE_S = 120.0  # between poses: more is a gap
-REACHED_K = 1.0  # from the set point: an oven that is further away is still heating
-GAP_SAMPLES = 2.0  # within a hold: more is a gap
 
 
 @dataclass(frozen=True)
@@ -290,7 +292,9 @@ class Soak:
         """(times, s; Allan deviation of the still record, V)."""
         paths, step = np.array(self.holds.labels["path"]), _lengths_s(self.holds)
         starts = self.holds.time_s - step / 2
-        new = (paths[1:] != paths[:-1]) | (np.abs(np.diff(starts) - step[:-1]) > GAP_SAMPLES / _rate_hz(self.table))
+        new = (paths[1:] != paths[:-1]) | (
+            np.abs(np.diff(starts) - step[:-1]) > LONGEST_HOLD_GAP / _rate_hz(self.table)
+        )
         means = np.split(self.holds.column(f"v{axis}_v"), np.flatnonzero(new) + 1)
         return _pooled(means, float(np.median(step)))
 
@@ -343,7 +347,7 @@ def _course(quantity: str, axis: str, done: list[Tumble]) -> Course:
     else:
         values = np.array([each.scale_v_per_g for each in done])
         stds = values * np.array([each.scale_std for each in done])
-    state = fit_steady_state(t_s, values, stds) if len(t_s) >= FEWEST_VALUES else None
+    state = fit_steady_state(t_s, values, stds) if len(t_s) >= FEWEST_APPROACH_VALUES else None
     return Course(quantity, axis, t_s, values, stds, state)
 
 
@@ -351,7 +355,7 @@ def _gaps(table: Table) -> tuple[RecordGap, ...]:
     paths, length = table.labels["path"], _lengths_s(table)
     ends, starts = (table.time_s + length / 2)[:-1], (table.time_s - length / 2)[1:]
     within = np.array([a == b and a.startswith(HOLD) for a, b in pairwise(paths)], dtype=bool)
-    allowed = np.where(within, GAP_SAMPLES / _rate_hz(table), LONGEST_MOVE_S)
+    allowed = np.where(within, LONGEST_HOLD_GAP / _rate_hz(table), LONGEST_MOVE_S)
     found = np.flatnonzero(starts - ends > allowed)
     return tuple(
         RecordGap(float(ends[i]), float(starts[i] - ends[i]), paths[i] if paths[i] == paths[i + 1] else "")

@@ -14,10 +14,9 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import stdtrit
 
+from calibrations.criteria import COVERAGE, COVERAGE_FACTOR, FEWEST_FOR_DRIFT, HORIZON_DAYS
 from calibrations.errors import DataError, TooFewRows
 from calibrations.table import Array
-
-COVERAGE = 2.0
 
 
 @dataclass(frozen=True)
@@ -40,7 +39,7 @@ class Agreement:
 
 def compare_values(a: tuple[float, float], b: tuple[float, float]) -> Agreement:
     """Compare two values with standard uncertainties, taken as independent."""
-    return Agreement(a[0], b[0], a[0] - b[0], COVERAGE * (a[1] ** 2 + b[1] ** 2) ** 0.5)
+    return Agreement(a[0], b[0], a[0] - b[0], COVERAGE_FACTOR * (a[1] ** 2 + b[1] ** 2) ** 0.5)
 
 
 # Repeatability: the change of a quantity between repetitions beyond the noise of each.
@@ -78,9 +77,6 @@ def repeatability(values: Sequence[float], stds: Sequence[float]) -> tuple[float
 #
 # Source  Mandel and Paule, Anal. Chem. 42 (1970); ILAC-G24 / OIML D 10 (intervals by drift); JCGM 100, H.3 (a line).
 
-FEWEST_CALIBRATIONS = 3  # fewer cannot separate drift from scatter
-LEVEL = 0.95
-HORIZON_DAYS = 3653  # ten years: no forecast beyond
 YEAR_DAYS = 365.25
 
 
@@ -100,7 +96,7 @@ class Stability:
     @property
     def coverage(self) -> float:
         """Student's factor for 95 %."""
-        return float(stdtrit(len(self.values) - 2, (1 + LEVEL) / 2))
+        return float(stdtrit(len(self.values) - 2, (1 + COVERAGE) / 2))
 
     @property
     def slope_std(self) -> float:
@@ -133,9 +129,9 @@ def fit_stability(t_days: Sequence[float], values: Sequence[float], stds: Sequen
     Raises TooFewRows for fewer than three, or for calibrations of one day only.
     """
     t, y, u = (np.asarray(each, dtype=np.float64) for each in (t_days, values, stds))
-    if len(t) < FEWEST_CALIBRATIONS or not np.ptp(t) > 0:
+    if len(t) < FEWEST_FOR_DRIFT or not np.ptp(t) > 0:
         raise TooFewRows(
-            f"a drift needs at least {FEWEST_CALIBRATIONS} calibrations at different times; there are {len(t)}"
+            f"a drift needs at least {FEWEST_FOR_DRIFT} calibrations at different times; there are {len(t)}"
         )
     scatter = _scatter(t, y, u)
     middle = float(np.average(t, weights=1 / (u**2 + scatter**2)))
@@ -166,13 +162,11 @@ def _scatter(t: Array, y: Array, u: Array) -> float:
 
 # A straight line through repeated measurements: the drift of a reference pose.
 
-FEWEST_TREND_POINTS = 3  # fewer cannot separate a trend from scatter
-
 
 def fit_trend(times: Array, values: Array) -> tuple[float, float]:
     """(slope, its standard error from the scatter about the line), shape (n,) each. Raises TooFewRows."""
-    if len(times) < FEWEST_TREND_POINTS:
-        raise TooFewRows(f"a trend needs at least {FEWEST_TREND_POINTS} measurements; there are {len(times)}")
+    if len(times) < FEWEST_FOR_DRIFT:
+        raise TooFewRows(f"a trend needs at least {FEWEST_FOR_DRIFT} measurements; there are {len(times)}")
     away = times - times.mean()
     slope = float(away @ values / (away @ away))
     left = values - values.mean() - slope * away

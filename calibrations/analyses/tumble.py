@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrations.criteria import UPRIGHT_COSINE
 from calibrations.errors import DataError
 from calibrations.estimators.least_squares import least_squares
 from calibrations.noise.mean_noise import white_std
@@ -28,8 +29,6 @@ from calibrations.table import Array, Table
 #
 # Source  Ferraris, Grimaldi and Parvis, Procedure for effortless in-field calibration of three-axis rate gyros and
 #         accelerometers, Sensors and Materials 7 (1995); IEEE Std 1293, two-point tumble; Ang (1)-(2).
-
-UPRIGHT_COSINE = 0.94  # cosine between edge and vertical: within 20 deg the edge counts as upright
 
 
 @dataclass(frozen=True)

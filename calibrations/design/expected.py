@@ -18,7 +18,7 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.special import ndtr
 
-from calibrations.criteria import INSEPARABLE
+from calibrations.criteria import INSEPARABLE, NAMED_GAIN
 from calibrations.design.optimal_design import noise_on_rows
 from calibrations.errors import DataError, MissingColumn
 from calibrations.fit import Fit
@@ -32,8 +32,6 @@ from calibrations.problem import Problem
 from calibrations.table import AXES, Array, Constant, Table
 from calibrations.tables import KINDS
 
-CERTAIN_PROBABILITY = 0.95  # probability of telling two explanations apart with which an experiment is worth its time
-NAMED = 20.0  # a gain of two parameters that has a chance of 0.003 on noise, in a search worth some 60 trials
 ROUNDS, CLOSE_GAIN = 12, 1e-2  # evaluations, and the relative change of lambda at which they end
 
 
@@ -61,7 +59,7 @@ class Expected:
     @property
     def probability_alone(self) -> float:
         """Of finding that something is missing, and telling what, by its own data."""
-        return min(pairs_separated(self.alone), _beyond(self.visible, NAMED))
+        return min(pairs_separated(self.alone), _beyond(self.visible, NAMED_GAIN))
 
 
 def expected_gain(best: Fit, rival: Fit, table: Table) -> Expected:

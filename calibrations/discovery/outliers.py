@@ -15,14 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from calibrations.criteria import GROSS, MOST_GROSS
+from calibrations.criteria import GROSS, MOST_GROSS, SAME_G
 from calibrations.fit import Fit, fit
 from calibrations.geometry.orientation import nominal_pose, specific_force
 from calibrations.model import Model
 from calibrations.table import Array, Table
 
 NEIGHBOURS = 6
-SAME_G = 1e-3  # apart: the same pose
 COUNTED = "(counted from 0, excluded ones too)"
 LEAVE_OUT = (
     "look at them, then leave them out of every analysis (`rig exclude RUN POSE --reason TEXT`; in a file, a column "

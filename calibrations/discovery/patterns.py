@@ -13,7 +13,7 @@ from functools import partial
 
 import numpy as np
 
-from calibrations.criteria import PATTERN_BETTER
+from calibrations.criteria import FEWEST_LEVELS, PATTERN_BETTER
 from calibrations.geometry.orientation import nominal_pose, specific_force
 from calibrations.table import Array, Table
 
@@ -28,7 +28,6 @@ SECTOR_WIDTH_DEG = 30.0
 FINER_WIDTHS_DEG = (10.0, 15.0, 20.0, 25.0, 30.0, 40.0, 50.0, 60.0)
 LEVELS = 12  # of a column, that a step could be at
 NEIGHBOURS = 200  # of a step, at most, once it is found
-FEWEST_LEVELS = 12  # values of a column that has levels
 MOST_WAVES = 40  # along the record
 FINER_WAVES = 21
 

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Generic, Protocol, Self, TypeVar
 
-from calibrations.criteria import NOTEWORTHY
+from calibrations.criteria import LIKELY, NOTEWORTHY
 from calibrations.discovery.verdict import Closest, Judgement, Verdict
 from calibrations.effects import Effect
 from calibrations.model import Model
@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from calibrations.discovery.dataset import Dataset
     from calibrations.discovery.patterns import Pattern
     from calibrations.plausibility import Finding
-
-LIKELY = 0.5  # probability of a candidate that is worth a sentence though it is not significant
 
 
 class Measured(Protocol):

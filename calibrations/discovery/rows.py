@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from calibrations.criteria import MATERIAL, REFINEMENT
+from calibrations.criteria import FEWEST_FOR_FLOOR, MATERIAL, REFINEMENT, WRONG_FLOOR
 from calibrations.design.experiment import separating_experiment
 from calibrations.discovery.candidates import candidates, with_rivals
 from calibrations.discovery.dataset import Cells, Dataset
@@ -47,7 +47,6 @@ FITTED_TO_MOTION = (
     "models of the run's sweep with the displacement sensor: they are not fitted to the motion, so that their error "
     "also contains changes since the sweep and the error of the reference."
 )
-NOTHING_LIKE_IT, SOME_ROWS = 0.5, 20  # error over the noise floor, and rows, that a correct noise floor does not leave
 
 
 @dataclass(frozen=True, eq=False)
@@ -334,7 +333,7 @@ class Rows(Dataset[Fit]):
 
     def remarks(self, found: Fit) -> list[str]:
         """A residual below the noise floor, which only a wrong floor leaves."""
-        if not found.noise.known or found.pooled_excess > NOTHING_LIKE_IT or found.table.n < SOME_ROWS:
+        if not found.noise.known or found.pooled_excess > WRONG_FLOOR or found.table.n < FEWEST_FOR_FLOOR:
             return []
         return ["The error is smaller than the noise floor: check the standard deviations and n of these means."]
 

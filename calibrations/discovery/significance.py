@@ -14,11 +14,11 @@ from functools import cached_property
 import numpy as np
 from scipy.special import chdtrc, fdtrc
 
+from calibrations.criteria import NOT_SHOWN
 from calibrations.fit import Fit
 from calibrations.table import Array
 
 DRAWS = 300
-SMALLEST = 1e-2  # of a column's length: what the model leaves less of, this data cannot show beside it
 ROUNDING = 1e-11  # of a column's length: what rounding leaves of a column that the model holds
 NEARLY = 1e-6  # least eigenvalue of a Gram matrix of columns of length 1: less has too few digits left for 1e-9
 
@@ -45,7 +45,7 @@ class Screen:
 
     def basis(self, columns: Array) -> Array:
         """Orthonormal basis of what `columns` (channels, n, k) could add to the model, shape (rows, rank)."""
-        return _beside(self.fit.noise.whiten(columns), self.explained, SMALLEST)
+        return _beside(self.fit.noise.whiten(columns), self.explained, NOT_SHOWN)
 
     def reductions(self, columns: Sequence[Array]) -> Array:
         """What the residual's sum of squares falls by with each of `columns`, (channels, n, k) each."""

@@ -28,6 +28,7 @@ from itertools import product
 
 import numpy as np
 
+from calibrations.criteria import LEAST_TAU_RATIO
 from calibrations.estimators.kalman import Belief, correct, predict
 from calibrations.table import Array
 
@@ -36,7 +37,6 @@ SIZE = 14
 TAU_STEP = np.array([0.4, 0.8])  # of a logarithm of a time constant, the slower and the faster one
 TAUS_S = np.exp(np.arange(np.log(150.0), np.log(100e3), TAU_STEP[0]))
 FAST_S = np.exp(np.arange(np.log(60.0), np.log(1300.0), TAU_STEP[1]))
-LEAST_TAU_RATIO = 3.0  # nearer than this factor, two time constants are one to any noise
 USUAL_S, USUAL_LN_SPREAD = 5400.0, 0.8  # of a slow time constant beforehand: its median, and the std of its logarithm
 APPROACH_PRIOR = (0.3, 0.4, 0.3)  # probability beforehand of no exponential, one, two
 SLOW_S = np.array([120.0, 800.0, 5e3, 3e4, 1.8e5])  # time constants of slow noise

@@ -24,13 +24,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
+from calibrations.criteria import COVERAGE
 from calibrations.fit import Fit, cautiously
 from calibrations.fitting.identifiability import covariance, gain
 from calibrations.fitting.inputs import Contribution
 from calibrations.noise.means import Noise
 from calibrations.table import Array
 
-COVERAGE_LEVEL = 0.95
 SLOW_NOISE = "slow noise"
 CHUNK = 512  # columns whitened at a time
 MOST_CORRELATED_ROWS = 400  # rows that the freedom of slow noise is worked out on
@@ -89,7 +89,7 @@ class Budget:
     def coverage(self) -> Array:
         """Coverage factor of each parameter for 95 %, from the whole degrees of freedom (GUM G.4.1)."""
         whole = np.minimum(np.maximum(np.floor(np.where(np.isnan(self.freedom), 1e9, self.freedom)), 1), 1e9)
-        return np.asarray(stdtrit(whole, (1 + COVERAGE_LEVEL) / 2))
+        return np.asarray(stdtrit(whole, (1 + COVERAGE) / 2))
 
     @cached_property
     def expanded(self) -> Array:

@@ -20,15 +20,18 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.special import bdtrc, chdtrc, fdtrc
 
-from calibrations.criteria import INSEPARABLE, SIGNIFICANT
+from calibrations.criteria import (
+    FEWEST_SENSORS,
+    INSEPARABLE,
+    LEAST_GAINING_SHARE,
+    LEAST_SHARED_GAIN,
+    MOST_SCORE_LENGTH,
+    SIGNIFICANT,
+)
 from calibrations.fleet.look import Score, Screening
 from calibrations.fleet.rigs import RigError
 from calibrations.table import Array
 
-FEWEST_SENSORS = 4  # sensors that make a batch
-MOST_SCORE_LENGTH = 2.0  # times the length of the median score: what one sensor may say
-LEAST_GAIN = 2.0  # fall of the sum of squares for each parameter that is worth having it (Mallows' C_p)
-LEAST_GAINING_SHARE = 0.5  # of the sensors that gain from an effect of their batch
 SMALLEST_EIGENVALUE = 1e-9  # eigenvalue of a covariance of scores, over the greatest: less is rounding
 
 
@@ -119,10 +122,10 @@ def _bounded(scores: list[Score]) -> tuple[Array, Array]:
 
 def _own(statistics: Array, ranks: Array) -> float:
     """Chance that noise makes as many sensors gain from the effect; 1 where they are fewer than MOST."""
-    n, gaining = len(statistics), int(np.sum(statistics > LEAST_GAIN * ranks))
+    n, gaining = len(statistics), int(np.sum(statistics > LEAST_SHARED_GAIN * ranks))
     if gaining < LEAST_GAINING_SHARE * n:
         return 1.0
-    each = float(np.max(chdtrc(ranks, LEAST_GAIN * ranks)))
+    each = float(np.max(chdtrc(ranks, LEAST_SHARED_GAIN * ranks)))
     return float(bdtrc(gaining - 1, n, each))
 
 

@@ -20,10 +20,11 @@ from typing import TypeVar
 import numpy as np
 from scipy.special import chdtrc, fdtrc
 
+from calibrations.criteria import NOT_SHOWN, POSSIBLY_SLOW
 from calibrations.discovery.candidates import askable
 from calibrations.discovery.outliers import fit_without
 from calibrations.discovery.patterns import patterns
-from calibrations.discovery.significance import SMALLEST, Screen, Search, of_search
+from calibrations.discovery.significance import Screen, Search, of_search
 from calibrations.discovery.structure import without_slow
 from calibrations.effects import Effect
 from calibrations.fit import Fit, cautiously
@@ -159,8 +160,6 @@ def _trials(found: Fit, groups: list[Group]) -> float:
 
 LEAST_RANK = 1e-10  # eigenvalue of a Gram matrix of columns of length 1: less is rounding
 
-LIKELY = 0.05  # chance, if all that is slow were an effect's, below which it is weighed against slow noise
-
 
 @dataclass(frozen=True, slots=True)  # a batch of a thousand sensors has 35,000
 class Score:
@@ -259,7 +258,7 @@ def _weighed(
     white = found.noise.whiten(np.concatenate(columns, axis=2))
     size = np.linalg.norm(white, axis=0)
     free = white - screen.explained @ (screen.explained.T @ white)
-    free[:, np.linalg.norm(free, axis=0) <= SMALLEST * size] = 0.0
+    free[:, np.linalg.norm(free, axis=0) <= NOT_SHOWN * size] = 0.0
     gram, along = free.T @ free, free.T @ screen.residual
     edges = np.cumsum([0, *(each.shape[2] for each in columns)])
     blocks = [slice(a, b) for a, b in pairwise(edges)]
@@ -299,7 +298,11 @@ def _beside_slow_noise(found: Fit, groups: SearchGroups, columns: list[Array], r
     effects = [k for k, group in enumerate(groups.all) if group.effect and ranks[k]]
     if not effects or not np.any(found.noise.slow):
         return p_values
-    tried = [k for k, p in zip(effects, _without_slow(found, [columns[k] for k in effects]), strict=True) if p < LIKELY]
+    tried = [
+        k
+        for k, p in zip(effects, _without_slow(found, [columns[k] for k in effects]), strict=True)
+        if p < POSSIBLY_SLOW
+    ]
     scaled = [columns[k] / np.maximum(np.sqrt(np.sum(columns[k] ** 2, axis=(0, 1))), 1e-300) for k in tried]
     smooth = found.problem.smooth
     worth = np.array(gains(found.noise, found.residual, found.jacobian, scaled, smooth)) if tried else np.zeros(0)

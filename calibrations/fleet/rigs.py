@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.special import fdtrc, stdtr
 
-from calibrations.criteria import SIGNIFICANT
+from calibrations.criteria import FAR_SENSOR, FEWEST_SENSORS_PER_RIG, SIGNIFICANT
 from calibrations.effects import Effect, Values
 from calibrations.fleet.look import StageScore
 from calibrations.geometry.orientation import nominal_pose, specific_force
@@ -59,12 +59,8 @@ def correct_stage_errors(table: Table, errors: StageErrors, effects: Mapping[str
 # each
 # batch was on one rig. StageErrors are therefore told from the median of the rigs that batches connect.
 
-FAR_SPREADS = (
-    5.0  # robust standard deviations off the others of its batch and rig: a sensor that tells nothing of the rig
-)
 TO_STD = 1.4826
 DETERMINED = 1e-8  # share of an information matrix: less is not known
-FEWEST_SENSORS_PER_RIG = 3  # sensors beyond what is estimated
 
 
 @dataclass(frozen=True)
@@ -225,7 +221,7 @@ def _far(sensors: Sequence[Measured], y: Array, v: Array) -> NDArray[np.bool_]:
         places.setdefault((each.batch, each.rig), []).append(k)
     for chosen in map(np.array, places.values()):
         off = np.abs(y[chosen] - np.median(y[chosen]))
-        far[chosen] = off > FAR_SPREADS * np.sqrt((TO_STD * np.median(off)) ** 2 + v[chosen])
+        far[chosen] = off > FAR_SENSOR * np.sqrt((TO_STD * np.median(off)) ** 2 + v[chosen])
     return far
 
 

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr, stdtr
 
+from calibrations.criteria import FALSE_OUTLIER, FEWEST_SIBLINGS, MOST_USUAL
 from calibrations.table import Array
 
 # One quantity of many siblings: its mean and spread in the batch, and what each one's own value is in their light.
@@ -34,11 +35,8 @@ from calibrations.table import Array
 #
 # Source  Gelman et al., Bayesian Data Analysis (3rd ed.), 5.4-5.5, (5.20)-(5.21); Efron and Morris (1975).
 
-FEWEST_SIBLINGS = 3  # siblings that tell a spread: with fewer the posterior of tau is none
 GRID = 80
 HALVINGS = 40
-LEAST_OUTLIER_GAIN = 0.01  # chance of setting any value of a batch apart where all are alike
-MOST_USUAL = 3.0  # robust standard deviations off the median: looked at again without each other
 TO_STD = 1.4826  # median of absolute deviations to standard deviation
 
 
@@ -130,7 +128,7 @@ def fit_siblings(y: Array, v: Array) -> Siblings:
         variance = alike.variance + alike.mean_std**2 + v
         off = np.abs(y - alike.mean) / np.sqrt(variance)
         freedom = max(int(np.sum(~apart)) - 1, 1)
-        apart &= 2 * stdtr(freedom, -off) * len(y) < LEAST_OUTLIER_GAIN
+        apart &= 2 * stdtr(freedom, -off) * len(y) < FALSE_OUTLIER
     return _posterior(y, v, apart)
 
 

@@ -21,14 +21,13 @@ import numpy as np
 import scipy  # its room of interpolation is loaded where it is first entered
 from numpy.typing import ArrayLike
 
+from calibrations.criteria import LONGEST_GAP_DEG, POINT_REACH_DEG
 from calibrations.errors import DataError
 from calibrations.importing.files import open_text_file
 from calibrations.table import Array
 
 COLUMN_NAMES = ("angle_deg", "error_deg", "std_deg")
 TURN_DEG = 360.0
-LONGEST_GAP_DEG = 45.0
-POINT_REACH_DEG = 1.0
 Point = tuple[float, float, float]  # angle, error, standard uncertainty of the error, deg
 
 

@@ -15,13 +15,11 @@ from __future__ import annotations
 import numpy as np
 
 from calibrations.analyses.tumble import estimate_faces
+from calibrations.criteria import LEAST_MAIN_SLOPE, LEAST_OTHER_AXIS, UPRIGHT_COSINE
 from calibrations.errors import DataError
 from calibrations.table import AXES, Array, Table
 
 EARTH_DEG_S = np.degrees(7.292115e-5)
-UPRIGHT_COSINE = 0.94  # cosine between an edge and the vertical: 20 deg
-LEAST_TURN_SHARE = 0.01  # of the mean square rate about another axis: 6 deg off it
-LEAST_MAIN_SHARE = 0.8  # of all outputs' slopes over the rate, by the edge that was turned about
 
 
 def rate_deg_s(table: Table) -> Array:
@@ -40,7 +38,7 @@ def turn_axes(table: Table) -> Array:
     if all(f"a{axis}" in table for axis in AXES):
         return _upright(table)
     found = np.abs(rate_slopes(table))
-    if found.max() < LEAST_MAIN_SHARE * np.linalg.norm(found):
+    if found.max() < LEAST_MAIN_SLOPE * np.linalg.norm(found):
         raise DataError(
             f"{table.source}: more than one output follows the rate, and nothing tells the axis of each turn; add the "
             "columns axis_x, axis_y, axis_z (1, 0, 0 for a turn about x), or ax, ay, az"
@@ -63,7 +61,7 @@ def rate_scales(table: Table) -> Array:
     rate = _changing(table)[:, None] * turn_axes(table)
     away = rate - rate.mean(axis=0)
     squares = np.sum(away**2, axis=0)
-    turned = squares > LEAST_TURN_SHARE * squares.max()
+    turned = squares > LEAST_OTHER_AXIS * squares.max()
     return np.where(turned, np.sum(away * table.outputs, axis=0) / np.where(turned, squares, 1.0), 0.0)
 
 

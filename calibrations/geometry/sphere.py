@@ -12,11 +12,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from calibrations.criteria import MOST_WORSE_COVERED
 from calibrations.importing.raw_logs import sphere_centre
 from calibrations.table import Array, Table
 
 HARD_IRON, SOFT_IRON = 1, 2  # highest degree of what they add to the magnitude
-MOST_WORSE = 10.0
 REMEDIES = {
     HARD_IRON: "turn the sensor about two axes at least",
     SOFT_IRON: "turn the sensor about three axes, each of its sides up and down",
@@ -26,9 +26,9 @@ REMEDIES = {
 def coverage_fault(table: Table, degree: int) -> str | None:
     """Why these directions do not determine harmonics up to `degree`; None where they do."""
     found = worst_ratio(directions(table), degree)
-    if found <= MOST_WORSE:
+    if found <= MOST_WORSE_COVERED:
         return None
-    times = f"{found:.0f} times worse than from as many on all sides, and {MOST_WORSE:g} times is the limit"
+    times = f"{found:.0f} times worse than from as many on all sides, and {MOST_WORSE_COVERED:g} times is the limit"
     known = times if found < 1e4 else "not at all"
     return (
         f"the orientations cover too little of the sphere: something in it would be known {known}; {REMEDIES[degree]}"

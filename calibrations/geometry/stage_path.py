@@ -10,10 +10,9 @@ from functools import lru_cache
 
 import numpy as np
 
+from calibrations.criteria import SHORTEST_APPROACH_DEG
 from calibrations.geometry.orientation import Pose, specific_force
 from calibrations.table import Array, Table
-
-SHORTEST_APPROACH_DEG = 0.5  # a shorter move does not count as an approach
 
 
 @lru_cache(maxsize=8)

@@ -10,27 +10,26 @@ from collections.abc import Callable, Collection, Mapping
 
 import numpy as np
 
+from calibrations.criteria import (
+    COLDEST_C,
+    EARTH_UT,
+    FEWEST_ANGLES,
+    HIGHEST_V,
+    HOTTEST_C,
+    LARGEST_ALPHA_DEG,
+    LARGEST_BETA_DEG,
+    LEAST_DIRECTION_SHARE,
+    LONGEST_M,
+    MOST_MAGNITUDE_SPREAD,
+    STILL_G,
+)
 from calibrations.errors import DataError
 from calibrations.importing.raw_logs import sphere_centre
 from calibrations.importing.units import column_unit
 from calibrations.table import NUMBERS, Array, Table
 
-HIGHEST_V = 50.0  # analog outputs end at the supply, 36 V at most
-HOTTEST_C, COLDEST_C = 200.0, -100.0  # parts are specified from -55 to 125 degC, some to 175
-LONGEST_M = 0.5  # a piezo stage travels 0.1 mm, a shaker a few centimetres
-LARGEST_ALPHA_DEG = 360.0  # an inclination lies within one turn
-LARGEST_BETA_DEG = 3600.0  # ten turns: cables allow fewer
 ARC_MINUTE_DEG = 1 / 60
 ROUNDING_DEG = 1e-3
-FEWEST_ANGLES = 6  # distinct values: the odds that all lie on whole arc minutes by chance are one in millions
-STILL_G = (0.3, 3.0)  # a sensor at rest shows 1 g, its bias and scale factor within reason
-EARTH_UT = (20.0, 70.0)  # on the ground 22 to 67 uT (World Magnetic Model)
-MOST_MAGNITUDE_SPREAD = (
-    0.3  # interquartile range of a magnitude over its median: scale factors of cheap sensors differ by tenths
-)
-LEAST_DIRECTION_SHARE = (  # mean square of directions along their weakest axis; 1/3 over the whole sphere
-    0.01  # mean square of directions along the axis that they have least of, 1/3 over the whole sphere
-)
 Doubt = tuple[str, str]  # the reason, and the unit that would fit, "" for none
 
 

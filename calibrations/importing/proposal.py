@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from calibrations.criteria import FEWEST_POSITIONS
 from calibrations.errors import DataError, MissingConstant
 from calibrations.importing.plausible import covers_all_directions, field_unit, gravity_unit, likely_unit
 from calibrations.importing.raw_logs import average_raw_log
@@ -257,7 +258,6 @@ EXAMPLES = {  # of constants: a value to try with, and what it is
     "sample_rate_hz": (100.0, "the sample rate in Hz"),
     "turn_deg": (360.0, "the angle of each turn in deg"),
 }
-FEWEST_POSITIONS = 4  # the smallest model has as many parameters
 ImportSheet = Callable[[str, Sequence[ColumnMapping], Mapping[str, Constant]], Table]
 
 

@@ -10,6 +10,19 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrations.criteria import (
+    FASTEST_MEANS_S,
+    FEWEST_ROWS_AT_REST,
+    JITTER_DEG,
+    LEAST_HANDLED_SPREAD,
+    LEAST_TURNED_SPREAD,
+    LONGEST_PAUSE,
+    MOST_STILL_NOISE,
+    MOST_UNCERTAIN_INFLATION,
+    SHORTEST_DWELL_SHARE,
+    SHORTEST_PAUSE_S,
+    SHORTEST_STILL_S,
+)
 from calibrations.errors import DataError, MissingConstant
 from calibrations.importing.sessions import average_sections, is_section_log
 from calibrations.noise.mean_noise import measured_inflation
@@ -21,16 +34,8 @@ from calibrations.table import Array, Constant, Table
 # of still windows is trimmed at both ends, where the hand still touches the sensor.
 
 WINDOW_S = 0.5
-SHORTEST_S = 1.0
 TRIM_S = 0.2
 QUIET_QUANTILE = 0.05  # of the windows are certainly still
-MOST_STILL_NOISE = 3.0  # times the quiet standard deviation: a window with less is still
-LEAST_TURNED_SPREAD = (  # times the noise of a sample: gravity on several sides spreads hundreds of times more
-    3.0  # times the noise of a sample, at least, in what gravity on many sides scatters: it is hundreds
-)
-LEAST_HANDLED_SPREAD = (  # times the quiet standard deviation: a hand exceeds it, a log at rest never does
-    10.0  # the same, reached when it is turned by hand; never reached in a log that never rests or only rests
-)
 
 
 def average_still_positions(log: Table, rate_hz: float) -> Table:
@@ -99,7 +104,7 @@ def still_intervals(samples: Array, rate_hz: float) -> list[tuple[int, int]]:
     if np.max(spread) < LEAST_HANDLED_SPREAD * quiet:
         return []
     still = spread < MOST_STILL_NOISE * max(quiet, np.finfo(float).tiny)
-    trim, shortest = round(TRIM_S * rate_hz), round(SHORTEST_S * rate_hz)
+    trim, shortest = round(TRIM_S * rate_hz), round(SHORTEST_STILL_S * rate_hz)
     runs = [(a + trim, b + width - 1 - trim) for a, b in _runs(still)]
     return [(a, b) for a, b in runs if b - a >= shortest]
 
@@ -165,17 +170,8 @@ def thin_by_direction(log: Table) -> Table:
 # means can and the stages rest at all; without times, where most rows stand in such stretches. Poses measured twice
 # or three times stay as they are, and so does a soak with a row every few seconds.
 
-FEWEST_ROWS_AT_REST = 50  # rows at rest in succession
-FASTEST_MEANS_S = 0.5  # between rows: no stage moves and settles in less
-JITTER_DEG = 0.05  # of an encoder at rest, peak to peak; stages resolve 5 arcmin
-SHORTEST_DWELL_SHARE = 0.25  # of the typical dwell: a shorter one is a stage that stops on its way
 SETTLE_S = 0.2  # dropped at each end of a dwell where the log shows the stages moving
-LONGEST_GAP_STEPS, SHORTEST_GAP_S = (
-    20.0,
-    0.2,
-)  # times the usual distance of samples, and at least: the logger paused between two dwells
 MOST_BLOCKS = 256  # stretches for the noise: limits time and memory
-MOST_UNCERTAIN_INFLATION = 0.1  # relative standard error: an inflation known worse is left out
 OUTPUTS = ("vx_v", "vy_v", "vz_v")
 MOUNTING = ("direction", "mount_deg", "flip")
 
@@ -272,7 +268,7 @@ def _changed(log: Table) -> NDArray[np.bool_]:
     changed = np.zeros(log.n, dtype=bool)
     if "t_s" in log:
         gaps = np.abs(np.diff(log.columns["t_s"]))
-        changed[1:] = gaps > max(SHORTEST_GAP_S, LONGEST_GAP_STEPS * float(np.median(gaps)))
+        changed[1:] = gaps > max(SHORTEST_PAUSE_S, LONGEST_PAUSE * float(np.median(gaps)))
     for name in MOUNTING:
         if name in log:
             changed[1:] |= np.diff(log.columns[name]) != 0

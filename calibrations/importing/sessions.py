@@ -16,14 +16,12 @@ from itertools import groupby
 
 import numpy as np
 
+from calibrations.criteria import FEWEST_SECTION_SAMPLES, LEAST_TURN_NOISE, LEAST_TURN_SHARE
 from calibrations.errors import DataError, MissingConstant
 from calibrations.table import Array, Constant, Table
 
 OUTPUTS = ("gx", "gy", "gz")
 RATE = "rate_deg_s"
-FEWEST_SAMPLES_PER_SECTION = 20  # mean number of samples in a section: with fewer, the rows are not samples
-LEAST_TURN_SHARE = 0.2  # of the largest distance from rest: from here on, a section is a turn
-LEAST_TURN_NOISE = 10.0  # times the noise of a sample at rest: a turn by hand is much larger
 
 
 def is_session(kind: str | None, columns: Mapping[str, Array], sections: Sequence[str] | None) -> bool:
@@ -59,7 +57,7 @@ def is_section_log(table: Table) -> bool:
         table.kind == "rates"
         and bool(sections)
         and "n" not in table
-        and table.n > FEWEST_SAMPLES_PER_SECTION * len(_bounds(sections or ()))
+        and table.n > FEWEST_SECTION_SAMPLES * len(_bounds(sections or ()))
     )
 
 

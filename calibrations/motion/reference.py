@@ -16,6 +16,7 @@ import numpy as np
 from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.optimize import minimize_scalar
 
+from calibrations.criteria import FEWEST_MOTION_PERIODS, HIGHEST_MOTION, HIGHEST_MOTION_HZ, MOST_SINES, PROMINENT
 from calibrations.errors import DataError
 from calibrations.motion.spectrum import (
     PAPER_CORNER_HZ,
@@ -39,9 +40,6 @@ from calibrations.table import Array
 NEIGHBOURS = 100  # lines on each side that the density is taken from
 OWN_LINES = 3  # beside the frequency, that the fitted sine has taken up
 ROUNDS = 12
-MOST_SINES = 8
-PROMINENT = 8.0  # times log(lines) the density around it: noise alone shows no such line
-LOWEST_LINE = 4  # periods in the record below which a line is drift
 
 
 @dataclass(frozen=True)
@@ -93,7 +91,7 @@ def strongest_line(t_s: Array, x: Array) -> tuple[float, float]:
     if len(x) < 8:
         raise DataError(f"{len(x)} samples are too few for a sine; it takes 8")
     f, power = periodogram(x, (len(t_s) - 1) / float(np.ptp(t_s)))
-    first = min(LOWEST_LINE, len(f) - 2)
+    first = min(FEWEST_MOTION_PERIODS, len(f) - 2)
     k = first + int(np.argmax(power[first:-1]))
     around = np.median(power[max(first, k - NEIGHBOURS) : k + NEIGHBOURS]) or np.finfo(float).tiny
     low, here, high = np.log(np.maximum(power[k - 1 : k + 2], np.finfo(float).tiny))
@@ -231,8 +229,6 @@ def _penalty(n: int) -> Array:
     return bands
 
 
-HIGHEST_HZ = 30.0  # of a line that is motion, or so many times the strongest's: above it is the probe's hum
-HIGHEST = 1.5
 STENCIL = np.array([-1.0, 16.0, -30.0, 16.0, -1.0]) / 12  # second derivative, of fourth order
 
 
@@ -307,7 +303,11 @@ def reference_acceleration(t_s: Array, displacement_m: Array, rate_hz: float) ->
     found = find_sines(t_s, displacement_m)
     left = displacement_m - sum((line.at(t_s) for line in found), np.zeros(len(t_s)))
     rest = smooth(left - left.mean())
-    most = max(HIGHEST_HZ, HIGHEST * max(found, key=lambda line: line.amplitude).frequency_hz) if found else 0.0
+    most = (
+        max(HIGHEST_MOTION_HZ, HIGHEST_MOTION * max(found, key=lambda line: line.amplitude).frequency_hz)
+        if found
+        else 0.0
+    )
     lines = sorted((line for line in found if line.frequency_hz <= most), key=line_prominence, reverse=True)
     moving = sum((-((2 * np.pi * s.frequency_hz) ** 2) * s.at(t_s) for s in lines), np.zeros(len(t_s)))
     return Reference(moving + second_derivative(rest.values, rate_hz, STENCIL), tuple(lines), rest, rate_hz)

@@ -16,14 +16,12 @@ import scipy  # its signal room, large and seldom needed, is loaded where it is 
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
+from calibrations.criteria import LONGEST_STEP, MOST_UNEVEN, SHORTEST_MOTION_S
 from calibrations.errors import DataError, TooFewRows
 from calibrations.table import AXES, Array, Table
 
 # A table of motion as records: stretches of evenly spaced samples at one attitude, without a gap.
 
-LONGEST_GAP_STEPS = 1.5  # times the usual step of time
-MOST_UNEVEN = 0.75  # of a step: rounded times are less, a lost sample is more
-SHORTEST_S = 2.0
 SAME_RATE = ("alpha_deg", "beta_deg", "mount_deg", "flip", "record")  # throughout a record
 
 
@@ -58,14 +56,15 @@ def find_records(table: Table) -> tuple[Record, ...]:
     if table.n < 2 or not t[-1] > t[0]:
         raise TooFewRows(f"{table.source}: {table.n} samples at one time are no record of a motion")
     step = float(np.median(np.diff(t))) or float(t[-1] - t[0]) / (table.n - 1)
-    cut = np.diff(t) > LONGEST_GAP_STEPS * step
+    cut = np.diff(t) > LONGEST_STEP * step
     for name in SAME_RATE:
         cut |= np.diff(table.optional(name, 0.0)) != 0
     edges = np.concatenate([[0], np.flatnonzero(cut) + 1, [table.n]])
-    long = [(int(a), int(b)) for a, b in pairwise(edges) if (b - a) * step >= SHORTEST_S - step / 2]
+    long = [(int(a), int(b)) for a, b in pairwise(edges) if (b - a) * step >= SHORTEST_MOTION_S - step / 2]
     if not long:
         raise TooFewRows(
-            f"{table.source}: no record lasts {SHORTEST_S:g} s at one attitude without a gap; record the motion longer"
+            f"{table.source}: no record lasts {SHORTEST_MOTION_S:g} s at one attitude without a gap; "
+            "record the motion longer"
         )
     return tuple(_checked(table, t, a, b) for a, b in long)
 

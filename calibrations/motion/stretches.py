@@ -14,6 +14,7 @@ from types import MappingProxyType
 import numpy as np
 from scipy.sparse import csr_array
 
+from calibrations.criteria import FEWEST_MOTION_STRETCHES, LEAST_LINE, LEAST_LINE_WEIGHT
 from calibrations.errors import TooFewRows
 from calibrations.motion.reference import Reference, line_prominence, reference_acceleration
 from calibrations.motion.spectrum import Record, corner_hz, find_records, first_order, periodogram, sample_output
@@ -21,9 +22,7 @@ from calibrations.table import Array, Table
 
 BESIDE_HZ = 8.0  # of a line, on each side: where its noise is taken from
 OWN_LINES = 3  # of a record's spectrum, on each side of a line: the motion's own
-LEAST_LINE = (
-    6.0  # times the median: not of this noise; what lies below has 0.934 of the mean (exponential distribution)
-)
+INLYING_MEAN = 0.934  # of an exponential distribution below LEAST_LINE medians
 
 
 @dataclass(frozen=True)
@@ -83,7 +82,7 @@ def noise_density(samples: Table, lines: Sequence[Line], axis: int) -> Array:
     def beside(at_hz: float) -> float:
         near = density[np.abs(f - at_hz) < BESIDE_HZ]
         inlying = near[near < LEAST_LINE * np.median(near)]
-        return float(np.mean(inlying) / 0.934 * np.abs(low_pass(np.array([at_hz]))[0]) ** 2)
+        return float(np.mean(inlying) / INLYING_MEAN * np.abs(low_pass(np.array([at_hz]))[0]) ** 2)
 
     return np.array([beside(at_hz) for at_hz in (0.0, *(line.at_hz for line in lines))])
 
@@ -113,11 +112,9 @@ def _spectrum(samples: Table, lines: Sequence[Line], axis: int, rows: slice, rat
 #     weights . samples = rows            the model's prediction is reduced by the same weights as the measurement
 
 STRETCHES = 30  # of all records together; slow noise wants 20
-FEWEST_STRETCHES = 6
 EDGE_S = 0.25  # left out at each end of a record: filters settle
 SAMPLES_A_PERIOD = 10  # of the fastest line, after averaging
 SLOWEST_RATE_HZ = 100.0
-LEAST_WEIGHT = 1.0  # times the noise of a row: weaker in every stretch, a line tells nothing
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -161,7 +158,7 @@ def make_stretches(table: Table) -> Stretches:
     slope = _slope(samples, expected)
     length_s = _length_s(found, made)
     cuts = list(_cuts(samples, length_s))
-    if len(cuts) < FEWEST_STRETCHES:
+    if len(cuts) < FEWEST_MOTION_STRETCHES:
         raise TooFewRows(f"{table.source}: the record holds only {len(cuts)} stretches of motion; record it longer")
     lines = _shown(samples, residual_lines(samples, made, expected, length_s), cuts, slope * expected)
     return _rows(table, samples, lines, cuts, slope)
@@ -171,7 +168,7 @@ def _shown(samples: Table, lines: tuple[Line, ...], cuts: list[tuple[int, int]],
     """The lines that stand out of a row's noise in one stretch at least; the strongest in any case."""
     there = np.abs((_weights(lines, cuts, samples.n) @ expected).reshape(-1, len(cuts)))
     white = _white(samples, lines, cuts)[: len(there)]
-    seen = np.any(there > LEAST_WEIGHT * white, axis=1)
+    seen = np.any(there > LEAST_LINE_WEIGHT * white, axis=1)
     return tuple(line for k, line in enumerate(lines) if k == 0 or seen[2 * k + 1])
 
 

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtr, chdtrc, digamma, polygamma
 
+from calibrations.criteria import FILTER_PERIODS
 from calibrations.noise.deviations import Curve
 from calibrations.noise.likelihood import ChannelFit, effect_spectrum
 from calibrations.noise.processes import Sampling
@@ -67,9 +68,6 @@ def _nodes(end: float) -> tuple[Array, Array]:
     return ((edges[:-1, None] + half) + half * NODES).ravel(), (half * WEIGHTS).ravel()
 
 
-BEHIND = 4.0  # periods of a filter's corner from which on it is judged
-
-
 @dataclass(frozen=True)
 class DeviationComparison:
     """Measured and expected deviations at the times that are judged (k,), with the chance of each ratio."""
@@ -107,7 +105,7 @@ class DeviationComparison:
 
 def compare_deviations(found: ChannelFit, curve: Curve) -> DeviationComparison:
     """The measured curve beside the model's. A variance is distributed as chi-square over its degrees of freedom."""
-    judged = curve.tau_s >= (BEHIND / found.channel.corner_hz if np.isfinite(found.channel.corner_hz) else 0.0)
+    judged = curve.tau_s >= (FILTER_PERIODS / found.channel.corner_hz if np.isfinite(found.channel.corner_hz) else 0.0)
     tau_s, measured, edf = curve.tau_s[judged], curve.deviation[judged], curve.edf[judged]
     modelled = deviation(found, tau_s)
     scaled = edf * (measured / modelled) ** 2

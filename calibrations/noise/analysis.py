@@ -18,14 +18,14 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import chdtri
 
-from calibrations.criteria import SPOILT_BY
+from calibrations.criteria import COVERAGE, IDENTIFIED, INTERVAL_STDS, SPOILT_BY
 from calibrations.effects.catalogue import catalogue
 from calibrations.effects.effect import Effect
 from calibrations.model import Estimate
 from calibrations.model.file import read_model
 from calibrations.noise.allan import deviation, variance_parts
 from calibrations.noise.channel_spectrum import Line
-from calibrations.noise.deviations import COVERAGE, OCTAVE_KINDS, OVERLAPPING, Curve
+from calibrations.noise.deviations import OCTAVE_KINDS, OVERLAPPING, Curve
 from calibrations.noise.disturbances import MISFITS, Disturbance, disturbance_document, disturbances
 from calibrations.noise.fit import fit_effects
 from calibrations.noise.likelihood import ChannelFit, effect_spectrum, log_likelihood, maximise
@@ -39,8 +39,6 @@ ORDER = (
     "white-noise", "flicker-noise", "rate-random-walk", "quantisation-noise", "sinusoidal-noise", "gauss-markov-noise",
 )  # fmt: skip
 SLOW = ("flicker-noise", "rate-random-walk")  # a weak one may be present beside any process, and widens its bound
-TO_BOUND = 1.96  # standard deviations
-BOUND = 3.84  # fall of twice the log-likelihood at the ends of a 95 % interval
 SPOILT = {WILD: ("white-noise", "quantisation-noise")}  # wild samples change fast noise alone
 
 
@@ -143,7 +141,7 @@ class ChannelNoise:
             return Coefficient(strength.value, strength.std or 0.0, unit, None, time_s, None, rivals)
         value, upper, values = upper_bound(self.fit, effect, self._beside(effect))
         time_s = next(iter(list(values.values())[1:]), None)
-        return Coefficient(value, (upper - value) / TO_BOUND, unit, upper, time_s, None, rivals)
+        return Coefficient(value, (upper - value) / INTERVAL_STDS, unit, upper, time_s, None, rivals)
 
     def _estimates(self, effect: Effect) -> list[Estimate]:
         """Of an effect's parameters in this channel, as every command shows them; none for an effect not in the fit."""
@@ -159,7 +157,7 @@ class ChannelNoise:
 
     def _sinusoid(self, unit: str) -> Coefficient:
         if not self.lines:
-            return Coefficient(0.0, self.fit.line_bound / TO_BOUND, unit, self.fit.line_bound)
+            return Coefficient(0.0, self.fit.line_bound / INTERVAL_STDS, unit, self.fit.line_bound)
         line = self.lines[0]
         return Coefficient(line.amplitude, line.std, unit, None, None, line.frequency_hz)
 
@@ -219,7 +217,7 @@ def upper_bound(fit: ChannelFit, effect: Effect, beside: Sequence[Effect]) -> tu
             if others
             else log_likelihood(base, fit.seen, fit.freedom)
         )
-        return 2 * (most.log_likelihood - float(value)) - BOUND
+        return 2 * (most.log_likelihood - float(value)) - IDENTIFIED
 
     weight = column / most.expected
     low = float(np.log(max(power, 1e-3 / np.sqrt(np.sum(fit.freedom * weight**2)))))
@@ -239,7 +237,7 @@ def _channels(record: Still, found: Search) -> dict[str, ChannelNoise]:
 def _below_step(hidden: Hidden, name: str, unit: str) -> Coefficient:
     """What is known of a process where the noise is below one step of the converter."""
     upper = hidden.white_below if name == "white-noise" else np.inf
-    return Coefficient(0.0, upper / TO_BOUND, unit, upper)
+    return Coefficient(0.0, upper / INTERVAL_STDS, unit, upper)
 
 
 def _differ(before: Coefficient, after: Coefficient) -> bool:

@@ -18,8 +18,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from calibrations.criteria import LEAST_WHITE, SLOWEST_FILTER_HZ
-from calibrations.design.expected import CERTAIN_PROBABILITY, Expected, pairs_separated
+from calibrations.criteria import CERTAIN_PROBABILITY, LEAST_WHITE, LONGEST_RECORD_S, SLOWEST_FILTER_HZ
+from calibrations.design.expected import Expected, pairs_separated
 from calibrations.design.experiment import TWO_HZ, Experiment, experiment_by_physics
 from calibrations.noise.disturbances import MISFITS, disturbances
 from calibrations.noise.fit import fit_effects
@@ -43,7 +43,6 @@ from calibrations.noise.spectrum import Bands, slow_bands
 
 LONGER = (2, 4, 8, 16, 32, 64)  # times the record at hand
 MEANS = 1 << 14  # of a record that is foreseen
-NIGHTS_S = 7 * 86400.0  # beyond which nobody waits
 PROCEDURE = "noise-floor"
 LONGER_SEPARATES = "a longer record holds more periods of what is slow, where the two differ"
 REPEAT_SHOWS = (
@@ -95,7 +94,7 @@ def separating_record(found: Search, named: tuple[str, ...]) -> Experiment | Non
     if not rivals:
         return None
     pairs = tuple((name, rival) for rival in rivals)
-    lengths = [k * found.still.length_s for k in LONGER if k * found.still.length_s <= NIGHTS_S]
+    lengths = [k * found.still.length_s for k in LONGER if k * found.still.length_s <= LONGEST_RECORD_S]
     lengths = lengths or [2 * found.still.length_s]
     foreseen = [(length_s, _information(found, name, rivals, length_s)) for length_s in lengths]
     chosen = next((each for each in foreseen if pairs_separated(each[1]) >= CERTAIN_PROBABILITY), foreseen[-1])

@@ -19,7 +19,7 @@ from scipy.ndimage import median_filter, uniform_filter1d
 from scipy.optimize import minimize_scalar
 from scipy.special import chdtrc
 
-from calibrations.criteria import FALSE_LINE, FEWEST_PERIODS
+from calibrations.criteria import FALSE_LINE, FEWEST_FAST_STRETCHES, FEWEST_PERIODS, MOST_FAST_LINES
 from calibrations.noise.processes import Sampling
 from calibrations.noise.record import Channel
 from calibrations.noise.spectrum import LENGTH, WINDOW, Bands, fast_bands, slow_bands
@@ -32,7 +32,6 @@ from calibrations.table import Array
 # Source  Rife and Boorstyn, IEEE Trans. Inf. Theory 20 (1974): frequency and amplitude of a tone, and their
 # variances.
 
-MOST = 8
 LOBE = 3  # ordinates on each side that a line reaches under the window
 AROUND = 65  # ordinates that tell the noise around a line
 CENTROID = 0.02  # ordinates by which the middle of a line may be off
@@ -105,7 +104,7 @@ def fast_lines(f: Array, density: Array, freedom: float, above_hz: float, length
     """(densities (f,) with the lines taken off, the lines above a frequency, strongest first)."""
     around = _median_around(density)
     found, left = [], density.copy()
-    for _ in range(MOST):
+    for _ in range(MOST_FAST_LINES):
         height = np.where(f > above_hz, left / around, 0.0)
         best = int(np.argmax(height))
         if not len(f) * chdtrc(freedom, freedom * height[best]) < FALSE_LINE:
@@ -123,7 +122,6 @@ def fast_lines(f: Array, density: Array, freedom: float, above_hz: float, length
 
 Lines = tuple[Line, ...]
 REACH = 16  # ordinates to each side that a line has a share in
-FEWEST_STRETCHES = 3  # stretches without which there is no fast spectrum
 LEAST_DENSITY = 0.05  # of the density around: what is left where a line was taken off
 
 
@@ -167,7 +165,7 @@ def fast_without(channel: Channel, lines: Iterable[Line]) -> tuple[Array, Array]
     """(frequencies, densities) of the ordinates that the means' bands do not reach, less the lines."""
     f, density = channel.segments.frequency_hz, channel.segments.density
     above_hz = min(0.5 / channel.sampling.interval_s, channel.corner_hz / 2)
-    chosen = f > (above_hz if int(channel.segments.stretches.sum()) >= FEWEST_STRETCHES else np.inf)
+    chosen = f > (above_hz if int(channel.segments.stretches.sum()) >= FEWEST_FAST_STRETCHES else np.inf)
     f, density = f[chosen], density[chosen].copy()
     for line in lines:
         near = np.flatnonzero(np.abs(f - line.frequency_hz) < REACH * channel.rate_hz / LENGTH)

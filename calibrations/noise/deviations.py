@@ -36,7 +36,7 @@ from typing import Any
 import numpy as np
 from scipy.special import chdtri, fdtrc, xlogy
 
-from calibrations.criteria import FALSE_MINIMUM
+from calibrations.criteria import COVERAGE, FALSE_MINIMUM, FEWEST_MEANS
 from calibrations.errors import DataError, TooFewRows
 from calibrations.noise.kernels import (
     ALLAN,
@@ -174,7 +174,6 @@ def _octave_noise_type(tree: Tree, octave: int) -> int:
     return 0
 
 
-COVERAGE = 0.95
 LARGEST_FILTER = 1024  # samples to an averaging time beyond which it might as well be continuous
 SHORT = 32  # samples to an averaging time below which a total deviation is an overlapping one
 MOST_OVERLAP = 64  # windows to an averaging time beyond which more say nothing, but of noise of the phase
@@ -251,9 +250,6 @@ def _averaged(t: Array, factor: float, alpha: int) -> Array:
     return np.asarray(factor**2 * (2 * w(t) - w(t - step) - w(t + step)))
 
 
-FEWEST_MEANS = (
-    120  # means: of fewer the correlation is too uncertain to tell a type from the next, by 2.7 standard errors
-)
 STATIONARY = 0.25  # order of integration up to which noise need not be differenced
 REDDEST, BLUEST = -3, 2
 

@@ -19,7 +19,7 @@ from functools import cached_property
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from calibrations.criteria import IDENTIFIED
+from calibrations.criteria import IDENTIFIED, INTERVAL_STDS
 from calibrations.effects import Effect
 from calibrations.errors import ModelError
 from calibrations.model import Estimate, Model, Term
@@ -29,8 +29,8 @@ from calibrations.noise.record import Channel, Still
 from calibrations.noise.samples import hidden_in
 from calibrations.table import Array
 
+ONE_SIDED_STDS = 1.645  # standard deviations of a one-sided bound of 95 %
 DERIVATIVE_STEP = 1e-3  # of a value, for the derivative
-ONE_SIDED_95, TWO_SIDED_95 = 1.645, 1.96  # standard deviations of a normal distribution
 
 
 def estimates(found: ChannelFit, effect: Effect, unit: str) -> Iterator[Estimate]:
@@ -50,12 +50,12 @@ def _spectrum_estimates(found: ChannelFit, effect: Effect, unit: str) -> Iterato
     power, deviations = values[strength.name] ** 2, power_deviations(found)
     of_power = deviations[effect.name, strength.name]
     identified = gain_of(found, effect) > IDENTIFIED
-    below = float(np.sqrt(power + ONE_SIDED_95 * of_power))
+    below = float(np.sqrt(power + ONE_SIDED_STDS * of_power))
     for p in effect.parameters:
         own = p.unit.replace("{out}", unit)
         if not identified:
             why = f"this record does not tell it from none; {strength.name} is below {below:.2g} {own}"
-            std = below / ONE_SIDED_95 if p is strength else None
+            std = below / ONE_SIDED_STDS if p is strength else None
             yield Estimate(p.name, axis, values[p.name], std, own, False, why if p is strength else "there may be none")
         elif p is strength:
             yield Estimate(p.name, axis, values[p.name], of_power / (2 * values[p.name]), own)
@@ -101,7 +101,7 @@ def _line_estimates(found: ChannelFit, unit: str) -> Iterator[Estimate]:
         yield Estimate(f"frequency_{k}", axis, float(line.frequency_hz), float(line.std_hz), "Hz")
     if not found.lines:
         why = f"no line stands out; one of less than {found.line_bound:.2g} {unit} would not"
-        yield Estimate("amplitude_1", axis, 0.0, float(found.line_bound / TWO_SIDED_95), unit, False, why)
+        yield Estimate("amplitude_1", axis, 0.0, float(found.line_bound / INTERVAL_STDS), unit, False, why)
 
 
 # A noise model fitted to a still record: coefficients of every channel by Whittle's likelihood, with uncertainties.

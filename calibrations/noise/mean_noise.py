@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from calibrations.criteria import NO_SCATTER
 from calibrations.table import Array, Table
 
 WINDOW = 6.0  # lags summed, at least, and in correlation times: exp(-6) of an exponential's sum is left out
-NOTHING = 1e-3  # of the usual scatter: less is none, but for rounding
 
 
 def white_std(table: Table) -> Array | None:
@@ -28,7 +28,7 @@ def white_std(table: Table) -> Array | None:
     usual = np.median(std, axis=0)
     if not np.all(usual > 0):
         return None
-    std = np.where(std > NOTHING * usual, std, usual)
+    std = np.where(std > NO_SCATTER * usual, std, usual)
     factors = np.array([inflation(table, axis) for axis in table.axes])
     mean: Array = std * np.sqrt(factors / table.column("n")[:, None])
     return mean

@@ -19,6 +19,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from calibrations.criteria import FEWEST_FOR_SLOW, INSEPARABLE, NOT_SHOWN
 from calibrations.kernels import whiten
 from calibrations.noise.means import Noise, Processes, processes, rms
 from calibrations.table import Array
@@ -106,12 +107,9 @@ RATIOS = (0.2, 0.3, 0.45, 0.7, 1.0, 1.4, 2.0)  # slow noise over white and scatt
 FLICKER_RATIOS = (*RATIOS, 2.8, 4.0)  # flicker spreads over all times, and less of it is drift
 TIME_CONSTANTS = 4
 FLICKER_PROCESSES = 6
-INSEPARABLE = 6.0  # of twice the log-likelihood: odds of less than 20 to 1
-FEWEST_FOR_SLOW = 20  # rows below which slow noise cannot be told from white
 ROUNDS = 3
 LEAST_STEP = 1e-9  # of the noise: less than this in one round is an exact fit, and no noise
 EXACT = 1e-12  # of a parameter's effect: noise below this is rounding
-NEARLY_SMOOTH = 1e-2  # of a column's length: less beside the smooth columns is taken as none
 
 
 def estimate(start: Noise, residual: Array, jacobian: Array, smooth: Array) -> Noise:
@@ -225,7 +223,7 @@ class NoiseSearch:
         for k in range(free.shape[1]):
             column = free[:, k] - kept @ (kept.T @ free[:, k])
             column -= kept @ (kept.T @ column)
-            if np.linalg.norm(column) > NEARLY_SMOOTH * size[k] > 0:
+            if np.linalg.norm(column) > NOT_SHOWN * size[k] > 0:
                 kept = np.column_stack([kept, column / np.linalg.norm(column)])
         return kept[:, first.shape[1] :]
 

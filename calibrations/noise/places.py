@@ -18,7 +18,7 @@ import numpy as np
 from scipy.fft import dct
 from scipy.special import chdtr, chdtrc
 
-from calibrations.criteria import NEGLIGIBLE, SIGNIFICANT
+from calibrations.criteria import FEWEST_LEVEL_ORDINATES, NEGLIGIBLE, SIGNIFICANT
 from calibrations.discovery.results import Place
 from calibrations.errors import DataError
 from calibrations.model import Model
@@ -182,7 +182,6 @@ def _text(found: ChannelFit, curve: DeviationComparison, low: float, high: float
 
 PARTS = 8
 TREND_SHARE = 0.25  # of a part's ordinates, that tell of its trend
-FEWEST_LEVEL_ORDINATES = 8  # ordinates of a part that tell of its level
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@ import numpy as np
 from scipy.fft import dct, idct
 from scipy.optimize import minimize_scalar
 
+from calibrations.criteria import FEWEST_ORDINATES, FEWEST_SAMPLES
 from calibrations.errors import DataError, TooFewRows
 from calibrations.noise.deviations import OCTAVE_KINDS, OVERLAPPING, Curve, Octaves
 from calibrations.noise.processes import Sampling
@@ -28,7 +29,6 @@ from calibrations.noise.spectrum import Means, Segments, Welch
 from calibrations.table import Array
 
 LOG_RATIOS = (-12.0, 16.0)  # of the variances of scatter and of a level's steps, that are looked through
-FEWEST_ORDINATES = 16  # ordinates from which a scatter can be told at all
 SLOPES = (0.5, 1.0, 1.5, 2.0)  # of a level's spectrum in powers of the frequency: 1 flickers, 2 walks
 NODES = ((-(3**0.5), 1 / 6), (0.0, 2 / 3), (3**0.5, 1 / 6))  # of a normal distribution, and weights (Gauss, Hermite)
 CURVATURE_STEP = 0.1  # of the logarithm of a ratio: a step in which the likelihood is a parabola
@@ -127,8 +127,6 @@ def _deviance_of_ratio(log_ratio: float, power: Array, level: Array) -> float:
 
 
 # A still record of any length, reduced in one pass to all that its noise is told from.
-
-FEWEST_SAMPLES = 64  # samples below which nothing can be said
 
 
 class Reduction:

@@ -30,6 +30,9 @@ from numpy.typing import NDArray
 from calibrations.criteria import (
     CLIPPED,
     CLIPPED_BEYOND_USUAL,
+    FEWEST_FOR_SCALE,
+    FILTER_PERIODS,
+    LEAST_DITHER,
     MOST_WILD,
     SHORTEST_STUCK,
     STUCK_BEYOND_CHANCE,
@@ -39,10 +42,8 @@ from calibrations.errors import DataError
 from calibrations.noise.deviations import Curve
 from calibrations.table import Array
 
-HALF = 0.5  # of a step: noise that rounding leaves as it is
-LEAST = HALF**2 + 1 / 12  # of a step's square: such noise, and what rounding adds
+LEAST = LEAST_DITHER**2 + 1 / 12  # of a step's square: such noise, and what rounding adds
 SOON = 64  # samples within which noise has to come to that
-BEHIND = 4.0  # periods of a low-pass after which noise averages as if there were none
 FASTEST = ("white-noise", "quantisation-noise")  # what is hidden at least
 
 
@@ -96,7 +97,7 @@ class Steps:
         limit = LEAST * self._step**2
         if not np.isfinite(self._step) or _reaching(curve, rate_hz, corner_hz) >= limit:
             return None
-        below = HALF * self._step / float(np.sqrt(min(rate_hz, np.pi * corner_hz)))
+        below = LEAST_DITHER * self._step / float(np.sqrt(min(rate_hz, np.pi * corner_hz)))
         levels = round((self._high - self._low) / self._step) + 1
         return Hidden(self._step, levels, below, bool(np.max(curve.deviation**2) < limit))
 
@@ -114,13 +115,12 @@ def _reaching(curve: Curve, rate_hz: float, corner_hz: float) -> float:
     soon = float(np.max(variance[curve.tau_s <= SOON / rate_hz]))
     if not np.isfinite(corner_hz):
         return soon
-    at = min(int(np.searchsorted(curve.tau_s, BEHIND / corner_hz)), len(variance) - 1)
+    at = min(int(np.searchsorted(curve.tau_s, FILTER_PERIODS / corner_hz)), len(variance) - 1)
     return max(soon, float(variance[at] * curve.tau_s[at]) * min(rate_hz, np.pi * corner_hz))
 
 
 PART = 4096  # samples whose scale is common
 SIDE = 3  # samples to each side
-FEWEST = 256  # samples that have a scale of their own
 DECILE, NORMAL = 0.9, 1.6449  # and where it is in a normal distribution, in standard deviations
 
 
@@ -171,7 +171,7 @@ class Outliers:
         """All but the outer samples of a part."""
         middle = part[SIDE:-SIDE]
         left, right = middle - _median(part, 0), middle - _median(part, SIDE + 1)
-        if len(middle) >= FEWEST or not self._scale:
+        if len(middle) >= FEWEST_FOR_SCALE or not self._scale:
             self._scale = float(np.quantile(np.abs(left), DECILE)) / NORMAL
         off = np.where(np.sign(left) == np.sign(right), np.minimum(np.abs(left), np.abs(right)), 0.0)
         wild = np.flatnonzero(off > WILD_SAMPLE * self._scale)

@@ -16,7 +16,7 @@ from functools import cached_property
 
 import numpy as np
 
-from calibrations.criteria import AT_LONGEST_TIME, INSEPARABLE
+from calibrations.criteria import AT_LONGEST_TIME, INSEPARABLE, MOST_PATTERNS
 from calibrations.discovery.results import Candidate
 from calibrations.effects import Effect
 from calibrations.model import Model
@@ -45,8 +45,6 @@ from calibrations.noise.telegraph import Telegraph, telegraph_of
 # 3. a step, a drift, or what follows a logged column is taken off as well where it makes needless a process that
 # would
 #    stand for it; and once more, as long as there is one.
-
-MOST_PATTERNS = 3  # of a channel
 
 
 @dataclass(frozen=True)

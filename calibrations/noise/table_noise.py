@@ -19,6 +19,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from calibrations.criteria import FEWEST_FREE_ROWS
 from calibrations.errors import DataError, ModelError
 from calibrations.geometry.rate_table import rate_deg_s, specific_force_g
 from calibrations.geometry.sphere import SOFT_IRON, coverage_fault
@@ -84,7 +85,6 @@ def _flicker(coefficient: float, fastest_s: float, slowest_s: float) -> Processe
 # Source  Draper and Smith, Applied Regression Analysis, on lack of fit: pure error by the widest model.
 
 FORMS = {"fields": "an ellipsoid", "rates": "outputs linear in rates and specific forces"}
-FEWEST_FREE_ROWS = 2  # rows more than the form has parameters
 
 
 def scatter(table: Table) -> Array | None:

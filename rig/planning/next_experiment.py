@@ -14,14 +14,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from calibrations.design.expected import (
-    CERTAIN_PROBABILITY,
-    Expected,
-    expected_gain,
-    pairs_separated,
-    predict_data,
-    vary_one_way,
-)
+from calibrations.criteria import CERTAIN_PROBABILITY
+from calibrations.design.expected import Expected, expected_gain, pairs_separated, predict_data, vary_one_way
 from calibrations.design.experiment import MENU, Experiment
 from calibrations.discovery.results import Diagnosis, Discovery
 from calibrations.effects import Effect

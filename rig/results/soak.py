@@ -8,8 +8,9 @@ from itertools import groupby
 import numpy as np
 
 from calibrations.analyses.forecast import ForecastHistory, forecast_history, steady_time
-from calibrations.analyses.soak import AXES, COVERAGE, FEWEST_VALUES, HOUR_S, Course, Soak, SteadyState
+from calibrations.analyses.soak import AXES, HOUR_S, Course, Soak, SteadyState
 from calibrations.analyses.soak import analyse_soak as soak_of
+from calibrations.criteria import COVERAGE_FACTOR, FEWEST_APPROACH_VALUES
 from calibrations.table import Table
 from procedures.session import Dwell
 from procedures.soak import REVERSAL
@@ -77,7 +78,7 @@ def steady(dwells: Sequence[Dwell], oven_c: float) -> bool:
     `oven_c` is the temperature of the oven that it is in (0: none).
     """
     reversals = [dwell for dwell in dwells if dwell.pose.path.startswith(REVERSAL)]
-    if len(list(groupby(reversals, lambda dwell: dwell.pose.path))) < FEWEST_VALUES:
+    if len(list(groupby(reversals, lambda dwell: dwell.pose.path))) < FEWEST_APPROACH_VALUES:
         return False
     sensors = dict.fromkeys(name.rpartition(".")[0] for name in dwells[0].means if name[-2:] in ("vx", "vy"))
     return all(_at_rest(soak_of(table_of(reversals, sensor), oven_c)) for sensor in sensors)
@@ -90,7 +91,7 @@ def _at_rest(found: Soak) -> bool:
         if (
             state is None
             or time is None
-            or time[0] + COVERAGE * time[1] > last_s
+            or time[0] + COVERAGE_FACTOR * time[1] > last_s
             or np.sum(course.t_s > time[0]) < SEEN
         ):
             return False
@@ -141,7 +142,7 @@ def _foreseen(found: Mapping[str, ForecastHistory]) -> dict[str, Result]:
         if course.known_s is not None:
             final = course.last.final
             unit = "V" if quantity == "bias" else "V/g"
-            results[f"{quantity}-final-{axis}"] = Result(final.value, unit, final.half / COVERAGE)
+            results[f"{quantity}-final-{axis}"] = Result(final.value, unit, final.half / COVERAGE_FACTOR)
             results[f"{quantity}-foreseen-{axis}"] = Result(course.known_s / HOUR_S, "h")
     return results
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from calibrations.analyses.stability import FEWEST_TREND_POINTS, fit_trend
+from calibrations.analyses.stability import fit_trend
+from calibrations.criteria import FEWEST_FOR_DRIFT
 from procedures.sweep import REFERENCE
 from rig.record.measured import Measured
 from rig.results.result import Result
@@ -18,7 +19,7 @@ def evaluate(measured: Measured) -> dict[str, Result]:
     if not measured.run.settings.get("reference_every"):
         return {}
     visits = [kept.dwell for kept in measured.kept() if kept.pose.path == REFERENCE.path]
-    if len(visits) < FEWEST_TREND_POINTS:
+    if len(visits) < FEWEST_FOR_DRIFT:
         return {}
     hours = np.array([dwell.t_s for dwell in visits]) / HOUR_S
     results = {}

@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from calibrations.analyses.control_chart import BASELINE_RUNS, FEWEST_RUNS, Chart, control_chart
+from calibrations.analyses.control_chart import Chart, control_chart
+from calibrations.criteria import BASELINE_RUNS, FEWEST_RUNS
 from drivers.errors import did_you_mean
 from rig.errors import RecordError, UnknownRun
 from rig.record import Run

@@ -12,9 +12,9 @@ from datetime import date, datetime, timedelta
 
 import numpy as np
 
-from calibrations.analyses.control_chart import BASELINE_RUNS, Chart, control_chart
-from calibrations.analyses.control_chart import FEWEST_RUNS as FEWEST_CHARTED
-from calibrations.analyses.stability import FEWEST_CALIBRATIONS, Stability, fit_stability
+from calibrations.analyses.control_chart import Chart, control_chart
+from calibrations.analyses.stability import Stability, fit_stability
+from calibrations.criteria import BASELINE_RUNS, FEWEST_FOR_DRIFT, FEWEST_RUNS
 from calibrations.errors import CalibrationError, DataError
 from calibrations.fit import fit
 from calibrations.model import Model
@@ -208,8 +208,8 @@ def _quantity(name: str, of: Sequence[Calibration], limit: Limit | None, baselin
     values = [each.values[name] for each in mine]
     numbers, stds = [each.value for each in values], [each.std for each in values]
     days = [each.at.timestamp() / 86400 for each in mine]
-    chart = control_chart(numbers, baseline, float(rms(np.array(stds)))) if len(mine) >= FEWEST_CHARTED else None
-    line = fit_stability(days, numbers, stds) if len(mine) >= FEWEST_CALIBRATIONS and np.ptp(days) > 0 else None
+    chart = control_chart(numbers, baseline, float(rms(np.array(stds)))) if len(mine) >= FEWEST_RUNS else None
+    line = fit_stability(days, numbers, stds) if len(mine) >= FEWEST_FOR_DRIFT and np.ptp(days) > 0 else None
     allowed = None
     if limit is not None:
         allowed = limit if isinstance(limit, tuple) else (numbers[-1] - limit, numbers[-1] + limit)

@@ -18,9 +18,10 @@ from typing import Any
 
 import numpy as np
 
-from calibrations.analyses.forecast import MOST_KNOWN_WIDTH, Forecast, QuantityFilter, filter_soak
+from calibrations.analyses.forecast import Forecast, QuantityFilter, filter_soak
 from calibrations.analyses.soak import fit_steady_state
 from calibrations.analyses.tumble import estimate_tumbles
+from calibrations.criteria import MOST_KNOWN_WIDTH
 from calibrations.errors import TooFewRows
 from tests.calibrations.drifting import Drifting, drifting, soak_of_world
 from tests.calibrations.warming import warming

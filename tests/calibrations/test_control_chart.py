@@ -7,7 +7,8 @@ import pytest
 from numpy.polynomial.legendre import leggauss
 from scipy.stats import norm
 
-from calibrations.analyses.control_chart import D2, D4, EWMA_LIMIT, EWMA_WEIGHT, LIMIT_SIGMAS, Chart, control_chart
+from calibrations.analyses.control_chart import D2, D4, EWMA_WEIGHT, Chart, control_chart
+from calibrations.criteria import EWMA_LIMIT, LIMIT_SIGMAS
 from calibrations.errors import TooFewRows
 
 # NIST/SEMATECH e-Handbook 6.3.2.2, flow rates of ten batches

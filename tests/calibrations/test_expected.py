@@ -5,14 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from calibrations.design.expected import (
-    CERTAIN_PROBABILITY,
-    Expected,
-    expected_gain,
-    pairs_separated,
-    predict_data,
-    vary_one_way,
-)
+from calibrations.criteria import CERTAIN_PROBABILITY
+from calibrations.design.expected import Expected, expected_gain, pairs_separated, predict_data, vary_one_way
 from calibrations.effects.catalogue import catalogue
 from calibrations.fit import Fit, fit, refit
 from calibrations.joined import joined

@@ -8,16 +8,9 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
+from calibrations.criteria import INSEPARABLE
 from calibrations.noise.means import white_only
-from calibrations.noise.means_fit import (
-    FLICKER_PROCESSES,
-    FLICKER_RATIOS,
-    INSEPARABLE,
-    RATIOS,
-    TIME_CONSTANTS,
-    estimate,
-    gains,
-)
+from calibrations.noise.means_fit import FLICKER_PROCESSES, FLICKER_RATIOS, RATIOS, TIME_CONSTANTS, estimate, gains
 from calibrations.table import Array
 from tests.calibrations import synthetic
 from tests.calibrations.test_kernels import covariance

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calibrations.analyses.control_chart import Chart as ControlChart
-from calibrations.analyses.stability import COVERAGE, Stability
+from calibrations.analyses.stability import Stability
+from calibrations.criteria import COVERAGE_FACTOR
 from calibrations.presentation.chart import (
     CANDIDATE,
     MEASURED,
@@ -67,7 +68,7 @@ def life(q: Life) -> Panel:
     The band is the 95 % interval of the value at that time, without the uncertainty of a calibration.
     """
     factor, spelt = prefixed(unit(q.unit), max(map(abs, q.values)))
-    values, expanded = factor * np.array(q.values), COVERAGE * factor * np.array(q.stds)
+    values, expanded = factor * np.array(q.values), COVERAGE_FACTOR * factor * np.array(q.stds)
     start, end = _ends(q)
     signals = [k in q.signals for k in range(len(values))]
     series: list[Band | Line | Rule | Note | Points] = list(_drift(q, start, end, factor))

@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from calibrations.criteria import COVERAGE
 from calibrations.discovery.results import Discovery, Step
 from calibrations.noise.allan import DeviationComparison, deviation, variance_parts
 from calibrations.noise.analysis import ChannelNoise, NoiseAnalysis
 from calibrations.noise.dataset import mismatch
-from calibrations.noise.deviations import COVERAGE, Curve
+from calibrations.noise.deviations import Curve
 from calibrations.noise.fit import NoiseFit
 from calibrations.noise.likelihood import ChannelFit
 from calibrations.noise.processes import GAUSS_MARKOV

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from calibrations.design.expected import CERTAIN_PROBABILITY, pairs_separated
+from calibrations.criteria import CERTAIN_PROBABILITY
+from calibrations.design.expected import pairs_separated
 from calibrations.design.experiment import Experiment
 from calibrations.discovery.results import Discovery, F
 from calibrations.fit import Fit

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from calibrations.analyses.control_chart import BASELINE_RUNS, FEWEST_RUNS
+from calibrations.criteria import BASELINE_RUNS, FEWEST_RUNS
 from calibrations.presentation.text import columns, concise
 from rig.cli.terminal.output import emit, json_option
 from rig.record import Record

@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from calibrations.analyses.control_chart import BASELINE_RUNS, FEWEST_RUNS
+from calibrations.criteria import BASELINE_RUNS, FEWEST_RUNS
 from rig.cli.terminal.history_words import compared_lines, document, lines, near_lines
 from rig.cli.terminal.output import bench_option, emit, json_option
 from rig.record import Record

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from calibrations.criteria import CERTAIN_PROBABILITY
 from calibrations.design.experiment import Experiment
 from calibrations.discovery.dataset import Cells
 from calibrations.discovery.results import Discovery
@@ -75,7 +76,7 @@ def _brings(expected: Expected | None, data: str) -> str:
     """What an experiment is expected to tell, by its own data where they are enough."""
     if expected is None:
         return "what it will tell is not computed"
-    from calibrations.design.expected import CERTAIN_PROBABILITY, pairs_separated  # only a planned experiment has it
+    from calibrations.design.expected import pairs_separated
 
     alone = expected.probability_alone >= CERTAIN_PROBABILITY
     value = expected.alone if alone else expected.together

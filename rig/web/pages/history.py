@@ -8,7 +8,7 @@ from dataclasses import replace
 from fastapi import Request
 from nicegui import events, ui
 
-from calibrations.analyses.control_chart import FEWEST_RUNS
+from calibrations.criteria import FEWEST_RUNS
 from calibrations.model.file import read_model
 from rig.record import Record, Run
 from rig.services.history import Calibration, History, Limit, Quantity, history, judged, latest, when

@@ -10,8 +10,8 @@ from urllib.parse import urlencode
 from nicegui import events, ui
 from starlette.datastructures import QueryParams
 
-from calibrations.analyses.control_chart import BASELINE_RUNS, FEWEST_RUNS
 from calibrations.analyses.stability import YEAR_DAYS
+from calibrations.criteria import BASELINE_RUNS, FEWEST_RUNS
 from calibrations.presentation.chart import Chart, Panel, one
 from calibrations.presentation.charts.history import EWMA, INDIVIDUALS, RANGES, control_panels, life
 from calibrations.presentation.interactive import figure
