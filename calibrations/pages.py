@@ -75,13 +75,8 @@ def pages(effects: Mapping[str, Effect]) -> dict[str, str]:
 
 def drawing(effect: Effect) -> str:
     """The effect's picture as an SVG document; the same effect gives the same text."""
-    chart = noise_signature_chart(effect) if _is_noise(effect) else signature_chart(effect)
+    chart = noise_signature_chart(effect) if effect.is_noise else signature_chart(effect)
     return sparing(svg(chart).decode())
-
-
-def _is_noise(effect: Effect) -> bool:
-    """Whether it acts on no sample but on the spectrum of a still record."""
-    return effect.kinds == ("still",)
 
 
 def write(folder: Path) -> None:
@@ -96,29 +91,22 @@ def write(folder: Path) -> None:
 
 
 def _alternative(effect: Effect) -> str:
-    if _is_noise(effect):
+    if effect.is_noise:
         return f"What {effect.name} adds to white noise"
-    return f"What {_plain_model(effect)} leaves of {effect.name}"
-
-
-def _plain_model(effect: Effect) -> str:
-    """The model that the picture's residual is left by."""
-    if effect.kinds == ("fields",):
-        return "a magnetometer without error"
-    return "a gyroscope without error" if effect.kinds == ("rates",) else "the linear model"
+    return f"What {effect.first_kind.perfect_sensor} leaves of {effect.name}"
 
 
 def _caption(effect: Effect) -> str:
     """What the picture shows, and of how large an effect."""
-    if _is_noise(effect):
+    if effect.is_noise:
         return _caption_of_noise(effect)
     kept = {"bias": "A model without a bias", "scale-factor": "A model without a scale factor"}
-    plain, turned = _plain_model(effect), effect.kinds in (("fields",), ("rates",))
+    kind = effect.first_kind
+    plain, turned = kind.perfect_sensor, kind.field or kind.turning
     values = [_value(p, effect) for p in effect.parameters if turned or not p.where]
-    sensor = {"fields": " in a field of 1", "rates": " of 1 V/(deg/s)"}[effect.kinds[0]] if turned else " of 1 V/g"
     return (
-        f"{kept.get(effect.name, plain[0].upper() + plain[1:])} leaves this, noise aside, of a sensor{sensor} with "
-        f"{', '.join(values)}."
+        f"{kept.get(effect.name, plain[0].upper() + plain[1:])} leaves this, noise aside, of a sensor{kind.nominal} "
+        f"with {', '.join(values)}."
     )
 
 
@@ -134,7 +122,7 @@ def _caption_of_noise(effect: Effect) -> str:
 def _value(p: Parameter, effect: Effect) -> str:
     value = np.atleast_1d(shown_value(p, effect))
     unit = "" if p.unit == "1" else f" {p.unit.replace('{out}', 'V')}"
-    if effect.kinds == ("fields",):
+    if effect.first_kind.field:
         unit = ""  # a share of the field
     own = f" ({value[1]:g} for y)" if len(value) > 1 and value[1] != value[0] else ""
     return f"{p.name.replace('_', ' ')} {value[0]:g}{unit}{own}"

@@ -73,7 +73,7 @@ class Response:
 @lru_cache(maxsize=8)
 def findings(table: Table) -> tuple[Finding, ...]:
     """What speaks against a table of poses, worst first; () for other kinds and for healthy data."""
-    if table.kind != "poses" or table.n < FEWEST_RESPONSE_ROWS:
+    if not table.type.stage_angles or table.n < FEWEST_RESPONSE_ROWS:
         return ()
     stated = response(table, specific_force(nominal_pose(table)))
     geometry = _geometry(table, stated)

@@ -27,13 +27,14 @@ from calibrations.noise.mean_noise import norm_std, white_std
 from calibrations.noise.means import Processes
 from calibrations.noise.table_noise import scatter
 from calibrations.table import Array, Table
+from calibrations.tables import FITTED
 
 STRENGTH = "field-strength"
 
 
 def check_kind(kind: str, source: str) -> None:
     """Raises ModelError for tables to which no model is fitted; known before any sample of theirs is read."""
-    if kind not in PROBLEMS:
+    if kind not in FITTED:
         raise ModelError(f"{source}: models are fitted to poses, positions, motion or rates, not to a table of {kind}")
 
 

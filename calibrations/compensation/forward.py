@@ -24,6 +24,7 @@ from calibrations.errors import ModelError
 from calibrations.model import Model, Term
 from calibrations.model.chain import Step
 from calibrations.table import AXES, NUMBERS
+from calibrations.tables import KINDS
 
 # Names that an input may have in every output language: a user's column may have any name.
 
@@ -106,7 +107,7 @@ def steps_of(model: Model) -> list[Step]:
 def input_unit(model: Model) -> str:
     """Unit of the sensed quantity: g, the field's strength, or deg/s."""
     kinds = {kind for term in model.terms for kind in term.effect.kinds if len(term.effect.kinds) == 1}
-    return {"fields": "field", "rates": "deg/s"}.get(next(iter(kinds), ""), "g") if len(kinds) == 1 else "g"
+    return KINDS[kinds.pop()].input_unit if len(kinds) == 1 else "g"
 
 
 def known_at_run_time(effect: Effect) -> str:

@@ -178,7 +178,7 @@ class Residual:
 
 def compensated_residual(made: Compensation, table: Table) -> Residual:
     """Errors on a table of poses. Raises DataError for another kind, MissingColumn for a missing input."""
-    if table.kind != "poses" or made.unit != "g":
+    if not table.type.stage_angles or made.unit != "g":
         raise DataError(
             f"{table.source}: a compensation is compared with poses of an accelerometer, not with {table.kind}"
         )

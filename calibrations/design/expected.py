@@ -182,7 +182,7 @@ def predict_data(like: Fit, columns: Mapping[str, Array]) -> Table:
     for a time or a direction that the model needs.
     """
     data = like.table
-    if data.kind != "poses":
+    if not data.type.stage_angles:
         raise DataError(f"{data.source}: a fit to {data.kind} foresees no poses; fit the model to poses")
     names = KINDS["poses"].outputs[: len(data.axes)]
     given = {name: np.asarray(values, dtype=np.float64) for name, values in columns.items() if name != "dwell_s"}

@@ -117,7 +117,7 @@ def _applies(effect: Effect, before: Fit) -> bool:
     model = before.model
     known = set(effect.after) <= set(model.effects) and not model.holds(effect.name)
     known = known and (not DRIFTING & set(effect.needs) or bool(OFFSETS & set(model.effects)))
-    askable = effect.kinds == ("fields",) or magnetometer_coverage_warning(before.table) is None
+    askable = effect.first_kind.field or magnetometer_coverage_warning(before.table) is None
     return known and askable and effect.excluded(before.table) is None
 
 
@@ -226,7 +226,7 @@ def _with_probabilities(found: list[RowCandidate], rows: int, unseen: float) -> 
 
 def _unlogged(effect: Effect, before: Fit, effects: Mapping[str, Effect]) -> tuple[str, ...]:
     """What an effect of time may be confused with, and the table lacks the column to tell: an unlogged temperature."""
-    if "t_s" not in effect.needs or before.table.kind != "poses":
+    if "t_s" not in effect.needs or not before.table.type.stage_angles:
         return ()
     return tuple(
         name
@@ -283,4 +283,4 @@ def _may_be(after: Fit, before: Fit, likeliest: float) -> bool:
     if likeliest - twice_log_likelihood(after) < INSEPARABLE:
         return True
     as_good = after.pooled_excess <= MATERIAL and after.share_left(before) <= MOST_BY_FORM
-    return as_good and after.table.kind != "motion"
+    return as_good and not after.table.type.moving

@@ -65,7 +65,7 @@ def unseen(model: Model, table: Table) -> Check | None:
     None where they are too few, where the others do not determine the model, or where the noise is not known.
     """
     marked = np.array([path.startswith(MARK) for path in table.labels.get("path", ())], dtype=bool)
-    if table.kind != "poses" or marked.sum() < FEWEST_CHECKS:
+    if not table.type.stage_angles or marked.sum() < FEWEST_CHECKS:
         return None
     try:
         found = fit(model, table.rows(~marked))

@@ -33,7 +33,7 @@ TO_STD = 1.4826  # median of absolute deviations to standard deviation
 def gross(found: Fit) -> NDArray[np.intp]:
     """Rows, in order of time, that are gross outliers; none in tables other than poses, nor where they are many."""
     table = found.table
-    if table.kind != "poses" or table.n < 3 * NEIGHBOURS:
+    if not table.type.stage_angles or table.n < 3 * NEIGHBOURS:
         return np.zeros(0, dtype=np.intp)
     place = specific_force(nominal_pose(table))
     around = found.residual[:, _nearest(place)]

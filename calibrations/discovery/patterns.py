@@ -67,9 +67,9 @@ WORDS = {
 def patterns(table: Table, channels: tuple[str, ...]) -> list[Pattern]:
     """Every pattern that the table's columns can show; rows in order of time."""
     found = [*_in_time(table), *_in_columns(table)]
-    if table.kind == "poses":
+    if table.type.stage_angles:
         found += [*_in_angles(table), *_in_stage(table, len(channels))]
-    if table.kind == "motion":
+    if table.type.moving:
         found += _in_parts(table, channels)
     return [per_channel(p, len(channels)) for p in found if np.ptp(p.columns) > 0]
 

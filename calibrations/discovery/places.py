@@ -80,7 +80,7 @@ def places(found: Fit) -> tuple[Place, ...]:
 
 def scales(found: Fit) -> Array:
     """Output per g, or deg/s, of each channel; 1 for a residual in what is sensed."""
-    if found.table.kind == "positions":
+    if found.table.type.magnitude:
         return np.ones(1)
     terms = [term for term in found.model.terms if term.name in ("scale-factor", "gyro-scale-factor")]
     values = {e.axis: abs(e.value) for term in terms for e in term.estimates}
@@ -137,7 +137,7 @@ def _stands_out(place: _Stretch, excess: float, floor: float) -> bool:
 
 def _sides(found: Fit) -> Iterator[tuple[str, float, float, NDArray[np.intp]]]:
     """Positions by the side of the sensor that gravity, or the field, came from."""
-    if found.table.kind != "positions":
+    if not found.table.type.magnitude:
         return
     a = backward(found.table, found.problem.layout.steps(found.theta))
     along = np.argmax(np.abs(a), axis=1)

@@ -31,22 +31,9 @@ from calibrations.fitting.determined import blind_to, undetermined
 from calibrations.model import Model
 from calibrations.noise.means import rms
 from calibrations.plausibility import Finding, refusal, rejection
-from calibrations.presentation.residual import milli_unit, pooled_milli, row_name
+from calibrations.presentation.residual import milli_unit, pooled_milli
 from calibrations.presentation.text import plain, quantity
 from calibrations.table import Array, Table
-
-DEFAULT_MODELS = {
-    "poses": "linear",
-    "positions": "common-scale",
-    "fields": "field",
-    "motion": "linear",
-    "rates": "gyroscope",
-}
-FITTED_TO_MOTION = (
-    "The model is fitted to this motion, and its error is that of the fit. The report of the run also compares the "
-    "models of the run's sweep with the displacement sensor: they are not fitted to the motion, so that their error "
-    "also contains changes since the sweep and the error of the reference."
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,12 +49,12 @@ class Rows(Dataset[Fit]):
     @property
     def default_model(self) -> str:  # type: ignore[override]
         """The shipped model for this content."""
-        return DEFAULT_MODELS.get(self.table.content, "linear")
+        return self.table.type.default_model
 
     @property
     def unseen(self) -> str:  # type: ignore[override]
         """Rows that a fit did not use."""
-        return f"unseen {row_name(self.table)}"
+        return f"unseen {self.table.type.rows}"
 
     @property
     def source(self) -> str:
@@ -97,13 +84,12 @@ class Rows(Dataset[Fit]):
     @property
     def description(self) -> str:
         """Rows and source."""
-        rows = "samples" if self.table.kind == "motion" else row_name(self.table)
-        return f"{self.table.n} {rows} of {self.table.source}"
+        return f"{self.table.n} {self.table.type.size_in} of {self.table.source}"
 
     @property
     def note(self) -> str:
         """That of a motion: the report also shows the models of its sweep."""
-        return FITTED_TO_MOTION if self.table.kind == "motion" else ""
+        return self.table.type.note
 
     def fit(self, model: Model) -> Fit:
         """Least squares. Raises what `fit` raises."""
@@ -139,7 +125,7 @@ class Rows(Dataset[Fit]):
 
     def _left_out(self, found: Fit) -> tuple[int, ...]:
         """Numbers of the rows that a fit leaves out."""
-        if self.table.kind != "poses":
+        if not self.table.type.stage_angles:
             return ()
         every = np.arange(self.table.n)
         kept = found.table.numbered(np.arange(found.table.n))
@@ -154,7 +140,7 @@ class Rows(Dataset[Fit]):
         hidden = blind_to(found, effects)
         if not hidden:
             return None
-        angles = found.table.column("alpha_deg") if found.table.kind == "poses" else np.arange(2.0)
+        angles = found.table.column("alpha_deg") if found.table.type.stage_angles else np.arange(2.0)
         one = f" They hold one inclination only, alpha = {angles[0]:g} deg; measure at others."
         return (
             f"With the model {found.model.name}, these effects cannot be tested on these data: {', '.join(hidden)}."
@@ -168,7 +154,7 @@ class Rows(Dataset[Fit]):
     @property
     def foreseeable(self) -> bool:
         """Of poses, whose angles are planned."""
-        return self.table.kind == "poses"
+        return self.table.type.stage_angles
 
     def figures(self, found: Fit) -> dict[str, str]:
         """Error, held-out error and noise floor."""
@@ -181,7 +167,7 @@ class Rows(Dataset[Fit]):
 
     def facts(self, candidate: Candidate, result: Diagnosis[Fit]) -> dict[str, str]:
         """Error on the rows of the fit, and on unseen rows."""
-        kind = row_name(self.table)
+        kind = self.table.type.rows
         return {
             f"Error, {kind} of the fit": _fall(result.excess_before, candidate.excess_after),
             f"Error, unseen {kind}": _fall(result.held_out_before, candidate.held_out_after),

@@ -132,7 +132,7 @@ def _next(present: Fit, found: list[RowCandidate]) -> Taken | None:
             continue
         if step.held_out_after < step.held_out_before and _share(present, step.after.pooled_excess) >= LEAST_SHARE:
             return step
-    if present.table.kind == "poses" or present.pooled_excess <= MATERIAL:
+    if present.table.type.stage_angles or present.pooled_excess <= MATERIAL:
         return None  # with known orientation an effect is seen beside others
     pair = best_pair(present, found)
     return _taken(present, found, pair[0]) if pair else None

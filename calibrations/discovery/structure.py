@@ -97,7 +97,7 @@ def sharpened(pattern: Pattern, screen: Screen) -> Pattern:
 def _out(fit: Fit) -> list[Pattern]:
     """The poses that stand out; none where there are none, or too many."""
     rows, n = standing_out(fit.residual, np.hypot(fit.noise.floor, fit.noise.wander)), fit.table.n
-    if fit.table.kind == "motion" or not 0 < len(rows) <= max(1, MOST_ROWS_STAND_OUT * n):
+    if fit.table.type.moving or not 0 < len(rows) <= max(1, MOST_ROWS_STAND_OUT * n):
         return []
     columns = per_channel(Pattern("", np.eye(n)[:, rows]), len(fit.channels)).columns
     choices = gammaln(n + 1) - gammaln(len(rows) + 1) - gammaln(n - len(rows) + 1)
@@ -132,7 +132,7 @@ def _fewest_samples(fit: Fit) -> float:
 def _patternless(fit: Fit) -> Pattern | None:
     """More noise than a sensor makes by itself. On positions it is how well a hand repeats them, and no effect."""
     excess = rms(fit.rmse / np.hypot(fit.noise.floor, fit.noise.known_slow))
-    if fit.table.kind == "positions" or not fit.noise.known or excess <= MOST_SLOW_NOISE:
+    if fit.table.type.magnitude or not fit.noise.known or excess <= MOST_SLOW_NOISE:
         return None
     slow, scatter = (float(np.max(noise / fit.noise.floor)) for noise in (fit.noise.slow, fit.noise.scatter))
     if scatter > slow and not correlation_known(fit.table) and scatter <= MOST_SLOW_NOISE * _fewest_samples(fit):
@@ -148,7 +148,7 @@ def plainer(begin: Fit, end: Fit) -> Pattern | None:
     costs log(rows), and so does the choice among the patterns. In a motion, whose rows repeat each other, a step at the
     beginning is an effect that is always there: nothing competes.
     """
-    if end is begin or begin.table.kind == "motion":
+    if end is begin or begin.table.type.moving:
         return None
     start = without_slow(begin)
     screen = Screen(start)

@@ -36,13 +36,13 @@ import numpy as np
 from calibrations.errors import ModelError, nearest
 from calibrations.geometry.orientation import Pose
 from calibrations.table import Array, Table
+from calibrations.tables import KINDS, Kind
 
 if TYPE_CHECKING:
     from calibrations.noise.spectrum import Bands
 
 HOOKS = ("pose", "force", "transduction", "output", "spectrum", "lines")  # places, in the order of the signal chain
-KINDS = ("poses", "positions", "motion")  # of tables, where an effect does not say
-ALL_KINDS = (*KINDS, "fields", "rates", "still")
+OF_ACCELEROMETERS = tuple(name for name, kind in KINDS.items() if kind.fitted and kind.input_unit == "g")
 NOTHING = np.zeros((1, 3))
 
 
@@ -130,7 +130,7 @@ class Effect:
     source: str = ""
 
     needs: tuple[str, ...] = ()
-    kinds: tuple[str, ...] = KINDS
+    kinds: tuple[str, ...] = OF_ACCELEROMETERS
     after: tuple[str, ...] = ()
     contains: tuple[str, ...] = ()
     exact: bool = False
@@ -155,6 +155,16 @@ class Effect:
     def acts_on(self) -> str:
         """The first place in the signal chain where it acts."""
         return next(hook for hook in HOOKS if hook in self.places)
+
+    @property
+    def first_kind(self) -> Kind:
+        """The first kind of data that the effect is defined for."""
+        return KINDS[self.kinds[0]]
+
+    @property
+    def is_noise(self) -> bool:
+        """Whether it acts on no sample but on the spectrum of a still record."""
+        return not self.first_kind.fitted
 
     def excluded(self, table: Table) -> str | None:
         """Why this effect cannot be tested on `table`, or None."""
@@ -242,8 +252,8 @@ def _check_member(cls: type[Effect], member: str, value: object) -> None:
 
 def _check_whole(cls: type[Effect]) -> None:
     for kind in cls.kinds:
-        if kind not in ALL_KINDS:
-            _refuse(cls, f'there is no kind of table "{kind}"{nearest(kind, ALL_KINDS)}')
+        if kind not in KINDS:
+            _refuse(cls, f'there is no kind of table "{kind}"{nearest(kind, KINDS)}')
     for p in cls.parameters:
         if p.where and p.where not in cls.constants and not any(f"{p.where}_{axis}" in cls.constants for axis in "xyz"):
             _refuse(cls, f'{p.name}: the effect has no constant "{p.where}"{nearest(p.where, cls.constants)}')

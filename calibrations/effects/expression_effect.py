@@ -14,7 +14,7 @@ from functools import lru_cache, partial
 
 import numpy as np
 
-from calibrations.effects import KINDS, Effect, Parameter, Values
+from calibrations.effects import OF_ACCELEROMETERS, Effect, Parameter, Values
 from calibrations.effects.expression import (
     COLUMNS,
     FORCES,
@@ -90,7 +90,7 @@ class _FromExpression(Effect):
         self.name, self.expression = name, expression.text
         self.formula = expression.text if "+=" in expression.text else f"v += {expression.text}"
         self.needs = _needs(expression, parameters)
-        self.kinds = KINDS if target == "v" else ("poses", "motion")
+        self.kinds = OF_ACCELEROMETERS if target == "v" else ("poses", "motion")
         self.constants = {_scale(p): partial(_size, expression, parameters, p) for p in parameters}
         self.parameters = tuple(
             Parameter(

@@ -39,7 +39,7 @@ def best_start(expression: Expression, parameters: Names, table: Table) -> Mappi
     axes = len(table.axes)
     known = scales(expression, parameters, table)
     straight = linear(expression.root, parameters)
-    if table.kind == "positions":  # the forces are not known beforehand
+    if table.type.magnitude:  # the forces are not known beforehand
         return {p: np.full(axes, known[p] * (FAINT if p in straight else 1.0)) for p in parameters}
     groups = [(k,) for k in range(axes)] if expression.target == "v" else [tuple(range(axes))]
     found = [_Search(expression, parameters, table, group).best() for group in groups]

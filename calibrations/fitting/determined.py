@@ -59,7 +59,7 @@ def undetermined(found: Fit) -> str | None:
         return None
     if lone.any() and not lone.all() and _mean_variance(leverage[~lone]) <= MOST_UNCERTAIN:
         return _unchecked(found, lone)
-    rows = "positions" if found.table.kind == "positions" else "rows"
+    rows = "positions" if found.table.type.magnitude else "rows"
     times = f"{np.sqrt(variance):.1f}" if variance < 1e4 else "many"
     return (
         f"the {len(found.theta)} parameters are not identifiable from these {rows}: {found.table.n} of them, and an "
@@ -84,7 +84,7 @@ def lets_go(before: Fit, after: Fit) -> bool:
 
     Effects that bend the output enough make one magnitude of anything: of a sphere without end, and of no other sense.
     """
-    if after.table.kind != "positions":
+    if not after.table.type.magnitude:
         return False
     known = {(t.name, e.name, e.axis) for t in before.model.terms for e in t.estimates if e.identified}
     return any((t.name, e.name, e.axis) in known and not e.identified for t in after.model.terms for e in t.estimates)

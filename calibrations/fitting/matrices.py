@@ -52,7 +52,7 @@ class CalibrationMatrices:
 
 def calibration_matrices(found: Fit) -> CalibrationMatrices | None:
     """The matrices of a fitted model; None without three axes, and for a motion."""
-    if len(found.table.axes) < 3 or found.table.kind == "motion":
+    if len(found.table.axes) < 3 or found.table.type.moving:
         return None
     M, S, b = _parts(_stacked(found, found.theta))
     if not np.isfinite(M).all() or not np.isfinite(S).all():

@@ -112,7 +112,7 @@ def _asked(found: Fit, effects: Mapping[str, Effect]) -> tuple[Effect, ...]:
 
 def _key(table: Table, needs: tuple[str, ...]) -> Key:
     """What columns at rows in order of time are a function of."""
-    design = ANGLES if table.kind == "poses" else table.columns
+    design = ANGLES if table.type.stage_angles else table.columns
     names = [name for name in dict.fromkeys((*design, *needs)) if name in table]
     return tuple(part for name in names for part in (name, table.column(name).tobytes()))
 
@@ -137,7 +137,7 @@ def _derivatives(found: Fit, effect: Effect) -> Iterator[Group]:
 def _patterns(found: Fit) -> Iterator[Group]:
     """Of poses those that angles and the order of rows can show: they are the same for all sensors of a design."""
     table = found.table
-    if table.kind == "poses":
+    if table.type.stage_angles:
         chosen = [name for name in (*ANGLES, *table.output_names) if name in table]
         table = Table.from_columns(table.kind, {name: table.column(name) for name in chosen})
     return (Group("", k, each.columns) for k, each in enumerate(patterns(table, found.channels)))

@@ -26,7 +26,7 @@ StageErrors = Mapping[str, Mapping[str, float]]  # effect -> parameter -> value
 
 def correct_stage_errors(table: Table, errors: StageErrors, effects: Mapping[str, Effect]) -> Table:
     """`table` at the poses that its stages truly took, given the parameters of effects on the pose; any other as is."""
-    if not errors or table.kind != "poses":
+    if not errors or not table.type.stage_angles:
         return table
     table = table.in_order()
     pose = nominal_pose(table)

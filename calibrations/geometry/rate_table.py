@@ -83,7 +83,7 @@ def specific_force_g(table: Table) -> Array:
 
 def earth_rate_warning(table: Table) -> str | None:
     """A warning that the earth's rate is not subtracted; None where it is."""
-    if table.kind != "rates" or "latitude_deg" in table.constants:
+    if not table.type.turning or "latitude_deg" in table.constants:
         return None
     return (
         f"the earth's rotation, {EARTH_DEG_S:.4f} deg/s at most, is not taken off the rates, as the latitude is not "

@@ -37,7 +37,7 @@ def coverage_fault(table: Table, degree: int) -> str | None:
 
 def magnetometer_coverage_warning(table: Table) -> str | None:
     """The effects that a magnetometer's directions cannot determine; None where they cover the sphere."""
-    if table.content != "fields":
+    if not table.type.field:
         return None
     for degree, what in ((HARD_IRON, "hard-iron and soft-iron"), (SOFT_IRON, "soft-iron")):
         if why := coverage_fault(table, degree):

@@ -307,9 +307,9 @@ def _attempt(
 
 def _objection(table: Table, laid: Sheet) -> str:
     """The reason why the tried table is implausible; "" for none."""
-    if table.kind == "positions" and table.n < FEWEST_POSITIONS:
+    if table.type.magnitude and table.n < FEWEST_POSITIONS:
         return f"{table.source}: {table.n} positions; no model has fewer than {FEWEST_POSITIONS} parameters"
-    if table.kind == "positions" and not laid.named and not covers_all_directions(table.outputs):
+    if table.type.magnitude and not laid.named and not covers_all_directions(table.outputs):
         return f"{table.source}: no three columns keep their magnitude over many directions"
     return ""
 

@@ -93,7 +93,7 @@ def sphere_centre(means: Array) -> Array:
 
 def is_raw_log(table: Table) -> bool:
     """Whether rows are samples of positions: many rows, and no count of averaged samples."""
-    return table.kind == "positions" and table.n >= 1000 and "n" not in table
+    return table.type.magnitude and table.n >= 1000 and "n" not in table
 
 
 def still_intervals(samples: Array, rate_hz: float) -> list[tuple[int, int]]:
@@ -179,7 +179,7 @@ MOUNTING = ("direction", "mount_deg", "flip")
 def is_pose_log(table: Table) -> bool:
     """Whether rows of poses are samples, not means."""
     if (
-        table.kind != "poses"
+        not table.type.stage_angles
         or table.n < 2 * FEWEST_ROWS_AT_REST
         or "n" in table
         or any(_std(v) in table for v in OUTPUTS)
@@ -343,7 +343,7 @@ def average_raw_log(log: Table) -> Table:
     """The means of a raw log; the table itself if its rows are means. Raises DataError, MissingConstant."""
     if is_pose_log(log):
         return average_dwells(log)
-    if is_raw_log(log) and log.content == "fields":
+    if is_raw_log(log) and log.type.field:
         return thin_by_direction(log)
     if is_section_log(log):
         return average_sections(log)

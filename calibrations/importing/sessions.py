@@ -54,7 +54,7 @@ def is_section_log(table: Table) -> bool:
     """Whether rows of rates are samples of named sections, not means."""
     sections = table.labels.get("path")
     return (
-        table.kind == "rates"
+        table.type.turning
         and bool(sections)
         and "n" not in table
         and table.n > FEWEST_SECTION_SAMPLES * len(_bounds(sections or ()))

@@ -33,13 +33,13 @@ def force(table: Table, steps: Sequence[Step]) -> Array:
 
 def static_force(table: Table, steps: Sequence[Step]) -> Array:
     """The same along the reference axes."""
-    if table.kind == "rates":
+    if table.type.turning:
         return rate_deg_s(table)
     pose = nominal = nominal_pose(table)
     for effect, p in steps:
         pose = effect.pose(pose, table, p)
     a = _reported(table).copy() if pose is nominal else specific_force(pose)
-    if table.kind == "motion":  # along the sensor's reference edge x, Ang V
+    if table.type.moving:  # along the sensor's reference edge x, Ang V
         a[:, 0] += table.column("acceleration_m_s2") / table.gravity_m_s2
     return a
 
@@ -72,7 +72,7 @@ def converted(parts: Sequence[Array], n: int, table: Table, steps: Sequence[Step
     v = np.zeros((n, 3))
     for part in parts:
         v += part
-    if table.kind == "motion":
+    if table.type.moving:
         v = sample_output(v, table)
     for effect, p in steps:
         v = effect.output(v, table, p)

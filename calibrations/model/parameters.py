@@ -156,9 +156,9 @@ def _from_data(model: Model, table: Table) -> dict[tuple[int, str, str], tuple[f
 @lru_cache(maxsize=8)
 def _nominal(table: Table) -> float:
     """Output per unit of what is sensed, as the range of outputs has it."""
-    if table.kind == "rates":
+    if table.type.turning:
         return float(np.max(np.abs(rate_scales(table)))) or 1.0
-    if table.content == "fields":
+    if table.type.field:
         return sphere_radius(table)
     spread = float(np.median(np.ptp(table.outputs, axis=0))) / 2
     return table.number("output_per_g", spread or 1.0)

@@ -205,7 +205,7 @@ class StillRecord(Dataset[NoiseFit]):
     def require_allowed(self, effect: Effect) -> None:
         """Raises ModelError for an effect that is not noise."""
         if "still" not in effect.kinds:
-            known = ", ".join(sorted(name for name, each in catalogue().items() if "still" in each.kinds))
+            known = ", ".join(sorted(name for name, each in catalogue().items() if each.is_noise))
             raise ModelError(
                 f"{effect.name} is not noise, and a still record shows noise alone; effects of noise: {known}"
             )

@@ -159,7 +159,7 @@ def _excess_on_other(halves: tuple[Channel, Channel], effects: Sequence[Effect])
 
 def noise_terms(model: Model) -> tuple[Term, ...]:
     """The model's effects of noise. Raises ModelError where it has none."""
-    terms = tuple(term for term in model.terms if "still" in term.effect.kinds)
+    terms = tuple(term for term in model.terms if term.effect.is_noise)
     if not terms:
         raise ModelError(
             f"{model.name}: none of its effects is noise, and a still record shows noise alone; "

@@ -151,7 +151,7 @@ def _at_longest_shape(mixture: Mixture, effect: Effect) -> bool:
 def search(still: Still, model: Model, effects: Mapping[str, Effect]) -> Search:
     """Raises ModelError for a model without noise."""
     given = tuple(term.effect for term in noise_terms(model))
-    known = {name: effect for name, effect in effects.items() if "still" in effect.kinds}
+    known = {name: effect for name, effect in effects.items() if effect.is_noise}
     known |= {effect.name: effect for effect in given}
     found = _search_once(still, model, known, given)
     if found.mixture.effects:

@@ -16,13 +16,6 @@ from calibrations.presentation.charts.columns import NAMES
 from calibrations.presentation.text import minus, plain
 from calibrations.table import MILLI, Array, Table
 
-ROWS = {"motion": "stretches"}  # what the rows of a kind of table are called, where not as the kind
-
-
-def row_name(table: Table) -> str:
-    """The name of a table's rows in text."""
-    return ROWS.get(table.kind, table.kind)
-
 
 def milli_unit(fit: Fit) -> str:
     """The unit of `in_milli`."""

@@ -17,5 +17,7 @@ KINDS: Mapping[str, Kind] = MappingProxyType(
     {kind.name: kind for kind in (Poses(), Positions(), Motion(), Still(), Rates(), Fields())}
 )
 FILE_KINDS: Mapping[str, Kind] = MappingProxyType({name: kind for name, kind in KINDS.items() if kind.file == name})
+MEANS = tuple(name for name, kind in FILE_KINDS.items() if kind.means)
+FITTED = tuple(name for name, kind in FILE_KINDS.items() if kind.fitted)
 
-__all__ = ["FILE_KINDS", "KINDS", "Kind"]
+__all__ = ["FILE_KINDS", "FITTED", "KINDS", "MEANS", "Kind"]

@@ -11,5 +11,9 @@ class Fields(Positions):
     name = "fields"
     outputs = ("mx", "my", "mz")
     input_unit = "field"
+    perfect_sensor = "a magnetometer without error"
+    nominal = " in a field of 1"
+    taken = "{} samples, one for each direction of the field"
     default_model = "field"
+    field = True
     sequential = False

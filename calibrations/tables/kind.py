@@ -20,6 +20,19 @@ class Kind:
     rows: str  # what its rows are called
     size_in: str  # what the size of a table is counted in
 
+    taken: str = "the means of {} still positions"  # the rows that a log of raw samples gave, by their number
+    perfect_sensor: str = "the linear model"  # what the picture of an effect is compared with
+    nominal: str = " of 1 V/g"  # the sensor in that picture
+    note: str = ""  # what else judges such data, in words
+
+    fitted: bool = True  # whether models are fitted to its rows by least squares
+    means: bool = False  # whether a row is the mean of samples in one orientation or at one rate
+    budget: bool = False  # whether a report draws up an uncertainty budget
     known_input: bool = False  # whether each row has a known specific force or rate: the residual is in the output
+    stage_angles: bool = False  # whether stages gave each row its orientation
+    moving: bool = False  # whether the sensor moves: its output filter matters, and rows are stretches that repeat
+    turning: bool = False  # whether the sensor turns at a constant rate, which is what it senses
+    magnitude: bool = False  # whether only the magnitude of the sensed quantity is known
+    field: bool = False  # whether that is a field, whose strength is a parameter
     same_pose: tuple[str, ...] = ()  # columns whose values make two rows the same pose
     sequential: bool = True  # whether rows without times are taken as one second apart

@@ -14,3 +14,9 @@ class Motion(Kind):
     unit = "V"
     rows = "stretches"
     size_in = "samples"
+    note = (
+        "The model is fitted to this motion, and its error is that of the fit. The report of the run also compares the "
+        "models of the run's sweep with the displacement sensor: they are not fitted to the motion, so that their "
+        "error also contains changes since the sweep and the error of the reference."
+    )
+    moving = True

@@ -12,5 +12,6 @@ class Poses(Kind):
     columns = (("alpha_deg", "beta_deg", "vx_v"),)
     outputs = ("vx_v", "vy_v", "vz_v")
     unit = "V"
-    known_input = True
+    taken = "the means of {} poses"
+    means = budget = known_input = stage_angles = True
     same_pose = ("alpha_deg", "beta_deg", "mount_deg", "flip")

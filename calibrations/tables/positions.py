@@ -12,3 +12,4 @@ class Positions(Kind):
     columns = (("ax", "ay", "az"), ("mx", "my", "mz"))
     outputs = ("ax", "ay", "az")
     default_model = "common-scale"
+    means = budget = magnitude = True

@@ -12,6 +12,9 @@ class Rates(Kind):
     columns = (("rate_deg_s", "gx", "gy", "gz"),)
     outputs = ("gx", "gy", "gz")
     input_unit = "deg/s"
+    perfect_sensor = "a gyroscope without error"
+    nominal = " of 1 V/(deg/s)"
+    taken = "the means of {} rests and turns"
     default_model = "gyroscope"
-    known_input = True
+    means = known_input = turning = True
     sequential = False

@@ -12,3 +12,4 @@ class Still(Kind):
     size_in = "samples"
     columns = (("t_s",), ())
     default_model = "still"
+    fitted = False

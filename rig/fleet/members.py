@@ -22,9 +22,10 @@ from calibrations.errors import DataError
 from calibrations.importing.files import open_text_file
 from calibrations.presentation.text import as_written
 from calibrations.table import NUMBERS
+from calibrations.tables import MEANS
 from rig.errors import RigError, UnknownRun
 from rig.record import Record, Run
-from rig.services.sensors import CALIBRATING, members
+from rig.services.sensors import members
 
 INDEX = "fleet.csv"
 COLUMNS = ("sensor", "batch", "rig", "file", "data")
@@ -168,7 +169,7 @@ def _of_record() -> Iterator[Member]:
     with Record.to_read() as record:
         seen: set[str] = set()
         for run in record.runs():
-            if run.state == "complete" and run.kind in CALIBRATING:
+            if run.state == "complete" and run.kind in MEANS:
                 yield from (m for m in _members(record, run) if m.sensor not in seen)
                 seen |= set(members(run))
 

@@ -16,7 +16,6 @@ from typing import Any, Literal
 import numpy as np
 
 from calibrations.discovery.results import Diagnosis
-from calibrations.discovery.rows import DEFAULT_MODELS
 from calibrations.errors import CalibrationError, DataError, ModelError
 from calibrations.fit import Fit
 from calibrations.fleet.look import Score, Screening, SharedDesigns, StageScore, screen_sensor
@@ -27,11 +26,11 @@ from calibrations.model import Model
 from calibrations.model.file import parse_model
 from calibrations.presentation.text import joined
 from calibrations.table import Table
+from calibrations.tables import FITTED, MEANS
 from rig.errors import RigError
 from rig.fleet.own_effects import Own, effects_of
 from rig.services.data import averaged
 from rig.services.load import LONGEST_BEGINNING, channels_alone, check_unit
-from rig.services.sensors import CALIBRATING
 
 # A look as a document of plain values, and back.
 
@@ -143,21 +142,21 @@ def model_of(asked: Question) -> Model:
 
 def _checked(table: Table, model: Model) -> Table:
     """The table, where a fleet may hold it against the model. Raises DataError, ModelError."""
-    if table.kind not in CALIBRATING:
+    if not table.type.means:
         raise DataError(_instead(table.source, table.kind))
     if not model.for_table(table).terms:
         raise ModelError(
             f"{table.source}: {model.name} is no model of {table.content}; make these sensors a fleet of their own, "
-            f"with --model {DEFAULT_MODELS[table.content]}"
+            f"with --model {table.type.default_model}"
         )
     check_unit(model, table.unit, table.source)
     return table
 
 
 def _instead(source: str, kind: str) -> str:
-    command = "noise" if kind == "still" else "discover"
+    command = "discover" if kind in FITTED else "noise"
     return (
-        f"{source}: is a table of {kind}, and fleets have {joined(list(CALIBRATING))}; leave it out, and ask for it "
+        f"{source}: is a table of {kind}, and fleets have {joined(list(MEANS))}; leave it out, and ask for it "
         f"alone: rig {command} {source}"
     )
 

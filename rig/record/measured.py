@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calibrations.table import Array, Table
+from calibrations.tables import KINDS
 from drivers.errors import did_you_mean
 from procedures.questions import EDGES
 from procedures.session import Pose, Reading
@@ -130,7 +131,7 @@ class Measured:
     @property
     def constants(self) -> Mapping[str, str | float]:
         """The constants of the bench and of the sensor."""
-        motion = tables.constants(self.run, self.sensor) if self.run.kind == "motion" else {}
+        motion = tables.constants(self.run, self.sensor) if KINDS[self.run.kind].moving else {}
         if self.sensor is None:
             return {**self.run.constants, **motion}
         sensor = Sensor.model_validate(self.run.bench["sensors"][self.sensor])

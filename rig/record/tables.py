@@ -17,6 +17,7 @@ import numpy as np
 from calibrations.geometry.error_table import ErrorTable
 from calibrations.noise.mean_noise import measured_inflation
 from calibrations.table import Array, Table
+from calibrations.tables import KINDS
 from procedures.session import Samples
 from rig.bench import D63, TURNING, Bench, Instrument
 from rig.errors import RecordError
@@ -97,7 +98,7 @@ def samples_table(run: Run, poses: Iterable[Kept]) -> Table:
     volts = np.concatenate([kept.samples.volts for kept in stretches])
     columns = {"t_s": np.concatenate([_times_s(kept) for kept in stretches])}
     columns |= {f"{name}_v": volts[:, k] for k, name in enumerate(names)}
-    if run.kind == "motion":
+    if KINDS[run.kind].moving:
         columns |= _attitude(stretches) | {"displacement_m": displacement_m(run, columns.pop(f"{D63}_v"))}
     columns, angle_stds = correct_angles(run, columns)
     constants = {**run.constants, **angle_stds, "sample_rate_hz": stretches[0].samples.rate_hz}

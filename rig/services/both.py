@@ -49,7 +49,7 @@ def both(first: Request, second: Request, tell: Callable[[str], None]) -> tuple[
 
 def again(first: Fit, second: Fit) -> Again | None:
     """The poses that both have; None where there are none, or the orientations are not known."""
-    if first.table.kind != "poses" or first.channels != second.channels:
+    if not first.table.type.stage_angles or first.channels != second.channels:
         return None
     there = _visits(second.table)
     rows = [(row, there[visit]) for visit, row in _visits(first.table).items() if visit in there]

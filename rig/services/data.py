@@ -33,10 +33,7 @@ def averaged(log: Table, tell: Callable[[str], None]) -> Table:
 
 
 def _taken(table: Table) -> str:
-    if table.content == "fields":
-        return f"{table.n} samples, one for each direction of the field"
-    what = {"poses": "poses", "rates": "rests and turns"}.get(table.kind, "still positions")
-    return f"the means of {table.n} {what}"
+    return table.type.taken.format(table.n)
 
 
 def _included(table: Table, tell: Callable[[str], None]) -> Table:

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
+from calibrations.tables import MEANS
 from rig.errors import UnknownRun
 from rig.lease import lease
 from rig.record import Record, Run
 from rig.results import judged
 
-NUMBERED = ("poses", "positions", "rates")  # kinds of which a row is a pose
 RESULTS = "results"  # the event that says how they were made anew
 
 
@@ -36,7 +36,7 @@ def numbered_run(data: str) -> str | None:
         return None
     with suppress(UnknownRun), Record.to_find(data) as record:
         run = record.run(data.partition("/")[0])
-        return run.run if run.bench and run.kind in NUMBERED else None
+        return run.run if run.bench and run.kind in MEANS else None
     return None
 
 

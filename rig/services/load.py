@@ -95,7 +95,7 @@ def rows_of(request: Request, effects: Mapping[str, Effect], tell: Tell) -> Tabl
             f"{request.data}: --channel and --rate are for still records, and this is none (or name --model still)"
         )
     table = with_known_noise(load(request.data, tell=tell), request.noise, effects)
-    if table.kind == "poses" and not correlation_known(table):
+    if table.type.stage_angles and not correlation_known(table):
         tell(
             f"{table.source}: how the samples of a mean correlate is not known, and they are taken as independent; "
             "scatter of the poses beyond that counts as noise. Give the constants filter_corner_hz and sample_rate_hz."
@@ -191,7 +191,7 @@ def is_noise(model: Model | None) -> bool:
     """Whether a model is one of noise. Raises ModelError for one of noise and of effects on samples."""
     if model is None:
         return False
-    noise = [term.name for term in model.terms if "still" in term.effect.kinds]
+    noise = [term.name for term in model.terms if term.effect.is_noise]
     if noise and len(noise) < len(model.terms):
         raise ModelError(
             f"{model.name}: {', '.join(noise)} is noise of a still record, and the other effects act on samples; "

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from calibrations.presentation.text import joined
+from calibrations.tables import FITTED
 from rig.record import Run
 
 # By the name of a result that is beyond its limit: what to look at. The first that fits counts.
@@ -80,7 +81,7 @@ def _commands(run: Run) -> Iterator[str]:
         yield f"Next: rig resume {run.run}"
     elif run.procedure == "check-standard":
         yield "Next: rig control"
-    elif run.rows and run.kind in ("poses", "motion", "positions", "rates"):
+    elif run.rows and run.kind in FITTED:
         data = f"{run.run}/{next(iter(sensors))}" if (sensors := run.bench.get("sensors")) else run.run
         if run.procedure == "soak":
             yield f"Next: rig report {data} --out night.html"

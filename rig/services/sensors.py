@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from calibrations.presentation.text import as_written
+from calibrations.tables import MEANS
 from rig.record import Run
 from rig.record.measured import sensors_of
-
-CALIBRATING = ("poses", "positions", "rates")  # kinds of tables that models are fitted to
 
 
 def members(run: Run) -> dict[str, str]:
@@ -29,7 +28,7 @@ def calibrating(runs: Iterable[Run]) -> dict[str, list[Run]]:
     """The complete runs of each sensor that models may be fitted to."""
     found: dict[str, list[Run]] = {}
     for run in runs:
-        if run.state == "complete" and run.kind in CALIBRATING:
+        if run.state == "complete" and run.kind in MEANS:
             for sensor in members(run):
                 found.setdefault(sensor, []).append(run)
     return found

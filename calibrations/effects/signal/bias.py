@@ -8,7 +8,7 @@ from calibrations.table import Array, Table
 def _at_zero(table: Table) -> Array:
     """The middle of each output; in a table of motion less what gravity gives there."""
     middle: Array = (table.outputs.max(axis=0) + table.outputs.min(axis=0)) / 2
-    if table.kind == "motion":
+    if table.type.moving:
         gravity = specific_force(nominal_pose(table))[:, : len(middle)]
         return np.asarray(middle - table.number("output_per_g", 0.0) * gravity.mean(axis=0))
     return middle

@@ -36,6 +36,7 @@ from calibrations.presentation.certificate.terms import name, term
 from calibrations.presentation.residual import in_milli, milli_unit
 from calibrations.presentation.text import exponent
 from calibrations.table import Array
+from calibrations.tables import MEANS
 
 TRIALS = 2000
 STEPS = 2  # of the estimate: the model is nearly straight over its uncertainty
@@ -105,7 +106,6 @@ def _wandering(phi: Array, trials: int, rng: np.random.Generator) -> Array:
     return x
 
 
-KINDS = ("poses", "positions", "rates")
 MISFIT = 1.05  # Birge ratio from which on it is told
 CERTAIN_K = 2.0  # coverage factor, where the degrees of freedom ask for no more
 
@@ -147,7 +147,7 @@ def figures(found: Fit, before: Model | None, limits: Mapping[str, Limit], trial
 
 def require_reference(source: str, kind: str) -> None:
     """Raises ModelError for a kind of data whose parameters could be traced to nothing: no reference is known."""
-    if kind not in KINDS:
+    if kind not in MEANS:
         raise ModelError(
             f"{source}: a certificate is drawn up of poses, positions or rates, whose reference is known, and not "
             f"of {kind}. Certify a sweep of the sensor (`rig run sweep`); `rig report` has what this one shows"

@@ -40,7 +40,7 @@ from calibrations.presentation.charts.fit import (
     scale_of,
 )
 from calibrations.presentation.charts.motion import evaluation
-from calibrations.presentation.residual import Shown, milli_unit, pooled_milli, row_name
+from calibrations.presentation.residual import Shown, milli_unit, pooled_milli
 from calibrations.presentation.text import plain
 
 BELOW = 0.5  # times the floor: where the logarithmic axis begins
@@ -160,7 +160,7 @@ def album(found: Discovery[Fit], compared: Comparison[Fit], motion: MotionResult
     The result of a run of the procedure motion comes first, if it is given.
     """
     fit = compared.fit
-    model, rows = fit.model.name, row_name(fit.table)
+    model, rows = fit.model.name, fit.table.type.rows
     shown, mapped = CAPTIONS.get(fit.table.content, POSITIONS)
     fall = (
         "Error of the model before and after each effect, as a multiple of the noise floor (grey): "

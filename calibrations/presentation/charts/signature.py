@@ -57,9 +57,9 @@ def _drawn(part: Part, *, legend: bool) -> Panel:
 
 def signature(effect: Effect) -> list[Part]:
     """What the linear model leaves of the effect, axis by axis."""
-    if effect.kinds == ("fields",):
+    if effect.first_kind.field:
         return [of_field(effect)]
-    if effect.kinds == ("rates",):
+    if effect.first_kind.turning:
         return of_rates(effect)
     known = catalogue()
     linear: list[Step] = [
@@ -89,7 +89,7 @@ def _left(table: Table, change: Array, v: Array, name: str) -> Array:
 def _panel(effect: Effect, table: Table, a: Array, k: int, left: Array) -> Part:
     """Over what the effect needs beside the angles, a force that what is left is a function of, or beta."""
     axis, other = "xyz"[k], "yxx"[k]
-    if table.kind == "motion":
+    if table.type.moving:
         close = (table.time_s >= CLOSE_S[0]) & (table.time_s <= CLOSE_S[1])
         rows = np.flatnonzero(close) if "output" in effect.places else np.arange(0, table.n, 8)
         return Part(axis, left, table.time_s, "time (s)", (Curve("", BLUE, "-", rows),))

@@ -19,7 +19,7 @@ MANY = 1e4  # degrees of freedom, told as no limit
 
 def budget(found: Fit) -> dict[str, Any] | None:
     """Numbers and words of the section; None for tables that no budget is drawn up for, and where nothing is known."""
-    if found.table.kind not in ("poses", "positions") or not len(found.theta):
+    if not found.table.type.budget or not len(found.theta):
         return None
     drawn = make_budget(found, input_contributions(found.table))
     if not drawn.given:
@@ -78,7 +78,7 @@ def _of(std: Any, k: int) -> float:
 
 def budget_document(found: Fit) -> dict[str, Any] | None:
     """The budget as JSON: for each parameter what it adds up to, and the contributions by source. None as `section`."""
-    if found.table.kind not in ("poses", "positions") or not len(found.theta):
+    if not found.table.type.budget or not len(found.theta):
         return None
     drawn = make_budget(found, input_contributions(found.table))
     known = [(k, name, e) for k, (name, e) in enumerate(_estimates(found)) if e.identified and e.std is not None]

@@ -24,7 +24,7 @@ from calibrations.presentation.charts.discovery import album
 from calibrations.presentation.report import parameters
 from calibrations.presentation.report.page import figure, page
 from calibrations.presentation.report.words import VERDICTS, key_figures, next_takes, next_words, state, summary
-from calibrations.presentation.residual import in_milli, milli_unit, pooled_milli, row_name
+from calibrations.presentation.residual import in_milli, milli_unit, pooled_milli
 from calibrations.presentation.text import capital, chance, measured, minus, plain, unbroken, unit
 
 EXPLAINED = 6  # candidates shown with formula and symptom, at most; the others in numbers only
@@ -51,7 +51,7 @@ def report(
         "report.html",
         **(motion_head(motion) if motion else discovery),
         discovery=discovery,
-        kind=row_name(found.start.table),
+        kind=found.start.table.type.rows,
         steps=[_first(found), *(_step(step, found) for step in found.steps)],
         chance_of_excess=unbroken(f"1 ± {spread_of_excess(found.end)}"),
         fails=[capital(minus(place.text)).replace("x the noise", "× the noise") for place in beside.fails],
@@ -134,7 +134,7 @@ def _probability(p: float) -> str:
 
 def _errors(fit: Fit) -> list[dict[str, str]]:
     """One row for each channel: error, floor, scatter and slow noise, in the residual's unit and in mg."""
-    posed = fit.table.kind == "poses"
+    posed = fit.table.type.stage_angles
     noise = {"rmse": fit.rmse, "floor": fit.noise.floor, "scatter": fit.noise.scatter, "slow": fit.noise.slow}
     rows = []
     for c, channel in enumerate(fit.channels):
@@ -179,7 +179,7 @@ def _provenance(found: Discovery[Fit], date: str, program: str) -> dict[str, str
     table, model = found.start.table, found.start.model
     facts: dict[str, object] = {
         "data": _name(table.source),
-        "kind and size": f"{table.n} {row_name(table)}; columns {', '.join(table.columns)}",
+        "kind and size": f"{table.n} {table.type.rows}; columns {', '.join(table.columns)}",
         "SHA-256 of the data": table.digest,
         "local gravity": f"{table.gravity_m_s2:g} m/s²",
         **{f"constant {name}": value for name, value in table.constants.items() if name != "gravity_m_s2"},

@@ -7,7 +7,7 @@ from calibrations.design.expected import pairs_separated
 from calibrations.design.experiment import Experiment
 from calibrations.discovery.results import Discovery, F
 from calibrations.fit import Fit
-from calibrations.presentation.residual import milli_unit, pooled_milli, row_name
+from calibrations.presentation.residual import milli_unit, pooled_milli
 from calibrations.presentation.text import joined, plain
 
 LONG_MIN = 120  # from here on, a duration is told in hours
@@ -32,7 +32,7 @@ def summary(found: Discovery[Fit]) -> str:
 
 
 def _error(found: Discovery[Fit]) -> str:
-    kind, (error, floor) = row_name(found.start.table), pooled_milli(found.start)
+    kind, (error, floor) = found.start.table.type.rows, pooled_milli(found.start)
     rows, unit = f"{found.start.table.n} {kind}", milli_unit(found.start)
     if not found.steps:
         left = f" Left over: {found.residual_structure}." if found.residual_structure else ""
@@ -65,7 +65,7 @@ def key_figures(found: Discovery[Fit]) -> list[tuple[str, str, str]]:
 
 
 def _over_floor(fit: Fit, unseen: float) -> str:
-    return f"{plain(fit.pooled_excess)} × the floor; {plain(unseen)} × on unseen {row_name(fit.table)}"
+    return f"{plain(fit.pooled_excess)} × the floor; {plain(unseen)} × on unseen {fit.table.type.rows}"
 
 
 def next_words(e: Experiment) -> str:

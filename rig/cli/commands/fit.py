@@ -74,7 +74,7 @@ def _further(data: Dataset[Any], model: Model, found: Any) -> _Further:
     from rig.cli.terminal.words import paper
 
     checked = unseen(model, found.table)
-    stepwise = "cross-axis-bias" in model.effects and found.table.kind == "poses"
+    stepwise = "cross-axis-bias" in model.effects and found.table.type.stage_angles
     return _Further(
         document(checked) | calibrated.document(found) | {"budget": in_parts(found)},
         (*calibrated.lines(found), *lines(checked, data.source)),

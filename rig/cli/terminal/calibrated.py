@@ -25,7 +25,7 @@ def lines(found: Fit) -> Iterator[str]:
         beyond = f"; {', '.join(made.beyond)} not in it" if made.beyond else ""
         yield f"General calibration, {EQUATION}, from {found.table.unit} to {made.unit} (Book 17.3){beyond}:"
         yield columns(("axis", "M", "", "", "S", "b"), _rows(made))
-    if found.table.content == "fields":
+    if found.table.type.field:
         yield _book(found.table)
     if (held := _held(found.table)) is not None:
         shown = (", ".join(f"{value:.7g}" for value in each) for each in (held.bias, held.scale))
@@ -65,7 +65,7 @@ def _nullable(std: Array) -> Any:
 
 def _held(table: Table) -> Faces | None:
     """What an accelerometer shows that was read beside a gyroscope; None where there is none, or a face is missing."""
-    if table.kind != "rates" or not all(f"a{axis}" in table for axis in "xyz"):
+    if not table.type.turning or not all(f"a{axis}" in table for axis in "xyz"):
         return None
     still = table.column("rate_deg_s") == 0
     return estimate_faces(np.column_stack([table.column(f"a{axis}")[still] for axis in "xyz"])) if still.any() else None
@@ -73,7 +73,7 @@ def _held(table: Table) -> Faces | None:
 
 def _by_hand(table: Table) -> dict[str, Any]:
     """The Book's hard iron and, of a horizontal turn, soft iron, and what they leave of the magnitude."""
-    if table.content != "fields":
+    if not table.type.field:
         return {}
     middle = estimate_hard_iron(table.outputs)
     told: dict[str, Any] = {"hard_iron": middle.tolist()}

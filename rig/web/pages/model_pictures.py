@@ -14,7 +14,7 @@ from calibrations.presentation.charts.columns import Column, choices, first_choi
 from calibrations.presentation.charts.discovery import levels, waterfall
 from calibrations.presentation.charts.fit import failure, measurement, most_telling, residual
 from calibrations.presentation.interactive import figure
-from calibrations.presentation.residual import Shown, residual_units, row_name
+from calibrations.presentation.residual import Shown, residual_units
 from rig.web.parts import box, div, redraw, words
 
 if TYPE_CHECKING:
@@ -93,10 +93,10 @@ class Pictures:
             self.selected = []
         self.fit, self.session, self.step = fit, session, None
         self.columns = choices(fit)
-        self.falling.set_text(f"{TITLES['waterfall']}; ◆ on {row_name(fit.table)} that the fit did not see")
+        self.falling.set_text(f"{TITLES['waterfall']}; ◆ on {fit.table.type.rows} that the fit did not see")
         x, colour = first_choices(list(self.columns))
         self._offer(fit.channels)
-        self.unit.set_options(residual_units(fit), value=fit.table.kind == "positions" or bool(self.unit.value))
+        self.unit.set_options(residual_units(fit), value=fit.table.type.magnitude or bool(self.unit.value))
         self.unit.set_visibility(len(self.unit.options) > 1)
         for select, first in ((self.x, x), (self.colour, colour)):
             value = select.value if select.value in self.columns else first
@@ -153,7 +153,7 @@ class Pictures:
             self.shown,
             self.columns.get(self.colour.value or "", self.columns[self.x.value]),
         )
-        moving = shown.fit.table.kind == "motion"  # its samples are drawn, which are no rows
+        moving = shown.fit.table.type.moving  # its samples are drawn, which are no rows
         plain = self.columns[self.x.value if self.x.value != FOLLOWED else next(iter(self.columns))]
         panels = {
             "measurement": motion.measurement(shown) if moving else measurement(shown, plain, colour),
@@ -207,7 +207,7 @@ class Pictures:
         """What is selected, or that not all is drawn, or what can be done."""
         self.clear.set_visibility(bool(self.selected))
         self.leave.set_visibility(bool(self.selected) and self.leave_out is not None)
-        hint = f"Draw a box in a picture to select {row_name(shown.fit.table)} in all of them."
+        hint = f"Draw a box in a picture to select {shown.fit.table.type.rows} in all of them."
         self.told.set_text(shown.summary(self.selected) if self.selected else shown.thinned or hint)
 
 
