@@ -29,7 +29,7 @@ from calibrations.model import Model
 from calibrations.model.chain import force, sensed
 from calibrations.model.file import read_model
 from calibrations.noise.means import rms
-from calibrations.presentation.text import plain
+from calibrations.presentation.text import rounded
 from calibrations.table import AXES, Array, Table
 
 DEFAULT_REACH = {
@@ -165,7 +165,7 @@ class Residual:
     def lines(self) -> list[str]:
         """For people."""
         return [
-            f"{axis}: rms error {plain(before)} mm/s² by the linear model, {plain(after)} mm/s² compensated, "
+            f"{axis}: rms error {rounded(before)} mm/s² by the linear model, {rounded(after)} mm/s² compensated, "
             f"{100 * (1 - after / before):.1f} % less, on {self.table.n} poses of {self.table.source}"
             for axis, (before, after) in self.rmse.items()
         ]

@@ -18,7 +18,7 @@ from calibrations.discovery.results import Place
 from calibrations.fit import Fit
 from calibrations.model.chain import backward
 from calibrations.noise.means import rms
-from calibrations.presentation.text import stretch
+from calibrations.presentation.text import interval
 from calibrations.table import MILLI, Array, Table
 
 MOST_PLACES = 8
@@ -64,7 +64,7 @@ class _Stretch:
         else:
             unit = WORDS[self.where][1]
             place = f"{self.where} {self.low:g} {unit}" if self.low == self.high else (
-                f"{self.where} {stretch(self.low, self.high)} {unit}"
+                f"{self.where} {interval(self.low, self.high)} {unit}"
             )  # fmt: skip
         mg = 1e3 * self.mean / self.scale
         own = f"{1e3 * self.mean:+.3g} mV" if self.unit == "V" else f"{self.mean:+.3g} {self.unit}"

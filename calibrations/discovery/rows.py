@@ -32,7 +32,7 @@ from calibrations.model import Model
 from calibrations.noise.means import rms
 from calibrations.plausibility import Finding, refusal, rejection
 from calibrations.presentation.residual import milli_unit, pooled_milli
-from calibrations.presentation.text import plain, quantity
+from calibrations.presentation.text import quantity, rounded
 from calibrations.table import Array, Table
 
 
@@ -160,9 +160,9 @@ class Rows(Dataset[Fit]):
         """Error, held-out error and noise floor."""
         (error, floor), unit = pooled_milli(found), milli_unit(found)
         return {
-            "error": f"{plain(found.pooled_excess)} × ({plain(error, 2)} {unit})",
-            f"on {self.unseen}": f"{plain(found.held_out_excess)} ×",
-            "noise floor": f"{plain(floor, 2)} {unit}",
+            "error": f"{rounded(found.pooled_excess)} × ({rounded(error, 2)} {unit})",
+            f"on {self.unseen}": f"{rounded(found.held_out_excess)} ×",
+            "noise floor": f"{rounded(floor, 2)} {unit}",
         }
 
     def facts(self, candidate: Candidate, result: Diagnosis[Fit]) -> dict[str, str]:
@@ -329,7 +329,7 @@ class Rows(Dataset[Fit]):
 
 
 def _fall(before: float, after: float) -> str:
-    return f"{plain(before)} → {plain(after)} × the noise floor"
+    return f"{rounded(before)} → {rounded(after)} × the noise floor"
 
 
 def _next_first(path: Path, stand: Settled) -> tuple[Candidate, ...]:

@@ -35,7 +35,7 @@ from calibrations.noise.places import evaluate, places
 from calibrations.noise.record import Still
 from calibrations.noise.search import Search, candidates, search
 from calibrations.noise.words import of_record, sentence
-from calibrations.presentation.text import plain, quantity
+from calibrations.presentation.text import quantity, rounded
 
 HEAD = (
     "model", "log-likelihood gained", "lost without it alone", "mismatch / chance", "other half",
@@ -124,8 +124,8 @@ class StillRecord(Dataset[NoiseFit]):
     def figures(self, found: NoiseFit) -> dict[str, str]:
         """Mismatch of the spectrum, also on the other half, and of the Allan deviation."""
         return {
-            "mismatch / chance": f"{plain(found.pooled_excess)} ×",
-            "on the other half": f"{plain(found.held_out_excess)} ×",
+            "mismatch / chance": f"{rounded(found.pooled_excess)} ×",
+            "on the other half": f"{rounded(found.held_out_excess)} ×",
             "Allan deviation is off by": ", ".join(f"{100 * value:.2g} %" for value in mismatch(found).values()),
         }
 
@@ -133,9 +133,9 @@ class StillRecord(Dataset[NoiseFit]):
         """Mismatch of the spectrum, and the gain in log-likelihood."""
         before, held_out = result.excess_before, result.held_out_before
         return {
-            "Mismatch of the spectrum": f"{plain(before)} → {plain(candidate.excess_after)} × chance",
-            "On the other half": f"{plain(held_out)} → {plain(candidate.held_out_after)} × chance",
-            "Log-likelihood": f"+{plain(candidate.gain / 2)}",
+            "Mismatch of the spectrum": f"{rounded(before)} → {rounded(candidate.excess_after)} × chance",
+            "On the other half": f"{rounded(held_out)} → {rounded(candidate.held_out_after)} × chance",
+            "Log-likelihood": f"+{rounded(candidate.gain / 2)}",
         }
 
     def _found(self, start: NoiseFit, effects: Mapping[str, Effect], origin: NoiseFit | None = None) -> NoiseFindings:

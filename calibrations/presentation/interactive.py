@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 
 from calibrations.presentation import chart as c
-from calibrations.presentation.text import exponent, plain
+from calibrations.presentation.text import exponent, rounded
 
 Figure = dict[str, Any]
 Trace = dict[str, Any]
@@ -151,7 +151,7 @@ def _marks(axis: c.Axis) -> dict[str, Any]:
     powers = range(exponent(axis.low), exponent(axis.high) + 1)
     values = [digit * 10.0**power for power in powers for digit in (1, 2, 5)]
     shown = [value for value in values if axis.low <= value * (1 + ROUNDING) and value <= axis.high * (1 + ROUNDING)]
-    return {"tickmode": "array", "tickvals": shown, "ticktext": [plain(value, 1) for value in shown]}
+    return {"tickmode": "array", "tickvals": shown, "ticktext": [rounded(value, 1) for value in shown]}
 
 
 Parts = tuple[list[Trace], list[dict[str, Any]], list[dict[str, Any]]]  # traces, shapes, annotations

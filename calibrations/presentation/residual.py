@@ -13,7 +13,7 @@ from calibrations.discovery.places import scales
 from calibrations.fit import Fit
 from calibrations.noise.means import rms
 from calibrations.presentation.charts.columns import NAMES
-from calibrations.presentation.text import minus, plain
+from calibrations.presentation.text import minus, rounded
 from calibrations.table import MILLI, Array, Table
 
 
@@ -112,7 +112,7 @@ class Shown:
             if name in self.fit.table:
                 values = self.fit.table.column(name)[rows]
                 told += f", {NAMES[name][0]} {values.min():g} to {values.max():g}°"
-        times = plain(float(rms(left)) / self.floor, 2)
+        times = rounded(float(rms(left)) / self.floor, 2)
         return f"{told}: residual {minus(f'{left.mean():+.3g}')} {self.unit} on average, rms {times} × the noise floor"
 
     def place(self, row: int) -> str:
@@ -121,7 +121,7 @@ class Shown:
 
     def _told(self, row: int) -> str:
         left = float(self.fit.residual[self.c, row])
-        times = plain(abs(left) / float(self.fit.noise.floor[self.c]), 2)
+        times = rounded(abs(left) / float(self.fit.noise.floor[self.c]), 2)
         error = f"residual {minus(f'{self.factor * left:+.3g}')} {self.unit}, {times} × the noise floor"
         return f"{self.place(row)}<br>{error}"
 

@@ -22,7 +22,7 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator, NullF
 
 from calibrations.errors import CalibrationError
 from calibrations.presentation import chart as c
-from calibrations.presentation.text import plain
+from calibrations.presentation.text import rounded
 
 RC: Any = {
     "font.family": ["DejaVu Sans"],
@@ -201,13 +201,13 @@ def _axis(ax: Axes, axis: c.Axis, along: c.Along, labelled: bool) -> None:
 def _mark_powers(ax: Axes, along: c.Along) -> None:
     """Marks of a logarithmic axis in plain text: powers of ten, and 2 and 5 where there are few of these."""
     side, (low, high) = (ax.xaxis, ax.get_xlim()) if along == "x" else (ax.yaxis, ax.get_ylim())
-    side.set_major_formatter(FuncFormatter(lambda value, _: plain(value, 1)))
+    side.set_major_formatter(FuncFormatter(lambda value, _: rounded(value, 1)))
     few = abs(np.log10(high / low)) < FEW_DECADES
     side.set_minor_formatter(FuncFormatter(_of_two_and_five) if few else NullFormatter())
 
 
 def _of_two_and_five(value: float, _: int | None = None) -> str:
-    return plain(value, 1) if f"{value:.0e}"[0] in "25" else ""
+    return rounded(value, 1) if f"{value:.0e}"[0] in "25" else ""
 
 
 def _second(ax: Axes, second: c.Second) -> None:

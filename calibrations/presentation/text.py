@@ -1,7 +1,7 @@
 """Numbers, units and lists as text, for terminal, page and report alike.
 
 An uncertainty has two significant digits (GUM 7.2.6). A standard uncertainty is given in the concise form,
-`2.500123(45) V` (GUM 7.2.2), in terminals; with a sign `±` in tables of pages and for expanded uncertainties.
+`2.500123(45) V` (GUM 7.2.2); the sign `±` is for expanded uncertainties only.
 """
 
 from __future__ import annotations
@@ -22,19 +22,6 @@ LARGE_STD = 100.0  # from here on the digits in brackets would stand before the 
 # Values with their uncertainty
 
 
-def measured(value: float, std: float | None) -> str:
-    """`2.50013 ± 0.00024`, or `(-1.23 ± 0.11) × 10⁻⁸`; six digits where the uncertainty is not known."""
-    if not _known(std):
-        return minus(f"{value:.6g}")
-    decimals = 1 - exponent(float(f"{std:.1e}"))
-    power = exponent(max(abs(value), std))
-    if SMALL < power <= LARGE:
-        shown = max(decimals, 0)
-        return minus(f"{round(value, decimals):.{shown}f} ± {round(std, decimals):.{shown}f}")
-    shown = decimals + power
-    return minus(f"({value / 10.0**power:.{shown}f} ± {std / 10.0**power:.{shown}f})") + times_ten_to(power)
-
-
 def concise(value: float, std: float | None, of: str = "") -> str:
     """`2.500123(45) V` in ASCII: the digits in brackets are the standard uncertainty of the last digits."""
     if not _known(std):
@@ -45,6 +32,41 @@ def concise(value: float, std: float | None, of: str = "") -> str:
     return f"{value:.{decimals}f}({round(std * 10**decimals)}) {of}".rstrip()
 
 
+def estimate_text(value: float, std: float | None) -> str:
+    """`2.50013(24)`, or `−1.23(11) × 10⁻⁸`: the concise form with typographic signs; six digits without `std`."""
+    if not _known(std):
+        return minus(f"{value:.6g}")
+    power = _power(value, std)
+    if power == 0 and std < LARGE_STD:
+        return minus(concise(value, std))
+    power = power or exponent(max(abs(value), std))
+    return minus(concise(value / 10.0**power, std / 10.0**power)) + times_ten_to(power)
+
+
+def expanded_text(value: float, expanded: float) -> str:
+    """`2.50013 ± 0.00048`, or `(−1.23 ± 0.22) × 10⁻⁸`: a value with its expanded uncertainty."""
+    power = _power(value, expanded)
+    text = f"{_to_digits(value, expanded, power)} ± {_to_digits(expanded, expanded, power)}"
+    return f"({text}){times_ten_to(power)}" if power else text
+
+
+def value_text(value: float, uncertainty: float) -> str:
+    """The value alone, to two digits of its uncertainty: `2.50013`, `−1.23 × 10⁻⁸`."""
+    power = _power(value, uncertainty)
+    return _to_digits(value, uncertainty, power) + (times_ten_to(power) if power else "")
+
+
+def _power(value: float, uncertainty: float) -> int:
+    """The power of ten that is written out: 0 unless both numbers are very small or one is large."""
+    power = exponent(max(abs(value), uncertainty))
+    return 0 if SMALL < power <= LARGE else power
+
+
+def _to_digits(value: float, uncertainty: float, power: int) -> str:
+    decimals = 1 - exponent(float(f"{uncertainty:.1e}"))
+    return minus(f"{round(value, decimals) / 10.0**power:.{max(decimals + power, 0)}f}")
+
+
 def _known(std: float | None) -> TypeGuard[float]:
     return std is not None and math.isfinite(std) and std > 0
 
@@ -52,7 +74,7 @@ def _known(std: float | None) -> TypeGuard[float]:
 # Values alone
 
 
-def plain(value: float, digits: int = 3) -> str:
+def rounded(value: float, digits: int = 3) -> str:
     """A value to so many significant digits, with a power of ten only where it is very small or large."""
     if value == 0 or not math.isfinite(value):
         return f"{value:g}"
@@ -77,7 +99,7 @@ def as_written(value: str | float) -> str:
     return f"{value:.15g}" if isinstance(value, float) else str(value)
 
 
-def chance(p: float) -> str:
+def probability(p: float) -> str:
     """A p-value or a probability: `0.02`, `7 × 10⁻¹¹`, `below 10⁻³⁰⁰`."""
     if p < 1e-300:
         return f"below{times_ten_to(-300)}".replace(" ×", "")
@@ -109,7 +131,7 @@ def size(count: int) -> str:
 # Intervals and limits
 
 
-def stretch(low: float, high: float) -> str:
+def interval(low: float, high: float) -> str:
     """An interval, to a hundredth of its length: `22.32 to 23.13`, `30 to 150`."""
     decimals = max(1, 1 - exponent(high - low)) if high > low else 6
     return f"{round(low, decimals):.10g} to {round(high, decimals):.10g}"

@@ -11,7 +11,7 @@ from calibrations.fleet.batch import Population
 from calibrations.presentation.certificate.terms import name as result_name
 from calibrations.presentation.charts.fleet import Spread
 from calibrations.presentation.report.fleet import calibration_report, population_report
-from calibrations.presentation.text import measured, plain
+from calibrations.presentation.text import estimate_text, rounded
 from rig.fleet.calibrate import Calibrated, Calibration
 from rig.fleet.own_effects import effects_of
 from rig.services.provenance import program, today
@@ -165,9 +165,9 @@ def _rows(batch: Calibrated) -> list[tuple[object, ...]]:
             batch.batch or "no batch",
             len(batch.members),
             _titled(batch, name),
-            measured(each.mean * size, each.mean_std * size),
-            plain(each.spread * size, 2),
-            plain(float(gain), 2),
+            estimate_text(each.mean * size, each.mean_std * size),
+            rounded(each.spread * size, 2),
+            rounded(float(gain), 2),
             ", ".join(m.sensor for m, out in zip(batch.members, each.apart, strict=True) if out) or "-",
         )
         for name, each, size, gain in zip(batch.names, batch.pooled.parameters, batch.pooled.scale, gains, strict=True)

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from calibrations.estimators.least_squares import Recursive
-from calibrations.presentation.text import measured
+from calibrations.presentation.text import estimate_text
 from calibrations.table import Array
 from procedures.questions import EDGES
 from procedures.session import Dwell, Pose
@@ -77,7 +77,7 @@ class SoFar:
             for parameter, (place, unit) in law.parameters(name).items():
                 value, std = float(estimate.values[place]), float(estimate.scattered[place])
                 if np.isfinite(std):
-                    yield f"{sensor} {parameter}".strip(), f"{measured(value, std)} {unit}"
+                    yield f"{sensor} {parameter}".strip(), f"{estimate_text(value, std)} {unit}"
 
 
 def _loaded(letter: str, load: Callable[[Pose], Array]) -> Callable[[Dwell], Iterator[Row]]:

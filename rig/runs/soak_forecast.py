@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from calibrations.analyses.forecast import LATEST_STEADY_S, STRETCH_S, Forecast, SoakForecast, filter_soak
 from calibrations.analyses.soak import HOLD, HOUR_S, REVERSAL
-from calibrations.presentation.text import plain
+from calibrations.presentation.text import rounded
 from procedures.session import Dwell
 from procedures.tumbles import tumble
 from rig.record import Kept, Record
@@ -109,7 +109,7 @@ def _final(name: str, forecast: Forecast) -> str:
     """The final value."""
     unit, final = ("V/g" if "scale" in name else "V"), forecast.final
     if forecast.known:
-        return f"final value {final.value:.5f} +- {plain(1e6 * final.half, 2)} u{unit} (95 %)"
+        return f"final value {final.value:.5f} +- {rounded(1e6 * final.half, 2)} u{unit} (95 %)"
     return f"final value not yet known: {final.low:.4f} to {final.high:.4f} {unit} (95 %)"
 
 
@@ -125,11 +125,11 @@ def _when(forecast: Forecast) -> str:
 
 
 def _span(seconds: float) -> str:
-    return f"{plain(seconds / HOUR_S, 2)} h" if seconds >= HOUR_S else f"{seconds / 60:.0f} min"
+    return f"{rounded(seconds / HOUR_S, 2)} h" if seconds >= HOUR_S else f"{seconds / 60:.0f} min"
 
 
 def lines(forecasts: Mapping[str, Forecast]) -> str:
     """The forecasts of all quantities in lines, with the time since power-on."""
     hours = max(each.t_s for each in forecasts.values()) / HOUR_S
     words = [f"  {name:<9} {present(name, each)} now; {outlook(name, each)}" for name, each in forecasts.items()]
-    return "\n".join([f"{plain(hours)} h after power-on", *words])
+    return "\n".join([f"{rounded(hours)} h after power-on", *words])

@@ -28,7 +28,7 @@ from calibrations.presentation.charts.columns import Column, in_time
 from calibrations.presentation.charts.history import Life
 from calibrations.presentation.charts.noise import TIME, Scaled, measured_points
 from calibrations.presentation.residual import Shown
-from calibrations.presentation.text import labelled, measured, minus, prefixed, unit
+from calibrations.presentation.text import estimate_text, labelled, minus, prefixed, unit
 from rig.services.both import Again
 from rig.services.course import Course
 from rig.services.history import Calibration, Quantity
@@ -77,7 +77,7 @@ def life_of(q: Quantity) -> Life:
 def _told(q: Quantity, each: Calibration, signals: bool) -> str:
     """The text of a calibration under the pointer."""
     value = each.values[q.name]
-    lines = [f"{each.day}: {measured(value.value, value.std)} {unit(q.unit)}", f"{each.data}, rig {each.rig}"]
+    lines = [f"{each.day}: {estimate_text(value.value, value.std)} {unit(q.unit)}", f"{each.data}, rig {each.rig}"]
     lines += ["beyond the limits of a control chart"] if signals else []
     lines += [each.expired] if each.expired else []
     return "<br>".join([*lines, "click: its model"])
@@ -109,7 +109,7 @@ def _differences(pairs: Sequence[Pair]) -> Panel:
         symbol=["diamond" if pair.differ else "circle" for pair in pairs],
         size=8,
         reach=np.array([DIFFERENT * factor * (pair.std or 0.0) for pair in pairs]),
-        hover=[f"{pair.name}: {measured(pair.difference, pair.std)} {unit(pair.unit)}" for pair in pairs],
+        hover=[f"{pair.name}: {estimate_text(pair.difference, pair.std)} {unit(pair.unit)}" for pair in pairs],
     )
     y = Axis(low=-0.5, high=len(pairs) - 0.5, names=names, reverse=True)
     return Panel((Rule(0.0, "x", width=1.2), dots), Axis(labelled("difference", spelt)), y)

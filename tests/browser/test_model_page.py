@@ -24,9 +24,9 @@ from tests.browser.measured import hidden, hundred_thousand, thousand, unexplain
 
 pytestmark = pytest.mark.slow
 
-DOTS = "[aria-label='What the model leaves'] .points path"
+DOTS = "[aria-label='Residuals'] .points path"
 ALIVE_MS = 5000  # on a busy machine; else a tenth of that
-BARS = "[aria-label^='The falling error'] .bars .point"
+BARS = "[aria-label^='Error by model'] .bars .point"
 
 
 def looked_at(workbench: Workbench, data: str, verdict: str) -> Page:
@@ -98,15 +98,15 @@ def test_an_effect_of_ones_own_with_a_mistake_and_then_right(workbench: Workbenc
 
 def test_of_a_still_record_the_allan_deviation_is_shown(workbench: Workbench, tmp_path: Path) -> None:
     page = looked_at(workbench, wandering(tmp_path), "misses rate-random-walk")
-    for picture in ("Allan deviation beside the model", "Spectrum beside the model", "Where it fails"):
+    for picture in ("Allan deviation and model", "Spectrum and model", "Residual pattern"):
         expect(page.locator(f"[aria-label='{picture}'] .points path").first).to_be_attached()
     expect(page.get_by_role("button", name="with rate-random-walk")).to_be_visible()  # its curve is drawn
     expect(page.locator(".card.first")).to_contain_text("× chance")
-    label = page.locator("[aria-label='Allan deviation beside the model'] .ytitle")
+    label = page.locator("[aria-label='Allan deviation and model'] .ytitle")
     expect(label).to_have_text("Allan deviation (V)")
     page.keyboard.press("g")
     expect(label).to_have_text("Allan deviation (mg)")
-    expect(page.locator("[aria-label='Spectrum beside the model'] .ytitle")).to_have_text("density (mg/√Hz)")
+    expect(page.locator("[aria-label='Spectrum and model'] .ytitle")).to_have_text("density (mg/√Hz)")
     expect(page.locator("[aria-label='The record'] .ytitle")).to_have_text("x less its mean (mg)")
     workbench.shot(page, "noise")
     page.get_by_role("button", name="Add rate-random-walk").click()
@@ -118,10 +118,10 @@ def test_of_a_motion_its_samples_are_drawn(workbench: Workbench) -> None:
     with Record() as record:
         run = start(record, read_bench(), find("motion"), {}, Quiet({})).run.run
     page = workbench.visit(f"/?data={run}")
-    expect(page.locator("[aria-label='Measurement beside model'] .ytitle")).to_have_text("x less its mean (mV)")
+    expect(page.locator("[aria-label='Measurement and model'] .ytitle")).to_have_text("x less its mean (mV)")
     expect(page.locator("[aria-label='Where it fails'] .xtitle")).to_have_text("phase of the motion at 10 Hz (deg)")
     page.keyboard.press("x")
-    expect(page.locator("[aria-label='What the model leaves'] .ytitle")).to_contain_text("residual of x in phase")
+    expect(page.locator("[aria-label='Residuals'] .ytitle")).to_contain_text("residual of x in phase")
     workbench.shot(page, "motion")
 
 
@@ -143,15 +143,15 @@ def test_a_search_is_told_cancelled_and_begun_again(
 
 def test_selection_units_axes_and_poses(workbench: Workbench, tmp_path: Path) -> None:
     page = looked_at(workbench, hidden(tmp_path, "package turned"), "misses axis-misalignment")
-    brushed(page, "Where it fails")
+    brushed(page, "Residual pattern")
     expect(page.get_by_text("of 518 selected")).to_be_visible()
-    for picture in ("Measurement beside model", "What the model leaves", "Where it fails"):
+    for picture in ("Measurement and model", "Residuals", "Residual pattern"):
         faded = f"[aria-label='{picture}'] .points path[style*='opacity: 0.2']"
         expect(page.locator(faded).first).to_be_attached()
     workbench.shot(page, "brushed")
     page.get_by_role("button", name="Select nothing").click()
-    expect(page.locator("[aria-label='What the model leaves'] .points path[style*='opacity: 0.2']")).to_have_count(0)
-    label = page.locator("[aria-label='What the model leaves'] .ytitle")
+    expect(page.locator("[aria-label='Residuals'] .points path[style*='opacity: 0.2']")).to_have_count(0)
+    label = page.locator("[aria-label='Residuals'] .ytitle")
     expect(label).to_have_text("residual of x (mV)")
     page.keyboard.press("g")
     expect(label).to_have_text("residual of x (mg)")
@@ -159,7 +159,7 @@ def test_selection_units_axes_and_poses(workbench: Workbench, tmp_path: Path) ->
     expect(label).to_have_text("residual of y (mg)")
     page.get_by_label("against").click()
     page.get_by_role("option", name="temperature (°C)").click()
-    expect(page.locator("[aria-label='What the model leaves'] .xtitle")).to_have_text("temperature (°C)")
+    expect(page.locator("[aria-label='Residuals'] .xtitle")).to_have_text("temperature (°C)")
     page.locator("[aria-label='Where it fails'] .points path").nth(9).hover(force=True)
     expect(page.locator("[aria-label='Where it fails'] .hovertext")).to_contain_text("α 90°, β 90°")
 
@@ -171,7 +171,7 @@ def test_selected_poses_are_left_out_with_a_reason_and_taken_in_again(workbench:
         run = start(record, bench, sweep, settings, Quiet({})).run
     page = workbench.visit(f"/?data={run.run}")
     expect(page.locator(".verdict .detail")).to_contain_text(f"on {run.rows} poses")
-    brushed(page, "Where it fails")
+    brushed(page, "Residual pattern")
     page.get_by_role("button", name="Leave out").click()
     dialog = page.get_by_role("dialog")
     dialog.get_by_role("button", name="Leave out").click()
@@ -218,7 +218,7 @@ def test_large_data_leave_the_page_alive(workbench: Workbench, tmp_path: Path, m
     dark.click()
     expect(page.locator("body.body--dark")).to_be_attached(timeout=ALIVE_MS)
     expect(page.locator(".verdict.good, .picture .title button:visible").first).to_be_visible()  # drawn to the end
-    brushed(page, "What the model leaves")
+    brushed(page, "Residuals")
     expect(page.get_by_text(re.compile("of [0-9]+ selected"))).to_be_visible(timeout=ALIVE_MS)
     workbench.shot(page, f"dark-{rows.split()[1]}")
     dark.click()

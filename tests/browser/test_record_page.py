@@ -16,7 +16,7 @@ from rig.record import Block, Kept, Record
 from tests.browser.conftest import Workbench
 from tests.browser.measured import hidden, wandering
 
-BOTH, DIFFERENCE = "What the model leaves of both", "Second less first, at the poses that both have"
+BOTH, DIFFERENCE = "Residuals of both", "Difference second − first at common poses"
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""Both models beside the displacement sensor: the paper's numbers on a rig whose truth is known."""
+"""Both models and the displacement sensor: the paper's numbers on a rig whose truth is known."""
 
 from __future__ import annotations
 

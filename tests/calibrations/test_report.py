@@ -23,7 +23,17 @@ from calibrations.presentation.chart import Chart, Panel, Picture
 from calibrations.presentation.report.report import report
 from calibrations.presentation.report.words import next_takes, next_words, state, summary
 from calibrations.presentation.residual import pooled_milli
-from calibrations.presentation.text import chance, joined, measured, minus, plain, stretch, unit
+from calibrations.presentation.text import (
+    estimate_text,
+    expanded_text,
+    interval,
+    joined,
+    minus,
+    probability,
+    rounded,
+    unit,
+    value_text,
+)
 from calibrations.table import Table
 from tests.calibrations.test_pictures import EFFECTS, by_hand, hand_table, warm, warm_table
 
@@ -125,20 +135,20 @@ def test_the_page_reaches_nowhere(make: object) -> None:
 def test_it_opens_with_the_verdict_and_the_falling_error() -> None:
     text = page()
     assert "<h1>The model linear misses temperature-bias.</h1>" in text
-    assert text.index("<h1>") < text.index("waterfall-") < text.index("Where the model linear fails")
-    assert "effect found" in Page(text).text
+    assert text.index("<h1>") < text.index("waterfall-") < text.index("Residuals of the model linear")
+    assert "effect missing" in Page(text).text
 
 
 def test_it_holds_the_errors_before_and_after() -> None:
     found, text = warm(), Page(page()).text
     (step,) = found.steps
     for value in (found.start.pooled_excess, found.end.pooled_excess, step.held_out_before, step.held_out_after):
-        assert f" {plain(value)} " in text
+        assert f" {rounded(value)} " in text
     for fit in (found.start, found.end):
-        assert f"{plain(pooled_milli(fit)[0], 2)} mg" in text
+        assert f"{rounded(pooled_milli(fit)[0], 2)} mg" in text
         for c in range(2):
-            assert f"{plain(1e3 * fit.rmse[c])} mV" in text
-            assert f"{plain(1e3 * fit.noise.floor[c])} mV" in text
+            assert f"{rounded(1e3 * fit.rmse[c])} mV" in text
+            assert f"{rounded(1e3 * fit.noise.floor[c])} mV" in text
 
 
 def test_it_holds_every_place_where_the_model_fails() -> None:
@@ -152,7 +162,7 @@ def test_it_holds_every_place_where_the_model_fails() -> None:
 def test_it_holds_every_candidate() -> None:
     text = Page(page()).text
     for c in warm().findings.candidates:
-        assert f"{c.name} {plain(c.excess_after)} {plain(c.held_out_after)} {chance(c.p_value)}" in text
+        assert f"{c.name} {rounded(c.excess_after)} {rounded(c.held_out_after)} {probability(c.p_value)}" in text
     best = warm().findings.candidates[0].effect
     assert best.formula.split()[-1] in text
     assert best.symptom[1:] in text
@@ -162,9 +172,9 @@ def test_it_holds_every_parameter_with_its_uncertainty() -> None:
     text = Page(page()).text
     for term in warm().end.model.terms:
         for e in term.estimates:
-            assert f"{e.name} {e.axis} {measured(e.value, e.std)} {unit(e.unit)}" in text
+            assert f"{e.name} {e.axis} {estimate_text(e.value, e.std)} {unit(e.unit)}" in text
     (reference,) = warm().end.model.terms[-1].constants.values()
-    assert f"{plain(reference, 6)} (a reference value, not fitted)" in text
+    assert f"{rounded(reference, 6)} (a reference value, not fitted)" in text
 
 
 def test_it_says_why_a_parameter_is_not_identified() -> None:
@@ -194,10 +204,10 @@ def test_it_holds_the_noise() -> None:
     text = Page(page()).text
     noise = warm().end.noise
     for c in range(2):
-        assert f"{plain(1e3 * noise.floor[c])} mV" in text
+        assert f"{rounded(1e3 * noise.floor[c])} mV" in text
         if noise.scatter[c] > 1e-3 * noise.floor[c]:
-            assert f"{plain(1e3 * noise.scatter[c])} mV" in text
-    assert "those that explain it best" in text
+            assert f"{rounded(1e3 * noise.scatter[c])} mV" in text
+    assert "from the residual of the final model" in text
 
 
 def test_it_holds_the_provenance_and_no_path_of_this_machine() -> None:
@@ -224,7 +234,7 @@ def test_the_same_arguments_give_the_same_page() -> None:
 
 def test_positions_are_told_as_positions() -> None:
     text = Page(hand_page()).text
-    assert "on unseen positions" in text
+    assert "positions not used in the fit" in text
     assert "norm" in text
     assert "poses" not in text.replace("poses.", "")
 
@@ -241,7 +251,7 @@ def test_doubt_is_said_so_with_the_experiment_that_ends_it() -> None:
     assert found.judgement.headline == "The model linear misses temperature-bias."
     assert "This data cannot separate temperature-bias from warm-up-bias or drift." in found.judgement.text
     assert found.verdict == "ambiguous"
-    assert next_words(e) == "To tell a from b or c, run sweep with flip = 1: it turns."
+    assert next_words(e) == "To separate a from b or c, run sweep with flip = 1: it turns."
     assert next_words(e) in Page(report(found, beside(), "d", "p", blank())).text
 
 
@@ -249,8 +259,8 @@ def test_the_next_experiment_stands_with_its_command_and_what_it_brings() -> Non
     bare = Experiment("sweep", {}, (("temperature-bias", "warm-up-bias"),), "it turns")
     e = replace(bare, command="rig run sweep --bench b.yaml", duration_s=3827.0, expected=Expected(1.0, 400.0, 1.0))
     assert next_takes(bare) == ""
-    assert next_takes(replace(e, duration_s=50835.0, expected=None)).startswith("It takes 14.1 h; what it will tell")
-    brings = "It takes 64 min, and is expected to tell them apart with a probability of 99.9 %, by all data together."
+    assert next_takes(replace(e, duration_s=50835.0, expected=None)).startswith("It takes 14.1 h. Its result cannot")
+    brings = "It takes 64 min and separates them with a probability of 99.9 %, from all data together."
     assert next_takes(e) == brings
     found = changed(warm(), alternatives={"temperature-bias": ("w",)}, next_experiment=e)
     page = report(found, beside(), "d", "p", blank())
@@ -263,7 +273,7 @@ def test_what_is_not_explained_is_said_so() -> None:
     found = Discovery.of(replace(dropped, left="step at t = 3120 s"))
     assert found.judgement.text == "No effect of the catalogue explains the residual: step at t = 3120 s."
     text = Page(report(found, beside(), "d", "p")).text
-    assert "Start from its pattern: step at t = 3120 s." in text
+    assert "Pattern of the residual: step at t = 3120 s." in text
     assert "This effect was tried and not kept" in text
 
 
@@ -274,28 +284,41 @@ def test_names_are_joined() -> None:
 @pytest.mark.parametrize(
     ("value", "std", "shown"),
     [
-        (2.500134567, 0.000241, "2.50013 ± 0.00024"),
-        (2.506215, 2.34e-6, "2.5062150 ± 0.0000023"),
-        (-1.234e-8, 1.1e-9, "(−1.23 ± 0.11) × 10⁻⁸"),
-        (1.0, 0.0996, "1.00 ± 0.10"),
-        (33123.8, 123.4, "33120 ± 120"),
-        (0.0, 0.5, "0.00 ± 0.50"),
+        (2.500134567, 0.000241, "2.50013(24)"),
+        (2.506215, 2.34e-6, "2.5062150(23)"),
+        (-1.234e-8, 1.1e-9, "−1.23(11) × 10⁻⁸"),
+        (1.0, 0.0996, "1.00(10)"),
+        (33123.8, 123.4, "3.312(12) × 10⁴"),
+        (0.0, 0.5, "0.00(50)"),
         (0.02, None, "0.02"),
     ],
 )
 def test_values_are_rounded_to_two_digits_of_their_uncertainty(value: float, std: float | None, shown: str) -> None:
-    assert measured(value, std) == shown
+    assert estimate_text(value, std) == shown
+
+
+@pytest.mark.parametrize(
+    ("value", "expanded", "shown"),
+    [
+        (2.500134567, 0.000482, "2.50013 ± 0.00048"),
+        (-1.234e-8, 2.2e-9, "(−1.23 ± 0.22) × 10⁻⁸"),
+        (33123.8, 123.4, "33120 ± 120"),
+    ],
+)
+def test_a_sign_is_for_expanded_uncertainties(value: float, expanded: float, shown: str) -> None:
+    assert expanded_text(value, expanded) == shown
+    assert value_text(value, expanded) == re.sub(r" ± [^)]*|[()]", "", shown)
 
 
 @pytest.mark.parametrize(
     ("value", "shown"), [(0.0, "0"), (9.996, "10.0"), (0.05066, "0.0507"), (1234.0, "1230"), (1.5e-7, "1.50 × 10⁻⁷")]
 )
-def test_plain_numbers_have_three_digits(value: float, shown: str) -> None:
-    assert plain(value) == shown
+def test_rounded_numbers_have_three_digits(value: float, shown: str) -> None:
+    assert rounded(value) == shown
 
 
-def test_chances_and_units() -> None:
-    assert [chance(p) for p in (1.0, 0.0187, 9.7e-12, 0.0)] == ["1", "0.019", "1 × 10⁻¹¹", "below 10⁻³⁰⁰"]
+def test_probabilities_and_units() -> None:
+    assert [probability(p) for p in (1.0, 0.0187, 9.7e-12, 0.0)] == ["1", "0.019", "1 × 10⁻¹¹", "below 10⁻³⁰⁰"]
     assert [unit(u) for u in ("V/g^2", "1", "degC", "V")] == ["V/g²", "", "°C", "V"]
 
 
@@ -309,5 +332,5 @@ def test_chances_and_units() -> None:
         (3.0, 3.0, "3 to 3"),
     ],
 )
-def test_a_stretch_has_a_hundredth_of_its_length(low: float, high: float, shown: str) -> None:
-    assert stretch(low, high) == shown
+def test_an_interval_has_a_hundredth_of_its_length(low: float, high: float, shown: str) -> None:
+    assert interval(low, high) == shown

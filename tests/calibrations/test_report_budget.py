@@ -18,7 +18,7 @@ def test_the_report_shows_sources_and_what_is_not_given() -> None:
     page = report(found, compare(table, read_model("linear")), "2026-01-01", "program 1")
     for text in ("Uncertainty budget", "gain of the converter", "white noise of the dwells", "coverage factor"):
         assert text in page
-    assert "Not given, and so not in these numbers: gravity at the place" in page
+    assert "Not given and not included: gravity at the place" in page
 
 
 def test_the_section_says_what_counts_most() -> None:

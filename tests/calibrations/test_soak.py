@@ -12,7 +12,7 @@ from calibrations.analyses.soak import analyse_soak
 from calibrations.errors import TooFewRows
 from calibrations.presentation.charts.soak import soak_album
 from calibrations.presentation.report.soak import soak_report
-from calibrations.presentation.text import measured
+from calibrations.presentation.text import estimate_text
 from tests.calibrations.soaks import BLOCK_S, soak_table
 
 FACTS = {"sensor": "a <sensor>", "run": "a night"}
@@ -55,7 +55,7 @@ def test_a_gap_is_marked_and_the_fit_goes_by_real_time() -> None:
     assert state is not None
     assert state.terms[0].tau_s[0] == pytest.approx(5400, abs=3 * state.terms[0].tau_s[1])
     assert "1.39 h at" in page(found)
-    assert "1.39 h are lost in 1 gap:" in page(found)
+    assert "1.39 h are lost in 1 gap." in page(found)
 
 
 def test_a_reversal_that_was_interrupted_is_left_out() -> None:
@@ -87,7 +87,7 @@ def test_a_short_soak_has_courses_and_no_verdict_on_steady_state() -> None:
     assert all(course.state is None for course in found.courses.values())
     assert found.time_s() is None
     assert found.temperature_wander_k is None
-    assert "cannot be told" in page(found)
+    assert "Too few reversals" in page(found)
 
 
 def test_without_a_whole_reversal_there_is_nothing() -> None:
@@ -134,11 +134,11 @@ def test_the_page_tells_the_night_without_a_network() -> None:
     text = page(found, results)
     time = found.time_s()
     assert time is not None
-    assert f"Bias and scale factor are steady {measured(time[0] / 3600, time[1] / 3600)} h after power-on" in text
-    assert "12.0 h held still, every sample kept, with 53 reversals" in text
+    assert f"Bias and scale factor are steady {estimate_text(time[0] / 3600, time[1] / 3600)} h after power-on" in text
+    assert "every sample of 12.0 h at rest, and 53 reversals" in text
     assert "0 to 7" in text
     assert re.search("0.123 K<.*at most 0.3<", text)
-    assert "None: every sample" in text
+    assert "None: the record holds every sample" in text
     assert "a &lt;sensor&gt;" in text
     assert not re.search(r'(src|href)="https?:', text)
     assert text == page(found, results)
@@ -146,7 +146,7 @@ def test_the_page_tells_the_night_without_a_network() -> None:
 
 def test_the_page_says_what_is_not_reached() -> None:
     text = page(analyse_soak(soak_table(7200.0, drift_v=0.02)))
-    assert "Steady state is not shown within" in text
+    assert "No steady state within" in text
     assert "steady state not reached" in text
 
 
@@ -156,7 +156,7 @@ def test_a_room_that_wandered_is_told() -> None:
     warm = type(table).from_columns(
         "poses", {**table.columns, "temperature_c": wandering}, table.constants, "", table.labels
     )
-    assert "no soak at constant ambient" in page(analyse_soak(warm))
+    assert "ambient temperature was not constant" in page(analyse_soak(warm))
 
 
 def test_pictures_are_named() -> None:

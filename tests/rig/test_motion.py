@@ -273,13 +273,13 @@ def test_all_commands_take_the_run(rig: Callable[..., Any], tmp_path: Path) -> N
     assert rig("report", run, "--model", "linear", "--out", page).status == 0
     text = Path(page).read_text()
     parts = (
-        "<h1>In motion, the physical model errs by ",
+        "<h1>In motion, the physical model has an rms error of ",
         "linear model of the sweep",
-        "Beside the displacement sensor",
+        "Comparison with the displacement sensor",
         "rms error of the physical model",
-        "What each filter does",
+        "Errors of the filters",
         "The model linear, fitted to the motion",
-        "The falling error",
+        "Error by model",
     )
     places = [text.index(part) for part in parts]
     assert places == sorted(places)

@@ -50,8 +50,9 @@ def last(told: SoFar, poses: list[Kept]) -> dict[str, str]:
 
 
 def number(words: str) -> tuple[float, float]:
-    value, _, std = words.replace("−", "-").partition(" ± ")
-    return float(value), float(std.split()[0])
+    value, _, std = words.replace("−", "-").partition("(")
+    decimals = len(value.partition(".")[2])
+    return float(value), float(std.partition(")")[0]) / 10**decimals
 
 
 def swept(alphas: tuple[float, ...]) -> Iterator[Pose]:

@@ -120,7 +120,7 @@ def test_the_report_is_one_page_with_both_pictures(rig: Rig, folder: Path) -> No
     assert ended.status == 0, ended.err
     page = Path("page.html").read_text()
     assert "The model still misses flicker-noise." in page
-    assert "Allan deviation beside the model" in page
+    assert "Allan deviation and model" in page
     assert "src=" not in page
     assert {path.name for path in Path("pictures").iterdir()} == {"allan.svg", "spectrum.svg"}
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from calibrations.presentation.certificate.content import RULE, Certificate, Decision, Outcome, Source
 from calibrations.presentation.certificate.results import CONSERVATIVE, WIDENED
-from calibrations.presentation.text import measured, minus, plain, unit
+from calibrations.presentation.text import expanded_text, minus, rounded, unit, value_text
 
 MANY = 1e4  # degrees of freedom, told as no limit
 END_SCATTER = 2.67  # of a normal's 97.5 % quantile, in its standard deviation, times the root of the trials
@@ -143,7 +143,7 @@ def _environment(c: Certificate) -> Section:
 def results_table(c: Certificate) -> Table:
     """The results as left: what a certificate is asked for first."""
     rows = tuple(
-        (_name(o), measured(o.value, o.expanded), unit(o.unit), _coverage(o), _freedom(o.freedom),
+        (_name(o), expanded_text(o.value, o.expanded), unit(o.unit), _coverage(o), _freedom(o.freedom),
          *(("–", "–") if o.decision is None else (_limits(o.decision), _statement(o.decision))))
         for o in c.figures.outcomes
     )  # fmt: skip
@@ -166,12 +166,12 @@ def _found(c: Certificate) -> Section:
     """As found, where an earlier calibration is known; the error of indication in any case."""
     outcomes = [o for o in c.figures.outcomes if o.found is not None]
     changes = tuple(
-        (_name(o), _like(o.found[0], o), _like(o.value, o), plain(o.value - o.found[0], 2), unit(o.unit),
-         f"{abs(o.value - o.found[0]) / o.expanded:.1f}")
+        (_name(o), value_text(o.found[0], o.expanded), value_text(o.value, o.expanded),
+         rounded(o.value - o.found[0], 2), unit(o.unit), f"{abs(o.value - o.found[0]) / o.expanded:.1f}")
         for o in outcomes if o.found is not None
     )  # fmt: skip
     errors = tuple(
-        (e.axis, *([plain(x) for x in e.found] if e.found else ["–", "–"]), *(plain(x) for x in e.left), e.unit)
+        (e.axis, *([rounded(x) for x in e.found] if e.found else ["–", "–"]), *(rounded(x) for x in e.left), e.unit)
         for e in c.figures.errors
     )
     head = ("axis", "rms as found", "greatest as found", "rms as left", "greatest as left", "unit")
@@ -192,8 +192,8 @@ def _uncertainty(c: Certificate) -> Section:
         for o in c.figures.outcomes
     )
     trials = tuple(
-        (_name(o), plain(o.std, 2), plain(o.simulated.std, 2), plain(o.expanded, 2),
-         f"{_like(o.simulated.low, o)} to {_like(o.simulated.high, o)}", unit(o.unit),
+        (_name(o), rounded(o.std, 2), rounded(o.simulated.std, 2), rounded(o.expanded, 2),
+         f"{value_text(o.simulated.low, o.expanded)} to {value_text(o.simulated.high, o.expanded)}", unit(o.unit),
          _checked(o))
         for o in c.figures.outcomes
     )  # fmt: skip
@@ -273,12 +273,6 @@ def _freedom(freedom: float) -> str:
     return f"{math.floor(freedom + ROUNDING):d}" if freedom < MANY else "∞"
 
 
-def _like(value: float, o: Outcome) -> str:
-    """A value to as many digits as the result has."""
-    head, _, tail = measured(value, o.expanded).partition(" ±")
-    return head.strip("(") + tail.partition(")")[2]
-
-
 def _limits(d: Decision) -> str:
     return minus(f"{d.low:g} to {d.high:g}")
 
@@ -292,8 +286,8 @@ def _line(s: Source, o: Outcome) -> tuple[str, ...]:
     return (
         s.name,
         s.kind,
-        "–" if s.std is None else f"{plain(s.std, 2)} {unit(s.unit)}".strip(),
-        "–" if s.sensitivity is None else plain(s.sensitivity, 2),
-        plain(s.contribution, 2) if s.contribution > NEGLIGIBLE * o.std else "negligible",
+        "–" if s.std is None else f"{rounded(s.std, 2)} {unit(s.unit)}".strip(),
+        "–" if s.sensitivity is None else rounded(s.sensitivity, 2),
+        rounded(s.contribution, 2) if s.contribution > NEGLIGIBLE * o.std else "negligible",
         _freedom(s.freedom),
     )

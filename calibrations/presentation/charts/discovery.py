@@ -41,7 +41,7 @@ from calibrations.presentation.charts.fit import (
 )
 from calibrations.presentation.charts.motion import evaluation
 from calibrations.presentation.residual import Shown, milli_unit, pooled_milli
-from calibrations.presentation.text import plain
+from calibrations.presentation.text import rounded
 
 BELOW = 0.5  # times the floor: where the logarithmic axis begins
 FEWEST = 4  # bars that there is room for: one alone is no thicker than they
@@ -114,20 +114,20 @@ def levels(found: Falling) -> list[Level]:
 
 
 def _rms(fit: Fit) -> str:
-    return f"{plain(pooled_milli(fit)[0], 2)} {milli_unit(fit)}"
+    return f"{rounded(pooled_milli(fit)[0], 2)} {milli_unit(fit)}"
 
 
 def waterfall(steps: Sequence[Level], words: Measure = Measure()) -> Chart:
-    """The falling error: a bar for the model as it was, one more for each effect added; the band is the noise floor.
+    """Error by model: a bar for the model as it was, one more for each effect added; the band is the noise floor.
 
     Bars are errors on rows of the fit, diamonds on rows that the fit did not use.
     """
     seen, unseen = (np.array([getattr(level, name) for level in steps], float) for name in ("seen", "unseen"))
     reach = 2.2 * max(*seen, *unseen, 3.0)
     colours = [MODEL, *(GOOD if value < NEAR else MEASURED for value in seen[1:])]
-    texts = [f"{plain(level.seen)} × ({level.rms})" for level in steps]
+    texts = [f"{rounded(level.seen)} × ({level.rms})" for level in steps]
     inside = [log10(max(value, BELOW) / BELOW) > LONG * log10(reach / BELOW) for value in seen]
-    hover = [f"{plain(value)} × {words.over} on {words.unseen}" for value in unseen]
+    hover = [f"{rounded(value)} × {words.over} on {words.unseen}" for value in unseen]
     series = (
         Span(BELOW, 1.0, "x"),
         Bars(BELOW, seen, colours, texts, inside),
@@ -155,7 +155,7 @@ def effect_chart(step: Step[Fit]) -> Chart:
 
 
 def album(found: Discovery[Fit], compared: Comparison[Fit], motion: MotionResult | None = None) -> list[Picture]:
-    """The falling error, the given model beside its data, where it fails, and each effect's curve.
+    """Error by model, the given model beside its data, where it fails, and each effect's curve.
 
     The result of a run of the procedure motion comes first, if it is given.
     """
@@ -171,10 +171,10 @@ def album(found: Discovery[Fit], compared: Comparison[Fit], motion: MotionResult
         left += f" Only the {MOST_ROWS} outputs with the largest residual are drawn."
     return [
         *(_evaluated(each) for each in (motion,) if each),
-        Picture("waterfall", "The falling error", fall, waterfall(levels(found))),
-        Picture("measurement", "Measurement beside model", shown.format(model), measurement_chart(fit)),
+        Picture("waterfall", "Error by model", fall, waterfall(levels(found))),
+        Picture("measurement", "Measurement and model", shown.format(model), measurement_chart(fit)),
         Picture("residual", "Residual", left, residual_chart(fit)),
-        Picture("failure", "Where the model fails", mapped.format(model), failure_chart(fit)),
+        Picture("failure", "Residual pattern", mapped.format(model), failure_chart(fit)),
         *(_curve(step, found) for step in tried(found)),
     ]
 
@@ -186,7 +186,7 @@ def _evaluated(motion: MotionResult) -> Picture:
         "half second. Below: the difference; the grey band is the difference by the sensor's noise alone, one standard "
         "deviation each way. Both are in the paper's band, a second-order low-pass at 20 Hz (Ang, Fig. 12)."
     )
-    return Picture("evaluation", "Both models beside the displacement sensor", caption, evaluation(motion))
+    return Picture("evaluation", "Both models and the displacement sensor", caption, evaluation(motion))
 
 
 def tried(found: Discovery[Fit]) -> tuple[Step[Fit], ...]:
@@ -208,4 +208,4 @@ def _curve(step: Step[Fit], found: Discovery[Fit]) -> Picture:
         f"{kept}Left: the residual before, and the part explained by {step.name} (full line clockwise, broken "
         "line anticlockwise). Right: the residual after, on the same scale."
     )
-    return Picture(f"effect-{step.name}", f"What {step.name} explains", caption, effect_chart(step))
+    return Picture(f"effect-{step.name}", f"Contribution of {step.name}", caption, effect_chart(step))

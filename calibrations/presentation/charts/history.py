@@ -24,7 +24,7 @@ from calibrations.presentation.chart import (
     Symbol,
     stacked,
 )
-from calibrations.presentation.text import labelled, plain, prefixed, unit
+from calibrations.presentation.text import labelled, prefixed, rounded, unit
 from calibrations.table import Array
 
 POINTS = 200
@@ -129,7 +129,7 @@ def control_panels(
         factor, spelt = prefixed(unit(of), float(np.abs([values, high]).max()))
         numbers = np.arange(first, first + len(values), dtype=float)
         mine = None if keys is None else keys[first - 1 :]
-        told = [f"{text}: {plain(v)} {spelt}" for text, v in zip(hover[first - 1 :], factor * values, strict=False)]
+        told = [f"{text}: {rounded(v)} {spelt}" for text, v in zip(hover[first - 1 :], factor * values, strict=False)]
         dots = _control_points(numbers, factor * values, beyond, judged, told, mine)
         band = Band(numbers, factor * low, factor * high, steps=True)
         y = Axis(labelled(label, spelt))

@@ -26,8 +26,8 @@ from calibrations.presentation.chart import (
     floor_band,
 )
 from calibrations.presentation.residual import Shown
-from calibrations.presentation.text import measured as written
-from calibrations.presentation.text import plain
+from calibrations.presentation.text import estimate_text as written
+from calibrations.presentation.text import rounded
 from calibrations.table import Array
 
 SHOWN_S = 0.5  # of the record: five periods of the paper's motion
@@ -159,7 +159,7 @@ def compensated(found: Residual) -> Chart:
         sides = ((found.linear, VERMILION, "linear model"), (found.compensated, BLUE, "compensated"))
         rows.append(tuple(
             Panel((Rule(0.0, width=0.7), Points(poses, errors[:, k], colour=colour, size=5)), Axis("pose"),
-                  Axis("sensor less reference (mm/s²)"), f"{axis}, {name}: rmse {plain(rmse)} mm/s²")
+                  Axis("sensor less reference (mm/s²)"), f"{axis}, {name}: rmse {rounded(rmse)} mm/s²")
             for (errors, colour, name), rmse in zip(sides, found.rmse[axis], strict=True)
         ))  # fmt: skip
     return Chart(tuple(rows), 2.6, share_x=True, share_y=True)

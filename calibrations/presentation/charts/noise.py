@@ -43,7 +43,7 @@ from calibrations.presentation.chart import (
 )
 from calibrations.presentation.charts.columns import in_time
 from calibrations.presentation.charts.discovery import Level, Measure
-from calibrations.presentation.text import plain
+from calibrations.presentation.text import rounded
 from calibrations.table import MILLI, Array
 
 POINTS = 160
@@ -167,12 +167,12 @@ def record(channel: Channel, into: Scaled) -> Panel:
     hover = f"%{{y:.4g}} {into.unit} at %{{x:.4g}} {unit}"
     at = np.asarray((np.arange(len(values)) + 0.5) * each_s / size)
     line = Line(at, np.asarray(values), colour=MEASURED, width=1, hover=hover)
-    x, y = f"time ({unit}); means of {plain(each_s, 2)} s", f"{channel.axis} less its mean ({into.unit})"
+    x, y = f"time ({unit}); means of {rounded(each_s, 2)} s", f"{channel.axis} less its mean ({into.unit})"
     return Panel((line,), Axis(x), Axis(y))
 
 
 def levels(start: NoiseFit, steps: Sequence[Step[NoiseFit]]) -> list[Level]:
-    """The falling error of a noise model: the mismatch of its spectrum, and that of its Allan deviation."""
+    """Error by model of a noise model: the mismatch of its spectrum, and that of its Allan deviation."""
     first = Level(start.model.name, start.pooled_excess, start.held_out_excess, _off(start))
     return [first, *(Level(f"+ {s.name}", s.after.pooled_excess, s.held_out_after, _off(s.after)) for s in steps)]
 
@@ -206,8 +206,8 @@ def still_album(found: Discovery[NoiseFit], given: NoiseFit) -> list[Picture]:
         curves.append(allan(end.still.allan[axis], into, models, raw))
         densities.append(spectrum(after, into, models))
     return [
-        Picture("allan", "Allan deviation beside the model", averaging, _named(curves, end)),
-        Picture("spectrum", "Spectrum beside the model", power, _named(densities, end)),
+        Picture("allan", "Allan deviation and model", averaging, _named(curves, end)),
+        Picture("spectrum", "Spectrum and model", power, _named(densities, end)),
     ]
 
 

@@ -30,7 +30,7 @@ from calibrations.presentation.chart import (
     one,
     stacked,
 )
-from calibrations.presentation.text import measured, plain
+from calibrations.presentation.text import estimate_text, rounded
 from calibrations.table import Array
 
 COLOURS = {"x": BLUE, "y": VERMILION}
@@ -115,7 +115,7 @@ def _forecast(course: ForecastHistory, factor: float, colour: str, label: str, t
     words = "not known at the end"
     if course.known_s is not None:
         series.append(Rule(course.known_s / HOUR_S, "x", INK, 1.1, "dash"))
-        words = f"known after {plain(course.known_s / HOUR_S)} h"
+        words = f"known after {rounded(course.known_s / HOUR_S)} h"
     series.append(Note(words, 1, 1, "xy", "right", "top"))
     return Panel(tuple(series), Axis(TIME, low=0.0), Axis(label, low=-reach, high=reach), title)
 
@@ -178,7 +178,7 @@ def _steady(course: Course) -> Iterator[Rule | Note]:
     if course.state and not course.state.terms and time:
         words = "steady from the first reversal on"
     elif time is not None:
-        words = f"steady after {measured(*(each / HOUR_S for each in time))} h"
+        words = f"steady after {estimate_text(*(each / HOUR_S for each in time))} h"
     up = course.values[0] > course.values[-1]
     yield Note(words, 1, 1 if up else 0, "xy", "right", "top" if up else "bottom")
 

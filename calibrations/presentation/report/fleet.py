@@ -9,7 +9,7 @@ from calibrations.fleet.batch import BatchVerdict, Population, SensorVerdict
 from calibrations.presentation.chart import Picture
 from calibrations.presentation.charts.fleet import Spread, rigs, shares, spreads
 from calibrations.presentation.report.page import figure, page
-from calibrations.presentation.text import chance, joined, measured, plain
+from calibrations.presentation.text import estimate_text, joined, probability, rounded
 
 MOST = 200  # sensors in a table of those that need a person
 ONE_RIG = "All were measured on one rig: an error of its stages cannot be told from one that all sensors have."
@@ -98,7 +98,7 @@ def _of_batches(found: Population) -> Section:
             each.effect,
             "one value for all" if each.common else "each its own",
             f"{each.sensors} of {each.of}",
-            chance(each.p_value),
+            probability(each.p_value),
             ", ".join(each.rivals) or "-",
         )
         for batch in found.batches
@@ -125,7 +125,7 @@ def _of_rigs(found: Population) -> Iterable[Section]:
         caption = "Every rig's error with its expanded uncertainty (k = 2); vermilion where it is more than chance."
         pictures.append(figure(Picture("rigs", "Errors of the rigs", caption, rigs(found.rigs))))
     rows = [
-        (e.rig, e.effect, e.parameter, f"{measured(e.value, e.std)} {e.unit}", chance(e.p_value), e.sensors)
+        (e.rig, e.effect, e.parameter, f"{estimate_text(e.value, e.std)} {e.unit}", probability(e.p_value), e.sensors)
         for e in found.rigs
         if e.beyond
     ]
@@ -143,7 +143,7 @@ def _of_persons(persons: list[SensorVerdict]) -> Iterable[Section]:
             each.rig or "-",
             each.verdict,
             ", ".join(each.own) or "-",
-            "-" if each.excess is None else plain(each.excess),
+            "-" if each.excess is None else rounded(each.excess),
             each.remark or "-",
         )
         for each in persons[:MOST]

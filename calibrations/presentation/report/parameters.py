@@ -11,7 +11,7 @@ from calibrations.fitting.budget import Budget, Line, make_budget
 from calibrations.fitting.inputs import input_contributions
 from calibrations.fitting.matrices import calibration_matrices
 from calibrations.model import Estimate
-from calibrations.presentation.text import measured, plain, unit
+from calibrations.presentation.text import estimate_text, rounded, unit
 
 NEGLIGIBLE = 1e-3  # share of the combined uncertainty, from which on a source shows in its digits
 MANY = 1e4  # degrees of freedom, told as no limit
@@ -46,10 +46,10 @@ def _parameter(drawn: Budget, k: int, effect: str, e: Estimate) -> dict[str, str
     return {
         "effect": effect,
         "name": _label(e),
-        "combined": plain(drawn.combined[k], 2),
+        "combined": rounded(drawn.combined[k], 2),
         "freedom": _freedom(drawn.freedom[k]),
         "coverage": f"{drawn.coverage[k]:.2f}",
-        "expanded": plain(drawn.expanded[k], 2),
+        "expanded": rounded(drawn.expanded[k], 2),
         "unit": unit(e.unit),
         "largest": largest.source,
     }
@@ -65,9 +65,9 @@ def _source(line: Line, k: int, combined: float) -> dict[str, str]:
     return {
         "source": line.source,
         "kind": line.kind,
-        "input": "–" if line.input_std is None else f"{plain(line.input_std, 2)} {unit(line.unit)}".strip(),
-        "sensitivity": "–" if line.sensitivity is None else plain(line.sensitivity[k], 2),
-        "std": plain(part, 2) if part > NEGLIGIBLE * combined else "negligible",
+        "input": "–" if line.input_std is None else f"{rounded(line.input_std, 2)} {unit(line.unit)}".strip(),
+        "sensitivity": "–" if line.sensitivity is None else rounded(line.sensitivity[k], 2),
+        "std": rounded(part, 2) if part > NEGLIGIBLE * combined else "negligible",
         "freedom": _freedom(line.freedom),
     }
 
@@ -115,9 +115,9 @@ def matrices(found: Fit) -> dict[str, Any] | None:
     rows = [
         {
             "axis": axis,
-            "M": [measured(float(value), float(std)) for value, std in zip(made.M[k], made.M_std[k], strict=True)],
-            "S": measured(float(made.S[k]), float(made.S_std[k])),
-            "b": measured(float(made.b[k]), float(made.b_std[k])),
+            "M": [estimate_text(float(value), float(std)) for value, std in zip(made.M[k], made.M_std[k], strict=True)],
+            "S": estimate_text(float(made.S[k]), float(made.S_std[k])),
+            "b": estimate_text(float(made.b[k]), float(made.b_std[k])),
         }
         for k, axis in enumerate(AXES)
     ]

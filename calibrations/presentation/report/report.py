@@ -25,11 +25,11 @@ from calibrations.presentation.report import parameters
 from calibrations.presentation.report.page import figure, page
 from calibrations.presentation.report.words import VERDICTS, key_figures, next_takes, next_words, state, summary
 from calibrations.presentation.residual import in_milli, milli_unit, pooled_milli
-from calibrations.presentation.text import capital, chance, measured, minus, plain, unbroken, unit
+from calibrations.presentation.text import capital, estimate_text, minus, probability, rounded, unbroken, unit
 
 EXPLAINED = 6  # candidates shown with formula and symptom, at most; the others in numbers only
-SHOWS = 1e-3  # share of the noise floor from which on a part of the noise is told
-SURE = 0.999  # probabilities beyond, on either side, are not told to more digits
+SHOWS = 1e-3  # share of the noise floor from which on a part of the noise is shown
+SURE = 0.999  # more digits of a probability mean nothing
 
 
 def report(
@@ -42,8 +42,8 @@ def report(
 ) -> str:
     """The page as HTML text. `beside` sets the model that was given beside the data; `pictures` are those of `album`.
 
-    `motion` is what a run of that procedure found beside the displacement sensor.
-    `date` and `program` (name and version) stand in the provenance: the same arguments give the same page.
+    `motion` is the comparison with the displacement sensor, for a run of that procedure.
+    `date` and `program` (name and version) go into the provenance: the same arguments give the same page.
     """
     shown = {p.name: figure(p) for p in (album(found, beside, motion) if pictures is None else pictures)}
     discovery = _head(found, beside.fit.model.name)
@@ -53,12 +53,12 @@ def report(
         discovery=discovery,
         kind=found.start.table.type.rows,
         steps=[_first(found), *(_step(step, found) for step in found.steps)],
-        chance_of_excess=unbroken(f"1 ± {spread_of_excess(found.end)}"),
+        chance_of_excess=estimate_text(1.0, spread_of_excess(found.end)),
         fails=[capital(minus(place.text)).replace("x the noise", "× the noise") for place in beside.fails],
         given=beside.fit.model.name,
         given_errors=_errors(beside.fit),
         candidates=[_candidate(c, k, found.start.table.unit) for k, c in enumerate(found.findings.candidates)],
-        before=(plain(found.start.pooled_excess), plain(found.start.held_out_excess)),
+        before=(rounded(found.start.pooled_excess), rounded(found.start.held_out_excess)),
         model=found.end.model.name,
         parameters=_parameters(found.end.model, {s.name for s in found.steps}),
         general=parameters.matrices(found.end),
@@ -91,23 +91,23 @@ def _head(found: Discovery[Fit], model: str) -> dict[str, Any]:
     }
 
 
-def spread_of_excess(fit: Fit) -> str:
+def spread_of_excess(fit: Fit) -> float:
     """Standard uncertainty that chance alone gives the pooled excess of a complete model."""
-    return plain(1 / np.sqrt(2 * max(fit.residual.size - len(fit.theta), 1)), 2)
+    return float(1 / np.sqrt(2 * max(fit.residual.size - len(fit.theta), 1)))
 
 
 def _error_of(fit: Fit) -> str:
     """The rms error with its unit."""
-    return f"{plain(pooled_milli(fit)[0], 2)} {milli_unit(fit)}"
+    return f"{rounded(pooled_milli(fit)[0], 2)} {milli_unit(fit)}"
 
 
 def _first(found: Discovery[Fit]) -> dict[str, str]:
-    level = {"seen": plain(found.start.pooled_excess), "unseen": plain(found.start.held_out_excess)}
+    level = {"seen": rounded(found.start.pooled_excess), "unseen": rounded(found.start.held_out_excess)}
     return {"name": found.start.model.name, "error": _error_of(found.start), "role": "as given", **level}
 
 
 def _step(step: Step[Fit], found: Discovery[Fit]) -> dict[str, str]:
-    level = {"seen": plain(step.after.pooled_excess), "unseen": plain(step.held_out_after)}
+    level = {"seen": rounded(step.after.pooled_excess), "unseen": rounded(step.held_out_after)}
     role = "cause" if step.name in found.causes else "refines the form of a cause"
     return {"name": f"+ {step.name}", "error": _error_of(step.after), "role": role, **level}
 
@@ -119,16 +119,16 @@ def _candidate(c: Candidate, rank: int, out: str) -> dict[str, Any]:
         "summary": capital(c.effect.summary),
         "formula": c.effect.formula.replace("{out}", out),
         "symptom": capital(c.effect.symptom),
-        "seen": plain(c.excess_after),
-        "unseen": plain(c.held_out_after),
-        "p": chance(c.p_value),
+        "seen": rounded(c.excess_after),
+        "unseen": rounded(c.held_out_after),
+        "p": probability(c.p_value),
         "probability": _probability(c.probability),
         "rivals": ", ".join(c.indistinguishable_from) or "–",
     }
 
 
 def _probability(p: float) -> str:
-    """Only approximate: neither certain nor impossible."""
+    """A probability is approximate: never certain, never impossible."""
     return f"above {SURE:g}" if p > SURE else f"below {1 - SURE:g}" if p < 1 - SURE else f"{p:.2g}"
 
 
@@ -138,11 +138,11 @@ def _errors(fit: Fit) -> list[dict[str, str]]:
     noise = {"rmse": fit.rmse, "floor": fit.noise.floor, "scatter": fit.noise.scatter, "slow": fit.noise.slow}
     rows = []
     for c, channel in enumerate(fit.channels):
-        row = {"channel": channel, "excess": plain(fit.excess[c]), "tau": _time_constant(fit.noise.taus_s[c])}
+        row = {"channel": channel, "excess": rounded(fit.excess[c]), "tau": _time_constant(fit.noise.taus_s[c])}
         for name, values in noise.items():
-            volts = f"{plain(1e3 * values[c])} m{fit.table.unit} = " if posed else ""
+            volts = f"{rounded(1e3 * values[c])} m{fit.table.unit} = " if posed else ""
             shows = values[c] > SHOWS * fit.noise.floor[c]
-            row[name] = f"{volts}{plain(in_milli(values, fit)[c])} {milli_unit(fit)}" if shows else "none found"
+            row[name] = f"{volts}{rounded(in_milli(values, fit)[c])} {milli_unit(fit)}" if shows else "none found"
         if row["slow"] == "none found":
             row["tau"] = "–"
         rows.append(row)
@@ -151,8 +151,8 @@ def _errors(fit: Fit) -> list[dict[str, str]]:
 
 def _time_constant(taus_s: tuple[float, ...]) -> str:
     if len(taus_s) == 1:
-        return f"{plain(taus_s[0], 2)} s"
-    return f"flicker noise, {plain(min(taus_s), 2)} to {plain(max(taus_s), 2)} s"
+        return f"{rounded(taus_s[0], 2)} s"
+    return f"flicker noise, {rounded(min(taus_s), 2)} to {rounded(max(taus_s), 2)} s"
 
 
 def _parameters(model: Model, added: set[str]) -> list[dict[str, Any]]:
@@ -162,7 +162,7 @@ def _parameters(model: Model, added: set[str]) -> list[dict[str, Any]]:
             "added": term.name in added,
             "tied": term.tied,
             "rows": [_estimate(e) for e in term.estimates],
-            "constants": {name: plain(value, 6) for name, value in term.constants.items()},
+            "constants": {name: rounded(value, 6) for name, value in term.constants.items()},
         }
         for term in model.terms
     ]
@@ -172,7 +172,7 @@ def _estimate(e: Estimate) -> dict[str, str]:
     row = {"name": e.name, "axis": e.axis or "–", "remark": "" if e.std else "uncertainty not known"}
     if not e.identified:
         return row | {"value": f"not identified: {e.why}", "unit": "", "remark": ""}
-    return row | {"value": measured(e.value, e.std), "unit": unit(e.unit)}
+    return row | {"value": estimate_text(e.value, e.std), "unit": unit(e.unit)}
 
 
 def _provenance(found: Discovery[Fit], date: str, program: str) -> dict[str, str]:
@@ -196,7 +196,7 @@ def _named(provenance: Mapping[str, str | float]) -> dict[str, str | float]:
 
 
 def _name(source: str) -> str:
-    """A file by its name alone: where it lies on this machine is nobody else's business."""
+    """The name of a file without its folder: paths of this machine are private."""
     if PurePath(source).is_absolute() or PureWindowsPath(source).is_absolute():
         return PureWindowsPath(source).name
     return source
@@ -208,10 +208,10 @@ def _name(source: str) -> str:
 NAMES = {
     "rmse-linear-x": "rms error of the linear model",
     "rmse-physical-x": "rms error of the physical model",
-    "improvement-x": "by how much the physical model's is less",
-    "noise-limit-x": "error due to the sensor's noise alone, in this band",
-    "amplitude": "peak acceleration, by the displacement sensor",
-    "frequency": "frequency, by the displacement sensor",
+    "improvement-x": "reduction of the rms error by the physical model",
+    "noise-limit-x": "error by the sensor's noise alone, in this band",
+    "amplitude": "peak acceleration, from the displacement sensor",
+    "frequency": "frequency, from the displacement sensor",
 }
 LEAST = 1e-8
 
@@ -219,24 +219,24 @@ LEAST = 1e-8
 def motion_head(found: MotionResult) -> dict[str, Any]:
     """The head of the page."""
     linear, physical, limit = (
-        f"{plain(q.value)} mm/s²" for q in (found.rmse_linear, found.rmse_physical, found.noise_limit)
+        f"{rounded(q.value)} mm/s²" for q in (found.rmse_linear, found.rmse_physical, found.noise_limit)
     )
     return {
-        "headline": f"In motion, the physical model errs by {physical}, the linear model by {linear}.",
+        "headline": f"In motion, the physical model has an rms error of {physical}, the linear model of {linear}.",
         "verdict": "measured",
         "state": "found",
         "what": f"Calibration report, motion at {found.frequency.value:.4g} Hz",
         "summary": unbroken(_summary(found)),
         "figures": [
-            ("linear model of the sweep", linear, "rms error beside the displacement sensor"),
-            ("physical model of the sweep", physical, f"{plain(found.excess)} × the noise limit"),
-            ("noise limit", limit, "error due to the sensor's noise alone, in this band"),
+            ("linear model of the sweep", linear, "rms error against the displacement sensor"),
+            ("physical model of the sweep", physical, f"{rounded(found.excess)} × the noise limit"),
+            ("noise limit", limit, "error by the sensor's noise alone, in this band"),
         ],
     }
 
 
 def motion_section(found: MotionResult) -> dict[str, Any]:
-    """What the page says of the motion, in rows."""
+    """The rows of the section on the motion."""
     return {
         "quantities": [(NAMES[name], *_written(quantity)) for name, quantity in found.results.items()],
         "biases": [_bias(bias) for bias in found.biases],
@@ -244,21 +244,21 @@ def motion_section(found: MotionResult) -> dict[str, Any]:
 
 
 def _summary(found: MotionResult) -> str:
-    before, after, limit = (plain(q.value) for q in (found.rmse_linear, found.rmse_physical, found.noise_limit))
+    before, after, limit = (rounded(q.value) for q in (found.rmse_linear, found.rmse_physical, found.noise_limit))
     return (
-        f"Shaken at {found.frequency.value:.4g} Hz with {plain(found.amplitude.value, 4)} mm/s² peak, the linear model "
-        f"errs by {before} mm/s² (rms), the physical model by {after} mm/s², "
-        f"{100 * found.improvement.value:.1f} % less. The sensor's noise alone leaves {limit} mm/s² in this band: the "
-        f"physical model is at {plain(found.excess)} × that limit. Both models were fitted to the sweep of this run "
-        "and have not seen the motion. Models that are fitted to the motion itself leave a smaller error, given below: "
-        "the fit takes up what changed since the sweep."
+        f"The motion has a frequency of {found.frequency.value:.4g} Hz and a peak of "
+        f"{rounded(found.amplitude.value, 4)} mm/s². The rms error of the linear model is {before} mm/s², that of the "
+        f"physical model {after} mm/s², {100 * found.improvement.value:.1f} % less. The sensor's noise alone gives "
+        f"{limit} mm/s² in this band: the physical model has {rounded(found.excess)} × that limit. Both models were "
+        "fitted to the sweep of this run, without the motion. Models that are fitted to the motion itself have a "
+        "smaller error, given below, because that fit includes the changes since the sweep."
     )
 
 
 def _written(q: Quantity) -> tuple[str, str]:
     if q.unit == "1":
-        return measured(100 * q.value, 100 * q.std), "%"
-    return measured(q.value, q.std), unit(q.unit)
+        return estimate_text(100 * q.value, 100 * q.std), "%"
+    return estimate_text(q.value, q.std), unit(q.unit)
 
 
 def _bias(bias: Bias) -> dict[str, str]:
@@ -274,5 +274,5 @@ def _bias(bias: Bias) -> dict[str, str]:
 
 
 def _small(value: float) -> str:
-    """To two digits; what is below the rounding of a computation is nothing."""
-    return plain(value, 2) if abs(value) > LEAST else "0"
+    """Two digits; 0 for values within the rounding of the computation."""
+    return rounded(value, 2) if abs(value) > LEAST else "0"

@@ -1,4 +1,4 @@
-"""The night's report: one HTML page on a soak, with its course, its steady state, its gaps and its verdicts."""
+"""The report on a soak: one HTML page with course, steady state, gaps and verdicts."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from calibrations.analyses.soak import HOUR_S, Course, RecordGap, Soak
 from calibrations.presentation.chart import Picture
 from calibrations.presentation.charts.soak import soak_album
 from calibrations.presentation.report.page import figure, page
-from calibrations.presentation.text import bound, joined, measured, minus, plain
+from calibrations.presentation.text import bound, estimate_text, joined, minus, rounded
 
-WANDERED_K = 1.0  # peak to peak: more is no constant ambient
+WANDERED_K = 1.0  # peak to peak; ambient that changes by more is not constant
 
 
 def soak_report(
@@ -26,7 +26,7 @@ def soak_report(
     foreseen: Mapping[str, ForecastHistory] = MappingProxyType({}),
 ) -> str:
     """The page as HTML text. `results` are the run's, by name, each with value, std, unit, limit and verdict; `facts`
-    its provenance; `foreseen` is what was known of each quantity on the way. The same arguments give the same page.
+    its provenance; `foreseen` the forecasts of each quantity. The same arguments give the same page.
     """
     shown = soak_album(found, foreseen) if pictures is None else pictures
     steady = found.time_s() is not None
@@ -51,39 +51,39 @@ def _headline(found: Soak, foreseen: Mapping[str, ForecastHistory]) -> str:
     time = found.time_s()
     if time is not None and found.from_start():
         return (
-            f"Bias and scale factor were steady from the first reversal on, {plain(time[0] / HOUR_S)} h after power-on."
+            f"Bias and scale factor are steady since the first reversal, {rounded(time[0] / HOUR_S)} h after power-on."
         )
     if time is not None:
         return f"Bias and scale factor are steady {_hours(time)} h after power-on."
     if any(course.state is None for course in found.courses.values()):
-        return "Whether bias and scale factor are steady cannot be told from so few reversals."
+        return "Too few reversals to decide whether bias and scale factor are steady."
     waiting = [name.replace("-", " of ") for name, course in found.courses.items() if course.time_s is None]
-    shown = f"Steady state is not shown within {_span_h(found)} h: {joined(waiting)} may still drift."
+    shown = f"No steady state within {_span_h(found)} h: {joined(waiting)} may still drift."
     bounds = steady_time(foreseen)
     if bounds is None:
         return shown
-    low, value, high = (plain(each / HOUR_S, 2) for each in bounds)
+    low, value, high = (rounded(each / HOUR_S, 2) for each in bounds)
     if np.isfinite(bounds.high):
-        return f"{shown} Foreseen: {value} h after power-on, {low} to {high} h by 95 %."
-    return f"{shown} Foreseen: later than {low} h after power-on."
+        return f"{shown} Forecast: {value} h after power-on, {low} to {high} h (95 %)."
+    return f"{shown} Forecast: later than {low} h after power-on."
 
 
 def _summary(found: Soak) -> str:
     """How much was measured, and what may have disturbed it."""
     held_h = float(np.sum(found.holds.column("n"))) / found.table.number("sample_rate_hz", 1.0) / HOUR_S
     reversals = len(next(iter(found.courses.values())).t_s)
-    text = f"{plain(held_h)} h held still, every sample kept, with {reversals} reversals in between."
+    text = f"The record holds every sample of {rounded(held_h)} h at rest, and {reversals} reversals."
     wander_k = found.temperature_wander_k
     if wander_k is not None and wander_k > WANDERED_K:
         text += (
-            f" The temperature wandered by {plain(wander_k, 2)} K beside the sensor's own warming: this is no soak at "
-            "constant ambient, and the drift is in part the room's."
+            f" Besides the sensor's own warming, the temperature changed by {rounded(wander_k, 2)} K. The ambient "
+            "temperature was not constant and caused a part of the drift."
         )
     if found.left_out:
-        text += f" {found.left_out} reversals are left out, interrupted or before the oven was warm."
+        text += f" {found.left_out} reversals are not used: they were interrupted, or the oven was not warm."
     if found.gaps:
         lost, plural = _length(sum(gap.length_s for gap in found.gaps)), "s" if len(found.gaps) > 1 else ""
-        text += f" {lost} are lost in {len(found.gaps)} gap{plural}: the fit takes the sensor to have stayed powered."
+        text += f" {lost} are lost in {len(found.gaps)} gap{plural}. The fit assumes that the sensor stayed powered."
     return text
 
 
@@ -94,13 +94,13 @@ def _figures(found: Soak) -> list[tuple[str, str, str]]:
         time, bias = found.time_s(axis), found.courses[f"bias-{axis}"]
         if bias.state is not None:
             change = f"{_signed(1e3 * bias.state.drift[0])} mV"
-            drift = f"bias drifts by {change}" if bias.state.terms else "no drift of the bias told from noise"
+            drift = f"bias drifts by {change}" if bias.state.terms else "no drift of the bias beyond the noise"
             reached = "from the start" if found.from_start(axis) else f"{_hours(time)} h" if time else "not reached"
             shown.append((f"steady state, axis {axis}", reached, drift))
     wander_k = found.temperature_wander_k
     if wander_k is not None:
         low, high = (float(f(found.holds.column("temperature_c"))) for f in (np.min, np.max))
-        remark = f"{low:.1f} to {high:.1f} °C; wandered by {plain(wander_k, 2)} K"
+        remark = f"{low:.1f} to {high:.1f} °C; ambient changed by {rounded(wander_k, 2)} K"
         shown.append(("temperature at the end", f"{found.holds.column('temperature_c')[-1]:.1f} °C", remark))
     return shown
 
@@ -111,67 +111,67 @@ def _course(course: Course) -> dict[str, Any]:
     row = {"name": course.quantity.replace("scale", "scale factor"), "axis": course.axis, "unit": unit}
     if state is None:
         return row | {
-            "final": plain(1e3 * course.values[-1], 6),
+            "final": rounded(1e3 * course.values[-1], 6),
             "drift": "–",
             "tolerance": "–",
             "tau": "–",
             "time": "–",
         }
-    taus = [measured(*(each / HOUR_S for each in term.tau_s)) for term in state.terms]
+    taus = [estimate_text(*(each / HOUR_S for each in term.tau_s)) for term in state.terms]
     return row | {
-        "final": measured(*(1e3 * each for each in state.final)),
-        "drift": measured(*(1e3 * each for each in state.drift)) if state.terms else "none told from noise",
-        "tolerance": plain(1e3 * state.tolerance, 2),
+        "final": estimate_text(*(1e3 * each for each in state.final)),
+        "drift": estimate_text(*(1e3 * each for each in state.drift)) if state.terms else "none beyond the noise",
+        "tolerance": rounded(1e3 * state.tolerance, 2),
         "tau": joined(taus) if taus else "–",
         "time": _hours(course.time_s) if course.time_s else "not reached",
     }
 
 
 def _outlook(name: str, course: ForecastHistory) -> dict[str, str]:
-    """One row of what was foreseen: the final value with its 95 % bounds at the end, and since when it was known."""
+    """One row of the forecasts: the last forecast with its 95 % bounds, and when it became known."""
     quantity, _, axis = name.partition("-")
     final, known_s = course.last.final, course.known_s
-    bounds = f"not known: {plain(1e3 * final.low, 6)} to {plain(1e3 * final.high, 6)}"
+    bounds = f"not known: {rounded(1e3 * final.low, 6)} to {rounded(1e3 * final.high, 6)}"
     return {
         "name": quantity.replace("scale", "scale factor"),
         "axis": axis,
         "unit": "mV" if quantity == "bias" else "mV/g",
-        "final": f"{plain(1e3 * final.value, 7)} ± {plain(1e3 * final.half, 2)}"
+        "final": f"{rounded(1e3 * final.value, 7)} ± {rounded(1e3 * final.half, 2)}"
         if known_s is not None
-        else ("no approach to a steady state" if course.last.surprised else bounds),
-        "known": "–" if known_s is None else plain(known_s / HOUR_S),
+        else ("not a warm-up: no forecast" if course.last.surprised else bounds),
+        "known": "–" if known_s is None else rounded(known_s / HOUR_S),
     }
 
 
 def _verdict(name: str, result: Mapping[str, Any]) -> dict[str, str]:
     value, std = result["value"], result["std"]
-    shown = measured(value, std) if std else minus(f"{value:.3g}")
+    shown = estimate_text(value, std) if std else minus(f"{value:.3g}")
     limit = bound(value, result["limit"])
     return {"name": name, "value": f"{shown} {result['unit']}", "limit": limit, "verdict": result["verdict"]}
 
 
 def _gap(gap: RecordGap) -> dict[str, str]:
     where = gap.path or "between two poses"
-    left_out = "; this reversal is left out" if gap.path.startswith("reversal") else ""
-    return {"at": f"{plain(gap.start_s / HOUR_S, 4)} h", "length": _length(gap.length_s), "where": where + left_out}
+    left_out = "; this reversal is not used" if gap.path.startswith("reversal") else ""
+    return {"at": f"{rounded(gap.start_s / HOUR_S, 4)} h", "length": _length(gap.length_s), "where": where + left_out}
 
 
 def _hours(time: tuple[float, float] | None) -> str:
     if time is None:
         return "–"
     value, std = (each / HOUR_S for each in time)
-    return measured(value, std) if std else plain(value)
+    return estimate_text(value, std) if std else rounded(value)
 
 
 def _span_h(found: Soak) -> str:
-    return plain(max(float(course.t_s[-1]) for course in found.courses.values()) / HOUR_S)
+    return rounded(max(float(course.t_s[-1]) for course in found.courses.values()) / HOUR_S)
 
 
 def _length(seconds: float) -> str:
     for unit_s, name in ((HOUR_S, "h"), (60.0, "min")):
         if seconds >= unit_s:
-            return f"{plain(seconds / unit_s)} {name}"
-    return f"{plain(seconds)} s"
+            return f"{rounded(seconds / unit_s)} {name}"
+    return f"{rounded(seconds)} s"
 
 
 def _signed(value: float) -> str:

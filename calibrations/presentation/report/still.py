@@ -1,4 +1,4 @@
-"""The report on a noise model: one HTML page with verdict, falling error, both pictures and the coefficients."""
+"""The report on a noise model: one HTML page with verdict, mismatch by model, pictures and coefficients."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from calibrations.noise.words import of_record
 from calibrations.presentation.chart import Picture
 from calibrations.presentation.report.page import figure, page
 from calibrations.presentation.report.words import VERDICTS, state
-from calibrations.presentation.text import capital, chance, joined, measured, plain, unit
+from calibrations.presentation.text import capital, estimate_text, joined, probability, rounded, unit
 
 
 def still_report(
@@ -35,10 +35,10 @@ def still_report(
         candidates=[
             {
                 "name": c.name,
-                "gain": plain(c.gain / 2),
-                "seen": plain(c.excess_after),
-                "unseen": plain(c.held_out_after),
-                "p": chance(c.p_value),
+                "gain": rounded(c.gain / 2),
+                "seen": rounded(c.excess_after),
+                "unseen": rounded(c.held_out_after),
+                "p": probability(c.p_value),
                 "rivals": ", ".join(c.indistinguishable_from) or "–",
             }
             for c in found.findings.candidates
@@ -54,31 +54,31 @@ def _summary(found: Discovery[NoiseFit]) -> str:
     text = capital(of_record(found.start.still)) + ". "
     if found.steps:
         text += (
-            f"With {joined(found.causes)} the mismatch of the spectrum falls from {plain(found.start.pooled_excess)} "
-            f"to {plain(found.end.pooled_excess)} times what chance leaves, and that of the Allan deviation from "
+            f"With {joined(found.causes)} the mismatch of the spectrum falls from {rounded(found.start.pooled_excess)} "
+            f"to {rounded(found.end.pooled_excess)} times the scatter by chance, and that of the Allan deviation from "
             f"{_off(found.start)} to {_off(found.end)}."
         )
     else:
-        text += f"The spectrum differs from the model's by {plain(found.start.pooled_excess)} times what chance leaves."
+        text += f"The mismatch of the spectrum is {rounded(found.start.pooled_excess)} times the scatter by chance."
     return f"{text} {found.judgement.text}"
 
 
 def _off(found: NoiseFit) -> str:
-    return joined(f"{plain(100 * value, 2)} % ({axis})" for axis, value in mismatch(found).items())
+    return joined(f"{rounded(100 * value, 2)} % ({axis})" for axis, value in mismatch(found).items())
 
 
 def _figures(found: Discovery[NoiseFit]) -> list[tuple[str, str, str]]:
-    remark = "mismatch of the spectrum over that by chance"
-    shown = [("before" if found.steps else "mismatch", plain(found.start.pooled_excess), remark)]
+    remark = "mismatch of the spectrum, relative to chance"
+    shown = [("before" if found.steps else "mismatch", rounded(found.start.pooled_excess), remark)]
     if found.steps:
         gained = found.end.log_likelihood - found.start.log_likelihood
-        shown.append(("after", plain(found.end.pooled_excess), remark))
-        shown.append(("log-likelihood", f"+{plain(gained)}", "gained by the effects added"))
+        shown.append(("after", rounded(found.end.pooled_excess), remark))
+        shown.append(("log-likelihood", f"+{rounded(gained)}", "gained by the effects added"))
     return shown
 
 
 def _steps(found: Discovery[NoiseFit]) -> Iterable[dict[str, str]]:
-    """Rows whose gains add up; beside them what the whole loses without each alone."""
+    """Rows of the steps: the gains, which add up, and the loss of the whole without each effect alone."""
     start, baseline = found.start, found.findings.baseline
     yield _step(start.model.name, start)
     if baseline is not start:
@@ -90,10 +90,10 @@ def _steps(found: Discovery[NoiseFit]) -> Iterable[dict[str, str]]:
 def _step(name: str, fit: NoiseFit, gained: float | None = None, alone: float | None = None) -> dict[str, str]:
     return {
         "name": name,
-        "gained": "–" if gained is None else plain(gained),
-        "alone": "–" if alone is None else plain(alone),
-        "seen": plain(fit.pooled_excess),
-        "unseen": plain(fit.held_out_excess),
+        "gained": "–" if gained is None else rounded(gained),
+        "alone": "–" if alone is None else rounded(alone),
+        "seen": rounded(fit.pooled_excess),
+        "unseen": rounded(fit.held_out_excess),
         "allan": _off(fit),
     }
 
@@ -102,7 +102,7 @@ def _estimate(e: Estimate) -> dict[str, str]:
     row = {"name": e.name.replace("_", " "), "axis": e.axis}
     if not e.identified:
         return row | {"value": f"not identified: {e.why}", "unit": ""}
-    return row | {"value": measured(e.value, e.std), "unit": unit(e.unit)}
+    return row | {"value": estimate_text(e.value, e.std), "unit": unit(e.unit)}
 
 
 def _provenance(found: Discovery[NoiseFit], date: str, program: str) -> dict[str, Any]:

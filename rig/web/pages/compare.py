@@ -17,7 +17,7 @@ from calibrations.presentation.charts.columns import choices, first_choices
 from calibrations.presentation.charts.noise import scaled, units
 from calibrations.presentation.interactive import figure, height_px
 from calibrations.presentation.residual import Shown, residual_units
-from calibrations.presentation.text import measured, plain, unit
+from calibrations.presentation.text import estimate_text, rounded, unit
 from rig.record import Record
 from rig.services.both import again, both
 from rig.services.charts import deviations, difference, differences, residuals
@@ -29,7 +29,7 @@ from rig.web.parts import box, div, failed, message, off_loop, redraw, table, wa
 
 # The pictures of the page Compare, of one axis at a time: of two tables, and of two still records.
 
-RESIDUALS, DIFFERENCE = "What the model leaves of both", "Second less first, at the poses that both have"
+RESIDUALS, DIFFERENCE = "Residuals of both", "Difference second − first at common poses"
 ALLAN = "Allan deviation of both, and the model fitted to each"
 
 
@@ -212,11 +212,11 @@ def _parameters(model: str, pairs: list[Pair]) -> None:
 
 def _row(pair: Pair) -> tuple[str, ...]:
     of = unit(pair.unit)
-    times = "unknown" if pair.deviations is None else plain(pair.deviations, 2)
+    times = "unknown" if pair.deviations is None else rounded(pair.deviations, 2)
     return (
         pair.name,
-        f"{measured(pair.first, pair.first_std)} {of}",
-        f"{measured(pair.second, pair.second_std)} {of}",
-        f"{measured(pair.difference, pair.std)} {of}",
+        f"{estimate_text(pair.first, pair.first_std)} {of}",
+        f"{estimate_text(pair.second, pair.second_std)} {of}",
+        f"{estimate_text(pair.difference, pair.std)} {of}",
         f"{times}{'  ← differ' if pair.differ else ''}",
     )

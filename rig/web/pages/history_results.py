@@ -15,7 +15,7 @@ from calibrations.criteria import BASELINE_RUNS, FEWEST_RUNS
 from calibrations.presentation.chart import Chart, Panel, one
 from calibrations.presentation.charts.history import EWMA, INDIVIDUALS, RANGES, control_panels, life
 from calibrations.presentation.interactive import figure
-from calibrations.presentation.text import measured, minus, plain, unit
+from calibrations.presentation.text import estimate_text, minus, rounded, unit
 from rig.errors import RigError
 from rig.services.charts import life_of
 from rig.services.history import Calibration, History, Quantity, closest, stale
@@ -157,7 +157,7 @@ def _show(found: Compared, model: str) -> None:
             first, second = found.data
             given = urlencode({"first": first, "second": second, "model": model})
             ui.link("One model fitted to both, in pictures", f"/compare?{given}").classes("small")
-    head, rows = agreements(found, plain)
+    head, rows = agreements(found, rounded)
     table(head, [(*row[:5], unit(row[5]), minus(row[6]), row[7]) for row in rows])
     words(E_N, "quiet small")
 
@@ -322,19 +322,19 @@ def calibrations_table(found: History, model: str) -> None:
 def _row(q: Quantity) -> tuple[str, ...]:
     spelt = unit(q.unit)
     allowed = "—" if q.allowed is None else minus(f"{q.allowed[0]:.6g} to {q.allowed[1]:.6g} {spelt}")
-    scatter = "—" if q.line is None else f"{plain(q.line.scatter, 2)} {spelt}"
-    last = f"{measured(q.last.value, q.last.std)} {spelt}"
+    scatter = "—" if q.line is None else f"{rounded(q.line.scatter, 2)} {spelt}"
+    last = f"{estimate_text(q.last.value, q.last.std)} {spelt}"
     return q.name, last, _drift(q), scatter, chart_verdict(q) or "—", allowed, str(q.due or "—")
 
 
 def _drift(q: Quantity) -> str:
     if q.line is None:
         return "—"
-    slope = measured(YEAR_DAYS * q.line.slope, YEAR_DAYS * q.line.slope_std)
+    slope = estimate_text(YEAR_DAYS * q.line.slope, YEAR_DAYS * q.line.slope_std)
     return f"{slope} {unit(q.unit)}{significance(q.line)}"
 
 
 def _calibration(each: Calibration, found: History, model: str) -> tuple[str | Link, ...]:
     values = (each.values.get(q.name) for q in found.quantities)
-    shown = ("—" if value is None else measured(value.value, value.std) for value in values)
+    shown = ("—" if value is None else estimate_text(value.value, value.std) for value in values)
     return each.day, Link(each.data, model_of(each.data, model)), each.rig, *shown, each.expired or ""

@@ -11,7 +11,7 @@ from nicegui import ui
 from calibrations.criteria import SIGNIFICANT
 from calibrations.discovery.verdict import Verdict
 from calibrations.presentation.report.words import next_takes, next_words
-from calibrations.presentation.text import capital, chance, plain
+from calibrations.presentation.text import capital, probability, rounded
 from rig.web.pages.model_own import Own
 from rig.web.parts import box, div, facts, failed, message, off_loop, waiting, words
 
@@ -161,7 +161,7 @@ class Card:
         with div("card first" if best else "card"):
             with ui.element("button").classes("head").props("type=button aria-expanded=false") as self.head:
                 words(c.name, "what")
-                words(f"{plain(result.held_out_before)} → {plain(c.held_out_after)} ×", "fall small")
+                words(f"{rounded(result.held_out_before)} → {rounded(c.held_out_after)} ×", "fall small")
                 ui.icon("expand_more")
             self.head.on("click", self.toggle)
             self.body = div("body")
@@ -212,7 +212,7 @@ def _written(value: object) -> str:
 def chances(c: Candidate) -> str:
     """The probability of a candidate, and the chance of so large a gain where nothing is missing."""
     beyond = "" if c.p_value < SIGNIFICANT else ", which is not significant"
-    return f"{share(c.probability)}; by chance {chance(c.p_value)}{beyond}"
+    return f"{share(c.probability)}; by chance {probability(c.p_value)}{beyond}"
 
 
 def share(probability: float) -> str:

@@ -32,10 +32,10 @@ if TYPE_CHECKING:
     from rig.services.session import ModelSession
 
 TITLES = {
-    "allan": "Allan deviation beside the model",
-    "spectrum": "Spectrum beside the model",
-    "ratio": "Where it fails",
-    "waterfall": "The falling error; ◆ on the other half of the record",
+    "allan": "Allan deviation and model",
+    "spectrum": "Spectrum and model",
+    "ratio": "Residual pattern",
+    "waterfall": "Mismatch by model; ◆ on the other half of the record",
     "record": "The record",
 }
 

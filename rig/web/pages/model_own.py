@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
 
-from calibrations.presentation.text import plain
+from calibrations.presentation.text import rounded
 from rig.web.parts import box, message, off_loop, words
 
 if TYPE_CHECKING:
@@ -81,8 +81,8 @@ class Own:
         self.step = step
         before, after = step.before.pooled_excess, step.after.pooled_excess
         self.fall.set_text(
-            f"error {plain(before)} → {plain(after)} × the noise floor; unseen rows {plain(step.held_out_before)} → "
-            f"{plain(unseen)} ×"
+            f"error {rounded(before)} → {rounded(after)} × the noise floor; held-out error "
+            f"{rounded(step.held_out_before)} → {rounded(unseen)} ×"
         )
         self.page.pictures.consider(step)
         self.add.enable()

@@ -25,10 +25,10 @@ if TYPE_CHECKING:
 LONG = 4  # letters of a channel's name
 LINKED = ("measurement", "residual", "failure")
 TITLES = {
-    "measurement": "Measurement beside model",
-    "residual": "What the model leaves",
-    "failure": "Where it fails",
-    "waterfall": "The falling error",
+    "measurement": "Measurement and model",
+    "residual": "Residuals",
+    "failure": "Residual pattern",
+    "waterfall": "Error by model",
 }
 FOLLOWED = "followed"  # the column that a candidate's curve follows
 POINTS = (

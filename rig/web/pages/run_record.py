@@ -12,7 +12,7 @@ from urllib.parse import urlencode
 from nicegui import ui
 
 from calibrations.presentation.interactive import figure
-from calibrations.presentation.text import bound, joined, measured, unit
+from calibrations.presentation.text import bound, estimate_text, joined, unit
 from rig.errors import RecordError
 from rig.record import Event, Record, Run
 from rig.services.charts import course_chart
@@ -301,7 +301,7 @@ def _results(run: Run) -> None:
     with ui.element("table").classes("plain-table"):
         for name, result in run.results.items():
             limit = "" if result["limit"] is None else bound(result["value"], result["limit"])
-            value = f"{measured(result['value'], result['std'])} {unit(result['unit'])}"
+            value = f"{estimate_text(result['value'], result['std'])} {unit(result['unit'])}"
             with ui.element("tr"):
                 for cell in (name, value, limit):
                     with ui.element("td"):
