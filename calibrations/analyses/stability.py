@@ -46,25 +46,28 @@ def compare_values(a: tuple[float, float], b: tuple[float, float]) -> Agreement:
 #
 #     s_b^2 = s^2 - u^2      s^2: variance of n repetitions, u^2: mean square of their own standard errors
 #
-# s^2 of n repetitions has n - 1 degrees of freedom: its relative standard deviation is sqrt(2 / (n - 1)).
+# s^2 of n repetitions has n - 1 degrees of freedom: its relative standard deviation is sqrt(2 / (n - 1)). It is that of
+# the variance that s_b and u make together, which is u^2 at least: repetitions that agree by chance do not lower it.
 #
 # Source  ISO 5725-2, variance between; JCGM 100, 4.2.
 
 
-def repeatability(values: Sequence[float], stds: Sequence[float]) -> tuple[float, float]:
+def repeatability(values: Sequence[float], stds: Sequence[float]) -> tuple[float, float | None]:
     """(s_b, its standard error) of `values` with own standard errors `stds`; 0 where noise explains the scatter.
 
-    The standard error is the distance to the root of s_b^2 plus its standard deviation, so it holds for s_b = 0 too.
-    Raises
-    DataError for fewer than two values.
+    The standard error is the distance to the root of s_b^2 plus its standard deviation, so it holds for s_b = 0 too. It
+    is None, not determined, where all values are equal and their own standard errors are 0. Raises DataError for fewer
+    than two values.
     """
     n = len(values)
     if n < 2:
         raise DataError("repeatability needs at least two repetitions; resume the run")
     variance = float(np.var(values, ddof=1))
-    left = max(0.0, variance - float(np.mean(np.square(stds))))
-    spread = variance * np.sqrt(2 / (n - 1))
-    return float(np.sqrt(left)), float(np.sqrt(left + spread) - np.sqrt(left))
+    noise = float(np.mean(np.square(stds)))
+    between = max(0.0, variance - noise)
+    spread = max(variance, noise) * np.sqrt(2 / (n - 1))
+    std = float(np.sqrt(between + spread) - np.sqrt(between))
+    return float(np.sqrt(between)), std if std > 0 else None
 
 
 # A quantity over a sensor's calibrations: its drift, its scatter between calibrations, and the next due date.

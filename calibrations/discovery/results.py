@@ -363,6 +363,12 @@ class Discovery(_Answer[F]):
         return self.judgement.verdict
 
     @property
+    def outcome(self) -> Verdict:
+        """The verdict for a label: `effect-missing` where the effects that were added complete the model."""
+        complete = self.verdict is Verdict.ADEQUATE
+        return Verdict.EFFECT_MISSING if complete and self.steps else self.verdict
+
+    @property
     def start(self) -> F:
         """The given model, fitted."""
         return self.findings.start

@@ -30,6 +30,11 @@ class Verdict(StrEnum):
     UNEXPLAINED = "unexplained"
     NO_RESPONSE = "no-response"
 
+    @property
+    def label(self) -> str:
+        """The verdict as a label."""
+        return self.value.replace("-", " ")
+
 
 @dataclass(frozen=True)
 class Closest:

@@ -64,9 +64,17 @@ def test_the_spread_between_is_freed_from_noise_on_the_mean() -> None:
 def test_noise_alone_is_no_spread_but_its_bound_is_told() -> None:
     value, std = repeatability([1.0, 1.1, 0.9], [0.5] * 3)
     assert value == 0
-    assert std == pytest.approx(np.sqrt(0.01 * np.sqrt(2 / 2)))
+    assert std == pytest.approx(0.5)  # of the noise: that the values agree better is chance
     with pytest.raises(DataError, match="at least two repetitions"):
         repeatability([1.0], [0.1])
+
+
+def test_the_standard_error_is_never_zero() -> None:
+    assert repeatability([1.0, 1.0, 1.0], [0.5] * 3) == (0.0, pytest.approx(0.5))
+    assert repeatability([1.0, 1.0, 1.0], [0.0] * 3) == (0.0, None)
+    value, std = repeatability([1.0, 1.1, 0.9], [0.0] * 3)
+    assert value == pytest.approx(0.1)
+    assert std == pytest.approx(np.sqrt(0.02) - 0.1)
 
 
 def steps(cycles: int, drift_v: float = 0.0, curve: float = 0.0) -> list[Tumble]:

@@ -21,7 +21,7 @@ from calibrations.model import Estimate, Model, Term
 from calibrations.model.file import read_model
 from calibrations.presentation.chart import Chart, Panel, Picture
 from calibrations.presentation.report.report import report
-from calibrations.presentation.report.words import next_takes, next_words, state, summary
+from calibrations.presentation.report.words import next_takes, next_words, summary
 from calibrations.presentation.residual import pooled_milli
 from calibrations.presentation.text import (
     estimate_text,
@@ -240,7 +240,7 @@ def test_positions_are_told_as_positions() -> None:
 
 
 def test_nothing_missing_is_said_so() -> None:
-    assert state(nothing()) == "adequate"
+    assert nothing().outcome == "adequate"
     assert nothing().judgement.headline == "No effect is missing."
     assert "On 250 poses its rms error is 0.05" in summary(nothing())
 

@@ -23,7 +23,7 @@ from calibrations.presentation.chart import Picture
 from calibrations.presentation.charts.discovery import album
 from calibrations.presentation.report import parameters
 from calibrations.presentation.report.page import figure, page
-from calibrations.presentation.report.words import VERDICTS, key_figures, next_takes, next_words, state, summary
+from calibrations.presentation.report.words import key_figures, next_takes, next_words, summary
 from calibrations.presentation.residual import in_milli, milli_unit, pooled_milli
 from calibrations.presentation.text import capital, estimate_text, minus, probability, rounded, unbroken, unit
 
@@ -83,8 +83,8 @@ def _head(found: Discovery[Fit], model: str) -> dict[str, Any]:
     """The head of the page, or of its part on models that were fitted to a motion."""
     return {
         "headline": found.judgement.headline,
-        "verdict": VERDICTS[state(found)],
-        "state": state(found),
+        "verdict": found.outcome.label,
+        "state": found.outcome.value,
         "what": f"Calibration report, model {model}",
         "summary": unbroken(summary(found)),
         "figures": key_figures(found),

@@ -12,7 +12,6 @@ from calibrations.noise.fit import NoiseFit
 from calibrations.noise.words import of_record
 from calibrations.presentation.chart import Picture
 from calibrations.presentation.report.page import figure, page
-from calibrations.presentation.report.words import VERDICTS, state
 from calibrations.presentation.text import capital, estimate_text, joined, probability, rounded, unit
 
 
@@ -23,8 +22,8 @@ def still_report(
     return page(
         "still.html",
         headline=found.judgement.headline,
-        verdict=VERDICTS[state(found)],
-        state=state(found),
+        verdict=found.outcome.label,
+        state=found.outcome.value,
         what=f"Noise report, model {found.start.model.name}",
         summary=_summary(found),
         figures=_figures(found),

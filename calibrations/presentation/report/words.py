@@ -5,24 +5,12 @@ from __future__ import annotations
 from calibrations.criteria import CERTAIN_PROBABILITY
 from calibrations.design.expected import pairs_separated
 from calibrations.design.experiment import Experiment
-from calibrations.discovery.results import Discovery, F
+from calibrations.discovery.results import Discovery
 from calibrations.fit import Fit
 from calibrations.presentation.residual import milli_unit, pooled_milli
 from calibrations.presentation.text import joined, rounded
 
 LONG_MIN = 120  # longer durations are given in hours
-VERDICTS = {
-    "adequate": "adequate",
-    "found": "effect missing",
-    "ambiguous": "ambiguous",
-    "unexplained": "unexplained",
-    "no-response": "no response",
-}
-
-
-def state(found: Discovery[F]) -> str:
-    """The verdict on the model that was given: as that of the discovery, or `found` where its effects complete it."""
-    return "found" if found.verdict == "adequate" and found.steps else found.verdict.value
 
 
 def summary(found: Discovery[Fit]) -> str:
