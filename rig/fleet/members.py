@@ -25,7 +25,7 @@ from calibrations.table import NUMBERS
 from calibrations.tables import MEANS
 from rig.errors import RigError, UnknownRun
 from rig.record import Record, Run
-from rig.services.sensors import members
+from rig.services.history import members
 
 INDEX = "fleet.csv"
 COLUMNS = ("sensor", "batch", "rig", "file", "data")

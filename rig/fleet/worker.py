@@ -29,8 +29,8 @@ from calibrations.table import Table
 from calibrations.tables import FITTED, MEANS
 from rig.errors import RigError
 from rig.fleet.own_effects import Own, effects_of
-from rig.services.data import averaged
 from rig.services.load import LONGEST_BEGINNING, channels_alone, check_unit
+from rig.services.tables import averaged
 
 # A look as a document of plain values, and back.
 

@@ -22,7 +22,7 @@ from rig.errors import ExportError
 from rig.files import require_out
 from rig.record import Record, Run
 from rig.record.measured import table_of
-from rig.services.data import load
+from rig.services.tables import load
 
 FORMATS = ("csv", "parquet", "hdf5", "event-model")
 UNITS = {"deg": "deg", "v": "V", "s": "s", "c": "degC"}

@@ -1,32 +1,70 @@
-"""A sensor's calibrations over its life: each complete run of it that determines a model, in the order of time.
+"""The calibrations of a sensor over its life: each complete run that determines a model, in the order of time.
 
-A calibration is derived from its samples anew, by one model for all, and so comparable. Its date is that of the run;
-of an imported table the constant `date` that the file carries (`# date: 2025-03-01`), else the day of the import.
+Every calibration is computed anew from its samples by the same model, so all are comparable. Its date is that of the
+run; an imported table has the constant `date` of its file (`# date: 2025-03-01`), else the day of the import.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import date, datetime, timedelta
+from pathlib import Path
 
 import numpy as np
 
 from calibrations.analyses.control_chart import Chart, control_chart
-from calibrations.analyses.stability import Stability, fit_stability
+from calibrations.analyses.stability import Agreement, Stability, compare_values, fit_stability
 from calibrations.criteria import BASELINE_RUNS, FEWEST_FOR_DRIFT, FEWEST_RUNS
 from calibrations.errors import CalibrationError, DataError
 from calibrations.fit import fit
 from calibrations.model import Model
 from calibrations.noise.means import rms
 from calibrations.presentation.certificate.terms import name as result_name
+from calibrations.presentation.text import as_written
 from calibrations.problem import check_kind
+from calibrations.tables import MEANS
 from drivers.errors import did_you_mean
 from rig.bench.certificates import EXPIRED
-from rig.errors import RecordError
+from rig.errors import RecordError, RigError
 from rig.record import Record, Run
-from rig.record.measured import Measured
-from rig.services.sensors import members, sensors
+from rig.record.measured import Measured, sensors_of
+
+
+def members(run: Run) -> dict[str, str]:
+    """Serial number (or name) -> the sensor's name in the run's batch, "" where there is one sensor."""
+    if batch := sensors_of(run):
+        said: dict[str, Mapping[str, str]] = {member: run.bench["sensors"][member] for member in batch}
+        return {each.get("serial") or each["name"]: member for member, each in said.items()}
+    name = run.constants.get("serial") or run.constants.get("sensor")
+    return {as_written(name): ""} if name else {}
+
+
+def sensors(runs: Iterable[Run]) -> list[str]:
+    """Every sensor of the runs."""
+    return list(dict.fromkeys(each for run in runs for each in members(run)))
+
+
+def calibrating(runs: Iterable[Run]) -> dict[str, list[Run]]:
+    """The complete runs of each sensor that models may be fitted to."""
+    found: dict[str, list[Run]] = {}
+    for run in runs:
+        if run.state == "complete" and run.kind in MEANS:
+            for sensor in members(run):
+                found.setdefault(sensor, []).append(run)
+    return found
+
+
+def lives(run: Run, runs: Iterable[Run]) -> dict[str, int]:
+    """How many calibrating runs there are of each sensor of `run`, where more than one."""
+    of = calibrating(runs)
+    counts = {sensor: len(of.get(sensor, ())) for sensor in members(run)}
+    return {sensor: count for sensor, count in counts.items() if count > 1}
+
+
+# A sensor's calibrations over its life: each complete run of it that determines a model, in the order of time.
+
 
 STALE_DAYS = 365.0  # where no limit says when a calibration is due
 Limit = float | tuple[float, float]
@@ -216,3 +254,94 @@ def _quantity(name: str, of: Sequence[Calibration], limit: Limit | None, baselin
     due = line.due_days(*allowed) if line is not None and allowed is not None else None
     when = None if due is None else datetime.fromtimestamp(due * 86400, tz=mine[-1].at.tzinfo).date()
     return Quantity(name, values[0].unit, mine, chart, line, allowed, when)
+
+
+# What results may come to before a sensor has to be calibrated again: of the bench file, and as a person says it.
+
+
+def limits_of(bench_file: Path | None) -> dict[str, Limit]:
+    """The ranges in the bench file's `limits.results`; a magnitude says nothing of a change. Raises BenchError."""
+    if bench_file is None:
+        return {}
+    from rig.bench import read_bench
+
+    return {name: each for name, each in read_bench(bench_file).result_limits.items() if isinstance(each, tuple)}
+
+
+def changes(given: Iterable[str]) -> dict[str, float]:
+    """`bias-x=0.005`: the greatest change since the last calibration, by result's name. Raises RigError."""
+    return dict(_change(text) for text in given)
+
+
+def _change(text: str) -> tuple[str, float]:
+    name, _, number = text.partition("=")
+    try:
+        change = abs(float(number))
+    except ValueError:
+        change = math.nan
+    if not math.isfinite(change):
+        raise RigError(f"the limit {text!r} is none: write NAME=CHANGE, as in bias-x=0.005")
+    return name, change
+
+
+# Two calibrations beside each other: of two days, of two sensors, of two rigs.
+
+
+@dataclass(frozen=True)
+class Compared:
+    """`one` and `other` for people; unit and agreement of every quantity that both have, by its name. `data`: the two
+    runs, None of means over several."""
+
+    one: str
+    other: str
+    rows: Mapping[str, tuple[str, Agreement]]
+    data: tuple[str, str] | None = None
+
+    @property
+    def agree(self) -> bool:
+        """Whether all of them do."""
+        return all(each.agrees for _, each in self.rows.values())
+
+
+def compare_sensors(life: History, other: str, last: Calibration) -> Compared:
+    """The last calibration of a life beside that of another sensor. Raises DataError, see `compare`."""
+    mine = life.calibrations[-1]
+    return Compared(f"{life.sensor}, {mine.day}", f"{other}, {last.day}", compare(mine, last), (mine.data, last.data))
+
+
+def compare_days(life: History, one: date, other: date) -> Compared:
+    """The calibrations closest to two days. Raises DataError, see `compare`."""
+    a, b = (closest(life.calibrations, day)[0] for day in (one, other))
+    return Compared(a.day, b.day, compare(a, b), (a.data, b.data))
+
+
+def compare_rigs(of: Sequence[Calibration], one: str, other: str) -> Compared:
+    """The means of all calibrations on two rigs. Raises RecordError for a rig that has none."""
+    return Compared(one, other, _compared(_means_on(one, of), _means_on(other, of), one, other))
+
+
+def compare(a: Calibration, b: Calibration) -> dict[str, tuple[str, Agreement]]:
+    """Two calibrations, by the names that both have: unit and agreement. Raises DataError where there is none."""
+    return _compared(a.values, b.values, a.data, b.data)
+
+
+def _means_on(rig: str, of: Sequence[Calibration]) -> dict[str, Value]:
+    mine = [each for each in of if each.rig == rig]
+    if not mine:
+        raise RecordError(f"no calibration on the rig {rig!r}.{did_you_mean(rig, {each.rig for each in of})}")
+    return {name: _mean([each.values[name] for each in mine if name in each.values]) for name in mine[-1].values}
+
+
+def _compared(a: Mapping[str, Value], b: Mapping[str, Value], one: str, other: str) -> dict[str, tuple[str, Agreement]]:
+    shared = [name for name in a if name in b and a[name].unit == b[name].unit]
+    if not shared:
+        raise DataError(f"{one} and {other} have no quantity in common; take a model that both determine")
+    return {n: (a[n].unit, compare_values((a[n].value, a[n].std), (b[n].value, b[n].std))) for n in shared}
+
+
+def _mean(values: Sequence[Value]) -> Value:
+    """The mean; uncertain by the calibrations' own uncertainty, which they may share, and by what they scatter."""
+    x = np.array([each.value for each in values])
+    own = float(rms(np.array([each.std for each in values])))
+    scatter = float(x.std(ddof=1) / np.sqrt(len(x))) if len(x) > 1 else 0.0
+    return Value(float(x.mean()), max(own, scatter), values[0].unit)

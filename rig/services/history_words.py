@@ -6,8 +6,7 @@ from collections.abc import Callable
 from datetime import date
 
 from calibrations.analyses.stability import Agreement, Stability
-from rig.services.history import Calibration, History, Quantity
-from rig.services.history_compared import Compared
+from rig.services.history import Calibration, Compared, History, Quantity
 
 Written = Callable[[float, int], str]
 

@@ -27,12 +27,12 @@ from calibrations.noise.table_noise import with_noise
 from calibrations.plausibility import doubt
 from calibrations.table import Table
 from rig.errors import UnknownRun
-from rig.services.data import BESIDE, load
 from rig.services.request import Request
+from rig.services.tables import BESIDE, load
 
 if TYPE_CHECKING:
     from calibrations.noise.record import Samples, Still
-    from rig.services.stream import Stream
+    from rig.services.still import Stream
 
 Tell = Callable[[str], None]
 CHANNELS = {f"{what}{axis}{end}" for what in ("v", "a", "g", "m", "") for axis in "xyz" for end in ("", "_v")}
@@ -133,8 +133,7 @@ def still_of(
     """
     from calibrations.noise.record import reduce_record
     from rig.record.store import Record
-    from rig.services.still import axes
-    from rig.services.stream import repairs
+    from rig.services.still import axes, repairs
 
     data = request.data
     with nullcontext() if Path(data).exists() or data.endswith(".npy") else Record.to_find(data) as record:

@@ -1,4 +1,4 @@
-"""What to do after a run: for each verdict that is no pass, and with what was measured."""
+"""Results of a run as a table, and the next steps: for each verdict that is not a pass, and for the measured data."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from calibrations.presentation.text import joined
+from calibrations.presentation.text import bound, columns, concise, joined
 from calibrations.tables import FITTED
 from rig.record import Run
 
+SPREADS = re.compile("tolerance|wander")  # uncertainties themselves: two digits
 # By the name of a result that is beyond its limit: what to look at. The first that fits counts.
 REMEDIES = {
     r"level-offset": "the half turn takes the level's own offset out of the tilt; have the level adjusted",
@@ -33,7 +34,7 @@ LONGER = 4  # times as long halves a statistical uncertainty
 
 
 def next_steps(run: Run, excluded: Mapping[int, str]) -> list[str]:
-    """What to do after a run: for each verdict that is no pass, and with what was measured."""
+    """What to do after a run: for each verdict that is not a pass, and with the measured data."""
     return [*_left_out(excluded), *_failed(run), *_marginal(run), *_unjudged(run.results), *_commands(run)]
 
 
@@ -87,3 +88,26 @@ def _commands(run: Run) -> Iterator[str]:
             yield f"Next: rig report {data} --out night.html"
             return
         yield f"Next: rig compare {data}, rig discover {data}, rig report {data} --out report.html"
+
+
+def results_table(results: Mapping[str, Any]) -> list[str]:
+    """A table of the results of a run, none where it has none."""
+    if not results:
+        return []
+    rows = [
+        (name, _result_value(name, r), _limit(r["value"], r["limit"]), r["verdict"] or "")
+        for name, r in results.items()
+    ]
+    return columns(("result", "value", "limit", "verdict"), rows).splitlines()
+
+
+def _result_value(name: str, result: Mapping[str, Any]) -> str:
+    if SPREADS.search(name):
+        return f"{result['value']:.2g} {result['unit']}"
+    return concise(result["value"], result["std"], result["unit"])
+
+
+def _limit(value: float, limit: Any) -> str:
+    if limit is None:
+        return "-"
+    return bound(value, limit).replace("−", "-")

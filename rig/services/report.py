@@ -1,17 +1,83 @@
-"""The report on data, as `rig report` writes it and the workbench hands it over: pictures, and the page's maker."""
+"""The report on data for `rig report` and the workbench: its pictures, and a function that makes the page."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from calibrations.discovery.verdict import Verdict
 from calibrations.errors import UnusableData
+from calibrations.motion.evaluate import MotionResult
+from rig.record import Record
+from rig.record.measured import Measured
+from rig.results.motion import beside_displacement
 from rig.services.load import loaded
 from rig.services.next_experiment import planned
-from rig.services.night import Page, night_of
 from rig.services.provenance import program, today
 from rig.services.request import Request
-from rig.services.shaken import shaken_of
+
+if TYPE_CHECKING:
+    from calibrations.presentation.chart import Picture
+
+
+def shaken_of(data: str) -> MotionResult | None:
+    """Both models beside the displacement sensor; None where `data` is a file, or a run of something else.
+
+    Raises SensorFault, RecordError, DataError.
+    """
+    if Path(data).exists():
+        return None
+    with Record.to_find(data) as record:
+        measured = Measured.named(record, data)
+        return beside_displacement(measured) if measured.run.procedure == "motion" else None
+
+
+# The page on a soak, for `rig report RUN`: asked for by the run's procedure, unless a model is named.
+
+
+Page = tuple[list["Picture"], Callable[[], str]]
+
+
+def night_of(data: str, date: str, program: str) -> Page | None:
+    """The pictures of a soak and what makes its page; None where `data` is no run of a soak.
+
+    Raises RecordError, DataError where it holds too little.
+    """
+    if not Record.is_there():
+        return None
+    with Record.to_read() as record:
+        if data.partition("/")[0] not in {run.run for run in record.runs() if run.procedure == "soak"}:
+            return None
+        from calibrations.presentation.charts.soak import soak_album
+        from calibrations.presentation.report.soak import soak_report
+        from rig.results.soak import foreseen_of, night
+
+        measured = Measured.named(record, data)
+        found, foreseen = night(measured), foreseen_of(measured)
+    pictures, facts = soak_album(found, foreseen), _facts(measured, date, program)
+    return pictures, lambda: soak_report(found, measured.run.results, facts, pictures, foreseen)
+
+
+def _facts(measured: Measured, date: str, program: str) -> Mapping[str, str]:
+    run = measured.run
+    sensor = [str(measured.constants[name]) for name in ("sensor", "serial") if name in measured.constants]
+    said = {
+        role: " ".join(str(part) for part in identity.values() if part) for role, identity in run.identities.items()
+    }
+    return {
+        "sensor": " ".join(sensor) or run.source,
+        "run": f"{measured.name}, {run.state}",
+        "begun": run.created,
+        "ended": run.ended or "–",
+        "settings": ", ".join(f"{name} {value}" for name, value in run.settings.items()),
+        **said,
+        "program": program,
+        "date": date,
+    }
+
+
+# The report on data, as `rig report` writes it and the workbench hands it over: pictures, and the page's maker.
 
 
 def reported(request: Request, tell: Callable[[str], None]) -> Page:

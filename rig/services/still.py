@@ -1,21 +1,313 @@
-"""DATA of a still sensor as a stream of samples: a table, an array in a file, or a run straight from its record."""
+"""DATA of a sensor at rest as a stream of samples: from a table, an array, or a run of the record."""
 
 from __future__ import annotations
 
+import re
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from calibrations.errors import DataError
-from calibrations.table import AXES
+from calibrations.errors import DataError, nearest
+from calibrations.noise.record import Sensed
+from calibrations.noise.samples import hidden_step
+from calibrations.table import AXES, STANDARD_GRAVITY, Array, Table
+from procedures.noise_floor import STILL
+from procedures.soak import HOLD
+from rig.errors import RecordError
 from rig.record.measured import Measured
 from rig.record.store import Record
-from rig.services.data import load
-from rig.services.still_run import of_run
-from rig.services.still_table import of_table
-from rig.services.stream import AXIS, Stream
+from rig.record.values import Kept
+from rig.services.tables import BESIDE, FOLLOWED, load
+
+LATE = 0.5  # sampling intervals by which a sample may be off before that is a gap
+DISAGREE = 0.01  # of two rates
+AXIS = re.compile(r"(v|a|g|m|)([xyz])(|_v)")  # of a channel, by its name
+SENSED = {  # what outputs in these units are better known in
+    "m/s^2": Sensed(1 / STANDARD_GRAVITY, "g"),
+    "m/s2": Sensed(1 / STANDARD_GRAVITY, "g"),
+    "deg/s": Sensed(3600.0, "deg/h"),
+}
+STATED = {"output_per_g": "g", "output_per_deg_s": "deg/s", "output_per_field": "field"}  # constants that data may have
+
+
+@dataclass
+class Stream:
+    """Samples of one channel, in blocks that are read once. What was seen on the way is known when they are read."""
+
+    source: str
+    channel: str
+    rate_hz: float
+    unit: str
+    blocks: Iterator[NDArray[Any]]
+    corner_hz: float = np.inf
+    others: tuple[str, ...] = ()
+    closed: list[tuple[float, float]] = field(default_factory=list)  # gaps: where each begins and how long it is, s
+    uneven_s: float = 0.0  # by how much the times are off the even row that is taken for them
+    upright_v: dict[int, float] = field(default_factory=dict)  # output along gravity, +1 and -1 g
+    constants: Mapping[str, str | float] = field(default_factory=dict)
+    logged: dict[str, list[Array]] = field(default_factory=dict)  # what was read beside the samples, in their blocks
+    coarse: dict[str, float] = field(default_factory=dict)  # of that, what was read with less noise than these steps
+
+    @property
+    def sensed(self) -> Sensed | None:
+        """The output as what is sensed, where its scale factor is known: by its unit, from poses along gravity, or as
+        the data state it (`output_per_g`, `output_per_deg_s`, `output_per_field`)."""
+        if self.unit in SENSED:
+            return SENSED[self.unit]
+        if self.unit == "V" and (scale := self.scale_v_per_g):
+            return Sensed(1 / scale, "g")
+        stated = ((_number(self.constants.get(name)), unit) for name, unit in STATED.items())
+        return next((Sensed(1 / abs(scale), unit) for scale, unit in stated if scale), None)
+
+    @property
+    def scale_v_per_g(self) -> float | None:
+        """From poses of the same run at +1 and -1 g; None where it has none."""
+        if {1, -1} <= self.upright_v.keys() and self.upright_v[1] != self.upright_v[-1]:
+            return abs(self.upright_v[1] - self.upright_v[-1]) / 2
+        return None
+
+
+def repairs(samples: Stream, n: int) -> Iterable[str]:
+    """How the samples were changed before the analysis, and what limits them."""
+    if samples.closed:
+        missing = sum(length for _, length in samples.closed)
+        gaps = "a gap is" if len(samples.closed) == 1 else f"{len(samples.closed)} gaps are"
+        yield (
+            f"{gaps} closed up, {missing:.3g} s in all: longer times are too short by up to "
+            f"{100 * missing * samples.rate_hz / n:.2g} %."
+        )
+    if samples.uneven_s:
+        yield (
+            f"Times are uneven by up to {samples.uneven_s:.2g} s, as if samples reached the computer in bursts; "
+            f"the analysis assumes {samples.rate_hz:.6g} evenly spaced samples a second."
+        )
+    for name, step in samples.coarse.items():
+        yield (
+            f"{name} was read in steps of {1e3 * step:.3g} mV, larger than its noise: its means are wrong by part of a "
+            "step, and the slope of an output that follows it is less certain than stated."
+        )
+
+
+def _number(constant: str | float | None) -> float:
+    """A scale factor as stated; 0 where none is."""
+    return constant if isinstance(constant, float) and np.isfinite(constant) else 0.0
+
+
+def channel_of(channels: tuple[str, ...], channel: str | None, source: str) -> str:
+    """The channel asked for, or the first. Raises DataError."""
+    if not channels:
+        raise DataError(f"{source}: has no channel beside the time; add a column with the sensor's output")
+    wanted = channel or channels[0]
+    found = next((name for name in (wanted, f"{wanted}_v") if name in channels), None)
+    if found is None:
+        raise DataError(f'{source}: has no channel "{wanted}"{nearest(wanted, channels)}')
+    return found
+
+
+def agreed(measured: float | None, stated: float, source: str) -> float:
+    """The rate, Hz. Raises DataError where two disagree, or there is none."""
+    if measured is None and not stated > 0:
+        raise DataError(
+            f"{source}: its rate is not known; give --rate HZ, or a line `# sample_rate_hz: 100` above the header"
+        )
+    if measured is None:
+        return stated
+    if stated > 0 and abs(measured / stated - 1) > DISAGREE:
+        raise DataError(
+            f"{source}: {stated:g} samples a second are stated, the column t_s has {measured:g}; correct one of them"
+        )
+    return measured
+
+
+# A still table as a stream: a channel, what may be followed, and times that must go on evenly.
+
+
+MOST_MISSING = 0.1  # of a record, in gaps that are closed up
+WHOLE = 0.1  # of a step, by which steps may be off whole numbers of them where single samples were lost
+FEW_GAPS = 0.01  # of all steps
+EVEN = "record anew, evenly and every sample (what is interpolated has less white noise than the sensor)"
+UNEVEN = 1e-3  # of a record, by which times may be off an even row: those of a computer that samples reach in bursts
+
+
+def of_table(table: Table, channel: str | None, rate_hz: float | None) -> Stream:
+    if table.kind != "still" or "alpha_deg" in table:
+        kind = "poses" if table.kind == "still" else table.kind
+        raise _no_record(f"{table.source}: a table of {kind}")
+    if "n" in table and (many := float(np.median(table.column("n")))) > 1:
+        raise _no_record(f"{table.source}: a row is the mean of {many:.0f} samples by its column n, as of poses")
+    channels = tuple(name for name in table.columns if name not in BESIDE)
+    chosen = channel_of(channels, channel, table.source)
+    stated = rate_hz or table.number("sample_rate_hz", 0.0)
+    times = _times(table)
+    rate = agreed(times.rate_hz if times else None, stated, table.source)
+    unit = "V" if chosen.endswith("_v") else str(table.constants.get("unit", "count"))
+    corner_hz = table.number("filter_corner_hz", np.inf)
+    others = tuple(name for name in channels if name != chosen)
+    found = Stream(
+        table.source, chosen, rate, unit, iter([table.column(chosen)]), corner_hz, others, constants=table.constants,
+        logged={name: [table.column(name)] for name in _logged(table, chosen)},
+    )  # fmt: skip
+    return replace(found, closed=list(times.gaps), uneven_s=times.uneven_s) if times else found
+
+
+def _no_record(what: str) -> DataError:
+    """What is no still record, and what to do."""
+    return DataError(
+        f"{what}; noise needs single samples of a sensor at rest: take a table of still, or `rig run noise-floor`"
+    )
+
+
+def _logged(table: Table, channel: str) -> Iterator[str]:
+    """Columns that an output may follow: temperature, supply, and what is no output of a sensor by its name."""
+    for name in table.columns:
+        own = name not in BESIDE and AXIS.fullmatch(channel) is not None and AXIS.fullmatch(name) is None
+        if name in FOLLOWED or (own and name != channel):
+            yield name
+
+
+@dataclass(frozen=True)
+class _Times:
+    """What a column of times says: the rate, the gaps in it, and by how much an even row of times is off, s."""
+
+    rate_hz: float
+    gaps: tuple[tuple[float, float], ...] = ()
+    uneven_s: float = 0.0
+
+
+def _times(table: Table) -> _Times | None:
+    """None without a column of times. Raises DataError where they do not go on, or are too uneven."""
+    if "t_s" not in table or table.n < 2:
+        return None
+    t_s = table.column("t_s")
+    step_s, length_s = np.diff(t_s), float(t_s[-1] - t_s[0])
+    typical = float(np.median(step_s))
+    if step_s.min() <= 0:
+        row = int(np.argmin(step_s > 0)) + 2
+        raise DataError(f"{table.source}: row {row}: the time does not go on; sort the rows and remove duplicates")
+    far = np.flatnonzero(np.abs(step_s - typical) > LATE * typical)
+    if len(far) <= FEW_GAPS * table.n and np.all(step_s[far] > typical):
+        gaps = tuple((float(t_s[i]), float(step_s[i] - typical)) for i in far)
+        _check_gaps(gaps, (table.n - 1) * typical, table.source)
+        return _Times((table.n - 1 - len(far)) / float(np.sum(np.delete(step_s, far))), gaps)
+    lost = np.round(step_s / typical) - 1
+    if 0 < lost.sum() < table.n and np.all(np.abs(step_s / typical - 1 - lost) < WHOLE):
+        raise DataError(
+            f"{table.source}: {lost.sum():.0f} samples are missing, here and there, the first after row {far[0] + 2}; "
+            f"{EVEN}, or analyse {_longest(far, table.n)} by themselves"
+        )
+    off_s = float(np.max(np.abs(t_s - np.linspace(t_s[0], t_s[-1], table.n))))
+    if off_s > UNEVEN * length_s:
+        raise DataError(
+            f"{table.source}: row {far[0] + 2} comes {step_s[far[0]]:.3g} s after the one before, others after "
+            f"{typical:.3g} s; samples must be evenly spaced: {EVEN}"
+        )
+    return _Times((table.n - 1) / length_s, (), off_s)
+
+
+def _longest(far: NDArray[np.intp], n: int) -> str:
+    """The longest stretch of n rows without a late one, counted from 1; `far` are the last rows before these."""
+    edges = np.array([-1, *far, n - 1])
+    k = int(np.argmax(np.diff(edges)))
+    return f"rows {edges[k] + 2} to {edges[k + 1] + 1}, the longest stretch without a loss,"
+
+
+def _check_gaps(gaps: Sequence[tuple[float, float]], length_s: float, source: str) -> None:
+    """Raises DataError where too much is missing to close the gaps up."""
+    missing = sum(length for _, length in gaps)
+    if missing > MOST_MISSING * length_s:
+        longest = max(gaps, key=lambda gap: gap[1])
+        raise DataError(
+            f"{source}: {len(gaps)} gaps, {missing:g} s in all beside {length_s:g} s of samples; the longest, of "
+            f"{longest[1]:g} s, is at t = {longest[0]:g} s: analyse the parts between gaps each by itself"
+        )
+
+
+# A run's still record as a stream, straight from the samples that were kept: no block is read twice.
+
+
+UPRIGHT = 0.999  # g: a pose that is as good as along gravity
+
+
+def of_run(measured: Measured, channel: str | None, rate_hz: float | None) -> Stream:
+    first = next((kept for kept in measured.kept() if _is_still(kept)), None)
+    if first is None:
+        raise RecordError(
+            f"run {measured.name} holds no still record; `rig run noise-floor` or `rig run soak` makes one"
+        )
+    names = first.samples.channels
+    chosen = channel_of(tuple(names), (channel or "").removesuffix("_v") or None, f"run {measured.name}")
+    rate = agreed(first.samples.rate_hz, rate_hz or 0.0, f"run {measured.name}")
+    corner = float(measured.constants.get("filter_corner_hz", np.inf))
+    outputs = tuple(name for name in names if name in ("vx", "vy", "vz") and name != chosen)
+    found = Stream(
+        measured.name, chosen, rate, "V", iter(()), corner if chosen in ("vx", "vy", "vz") else np.inf, outputs
+    )
+    found.blocks, found.constants = _still_blocks(measured, found), measured.constants
+    return found
+
+
+def _is_still(kept: Kept) -> bool:
+    return kept.pose.path.split(" ")[0] in (STILL, HOLD)
+
+
+def _still_blocks(measured: Measured, into: Stream) -> Iterator[NDArray[Any]]:
+    """Blocks of the still record one after the other; what else is met on the way is noted in `into`."""
+    next_s = None
+    for kept in measured.kept():
+        samples = kept.samples
+        if into.channel not in samples.channels:
+            continue
+        volts = samples.volts[:, samples.channels.index(into.channel)]
+        if not _is_still(kept):
+            _note_upright(kept, volts, into)
+            continue
+        if next_s is not None and abs(samples.start_s - next_s) > LATE / into.rate_hz:
+            into.closed.append((next_s, samples.start_s - next_s))
+        next_s = samples.start_s + len(volts) / into.rate_hz
+        if not into.logged:
+            into.coarse |= coarse(kept)
+        for name, values in _beside(kept):
+            into.logged.setdefault(name, []).extend(values)
+        yield volts
+
+
+def _beside(kept: Kept) -> Iterator[tuple[str, list[Array]]]:
+    """Temperature of a block, and supply, as means of a second each: in blocks that take no room."""
+    samples, n = kept.samples, len(kept.samples.volts)
+    temperature, supply = FOLLOWED
+    if kept.temperature_c is not None:
+        yield temperature, [np.broadcast_to(kept.temperature_c, n)]
+    if (channel := supply.removesuffix("_v")) in samples.channels:
+        volts = samples.volts[:, samples.channels.index(channel)]
+        pieces = np.array_split(volts, max(1, round(n / samples.rate_hz)))
+        yield supply, [np.broadcast_to(piece.mean(), len(piece)) for piece in pieces]
+
+
+def coarse(kept: Kept) -> dict[str, float]:
+    """The steps of the supply's readings, where its noise does not smooth them in means."""
+    channel = FOLLOWED[1].removesuffix("_v")
+    if channel not in kept.samples.channels:
+        return {}
+    step = hidden_step(kept.samples.volts[:, kept.samples.channels.index(channel)])
+    return {} if step is None else {FOLLOWED[1]: step}
+
+
+def _note_upright(kept: Kept, volts: Array, into: Stream) -> None:
+    """The mean output of the channel's axis along gravity."""
+    alpha, beta = np.radians(kept.pose.alpha_deg), np.radians(kept.pose.beta_deg)
+    along: Mapping[str, float] = {"vx": np.sin(alpha) * np.cos(beta), "vy": np.sin(alpha) * np.sin(beta)}
+    g = along.get(into.channel, 0.0)
+    if abs(g) > UPRIGHT and kept.pose.flip == 0 and kept.pose.mount_deg == 0:
+        into.upright_v.setdefault(round(g), float(volts.mean()))
+
+
+# DATA of a still sensor as a stream of samples: a table, an array in a file, or a run straight from its record.
+
 
 BLOCK = 1 << 17
 

@@ -8,7 +8,7 @@ import sys
 from calibrations.loop import diagnose
 from calibrations.model.file import read_model
 from calibrations.table import Table
-from rig.services.data import load
+from rig.services.tables import load
 from tests.benchmark.timed import seconds
 
 

@@ -13,7 +13,7 @@ from calibrations.fit import fit
 from calibrations.fitting.matrices import CalibrationMatrices, calibration_matrices
 from calibrations.model.file import read_model
 from calibrations.table import Array, Table
-from rig.cli.terminal import calibrated
+from rig.cli.commands import fit as command
 from tests.calibrations import synthetic, turned
 
 AXES = np.array([[1.0, 0.0, 0.0], [0.02, 1.0, 0.0], [-0.01, 0.03, 1.0]])
@@ -92,10 +92,10 @@ def test_two_axes_have_none() -> None:
 
 def test_a_fit_tells_it_in_words_and_as_json() -> None:
     found = fit(read_model("magnetometer"), turned.sap6("HC"))
-    text = "\n".join(calibrated.lines(found))
+    text = "\n".join(command.calibration_lines(found))
     assert "General calibration, G_c = M (S G_r + b), from uT to field (Book 17.3)" in text
     assert "The Book's way, from the extremes: hard iron -0.1625, -2.0938, -12.31" in text
-    whole = json.loads(json.dumps(calibrated.document(found), allow_nan=False))
+    whole = json.loads(json.dumps(command.calibration_document(found), allow_nan=False))
     assert whole["by_hand"]["hard_iron"] == pytest.approx([-0.1625, -2.09375, -12.3125])
     document = whole["calibration"]
     assert np.array(document["M"]["value"]) == pytest.approx(made(calibration_matrices(found)).M)

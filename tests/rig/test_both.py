@@ -13,9 +13,9 @@ from calibrations.importing.foreign import write_csv
 from calibrations.model.file import read_model
 from calibrations.table import Table
 from rig.errors import RecordError
-from rig.services.both import again, both
 from rig.services.load import still_of
 from rig.services.request import Request
+from rig.services.two_runs import again, both
 
 ALPHA, BETA = (each.ravel() for each in np.meshgrid([30.0, 90.0, 150.0], np.arange(0.0, 360.0, 30.0)))
 

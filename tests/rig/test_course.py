@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from procedures.session import Dwell, Pose
-from rig.services.course import MOST, Course, kind_of
+from rig.services.charts import MOST, Course, kind_of
 
 
 def dwell(number: int, path: str = "hold 1") -> Dwell:

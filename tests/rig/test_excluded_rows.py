@@ -9,7 +9,7 @@ import pytest
 
 from calibrations.errors import DataError
 from calibrations.importing.foreign import write_csv
-from rig.services.data import load
+from rig.services.tables import load
 from tests.calibrations.synthetic import components, poses, turns
 from tests.rig.conftest import Ended
 

@@ -19,10 +19,8 @@ from procedures.errors import Declined, NoAnswer
 from procedures.questions import Choice, Confirm, Mounting, Number
 from procedures.session import Limits, Pose, Reading
 from rig.bench import Bench, read_bench
-from rig.cli.terminal.before import before, checks, mounting
-from rig.cli.terminal.gauge import WIDTH, gauge
 from rig.cli.terminal.guide import Guide
-from rig.cli.terminal.screen import screen
+from rig.cli.terminal.screen import WIDTH, before, checks, gauge, mounting, screen
 from rig.cli.terminal.watch import watching
 from rig.drawings import Attitude, page
 from rig.errors import Stopped

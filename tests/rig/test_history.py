@@ -16,8 +16,7 @@ from calibrations.model.file import read_model
 from calibrations.table import Table
 from rig.errors import RecordError
 from rig.record import Record
-from rig.services.history import Calibration, Value, history, latest
-from rig.services.history_compared import compare_rigs
+from rig.services.history import Calibration, Value, compare_rigs, history, latest
 from tests.rig.lives import COLUMNS, calibrated
 
 Rig = Callable[..., Any]

@@ -15,7 +15,7 @@ from rig.bench import DEFAULT
 from rig.cli import main
 from rig.files import RECORD
 from rig.record import Record
-from rig.services.several import load_all
+from rig.services.tables import load_all
 from tests.calibrations.fitted import LINEAR, model
 from tests.rig.conftest import Ended, contents
 from tests.rig.postgres import Server

@@ -27,7 +27,7 @@ from rig.record import Kept, Record
 from rig.record.measured import Measured
 from rig.results.evaluate import names
 from rig.runs.runner import Outcome, resume, start
-from rig.services.shaken import shaken_of
+from rig.services.report import shaken_of
 from tests.rig.rigging import Onlooker
 from tests.slow import first_fast
 

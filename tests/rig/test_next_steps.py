@@ -9,9 +9,8 @@ from typing import Any
 
 import pytest
 
-from rig.cli.terminal.verdicts import lines
 from rig.record import Run
-from rig.services.next_steps import REMEDIES, next_steps
+from rig.services.next_steps import REMEDIES, next_steps, results_table
 
 RUN = Run("r1", "poses", "sweep", "complete", {}, {}, {}, "", {}, "", "", None, None, {}, 20)
 
@@ -87,7 +86,7 @@ def test_every_command_that_a_remedy_names_is_there() -> None:
 def test_results_are_a_table() -> None:
     both = {"a": result("fail", 1.0), "b": {**result("pass"), "limit": [0.0, 2.0]}, "c": result(None, None)}
     both |= {"d": {**result("fail"), "value": -1.0}, "d-tolerance": {**result(None, None), "value": 0.0012345}}
-    assert [line.split() for line in lines(both)] == [
+    assert [line.split() for line in results_table(both)] == [
         ["result", "value", "limit", "verdict"],
         ["a", "1.00(10)", "V", "at", "most", "1", "fail"],
         ["b", "1.00(10)", "V", "0", "to", "2", "pass"],
@@ -95,4 +94,4 @@ def test_results_are_a_table() -> None:
         ["d", "-1.00(10)", "V", "at", "least", "-1", "fail"],
         ["d-tolerance", "0.0012", "V", "-"],
     ]
-    assert lines({}) == []
+    assert results_table({}) == []

@@ -14,8 +14,7 @@ from calibrations.noise.deviations import deviations
 from procedures.noise_floor import STILL
 from procedures.session import Pose
 from rig.record import Block, Kept, Record
-from rig.services.still import stream
-from rig.services.still_run import coarse
+from rig.services.still import coarse, stream
 from tests.rig.conftest import Ended
 
 Rig = Callable[..., Ended]

@@ -20,7 +20,7 @@ from procedures.pose_list import format_poses
 from procedures.session import Pose
 from procedures.settings import parse
 from rig.bench import read_bench
-from rig.cli.terminal.chosen import document, lines
+from rig.cli.commands.plan import document, lines
 from rig.errors import PlanError
 from rig.planning.optimal import AGAIN, CHECK, DESIGN, Optimal, most_relative, optimal, relative
 from rig.planning.planned import EXCHANGE_S, from_home_s, moves_s

@@ -10,7 +10,7 @@ from calibrations.fit import fit
 from calibrations.model.file import read_model
 from calibrations.table import Table
 from rig.record import Record, Run
-from rig.services.side_by_side import Pair, parameters_of, results_of
+from rig.services.two_runs import Pair, parameters_of, results_of
 from tests.hidden.rigs import clean_rig
 
 

@@ -72,7 +72,7 @@ def command(
     files = _writer(language)(made, origin, make_vectors(made))
     beside = None
     if data is not None:
-        from rig.services.data import load
+        from rig.services.tables import load
 
         table = load(data, tell=note)
         check_unit(found, table.unit, table.source)

@@ -35,8 +35,8 @@ def command(folder: Path, as_json: bool) -> None:
     from rig.files import write_whole
     from rig.record import Record
     from rig.runs.runner import start
-    from rig.services.data import load
     from rig.services.provenance import program, today
+    from rig.services.tables import load
 
     try:
         folder.mkdir(parents=True, exist_ok=True)

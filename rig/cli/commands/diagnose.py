@@ -26,8 +26,7 @@ def command(request: Request, check: bool, as_json: bool) -> int:
     from calibrations.discovery.verdict import Verdict
     from calibrations.documents import diagnosis_document
     from rig.cli.terminal.asked import asked, note_untestable
-    from rig.cli.terminal.own_effect import own_effect, told
-    from rig.cli.terminal.words import planned, warning
+    from rig.cli.terminal.words import own_effect, planned, told, warning
 
     question = asked(request)
     result = question.data.diagnose(question.model, question.effects)

@@ -56,8 +56,7 @@ def _discover(request: Request, several: tuple[str, ...], out: Path | None, chec
     from calibrations.discovery.verdict import Verdict
     from calibrations.documents import discovery_document
     from rig.cli.terminal.asked import asked, write_model
-    from rig.cli.terminal.own_effect import own_effect, told
-    from rig.cli.terminal.words import discovery, parameters, planned, warning
+    from rig.cli.terminal.words import discovery, own_effect, parameters, planned, told, warning
 
     question = asked(request, out)
     data = question.data if len(several) == 1 else _together(several, request, question)
@@ -80,7 +79,7 @@ def _together(several: tuple[str, ...], request: Request, question: Loaded) -> D
     """Several data as one table."""
     from calibrations.discovery.rows import Rows
     from rig.services.load import with_known_noise
-    from rig.services.several import load_all
+    from rig.services.tables import load_all
 
     if question.data.form != "rows":
         raise click.UsageError("still records are judged one at a time; name one")

@@ -21,9 +21,9 @@ def command(run: str, pose: int, reason: str | None, include: bool, as_json: boo
     """
     if include == bool(reason and reason.strip()):
         raise click.UsageError("say why the pose is left out (--reason TEXT), or take it in again (--include)")
-    from rig.cli.terminal.verdicts import lines
     from rig.record import Record
     from rig.services.exclusion import RESULTS, exclude
+    from rig.services.next_steps import results_table
 
     with Record.to_find(run) as record:
         found = exclude(record, run, [pose], None if include else reason)
@@ -33,7 +33,7 @@ def command(run: str, pose: int, reason: str | None, include: bool, as_json: boo
         emit({"schema": "rig.exclude/1", "run": run, "pose": pose, "excluded": said, "results": found.results})
         return
     done = "is taken in again" if include else f"is left out: {reason}"
-    after = [f"results: {told[-1]}", *lines(found.results)] if found.state == "complete" and told else []
+    after = [f"results: {told[-1]}", *results_table(found.results)] if found.state == "complete" and told else []
     if found.state != "complete" and not include:
         after = [f"Next: rig resume {run} measures it again"]
     click.echo("\n".join([f"{run}: pose {pose} {done}", *after]))

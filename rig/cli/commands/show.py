@@ -11,13 +11,12 @@ from calibrations.errors import CalibrationError
 from calibrations.presentation.text import columns, duration
 from rig.bench.certificates import EXPIRED
 from rig.cli.terminal.output import emit, json_option
-from rig.cli.terminal.verdicts import lines as results
 from rig.errors import RecordError
 from rig.record import Event, Kept, Line, Record, Run
 from rig.record.codec import digest_of
 from rig.record.measured import Measured, sensors_of
-from rig.services.next_steps import next_steps
-from rig.services.sensors import lives
+from rig.services.history import lives
+from rig.services.next_steps import next_steps, results_table
 
 TURNS = ("begun", "error", "stopped", "complete")  # of a run's log: its beginnings and its ends
 Ranges = Mapping[str, tuple[float, float]]
@@ -42,7 +41,7 @@ def command(run: str, poses: bool, wants_log: bool, as_json: bool) -> None:
         more = ({"kept": listed} if poses else {}) | ({"log": [vars(line) for line in lines]} if wants_log else {})
         emit(_document(found, events, ranges) | more)
     else:
-        after = [*results(found.results), *next_steps(found, left_out)]
+        after = [*results_table(found.results), *next_steps(found, left_out)]
         after += [
             f"{count} runs of the sensor {name} are in the record: rig history {name}" for name, count in known.items()
         ]

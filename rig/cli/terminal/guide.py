@@ -19,8 +19,7 @@ from procedures.errors import BadAnswer, Declined, NoAnswer
 from procedures.questions import Choice, Question
 from procedures.session import Reading
 from rig.bench import Bench
-from rig.cli.terminal.before import before, drawn, mounting
-from rig.cli.terminal.screen import screen
+from rig.cli.terminal.screen import before, drawn, mounting, screen
 from rig.drawings import Attitude, drawing_of, page
 from rig.files import free_bytes, home, write_whole
 from rig.planning.plan import Plan

@@ -30,7 +30,7 @@ from rig.runs.live import FIRST, STANDARD, Live, Measurement, stands
 from rig.runs.runner import start
 from rig.services.load import effects_of
 from rig.services.request import Request
-from rig.services.several import begun, joined_runs
+from rig.services.tables import begun, joined_runs
 
 
 @dataclass

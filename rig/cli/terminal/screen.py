@@ -1,8 +1,13 @@
-"""The one screen of a run: what happens now, how far it is, live values against their limits."""
+"""Screens of a run: the plan before it begins, and the live values with their limits."""
 
 from __future__ import annotations
 
+import math
+import re
+from collections import Counter
 from collections.abc import Iterator
+from datetime import date
+from pathlib import Path
 
 from rich.console import Group, RenderableType
 from rich.panel import Panel
@@ -10,9 +15,28 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from calibrations.presentation.text import duration
-from rig.cli.terminal.gauge import STYLES, gauge
-from rig.runs.observer import Seen, Value, values
+from calibrations.presentation.text import duration, size
+from procedures.catalogue import Procedure
+from rig.bench import Bench
+from rig.bench.certificates import expired
+from rig.drawings import Attitude, drawing_of, sketch
+from rig.planning.plan import Plan, stretches
+from rig.runs.observer import Seen, Value, nearness, values
+
+WIDTH = 15  # characters, the ends included
+STYLES = {"": "green", "near its limit": "yellow", "beyond its limit": "bold red"}
+
+
+def gauge(value: float, low: float, high: float) -> Text:
+    """`├────────●───┤`: where `value` is from `low` to `high`; beyond them it stands at the end."""
+    share = (value - low) / (high - low) if math.isfinite(value) and high > low else 1.0
+    place = 1 + round(min(max(share, 0.0), 1.0) * (WIDTH - 3))
+    mark = ("●", STYLES[nearness(value, low, high)])
+    return Text.assemble(("├" + "─" * (place - 1), "dim"), mark, ("─" * (WIDTH - 2 - place) + "┤", "dim"))
+
+
+# The one screen of a run: what happens now, how far it is, live values against their limits.
+
 
 Row = tuple[RenderableType, ...]
 
@@ -51,3 +75,86 @@ def _row(value: Value) -> Row:
 
 def _bar(value: float, low: float, high: float) -> Text:
     return Text.assemble((f"{low:>6.4g} ", "dim"), gauge(value, low, high), (f" {high:.4g}", "dim"))
+
+
+# What a technician sees before a run: what it will do, how long, how far the stages turn, what to check by hand.
+
+
+FACTS = re.compile(r"^(Excites|Blind to)\s+(.*(?:\n\s+.*)*)", re.MULTILINE)
+MOST_STRETCHES = 6
+
+
+def before(plan: Plan, procedure: Procedure, bench: Bench, free_bytes: int, today: date) -> RenderableType:
+    """The whole screen; `free_bytes` is the room on the record's disk."""
+    facts = Table.grid(padding=(0, 2))
+    for name, text in _facts(plan, procedure, bench, free_bytes):
+        facts.add_row(Text(name, style="bold"), text)
+    for text in expired(bench, today):
+        facts.add_row(Text("Expired", style="bold yellow"), f"{text}: the run will be marked")
+    summary = Text(procedure.summary[:1].upper() + procedure.summary[1:] + ".")
+    check = Text("\n".join(f"[ ] {line}" for line in checks(plan)))
+    by_hand = Group(Text("\nCheck by hand", style="bold"), check)
+    return Panel(Group(summary, Text(), facts, by_hand), title=f"{plan.procedure} on {bench.name}", title_align="left")
+
+
+def _facts(plan: Plan, procedure: Procedure, bench: Bench, free_bytes: int) -> Iterator[tuple[str, str]]:
+    for match in FACTS.finditer(procedure.doc):
+        yield match[1], " ".join(match[2].split())
+    time = " of simulated time, which is faster" if bench.simulated else ""
+    yield "Takes", f"{duration(plan.duration_s)}{time}, {plan.poses} poses"
+    yield "Does", "\n".join(_does(plan))
+    for role, ((low, high), (least, most)) in plan.reach.items():
+        yield f"Turns {role}", f"from {low:g} to {high:g} deg; its limits are {least:g} to {most:g} deg"
+    yield "Stops", "; ".join(_stops(bench))
+    if asked := Counter(re.sub(r"-\d+$", "", question.name) for question in plan.asked):
+        yield "Asks you", ", ".join(f"{name} ({n} times)" if n > 1 else name for name, n in asked.items())
+    room = "" if free_bytes > plan.bytes else ": there is not enough room"
+    yield "Keeps", f"{size(plan.bytes)} on the disk, where {size(free_bytes)} are free{room}"
+
+
+def _does(plan: Plan) -> list[str]:
+    lines = [stretch.words for stretch in stretches(plan)]
+    if len(lines) > MOST_STRETCHES:
+        lines[MOST_STRETCHES - 1 :] = [f"and {len(lines) - MOST_STRETCHES + 1} more: rig plan {plan.procedure}"]
+    return lines or ["keeps readings, and no pose"]
+
+
+def _stops(bench: Bench) -> list[str]:
+    low, high = bench.limits.temperature_c
+    level_deg = bench.limits.level_deg
+    tilt = [] if level_deg is None else [f"where the table is tilted by more than {level_deg:g} deg"]
+    return [f"where the sensor is not at {low:g} to {high:g} C", *tilt]
+
+
+def checks(plan: Plan) -> list[str]:
+    """What only a person can see, before anything moves."""
+    whats = [step.what for step in plan.steps]
+    level = any("level" in question.name for question in plan.asked)
+    lines = [
+        "the cables are free to turn as far as the stages do, and nothing and nobody is in their way",
+        "the sensor is screwed down as drawn, its pin 1 where the drawing has it",
+    ]
+    if any("level is read" in what for what in whats):
+        lines.append("the level lies on the table and is switched on")
+    if level:
+        lines.append("a level lies on the table: you will read it")
+    if "oven on" in whats:
+        lines.append("the oven is closed, and what is in it can bear its temperatures")
+    if any("positioner swings" in what for what in whats):
+        lines.append("the nano-positioner's carriage is free to move")
+    return lines
+
+
+def mounting(plan: Plan) -> Attitude:
+    """How the sensor is mounted first: as the first question with a drawing says, or else the first pose."""
+    drawn = [attitude for question in plan.asked if (attitude := drawing_of(question)) is not None]
+    posed = [Attitude(mount_deg=held.pose.mount_deg, flip=held.pose.flip) for held in plan.held]
+    return next(iter([*drawn, *posed]), Attitude())
+
+
+def drawn(attitude: Attitude, file: Path) -> RenderableType:
+    """The sketch beside its legend; `file` is the drawing for a browser."""
+    beside = Table.grid(padding=(0, 3))
+    legend = f"\n{attitude.words}\n\nThe table from above at alpha 0:\nx, y  axes of the sensor\no     pin 1\n\n{file}"
+    beside.add_row(Text("\n".join(sketch(attitude))), Text(legend, overflow="fold"))
+    return beside

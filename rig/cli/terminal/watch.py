@@ -17,14 +17,13 @@ from procedures.session import Reading
 from rig.bench import Bench
 from rig.bench.certificates import EXPIRED
 from rig.cli.terminal.output import emit, note, notes
-from rig.cli.terminal.verdicts import lines as results
 from rig.planning.plan import Plan
 from rig.record import Kept, Record
 from rig.runs.background.control import Beside
 from rig.runs.progress import SoFar
 from rig.runs.runner import Outcome, Watch, Wish
 from rig.runs.soak_forecast import SoakWatch, soak_watch
-from rig.services.next_steps import next_steps
+from rig.services.next_steps import next_steps, results_table
 
 trace_option = click.option("--trace", is_flag=True, help="Log every message to and from instruments.")
 
@@ -112,7 +111,7 @@ def tell(record: Record, outcome: Outcome, as_json: bool) -> int:
     else:
         mark = [f"But {run.constants[EXPIRED]}."] if EXPIRED in run.constants else []
         after = next_steps(run, record.excluded(run.run))
-        click.echo("\n".join([f"{run.run}: {run.state}, {run.extent}", *results(run.results), *mark, *after]))
+        click.echo("\n".join([f"{run.run}: {run.state}, {run.extent}", *results_table(run.results), *mark, *after]))
     if outcome.error is not None:
         notes(outcome.moving)
         raise outcome.error

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from calibrations.criteria import CERTAIN_PROBABILITY
 from calibrations.design.experiment import Experiment
 from calibrations.discovery.dataset import Cells
+from calibrations.discovery.patterns import Pattern
 from calibrations.discovery.results import Discovery
 from calibrations.discovery.verdict import Verdict
 from calibrations.effects import Effect
@@ -104,3 +106,27 @@ def paper(table: Table) -> str:
     ]
     head = ("axis", "manufacturer (1)-(3)", "paper (4)-(17)", "tilt that (20)-(21) would correct twice")
     return "The paper's stepwise estimate on the same data, rms error:\n" + columns(head, rows)
+
+
+# What is left of a residual as an effect of one's own: the command that adds it to the model.
+
+
+def own_effect(pattern: Pattern | None, model: str, request: Request) -> dict[str, Any] | None:
+    """The pattern as `expression`, `name`, and the `command` that adds it to `model`; None where it cannot be one."""
+    if pattern is None or not pattern.expression:
+        return None
+    words = ["rig", "add", pattern.expression, "--name", pattern.name, "--model", model, "--data", request.data]
+    words += ["--out", f"{pattern.name}.yaml", *(["--bench", str(request.bench_file)] if request.bench_file else [])]
+    return {"expression": pattern.expression, "name": pattern.name, "command": shlex.join(words)}
+
+
+def told(pattern: Pattern | None, model: str, request: Request) -> list[str]:
+    """What a person may do about what is left."""
+    if found := own_effect(pattern, model, request):
+        return [
+            "To take it into the model as an effect of your own (and then see what is left):",
+            f"    {found['command']}",
+        ]
+    if pattern is not None and pattern.poses and not Path(data := request.data).exists():
+        return [f"Look at them: rig show {data} --poses. rig exclude {data} POSE leaves one out, with a reason."]
+    return []

@@ -19,10 +19,9 @@ from calibrations.presentation.interactive import figure, height_px
 from calibrations.presentation.residual import Shown, residual_units
 from calibrations.presentation.text import estimate_text, rounded, unit
 from rig.record import Record
-from rig.services.both import again, both
 from rig.services.charts import deviations, difference, differences, residuals
 from rig.services.request import Request
-from rig.services.side_by_side import Pair, parameters_of, results_of
+from rig.services.two_runs import Pair, again, both, parameters_of, results_of
 from rig.web.desk import Desk, models
 from rig.web.frame import Key, frame
 from rig.web.parts import box, div, failed, message, off_loop, redraw, table, waiting, words

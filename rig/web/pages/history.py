@@ -11,10 +11,19 @@ from nicegui import events, ui
 from calibrations.criteria import FEWEST_RUNS
 from calibrations.model.file import read_model
 from rig.record import Record, Run
-from rig.services.history import Calibration, History, Limit, Quantity, history, judged, latest, when
-from rig.services.history_limits import limits_of
+from rig.services.history import (
+    Calibration,
+    History,
+    Limit,
+    Quantity,
+    calibrating,
+    history,
+    judged,
+    latest,
+    limits_of,
+    when,
+)
 from rig.services.load import effects_of
-from rig.services.sensors import calibrating
 from rig.web.desk import Desk, models, runs
 from rig.web.frame import Key, frame
 from rig.web.pages.history_results import (

@@ -18,9 +18,18 @@ from calibrations.presentation.interactive import figure
 from calibrations.presentation.text import estimate_text, minus, rounded, unit
 from rig.errors import RigError
 from rig.services.charts import life_of
-from rig.services.history import Calibration, History, Quantity, closest, stale
-from rig.services.history_compared import Compared, compare_days, compare_rigs, compare_sensors
-from rig.services.history_limits import changes
+from rig.services.history import (
+    Calibration,
+    Compared,
+    History,
+    Quantity,
+    changes,
+    closest,
+    compare_days,
+    compare_rigs,
+    compare_sensors,
+    stale,
+)
 from rig.services.history_words import agreements, but_stale, chart_verdict, near, next_due, significance, summary
 from rig.services.provenance import today
 from rig.web.parts import Link, box, div, failed, for_page, message, off_loop, redraw, table, words

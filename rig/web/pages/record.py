@@ -8,7 +8,7 @@ from urllib.parse import urlencode
 from nicegui import events, ui
 
 from rig.record import Run
-from rig.services.sensors import calibrating, members
+from rig.services.history import calibrating, members
 from rig.web.desk import Desk, runs
 from rig.web.frame import frame
 from rig.web.pages.history_results import Asked

@@ -15,14 +15,13 @@ from calibrations.presentation.interactive import figure
 from calibrations.presentation.text import bound, estimate_text, joined, unit
 from rig.errors import RecordError
 from rig.record import Event, Record, Run
-from rig.services.charts import course_chart
-from rig.services.course import Course, kind_of
+from rig.services.charts import Course, course_chart, kind_of
 from rig.services.exclusion import exclude, numbered_run
 from rig.services.export import export
+from rig.services.history import lives
 from rig.services.next_steps import next_steps
 from rig.services.report import reported
 from rig.services.request import Request
-from rig.services.sensors import lives
 from rig.web.desk import Desk
 from rig.web.frame import frame
 from rig.web.pages.history_results import Asked

@@ -1,0 +1,150 @@
+"""Comparison of two runs, or of two sensors of a run: results, parameters, and measurements at the same poses.
+
+`deviations` is the difference divided by its standard uncertainty, with both uncertainties independent: above 2 it is
+unlikely to be chance (E_n of ISO/IEC 17043 is half of it).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from math import hypot
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrations.discovery.results import FittedModel
+from calibrations.fit import Fit
+from calibrations.model import Estimate
+from calibrations.table import Array, Table
+from rig.errors import RecordError
+from rig.record import Run
+from rig.services.load import loaded
+from rig.services.request import Request
+
+DIFFERENT = 2.0  # standard uncertainties
+
+
+@dataclass(frozen=True)
+class Pair:
+    """One quantity of both, in `unit`."""
+
+    name: str
+    unit: str
+    first: float
+    second: float
+    first_std: float | None
+    second_std: float | None
+
+    @property
+    def difference(self) -> float:
+        """The second less the first."""
+        return self.second - self.first
+
+    @property
+    def std(self) -> float | None:
+        """Of the difference; None where neither uncertainty is known."""
+        return hypot(self.first_std or 0.0, self.second_std or 0.0) or None
+
+    @property
+    def deviations(self) -> float | None:
+        """The difference in standard uncertainties."""
+        return None if self.std is None else self.difference / self.std
+
+    @property
+    def differ(self) -> bool:
+        """Whether the difference is hardly chance."""
+        return self.deviations is not None and abs(self.deviations) > DIFFERENT
+
+
+def results_of(first: Run, second: Run, sensors: tuple[str, str] = ("", "")) -> list[Pair]:
+    """The results that both have; of a batch those of the sensors named."""
+    one, other = (_own(run.results, sensor) for run, sensor in zip((first, second), sensors, strict=True))
+    return [
+        Pair(name, a["unit"], a["value"], b["value"], a["std"], b["std"])
+        for name, a in one.items()
+        if (b := other.get(name)) is not None and a["unit"] == b["unit"]
+    ]
+
+
+def parameters_of(first: FittedModel, second: FittedModel) -> list[Pair]:
+    """The parameters of one model that was fitted to both."""
+    other = dict(_estimates(second))
+    return [
+        Pair(name, a.unit, a.value, b.value, a.std, b.std)
+        for name, a in _estimates(first)
+        if (b := other.get(name)) is not None and a.identified and b.identified
+    ]
+
+
+def _own(results: Mapping[str, Any], sensor: str) -> Mapping[str, Any]:
+    """Those of one sensor, without its name; those of all as they are."""
+    if not sensor:
+        return results
+    return {name.rpartition("/")[2]: each for name, each in results.items() if name.startswith(f"{sensor}/")}
+
+
+def _estimates(fit: FittedModel) -> Iterator[tuple[str, Estimate]]:
+    for term in fit.model.terms:
+        for each in term.estimates:
+            yield " ".join(dict.fromkeys(filter(None, (term.name, each.name, each.axis)))), each
+
+
+# Two runs, or two sensors, by one model: the fits of both, and their measurements at the poses that both have.
+
+
+POSE = ("alpha_deg", "beta_deg", "direction", "mount_deg", "flip")  # what a pose is, as far as it is known
+SAME_DECIMALS = 2  # of a degree: nearer, gravity along an axis differs by 0.2 mg at most
+
+
+@dataclass(frozen=True)
+class Again:
+    """What was measured at the same poses in two tables: rows (k,) of both, the visits of a pose in their order.
+
+    `difference` is the second less the first, in the outputs' unit, of shape (channels, k); `floor` the white noise of
+    such a difference, per channel.
+    """
+
+    first: NDArray[np.intp]
+    second: NDArray[np.intp]
+    difference: Array
+    floor: Array
+
+
+def both(first: Request, second: Request, tell: Callable[[str], None]) -> tuple[FittedModel, FittedModel]:
+    """One model fitted to both: that of the first request, or of its kind of data.
+
+    Raises RecordError where they are of two kinds, and what `loaded` and `fit` raise.
+    """
+    one, other = loaded(first, tell), loaded(second, tell)
+    if one.data.content != other.data.content:
+        raise RecordError(
+            f"{first.data} is of {one.data.content}, {second.data} of {other.data.content}: no model describes both; "
+            "mark two of one kind in the record"
+        )
+    return one.data.fit(one.model), other.data.fit(one.model)
+
+
+def again(first: Fit, second: Fit) -> Again | None:
+    """The poses that both have; None where there are none, or the orientations are not known."""
+    if not first.table.type.stage_angles or first.channels != second.channels:
+        return None
+    there = _visits(second.table)
+    rows = [(row, there[visit]) for visit, row in _visits(first.table).items() if visit in there]
+    if not rows:
+        return None
+    one, other = (np.array(side) for side in zip(*rows, strict=True))
+    difference = (second.table.outputs[other] - first.table.outputs[one]).T
+    return Again(one, other, difference, np.hypot(first.noise.floor, second.noise.floor))
+
+
+def _visits(table: Table) -> dict[tuple[float, ...], int]:
+    """The row of every pose and number of its visit."""
+    columns = np.column_stack([table.optional(name, 0.0) for name in POSE])
+    seen: dict[tuple[float, ...], int] = {}
+    found = {}
+    for row, pose in enumerate(map(tuple, np.round(columns, SAME_DECIMALS) + 0.0)):
+        seen[pose] = seen.get(pose, 0) + 1
+        found[*pose, float(seen[pose])] = row
+    return found
