@@ -18,7 +18,7 @@ from typing import Any, cast
 import click
 
 from rig.cli.terminal.failure import exit_status
-from rig.cli.terminal.record_option import with_record
+from rig.cli.terminal.options import with_record
 
 FOLDER = Path(__file__).parent / "commands"
 # The sections of `rig --help`. A command that is in none of them is listed under "Other".

@@ -27,6 +27,7 @@ from calibrations.noise.table_noise import with_noise
 from calibrations.plausibility import doubt
 from calibrations.table import Table
 from rig.errors import UnknownRun
+from rig.files import require_out
 from rig.services.request import Request
 from rig.services.tables import BESIDE, load
 
@@ -58,12 +59,13 @@ def effects_of(bench_file: Path | None) -> Mapping[str, Effect]:
     return catalogue(read_bench(bench_file).folders.effects)
 
 
-def loaded(request: Request, tell: Tell) -> Loaded:
-    """Data, model (by default that of the kind of data) and effects; `tell` hears what a person should know.
+def loaded(request: Request, tell: Tell, out: Path | None = None) -> Loaded:
+    """Data, model (by default that of the kind of data) and effects; `tell` receives remarks for a person.
 
-    Data are a still record where their kind is still, they are an array, or a noise model is named.
-    Raises DataError, RecordError, ModelError, UnknownName.
+    The data are a still record if their kind is still, if they are an array, or if a noise model is named.
+    Raises DataError, RecordError, ModelError, UnknownName; OutputError if `out` cannot be written.
     """
+    require_output(request, out)
     effects = effects_of(request.bench_file)
     chosen = read_model(request.model, effects) if request.model is not None else None
     data = (
@@ -72,6 +74,12 @@ def loaded(request: Request, tell: Tell) -> Loaded:
     if chosen is not None:
         check_unit(chosen, data.unit, data.source)
     return Loaded(data, chosen or read_model(data.default_model, effects), effects)
+
+
+def require_output(request: Request, out: Path | None) -> None:
+    """Raises OutputError if the folder of `out` is missing, or if `out` is an input of the request."""
+    if out is not None:
+        require_out(out, request.data, request.model, request.bench_file)
 
 
 def loaded_table(request: Request, tell: Tell) -> tuple[Table, Model, Mapping[str, Effect]]:

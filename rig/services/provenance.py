@@ -1,16 +1,20 @@
-"""Where a result comes from: the program, the day, and what a model file says of its making."""
+"""The origin of a result: program and date; model files with their provenance."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
 from importlib.metadata import version
+from pathlib import Path
 
 from calibrations.discovery.results import FittedModel
 from calibrations.errors import UnusableData
 from calibrations.model import Model
+from calibrations.model.file import dump_model
 from calibrations.plausibility import NO_RESPONSE, refusal
 from calibrations.table import NUMBERS, Table
+from rig.files import write_whole
 
 OF_THE_SENSOR = ("sensor", "serial", "gravity_m_s2")  # constants of the data that a model file keeps
 
@@ -53,3 +57,19 @@ def covered(model: Model, table: Table) -> dict[str, tuple[float, float]]:
     own = {name for term in model.terms for name in term.effect.needs if name not in NUMBERS}
     there = [name for name in (*INFLUENCES, *sorted(own)) if name in table and table.n]
     return {name: (float(table.column(name).min()), float(table.column(name).max())) for name in there}
+
+
+def write_model(fit: FittedModel, parent: Model, out: Path | None, tell: Callable[[str], None]) -> Path | None:
+    """Write the fitted model with its provenance to `out`, completely or not at all. Returns the path.
+
+    None without `out`, and if an output does not respond: such a model cannot correct anything, and `tell` receives the
+    reason.
+    """
+    if out is None:
+        return None
+    try:
+        write_whole(out, dump_model(with_provenance(fit, parent)))
+    except UnusableData as error:
+        tell(str(error))
+        return None
+    return out

@@ -13,7 +13,7 @@ import pytest
 
 from rig.bench import read_bench
 from rig.cli import rig as commands
-from rig.cli.terminal.record_option import OPTION
+from rig.cli.terminal.options import OPTION
 from rig.errors import RecordError
 from rig.files import LAB, RECORD
 from rig.record import Record

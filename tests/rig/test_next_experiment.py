@@ -21,7 +21,7 @@ from procedures.catalogue import find
 from procedures.settings import parse
 from rig.bench import read_bench
 from rig.cli import rig as commands
-from rig.cli.terminal.settings import read_settings
+from rig.cli.terminal.options import read_settings
 from rig.planning.foresight import with_next
 from rig.planning.next_experiment import Dispute, chosen, command_line, planned_experiment, proposed
 from rig.planning.sweep_range import columns

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from rig.cli.terminal.options import request_options
 from rig.cli.terminal.output import emit, note, notes
-from rig.cli.terminal.request import request_options
 
 if TYPE_CHECKING:
     from calibrations.effects import Effect
@@ -36,14 +36,15 @@ def command(request: Request, effect: str, name: str | None, out: Path, as_json:
     """
     from calibrations.discovery.verdict import Verdict
     from calibrations.documents import discovery_document
-    from rig.cli.terminal.asked import asked, write_model
     from rig.cli.terminal.words import addition, parameters, planned, warning
+    from rig.services.load import loaded
+    from rig.services.provenance import write_model
 
-    question = asked(request, out)
+    question = loaded(request, note, out)
     chosen = _chosen(effect, name, question)
     result = question.data.add(chosen, question.model, {**question.effects, chosen.name: chosen})
     result = planned(result, request, question.effects)
-    written = write_model(result.end, question.model, out)
+    written = write_model(result.end, question.model, out, note)
     if as_json:
         emit(discovery_document(result, str(written) if written else None))
         notes(warning([result.caution]))

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from rig.cli.terminal.output import check_option, emit, model_option, notes
-from rig.cli.terminal.request import request_options
+from rig.cli.terminal.options import request_options
+from rig.cli.terminal.output import check_option, emit, model_option, note, notes
 
 if TYPE_CHECKING:
     from rig.services.request import Request
@@ -22,10 +22,10 @@ def command(request: Request, check: bool, as_json: bool) -> int:
     """Set a model beside DATA (a file or a run) and say where it fails. A model without values is fitted first."""
     from calibrations.discovery.verdict import Verdict
     from calibrations.documents import comparison_document
-    from rig.cli.terminal.asked import asked
     from rig.cli.terminal.words import table, warning
+    from rig.services.load import loaded
 
-    question = asked(request)
+    question = loaded(request, note)
     result = question.data.compare(question.model)
     name, cautions = request.model or question.model.name, question.data.cautions(result.fit)
     if as_json:

@@ -28,14 +28,13 @@ def command(folder: Path, as_json: bool) -> None:
     from procedures.catalogue import find
     from procedures.settings import parse
     from rig.bench import read_bench
-    from rig.cli.terminal.asked import write_model
     from rig.cli.terminal.watch import watching
     from rig.cli.terminal.words import discovery
     from rig.cli.terminal.words import table as shown
     from rig.files import write_whole
     from rig.record import Record
     from rig.runs.runner import start
-    from rig.services.provenance import program, today
+    from rig.services.provenance import program, today, write_model
     from rig.services.tables import load
 
     try:
@@ -60,7 +59,7 @@ def command(folder: Path, as_json: bool) -> None:
     note("3  Diagnose and add, until nothing is missing.\n")
     found = discover(table, linear)
     model, page = folder / "model.yaml", folder / "report.html"
-    write_model(found.end, linear, model)
+    write_model(found.end, linear, model, note)
     write_whole(page, report(found, beside, today(), program(), album(found, beside)))
     if as_json:
         emit({**discovery_document(found, str(model)), "run": run, "report": str(page)})

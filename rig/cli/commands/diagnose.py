@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from rig.cli.terminal.output import check_option, emit, model_option, notes
-from rig.cli.terminal.request import request_options
+from rig.cli.terminal.options import request_options
+from rig.cli.terminal.output import check_option, emit, model_option, note, notes
 
 if TYPE_CHECKING:
     from calibrations.discovery.results import Diagnosis
@@ -25,13 +25,14 @@ def command(request: Request, check: bool, as_json: bool) -> int:
     """Find the physical effect that a model misses on DATA (a file or a run)."""
     from calibrations.discovery.verdict import Verdict
     from calibrations.documents import diagnosis_document
-    from rig.cli.terminal.asked import asked, note_untestable
     from rig.cli.terminal.words import own_effect, planned, told, warning
+    from rig.services.load import loaded
 
-    question = asked(request)
+    question = loaded(request, note)
     result = question.data.diagnose(question.model, question.effects)
     result = planned(result, request, question.effects)
-    note_untestable(question.data, result.fit, question.effects)
+    if (untestable := question.data.untestable(result.fit, question.effects)) is not None:
+        note(untestable)
     name = request.model or question.model.name
     if as_json:
         own = own_effect(result.pattern, name, request)

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from rig.cli.terminal.options import request_options
 from rig.cli.terminal.output import check_option, emit, model_option, note, notes, watch_options
-from rig.cli.terminal.request import request_options
 
 if TYPE_CHECKING:
     from calibrations.discovery.dataset import Dataset
@@ -55,13 +55,14 @@ def command(
 def _discover(request: Request, several: tuple[str, ...], out: Path | None, check: bool, as_json: bool) -> int:
     from calibrations.discovery.verdict import Verdict
     from calibrations.documents import discovery_document
-    from rig.cli.terminal.asked import asked, write_model
     from rig.cli.terminal.words import discovery, own_effect, parameters, planned, told, warning
+    from rig.services.load import loaded
+    from rig.services.provenance import write_model
 
-    question = asked(request, out)
+    question = loaded(request, note, out)
     data = question.data if len(several) == 1 else _together(several, request, question)
     result = planned(data.discover(question.model, question.effects), request, question.effects)
-    written = write_model(result.end, question.model, out)
+    written = write_model(result.end, question.model, out, note)
     reached = str(written) if written else request.model or question.model.name
     own = (result.pattern if len(several) == 1 else None, reached, request)
     if as_json:

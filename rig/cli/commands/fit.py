@@ -17,8 +17,8 @@ from calibrations.fit import Fit
 from calibrations.fitting.matrices import CalibrationMatrices, calibration_matrices
 from calibrations.presentation.text import columns, concise
 from calibrations.table import Array, Table
-from rig.cli.terminal.output import check_option, emit, model_option, notes
-from rig.cli.terminal.request import request_options
+from rig.cli.terminal.options import request_options
+from rig.cli.terminal.output import check_option, emit, model_option, note, notes
 
 if TYPE_CHECKING:
     from calibrations.discovery.dataset import Dataset
@@ -36,14 +36,16 @@ def command(request: Request, out: Path | None, check: bool, as_json: bool) -> i
     """Estimate the parameters of a model from DATA (a file or a run), with standard uncertainties."""
     from calibrations.discovery.verdict import Verdict
     from calibrations.documents import fit_document
-    from rig.cli.terminal.asked import asked, note_untestable, write_model
     from rig.cli.terminal.words import parameters, table, warning
+    from rig.services.load import loaded
+    from rig.services.provenance import write_model
 
-    question = asked(request, out)
+    question = loaded(request, note, out)
     data = question.data
     found = data.fit(question.model)
-    written, reason = write_model(found, question.model, out), data.rejection(found)
-    note_untestable(data, found, question.effects)
+    written, reason = write_model(found, question.model, out, note), data.rejection(found)
+    if (untestable := data.untestable(found, question.effects)) is not None:
+        note(untestable)
     cautions, further = data.cautions(found), _further(data, question.model, found)
     if as_json:
         emit(fit_document(data, found, str(written) if written else None) | further.document)

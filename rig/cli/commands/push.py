@@ -9,8 +9,8 @@ from click.core import ParameterSource
 from sqlalchemy import URL
 
 from rig.bench import read_bench
+from rig.cli.terminal.options import require_no_password
 from rig.cli.terminal.output import bench_option, emit, json_option, note
-from rig.cli.terminal.record_option import require_no_password
 from rig.files import LAB
 from rig.record import Record
 from rig.record.lab import READER, WRITER, lab_url, prepare, shown

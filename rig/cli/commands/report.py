@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from rig.cli.terminal.options import request_options
 from rig.cli.terminal.output import emit, model_option, note
-from rig.cli.terminal.request import request_options
 
 if TYPE_CHECKING:
     from rig.services.request import Request
@@ -30,11 +30,11 @@ def command(request: Request, out: Path | None, folder: Path | None, form: str, 
     if out is None and folder is None:
         raise click.UsageError("nothing to write: give --out FILE.html, --pictures FOLDER, or both")
     from calibrations.presentation.static import save_all
-    from rig.cli.terminal.asked import require_place
     from rig.files import write_whole
+    from rig.services.load import require_output
     from rig.services.report import reported
 
-    require_place(request, out)
+    require_output(request, out)
     pictures, page = reported(request, note)
     if out is not None:
         write_whole(out, page())

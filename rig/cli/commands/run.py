@@ -9,8 +9,8 @@ import click
 from procedures.catalogue import find
 from procedures.settings import parse
 from rig.bench import read_bench
+from rig.cli.terminal.options import PASS_ON, read_settings, settings_arguments
 from rig.cli.terminal.output import bench_option, json_option, note, watch_options
-from rig.cli.terminal.settings import PASS_ON, read_settings, settings_arguments
 from rig.cli.terminal.watch import tell, trace_option, watching
 from rig.record import Record
 from rig.record.push import push_after

@@ -19,7 +19,6 @@ from calibrations.table import Table
 from procedures.catalogue import find
 from procedures.settings import parse
 from rig.bench import Bench, read_bench
-from rig.cli.terminal.asked import write_model
 from rig.cli.terminal.output import emit, note, notes
 from rig.cli.terminal.watch import watching
 from rig.cli.terminal.words import discovery, parameters, warning
@@ -29,6 +28,7 @@ from rig.record.measured import Measured
 from rig.runs.live import FIRST, STANDARD, Live, Measurement, stands
 from rig.runs.runner import start
 from rig.services.load import effects_of
+from rig.services.provenance import write_model
 from rig.services.request import Request
 from rig.services.tables import begun, joined_runs
 
@@ -103,7 +103,7 @@ def discover_live(
             taken.stopped()
             raise
     found = done[-1].found
-    written = write_model(found.end, given, out)
+    written = write_model(found.end, given, out, note)
     if as_json:
         emit(document(done, standard_s, written))
         notes(warning([found.caution]))
