@@ -55,16 +55,27 @@ def _unexplained_poses() -> Table:
     return synthetic.poses(columns, 2.5 + x + 2e-3 * np.sin(5 * np.radians(columns["beta_deg"])), 2.5 + y)
 
 
+def _positions() -> Table:
+    """Scale factors that differ between the axes, and noise that a column states."""
+    a = 9.81 * (test_common_floor.upper(40, -1.0, 3) * [1.02, 0.99, 1.01] + [0.1, -0.08, 0.15])
+    a += 1e-3 * np.random.default_rng(3).standard_normal(a.shape)
+    columns = dict(zip(("ax", "ay", "az"), a.T, strict=True))
+    columns |= {f"{name}_std": np.full(len(a), 1e-2) for name in columns} | {"n": np.full(len(a), 100.0)}
+    return Table.from_columns("positions", columns, {"unit": "m/s2"}, "positions")
+
+
 TABLES: Mapping[str, Callable[[], Table]] = {
     "poses": _poses,
     "clean poses": _clean_poses,
     "unexplained poses": _unexplained_poses,
-    "positions": lambda: test_common_floor.accelerometer(3),
+    "positions": _positions,
+    "positions without stated noise": lambda: test_common_floor.accelerometer(3),
     "fields": test_common_floor.magnetometer,
     "rates": lambda: turned.gyroscope(4, lean_deg=2.0, per_g=0.6),
     "motion": lambda: shaken.record(shaken.TWO, 10.0, 1, turn_deg=(0.0, 1.5, 2.0)),
 }
-KINDS = (*TABLES, "still")
+SLOW = ("poses", "positions without stated noise", "motion")  # their searches take seconds each
+KINDS = [pytest.param(kind, marks=pytest.mark.slow) if kind in SLOW else kind for kind in (*TABLES, "still")]
 
 
 class Answers:
