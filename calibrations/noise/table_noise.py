@@ -84,8 +84,6 @@ def _flicker(coefficient: float, fastest_s: float, slowest_s: float) -> Processe
 #
 # Source  Draper and Smith, Applied Regression Analysis, on lack of fit: pure error by the widest model.
 
-FORMS = {"fields": "an ellipsoid", "rates": "outputs linear in rates and specific forces"}
-
 
 def scatter(table: Table) -> Array | None:
     """Standard deviation of each row in the residual's unit, shape (channels, n).
@@ -98,12 +96,13 @@ def scatter(table: Table) -> Array | None:
 
 def scatter_remark(table: Table) -> str | None:
     """What is taken for the noise of a table that does not say it, in words; None where it does, or is not asked."""
-    if table.content not in FORMS or white_std(table) is not None:
+    form = table.type.widest_form
+    if not form or white_std(table) is not None:
         return None
     if scatter(table) is None:
         return "the noise of its means is not known, and its rows do not show it: what a model leaves is its noise"
     return (
-        f"the noise of its means is not known: what {FORMS[table.content]} leaves is taken for it, and nothing beyond "
+        f"the noise of its means is not known: what {form} leaves is taken for it, and nothing beyond "
         f"is looked for; give {table.output_names[0]}_std, and so on, and n"
     )
 

@@ -94,8 +94,9 @@ class Shown:
     @property
     def label(self) -> str:
         """Of the residual's axis."""
-        if self.fit.table.kind == "positions":
-            return f"residual of |{'m' if self.fit.table.content == 'fields' else 'a'}| ({self.unit})"
+        kind = self.fit.table.type
+        if kind.magnitude:
+            return f"residual of |{kind.symbol}| ({self.unit})"
         return f"residual of {self.fit.channels[self.c]} ({self.unit})"
 
     @cached_property
@@ -146,7 +147,7 @@ def _place(table: Table, row: int) -> Iterator[str]:
 def residual_units(fit: Fit) -> dict[bool, str]:
     """What a residual can be given in: False the output's unit, True that of what is sensed."""
     sensed = fit.table.input_unit
-    return {True: sensed} if fit.table.kind == "positions" else {False: fit.table.unit, True: sensed}
+    return {True: sensed} if fit.table.type.magnitude else {False: fit.table.unit, True: sensed}
 
 
 def residual_unit(fit: Fit) -> str:

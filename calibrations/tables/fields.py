@@ -17,3 +17,10 @@ class Fields(Positions):
     default_model = "field"
     field = True
     sequential = False
+    widest_form = "an ellipsoid"
+    symbol = "m"
+    sensed_in = "share of the field"
+    sensed_along = "share of the field along {}"
+    nearest_to = "the field"
+    measurement_caption = "The magnitude of the field by the model {} at each position: 1 if the model is right."
+    failure_caption = "The residual of the model {} over the direction of the field; pale is near the noise."

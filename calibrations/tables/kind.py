@@ -20,9 +20,17 @@ class Kind:
     rows: str  # what its rows are called
     size_in: str  # what the size of a table is counted in
 
+    symbol: str = "a"  # of the sensed quantity
+    sensed_in: str = "g"  # what its magnitude is given in
+    sensed_along: str = "specific force along {} (g)"  # its component along an axis
+    nearest_to: str = "gravity"  # the direction by which rows are told apart
+    drawn_over: tuple[str, str, str] | None = None  # name, label and column that charts draw its rows over
+    measurement_caption: str  # of the picture of measurement beside {model}
+    failure_caption: str  # of the picture of where {model} fails
     taken: str = "the means of {} still positions"  # the rows that a log of raw samples gave, by their number
     perfect_sensor: str = "the linear model"  # what the picture of an effect is compared with
     nominal: str = " of 1 V/g"  # the sensor in that picture
+    widest_form: str = ""  # whose residual is the noise where the rows give none
     note: str = ""  # what else judges such data, in words
 
     fitted: bool = True  # whether models are fitted to its rows by least squares

@@ -20,3 +20,7 @@ class Motion(Kind):
         "error also contains changes since the sweep and the error of the reference."
     )
     moving = True
+    measurement_caption = "Output over a few periods, less its mean: dots are measured, lines are the model {}."
+    failure_caption = (
+        "Mean residual of the model {} over one period of the motion's strongest line, with the noise of the mean."
+    )

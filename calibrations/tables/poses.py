@@ -15,3 +15,9 @@ class Poses(Kind):
     taken = "the means of {} poses"
     means = budget = known_input = stage_angles = True
     same_pose = ("alpha_deg", "beta_deg", "mount_deg", "flip")
+    drawn_over = ("beta", "β (deg)", "beta_deg")
+    measurement_caption = (
+        "Dots are measured, lines are the model {}. "
+        "Filled markers are clockwise approaches, open ones anticlockwise approaches."
+    )
+    failure_caption = "The residual of the model {} at both stage angles; pale is near the noise."

@@ -13,3 +13,5 @@ class Positions(Kind):
     outputs = ("ax", "ay", "az")
     default_model = "common-scale"
     means = budget = magnitude = True
+    measurement_caption = "The magnitude of gravity by the model {} at each position: 1 g if the model is right."
+    failure_caption = "The residual of the model {} over the direction of gravity; pale is near the noise."

@@ -18,3 +18,10 @@ class Rates(Kind):
     default_model = "gyroscope"
     means = known_input = turning = True
     sequential = False
+    widest_form = "outputs linear in rates and specific forces"
+    sensed_in = "deg/s"
+    sensed_along = "rate about {} (deg/s)"
+    nearest_to = "the axis of turn"
+    drawn_over = ("rate", "rate (deg/s)", "rate_deg_s")
+    measurement_caption = "Dots are measured, crosses are the model {}."
+    failure_caption = "The residual of the model {} over the rate of the turn."

@@ -21,6 +21,7 @@ from calibrations.discovery.results import Diagnosis, Discovery
 from calibrations.effects import Effect
 from calibrations.errors import CalibrationError
 from calibrations.fit import Fit, refit
+from calibrations.tables import KINDS
 from drivers.errors import LimitError
 from procedures.catalogue import find
 from procedures.errors import ProcedureError
@@ -85,7 +86,7 @@ def planned_experiment(experiment: Experiment, bench: Bench, bench_file: Path | 
 def gives_poses(e: Experiment, bench: Bench) -> bool:
     """Whether its data are poses, which are judged together with those of a sweep. Raises as `plan` does."""
     poses = planned_experiment(e, bench, None)[1].poses
-    return bool(poses) and find(e.procedure, bench.folders.procedures).kind == "poses"
+    return bool(poses) and KINDS[find(e.procedure, bench.folders.procedures).kind].stage_angles
 
 
 def command_line(experiment: Experiment, bench_file: Path | None) -> str:

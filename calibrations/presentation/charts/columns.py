@@ -11,7 +11,7 @@ from calibrations.effects import Effect
 from calibrations.fit import Fit
 from calibrations.geometry.orientation import other_in_plane, out_of_plane
 from calibrations.model.chain import backward, force
-from calibrations.table import Array, Table
+from calibrations.table import AXES, Array, Table
 
 LENGTHS = ((7200.0, 3600.0, "h"), (180.0, 60.0, "min"), (-1.0, 1.0, "s"))  # longer than, unit, its name
 LABELS = {"temperature_c": "temperature (°C)", "supply_v": "supply voltage (V)"}
@@ -49,18 +49,19 @@ def specific_force(fit: Fit) -> Array:
 def columns(fit: Fit) -> list[Column]:
     """What the residual is drawn against: angle or specific force, time, temperature, as far as measured."""
     table, n = fit.table, len(fit.channels)
-    if table.kind == "poses":
-        found = [_same("beta", "β (deg)", table.column("beta_deg"), n)]
-    elif table.kind == "motion":
-        found = []
-    elif table.kind == "rates":
-        found = [_same("rate", "rate (deg/s)", table.column("rate_deg_s"), n)]
-    else:
-        forces = specific_force(fit).T
-        what = "share of the field" if table.content == "fields" else "specific force"
-        unit = "" if table.content == "fields" else " (g)"
-        found = [_same(f"a{k}", f"{what} along {k}{unit}", a, n) for k, a in zip("xyz", forces, strict=True)]
+    found: list[Column] = []
+    if table.type.drawn_over:
+        name, label, column = table.type.drawn_over
+        found = [_same(name, label, table.column(column), n)]
+    elif table.type.magnitude:
+        found = _sensed(fit, "a")
     return found + _others(table, n)
+
+
+def _sensed(fit: Fit, letter: str) -> list[Column]:
+    """What is sensed along each axis, named by a letter and the axis."""
+    along, n = fit.table.type.sensed_along, len(fit.channels)
+    return [_same(letter + k, along.format(k), a, n) for k, a in zip(AXES, specific_force(fit).T, strict=True)]
 
 
 def telling_columns(fit: Fit, effect: Effect) -> list[Column]:
@@ -70,13 +71,11 @@ def telling_columns(fit: Fit, effect: Effect) -> list[Column]:
     """
     table, n = fit.table, len(fit.channels)
     needed = [_needed(table, name, n) for name in effect.needs if name not in SHOWN_OTHERWISE]
-    if table.kind == "motion":  # what it explains returns in every stretch
+    if table.type.moving:  # what it explains returns in every stretch
         return columns(fit)[:1] + needed
-    if table.kind == "rates":
-        return [
-            _same(f"w{k}", f"rate about {k} (deg/s)", w, n) for k, w in zip("xyz", specific_force(fit).T, strict=True)
-        ] + needed
-    if table.kind != "poses":
+    if table.type.turning:
+        return _sensed(fit, "w") + needed
+    if not table.type.stage_angles:
         return columns(fit)[:3] + needed
     a = specific_force(fit)
     roles = {"own": a, "other": other_in_plane(a), "out": out_of_plane(a)}
@@ -122,10 +121,9 @@ def choices(fit: Fit) -> dict[str, Column]:
     """Columns that a residual may be drawn against or coloured by; the most likely causes first."""
     table, n = fit.table, len(fit.channels)
     found = {column.name: column for column in columns(fit)}
-    if table.kind == "poses":
-        for k, a in zip("xyz", specific_force(fit).T, strict=True):
-            found[f"a{k}"] = Column(f"a{k}", (f"specific force along {k} (g)",) * n, np.tile(a, (n, 1)))
-    elif table.kind != "motion":
+    if table.type.stage_angles:
+        found |= {column.name: column for column in _sensed(fit, "a")}
+    elif not table.type.moving:
         found["axis"] = nearest_axis(fit)
     drawn = {"beta_deg" if name == "beta" else name for name in found} | {"t_s", "temperature_c"} & set(table.columns)
     for name, values in table.columns.items():
@@ -136,9 +134,8 @@ def choices(fit: Fit) -> dict[str, Column]:
 
 def nearest_axis(fit: Fit) -> Column:
     """The sensor axis nearest to gravity, to the field or to the axis of turn: 0, 1, 2."""
-    what = {"fields": "the field", "rates": "the axis of turn"}.get(fit.table.content, "gravity")
     n, nearest = len(fit.channels), np.argmax(np.abs(specific_force(fit)), axis=1).astype(float)
-    return Column("axis", (f"axis nearest to {what}",) * n, np.tile(nearest, (n, 1)), ("x", "y", "z"))
+    return Column("axis", (f"axis nearest to {fit.table.type.nearest_to}",) * n, np.tile(nearest, (n, 1)), AXES)
 
 
 def first_choices(found: Sequence[str]) -> tuple[str, str]:

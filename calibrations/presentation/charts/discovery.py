@@ -49,28 +49,6 @@ NEAR = 1.15  # times the floor: as good as noise
 LONG = 0.3  # of the axis: a bar that its text fits into
 ROW = 0.42  # inches
 MOST_CURVES = 4
-DOTS = "Filled markers are clockwise approaches, open ones anticlockwise approaches."
-POSES = (
-    f"Dots are measured, lines are the model {{}}. {DOTS}",
-    "The residual of the model {} at both stage angles; pale is near the noise.",
-)
-MOTION = (
-    "Output over a few periods, less its mean: dots are measured, lines are the model {}.",
-    "Mean residual of the model {} over one period of the motion's strongest line, with the noise of the mean.",
-)
-POSITIONS = (
-    "The magnitude of gravity by the model {} at each position: 1 g if the model is right.",
-    "The residual of the model {} over the direction of gravity; pale is near the noise.",
-)
-RATES = (
-    "Dots are measured, crosses are the model {}.",
-    "The residual of the model {} over the rate of the turn.",
-)
-FIELDS = (
-    "The magnitude of the field by the model {} at each position: 1 if the model is right.",
-    "The residual of the model {} over the direction of the field; pale is near the noise.",
-)
-CAPTIONS = {"poses": POSES, "motion": MOTION, "rates": RATES, "fields": FIELDS}
 
 
 @dataclass(frozen=True)
@@ -150,7 +128,7 @@ def effect_chart(step: Step[Fit]) -> Chart:
             residual(before, x, colour, step, title=titles[0]),
             residual(after, x, colour, second=True, title=titles[1]),
         ))  # fmt: skip
-    bar = None if step.before.table.kind == "motion" else scale_of(colour, 0)
+    bar = None if step.before.table.type.moving else scale_of(colour, 0)
     return Chart(tuple(rows), row_height(step.before), share_y=True, bar=bar)
 
 
@@ -161,20 +139,21 @@ def album(found: Discovery[Fit], compared: Comparison[Fit], motion: MotionResult
     """
     fit = compared.fit
     model, rows = fit.model.name, fit.table.type.rows
-    shown, mapped = CAPTIONS.get(fit.table.content, POSITIONS)
+    kind = fit.table.type
     fall = (
         "Error of the model before and after each effect, as a multiple of the noise floor (grey): "
         f"bars on the {rows} of the fit, diamonds on {rows} that the fit did not use."
     )
+    shown, mapped = (text.format(model) for text in (kind.measurement_caption, kind.failure_caption))
     left = f"Measured less the model {model}. The grey band is the noise floor, one standard deviation each way."
     if len(fit.channels) > len(drawn_channels(fit, fit.residual)):
         left += f" Only the {MOST_ROWS} outputs with the largest residual are drawn."
     return [
         *(_evaluated(each) for each in (motion,) if each),
         Picture("waterfall", "Error by model", fall, waterfall(levels(found))),
-        Picture("measurement", "Measurement and model", shown.format(model), measurement_chart(fit)),
+        Picture("measurement", "Measurement and model", shown, measurement_chart(fit)),
         Picture("residual", "Residual", left, residual_chart(fit)),
-        Picture("failure", "Residual pattern", mapped.format(model), failure_chart(fit)),
+        Picture("failure", "Residual pattern", mapped, failure_chart(fit)),
         *(_curve(step, found) for step in tried(found)),
     ]
 

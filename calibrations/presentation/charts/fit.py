@@ -58,11 +58,11 @@ ACROSS_PX, DOWN_PX, LEAST_PX, MOST_PX = 900.0, 330.0, 3.0, 10.0  # of a map of p
 
 def measurement_chart(fit: Fit) -> Chart:
     """A panel for each output, or one for the magnitude of positions."""
-    if fit.table.kind == "motion":
+    if fit.table.type.moving:
         return stacked([motion.measurement(Shown(fit, c, False)) for c in motion.firsts(fit)], 2.6)
-    found, n = choices(fit), 1 if fit.table.kind == "positions" else len(fit.channels)
+    found, n = choices(fit), 1 if fit.table.type.magnitude else len(fit.channels)
     x, colour = (found[name] for name in first_choices(list(found)))
-    if fit.table.kind == "positions":
+    if fit.table.type.magnitude:
         x = columns(fit)[3]
     panels = [measurement(Shown(fit, c, False), x, colour) for c in range(n)]
     bar = scale_of(colour, 0)
@@ -85,7 +85,7 @@ def residual_chart(fit: Fit) -> Chart:
 
 def failure_chart(fit: Fit) -> Chart:
     """A map for each channel; for a motion the residual over one period."""
-    if fit.table.kind == "motion":
+    if fit.table.type.moving:
         return stacked([motion.failure(Shown(fit, c, False)) for c in motion.firsts(fit)], 2.6)
     panels = [failure(Shown(fit, c, False)) for c in range(len(fit.channels))]
     reach = max(PALE, float(np.abs(fit.residual / fit.noise.floor[:, None]).max()))
@@ -95,7 +95,7 @@ def failure_chart(fit: Fit) -> Chart:
 def drawn_channels(fit: Fit, values: Array) -> list[int]:
     """All channels; of a motion those with the largest rms of `values`, shape (channels, n), over the noise floor."""
     every = range(len(fit.channels))
-    if fit.table.kind != "motion":
+    if not fit.table.type.moving:
         return list(every)
     size = rms(values) / fit.noise.floor
     return sorted(sorted(every, key=lambda c: -float(size[c]))[:MOST_ROWS])
@@ -103,7 +103,7 @@ def drawn_channels(fit: Fit, values: Array) -> list[int]:
 
 def row_height(fit: Fit) -> float:
     """Inches of a channel's row of panels."""
-    return SMALL_ROW if fit.table.kind == "motion" else ROW
+    return SMALL_ROW if fit.table.type.moving else ROW
 
 
 def measurement(shown: Shown, x: Column, colour: Column) -> Panel:
@@ -116,16 +116,16 @@ def measurement(shown: Shown, x: Column, colour: Column) -> Panel:
     if x.name == "beta":
         lines = (Line(*_stretches(shown, x.values[c], model), width=1.2, hover=told),)
         series = (*lines, dots)
-    elif fit.table.kind == "positions":
+    elif fit.table.type.magnitude:
         std = fit.noise.fast[0, rows]
         dots = replace(dots, low=dots.y - std, high=dots.y + std)
         series = (Rule(1.0, colour=MODEL, width=1.2), dots)  # type: ignore[assignment] # a tuple of any series
     else:
         crosses = Points(x.values[c, rows], model[rows], colour=MODEL, symbol="cross", size=9)
         series = (dots, crosses)  # type: ignore[assignment]
-    title = "" if fit.table.kind == "positions" else f"axis {fit.channels[c]}"
+    title = "" if fit.table.type.magnitude else f"axis {fit.channels[c]}"
     second = None
-    if not shown.in_g and fit.table.kind == "poses":
+    if not shown.in_g and fit.table.type.stage_angles:
         second = Second(float(scales(fit)[c]), zero(fit, c), f"{fit.table.input_unit}, by bias and scale factor")
     return Panel(series, _axis(x, c), Axis(label), title, second=second)
 
@@ -141,10 +141,10 @@ def residual(
     dots = _dots(shown, x.values[c, rows], shown.residual, colour, shown.hover)
     lines = tuple(_explained(step, x, shown)) if step else ()
     right = None
-    if second and shown.fit.table.kind != "positions" and not shown.in_g:
+    if second and not shown.fit.table.type.magnitude and not shown.in_g:
         right = Second(shown.scale, 0.0, MILLI[shown.fit.table.input_unit])
     label = shown.label
-    if shown.fit.table.kind == "motion":
+    if shown.fit.table.type.moving:
         label = label.replace(" in ", "\nin ", 1).replace(" with", "\nwith", 1)
     return Panel((*floor_band(shown.floor), dots, *lines), _axis(x, c), Axis(label), title, second=right)
 
@@ -158,17 +158,17 @@ def failure(shown: Shown) -> Panel:
                   scale=_signed(max(PALE, float(np.abs(over).max(initial=0.0)))), hover=shown.hover,
                   keys=range(len(rows)))  # fmt: skip
     circles: tuple[Line, ...] = ()
-    if fit.table.kind == "positions":
+    if fit.table.type.magnitude:
         turn = np.linspace(0, 2 * np.pi, 121)
         circles = tuple(Line(np.cos(turn) + at, np.sin(turn), colour=QUIET, width=0.8) for at in (0.0, HALF_SPHERES))
-    title = "" if fit.table.kind == "positions" else f"axis {fit.channels[c]}"
-    return Panel((*circles, dots), *axes, title, equal=fit.table.kind == "positions")
+    title = "" if fit.table.type.magnitude else f"axis {fit.channels[c]}"
+    return Panel((*circles, dots), *axes, title, equal=fit.table.type.magnitude)
 
 
 def _marker_px(shown: Shown) -> float:
     """Markers of neighbouring poses, and of both directions of turning, must not overlap."""
     table = shown.fit.table
-    if table.kind != "poses":
+    if not table.type.stage_angles:
         return MOST_PX
     across, down = (len(np.unique(table.column(name))) for name in ("beta_deg", "alpha_deg"))
     return min(max(min(ACROSS_PX / across, DOWN_PX / (2 * down)), LEAST_PX), MOST_PX)
@@ -198,8 +198,8 @@ def _axis(x: Column, c: int) -> Axis:
 def _outputs(shown: Shown) -> tuple[Array, Array, str]:
     """Measured values, the model's values, and their label, for every row."""
     fit, c = shown.fit, shown.c
-    if fit.table.kind == "positions":
-        what = "|m| by the model (share of the field)" if fit.table.content == "fields" else "|a| by the model (g)"
+    if fit.table.type.magnitude:
+        what = f"|{fit.table.type.symbol}| by the model ({fit.table.type.sensed_in})"
         return 1.0 + fit.residual[0], np.ones(fit.table.n), what
     measured = fit.table.outputs[:, c]
     model = measured - fit.residual[c]
@@ -233,17 +233,17 @@ def _explained(step: Step[Fit], x: Column, shown: Shown) -> Iterator[Line]:
 def _map(shown: Shown) -> tuple[Array, Array, tuple[Axis, Axis]]:
     """The place of each row, and the axes."""
     fit = shown.fit
-    if fit.table.kind == "poses":
+    if fit.table.type.stage_angles:
         alpha, side = fit.table.column("alpha_deg"), np.sign(fit.table.optional("direction", 0.0))
         steps = np.diff(np.unique(alpha))
         apart = APART * float(np.median(steps)) if len(steps) else 1.0
         label = "β (deg); ▲ turning clockwise, ▼ anticlockwise"
         return fit.table.column("beta_deg"), alpha + apart * side, (Axis(label, ticks="quarters"), Axis("α (deg)"))
-    if fit.table.kind == "positions":
+    if fit.table.type.magnitude:
         a = specific_force(fit)
         flat = a[:, :2] / np.sqrt(np.linalg.norm(a, axis=1, keepdims=True) + np.abs(a[:, 2:]))
         right = np.where(a[:, 2] < 0, HALF_SPHERES, 0.0)
-        unit = "share of the field" if fit.table.content == "fields" else "g"
+        unit = fit.table.type.sensed_in
         return flat[:, 0] + right, flat[:, 1], (Axis(f"{TOWARDS} ({unit})"), Axis(f"towards y ({unit})"))
     first = columns(fit)[0]
     over = fit.residual[shown.c] / fit.noise.floor[shown.c]
@@ -270,7 +270,7 @@ def most_telling(step: Step[Fit]) -> Column:
     effect = next(term.effect for term in step.after.model.terms if term.name == step.name)
     found = telling_columns(step.before, effect)
     told = np.array([explained(change, column.values, sides) for column in found])
-    if step.before.table.kind == "motion":
+    if step.before.table.type.moving:
         return found[0]
     if told.max() < TELLING:
         label = f"change made by {step.name} ({residual_unit(step.before)})"
