@@ -22,9 +22,8 @@ from rig.errors import OutputError
 from rig.files import write_whole
 from rig.fleet.discover import errors_of, stands_out
 from rig.fleet.members import Member
-from rig.fleet.own_effects import Own, effects_of
 from rig.fleet.questions import Fleet
-from rig.fleet.worker import Question, model_of, read_look
+from rig.fleet.worker import Own, Question, effects_of, model_of, read_look
 from rig.services.provenance import program
 
 Names = tuple[tuple[str, str, str, str], ...]

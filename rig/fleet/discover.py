@@ -28,9 +28,8 @@ from calibrations.fleet.batch import (
 from calibrations.fleet.look import NOWHERE, Screening
 from calibrations.fleet.rigs import Measured, RigError, StageErrors, find_rig_errors, unconnected_rigs
 from rig.fleet.members import Member
-from rig.fleet.own_effects import effects_of
 from rig.fleet.questions import Fleet
-from rig.fleet.worker import Question, read_look
+from rig.fleet.worker import Question, effects_of, read_look
 
 STANDS_OUT = 0.05  # chance, over the whole search, below which a sensor is diagnosed in full
 MOST_ROUNDS = 6

@@ -13,7 +13,7 @@ from calibrations.presentation.charts.fleet import Spread
 from calibrations.presentation.report.fleet import calibration_report, population_report
 from calibrations.presentation.text import estimate_text, rounded
 from rig.fleet.calibrate import Calibrated, Calibration
-from rig.fleet.own_effects import effects_of
+from rig.fleet.worker import effects_of
 from rig.services.provenance import program, today
 
 SCHEMA = "rig.fleet/1"

@@ -1,4 +1,4 @@
-"""How far a search through the catalogue is, as seen by the effects that it asks for; and its end before its time."""
+"""Parts that pages are made of: boxes, tables, messages, states, progress of a search, work in a thread."""
 
 from __future__ import annotations
 
@@ -25,11 +25,14 @@ from rig.errors import RigError
 
 
 class Cancelled(Exception):
-    """Nobody waits for the answer any more."""
+    """The search was cancelled: no page waits for its result."""
 
 
 class Counted(Mapping[str, Effect]):
-    """The same effects. A search goes through them in rounds; `round` is the present one, `at` how far it is."""
+    """The effects of a search, with its progress: a search reads all of them once a round.
+
+    `round` is the number of the present round, `at` the index of the effect in it. `cancelled` ends the search.
+    """
 
     def __init__(self, effects: Mapping[str, Effect]) -> None:
         self._effects = effects
@@ -54,22 +57,22 @@ class Counted(Mapping[str, Effect]):
 
     @property
     def share(self) -> float:
-        """Of the present round."""
+        """Progress of the present round, 0 to 1."""
         return self.at / len(self)
 
     @property
-    def told(self) -> str:
-        """For people."""
+    def text(self) -> str:
+        """The progress in words."""
         if not self.round:
             return "Fitting the model"
         if self.at == len(self):
-            return f"Round {self.round}: weighing what was tried"
+            return f"Round {self.round}: comparing the results"
         return f"Round {self.round}, effect {self.at + 1} of {len(self)}: {self.now}"
 
 
-# Small parts that pages are made of: boxes, and the states of having nothing, waiting, and having failed.
+# Boxes, tables and states.
 
-# A cell of a sorted table: it leads to the row's `to`, where there is one.
+# A cell of a sorted table: a link to the row's `to`, if it has one.
 LINKED = """<q-td :props="props">
   <a v-if="props.row.to" :href="props.row.to" @click.stop>{{ props.value }}</a><span v-else>{{ props.value }}</span>
 </q-td>"""
@@ -94,7 +97,7 @@ def words(text: str, classes: str = "") -> ui.label:
 
 @contextmanager
 def state(title: str, why: str = "", kind: str = "") -> Iterator[None]:
-    """A box in place of what is not there, which says what to do; inside, what to press."""
+    """A box for missing content that says what to do; the body adds buttons."""
     with box(f"state {kind}").props("role=status"):
         words(title, "title")
         if why:
@@ -104,21 +107,21 @@ def state(title: str, why: str = "", kind: str = "") -> Iterator[None]:
 
 
 def waiting(text: str) -> ui.label:
-    """Something is on its way; the label may be told how far."""
+    """A spinner; the caller may update the returned label with the progress."""
     with div("row-of").props("role=status"):
         ui.spinner(size="1.4em")
         return words(text, "quiet")
 
 
 def failed(title: str, why: str) -> None:
-    """An error state."""
+    """An error message."""
     with box("error").props("role=alert"):
         words(title, "title")
         words(why, "why quiet").style("white-space: pre-wrap")
 
 
 def facts(rows: Mapping[str, str]) -> None:
-    """Names and what they are, in two columns."""
+    """Names and values in two columns."""
     with div("facts"):
         for name, value in rows.items():
             words(name, "k")
@@ -127,7 +130,7 @@ def facts(rows: Mapping[str, str]) -> None:
 
 @dataclass(frozen=True)
 class Link:
-    """A cell that leads somewhere."""
+    """A cell with a link."""
 
     text: str
     to: str
@@ -148,13 +151,13 @@ def table(head: tuple[str, ...], rows: Sequence[tuple[str | Link, ...]]) -> None
 
 
 def redraw(plot: ui.plotly, figure: dict[str, Any]) -> None:
-    """A picture that stays as it is keeps its zoom, and a box that is being drawn in it."""
+    """Update a plot only if its figure changed: an unchanged plot keeps its zoom and its selection."""
     if figure != plot.figure:
         plot.update_figure(figure)
 
 
 async def off_loop(call: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
-    """What takes long, in a thread: the page stays alive. A server that is to end does not wait for it."""
+    """Call in a thread, so that the page stays responsive. The server does not wait for the thread when it ends."""
     future = Future[R]()
     work = partial(copy_context().run, call, *args, **kwargs)
     Thread(target=_settled, args=(future, work), name=call.__name__, daemon=True).start()
@@ -162,7 +165,7 @@ async def off_loop(call: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R
 
 
 def _settled(future: Future[R], work: Callable[[], R]) -> None:
-    """What came of the work, whatever it was; also where nobody waits for it any more."""
+    """Set the result or the error of the work, even if no page waits for it."""
     if future.set_running_or_notify_cancel():
         try:
             result = work()
@@ -172,15 +175,14 @@ def _settled(future: Future[R], work: Callable[[], R]) -> None:
             future.set_result(result)
 
 
-# What the program says, on a page: its sentences with their signs, its errors as one message.
-#
-# A message says what, where and what to do; what the program did wrong is said to be its fault.
+# Messages. An error of the user or of an instrument says what, where and what to do; any other error is called a fault
+# of the program.
 
 KNOWN = (CalibrationError, ProcedureError, DriverError, RigError)
 
 
 def message(error: Exception) -> str:
-    """What went wrong; a fault of the program goes to the server's log as well."""
+    """The text of an error; a fault of the program also goes to the server's log."""
     if isinstance(error, KNOWN):
         return str(error)
     if isinstance(error, OSError) and error.strerror:
@@ -190,6 +192,35 @@ def message(error: Exception) -> str:
 
 
 def for_page(text: str) -> str:
-    """A sentence of the command line with the signs that a terminal may not have: −, ±, ×, °C."""
+    """A sentence of the command line with typographic signs: −, ±, ×, °C."""
     signs = re.sub(r"(?<![\w.)\]-])-(?=\d)", "−", text.replace(" +- ", " ± "))
     return re.sub(r"(?<=\d) x (?=the |that |its )", " × ", re.sub(r"(?<=\d) (deg)?C\b", " °C", signs))
+
+
+# Settings of a procedure as text: `step_deg = 10.0` is shown as `step (deg)`, `10`.
+
+UNITS = {  # ends of names, longest first
+    "deg_s": "deg/s",
+    "m_s2": "m/s²",
+    "deg": "deg",
+    "hz": "Hz",
+    "um": "µm",
+    "c": "°C",
+    "s": "s",
+}
+
+
+def setting_label(name: str) -> str:
+    """`step_deg` as `step (deg)`."""
+    unit = next((end for end in UNITS if name.endswith(f"_{end}")), "")
+    head = name.removesuffix(f"_{unit}").replace("_", " ")
+    return f"{head} ({UNITS[unit]})" if unit else head
+
+
+def setting_text(value: Any) -> str:
+    """The text of a value, as a person types it."""
+    if isinstance(value, (list, tuple)):
+        return ",".join(f"{part:g}" if isinstance(part, float) else str(part) for part in value)
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:g}" if isinstance(value, float) else str(value)

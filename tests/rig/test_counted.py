@@ -16,13 +16,13 @@ from tests.browser.measured import hidden
 
 def test_it_tells_what_is_tried() -> None:
     counted = Counted({name: catalogue()[name] for name in ("bias", "hysteresis")})
-    assert (counted.told, counted.share) == ("Fitting the model", 0.0)
+    assert (counted.text, counted.share) == ("Fitting the model", 0.0)
     effects = iter(counted.values())
     next(effects)
     next(effects)
-    assert (counted.told, counted.share) == ("Round 1, effect 2 of 2: hysteresis", 0.5)
+    assert (counted.text, counted.share) == ("Round 1, effect 2 of 2: hysteresis", 0.5)
     assert list(effects) == []
-    assert (counted.told, counted.share) == ("Round 1: weighing what was tried", 1.0)
+    assert (counted.text, counted.share) == ("Round 1: comparing the results", 1.0)
     assert list(counted) == ["bias", "hysteresis"]
     assert counted.round == 2
 

@@ -22,10 +22,11 @@ from procedures.settings import parse
 from rig.bench import read_bench
 from rig.cli import rig as commands
 from rig.cli.terminal.options import read_settings
-from rig.planning.foresight import with_next
 from rig.planning.next_experiment import Dispute, chosen, command_line, planned_experiment, proposed
 from rig.planning.sweep_range import columns
 from rig.record import Record
+from rig.services.next_experiment import planned
+from rig.services.request import Request
 from tests.hidden.quick_rig import QuickRig
 from tests.hidden.rigs import IDEAL
 from tests.rig.conftest import Ended
@@ -152,8 +153,10 @@ def test_another_bench_than_that_of_the_run_is_named(bench: dict[str, str], told
     about: dict[str, Any] = {"identities": {}, "configuration": "", "constants": {}, "source": ""}
     with Record() as record:
         run = record.begin("sweep", {}, bench=bench, **about)
-    assert with_next(turned(), run, catalogue(), None, heard.append).next_experiment.command.startswith("rig run sweep")
-    assert (f'{run} was measured on the bench "ours", and the next' in " ".join(heard)) == told
+    assert planned(turned(), Request(run), catalogue(), heard.append).next_experiment.command.startswith(
+        "rig run sweep"
+    )
+    assert (f'{run} was measured on the bench "ours", but the next' in " ".join(heard)) == told
 
 
 def test_the_same_data_counts_once(refused: Callable[..., str]) -> None:

@@ -63,8 +63,7 @@ def discover(
     from rig.fleet.calibrate import write_guide
     from rig.fleet.discover import discover_fleet
     from rig.fleet.documents import population_document
-    from rig.fleet.own_effects import effects_of, own_files
-    from rig.fleet.worker import Question
+    from rig.fleet.worker import Question, effects_of, own_files
 
     own = own_files(bench_file)
     start = Question("look", dump_model(read_model(model, effects_of(own))), own=own)
@@ -103,7 +102,7 @@ def calibrate(
     from rig.files import require_out, write_whole
     from rig.fleet.calibrate import calibrate_fleet, made_folder, models, read_guide, safe
     from rig.fleet.documents import calibration_document
-    from rig.fleet.own_effects import own_files
+    from rig.fleet.worker import own_files
 
     if report is not None:
         require_out(report, *sources)

@@ -1,20 +1,31 @@
-"""Run: the bench, a procedure with its plan, and the run that is under way."""
+"""Run page: the bench, a procedure with its plan, and the run in progress."""
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from datetime import UTC, datetime
+from typing import Any
 
 from fastapi import Request
 from nicegui import ui
 
+from calibrations.presentation.text import duration, size
+from procedures.catalogue import Procedure, find, paths, summary
+from procedures.settings import choices, parse
 from rig.bench import Bench, read_bench
 from rig.bench.certificates import expired
+from rig.files import free_bytes, home
 from rig.instruments.instruments import checked
-from rig.web.desk import Desk
+from rig.planning.plan import Plan, plan, stretches
+from rig.runs.background import control
+from rig.web.desk import Desk, lab_read
 from rig.web.frame import Key, frame
 from rig.web.pages.run_live import Live
-from rig.web.pages.run_plan import Planning
-from rig.web.parts import box, div, failed, message, off_loop, table, waiting, words
+from rig.web.parts import box, div, facts, failed, message, off_loop, setting_label, setting_text, table, waiting, words
+
+MOST_STRETCHES = 12
+DEFAULT_PROCEDURE = "sweep"
 
 
 def register(desk: Desk) -> None:
@@ -37,11 +48,11 @@ def register(desk: Desk) -> None:
                     planning.lay_out_plan()
             planning.started = live.look
             keys["s"] = Key("start the planned run", planning.start)
-            keys["p"] = Key("pause the run, or go on", live.pause_or_go_on)
+            keys["p"] = Key("pause or resume the run", live.pause_or_go_on)
 
 
 class Instruments:
-    """What is on the bench, and whether it answers."""
+    """The instruments of the bench, and a button that checks them."""
 
     def __init__(self, bench: Bench) -> None:
         self.bench = bench
@@ -58,7 +69,7 @@ class Instruments:
             ui.button("Check the instruments", icon="fact_check", on_click=self.check).props("outline dense")
 
     async def check(self) -> None:
-        """Let every instrument say who it is, and test itself."""
+        """Identify and self-test every instrument."""
         self.rows.clear()
         with self.rows:
             waiting("Connecting; nothing moves")
@@ -81,3 +92,139 @@ class Instruments:
 
 def _where(url: str) -> str:
     return "simulated" if url.startswith("simulated") else url
+
+
+class Planning:
+    """The form of a procedure and its settings; every change makes a new plan."""
+
+    def __init__(self, desk: Desk, bench: Bench, given: Mapping[str, str]) -> None:
+        self.desk, self.bench = desk, bench
+        self.given = {name: value for name, value in given.items() if name != "procedure"}
+        self.started: Callable[[], Awaitable[None]] | None = None
+        self.asked, self.good = 0, False
+        names = {name: f"{name}: {summary(path)}" for name, path in paths(bench.folders.procedures).items()}
+        chosen = given.get("procedure", DEFAULT_PROCEDURE)
+        with box():
+            words("Measure", "title")
+            self.name = ui.select(names, label="Procedure", value=chosen if chosen in names else DEFAULT_PROCEDURE)
+            self.name.props("dense options-dense").on_value_change(self._chosen).style("width: 100%")
+            self.about = words("", "quiet small")
+            self.fields = div("settings")
+            with ui.expansion("What the settings mean").props("dense") as self.meant:
+                self.meaning = words("", "quiet small")
+            self.attended = ui.switch("Ask me, even if the simulated rig can answer", value=not bench.simulated)
+            self.attended.set_visibility(bench.simulated)
+            with div("row-of"):
+                self.button = ui.button("Start", icon="play_arrow", on_click=self.start)
+
+    def lay_out_plan(self) -> None:
+        """Place the box of the plan on the page."""
+        with box() as self.plan_box:
+            words("Plan", "title")
+            self.plan = div("stack")
+        self._chosen()
+
+    @property
+    def procedure(self) -> Procedure:
+        """The selected procedure."""
+        return find(str(self.name.value), self.bench.folders.procedures)
+
+    def _chosen(self) -> None:
+        """Show the settings of the selected procedure."""
+        procedure = self.procedure
+        self.about.set_text(" ".join(procedure.doc.partition("\n\n")[2].split("Source")[0].split()))
+        self.meaning.set_text(_meaning(procedure))
+        self.meant.set_visibility(bool(procedure.defaults))
+        self.fields.clear()
+        few = choices(procedure)
+        self.inputs: dict[str, Any] = {}
+        with self.fields:
+            for name, default in procedure.defaults.items():
+                field = _field(name, self.given.get(name, setting_text(default)), few.get(name, ()))
+                self.inputs[name] = field.on_value_change(self.replan)
+        ui.timer(0.0, self.replan, once=True)
+
+    def settings(self) -> dict[str, str]:
+        """The settings that differ from their defaults, as texts."""
+        defaults = self.procedure.defaults
+        texts = {name: str(field.value or "").strip() for name, field in self.inputs.items()}
+        return {name: text for name, text in texts.items() if text != setting_text(defaults[name])}
+
+    async def replan(self) -> None:
+        """Plan the run with the present settings."""
+        self.asked += 1
+        asked, self.good = self.asked, False
+        self.button.disable()
+        self.plan.clear()
+        with self.plan:
+            waiting("Planning; nothing moves")
+        try:
+            procedure = self.procedure
+            found = await off_loop(plan, self.bench, procedure, parse(procedure, self.settings()))
+        except Exception as error:
+            if asked == self.asked:
+                self.plan.clear()
+                with self.plan:
+                    failed("This procedure cannot run", message(error))
+            return
+        if asked == self.asked:
+            self.good = True
+            self.button.enable()
+            self.plan.clear()
+            with self.plan:
+                _show(found, self.bench)
+
+    async def start(self) -> None:
+        """Start the run in a background process."""
+        if lab_read() is not None:
+            ui.notify(
+                "This workbench reads the lab's record; start `rig web` without --record to make runs", type="warning"
+            )
+            return
+        under_way = control.latest()
+        if under_way is not None and under_way.phase != "ended":
+            ui.notify(f"{under_way.procedure} is running; stop it first", type="warning")
+            return
+        if self.good:
+            self.button.disable()
+            name, settings = str(self.name.value), self.settings()
+            await off_loop(control.begin, name, settings, self.desk.bench_file, bool(self.attended.value))
+            if self.started is not None:
+                await self.started()
+            self.button.enable()
+
+
+def _show(found: Plan, bench: Bench) -> None:
+    """Show a plan."""
+    faster = ", which is simulated and faster" if bench.simulated else ""
+    free = free_bytes(home())
+    rows = {
+        "Takes": f"{duration(found.duration_s)}{faster}",
+        "Stores": f"{found.poses} poses, {size(found.bytes)}; {size(free)} are free on the disk",
+    }
+    for role, ((low, high), (least, most)) in found.reach.items():
+        rows[f"Turns {role}"] = f"from {low:g} to {high:g} deg; the limits are {least:g} to {most:g} deg"
+    if found.questions:
+        rows["Asks you"] = "; ".join(dict.fromkeys(found.questions))
+    facts(rows)
+    lines = [(duration(stretch.start_s), stretch.words) for stretch in stretches(found)]
+    table(("at", "what"), lines[:MOST_STRETCHES])
+    if len(lines) > MOST_STRETCHES:
+        words(f"and {len(lines) - MOST_STRETCHES} more: rig plan {found.procedure}", "quiet small")
+
+
+def _field(name: str, value: str, few: Sequence[str]) -> ui.select | ui.input:
+    """One setting: a list if it has only a few possible values."""
+    if value in few:
+        return ui.select(list(few), label=setting_label(name), value=value).props("dense options-dense")
+    return ui.input(setting_label(name), value=value).props("dense debounce=300")
+
+
+def _meaning(procedure: Procedure) -> str:
+    """The docstring of the procedure with the labels of the page in place of the names of settings."""
+    text = " ".join(inspect.cleandoc(procedure.function.__doc__ or "").split())
+    for name in sorted(procedure.defaults, key=len, reverse=True):
+        text = text.replace(f"`{name}`", setting_label(name).partition(" (")[0]).replace(
+            f"`{name}=", f"`{setting_label(name)} = "
+        )
+    return text.replace("`", "")

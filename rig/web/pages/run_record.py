@@ -25,8 +25,7 @@ from rig.services.request import Request
 from rig.web.desk import Desk
 from rig.web.frame import frame
 from rig.web.pages.history_results import Asked
-from rig.web.pages.run_plan import label, written
-from rig.web.parts import box, div, facts, failed, message, off_loop, table, words
+from rig.web.parts import box, div, facts, failed, message, off_loop, setting_label, setting_text, table, words
 
 MOST_NAMED = 8
 
@@ -313,8 +312,8 @@ def _results(run: Run) -> None:
 def _made(run: Run) -> dict[str, str]:
     said = {role: " ".join(str(part) for part in each.values() if part) for role, each in run.identities.items()}
     why = {"message": run.message} if run.message else {}
-    settings = {label(name): written(value) for name, value in run.settings.items()}
-    known = {label(name): written(value) for name, value in run.constants.items()}
+    settings = {setting_label(name): setting_text(value) for name, value in run.settings.items()}
+    known = {setting_label(name): setting_text(value) for name, value in run.constants.items()}
     return {"procedure": run.procedure, "bench or file": run.source, **why, **settings, **said, **known}
 
 
