@@ -150,10 +150,11 @@ def _of_run(name: str, said: dict[str, str]) -> Iterator[Member]:
         raise UnknownRun(f"{name}: there is no such file or folder")
     try:
         with Record.to_find(run_id) as record:
-            found = list(_members(record, record.run(run_id)))
+            run = record.run(run_id)
+            found = list(_members(record, run))
     except UnknownRun as error:
         raise UnknownRun(f"{name}: there is no such file or folder, and {error}") from None
-    mine = [member for member in found if not slash or member.data == name]
+    mine = [member for member in found if not slash or member.data == f"{run.run}/{chosen}"]
     if not mine:
         raise UnknownRun(f"run {run_id} has no sensor {chosen!r}; it has {', '.join(m.data for m in found)}")
     for m in mine:

@@ -71,9 +71,10 @@ def unsent(own: Record, lab: Record, named: Sequence[str] = ()) -> list[str]:
 
     Raises UnknownRun, RecordError for an unfinished named run, LabAway.
     """
-    finished = named or [run.run for run in reversed(own.runs()) if run.state == FINISHED]
-    for run in named:
+    finished = [own.run(name).run for name in named]
+    for run in finished:
         _require_finished(own, run)
+    finished = finished or [run.run for run in reversed(own.runs()) if run.state == FINISHED]
     with own.engine.connect() as at:
         heads = {run: (uid_of(at, run), head(at, run)) for run in finished}
     with lab.engine.connect() as at:

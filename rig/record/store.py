@@ -18,7 +18,7 @@ from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from sqlalchemy import URL, Connection, Engine, Integer, Row, Select, exists, func, insert, select, true, update
+from sqlalchemy import URL, Connection, Engine, Integer, Row, Select, exists, false, func, insert, select, true, update
 from sqlalchemy import Table as SqlTable
 from sqlalchemy.exc import DatabaseError
 
@@ -48,6 +48,8 @@ from rig.record.schema import (
 from rig.record.values import Block, Event, Kept, Line, Run
 
 FILE = "record.db"
+LAST = "last"  # the newest run, in the place of an id
+MOST_LISTED = 5
 MOST_LINES = 1000  # of the log in memory
 _POSE = ("alpha_deg", "beta_deg", "direction", "path", "mount_deg", "flip", "up", "rate_deg_s")
 _BESIDE = ("t_s", "temperature_c", "alpha_read_deg", "beta_read_deg")
@@ -217,14 +219,21 @@ class Record:
             rows = at.execute(_select_runs().order_by(newest_first(at)))
             return [self._seen(Run(**row._mapping)) for row in rows]
 
-    def run(self, run: str) -> Run:
-        """One run. Raises UnknownRun with a suggestion."""
+    def run(self, name: str) -> Run:
+        """The run with this id, or whose id alone begins so; `last` and `last PROCEDURE` are the newest ones.
+
+        Raises UnknownRun with a suggestion.
+        """
         with self._reading() as at:
-            row = at.execute(_select_runs().where(runs.c.run == run)).one_or_none()
-            if row is not None:
-                return self._seen(Run(**row._mapping))
-            known = at.execute(select(runs.c.run)).scalars().all()
-        raise UnknownRun(f"no run {run!r} in {self.where}.{did_you_mean(run, known[-20:])}")
+            rows = at.execute(_named(at, name)).all() or at.execute(_beginning(name)).all()
+            known = at.execute(select(runs.c.procedure if name.startswith(f"{LAST} ") else runs.c.run)).scalars().all()
+        if len(rows) == 1:
+            return self._seen(Run(**rows[0]._mapping))
+        if rows:
+            listed = ", ".join(sorted(row.run for row in rows)[:MOST_LISTED])
+            raise UnknownRun(f"{len(rows)} runs in {self.where} begin with {name!r}: {listed}; write more of the id")
+        wanted = name.removeprefix(f"{LAST} ")
+        raise UnknownRun(f"no run {name!r} in {self.where}.{did_you_mean(wanted, list(dict.fromkeys(known))[-20:])}")
 
     def poses(self, run: str) -> list[Pose]:
         """The poses in order, without the excluded ones."""
@@ -364,6 +373,20 @@ def _select_runs() -> Select[Any]:
     imported = select(func.max(func.length(columns.c.numbers, type_=Integer) // 8)).where(columns.c.run == runs.c.run)
     on_its_way = exists().where(arrivals.c.run == runs.c.run, arrivals.c.digest.is_(None))
     return select(runs, func.coalesce(imported.scalar_subquery(), kept).label("rows")).where(~on_its_way)
+
+
+def _named(at: Connection, name: str) -> Select[Any]:
+    """The run of this id; the newest one for `last`, or the newest of a procedure for `last PROCEDURE`."""
+    last, _, procedure = name.partition(" ")
+    if last != LAST:
+        return _select_runs().where(runs.c.run == name)
+    chosen = _select_runs().where(runs.c.procedure == procedure) if procedure else _select_runs()
+    return chosen.order_by(newest_first(at)).limit(1)
+
+
+def _beginning(name: str) -> Select[Any]:
+    """The runs whose id begins so; none for no beginning."""
+    return _select_runs().where(runs.c.run.startswith(name, autoescape=True) if name else false())
 
 
 def _dwell(row: Row[Any]) -> Dwell:

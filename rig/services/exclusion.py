@@ -15,19 +15,19 @@ from rig.results import judged
 RESULTS = "results"  # the event that says how they were made anew
 
 
-def exclude(record: Record, run_id: str, numbers: Sequence[int], reason: str | None) -> Run:
+def exclude(record: Record, name: str, numbers: Sequence[int], reason: str | None) -> Run:
     """Leave poses out, with a reason; None takes them in again. The run as it is then.
 
     Results of a complete run are evaluated again. Raises UnknownRun, RecordError for a pose that is not there, Busy
     while a process works on the run.
     """
-    run = record.run(run_id)
-    with lease(record.folder, run_id, f"run {run_id}"):
+    run = record.run(name)
+    with lease(record.folder, run.run, f"run {run.run}"):
         for number in numbers:
-            record.exclude(run_id, number, reason)
+            record.exclude(run.run, number, reason)
         if run.state == "complete":
             _evaluate_again(record, run)
-    return record.run(run_id)
+    return record.run(run.run)
 
 
 def numbered_run(data: str) -> str | None:

@@ -52,7 +52,8 @@ def _write_events(data: str, path: Path) -> int:
     if Path(data).is_file():
         raise ExportError(f"{data} is a file; give the id of a run, because event-model documents describe a run")
     with Record.to_read() as record:
-        run, table = record.run(data), table_of(record, data)
+        run = record.run(data)
+        table = table_of(record, run.run)
     lines = [json.dumps({"name": name, "doc": document}) for name, document in documents(run, table)]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return table.n

@@ -90,9 +90,10 @@ def _of_run(data: str) -> Table:
 
 def load_all(names: Sequence[str], tell: Callable[[str], None] = lambda _: None) -> Table:
     """The tables that `names` name, joined. Raises what `load` and `joined` raise."""
-    if twice := next((name for name in names if names.count(name) > 1), None):
-        raise DataError(f"{twice} is named twice; the same data counts once")
     tables = [load(name, tell=tell) for name in names]
+    sources = [table.source for table in tables]
+    if twice := next((name for name, source in zip(names, sources, strict=True) if sources.count(source) > 1), None):
+        raise DataError(f"{twice} is named twice; the same data counts once")
     if len(tables) == 1:
         return tables[0]
     return joined_runs(tables, [_begun(name) for name in names], tell)

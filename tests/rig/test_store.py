@@ -105,7 +105,7 @@ def test_an_unknown_run_names_the_nearest() -> None:
     with Record() as record:
         run = begin(record)
         with pytest.raises(UnknownRun, match=f"Did you mean '{run}'"):
-            record.run(run[:-1])
+            record.run(f"{run[:-1]}?")
 
 
 def test_a_run_without_poses_is_no_table_yet() -> None:

@@ -27,6 +27,7 @@ def command(run: str, pose: int, reason: str | None, include: bool, as_json: boo
 
     with Record.to_find(run) as record:
         found = exclude(record, run, [pose], None if include else reason)
+        run = found.run
         told = [event.text for event in record.events(run) if event.what == RESULTS]
     if as_json:
         said = None if include else reason

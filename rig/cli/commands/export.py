@@ -19,6 +19,6 @@ def command(data: str, kind: str, path: Path, as_json: bool) -> None:
     """Write DATA, a run or a file, to --out."""
     rows = export(data, kind, path)
     if as_json:
-        emit({"schema": "rig.services.export/1", "data": data, "format": kind, "rows": rows, "path": str(path)})
+        emit({"schema": "rig.export/1", "data": data, "format": kind, "rows": rows, "path": str(path)})
     else:
         note(f"{rows} rows to {path}")

@@ -35,6 +35,6 @@ def command(
             return tell(record, Outcome(found), as_json)
         own = Bench.model_validate(found.bench)
         with watching(find(found.procedure, own.folders.procedures), own, unattended, answers) as watch:
-            outcome = resume(record, run, watch, bench, trace)
+            outcome = resume(record, found.run, watch, bench, trace)
         push_after(record, outcome.run, (bench or own).lab, note)
         return tell(record, outcome, as_json)

@@ -30,7 +30,9 @@ Ranges = Mapping[str, tuple[float, float]]
 def command(run: str, poses: bool, wants_log: bool, as_json: bool) -> None:
     """Show how RUN was made, how it ended, its results, and the range of each of its columns."""
     with Record.to_find(run) as record:
-        found, left_out = record.run(run), record.excluded(run)
+        found = record.run(run)
+        run = found.run
+        left_out = record.excluded(run)
         turns = [Event(line.at, line.what, line.text) for line in record.lines(run, TURNS)]
         events = sorted([*record.events(run), *turns], key=lambda event: event.at)
         ranges = _ranges(record, found)
