@@ -32,6 +32,7 @@ def runs(workbench: Workbench, tmp_path: Path) -> Iterator[list[str]]:
         yield made
 
 
+@pytest.mark.slow
 def test_runs_are_searched_and_one_is_opened_and_noted(workbench: Workbench, runs: list[str]) -> None:
     page = workbench.visit("/record")
     expect(page.get_by_role("cell", name=runs[0])).to_be_visible()

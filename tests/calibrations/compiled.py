@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from calibrations.compensation import c99
 from calibrations.compensation.about import Origin
@@ -16,6 +18,10 @@ from calibrations.table import Array
 
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wconversion", "-Wdouble-promotion", "-O2")
 ORIGIN = Origin("sensor", "sensor.yaml", "0" * 64, "a program", "2026-01-01")
+COMPILERS = [
+    pytest.param(name, marks=[pytest.mark.skipif(shutil.which(name) is None, reason=f"{name} is not installed"), *more])
+    for name, more in (("gcc", []), ("clang", [pytest.mark.slow]))
+]
 DRIVER = """#include "sensor.h"
 #include <stdio.h>
 int main(void)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 from pathlib import Path
 from typing import Any
@@ -21,16 +20,12 @@ from calibrations.geometry.orientation import nominal_pose, specific_force
 from calibrations.kernels import slip
 from calibrations.model.chain import respond
 from calibrations.table import Table
-from tests.calibrations.compiled import FOLLOWING, ORIGIN, build, through, written
+from tests.calibrations.compiled import COMPILERS, FOLLOWING, ORIGIN, build, through, written
 from tests.calibrations.fitted import LINEAR, PHYSICAL, model
 
 SLIPS = {"hysteresis": {"height": (0.003, 0.002), "reach": 0.1, "spread": 0.5, "pressing": 0.4}}
 LAGS = {"temperature-hysteresis": {"slope": (0.001, -0.002), "play": 0.6}}
 BOTH = {**PHYSICAL, **SLIPS, **LAGS}
-COMPILERS = [
-    pytest.param(name, marks=pytest.mark.skipif(shutil.which(name) is None, reason=f"{name} is not installed"))
-    for name in ("gcc", "clang")
-]
 
 
 def test_what_an_effect_remembers_is_what_its_kernel_does() -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import shutil
 import subprocess
 from pathlib import Path
 from typing import Any
@@ -18,14 +17,10 @@ from calibrations.compensation.document import make_vectors
 from calibrations.compensation.graph import OPERATIONS
 from calibrations.compensation.inverse import Compensation, invert_model
 from calibrations.table import Array
-from tests.calibrations.compiled import DRIVER, ORIGIN, build, through, written
+from tests.calibrations.compiled import COMPILERS, DRIVER, ORIGIN, build, through, written
 from tests.calibrations.fitted import LINEAR, PHYSICAL, model
 from tests.calibrations.test_compensation import EVERYTHING
 
-COMPILERS = [
-    pytest.param(name, marks=pytest.mark.skipif(shutil.which(name) is None, reason=f"{name} is not installed"))
-    for name in ("gcc", "clang")
-]
 MODELS = {"linear": LINEAR, "physical": PHYSICAL, "everything": EVERYTHING}
 
 

@@ -72,6 +72,7 @@ def test_a_small_correction_of_the_form_is_a_refinement(cubic: float, causes: in
     assert (found.causes, found.refinements) == (both[:causes], both[causes:])
 
 
+@pytest.mark.slow
 def test_an_effect_that_later_ones_make_needless_is_dropped() -> None:
     columns = turns(step_deg=30.0)
     x, y, _ = components(columns)

@@ -30,6 +30,7 @@ LOOKS_H = (1.0, 2.0, 4.0, 12.0)
 TAU_S = 5400.0
 
 
+@pytest.mark.slow
 def test_the_bounds_hold_where_heat_flows_into_a_house() -> None:
     """No law of the filters is in it: of sixty such soaks, and sixty by the other laws, 95 to 98 of a hundred hold at
     any of eight times."""
@@ -83,6 +84,7 @@ def test_what_is_known_is_so_and_is_known_early() -> None:
     assert np.mean([looked(seed)[0][3].known for seed in range(SEEDS)]) > 0.6
 
 
+@pytest.mark.slow
 def test_a_simulated_sensor_comes_to_what_was_foreseen() -> None:
     table, settled = soak_of_world(1)
     found = forecast_history(table)
@@ -142,6 +144,7 @@ def test_minutes_and_hours_are_both_followed() -> None:
     assert 0.3 < last.surprise < 1.5
 
 
+@pytest.mark.slow
 def test_a_room_that_swings_within_a_day_is_in_the_bounds() -> None:
     """A sine of 24 h looks like a drift for half a day."""
     t_s = times_s(48)

@@ -24,7 +24,8 @@ def found(seed: int, kind: str, n: int = 52, *, slow_v: float = DRIFT_V, fast_v:
     return fit_steady_state(t_s, values, np.full(n, WHITE_V))
 
 
-@pytest.mark.parametrize("kind", first_fast(["flicker", "white", "slow"]))
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["flicker", "white", "slow"])
 def test_time_constants_come_with_true_standard_errors(kind: str) -> None:
     states = [found(seed, kind) for seed in range(3 * SEEDS)]
     assert all(len(state.terms) == 1 for state in states)
@@ -37,7 +38,7 @@ def test_time_constants_come_with_true_standard_errors(kind: str) -> None:
     assert np.isfinite(times).mean() > 0.9
 
 
-@pytest.mark.parametrize("kind", ["white", "slow", "flicker"])
+@pytest.mark.parametrize("kind", first_fast(["slow", "white", "flicker"]))
 def test_where_nothing_drifts_no_drift_is_claimed(kind: str) -> None:
     states = [found(seed, kind, slow_v=0.0) for seed in range(SEEDS)]
     assert sum(bool(state.terms) for state in states) == 0
@@ -47,14 +48,14 @@ def test_where_nothing_drifts_no_drift_is_claimed(kind: str) -> None:
     assert all(time == (45.0, pytest.approx(45 / np.sqrt(12))) for time in steady)
 
 
-@pytest.mark.parametrize("n", [20, 52])
+@pytest.mark.parametrize("n", first_fast([20, 52]))
 def test_a_random_walk_is_seldom_an_exponential_and_comes_to_no_rest(n: int) -> None:
     states = [found(seed, "walk", n, slow_v=0.0) for seed in range(SEEDS)]
     assert sum(bool(state.terms) for state in states) <= 0.1 * SEEDS
     assert sum(state.time_s is None for state in states) > 0.4 * SEEDS
 
 
-@pytest.mark.parametrize("n", [20, 52])
+@pytest.mark.parametrize("n", first_fast([20, 52]))
 def test_minutes_are_told_from_hours(n: int) -> None:
     states = [found(seed, "white", n, fast_v=0.8e-3) for seed in range(SEEDS)]
     assert all(len(state.terms) == 2 for state in states)

@@ -51,7 +51,7 @@ CASES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("case", first_fast(CASES, 2))
+@pytest.mark.parametrize("case", first_fast(CASES))
 def test_the_proposed_experiment_tells_which_it_is(case: str) -> None:
     config, first, truth, procedure = CASES[case]
     bench, effects = read_bench(None), catalogue()

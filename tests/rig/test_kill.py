@@ -86,7 +86,8 @@ def test_whole_processes_killed_while_they_start(nursery: Nursery, whole: Undist
     finished(nursery, rig_home, whole, Story(seen=[seen]))
 
 
-@pytest.mark.parametrize("name", first_fast(["SIGTERM", "SIGINT"]))
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGINT"])
 def test_a_signal_ends_the_process_with_status_4_and_resume_finishes_the_run(
     name: str, nursery: Nursery, whole: Undisturbed, rig_home: Path
 ) -> None:

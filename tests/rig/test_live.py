@@ -23,7 +23,6 @@ from rig.runs.live import FIRST, Live, Measurement, stands
 from tests.hidden.quick_rig import QuickRig
 from tests.hidden.rigs import IDEAL
 from tests.rig.conftest import Ended
-from tests.slow import first_fast
 
 FAST_ADC = {"driver": "labjack_t7", "url": "simulated", "settings": {"channels": {"vx": 0, "vy": 1}, "rate_hz": 200}}
 TURNED = {"preset": "ideal", "sensor": {"package": {"turn_z_deg": 0.1}}}
@@ -44,10 +43,11 @@ def bench(bench_file: Callable[..., Path]) -> Callable[..., str]:
     return write
 
 
+@pytest.mark.slow
 @pytest.mark.sockets
 @pytest.mark.parametrize(
     ("world", "cause"),
-    first_fast([(TURNED, "axis-misalignment"), (FORESHORTENED, "cross-axis-bias")]),
+    [(TURNED, "axis-misalignment"), (FORESHORTENED, "cross-axis-bias")],
     ids=["turned", "bent"],
 )
 def test_the_cause_is_found_in_less_rig_time_than_the_standard_sweep(

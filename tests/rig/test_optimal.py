@@ -27,6 +27,7 @@ from rig.planning.planned import EXCHANGE_S, from_home_s, moves_s
 from rig.record import Kept, Record
 from rig.runs.runner import resume, start
 from tests.rig.rigging import Onlooker
+from tests.slow import first_fast
 
 COARSE = {"step_deg": "30", "inclinations_deg": "90,45,135"}  # a small sweep, to be quick
 
@@ -44,7 +45,7 @@ def angles(pose: Pose) -> tuple[float, float]:
     return pose.alpha_deg, pose.beta_deg
 
 
-@pytest.mark.parametrize("paths", ["grid", "ang"])
+@pytest.mark.parametrize("paths", first_fast(["grid", "ang"]))
 def test_it_takes_1_8_times_less_rig_time_than_the_standard_sweep(paths: str) -> None:
     found = chosen(poses=60, paths=paths)
     assert found.times_less > 1.8

@@ -126,6 +126,7 @@ def test_a_read_only_record_is_read_and_a_run_into_it_is_refused(read_only: str)
     assert "Traceback" not in refused.stderr
 
 
+@pytest.mark.slow
 def test_two_processes_write_one_record(rig_home: Path) -> None:
     words = [sys.executable, "-m", "rig", "run", "sweep", *SMALL_ARGUMENTS, "--unattended"]
     pipes: Any = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE, "text": True}

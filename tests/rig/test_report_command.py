@@ -34,6 +34,7 @@ def test_page_and_pictures(rig: Callable[..., Any], data: str, tmp_path: Path) -
     assert sorted(path.name for path in tmp_path.iterdir()) == ["page.html", "pictures", "warm.csv"]
 
 
+@pytest.mark.slow
 def test_pictures_alone_as_svg(rig: Callable[..., Any], data: str, tmp_path: Path) -> None:
     ended = rig("report", data, "--pictures", str(tmp_path / "p"), "--format", "svg")
     assert ended.status == 0, ended.err

@@ -11,6 +11,7 @@ import pytest
 
 from rig.record import Record
 from tests.rig.rigging import sigterm_at
+from tests.slow import first_fast
 
 UNATTENDED = ("--dwell-s", "0.2", "--unattended", "--json")
 
@@ -18,11 +19,13 @@ UNATTENDED = ("--dwell-s", "0.2", "--unattended", "--json")
 @pytest.mark.sockets
 @pytest.mark.parametrize(
     ("procedure", "at_pose"),
-    [
-        (("misalignment", "--most-rounds", "1"), 12),
-        (("temperature-cycle", "--temperatures-c", "40,50", "--soak-s", "1200"), 11),
-        (("repeat", "--times", "2"), 21),
-    ],
+    first_fast(
+        [
+            (("misalignment", "--most-rounds", "1"), 12),
+            (("temperature-cycle", "--temperatures-c", "40,50", "--soak-s", "1200"), 11),
+            (("repeat", "--times", "2"), 21),
+        ]
+    ),
 )
 def test_it_goes_on_sample_for_sample(procedure: tuple[str, ...], at_pose: int, rig: Callable[..., Any]) -> None:
     whole = json.loads(rig("run", *procedure, *UNATTENDED).out)["run"]

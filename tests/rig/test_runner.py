@@ -21,6 +21,7 @@ from rig.record import Kept, Record
 from rig.record.measured import table_of
 from rig.runs.runner import Outcome, resume, start
 from tests.rig.rigging import POSES, Onlooker, small_sweep
+from tests.slow import first_fast
 
 pytestmark = pytest.mark.sockets
 
@@ -95,7 +96,7 @@ def test_the_same_seed_gives_the_same_run_sample_for_sample() -> None:
         assert samples(record, one) != samples(record, other)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("number", first_fast([signal.SIGINT, signal.SIGTERM, signal.SIGHUP]))
 def test_a_signal_stops_and_resume_makes_the_same_run(number: signal.Signals) -> None:
     with Record() as record:
         whole = run_small(record).run.run

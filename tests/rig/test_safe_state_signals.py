@@ -49,7 +49,11 @@ def signal_at(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, int], list[int]
     return arrange
 
 
-@pytest.mark.parametrize("procedure", sorted(SHORT.keys() - {"motion", "repeat"}))
+FAST = ("misalignment", "noise-floor", "sweep")  # the others take longer, on the same way
+OTHERS = sorted(SHORT.keys() - {"motion", "repeat", *FAST})
+
+
+@pytest.mark.parametrize("procedure", first_fast((*FAST, *OTHERS), len(FAST)))
 @pytest.mark.parametrize(("method", "share"), first_fast([("sleep", 0.4), ("wait_readable", 0.7)]))
 def test_wherever_it_waits(
     procedure: str, method: str, share: float, signal_at: Callable[[str, int], list[int]]

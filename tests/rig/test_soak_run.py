@@ -162,6 +162,7 @@ def test_killed_at_random_moments_it_ends_with_every_block_once(tmp_path: Path) 
                 assert record.run(run).state == "complete"
 
 
+@pytest.mark.slow
 def test_a_kill_in_a_hold_is_a_gap_in_the_results(rig_home: Path) -> None:
     with Nursery() as nursery:
         killed = nursery.run(rig_home, "run", *SHORT_RUN, "--block-s", "5", harm=Harm("INSERT INTO blocks", 48))

@@ -81,7 +81,8 @@ def test_a_cancelled_run_leaves_nothing() -> None:
         assert record.runs() == []
 
 
-@pytest.mark.parametrize(("wish", "excluded"), first_fast([("repeat", [REPEATED]), ("resume", [])]))
+@pytest.mark.slow
+@pytest.mark.parametrize(("wish", "excluded"), [("repeat", [REPEATED]), ("resume", [])])
 def test_ctrl_c_stops_and_a_person_has_it_go_on(wish: str, excluded: list[str]) -> None:
     with begun(*LONG) as terminal:
         terminal.expect(UNDER_WAY)
@@ -100,17 +101,21 @@ def end_it(terminal: pexpect.spawn[str]) -> None:
     terminal.sendline("end")
 
 
-@pytest.mark.parametrize(
-    "end",
-    [end_it, pexpect.spawn.sendintr, pexpect.spawn.sendeof, lambda terminal: terminal.kill(signal.SIGTERM)],
-    ids=["end", "ctrl-c", "ctrl-d", "sigterm"],
-)
-def test_the_menu_ends_a_run_that_can_be_resumed(end: Callable[[pexpect.spawn[str]], object]) -> None:
+ENDS: dict[str, Callable[[pexpect.spawn[str]], object]] = {
+    "end": end_it,
+    "ctrl-c": pexpect.spawn.sendintr,
+    "ctrl-d": pexpect.spawn.sendeof,
+    "sigterm": lambda terminal: terminal.kill(signal.SIGTERM),
+}
+
+
+@pytest.mark.parametrize("end", first_fast(ENDS))
+def test_the_menu_ends_a_run_that_can_be_resumed(end: str) -> None:
     with begun(*LONG) as terminal:
         terminal.expect(UNDER_WAY)
         press_ctrl_c(terminal)
         terminal.expect("What now.*:")
-        end(terminal)
+        ENDS[end](terminal)
         terminal.expect("`rig resume .*` continues the run")
         terminal.expect(pexpect.EOF)
     assert terminal.exitstatus == 4
@@ -119,6 +124,7 @@ def test_the_menu_ends_a_run_that_can_be_resumed(end: Callable[[pexpect.spawn[st
     assert 0 < run.rows < LONG_POSES
 
 
+@pytest.mark.slow
 def test_sigterm_ends_a_guided_run_without_a_menu() -> None:
     with begun(*LONG) as terminal:
         terminal.expect(UNDER_WAY)

@@ -45,6 +45,7 @@ def test_a_magnetometer_begins_with_the_field_alone(rig: Rig, magnetometer: str,
     assert np.shape(again["calibration"]["M"]["value"]) == (3, 3)
 
 
+@pytest.mark.slow
 def test_every_command_takes_a_magnetometer(rig: Rig, magnetometer: str, tmp_path: Path) -> None:
     model = str(tmp_path / "hard.yaml")
     assert "+ hard-iron" in rig("add", "hard-iron", "--model", "field", "--data", magnetometer, "--out", model).out

@@ -20,6 +20,7 @@ from rig.planning.plan import Plan
 from rig.record import Kept, Record
 from rig.runs.runner import REPEATED, Outcome, Wish, start
 from tests.rig.rigging import POSES, Onlooker, small_sweep
+from tests.slow import first_fast
 
 pytestmark = pytest.mark.sockets
 
@@ -50,7 +51,7 @@ def measured(record: Record, run: str) -> list[object]:
     return [(k.pose, k.samples.volts.tobytes(), k.t_s) for k in record.kept(run) if k.excluded is None]
 
 
-@pytest.mark.parametrize("disturb", [interrupt, alarm])
+@pytest.mark.parametrize("disturb", first_fast([alarm, interrupt]))
 def test_resumed_at_once_it_equals_an_undisturbed_run(disturb: Callable[[], object]) -> None:
     with Record() as record:
         whole = start(record, read_bench(), *small_sweep(), Onlooker())
@@ -92,7 +93,7 @@ def test_it_stands_still_and_says_so_before_anybody_is_asked() -> None:
     assert outcome == seen
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("number", first_fast([signal.SIGTERM, signal.SIGHUP]))
 def test_nobody_is_asked_after_another_signal(number: signal.Signals) -> None:
     watch = Disturbed(lambda: signal.raise_signal(number), "resume")
     with Record() as record:
