@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 
 from calibrations.presentation import chart as c
-from calibrations.presentation.text import exponent, rounded
+from calibrations.presentation.text import exponent, tick_text
 
 Figure = dict[str, Any]
 Trace = dict[str, Any]
@@ -28,10 +28,14 @@ CONFIG = {
 SIZE = 11.5  # of the letters, px
 MARGIN = {"l": 62, "r": 12, "t": 8, "b": 44}
 ROW_GAP = 56  # px below a row of panels: its axis
+COLUMN_GAP = 0.09  # of the width, left of a panel: its axis
 SYMBOLS = {"cross": "cross-thin-open"}
 DAY_S = 86400.0
 FEW_DECADES = 2.5
+FEW_INTEGERS = 12  # each has its mark
+TITLE_PX, LEGEND_PX = 22, 18  # above panels
 ROUNDING = 1e-9
+NOTE_PX = {"left": 4, "center": 0, "right": -4}
 INCH_PX = 96
 BAR_STEP = 0.12  # of the width of the panels, from one colour bar to the next
 BAR = {"thickness": 10, "outlinewidth": 0, "xpad": 4, "exponentformat": "none"}
@@ -52,10 +56,34 @@ def figure(chart: c.Chart, keep: str, drag: Literal["select", "zoom", False] = "
         "shapes": [],
         "annotations": [],
     }
-    for number, (panel, x_domain, y_domain) in enumerate(_places(chart), 1):
+    places = list(_places(chart))
+    for number, (panel, x_domain, y_domain) in enumerate(places, 1):
         _panel(panel, "" if number == 1 else str(number), x_domain, y_domain, data, layout)
+        if len(places) > 1 and (panel.title or panel.remark):
+            layout["margin"]["t"] = TITLE_PX + LEGEND_PX
+            layout["annotations"] += [_referred(each, str(number) if number > 1 else "") for each in _titles(panel)]
+    _share_axes(chart, layout)
     _one_bar_a_scale(data)
     return {"data": data, "layout": layout, "config": CONFIG}
+
+
+def _titles(panel: c.Panel) -> Iterator[dict[str, Any]]:
+    """Title and remark of a panel, above its left and right end."""
+    above = {"y": 1, "yref": "y domain", "yanchor": "bottom", "xref": "x domain", "showarrow": False,
+             "yshift": 2 + LEGEND_PX * bool(panel.legend)}  # fmt: skip
+    if panel.title:
+        yield above | {"text": f"<b>{panel.title}</b>", "x": 0, "xanchor": "left"}
+    if panel.remark:
+        yield above | {"text": panel.remark, "x": 1, "xanchor": "right"}
+
+
+def _share_axes(chart: c.Chart, layout: dict[str, Any]) -> None:
+    """Vertical axes of a row follow the first one of that row."""
+    first = 1
+    for row in chart.panels if chart.share_y else ():
+        for number in range(first + 1, first + len(row)) if row[0].y.low is None else ():
+            layout[f"yaxis{number}"]["matches"] = f"y{first if first > 1 else ''}"
+        first += len(row)
 
 
 def _one_bar_a_scale(data: Sequence[Trace]) -> None:
@@ -84,7 +112,7 @@ def _places(chart: c.Chart) -> Iterator[tuple[c.Panel, list[float] | None, list[
     for row, height in zip(chart.panels, heights, strict=True):
         bottom = top - height / whole
         for j, panel in enumerate(row):
-            x = None if len(row) == 1 else [j / len(row) + 0.05 * (j > 0), (j + 1) / len(row)]
+            x = None if len(row) == 1 else [j / len(row) + COLUMN_GAP * (j > 0), (j + 1) / len(row)]
             yield panel, x, None if rows == 1 else [min(max(bottom, 0.0) + gap * (bottom > 1e-9), top), top]
         top = bottom
 
@@ -134,6 +162,8 @@ def _axis(axis: c.Axis) -> dict[str, Any]:
         made["dtick"] = 90
     if axis.ticks == "integers":
         made["tickformat"] = "d"
+        if axis.low is not None and axis.high is not None and axis.high - axis.low < FEW_INTEGERS:
+            made["dtick"] = 1
     if axis.ticks == "dates":
         made["type"] = "date"
         ends = tuple(None if end is None else _dates([end])[0] for end in ends)  # type: ignore[assignment]
@@ -151,7 +181,7 @@ def _marks(axis: c.Axis) -> dict[str, Any]:
     powers = range(exponent(axis.low), exponent(axis.high) + 1)
     values = [digit * 10.0**power for power in powers for digit in (1, 2, 5)]
     shown = [value for value in values if axis.low <= value * (1 + ROUNDING) and value <= axis.high * (1 + ROUNDING)]
-    return {"tickmode": "array", "tickvals": shown, "ticktext": [rounded(value, 1) for value in shown]}
+    return {"tickmode": "array", "tickvals": shown, "ticktext": [tick_text(value) for value in shown]}
 
 
 Parts = tuple[list[Trace], list[dict[str, Any]], list[dict[str, Any]]]  # traces, shapes, annotations
@@ -167,15 +197,21 @@ def _points(s: c.Points, panel: c.Panel) -> Parts:
     trace = _trace(s, panel, "markers") | {"marker": _marker(s)}
     if s.low is not None and s.high is not None:
         above, below = np.asarray(s.high) - s.y, np.asarray(s.y) - s.low
-        bars = {"type": "data", "symmetric": False, "array": _list(above), "arrayminus": _list(below)}
-        trace["error_y"] = bars | {"width": 0, "thickness": 1}
+        ends = {"symmetric": False, "array": _list(above), "arrayminus": _list(below)}
+        trace["error_y"] = ends | {"type": "data", "width": 0, "thickness": 1, "color": _bar_colour(s)}
     if s.reach is not None:
-        trace["error_x"] = {"type": "data", "array": _list(s.reach), "width": 4, "thickness": 1.6}
+        trace["error_x"] = {"type": "data", "array": _list(s.reach), "width": 4, "thickness": 1.6,
+                            "color": _bar_colour(s)}  # fmt: skip
     if s.keys is not None:
         trace["customdata"] = list(s.keys)
     if len(s.hover):
         trace |= {"text": list(s.hover), "hovertemplate": "%{text}<extra></extra>"}
     return [trace], [], []
+
+
+def _bar_colour(s: c.Points) -> str:
+    """Bars of one trace have one colour."""
+    return _visible(s.colour) if isinstance(s.colour, str) and s.values is None else c.BAND
 
 
 def _marker(s: c.Points) -> dict[str, Any]:
@@ -265,7 +301,8 @@ def _cells(s: c.Cells, panel: c.Panel) -> Parts:  # noqa: ARG001
 def _note(s: c.Note, panel: c.Panel) -> Parts:
     x = s.x if "x" in s.shares else _list(np.array([s.x]), panel.x)[0]
     note = {"text": s.text, "x": _power(x, panel.x, "x" in s.shares), "y": _power(s.y, panel.y, "y" in s.shares),
-            "showarrow": False, "xanchor": s.horizontal, "yanchor": s.vertical, "textangle": -90 if s.upright else 0,
+            "showarrow": False, "xanchor": s.horizontal, "xshift": NOTE_PX[s.horizontal],
+            "yanchor": s.vertical, "textangle": -90 if s.upright else 0,
             "xref": "x domain" if "x" in s.shares else "x", "yref": "y domain" if "y" in s.shares else "y"}  # fmt: skip
     return [], [], [note]
 

@@ -22,7 +22,7 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator, NullF
 
 from calibrations.errors import CalibrationError
 from calibrations.presentation import chart as c
-from calibrations.presentation.text import rounded
+from calibrations.presentation.text import tick_text
 
 RC: Any = {
     "font.family": ["DejaVu Sans"],
@@ -63,6 +63,7 @@ LINE = 0.8
 DASHES = {"solid": "-", "dash": "--", "dot": ":"}
 SYMBOLS = {"circle": "o", "diamond": "D", "triangle-up": "^", "triangle-down": "v", "cross": "+"}
 FEW_DECADES = 2.5
+FEW_MARKS, LONG_MARK = 4, 200.0  # marks of an axis whose values are so many times its range
 MOST_LEVEL = 8  # names on a horizontal axis; more are written aslant
 DROPPED = (r"<metadata>.*?</metadata>", r"<style.*?</style>", r' xmlns(:\w+)?="[^"]*"', r' (width|height)="[\d.]+pt"')
 
@@ -187,6 +188,8 @@ def _axis(ax: Axes, axis: c.Axis, along: c.Along, labelled: bool) -> None:
         side.set_major_locator(MaxNLocator(integer=True))
     elif axis.ticks == "dates":
         ax.xaxis_date()
+    elif along == "x" and not axis.log and _long_marks(*ax.get_xlim()):
+        side.set_major_locator(MaxNLocator(FEW_MARKS))
     limits: Any = (axis.low, axis.high)
     if limits != (None, None):
         (ax.set_xlim if along == "x" else ax.set_ylim)(*limits)
@@ -198,16 +201,21 @@ def _axis(ax: Axes, axis: c.Axis, along: c.Along, labelled: bool) -> None:
         (ax.set_xlabel if along == "x" else ax.set_ylabel)(axis.label)
 
 
+def _long_marks(low: float, high: float) -> bool:
+    """Whether the marks of this range have many digits, and would touch each other."""
+    return high > low and max(abs(low), abs(high)) > LONG_MARK * (high - low)
+
+
 def _mark_powers(ax: Axes, along: c.Along) -> None:
     """Marks of a logarithmic axis in plain text: powers of ten, and 2 and 5 where there are few of these."""
     side, (low, high) = (ax.xaxis, ax.get_xlim()) if along == "x" else (ax.yaxis, ax.get_ylim())
-    side.set_major_formatter(FuncFormatter(lambda value, _: rounded(value, 1)))
+    side.set_major_formatter(FuncFormatter(lambda value, _: tick_text(value)))
     few = abs(np.log10(high / low)) < FEW_DECADES
     side.set_minor_formatter(FuncFormatter(_of_two_and_five) if few else NullFormatter())
 
 
 def _of_two_and_five(value: float, _: int | None = None) -> str:
-    return rounded(value, 1) if f"{value:.0e}"[0] in "25" else ""
+    return tick_text(value) if f"{value:.0e}"[0] in "25" else ""
 
 
 def _second(ax: Axes, second: c.Second) -> None:

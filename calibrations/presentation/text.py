@@ -84,6 +84,11 @@ def rounded(value: float, digits: int = 3) -> str:
     return minus(f"{value / 10.0**power:.{digits - 1}f}") + times_ten_to(power)
 
 
+def tick_text(value: float) -> str:
+    """A mark of a logarithmic axis: `0.002`, `10⁻⁵`."""
+    return rounded(value, 1).removeprefix("1 × ")
+
+
 def quantity(value: float, of: str) -> str:
     """A value with the prefix that reads best, in ASCII: `51.2 uV`, `0.1 mg`, `3 per mille` of a field."""
     if of == "field":

@@ -83,7 +83,7 @@ def test_a_life_says_what_the_command_says_and_its_points_lead_to_their_runs(
     page.get_by_label("Baseline of the charts").fill("3")
     expect(page.locator(".verdict")).to_contain_text("Out of control: bias-x.")
     assert symbols(page, LIFE) == ["circle"] * 4 + ["diamond"] * 2
-    assert symbols(page, "Individuals: a jump") == ["circle-open"] * 3 + ["circle", "diamond", "diamond"]
+    assert symbols(page, "Individuals") == ["circle-open"] * 3 + ["circle", "diamond", "diamond"]
     dots(page, "Moving ranges", 5)
     expect(page).to_have_url(re.compile("limit=bias-x%3D0.02&baseline=3"))
     page.locator(f"[aria-label='{LIFE}'] .points path").nth(2).hover(force=True)

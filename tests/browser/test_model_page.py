@@ -107,7 +107,7 @@ def test_of_a_still_record_the_allan_deviation_is_shown(workbench: Workbench, tm
     page.keyboard.press("g")
     expect(label).to_have_text("Allan deviation (mg)")
     expect(page.locator("[aria-label='Spectrum and model'] .ytitle")).to_have_text("density (mg/√Hz)")
-    expect(page.locator("[aria-label='The record'] .ytitle")).to_have_text("x less its mean (mg)")
+    expect(page.locator("[aria-label='The record'] .ytitle")).to_have_text("x − mean (mg)")
     workbench.shot(page, "noise")
     page.get_by_role("button", name="Add rate-random-walk").click()
     expect(page.locator(BARS)).to_have_count(2)
@@ -118,7 +118,7 @@ def test_of_a_motion_its_samples_are_drawn(workbench: Workbench) -> None:
     with Record() as record:
         run = start(record, read_bench(), find("motion"), {}, Quiet({})).run.run
     page = workbench.visit(f"/?data={run}")
-    expect(page.locator("[aria-label='Measurement and model'] .ytitle")).to_have_text("x less its mean (mV)")
+    expect(page.locator("[aria-label='Measurement and model'] .ytitle")).to_have_text("x − mean (mV)")
     expect(page.locator("[aria-label='Where it fails'] .xtitle")).to_have_text("phase of the motion at 10 Hz (deg)")
     page.keyboard.press("x")
     expect(page.locator("[aria-label='Residuals'] .ytitle")).to_contain_text("residual of x in phase")

@@ -93,7 +93,8 @@ def test_its_pictures_are_files_of_each_sensor(rig: Rig, tmp_path: Path) -> None
     picture = (tmp_path / "charts" / "control-CS-1.svg").read_text()
     assert f"written: {tmp_path / 'charts' / 'control-CS-1.svg'}" in ended.out
     assert all(
-        words in picture for words in ("Individuals", "Moving ranges", "EWMA", "bias-x less 2.5 V", "out of control")
+        words in picture
+        for words in ("Individuals", "Moving ranges", "EWMA", "bias-x − centre", "centre 2.5 V", "out of control")
     )
 
 

@@ -14,6 +14,7 @@ from calibrations.model.chain import backward, force
 from calibrations.table import AXES, Array, Table
 
 LENGTHS = ((7200.0, 3600.0, "h"), (180.0, 60.0, "min"), (-1.0, 1.0, "s"))  # longer than, unit, its name
+RESOLUTION_C = 0.01  # a smaller range of temperatures is that of a constant one
 LABELS = {"temperature_c": "temperature (°C)", "supply_v": "supply voltage (V)"}
 SHOWN_OTHERWISE = ("direction", "alpha_deg", "beta_deg")
 NAMES = {
@@ -96,7 +97,7 @@ def _needed(table: Table, name: str, n: int) -> Column:
 def _others(table: Table, n: int) -> list[Column]:
     """Time, and temperature where it was measured and moved."""
     found = [_time(table, n)]
-    if "temperature_c" in table and np.ptp(table.column("temperature_c")) > 0:
+    if "temperature_c" in table and np.ptp(table.column("temperature_c")) > RESOLUTION_C:
         found.append(_needed(table, "temperature_c", n))
     return found
 

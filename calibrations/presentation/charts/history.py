@@ -31,7 +31,7 @@ POINTS = 200
 AHEAD = 0.5  # of the time from first to last calibration: how far the drift is drawn beyond the last
 MARGIN = 0.03  # of the time shown, at both ends
 ALONE_DAYS = 30.0  # around calibrations of one moment
-INDIVIDUALS, EWMA, RANGES = "Individuals: a jump", "EWMA: a slow drift", "Moving ranges"
+INDIVIDUALS, EWMA, RANGES = "Individuals", "EWMA", "Moving ranges"
 
 
 @dataclass(frozen=True)
@@ -58,8 +58,13 @@ class Life:
 def lives(quantities: Sequence[Life]) -> Chart:
     """A panel for each quantity, over the time of all of them."""
     ends = [_ends(each) for each in quantities]
-    x = Axis(low=min(start for start, _ in ends), high=max(end for _, end in ends), ticks="dates")
+    x = _dates(min(start for start, _ in ends), max(end for _, end in ends))
     return stacked([replace(life(each), x=x) for each in quantities], 2.2)
+
+
+def _dates(start: float, end: float) -> Axis:
+    room = MARGIN * (end - start)
+    return Axis(low=start - room, high=end + room, ticks="dates")
 
 
 def life(q: Life) -> Panel:
@@ -83,9 +88,7 @@ def life(q: Life) -> Panel:
                symbol=["diamond" if s else "circle" for s in signals], size=8, low=values - expanded,
                high=values + expanded, hover=q.hover, keys=q.keys)
     )  # fmt: skip
-    room = MARGIN * (end - start)
-    return Panel(tuple(series), Axis(low=start - room, high=end + room, ticks="dates"), Axis(labelled(q.name, spelt)),
-                 q.name)  # fmt: skip
+    return Panel(tuple(series), _dates(start, end), Axis(labelled(q.name, spelt)), q.name)
 
 
 def _ends(q: Life) -> tuple[float, float]:
@@ -113,29 +116,29 @@ def control_charts(charts: Mapping[str, ControlChart], units: Mapping[str, str])
 def control_panels(
     name: str, chart: ControlChart, of: str, hover: Sequence[str] = (), keys: Sequence[str] | None = None
 ) -> dict[str, Panel]:
-    """The three charts of one quantity by title, less the centre.
+    """The three charts of one quantity by title; values are differences from the centre.
 
     Open dots are the baseline, which sets the limits (the band); diamonds are beyond the limits.
     """
     reach, limit = np.full(len(chart.values), chart.reach), np.full(len(chart.ranges), chart.range_limit)
-    slow, since, less = chart.ewma_reach, chart.judged, f"{name} less {chart.centre:.6g} {unit(of)}".rstrip()
+    slow, since, change = chart.ewma_reach, chart.judged, f"{name} − centre"
+    centre = f"centre {chart.centre:.6g} {unit(of)}".rstrip()
     parts = {
-        INDIVIDUALS: (1, chart.values - chart.centre, -reach, reach, chart.jumps, since, less),
-        EWMA: (1, chart.ewma - chart.centre, -slow, slow, chart.drifts, since, less),
-        RANGES: (2, chart.ranges, 0 * limit, limit, (), since - 1, "range"),
+        INDIVIDUALS: (1, chart.values - chart.centre, -reach, reach, chart.jumps, since, change, centre),
+        EWMA: (1, chart.ewma - chart.centre, -slow, slow, chart.drifts, since, change, chart.verdict),
+        RANGES: (2, chart.ranges, 0 * limit, limit, (), since - 1, "range", ""),
     }
+    x = Axis("calibration", low=0.5, high=len(chart.values) + 0.5, ticks="integers")
     made = {}
-    for title, (first, values, low, high, beyond, judged, label) in parts.items():
+    for title, (first, values, low, high, beyond, judged, label, remark) in parts.items():
         factor, spelt = prefixed(unit(of), float(np.abs([values, high]).max()))
         numbers = np.arange(first, first + len(values), dtype=float)
         mine = None if keys is None else keys[first - 1 :]
         told = [f"{text}: {rounded(v)} {spelt}" for text, v in zip(hover[first - 1 :], factor * values, strict=False)]
         dots = _control_points(numbers, factor * values, beyond, judged, told, mine)
         band = Band(numbers, factor * low, factor * high, steps=True)
-        y = Axis(labelled(label, spelt))
         series = (band, Rule(0.0, width=0.7), Line(numbers, factor * values, colour=MEASURED, width=1), dots)
-        remark = chart.verdict if title == EWMA else ""
-        made[title] = Panel(series, Axis("calibration", ticks="integers"), y, title, remark)
+        made[title] = Panel(series, x, Axis(labelled(label, spelt)), title, remark)
     return made
 
 

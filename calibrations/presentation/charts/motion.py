@@ -32,25 +32,27 @@ from calibrations.table import Array
 
 SHOWN_S = 0.5  # of the record: five periods of the paper's motion
 BINS = 40  # of a period
+ROOM, LEGEND_ROOM = 0.05, 0.25  # below and above the curves, as shares of their range
 
 
 def evaluation(result: MotionResult) -> Chart:
-    """Fig. 12 of the paper: each model's acceleration beside the reference above, and its error below."""
+    """Fig. 12 of the paper: the acceleration by each model and the reference above, the error of the model below."""
     first = result.t_s[0]
     shown = (result.t_s - first) < SHOWN_S
     t = result.t_s[shown] - first
+    curves = [values[shown] for values in (result.linear, result.physical, result.reference)]
+    low, high = float(np.min(curves)), float(np.max(curves))
+    axis = Axis("acceleration (mm/s²)", low=low - ROOM * (high - low), high=high + LEGEND_ROOM * (high - low))
     above, below = [], []
     for k, (name, values, error) in enumerate(_models(result)):
         colour = (VERMILION, BLUE)[k]
         sensor = Line(t, values[shown], f"sensor, {name} model", colour, 1.8)
         reference = Line(t, result.reference[shown], "displacement sensor", INK, 1.8, "dot")
-        reach = 1.5 * float(np.abs(values[shown]).max())
         title = f"{'ab'[k]}  {name} model: rmse {written(error.value, error.std)} mm/s²"
-        axis = Axis("acceleration (mm/s²)", low=-reach, high=reach)
         above.append(Panel((sensor, reference), Axis(), axis, title, legend="upper right"))
         error_line = Line(t, (values - result.reference)[shown], colour=colour)
         series = (*floor_band(result.noise_limit.value), error_line)
-        below.append(Panel(series, Axis("time (s)"), Axis("sensor less reference (mm/s²)")))
+        below.append(Panel(series, Axis("time (s)"), Axis("sensor − reference (mm/s²)")))
     return Chart((tuple(above), tuple(below)), 2.8, share_x=True, share_y=True)
 
 
@@ -68,7 +70,7 @@ def measurement(shown: Shown) -> Panel:
     told = [f"{y:.5g} at {x:.3f} s" for x, y in zip(found.at, shown.factor * found.measured, strict=True)]
     line = Line(found.at, shown.factor * found.model, "model", hover="the model: %{y:.5g}")
     dots = Points(found.at, shown.factor * found.measured, "measured", size=5, hover=told)
-    return Panel((line, dots), Axis("time (s)"), Axis(f"{axis} less its mean ({shown.unit})"), f"axis {axis}")
+    return Panel((line, dots), Axis("time (s)"), Axis(f"{axis} − mean ({shown.unit})"), f"axis {axis}")
 
 
 def failure(shown: Shown) -> Panel:
@@ -159,7 +161,7 @@ def compensated(found: Residual) -> Chart:
         sides = ((found.linear, VERMILION, "linear model"), (found.compensated, BLUE, "compensated"))
         rows.append(tuple(
             Panel((Rule(0.0, width=0.7), Points(poses, errors[:, k], colour=colour, size=5)), Axis("pose"),
-                  Axis("sensor less reference (mm/s²)"), f"{axis}, {name}: rmse {rounded(rmse)} mm/s²")
+                  Axis("sensor − reference (mm/s²)"), f"{axis}, {name}: rmse {rounded(rmse)} mm/s²")
             for (errors, colour, name), rmse in zip(sides, found.rmse[axis], strict=True)
         ))  # fmt: skip
     return Chart(tuple(rows), 2.6, share_x=True, share_y=True)

@@ -54,6 +54,7 @@ LESS = "after removing non-noise signals"
 SUM = "sum of the processes"
 TIME = "averaging time (s)"
 FREQUENCY = "frequency (Hz)"
+OTHERS = (("modified", "modified Allan", BLUE), ("hadamard", "Hadamard", GREEN), ("total", "total", VERMILION))
 MEASURE = Measure("mismatch of the spectrum / chance", "chance", "the record", "the other half")
 COLOURS = {
     "white-noise": BLUE,
@@ -167,7 +168,7 @@ def record(channel: Channel, into: Scaled) -> Panel:
     hover = f"%{{y:.4g}} {into.unit} at %{{x:.4g}} {unit}"
     at = np.asarray((np.arange(len(values)) + 0.5) * each_s / size)
     line = Line(at, np.asarray(values), colour=MEASURED, width=1, hover=hover)
-    x, y = f"time ({unit}); means of {rounded(each_s, 2)} s", f"{channel.axis} less its mean ({into.unit})"
+    x, y = f"time ({unit}); means of {rounded(each_s, 2)} s", f"{channel.axis} − mean ({into.unit})"
     return Panel((line,), Axis(x), Axis(y))
 
 
@@ -263,17 +264,16 @@ def _deviations(noise: ChannelNoise) -> Chart:
     thin = tuple(_part(name, tau_s, np.sqrt(v)) for name, v in processes.items()) if several else ()
     whole = Line(tau_s, noise.modelled(tau_s), SUM if several else next(iter(processes), SUM), INK, 1.8)
     y = Axis(f"deviation ({noise.unit})", log=True, low=curve.low.min() / 2, high=3 * curve.high.max())
-    left = Panel((*thin, whole, dots), Axis(TIME, log=True), y, "Allan deviation, overlapping", legend="upper center")
-    others = [part for kind, colour in (("modified", BLUE), ("hadamard", GREEN), ("total", VERMILION))
-              for part in _other(noise.deviations[kind], kind, colour)]  # fmt: skip
-    line = Line(curve.tau_s, curve.deviation, "Allan", QUIET)
-    right = Panel((*others, line), Axis(TIME, log=True), y, "other deviations", legend="upper center")
+    left = Panel((*thin, whole, dots), Axis(TIME, log=True), y, "Overlapping Allan deviation", legend="upper center")
+    others = [part for kind, name, colour in OTHERS for part in _other(noise.deviations[kind], name, colour)]
+    line = Line(curve.tau_s, curve.deviation, "overlapping Allan", QUIET)
+    right = Panel((*others, line), Axis(TIME, log=True), y, "Other deviations", legend="upper center")
     return beside([left, right], 4.0, share_y=True)
 
 
-def _other(curve: Curve, kind: str, colour: str) -> tuple[Band, Line]:
+def _other(curve: Curve, name: str, colour: str) -> tuple[Band, Line]:
     band = Band(curve.tau_s, curve.low, curve.high, colour=colour, opacity=0.18)
-    return band, Line(curve.tau_s, curve.deviation, kind, colour, markers=True)
+    return band, Line(curve.tau_s, curve.deviation, name, colour, markers=True)
 
 
 def _density(noise: ChannelNoise) -> Chart:

@@ -11,6 +11,7 @@ from calibrations.analyses.forecast import ForecastHistory
 from calibrations.analyses.soak import HOUR_S, Course, Soak
 from calibrations.presentation.chart import (
     AMBER,
+    BAND,
     BLUE,
     GREEN,
     INK,
@@ -34,7 +35,6 @@ from calibrations.presentation.text import estimate_text, rounded
 from calibrations.table import Array
 
 COLOURS = {"x": BLUE, "y": VERMILION}
-GREY = "#b4bbc3"
 TIME = "time since power-on (h)"
 SHOWN = 600  # means of the still record that a line is drawn through, at most
 CURVE = 400  # points of a fitted curve
@@ -77,9 +77,9 @@ def drift(found: Soak) -> Chart:
     """A column for each axis: bias above, scale factor below, as change from the final value."""
     above, below = [], []
     for axis in found.axes:
-        above.append(_course(found, found.courses[f"bias-{axis}"], 1e3, "bias less final value (mV)", f"axis {axis}"))
+        above.append(_course(found, found.courses[f"bias-{axis}"], 1e3, "bias − final value (mV)", f"axis {axis}"))
         scale = found.courses[f"scale-{axis}"]
-        below.append(_course(found, scale, 1e6 / _final(scale), "scale factor less final value (ppm)"))
+        below.append(_course(found, scale, 1e6 / _final(scale), "scale factor − final value (ppm)"))
     return Chart((tuple(above), tuple(below)), 2.9, share_x=True)
 
 
@@ -132,7 +132,7 @@ def surroundings(found: Soak) -> Chart:
     for axis in found.axes:
         times_s, rms = found.noise_of_hours(axis)
         lines.append(Line(times_s / HOUR_S, 1e3 * rms, f"axis {axis}", COLOURS[axis], markers=True))
-    panels.append(Panel((*_gaps(found), *lines), begin, Axis("noise, rms (mV)"), legend="upper right"))
+    panels.append(Panel((*_gaps(found), *lines), begin, Axis("noise, rms (mV)"), legend="best"))
     return stacked(panels, 1.7)
 
 
@@ -154,7 +154,7 @@ def _course(found: Soak, course: Course, factor: float, label: str, title: str =
     series: list[Series] = list(_gaps(found))
     if course.quantity == "bias":
         t_s, volts = _still(found, course)
-        series.append(Line(t_s / HOUR_S, factor * (volts - final), colour=GREY, width=0.8))
+        series.append(Line(t_s / HOUR_S, factor * (volts - final), colour=BAND, width=0.8))
     if state is not None:
         series.append(Span(-factor * state.tolerance, factor * state.tolerance))
         t_s = np.linspace(*state.span_s, CURVE)
