@@ -10,6 +10,7 @@ A library of its own: tables in, frozen results out, no instrument needed.
 
     read, table      data            fit, compare       a model beside data
     diagnose         missing effects discover           missing effects, added one by one
+    noise            noise of a still sensor
     compensate       outputs back to specific force
 
 The functions are in `calibrations.face` and load when they are used.
@@ -22,9 +23,9 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from calibrations.face import compare, compensate, diagnose, discover, fit, read, table
+    from calibrations.face import compare, compensate, diagnose, discover, fit, noise, read, table
 
-__all__ = ["compare", "compensate", "diagnose", "discover", "fit", "read", "table"]
+__all__ = ["compare", "compensate", "diagnose", "discover", "fit", "noise", "read", "table"]
 
 
 class _Face(ModuleType):

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -19,8 +19,16 @@ from calibrations.loop import diagnose as diagnosed
 from calibrations.loop import discover as discovered
 from calibrations.model import Model
 from calibrations.model.file import read_model
-from calibrations.table import Array, Constant, Table
+from calibrations.table import AXES, Array, Constant, Table
+from calibrations.tables import KINDS
 
+if TYPE_CHECKING:
+    from calibrations.noise.analysis import NoiseAnalysis
+    from calibrations.noise.record import Samples
+
+MOST_UNEVEN = 0.5  # of a step, by which steps of time may differ
+NOT_CHANNELS = ("t_s", "temperature_c", "supply_v")
+AXIS_OF = {name: axis for kind in KINDS.values() for name, axis in zip(kind.outputs, AXES, strict=False)} | {"v": "x"}
 GivenModel = Model | str | Path  # a model, the name of a shipped one, or a model file
 
 
@@ -61,6 +69,19 @@ def discover(data: Table, model: GivenModel) -> Discovery[Fit]:
     return discovered(data, _model(model))
 
 
+def noise(data: Table | Array, rate_hz: float | None = None) -> NoiseAnalysis:
+    """Allan deviation and noise coefficients of samples at an even rate: an array (n,), or a table of kind still.
+
+    A table's columns but time, temperature and supply are its channels. `rate_hz` is needed where neither t_s nor
+    sample_rate_hz gives it. Raises DataError for uneven times, which `rig noise` can close.
+    """
+    from calibrations.noise.analysis import analyse
+    from calibrations.noise.record import reduce_record
+
+    given = data if isinstance(data, Table) else Table.from_columns("still", {"v": data}, None, "the given samples")
+    return analyse(reduce_record(_channels(given, rate_hz), given.source, given.constants, every_deviation=True))
+
+
 def compensate(model: GivenModel, outputs: Array, **columns: Array) -> Array:
     """The specific force along the reference axes, g, shape (n, axes), from outputs of the model's axes, (n, axes).
 
@@ -82,3 +103,21 @@ def compensate(model: GivenModel, outputs: Array, **columns: Array) -> Array:
 
 def _model(model: GivenModel) -> Model:
     return model if isinstance(model, Model) else read_model(model)
+
+
+def _channels(table: Table, rate_hz: float | None) -> Iterator[Samples]:
+    """The channels of a still table. Raises DataError where its rate is unknown, or its times are uneven."""
+    from calibrations.noise.record import Samples
+
+    rate_hz = rate_hz or table.number("sample_rate_hz", 0.0)
+    if not rate_hz:
+        if "t_s" not in table:
+            raise DataError(f"{table.source}: its rate is not known; give rate_hz, as in cal.noise(data, rate_hz=100)")
+        steps_s = np.diff(table.time_s)
+        rate_hz = 1 / float(np.median(steps_s))
+        if np.ptp(steps_s) * rate_hz > MOST_UNEVEN:
+            raise DataError(f"{table.source}: t_s is uneven; `rig noise` closes gaps and says so")
+    corner_hz = table.number("filter_corner_hz", np.inf)
+    for name in (name for name in table.columns if name not in NOT_CHANNELS):
+        unit = "V" if name.endswith("_v") else str(table.constants.get("unit", "count"))
+        yield Samples(AXIS_OF.get(name, name), [table.column(name)], rate_hz, unit, corner_hz, name=name)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Generic
+from typing import TYPE_CHECKING, Any, Generic
 
 from calibrations.criteria import MOST_BY_FORM
 from calibrations.discovery.results import Candidate, Comparison, Diagnosis, Discovery, F, Findings, Place, Step
@@ -13,6 +13,9 @@ from calibrations.effects import Effect
 from calibrations.errors import ModelError
 from calibrations.model import Model
 from calibrations.plausibility import Finding
+
+if TYPE_CHECKING:
+    from calibrations.presentation.chart import Chart
 
 Cells = tuple[Sequence[str], Sequence[Sequence[str]]]  # head and rows of a table of text
 
@@ -181,6 +184,14 @@ class Dataset(ABC, Generic[F]):
     @abstractmethod
     def candidate_table(self, result: Diagnosis[F], candidates: Sequence[Candidate]) -> Cells:
         """The candidates, as text."""
+
+    @abstractmethod
+    def fit_chart(self, found: F) -> Chart:
+        """A fit beside these data."""
+
+    @abstractmethod
+    def steps_chart(self, found: Discovery[F]) -> Chart:
+        """The error after each step."""
 
     def remarks(self, found: F) -> list[str]:  # noqa: ARG002
         """Sentences on an error that cannot be right."""

@@ -21,12 +21,16 @@ from calibrations.criteria import LIKELY, NOTEWORTHY
 from calibrations.discovery.verdict import Closest, Judgement, Verdict
 from calibrations.effects import Effect
 from calibrations.model import Model
+from calibrations.presentation.result import Result
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from calibrations.design.experiment import Experiment
     from calibrations.discovery.dataset import Dataset
     from calibrations.discovery.patterns import Pattern
     from calibrations.plausibility import Finding
+    from calibrations.presentation.chart import Chart
 
 
 class Measured(Protocol):
@@ -87,8 +91,8 @@ class Place:
     text: str
 
 
-@dataclass(frozen=True)
-class Comparison(Generic[F]):
+@dataclass(frozen=True, repr=False)
+class Comparison(Result, Generic[F]):
     """A model beside data: its fit, and the places where it fails, worst first."""
 
     data: Dataset[F]
@@ -100,6 +104,26 @@ class Comparison(Generic[F]):
     def adequate(self) -> bool:
         """Whether the model fails nowhere, on data that can be used."""
         return not self.fails and self.rejection is None
+
+    def report(self) -> str:
+        """The error of each channel, and the places where the model fails."""
+        from calibrations.presentation.answers import comparison_text
+
+        return comparison_text(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        """`rig.comparison/1`."""
+        from calibrations.documents import comparison_document
+
+        return comparison_document(self, self.fit.model.name)
+
+    def records(self) -> list[dict[str, Any]]:
+        """A row a place where the model fails."""
+        return [vars(place) for place in self.fails]
+
+    def plot(self) -> Figure:
+        """The residual, or the Allan deviations."""
+        return _drawn(self.data.fit_chart(self.fit))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -259,8 +283,8 @@ class Findings(Generic[F]):
         return replace(self, steps=(), tried=self.steps, causes=(), alternatives={}, separations={}, settled=True)
 
 
-@dataclass(frozen=True)
-class _Answer(Generic[F]):
+@dataclass(frozen=True, repr=False)
+class _Answer(Result, Generic[F]):
     """What diagnosis and discovery have in common. `next_experiment` may be planned on a bench later."""
 
     findings: Findings[F]
@@ -292,7 +316,7 @@ class _Answer(Generic[F]):
         return self.findings.outliers
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Diagnosis(_Answer[F]):
     """What the given model misses."""
 
@@ -301,6 +325,26 @@ class Diagnosis(_Answer[F]):
         """The findings as an answer on the given model."""
         doubtful = findings.given.verdict is not Verdict.EFFECT_MISSING
         return cls(findings, findings.experiment(findings.names) if doubtful else None)
+
+    def report(self) -> str:
+        """The verdict on the given model, its candidates, and the best of them."""
+        from calibrations.presentation.answers import diagnosis_text
+
+        return diagnosis_text(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        """`rig.diagnosis/1`."""
+        from calibrations.documents import diagnosis_document
+
+        return diagnosis_document(self, self.fit.model.name)
+
+    def records(self) -> list[dict[str, Any]]:
+        """A row a candidate."""
+        return list(self.to_dict()["candidates"])
+
+    def plot(self) -> Figure:
+        """The residual of the given model, or its Allan deviations."""
+        return _drawn(self.findings.data.fit_chart(self.fit))
 
     @property
     def judgement(self) -> Judgement:
@@ -343,7 +387,7 @@ class Diagnosis(_Answer[F]):
         return "; ".join(filter(None, (self.findings.set_aside, self.findings.undetermined[0]))) or None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Discovery(_Answer[F]):
     """The effects that were missing, in the order added, and the final model."""
 
@@ -351,6 +395,31 @@ class Discovery(_Answer[F]):
     def of(cls, findings: Findings[F]) -> Discovery[F]:
         """The findings as an answer on the final model."""
         return cls(findings, findings.experiment(findings.causes))
+
+    @property
+    def model(self) -> Model:
+        """The final model, with its values."""
+        return self.end.model
+
+    def report(self) -> str:
+        """The error after each step, the verdict, and the final model."""
+        from calibrations.presentation.answers import discovery_text
+
+        return f"{self.findings.data.description}\n\n{discovery_text(self)}\n\n{self.model.params}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """`rig.discovery/1`."""
+        from calibrations.documents import discovery_document
+
+        return discovery_document(self, None)
+
+    def records(self) -> list[dict[str, Any]]:
+        """A row a step."""
+        return list(self.to_dict()["steps"])
+
+    def plot(self) -> Figure:
+        """Error by model."""
+        return _drawn(self.findings.data.steps_chart(self))
 
     @property
     def judgement(self) -> Judgement:
@@ -402,3 +471,9 @@ class Discovery(_Answer[F]):
     def caution(self) -> str | None:
         """Rows that were set aside, and why the data do not determine the final model."""
         return "; ".join(filter(None, (self.findings.set_aside, self.findings.undetermined[1]))) or None
+
+
+def _drawn(chart: Chart) -> Figure:
+    from calibrations.presentation.static import draw  # a result without a picture needs no matplotlib
+
+    return draw(chart)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -34,6 +34,9 @@ from calibrations.plausibility import Finding, refusal, rejection
 from calibrations.presentation.residual import milli_unit, pooled_milli
 from calibrations.presentation.text import quantity, rounded
 from calibrations.table import Array, Table
+
+if TYPE_CHECKING:
+    from calibrations.presentation.chart import Chart
 
 
 @dataclass(frozen=True, eq=False)
@@ -316,6 +319,18 @@ class Rows(Dataset[Fit]):
             for c in candidates
         ]
         return ("candidate", f"error on {self.unseen} / floor", "p-value", chance, "cannot be separated from"), rows
+
+    def fit_chart(self, found: Fit) -> Chart:
+        """The residual."""
+        from calibrations.presentation.charts.fit import residual_chart
+
+        return residual_chart(found)
+
+    def steps_chart(self, found: Discovery[Fit]) -> Chart:
+        """Error by model."""
+        from calibrations.presentation.charts.discovery import levels, waterfall
+
+        return waterfall(levels(found))
 
     def remarks(self, found: Fit) -> list[str]:
         """A residual below the noise floor, which only a wrong floor leaves."""

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.optimize import brentq
@@ -32,8 +32,13 @@ from calibrations.noise.likelihood import ChannelFit, effect_spectrum, log_likel
 from calibrations.noise.record import Channel, Still
 from calibrations.noise.samples import CONSTANT, WILD, Hidden, hidden_in
 from calibrations.noise.search import Search, search
+from calibrations.presentation.result import Result
 from calibrations.table import Array
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Document = dict[str, Any]
 MODEL = "still"  # the search begins with white noise alone
 ORDER = (
     "white-noise", "flicker-noise", "rate-random-walk", "quantisation-noise", "sinusoidal-noise", "gauss-markov-noise",
@@ -162,8 +167,8 @@ class ChannelNoise:
         return Coefficient(line.amplitude, line.std, unit, None, None, line.frequency_hz)
 
 
-@dataclass(frozen=True)
-class NoiseAnalysis:
+@dataclass(frozen=True, repr=False)
+class NoiseAnalysis(Result):
     """The noise of a still record: `record` as it was read, and the search on it."""
 
     record: Still
@@ -182,6 +187,28 @@ class NoiseAnalysis:
     @cached_property
     def disturbances(self) -> tuple[Disturbance, ...]:
         return disturbances(self.search)
+
+    def report(self) -> str:
+        """Coefficients, density and Allan deviation of each channel."""
+        from calibrations.presentation.noise_text import summary
+
+        return summary(self)
+
+    def to_dict(self) -> Document:
+        """`rig.noise/1`."""
+        return noise_document(self)
+
+    def records(self) -> list[Document]:
+        """A row a process of each channel."""
+        processes = [(axis, each) for axis, noise in self.channels.items() for each in noise.coefficients.items()]
+        return [{"axis": axis, "process": name, **_coefficient(each)} for axis, (name, each) in processes]
+
+    def plot(self) -> Figure:
+        """The Allan deviation of the first channel."""
+        from calibrations.presentation.charts.noise import noise_album
+        from calibrations.presentation.static import draw
+
+        return draw(noise_album(self)[0].chart)
 
     def spoils(self, disturbance: Disturbance) -> tuple[str, ...]:
         """The coefficients that a disturbance changes, or would change had it not been removed."""
@@ -247,8 +274,6 @@ def _differ(before: Coefficient, after: Coefficient) -> bool:
 
 
 # The JSON document of a noise analysis.
-
-Document = dict[str, Any]
 
 
 def noise_document(analysis: NoiseAnalysis) -> Document:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from calibrations.criteria import MOST_UNEXPLAINED
 from calibrations.discovery.dataset import Cells, Dataset
@@ -36,6 +36,9 @@ from calibrations.noise.record import Still
 from calibrations.noise.search import Search, candidates, search
 from calibrations.noise.words import of_record, sentence
 from calibrations.presentation.text import quantity, rounded
+
+if TYPE_CHECKING:
+    from calibrations.presentation.chart import Chart
 
 HEAD = (
     "model", "log-likelihood gained", "lost without it alone", "mismatch / chance", "other half",
@@ -298,6 +301,18 @@ class StillRecord(Dataset[NoiseFit]):
             "cannot be separated from",
         )  # fmt: skip
         return head, rows
+
+    def fit_chart(self, found: NoiseFit) -> Chart:
+        """Measured and modelled Allan deviations."""
+        from calibrations.presentation.charts.noise import fit_chart
+
+        return fit_chart(found)
+
+    def steps_chart(self, found: Discovery[NoiseFit]) -> Chart:
+        """Error by model."""
+        from calibrations.presentation.charts.noise import steps_chart
+
+        return steps_chart(found.start, found.steps)
 
     def remarks(self, found: NoiseFit) -> list[str]:
         """Lines that the log-likelihood does not include."""

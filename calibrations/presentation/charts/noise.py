@@ -42,7 +42,7 @@ from calibrations.presentation.chart import (
     one,
 )
 from calibrations.presentation.charts.columns import in_time
-from calibrations.presentation.charts.discovery import Level, Measure
+from calibrations.presentation.charts.discovery import Level, Measure, waterfall
 from calibrations.presentation.text import rounded
 from calibrations.table import MILLI, Array
 
@@ -176,6 +176,19 @@ def levels(start: NoiseFit, steps: Sequence[Step[NoiseFit]]) -> list[Level]:
     """Error by model of a noise model: the mismatch of its spectrum, and that of its Allan deviation."""
     first = Level(start.model.name, start.pooled_excess, start.held_out_excess, _off(start))
     return [first, *(Level(f"+ {s.name}", s.after.pooled_excess, s.held_out_after, _off(s.after)) for s in steps)]
+
+
+def steps_chart(start: NoiseFit, steps: Sequence[Step[NoiseFit]]) -> Chart:
+    """Error by model."""
+    return waterfall(levels(start, steps), MEASURE)
+
+
+def fit_chart(found: NoiseFit) -> Chart:
+    """The measured Allan deviation of each channel, and that of the model."""
+    into = Scaled(1.0, found.still.unit)
+    curves = (found.still.allan[each.channel.axis] for each in found.channels)
+    drawn = ([Drawn(each, found.model.name, INK)] for each in found.channels)
+    return _named([allan(curve, into, models) for curve, models in zip(curves, drawn, strict=True)], found)
 
 
 def _off(found: NoiseFit) -> str:

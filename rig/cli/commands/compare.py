@@ -22,7 +22,7 @@ def command(request: Request, check: bool, as_json: bool) -> int:
     """Set a model beside DATA (a file or a run) and say where it fails. A model without values is fitted first."""
     from calibrations.discovery.verdict import Verdict
     from calibrations.documents import comparison_document
-    from rig.cli.terminal.words import table, warning
+    from rig.cli.terminal.words import warning
     from rig.services.load import loaded
 
     question = loaded(request, note)
@@ -32,18 +32,10 @@ def command(request: Request, check: bool, as_json: bool) -> int:
         emit(comparison_document(result, name))
         notes(warning(cautions))
     else:
-        data = question.data
-        click.echo(f"{question.model.name} on {data.description}\n\n{table(data.error_table(result.fit))}\n")
-        if (more := data.comparison_table(result)) is not None:
-            click.echo(f"{table(more)}\n")
-        if result.rejection is not None:
-            click.echo(f"This data cannot be used: {result.rejection.verdict}: {result.rejection.text}.")
-        elif result.adequate:
-            click.echo(data.complete)
-        else:
-            click.echo("It fails, worst first:\n" + "\n".join(f"  {place.text}" for place in result.fails))
+        click.echo(result.report())
+        if result.rejection is None and not result.adequate:
             click.echo(f"\nWhich effect is missing: rig diagnose {request.data} --model {name}")
-        for line in filter(None, (data.note, *warning(cautions))):
+        for line in filter(None, (question.data.note, *warning(cautions))):
             click.echo(f"\n{line}")
     silent = result.rejection is not None and result.rejection.verdict == Verdict.NO_RESPONSE
     undetermined = question.data.undetermined(result.fit) is not None

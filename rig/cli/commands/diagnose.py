@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     from calibrations.discovery.results import Diagnosis
     from rig.services.request import Request
 
-SHOWN = 6
-
 
 @click.command("diagnose")
 @click.argument("data")
@@ -44,16 +42,13 @@ def command(request: Request, check: bool, as_json: bool) -> int:
 
 
 def _text(result: Diagnosis[Any], model: str, request: Request) -> str:
-    from calibrations.documents import why
-    from rig.cli.terminal.words import experiment, table
+    from calibrations.presentation.answers import diagnosis_text
+    from rig.cli.terminal.words import experiment
 
     data = result.findings.data
-    lines = [f"{model} on {data.description}", "", result.judgement.text, ""]
-    if shown := result.candidates[:SHOWN]:
-        lines += [table(data.candidate_table(result, shown)), ""]
+    lines = [diagnosis_text(result, model), ""]
     if result.missing:
         best = result.candidates[0]
-        lines += [f"{best.name}: {why(best, result)}", "", f"    {best.effect.formula.splitlines()[0]}", ""]
         lines.append(
             f"Add it: rig add {best.name} --model {model} --data {request.data} --out model.yaml{request.bench_words}"
         )

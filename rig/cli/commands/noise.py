@@ -9,13 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from calibrations.noise.analysis import ChannelNoise, Coefficient, NoiseAnalysis
-from calibrations.noise.deviations import minimum_s
-from calibrations.noise.record import Sensed
-from calibrations.noise.samples import COARSE
-from calibrations.noise.telegraph import TWO_LEVELS
-from calibrations.noise.words import sentence
-from calibrations.presentation.text import columns, duration, exponent
+from calibrations.noise.analysis import NoiseAnalysis
 from rig.cli.terminal.output import Positive, emit, json_option, note, notes
 
 if TYPE_CHECKING:
@@ -52,6 +46,7 @@ def command(
     not noise (a step, an output that follows a logged column) are removed first, as `rig diagnose` does.
     """
     from calibrations.noise.analysis import analyse, noise_document
+    from calibrations.presentation.noise_text import remarks
 
     analysis = analyse(_record(data, channel, rate_hz, tau_s))
     notes(remarks(analysis))
@@ -59,7 +54,7 @@ def command(
     if as_json:
         emit(noise_document(analysis))
     else:
-        click.echo(summary(analysis))
+        click.echo(analysis.report())
     if folder is not None:
         from calibrations.presentation.charts.noise import noise_album
         from calibrations.presentation.static import save_all
@@ -89,140 +84,9 @@ def _record(data: str, channel: str | None, rate_hz: float | None, tau_s: tuple[
     return replace(still, deviations=curves)
 
 
-# A noise analysis in words: coefficients in units that sensor engineers use, the Allan deviation as a table.
-
-
-PREFIXES = ((1.0, ""), (1e3, "m"), (1e6, "u"), (1e9, "n"), (1e12, "p"))
-MEANS = {
-    "white-noise": "velocity or angle random walk",
-    "flicker-noise": "bias instability",
-    "rate-random-walk": "the bias wanders",
-    "quantisation-noise": "of the output's sum over time",
-    "sinusoidal-noise": "amplitude",
-    "gauss-markov-noise": "standard deviation",
-}
-NOISE = (COARSE, TWO_LEVELS)  # noise that the coefficients alone do not describe
-Factor = tuple[float, str]
-
-
-def summary(analysis: NoiseAnalysis) -> str:
-    """The whole analysis, for a terminal."""
-    record = analysis.record
-    length = f", {duration(record.length_s)}" if record.length_s >= 1 else ""
-    parts = [f"{record.source}: {record.n} samples at {record.rate_hz:g} Hz{length}\n", *_disturbances(analysis)]
-    for axis, noise in analysis.channels.items():
-        sensed = record.sensed.get(axis)
-        parts += [f"Noise of {axis}\n", _coefficients(noise, sensed), ""]
-        parts += [_density(noise, sensed), "", _allan(noise), ""]
-    return "\n".join(parts).rstrip()
-
-
-def remarks(analysis: NoiseAnalysis) -> Iterable[str]:
-    """Warnings about the coefficients."""
-    for name, rivals in analysis.search.rivals.items():
-        if rivals:
-            yield f"The record cannot separate {name} from {' or '.join(rivals)}: record for longer."
-
-
 def rounded_times(tau_s: Iterable[float], analysis: NoiseAnalysis) -> Iterable[str]:
     """Which of the given averaging times are not whole numbers of samples."""
     taken_s = next(iter(analysis.channels.values())).allan.tau_s.tolist()
     for given, taken in zip(tau_s, taken_s, strict=False):
         if not np.isclose(given, taken):
             yield f"An averaging time of {given:g} s is not a whole number of samples: {taken:g} s is used."
-
-
-def _coefficients(noise: ChannelNoise, sensed: Sensed | None) -> str:
-    rows = []
-    for name, coefficient in noise.coefficients.items():
-        second = () if sensed is None else (_shown(coefficient, sensed.factor, sensed.unit, noise.unit),)
-        meaning = MEANS.get(name, "") + _detail(coefficient)
-        rows.append((name, _shown(coefficient, 1.0, noise.unit, noise.unit), *second, meaning))
-    return columns(("process", "coefficient", *(() if sensed is None else ("or",)), ""), rows)
-
-
-def _disturbances(analysis: NoiseAnalysis) -> Iterable[str]:
-    """What is not a noise process, and the coefficients that it spoils."""
-    for each in analysis.disturbances:
-        if each.kind in NOISE:
-            yield f"{sentence(each.text)}\n"
-    others = [each for each in analysis.disturbances if each.kind not in NOISE]
-    if not others:
-        return
-    yield "Disturbances that are not noise:"
-    for each in others:
-        effect = " and ".join(analysis.spoils(each))
-        removed = ", removed before the fit" if each.pattern is not None else ""
-        spoils = f"; it spoils {effect}" if effect else ""
-        yield f"  {each.text}{removed}{spoils}{'' if each.matters else '; too small to matter'}"
-    yield ""
-    if analysis.uncleaned is None:
-        return
-    yield "With these disturbances in the record, the fit would give:"
-    for axis, noise in analysis.uncleaned.items():
-        spoilt = {name for each in others if each.axis == axis for name in analysis.spoils(each)}
-        for name, coefficient in noise.coefficients.items():
-            if name in spoilt:
-                shown = _shown(coefficient, 1.0, noise.unit, noise.unit)
-                yield f"  {axis}: {name} {shown}{_detail(coefficient)}"
-    yield ""
-
-
-def _detail(coefficient: Coefficient) -> str:
-    if coefficient.frequency_hz is not None:
-        return f", {coefficient.frequency_hz:.6g} Hz"
-    if coefficient.alternatives:
-        return f"; this or {' or '.join(coefficient.alternatives)}"
-    time_s = coefficient.time_constant_s
-    return f", time constant {time_s:.3g} s" if time_s and coefficient.identified else ""
-
-
-def _shown(coefficient: Coefficient, factor: float, unit: str, base: str) -> str:
-    """`12.34(56) uV/sqrt(Hz)`, or the upper bound. `base` is the unit of the channel, `unit` that of the result."""
-    per = coefficient.unit.removeprefix(base)
-    if coefficient.upper is not None and np.isinf(coefficient.upper):
-        return "not known"
-    if coefficient.upper is not None:
-        scale, prefix = _prefixed(coefficient.upper * factor, unit)
-        return f"not identified, below {coefficient.upper * factor * scale:.2g} {prefix}{unit}{per}"
-    value, std = coefficient.value * factor, coefficient.std * factor
-    scale, prefix = _prefixed(value, unit)
-    digits = min(9, max(0, 1 - exponent(float(f"{std * scale:.1e}"))))
-    last = round(std * scale * 10**digits)
-    return f"{value * scale:.{digits}f}({last}) {prefix}{unit}{per}"
-
-
-def _prefixed(value: float, unit: str) -> Factor:
-    """The factor and prefix with which a value reads best; counts and compound units have none."""
-    if unit not in ("V", "g"):
-        return 1.0, ""
-    return next(((f, p) for f, p in PREFIXES if abs(value) * f >= 1), (1.0, ""))
-
-
-def _density(noise: ChannelNoise, sensed: Sensed | None) -> str:
-    """White noise as data sheets give it: one-sided, and so sqrt(2) times the coefficient of the Allan deviation."""
-    white = noise.coefficients["white-noise"]
-    if not white.identified:
-        return "No white noise was identified."
-    scaled = Coefficient(white.value * np.sqrt(2), white.std * np.sqrt(2), white.unit)
-    shown = [_shown(scaled, 1.0, noise.unit, noise.unit)]
-    if sensed is not None:
-        shown.append(_shown(scaled, sensed.factor, sensed.unit, noise.unit))
-    return f"Noise density as in data sheets (one-sided): {' or '.join(shown)}."
-
-
-def _allan(noise: ChannelNoise) -> str:
-    curve, cleaned = noise.allan, noise.cleaned_allan
-    scale, prefix = _prefixed(float(curve.deviation.max()), noise.unit)
-    values = [f"{each * scale:.4g}" for each in curve.deviation.tolist()]
-    bounds = [f"{low * scale:.4g} .. {high * scale:.4g}" for low, high in zip(curve.low, curve.high, strict=True)]
-    table = [[f"{tau:.4g}" for tau in curve.tau_s.tolist()], values, bounds]
-    head = ["time (s)", f"Allan deviation ({prefix}{noise.unit})", "95 % interval"]
-    if noise.search.patterns and np.array_equal(cleaned.tau_s, curve.tau_s):
-        head.append("without disturbances")
-        table.append([f"{each * scale:.4g}" for each in cleaned.deviation.tolist()])
-    head.append("by these processes")
-    table.append([f"{each * scale:.4g}" for each in noise.modelled(curve.tau_s).tolist()])
-    lowest_s = minimum_s(curve)
-    end = "" if lowest_s is None else f"\nLowest at {lowest_s:.4g} s: averaging for longer does not help."
-    return columns(head, list(zip(*table, strict=True))) + end

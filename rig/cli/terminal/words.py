@@ -17,6 +17,7 @@ from calibrations.discovery.verdict import Verdict
 from calibrations.effects import Effect
 from calibrations.errors import DataError
 from calibrations.model import Estimate, Model
+from calibrations.presentation.answers import discovery_text
 from calibrations.presentation.text import columns, concise, duration, quantity
 from calibrations.table import Table
 from rig.cli.terminal.output import note
@@ -50,11 +51,8 @@ def planned(result: Answer, request: Request, effects: Mapping[str, Effect]) -> 
 
 def discovery(result: Discovery[Any]) -> str:
     """The error after each step, the verdict, and the next experiment."""
-    data = result.findings.data
-    lines = [table(data.step_table(result)), "", result.judgement.text, *data.remarks(result.end)]
-    if result.next_experiment:
-        lines += experiment(result.next_experiment, data.source)
-    return "\n".join([*lines, *warning([result.caution])])
+    source = result.findings.data.source
+    return discovery_text(result, experiment(result.next_experiment, source) if result.next_experiment else ())
 
 
 def addition(result: Discovery[Any], data: str, out: Path) -> str:

@@ -10,17 +10,15 @@ from nicegui import ui
 
 from calibrations.noise.allan import compare_deviations
 from calibrations.presentation.chart import one
-from calibrations.presentation.charts.discovery import waterfall
 from calibrations.presentation.charts.noise import (
-    MEASURE,
     Drawn,
     allan,
     candidate,
-    levels,
     ratio,
     record,
     scaled,
     spectrum,
+    steps_chart,
     units,
 )
 from calibrations.presentation.interactive import figure
@@ -98,8 +96,7 @@ class NoisePictures:
         }
         for name, panel in panels.items():
             redraw(self.plots[name], figure(one(panel), f"{name} {found.channel.axis} {into.unit}"))
-        fall = waterfall(levels(self.session.start, self.session.steps), MEASURE)
-        redraw(self.plots["waterfall"], figure(fall, "waterfall", False))
+        redraw(self.plots["waterfall"], figure(steps_chart(self.session.start, self.session.steps), "waterfall", False))
 
     def next_axis(self) -> None:
         """The next channel."""
