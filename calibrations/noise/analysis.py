@@ -28,7 +28,7 @@ from calibrations.noise.channel_spectrum import Line
 from calibrations.noise.deviations import OCTAVE_KINDS, OVERLAPPING, Curve
 from calibrations.noise.disturbances import MISFITS, Disturbance, disturbance_document, disturbances
 from calibrations.noise.fit import fit_effects
-from calibrations.noise.likelihood import ChannelFit, effect_spectrum, log_likelihood, maximise
+from calibrations.noise.likelihood import ChannelFit, effect_spectrum, log_likelihood, maximise_from
 from calibrations.noise.record import Channel, Still
 from calibrations.noise.samples import CONSTANT, WILD, Hidden, hidden_in
 from calibrations.noise.search import Search, search
@@ -236,14 +236,15 @@ def upper_bound(fit: ChannelFit, effect: Effect, beside: Sequence[Effect]) -> tu
         for each in (effect, *beside)
     )
     power = most.values[effect.name][strength] ** 2
+    G = np.column_stack(others) if others else None
+    start = np.array([most.values[each.name][each.parameters[0].name] ** 2 for each in beside])
 
     def loss(log_power: float) -> float:
         base = np.exp(log_power) * column
-        value = (
-            maximise(np.column_stack(others), fit.seen, fit.freedom, base)[1]
-            if others
-            else log_likelihood(base, fit.seen, fit.freedom)
-        )
+        if G is None:
+            value = log_likelihood(base, fit.seen, fit.freedom)
+        else:
+            value = maximise_from(start.copy(), G, fit.seen, fit.freedom, base)[1]
         return 2 * (most.log_likelihood - float(value)) - IDENTIFIED
 
     weight = column / most.expected

@@ -125,9 +125,9 @@ def _information(found: Search, name: str, rivals: tuple[str, ...], length_s: fl
 def _deviance_of_wrong(right: ChannelFit, wrong: ChannelFit, length_s: float) -> float:
     """Deviance of the wrong effects on what the right ones expect of a record of this length."""
     there = longer_channel(right.channel, length_s)
-    truth = replace(right, channel=there, parts=(_slow(there),), lines=())
+    truth = replace(right, channel=there, parts=(_slow(there),), lines=(), fits={})
     bands = replace(truth.parts[0], density=truth.expected)
-    return fit_effects(replace(truth, parts=(bands,)), wrong.effects).deviance
+    return fit_effects(replace(truth, parts=(bands,), fits={}), wrong.effects).deviance
 
 
 def longer_channel(channel: Channel, length_s: float) -> Channel:

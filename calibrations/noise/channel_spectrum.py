@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from scipy.ndimage import median_filter, uniform_filter1d
@@ -48,13 +49,27 @@ class Line:
     std_hz: float = 0.0
 
 
+@lru_cache(maxsize=2)
+def _window(n: int) -> Array:
+    """Hann's, shape (n,)."""
+    return np.asarray(np.sin(np.pi * (np.arange(n) + 0.5) / n) ** 2)
+
+
+def windowed_density(means: Array, sampling: Sampling) -> Array:
+    """Two-sided density of means (n,) under Hann's window, at whole numbers of periods in the record."""
+    window = _window(len(means))
+    spectrum = np.fft.rfft(means * window)
+    return np.asarray((spectrum.real**2 + spectrum.imag**2) * (sampling.interval_s / np.sum(window**2)))
+
+
 def without_line(
-    means: Array, sampling: Sampling, expected: Callable[[Array], Array], highest_hz: float
+    means: Array, power: Array, sampling: Sampling, expected: Callable[[Array], Array], highest_hz: float
 ) -> tuple[Array, Line] | float:
-    """(means (n,) less their strongest sinusoid, the sinusoid); where none stands out, the amplitude it might have."""
-    n, dt = len(means), sampling.interval_s
-    window = np.sin(np.pi * (np.arange(n) + 0.5) / n) ** 2
-    power = np.abs(np.fft.rfft(means * window)) ** 2 * dt / np.sum(window**2)
+    """(means (n,) less their strongest sinusoid, the sinusoid); where none stands out, the amplitude it might have.
+
+    `power` is their windowed density.
+    """
+    n, dt, window = len(means), sampling.interval_s, _window(len(means))
     last = min(len(power) - 1, int(min(highest_hz, 1 / dt) * n * dt))
     if last <= FEWEST_PERIODS:
         return float(np.sqrt(2 * np.mean(means**2)))
@@ -187,9 +202,10 @@ def strongest_line(channel: Channel, beside: Lines, level: Callable[[Array], Arr
 
     Where none stands out, the amplitude that one might have.
     """
-    means = means_without(channel, beside)
-    around = _level_around(means, channel.sampling)
-    slow = without_line(means, channel.sampling, lambda f: np.maximum(level(f), around(f)), channel.corner_hz / 2)
+    means, sampling = means_without(channel, beside), channel.sampling
+    power = windowed_density(means, sampling)
+    around = _level_around(power, len(means) * sampling.interval_s)
+    slow = without_line(means, power, sampling, lambda f: np.maximum(level(f), around(f)), channel.corner_hz / 2)
     f, density = fast_without(channel, beside)
     fast = fast_lines(f, density, channel.segments.freedom, 0.0, channel.length_s)[1] if len(f) else []
     if isinstance(slow, float):
@@ -200,13 +216,10 @@ def strongest_line(channel: Channel, beside: Lines, level: Callable[[Array], Arr
     return max([slow[1], *fast[:1]], key=lambda line: line.amplitude)
 
 
-def _level_around(means: Array, sampling: Sampling) -> Callable[[Array], Array]:
-    """The means' own density around a frequency, as the geometric mean of many ordinates: a hump is no line."""
-    n, dt = len(means), sampling.interval_s
-    window = np.sin(np.pi * (np.arange(n) + 0.5) / n) ** 2
-    power = np.abs(np.fft.rfft(means * window)) ** 2 * dt / np.sum(window**2)
+def _level_around(power: Array, length_s: float) -> Callable[[Array], Array]:
+    """The density around a frequency, as the geometric mean of many ordinates: a hump is no line."""
     logs = uniform_filter1d(np.log(np.maximum(power, np.finfo(float).tiny)), AROUND, mode="nearest")
-    return lambda f: np.asarray(np.exp(logs[np.round(f * n * dt).astype(int)] + np.euler_gamma))
+    return lambda f: np.asarray(np.exp(logs[np.round(f * length_s).astype(int)] + np.euler_gamma))
 
 
 def _unfolded(seen_hz: float, line: Line, channel: Channel) -> float | None:

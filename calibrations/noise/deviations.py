@@ -30,6 +30,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass
+from functools import lru_cache
 from types import MappingProxyType
 from typing import Any
 
@@ -107,6 +108,7 @@ class Octaves:
         self._offset: float | None = None
         self._tree = empty_tree()
         self._whole: Tree | None = None
+        self._curves: dict[str, Curve] = {}
 
     def add(self, samples: Array) -> None:
         """The next samples, of any real type, shape (n,)."""
@@ -116,6 +118,7 @@ class Octaves:
                 self._offset = float(part.mean())
             absorb(self._tree, part, self._offset, self._third)
         self._whole = None
+        self._curves = {}
 
     @property
     def n(self) -> int:
@@ -124,6 +127,11 @@ class Octaves:
 
     def curve(self, kind: str = OVERLAPPING) -> Curve:
         """The deviation at 1, 2, 4 ... samples, as far as the record has two windows (hadamard: three)."""
+        if kind not in self._curves:
+            self._curves[kind] = self._curve(kind)
+        return self._curves[kind]
+
+    def _curve(self, kind: str) -> Curve:
         if self._whole is None:
             self._whole = deepcopy(self._tree)
             finish(self._whole, self._third)
@@ -195,6 +203,7 @@ COVARIANCES: Mapping[int, Callable[[Array], Any]] = MappingProxyType(
 )
 
 
+@lru_cache(maxsize=1024)  # records of one length have them in common
 def freedom(kind: str, alpha: int, n: int, m: int, overlap: int) -> float:
     """Equivalent degrees of freedom, at least 1.
 

@@ -23,8 +23,17 @@ from calibrations.criteria import IDENTIFIED, INTERVAL_STDS
 from calibrations.effects import Effect
 from calibrations.errors import ModelError
 from calibrations.model import Estimate, Model, Term
-from calibrations.noise.channel_spectrum import Line, Lines, bands, strongest_line
-from calibrations.noise.likelihood import ChannelFit, Values, effect_spectrum, information, maximise
+from calibrations.noise.channel_spectrum import Line, bands, strongest_line
+from calibrations.noise.likelihood import (
+    ChannelFit,
+    Values,
+    effect_spectrum,
+    information,
+    maximise,
+    maximise_from,
+    profile,
+    unit_spectrum,
+)
 from calibrations.noise.record import Channel, Still
 from calibrations.noise.samples import hidden_in
 from calibrations.table import Array
@@ -33,9 +42,13 @@ ONE_SIDED_STDS = 1.645  # standard deviations of a one-sided bound of 95 %
 DERIVATIVE_STEP = 1e-3  # of a value, for the derivative
 
 
-def estimates(found: ChannelFit, effect: Effect, unit: str) -> Iterator[Estimate]:
+Deviations = Mapping[tuple[str, str], float]  # of each strength's square and of each shape, by effect and parameter
+
+
+def estimates(found: ChannelFit, effect: Effect, unit: str, deviations: Deviations) -> Iterator[Estimate]:
     """Of one effect's parameters, in the order in which they are declared."""
-    seen = _line_estimates(found, unit) if "lines" in effect.places else _spectrum_estimates(found, effect, unit)
+    lines = "lines" in effect.places
+    seen = _line_estimates(found, unit) if lines else _spectrum_estimates(found, effect, unit, deviations)
     hidden = hidden_in(found.channel.oddities)
     if hidden is None or not hidden.hides(effect.name):
         yield from seen
@@ -45,10 +58,9 @@ def estimates(found: ChannelFit, effect: Effect, unit: str) -> Iterator[Estimate
         yield replace(each, std=None, identified=False, why=why)
 
 
-def _spectrum_estimates(found: ChannelFit, effect: Effect, unit: str) -> Iterator[Estimate]:
+def _spectrum_estimates(found: ChannelFit, effect: Effect, unit: str, deviations: Deviations) -> Iterator[Estimate]:
     strength, values, axis = effect.parameters[0], found.values[effect.name], found.channel.axis
-    power, deviations = values[strength.name] ** 2, power_deviations(found)
-    of_power = deviations[effect.name, strength.name]
+    power, of_power = values[strength.name] ** 2, deviations[effect.name, strength.name]
     identified = gain_of(found, effect) > IDENTIFIED
     below = float(np.sqrt(power + ONE_SIDED_STDS * of_power))
     for p in effect.parameters:
@@ -77,7 +89,7 @@ def gain_of(found: ChannelFit, effect: Effect) -> float:
     return float(lost / max(1.0, found.excess) ** 2)
 
 
-def power_deviations(found: ChannelFit) -> dict[tuple[str, str], float]:
+def power_deviations(found: ChannelFit) -> Deviations:
     """Standard deviation of each strength's square and of each shape, by (effect, parameter)."""
     columns: dict[tuple[str, str], Array] = {}
     for effect in found.effects:
@@ -115,11 +127,27 @@ ROUNDS = 2  # over the shapes, where a model has several
 
 @dataclass(frozen=True)
 class NoiseFit:
-    """A noise model beside a still record. `model` has the values; a channel each."""
+    """A noise model on a still record, channel by channel. `stated` has values where they are not fitted here."""
 
     still: Still
-    model: Model
+    stated: Model
     channels: tuple[ChannelFit, ...]
+    fitted: bool = True
+
+    @cached_property
+    def model(self) -> Model:
+        """The model with its values; uncertainties take as long as the fit."""
+        if not self.fitted:
+            return self.stated
+        every = [(each, power_deviations(each) if each.effects else {}) for each in self.channels]
+        terms = tuple(
+            Term(
+                term.effect,
+                estimates=tuple(e for each in every for e in estimates(each[0], term.effect, self.still.unit, each[1])),
+            )
+            for term in noise_terms(self.stated)
+        )
+        return replace(self.stated, terms=terms, unit=self.still.unit)
 
     @property
     def measured(self) -> Still:
@@ -139,7 +167,7 @@ class NoiseFit:
     @cached_property
     def held_out_excess(self) -> float:
         """Pooled excess on each half of the record with the model fitted to the other half."""
-        effects = tuple(term.effect for term in noise_terms(self.model))
+        effects = tuple(term.effect for term in noise_terms(self.stated))
         each = [_excess_on_other(pair, effects) for c in self.still.channels for pair in (c.halves(), c.halves()[::-1])]
         return float(np.sqrt(np.mean(np.square(each))))
 
@@ -171,16 +199,7 @@ def noise_terms(model: Model) -> tuple[Term, ...]:
 def fit(model: Model, still: Still) -> NoiseFit:
     """The model with its coefficients estimated from the record. Raises ModelError for one without noise."""
     effects = tuple(term.effect for term in noise_terms(model))
-    return noise_fit(model, still, tuple(fit_channel(channel, effects) for channel in still.channels))
-
-
-def noise_fit(model: Model, still: Still, channels: tuple[ChannelFit, ...]) -> NoiseFit:
-    """The fit of all channels as one value, its estimates in the model."""
-    terms = tuple(
-        Term(term.effect, estimates=tuple(e for each in channels for e in estimates(each, term.effect, still.unit)))
-        for term in noise_terms(model)
-    )
-    return NoiseFit(still, replace(model, terms=terms, unit=still.unit), channels)
+    return NoiseFit(still, model, tuple(fit_channel(channel, effects) for channel in still.channels))
 
 
 def fit_channel(channel: Channel, effects: Sequence[Effect]) -> ChannelFit:
@@ -189,8 +208,7 @@ def fit_channel(channel: Channel, effects: Sequence[Effect]) -> ChannelFit:
     most = most_lines(effects)
     if not most:
         return fit_effects(without_effects(channel), smooth)
-    lines, bound = find_lines(channel, smooth, most)
-    return replace(fit_effects(without_effects(channel, lines), smooth), line_bound=bound)
+    return fit_effects(find_lines(channel, smooth, most), smooth)
 
 
 def most_lines(effects: Iterable[Effect]) -> int:
@@ -198,15 +216,20 @@ def most_lines(effects: Iterable[Effect]) -> int:
     return sum(len(effect.parameters) // 2 for effect in effects if "lines" in effect.places)
 
 
-def find_lines(channel: Channel, beside: Sequence[Effect], most: int) -> tuple[Lines, float]:
-    """(lines that stand out above the effects' spectrum, strongest first; the amplitude that one more might have)."""
+def find_lines(channel: Channel, beside: Sequence[Effect], most: int) -> ChannelFit:
+    """The channel less the lines that exceed the effects' spectrum, strongest first, `most` of them.
+
+    `line_bound` is the amplitude that one more might have.
+    """
     lines: list[Line] = []
     while True:
-        present = fit_effects(without_effects(channel, lines), beside)
-        found = strongest_line(channel, tuple(lines), present.level)
+        rest = without_effects(channel, lines)
+        found = strongest_line(channel, tuple(lines), fit_effects(rest, beside).level)
         if isinstance(found, float) or len(lines) == most:
             bound = found if isinstance(found, float) else found.amplitude
-            return tuple(sorted(lines, key=lambda line: -line.amplitude)), bound
+            ordered = tuple(sorted(lines, key=lambda line: -line.amplitude))
+            rest = rest if ordered == rest.lines else without_effects(channel, ordered)
+            return replace(rest, line_bound=bound, fits={})
         lines.append(found)
 
 
@@ -217,21 +240,24 @@ def without_effects(channel: Channel, lines: Iterable[Line] = ()) -> ChannelFit:
 
 
 def fit_effects(start: ChannelFit, effects: Sequence[Effect]) -> ChannelFit:
-    """Effects with a spectrum fitted to what is seen."""
+    """Effects with a spectrum fitted to what is seen; a search returns to many of these fits."""
     if not effects:
         return start
-    at = replace(start, effects=tuple(effects), values={})
-    shapes: dict[str, Values] = {effect.name: _first_shape(effect, at.channel) for effect in effects}
-    bent = [effect for effect in effects if shapes[effect.name]]
+    names = frozenset(effect.name for effect in effects)
+    if names not in start.fits:
+        start.fits[names] = _fit_effects(replace(start, effects=tuple(effects), values={}), effects)
+    return start.fits[names]
+
+
+def _fit_effects(at: ChannelFit, effects: Sequence[Effect]) -> ChannelFit:
+    bent = [effect for effect in effects if len(effect.parameters) > 1]
+    grids = {effect.name: shape_grid(effect, effect.parameters[1].name, at.channel) for effect in bent}
+    shapes: dict[str, Values] = {effect.name: {} for effect in effects}
+    shapes |= {effect.name: {effect.parameters[1].name: float(np.median(grids[effect.name]))} for effect in bent}
     for _ in range(ROUNDS if len(bent) > 1 else 1):
         for effect in bent:
-            shapes[effect.name] = _best_shape(at, effect, shapes)
-    return replace(at, values=_best_strengths(at, shapes)[0])
-
-
-def _first_shape(effect: Effect, channel: Channel) -> Values:
-    """Where the search for an effect's shape begins: its parameters but the first."""
-    return {p.name: float(np.median(shape_grid(effect, p.name, channel))) for p in effect.parameters[1:]}
+            shapes[effect.name] = _best_shape(at, effect, grids[effect.name], shapes)
+    return replace(at, values=_best_strengths(at, shapes))
 
 
 def shape_grid(effect: Effect, name: str, channel: Channel) -> Array:
@@ -242,31 +268,37 @@ def shape_grid(effect: Effect, name: str, channel: Channel) -> Array:
     return np.asarray(guess(channel))
 
 
-def _best_strengths(at: ChannelFit, shapes: Mapping[str, Values]) -> tuple[dict[str, Values], float]:
-    """(values of all effects, log-likelihood) of the most likely strengths for given shapes."""
-    columns = [
-        effect_spectrum(effect, at.parts, {effect.parameters[0].name: 1.0, **shapes[effect.name]})
-        for effect in at.effects
-    ]
-    power, value = maximise(np.column_stack(columns), at.seen, at.freedom, np.zeros(len(at.seen)))
-    values = {
+def _best_strengths(at: ChannelFit, shapes: Mapping[str, Values]) -> dict[str, Values]:
+    """Values of all effects with the most likely strengths for given shapes."""
+    power, _ = maximise(_unit_columns(at, at.effects, shapes), at.seen, at.freedom, np.zeros(len(at.seen)))
+    return {
         effect.name: {effect.parameters[0].name: float(np.sqrt(v)), **shapes[effect.name]}
         for effect, v in zip(at.effects, power, strict=True)
     }
-    return values, float(value)
 
 
-def _best_shape(at: ChannelFit, effect: Effect, shapes: Mapping[str, Values]) -> Values:
-    """The most likely shape of one effect beside the others."""
+def _unit_columns(at: ChannelFit, effects: Sequence[Effect], shapes: Mapping[str, Values]) -> Array:
+    """Spectra of effects for a strength of 1, shape (b, effects)."""
+    return np.column_stack([unit_spectrum(effect, at.parts, shapes[effect.name]) for effect in effects])
+
+
+def _best_shape(at: ChannelFit, effect: Effect, grid: Array, shapes: Mapping[str, Values]) -> Values:
+    """The most likely shape of one effect beside the others, near the best of a grid (g,)."""
     name = effect.parameters[1].name
-
-    def loss(log_value: float) -> float:
-        return -_best_strengths(at, {**shapes, effect.name: {name: float(np.exp(log_value))}})[1]
-
-    logs = np.log(shape_grid(effect, name, at.channel))
-    best = int(np.argmin([loss(value) for value in logs]))
+    others = [other for other in at.effects if other is not effect]
+    G = np.column_stack([_unit_columns(at, others, shapes), at.seen]) if others else at.seen[:, None].copy()
+    tried = np.array([unit_spectrum(effect, at.parts, {name: value}) for value in grid.tolist()])
+    thetas, values = profile(G, tried, at.seen, at.freedom)
+    best = int(np.argmax(values))
+    logs = np.log(grid)
     ends = logs[max(0, best - 1)], logs[min(len(logs) - 1, best + 1)]
     if ends[0] == ends[1]:
         return {name: float(np.exp(ends[0]))}
+    none = np.zeros(len(at.seen))
+
+    def loss(log_value: float) -> float:
+        G[:, -1] = unit_spectrum(effect, at.parts, {name: float(np.exp(log_value))})
+        return -float(maximise_from(thetas[best].copy(), G, at.seen, at.freedom, none)[1])
+
     found = minimize_scalar(loss, bounds=ends, method="bounded", options={"xatol": 0.02})
     return {name: float(np.exp(found.x))}

@@ -243,6 +243,19 @@ def reflected_squares(b: Array, k: int) -> float:
 
 
 @njit(cache=True, nogil=True)
+def matched_sums(forms: Array, weighted: Array, weight: Array) -> tuple[Array, Array]:
+    """Weighted products (g,) of forms (g, k) with data, which come times their weights (k,), and with themselves."""
+    tops, bottoms = np.empty(len(forms)), np.empty(len(forms))
+    for g in range(len(forms)):
+        top = bottom = 0.0
+        for k in range(len(weight)):
+            top += forms[g, k] * weighted[k]
+            bottom += forms[g, k] ** 2 * weight[k]
+        tops[g], bottoms[g] = top, bottom
+    return tops, bottoms
+
+
+@njit(cache=True, nogil=True)
 def first_order_lag(values: Array, steps: float) -> Array:
     """Values (n,) through a first-order lag with a time constant of so many steps, settled at the first value."""
     share = 1.0 - np.exp(-1.0 / steps)

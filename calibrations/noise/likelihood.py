@@ -12,7 +12,7 @@ Source  Whittle, Ark. Mat. 2 (1953); Fevotte, Bertin and Durrieu, Neural Comput.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -36,7 +36,8 @@ from calibrations.table import Array
 # Source  Whittle, Ark. Mat. 2 (1953); Fevotte, Bertin and Durrieu, Neural Comput. 21 (2009): multiplicative steps.
 
 MULTIPLICATIVE_STEPS, SCORING_STEPS, SWEEPS = 20, 100, 200
-CONVERGED = 1e-9
+CONVERGED = 1e-9  # log-likelihood that a step gains
+NEARLY = 1e-3  # the same on a grid, of which the best point is refined
 
 
 @njit(cache=True, nogil=True)
@@ -53,9 +54,16 @@ def maximise(G: Array, seen: Array, freedom: Array, base: Array) -> tuple[Array,
     for j in range(p):
         theta[j] = np.exp(np.sum(freedom * np.log(seen / G[:, j])) / np.sum(freedom)) / p
     for _ in range(MULTIPLICATIVE_STEPS):
-        S = base + G @ theta
-        for j in range(p):
-            theta[j] *= np.sqrt(np.sum(freedom * G[:, j] * seen / S**2) / np.sum(freedom * G[:, j] / S))
+        share = freedom / (base + G @ theta)
+        theta *= np.sqrt((G.T @ (share * share * seen / freedom)) / (G.T @ share))
+    return maximise_from(theta, G, seen, freedom, base)
+
+
+@njit(cache=True, nogil=True)
+def maximise_from(
+    theta: Array, G: Array, seen: Array, freedom: Array, base: Array, converged: float = CONVERGED
+) -> tuple[Array, float]:
+    """The same from coefficients (p,) near the maximum, such as those for a shape nearby."""
     value = log_likelihood(base + G @ theta, seen, freedom)
     for _ in range(SCORING_STEPS):
         step = _scoring_step(G, seen, freedom, base, theta) - theta
@@ -72,9 +80,23 @@ def maximise(G: Array, seen: Array, freedom: Array, base: Array) -> tuple[Array,
             break
         gained = better - value
         theta, value = there, better
-        if gained < CONVERGED:
+        if gained < converged:
             break
     return theta, value
+
+
+@njit(cache=True, nogil=True)
+def profile(G: Array, shapes: Array, seen: Array, freedom: Array) -> tuple[Array, Array]:
+    """Coefficients (g, p) and log L (g,) with the last column of G (b, p) replaced by each of `shapes` (g, b)."""
+    base = np.zeros(len(seen))
+    thetas, values = np.zeros((len(shapes), G.shape[1])), np.zeros(len(shapes))
+    for k in range(len(shapes)):
+        G[:, -1] = shapes[k]
+        if k == 0:
+            thetas[k], values[k] = maximise(G, seen, freedom, base)
+        else:
+            thetas[k], values[k] = maximise_from(thetas[k - 1].copy(), G, seen, freedom, base, NEARLY)
+    return thetas, values
 
 
 @njit(cache=True, nogil=True)
@@ -116,6 +138,7 @@ class ChannelFit:
     effects: tuple[Effect, ...]  # those with a spectrum
     values: Mapping[str, Values]
     line_bound: float = 0.0  # amplitude that one more line might have
+    fits: dict[frozenset[str], ChannelFit] = field(default_factory=dict, repr=False)  # to this spectrum, by effects
 
     @cached_property
     def seen(self) -> Array:
@@ -188,7 +211,13 @@ class ChannelFit:
 def effect_spectrum(effect: Effect, parts: Sequence[Bands], values: Values) -> Array:
     """Two-sided density that an effect makes in all bands."""
     p = EffectValues.of(values)
-    return np.concatenate([np.asarray(effect.spectrum(part, p), dtype=float) for part in parts])
+    spectra = [np.asarray(effect.spectrum(part, p), dtype=float) for part in parts]
+    return spectra[0] if len(spectra) == 1 else np.concatenate(spectra)
+
+
+def unit_spectrum(effect: Effect, parts: Sequence[Bands], shape: Values) -> Array:
+    """The same for a strength of 1."""
+    return effect_spectrum(effect, parts, {effect.parameters[0].name: 1.0, **shape})
 
 
 def effect_lines(effect: Effect, values: Values) -> tuple[Line, ...]:

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import combinations
 
 import numpy as np
@@ -43,7 +43,8 @@ def chance(gain: float, tubes: Sequence[float]) -> float:
     return float(min(1.0, sum(w * chdtrc(k, gain) for k, w in enumerate(weights) if k)))
 
 
-def least_gain(of_chance: float, tubes: Sequence[float]) -> float:
+@lru_cache(maxsize=256)  # that of processes without a shape is the same for all records
+def least_gain(of_chance: float, tubes: tuple[float, ...]) -> float:
     """The gain that noise alone makes with this chance."""
     return float(brentq(lambda gain: chance(gain, tubes) - of_chance, 1e-3, MOST_GAIN))
 
@@ -132,13 +133,16 @@ class Mixtures:
     def best(self) -> Mixture:
         """The one that is worth most.
 
-        No mixture gains more than all effects together, so that a mixture whose price leaves too little is not fitted.
+        No mixture gains more than one that contains it, so that a mixture whose price leaves too little is not fitted.
+        Shapes take longest to fit: mixtures with few of them come first.
         """
-        most = self.of(self.others).gain
-        best = self.of(())
-        for subset in (subset for k in range(1, len(self.others) + 1) for subset in combinations(self.others, k)):
+        best, fitted = self.of(()), [self.of(self.others)]
+        subsets = [subset for k in range(1, len(self.others) + 1) for subset in combinations(self.others, k)]
+        for subset in sorted(subsets, key=lambda subset: sum(len(effect.parameters) > 1 for effect in subset)):
+            most = min(wider.gain for wider in fitted if set(subset) <= set(wider.effects))
             if most - sum(self.prices[effect.name] for effect in subset) > best.worth:
-                best = max(best, self.of(subset), key=lambda mixture: mixture.worth)
+                fitted.append(self.of(subset))
+                best = max(best, fitted[-1], key=lambda mixture: mixture.worth)
         return best
 
     def lost_without(self, mixture: Mixture, name: str) -> float:
@@ -147,15 +151,7 @@ class Mixtures:
         return mixture.gain - rest.gain
 
     def _fitted(self, effects: Sequence[Effect]) -> tuple[ChannelFit, ...]:
-        names = frozenset(effect.name for effect in effects)
-        if names not in self._fits:
-            self._fits[names] = tuple(fit_effects(each, (*self.given, *effects)) for each in self.seen)
-        return self._fits[names]
-
-    @cached_property
-    def _fits(self) -> dict[frozenset[str], tuple[ChannelFit, ...]]:
-        """The fits so far by the names of their effects: a search returns to many of them."""
-        return {}
+        return tuple(fit_effects(each, (*self.given, *effects)) for each in self.seen)
 
 
 def likelihood(channels: Iterable[ChannelFit]) -> float:

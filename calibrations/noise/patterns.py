@@ -10,8 +10,9 @@ Source  Van Trees, Detection, Estimation, and Modulation Theory, part I, 4.3: a 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache, partial
 from itertools import product
 
 import numpy as np
@@ -19,7 +20,7 @@ from scipy.fft import dct, dst
 
 from calibrations.criteria import INSEPARABLE, PATTERN_AMPLITUDE, PATTERN_CERTAIN
 from calibrations.noise.channel_spectrum import means_without
-from calibrations.noise.kernels import first_order_lag
+from calibrations.noise.kernels import first_order_lag, matched_sums
 from calibrations.noise.likelihood import ChannelFit
 from calibrations.noise.record import Channel
 from calibrations.noise.samples import hidden_in
@@ -34,9 +35,10 @@ PER = {"temperature_c": "K", "supply_v": "V"}  # units of columns
 
 @dataclass(frozen=True)
 class Pattern:
-    """A part of one channel's means that is no noise: a `form` (m,), its amount, and how uncertain that is.
+    """A part of one channel's means that is no noise: a form (m,), its amount, and how uncertain that is.
 
-    `words` has a place for that amount. `gain`: twice the log-likelihood; `price`: of its search. `cause` is the logged
+    `make` computes the form, which few patterns need. `words` has a place for the amount. `gain`: twice the
+    log-likelihood; `price`: of its search. `cause` is the logged
     column that it follows; `rivals` are the other patterns that explain as much. `doubt`: how uncertain the form leaves
     the amount, of the amount.
     """
@@ -44,7 +46,7 @@ class Pattern:
     kind: str
     axis: str
     words: str
-    form: Array
+    make: Callable[[], Array] = field(repr=False)
     size: float
     std: float
     gain: float
@@ -52,6 +54,12 @@ class Pattern:
     cause: str = ""
     doubt: float = 0.0
     rivals: tuple[Pattern, ...] = ()
+
+    @cached_property
+    def form(self) -> Array:
+        """Its form, of mean 0, shape (m,)."""
+        form = self.make()
+        return np.asarray(form - form.mean())
 
     @property
     def worth(self) -> float:
@@ -81,6 +89,8 @@ class Pattern:
 
 def pattern_of(found: ChannelFit) -> Pattern | None:
     """The pattern that explains most of what one channel does, where it is no chance."""
+    if hidden_in(found.channel.oddities) is not None:
+        return None  # rounding makes steps and slopes of its own
     spectrum, unit = _Ordinates.of(found), found.channel.unit
     every = [
         _step(found.channel, spectrum, unit), *_courses(found.channel, spectrum, unit),
@@ -88,7 +98,7 @@ def pattern_of(found: ChannelFit) -> Pattern | None:
     ]  # fmt: skip
     kinds = {(each.kind, each.cause) for each in every}
     best, *others = sorted((_best(every, *kind) for kind in kinds), key=lambda each: -each.worth)
-    if best.worth <= 0 or hidden_in(found.channel.oddities) is not None:  # rounding makes steps and slopes of its own
+    if best.worth <= 0:
         return None
     return replace(best, rivals=tuple(each for each in others if best.worth - each.worth < INSEPARABLE))
 
@@ -129,40 +139,77 @@ class _Ordinates:
 
 def _step(channel: Channel, by: _Ordinates, unit: str) -> Pattern:
     """The step that explains most, at whatever mean."""
-    n, k = by.n, np.arange(1, len(by.seen) + 1)
-    per_step = -np.sqrt(2 / n) / (2 * np.sin(np.pi * k / (2 * n)))  # of a step at m: times sin(pi k m / n)
+    n, k = by.n, len(by.seen)
+    per_step = _per_step(n, k)
     along, power = np.zeros(n - 1), np.zeros(n + 1)
-    along[: min(len(k), n - 1)] = (by.seen * per_step / by.variance)[: n - 1]
-    power[1 : len(k) + 1] = per_step**2 / by.variance
+    along[: min(k, n - 1)] = (by.seen * per_step / by.variance)[: n - 1]
+    power[1 : k + 1] = per_step**2 / by.variance
     top = dst(along, type=1) / 2
-    turned = (dct(power, type=1) + power[0] + (-1.0) ** np.arange(n + 1) * power[-1]) / 2
-    twice = 2 * np.arange(1, n)
-    bottom = (power.sum() - turned[np.where(twice <= n, twice, 2 * n - twice)]) / 2
+    turned = dct(power, type=1) + power[0]
+    turned[::2] += power[-1]
+    turned[1::2] -= power[-1]
+    up = turned[2::2] / 2  # at 2, 4 .. n, and back
+    bottom = (power.sum() - np.concatenate([up, up[::-1][1 - n % 2 :]])) / 2
     gain = np.where(bottom > 0, top**2 / np.maximum(bottom, np.finfo(float).tiny), 0.0)
     gain[: EDGE - 1] = gain[n - EDGE :] = 0.0
     at = int(np.argmax(gain))
     text = f"a step of {{}} {unit} of {channel.axis} at t = {(at + 1) * channel.sampling.interval_s:.6g} s"
-    form = np.asarray(np.arange(n) > at, dtype=float)
-    return _matched(STEP, channel, text, form, by, PATTERN_AMPLITUDE + 2 * float(np.log(n)))
+    price = PATTERN_AMPLITUDE + 2 * float(np.log(n))
+    size, std = float(top[at] / bottom[at]), float(bottom[at] ** -0.5)
+    return Pattern(STEP, channel.axis, text, partial(_step_form, n, at), size, std, float(gain[at]), price)
 
 
-def _matched(
-    kind: str, channel: Channel, words: str, form: Array, by: _Ordinates, price: float, cause: str = ""
-) -> Pattern:
-    form = form - form.mean()
-    size, std, gain = by.matched(form)
-    return Pattern(kind, channel.axis, words, form, size, std, gain, price, cause)
+def _step_form(n: int, at: int) -> Array:
+    return np.asarray(np.arange(n) > at, dtype=float)
+
+
+@lru_cache(maxsize=2)
+def _per_step(n: int, k: int) -> Array:
+    """Cosine coefficients (k,) of a step at mean m of n, over sin(pi k m / n)."""
+    return np.asarray(-np.sqrt(2 / n) / (2 * np.sin(np.pi * np.arange(1, k + 1) / (2 * n))))
 
 
 def _courses(channel: Channel, by: _Ordinates, unit: str) -> Iterator[Pattern]:
-    """A drift in a straight line, and settlings."""
-    hours = (np.arange(by.n) + 0.5) * channel.sampling.interval_s / 3600
-    yield _matched(DRIFT, channel, f"a drift of {channel.axis} by {{}} {unit}/h", hours, by, PATTERN_AMPLITUDE)
-    price = PATTERN_AMPLITUDE + 2 * float(np.log(len(TIMES)))
-    for share in TIMES.tolist():
-        left = -np.exp(-(np.arange(by.n) + 0.5) / by.n / share)
-        text = f"{channel.axis} settles by {{}} {unit}, with a time constant of about {share * channel.length_s:.2g} s"
-        yield _matched(SETTLING, channel, text, left, by, price)
+    """A drift in a straight line, and the settling that explains most."""
+    n, axis = by.n, channel.axis
+    tops, bottoms = matched_sums(_course_coefficients(n, len(by.seen)), by.seen / by.variance, 1 / by.variance)
+    sizes, stds, gains = (each.tolist() for each in (tops / bottoms, bottoms**-0.5, tops**2 / bottoms))
+    hours = channel.sampling.interval_s / 3600
+    yield Pattern(
+        DRIFT, axis, f"a drift of {axis} by {{}} {unit}/h", partial(_ramp, n, hours), sizes[0] / hours,
+        stds[0] / hours, gains[0], PATTERN_AMPLITUDE,
+    )  # fmt: skip
+    best = int(np.argmax(gains[1:]))
+    share, price = float(TIMES[best]), PATTERN_AMPLITUDE + 2 * float(np.log(len(TIMES)))
+    text = f"{axis} settles by {{}} {unit}, with a time constant of about {share * channel.length_s:.2g} s"
+    make = partial(_settling, n, share)
+    yield Pattern(SETTLING, axis, text, make, sizes[1 + best], stds[1 + best], gains[1 + best], price)
+
+
+def _ramp(n: int, per_mean: float) -> Array:
+    return np.asarray((np.arange(n) + 0.5) * per_mean)
+
+
+def _settling(n: int, share: float) -> Array:
+    return np.asarray(-np.exp(-(np.arange(n) + 0.5) / n / share))
+
+
+@lru_cache(maxsize=2)
+def _course_coefficients(n: int, k: int) -> Array:
+    """Cosine coefficients of a ramp by 1 from mean to mean, and of settlings with TIMES; shape (1 + times, k).
+
+    The sum of exp(-a (j + 1/2)) cos(2 y (j + 1/2)) over j < n is geometric, with y = pi k / (2 n); that of the ramp is
+    its derivative at a = 0.
+    """
+    number = np.arange(1, k + 1)
+    y = np.pi * number / (2 * n)
+    cosine, square, odd = np.cos(y), np.sin(y) ** 2, number % 2 == 1
+    found = np.empty((1 + len(TIMES), k))
+    found[0] = np.where(odd, -cosine / square, 0.0)
+    for row, share in zip(found[1:], TIMES.tolist(), strict=True):
+        half, end = np.sinh(1 / (2 * n * share)), np.exp(-1 / share)
+        row[:] = -half * cosine / (square + half**2) * np.where(odd, 1 + end, 1 - end)
+    return np.asarray(found / np.sqrt(2 * n))
 
 
 def _followed(channel: Channel, by: _Ordinates, unit: str) -> Iterator[Pattern]:
@@ -173,7 +220,8 @@ def _followed(channel: Channel, by: _Ordinates, unit: str) -> Iterator[Pattern]:
         for (values, doubt), (share, behind) in product(readings, _lags(channel.length_s)):
             form = values if share == 0 else first_order_lag(values, share * len(values))
             text = f"{channel.axis} follows {name} by {{}} {unit}/{PER.get(name, name)}{behind}"
-            yield replace(_matched(FOLLOWS, channel, text, form, by, price, name), doubt=doubt)
+            make = partial(np.asarray, form)
+            yield Pattern(FOLLOWS, channel.axis, text, make, *by.matched(form), price, name, doubt)
 
 
 def _lags(length_s: float) -> Iterator[tuple[float, str]]:

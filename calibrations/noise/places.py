@@ -128,7 +128,7 @@ def evaluate(model: Model, still: Still) -> NoiseFit | None:
         }
         lines = tuple(line for term in terms for line in effect_lines(term.effect, values[term.name]))
         channels.append(_with_values(channel, lines, values, model))
-    return NoiseFit(still, replace(model, unit=still.unit), tuple(channels))
+    return NoiseFit(still, replace(model, unit=still.unit), tuple(channels), fitted=False)
 
 
 def _with_values(channel: Channel, lines: tuple[Line, ...], values: dict[str, Values], model: Model) -> ChannelFit:

@@ -27,7 +27,6 @@ from calibrations.noise.fit import (
     find_lines,
     fit,
     most_lines,
-    noise_fit,
     noise_terms,
     shape_grid,
     without_effects,
@@ -113,7 +112,7 @@ class Search:
         model = self.model
         for name in self.gains:
             model = model.with_effect(self.effects[name])
-        return noise_fit(model, self.still, self.mixture.channels)
+        return NoiseFit(self.still, model, self.mixture.channels)
 
     def _rivals(self, effect: Effect) -> list[str]:
         rest = [e for e in self.mixture.effects if e is not effect]
@@ -171,7 +170,8 @@ def _with_common_amounts(whole: Still, found: Search, given: tuple[Effect, ...])
     for channel, beside in zip(whole.channels, found.mixture.channels, strict=True):
         own = tuple(pattern for pattern in found.patterns if pattern.axis == channel.axis)
         patterns += refitted(own, beside, channel) if own else ()
-    left = _search_once(without_patterns(whole, tuple(patterns)), found.model, found.effects, given)
+    cleaned = with_cleaned_curves(without_patterns(whole, tuple(patterns)), tuple(patterns))
+    left = _search_once(cleaned, found.model, found.effects, given)
     return replace(left, patterns=tuple(patterns), telegraphs=found.telegraphs)
 
 
@@ -205,14 +205,18 @@ def _patterns(found: Search, channels: tuple[ChannelFit, ...]) -> tuple[Pattern,
 
 
 def without_patterns(still: Still, patterns: tuple[Pattern, ...]) -> Still:
-    """The record less the patterns; its Allan deviations from a mean's length on, where they show."""
-    channels, curves = still.channels, dict(still.allan)
+    """The record less the patterns; its Allan deviations are still those with them."""
+    channels = still.channels
     for pattern in patterns:
         channels = tuple(pattern.taken_off(channel) for channel in channels)
-    for channel in channels:
-        if channel.axis in {pattern.axis for pattern in patterns}:
-            curves[channel.axis] = _cleaned_curve(curves[channel.axis], channel)
-    return replace(still, channels=channels, allan=curves)
+    return replace(still, channels=channels)
+
+
+def with_cleaned_curves(still: Still, patterns: tuple[Pattern, ...]) -> Still:
+    """The record with Allan deviations less the patterns, from a mean's length on, where they show."""
+    changed = {pattern.axis for pattern in patterns}
+    curves = {c.axis: _cleaned_curve(still.allan[c.axis], c) for c in still.channels if c.axis in changed}
+    return replace(still, allan={**still.allan, **curves})
 
 
 def _cleaned_curve(curve: Curve, channel: Channel) -> Curve:
@@ -236,12 +240,8 @@ def _search_once(still: Still, model: Model, known: Mapping[str, Effect], given:
     others = tuple(e for e in known.values() if "spectrum" in e.places and e not in smooth)
     plain = tuple(effect for effect in (*smooth, *others) if len(effect.parameters) == 1)
     most = most_lines(known.values())
-    each = [find_lines(channel, plain, most) if most else ((), 0.0) for channel in still.channels]
-    shown = tuple(
-        replace(without_effects(channel, lines), line_bound=bound)
-        for channel, (lines, bound) in zip(still.channels, each, strict=True)
-    )
-    return Search(still, model, known, tuple(lines for lines, _ in each), (), Mixtures(shown, smooth, others))
+    shown = tuple(find_lines(c, plain, most) if most else without_effects(c) for c in still.channels)
+    return Search(still, model, known, tuple(each.lines for each in shown), (), Mixtures(shown, smooth, others))
 
 
 def candidates(found: Search, before: NoiseFit, doubts: Mapping[str, tuple[str, ...]]) -> tuple[Candidate, ...]:

@@ -14,8 +14,8 @@ Source  Strang, SIAM Review 41 (1999): the transform; Whittle, Ark. Mat. 2 (1953
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,7 @@ from calibrations.table import Array
 
 SINGLE = 16  # lowest coefficients, that stand for themselves
 RATIO = 1.05  # of a band's ends
+MOST_COLUMNS = 128  # that are kept: those of a grid of shapes are computed before those between
 
 
 @dataclass(frozen=True)
@@ -39,11 +40,7 @@ class Bands:
     sampling: Sampling
     number: Array  # (b,) number of the coefficient; 0: not of a cosine transform
     corner_hz: float
-
-    @cached_property
-    def _columns(self) -> dict[str, Array]:
-        """Columns of processes without a shape, which every fit needs again."""
-        return {}
+    columns: dict[tuple[str, float], Array] = field(default_factory=dict, repr=False)  # those computed so far
 
     def column(self, process: str, time_constant_s: float = 0.0) -> Array:
         """What is expected of a process, for a coefficient of 1, shape (b,).
@@ -51,11 +48,13 @@ class Bands:
         What a filter lets through of white noise is a Gauss-Markov process, and none of it folds back as white noise
         would; what is slow is so far below the corner that the filter's gain is enough.
         """
-        if process not in LINEAR:
-            return self._column(process, time_constant_s)
-        if process not in self._columns:
-            self._columns[process] = self._column(process)
-        return self._columns[process]
+        key = process, time_constant_s
+        if key not in self.columns:
+            column = self._column(process, time_constant_s)
+            if len(self.columns) >= MOST_COLUMNS:
+                return column
+            self.columns[key] = column
+        return self.columns[key]
 
     def _column(self, process: str, time_constant_s: float = 0.0) -> Array:
         f = self.frequency_hz
@@ -94,11 +93,17 @@ def slow_bands(means: Array, sampling: Sampling, corner_hz: float = np.inf) -> B
     n = len(means)
     highest = min(n, 2 + int(corner_hz * n * sampling.interval_s) if np.isfinite(corner_hz) else n)
     power = dct(means, type=2, norm="ortho")[1:highest] ** 2 * sampling.interval_s
-    edges = _edges(len(power))
+    empty = _slow_grid(n, highest, sampling, corner_hz)
+    return replace(empty, density=np.add.reduceat(power, _edges(highest - 1)[:-1]) / empty.freedom)
+
+
+@lru_cache(maxsize=8)
+def _slow_grid(n: int, highest: int, sampling: Sampling, corner_hz: float) -> Bands:
+    """Slow bands without power: records of one length have their columns in common."""
+    edges = _edges(highest - 1)
     count = np.diff(edges).astype(float)
     number = (edges[1:] + edges[:-1] + 1) / 2
-    density = np.add.reduceat(power, edges[:-1]) / count
-    return Bands(number / (2 * n * sampling.interval_s), density, count, sampling, number, corner_hz)
+    return Bands(number / (2 * n * sampling.interval_s), np.zeros(len(count)), count, sampling, number, corner_hz)
 
 
 def fast_bands(frequency_hz: Array, density: Array, freedom: float, rate_hz: float, corner_hz: float) -> Bands:
@@ -118,6 +123,7 @@ def fast_bands(frequency_hz: Array, density: Array, freedom: float, rate_hz: flo
     return Bands(mean(frequency_hz), mean(density), freedom * count / alike, Sampling(rate_hz), none, corner_hz)
 
 
+@lru_cache(maxsize=8)
 def _edges(n: int) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
     """Where bands of n ordinates begin, and n."""
     edges = [*range(min(n, SINGLE) + 1)]

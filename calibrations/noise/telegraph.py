@@ -90,30 +90,12 @@ def _telegraph(found: ChannelFit, values: Array, path: Path) -> Telegraph:
 
 def _path(values: Array, width: int) -> Path | None:
     """The likeliest path of two levels that stand out of means over so many values; None where it hardly goes."""
-    at = _two_means(values[: len(values) // width * width].reshape(-1, width).mean(axis=1))
-    spread, goes = float(np.std(np.diff(values))) / 2**0.5, 1 / (16 * width)
-    if not spread > 0 or not len(at):
+    low, high = two_means(values[: len(values) // width * width].reshape(-1, width).mean(axis=1))
+    spread = float(np.std(np.diff(values))) / 2**0.5
+    if not spread > 0 or not high > low:
         return None
-    path = np.zeros(0, dtype=np.int64)
-    for _ in range(ROUNDS):
-        path = viterbi((values - at.mean()) * (at[1] - at[0]) / spread**2, float(np.log(goes / (1 - goes))))
-        times = int(np.count_nonzero(np.diff(path)))
-        if times < FEWEST_JUMPS:
-            return None
-        at, goes = _levels(values, path), times / len(path)
-        spread = max(float(np.std(values - at[path])), LEAST * float(at[1] - at[0]))
-    return path
-
-
-def _two_means(means: Array) -> Array:
-    """Two levels (2,) in means: those of the nearer ones (two-means)."""
-    at = np.array([means.min(), means.max()])
-    for _ in range(ROUNDS):
-        upper = means > at.mean()
-        if upper.all() or not upper.any():
-            return at[:0]
-        at = np.array([means[~upper].mean(), means[upper].mean()])
-    return at
+    path = likeliest_path(values, low, high, spread, 1 / (16 * width))
+    return path if len(path) else None
 
 
 def _levels(values: Array, path: Path) -> Array:
@@ -134,24 +116,68 @@ def _path_deviance(values: Array, path: Path) -> float:
 
 
 @njit(cache=True, nogil=True)
-def viterbi(upper: Array, goes: float) -> Path:
-    """The likeliest path of 0 and 1, shape (n,).
+def two_means(means: Array) -> tuple[float, float]:
+    """Two levels of means (n,): those of the nearer ones; twice the same where there is only one."""
+    low, high = means.min(), means.max()
+    for _ in range(ROUNDS):
+        middle, sums, counts = (low + high) / 2, np.zeros(2), np.zeros(2)
+        for value in means:
+            level = 1 if value > middle else 0
+            sums[level] += value
+            counts[level] += 1
+        if counts.min() == 0:
+            return low, low
+        low, high = sums[0] / counts[0], sums[1] / counts[1]
+    return low, high
 
-    upper  (n,) the logarithm of how much more likely each value is at the upper level
-    goes   the logarithm of how much more likely it goes than stays, between two values
+
+@njit(cache=True, nogil=True)
+def likeliest_path(values: Array, low: float, high: float, spread: float, goes: float) -> Path:
+    """Path and levels in turn, shape (n,); empty where it jumps less than FEWEST_JUMPS times.
+
+    spread  standard deviation of the noise beside the levels
+    goes    share of the values at which the path jumps
     """
-    n = len(upper)
-    came = np.zeros((n, 2), dtype=np.int64)
-    lower_worth, upper_worth = 0.0, upper[0]
-    for i in range(1, n):
-        came[i, 0] = 1 if upper_worth + goes > lower_worth else 0
-        came[i, 1] = 0 if lower_worth + goes > upper_worth else 1
-        lower_worth, upper_worth = (
-            max(lower_worth, upper_worth + goes),
-            max(upper_worth, lower_worth + goes) + upper[i],
-        )
-    path = np.zeros(n, dtype=np.int64)
-    path[n - 1] = 1 if upper_worth > lower_worth else 0
-    for i in range(n - 1, 0, -1):
-        path[i - 1] = came[i, path[i]]
+    n = len(values)
+    path, before = np.zeros(n, dtype=np.int64), np.empty(n, dtype=np.int8)
+    for _ in range(ROUNDS):
+        changed = viterbi(values, (low + high) / 2, (high - low) / spread**2, np.log(goes / (1 - goes)), before, path)
+        times, upper, total, above = 0, 0, 0.0, 0.0
+        for i in range(n):
+            times += i > 0 and path[i] != path[i - 1]
+            upper += path[i]
+            total += values[i]
+            above += path[i] * values[i]
+        if times < FEWEST_JUMPS:
+            return path[:0]
+        if not changed:
+            break
+        low, high, goes = (total - above) / (n - upper), above / upper, times / n
+        square = 0.0
+        for i in range(n):
+            square += (values[i] - low - path[i] * (high - low)) ** 2
+        spread = max(np.sqrt(square / n), LEAST * (high - low))
     return path
+
+
+@njit(cache=True, nogil=True)
+def viterbi(values: Array, middle: float, slope: float, goes: float, before: NDArray[np.int8], path: Path) -> bool:
+    """Write the likeliest path of 0 and 1 to `path` (n,), and return whether it changes.
+
+    slope   a value's distance from the middle, times this, is the logarithm of how much more likely the upper level is
+    goes    the logarithm of how much more likely it goes than stays, between two values
+    before  (n,) memory for the level that both come from, +1 or -1; 0: each from itself
+
+    Only the difference of the log-likelihoods of both levels counts: beyond -goes either way, both come from one level.
+    """
+    n = len(values)
+    ahead = (values[0] - middle) * slope
+    for i in range(1, n):
+        before[i] = (ahead > -goes) - (ahead < goes)
+        ahead = min(max(ahead, goes), -goes) + (values[i] - middle) * slope
+    level, changed = 1 if ahead > 0 else 0, False
+    for i in range(n - 1, -1, -1):
+        changed |= path[i] != level
+        path[i] = level
+        level = (before[i] + 1) // 2 if before[i] != 0 else level
+    return changed

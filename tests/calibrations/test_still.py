@@ -227,7 +227,16 @@ def test_chances_are_those_of_a_bound_and_of_a_tube() -> None:
     assert chance(6.6349, [1.0]) == pytest.approx(0.005 + np.exp(-6.6349 / 2), rel=1e-3)
     assert chance(6.6349, [0.0, 0.0]) == pytest.approx(0.5 * 0.01 + 0.25 * np.exp(-6.6349 / 2), rel=1e-3)
     assert chance(0.0, [0.0]) == 1.0
-    assert chance(least_gain(1e-4, [0.5, 0.5]), [0.5, 0.5]) == pytest.approx(1e-4)
+    assert chance(
+        least_gain(
+            1e-4,
+            (
+                0.5,
+                0.5,
+            ),
+        ),
+        [0.5, 0.5],
+    ) == pytest.approx(1e-4)
 
 
 def test_an_effect_of_ones_own_is_one_more_process() -> None:
