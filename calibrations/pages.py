@@ -14,8 +14,7 @@ import numpy as np
 from calibrations.compensation.forward import known_at_run_time
 from calibrations.effects import Effect, Parameter
 from calibrations.effects.catalogue import catalogue
-from calibrations.presentation.charts.signature import shown_value, signature_chart
-from calibrations.presentation.charts.signature_noise import noise_signature_chart, shown_noise
+from calibrations.presentation.charts.signature import noise_signature_chart, shown_noise, shown_value, signature_chart
 from calibrations.presentation.static import sparing, svg
 
 ACTS_ON = {
@@ -61,9 +60,9 @@ def index(effects: Mapping[str, Effect]) -> str:
     return (
         "# The catalogue of physical effects\n\n"
         "Made by `python -m calibrations.pages docs/effects` from the files in `calibrations/effects`;\n"
-        "`rig effects NAME` shows the same in a terminal. The pictures show what the linear model leaves of each,\n"
-        "noise aside; those of noise, what it adds to white noise.\n\n"
-        f"| effect | acts on | what happens | what it leaves |\n| --- | --- | --- | --- |\n{rows}\n{SOURCES}"
+        "`rig effects NAME` shows the same in a terminal. The pictures show the residual of the linear\n"
+        "model without noise; those of noise show its contribution to white noise.\n\n"
+        f"| effect | acts on | what happens | residual |\n| --- | --- | --- | --- |\n{rows}\n{SOURCES}"
     )
 
 
@@ -92,22 +91,20 @@ def write(folder: Path) -> None:
 
 def _alternative(effect: Effect) -> str:
     if effect.is_noise:
-        return f"What {effect.name} adds to white noise"
-    return f"What {effect.first_kind.perfect_sensor} leaves of {effect.name}"
+        return f"Contribution of {effect.name} to white noise"
+    return f"Residual of {effect.first_kind.perfect_sensor} with {effect.name}"
 
 
 def _caption(effect: Effect) -> str:
     """What the picture shows, and of how large an effect."""
     if effect.is_noise:
         return _caption_of_noise(effect)
-    kept = {"bias": "A model without a bias", "scale-factor": "A model without a scale factor"}
+    kept = {"bias": "a model without a bias", "scale-factor": "a model without a scale factor"}
     kind = effect.first_kind
     plain, turned = kind.perfect_sensor, kind.field or kind.turning
     values = [_value(p, effect) for p in effect.parameters if turned or not p.where]
-    return (
-        f"{kept.get(effect.name, plain[0].upper() + plain[1:])} leaves this, noise aside, of a sensor{kind.nominal} "
-        f"with {', '.join(values)}."
-    )
+    model, shown = kept.get(effect.name, plain), ", ".join(values)
+    return f"Residual of {model} for a sensor{kind.nominal} with {shown}, without noise."
 
 
 def _caption_of_noise(effect: Effect) -> str:

@@ -5,9 +5,8 @@ The only state is the history of a model with memory: a structure that the calle
 
 from __future__ import annotations
 
-from calibrations.compensation.about import Origin, header_lines, unit_of_input
 from calibrations.compensation.cost import PASSES
-from calibrations.compensation.document import ReferenceVectors
+from calibrations.compensation.document import Origin, ReferenceVectors, header_lines, unit_of_input
 from calibrations.compensation.graph import OPERATIONS
 from calibrations.compensation.inverse import Compensation
 from calibrations.compensation.program import Line

@@ -9,20 +9,223 @@ are
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
+from decimal import ROUND_CEILING, Context
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
 from scipy.stats import qmc
 
-from calibrations.compensation.about import Origin, header_lines, unit_of_input
 from calibrations.compensation.cost import ErrorSize
+from calibrations.compensation.forward import FORCES, INVERTED, LEFT_OUT, NOISE, OF_THE_RIG
 from calibrations.compensation.graph import evaluate_nodes
 from calibrations.compensation.inverse import Compensation
 from calibrations.compensation.program import Line
 from calibrations.documents import parameters_document
+from calibrations.model import Estimate
+from calibrations.presentation.text import as_written
 from calibrations.table import Array
+
+WIDTH = 112
+UPWARD = Context(prec=3, rounding=ROUND_CEILING)  # bounds are not rounded down
+UNIT_TEXT = {
+    "g": "g, the local gravity of the calibration",
+    "field": "shares of the field at the calibration",
+    "deg/s": "deg/s",
+}
+PROVENANCE_TITLES = {"data": "data", "data_sha256": "SHA-256 of the data", "created": "calibrated", "sensor": "sensor",
+        "serial": "serial number", "gravity_m_s2": "local gravity, m/s^2"}  # fmt: skip
+UNITS = {"temperature_c": "C", "supply_v": "V", "t_s": "s since the power came on"}
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Name and digest of the model file, the program that wrote the source, and the date."""
+
+    name: str
+    model_file: str
+    sha256: str
+    program: str
+    date: str
+
+
+def header_lines(made: Compensation, origin: Origin) -> list[str]:
+    """The head of a source file, wrapped; an empty line separates its sections."""
+    sections = [_what(made, origin), _inputs(made), _how(made), _effects(made), _uncertainty(made), _parameters(made)]
+    return [line for section in sections for line in [*(w for text in section for w in _wrapped(text)), ""]][:-1]
+
+
+def error_text(value: float, unit: str) -> str:
+    """An error in the unit of the sensed quantity; in mg for g."""
+    return f"{1e3 * value:.2g} mg" if unit == "g" else f"{value:.2g} {unit}"
+
+
+def steps_text(made: Compensation) -> str:
+    """`7 steps`."""
+    return f"{made.bound.steps} step{'s' if made.bound.steps > 1 else ''}"
+
+
+def round_up(bound: float) -> str:
+    """A bound to three digits, rounded up."""
+    return f"{float(UPWARD.create_decimal(bound)):.3g}"
+
+
+def unit_of_input(name: str, made: Compensation) -> str:
+    """The unit of an input of the program."""
+    if name[0] == "v" and name[1:] in made.forward.axes:
+        return made.model.unit or "V"
+    if name in ("ax", "ay", "az"):
+        return made.unit
+    return UNITS.get(name, "as in the calibration")
+
+
+def operations_text(made: Compensation) -> str:
+    """`113 add, 102 multiply: 215 a sample`."""
+    count: Mapping[str, int] = made.program.operations
+    return f"{', '.join(f'{n} {kind}' for kind, n in count.items())}: {sum(count.values())} a sample"
+
+
+def _wrapped(text: str) -> list[str]:
+    indent = " " * (len(text) - len(text.lstrip()))
+    return wrap(
+        text.strip(), WIDTH, initial_indent=indent, subsequent_indent=indent + "  ", break_on_hyphens=False
+    ) or [""]
+
+
+def _what(made: Compensation, origin: Origin) -> Iterator[str]:
+    model = made.model
+    yield f"{origin.name}: from outputs to {_sensed(made)} along the reference axes, by the model {model.name}."
+    yield f"  in {UNIT_TEXT[made.unit]}"
+    yield f"  model file  {origin.model_file}, SHA-256 {origin.sha256}"
+    for key, title in PROVENANCE_TITLES.items():
+        if key in model.provenance:
+            yield f"  {title}  {as_written(model.provenance[key])}"
+    yield f"  written by {origin.program} on {origin.date}"
+
+
+def _sensed(made: Compensation) -> str:
+    return {
+        "g": "specific force",
+        "field": "the magnetic field",
+        "deg/s": "angular rate",
+    }[made.unit]
+
+
+def _inputs(made: Compensation) -> Iterator[str]:
+    yield "Inputs:"
+    for axis in made.forward.axes:
+        yield f"  v{axis}  output of the {axis} axis, {unit_of_input(f'v{axis}', made)}"
+    for name, (low, high) in made.beside.items():
+        yield f"  {name}  {unit_of_input(name, made)}, from {low:g} to {high:g}{_of_axis(name, made)}"
+    yield f"Proved for +-{made.range.reach:g} {made.unit} on each axis; not beyond these ranges."
+
+
+def _of_axis(name: str, made: Compensation) -> str:
+    if name not in ("ax", "ay", "az"):
+        return ""
+    if (size := made.costs.out_of_gravity) is None:
+        return "; this axis is not measured: use another sensor for it"
+    return (
+        "; this axis is not measured. Use another sensor for it; or, if only gravity acts, the function in_gravity, "
+        f"which computes it from the other axes and the side that is up, with an error of {_size_text(size, made.unit)}"
+    )
+
+
+def _how(made: Compensation) -> Iterator[str]:
+    bound = made.bound
+    left = f"q^{bound.steps} x {made.range.reach:g} {made.unit} = {round_up(bound.within)} {made.unit}"
+    yield (
+        f"Method: a <- a + C (v - G(a)), {steps_text(made)} from a = 0. Each step reduces the error by the factor "
+        f"q <= {round_up(bound.q)}, proved over the whole range by interval arithmetic; the remaining error is "
+        f"below {left}, without rounding."
+    )
+    yield f"Operations: {operations_text(made)}."
+
+
+def _effects(made: Compensation) -> Iterator[str]:
+    by_how: dict[str, list[str]] = {}
+    for fate in made.forward.fates:
+        by_how.setdefault(fate.how, []).append(fate.effect)
+    yield f"Inverted: {', '.join(by_how.get(INVERTED, ['nothing']))}."
+    if remembering := made.forward.remembering:
+        yield (
+            f"With a history: {', '.join(remembering)}. Give every sample, in order: {len(made.forward.memory)} "
+            "numbers are stored between samples, 0 before the first. The true history is unknown until the input "
+            "has turned round at both ends of its range."
+        )
+    if rigs := by_how.get(OF_THE_RIG):
+        yield f"Effects of the rig, not compensated: {', '.join(rigs)}."
+    if noise := by_how.get(NOISE):
+        yield f"Noise, not compensated: {', '.join(noise)}."
+    for fate in made.forward.fates:
+        if fate.how == LEFT_OUT:
+            size = made.costs.left_out[fate.effect]
+            cost = f"error {_size_text(size, made.unit)}" if size else "a sweep does not excite it: error not computed"
+            yield f"Left out: {fate.effect}, because {fate.why}; {cost}."
+
+
+def _size_text(size: ErrorSize, unit: str) -> str:
+    rms, most = error_text(size.rms, unit), error_text(size.most, unit)
+    return f"{rms} rms and {most} at most in a simulated sweep over the stated ranges"
+
+
+def coverage_text(made: Compensation) -> str:
+    """The temperatures, supplies and times of the calibration data, and stated ranges beyond them."""
+    known = made.model.covered
+    if not known:
+        return (
+            "The model file does not give the temperature, supply and time of its calibration. Outside of them "
+            "the model is extrapolated."
+        )
+    said = ", ".join(f"{name} {_span(name, known[name], made)}" for name in known)
+    beyond = [
+        name for name, (low, high) in made.beside.items()
+        if name not in FORCES and (name not in known or low < known[name][0] or high > known[name][1])
+    ]  # fmt: skip
+    text = f"Covered by the data of the calibration: {said}; beyond, the model is extrapolated"
+    return f"{text}. The stated range goes beyond in {', '.join(beyond)}." if beyond else f"{text}."
+
+
+def uncertainty_text(made: Compensation) -> str:
+    """The standard uncertainty due to the parameters, over the data's coverage and at its maximum."""
+    found = made.costs.parameters
+    if found is None:
+        return "Uncertainty: the model file has none."
+    where = ", ".join(f"{name} {_span(name, span, made)}" for name, span in found.within.items())
+    at = ", ".join(f"{name} {value:.6g}" for name, value in found.at.items())
+    rms, most, largest = (error_text(value, made.unit) for value in (found.rms, found.most, found.largest))
+    return (
+        "Standard uncertainty of the result from the parameters, taken as independent (a model file has no "
+        f"correlations): {rms} rms, {most} at most over the sphere of directions{f' with {where}' if where else ''}; "
+        f"{largest} at most over the whole stated range{f', at {at}' if at else ''}. "
+        "Noise and errors of the model are not included."
+    )
+
+
+def _span(name: str, span: tuple[float, float], made: Compensation) -> str:
+    low, high = (f"{end:.6g}" for end in span)
+    return f"{low if low == high else f'{low} to {high}'} {unit_of_input(name, made)}"
+
+
+def _uncertainty(made: Compensation) -> Iterator[str]:
+    yield uncertainty_text(made)
+    yield coverage_text(made)
+
+
+def _parameters(made: Compensation) -> Iterator[str]:
+    yield "Parameters, with standard uncertainties:"
+    for term in made.model.terms:
+        for e in term.estimates:
+            yield f"  {term.name} {f'{e.name} {e.axis}'.strip()} = {_value(e)} {e.unit}".rstrip()
+
+
+def _value(e: Estimate) -> str:
+    if not e.identified:
+        return f"{e.value:.8g}, not identified,"
+    return f"{e.value:.8g} +- {e.std:.2g}" if e.std else f"{e.value:.8g}"
+
 
 # Reference vectors for the self-test: inputs and expected results.
 #

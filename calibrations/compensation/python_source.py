@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from calibrations.compensation.about import Origin, header_lines
 from calibrations.compensation.cost import PASSES
-from calibrations.compensation.document import ReferenceVectors
+from calibrations.compensation.document import Origin, ReferenceVectors, header_lines
 from calibrations.compensation.graph import OPERATIONS
 from calibrations.compensation.inverse import Compensation
 from calibrations.compensation.program import Line

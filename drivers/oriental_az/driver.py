@@ -14,8 +14,7 @@ from dataclasses import dataclass, replace
 from drivers.errors import DriverError, Interlocked, LimitError, NotSettled, StageAlarm, StageLost
 from drivers.instrument import Check, Identity
 from drivers.oriental_az import registers as az
-from drivers.oriental_az.registers import Alarm
-from drivers.oriental_az.settings import LEAD_S, Settings
+from drivers.oriental_az.registers import LEAD_S, Alarm, Settings
 from drivers.transport import Address, Links
 from drivers.transport.modbus import Unit
 

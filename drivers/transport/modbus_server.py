@@ -15,9 +15,8 @@ from pymodbus.pdu import bit_message as bits
 from pymodbus.pdu import register_message as words
 
 from drivers.transport.address import Url
-from drivers.transport.faults import Faults, Kind
+from drivers.transport.faults import Faults, Kind, Wire
 from drivers.transport.server import Connection, Port
-from drivers.transport.wire_faults import Wire
 
 MODBUS_FAULTS = {"exception": Kind("declines whatever it is asked with this exception", 4, least=1)}
 ILLEGAL_FUNCTION, ILLEGAL_ADDRESS, ILLEGAL_VALUE, DEVICE_FAILURE = 1, 2, 3, 4

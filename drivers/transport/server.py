@@ -19,9 +19,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Protocol
 
 from drivers.transport.address import Address, Url
-from drivers.transport.faults import Faults
+from drivers.transport.faults import END, Faults, Said, Wire, disturbed
 from drivers.transport.link import connection_key
-from drivers.transport.wire_faults import END, Said, Wire, disturbed
 
 NO_FAULTS = Faults()
 FAULTS_OF = "faults of"

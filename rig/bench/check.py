@@ -18,8 +18,7 @@ from calibrations.table import gravity_fault
 from drivers.errors import LinkRefused, did_you_mean
 from drivers.manual_stage.person import PERSON
 from drivers.transport.address import Url
-from drivers.transport.faults import Fault
-from drivers.transport.wire_faults import kinds_of
+from drivers.transport.faults import Fault, kinds_of
 from drivers.world.batch import with_own
 from drivers.world.config import WorldConfig
 from drivers.world.errors import SimulationError

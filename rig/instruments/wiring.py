@@ -21,9 +21,9 @@ from drivers.instrument import Instrument as Driver
 from drivers.manual_stage.person import PERSON
 from drivers.transport import Address, Links
 from drivers.transport.address import Url
+from drivers.transport.faults import faults_of
 from drivers.transport.link import Tap
 from drivers.transport.server import Server
-from drivers.transport.wire_faults import faults_of
 from drivers.world.batch import Batch
 from drivers.world.config import WorldConfig
 from drivers.world.world import World

@@ -24,10 +24,9 @@ from calibrations.presentation.chart import (
     floor_band,
     one,
 )
-from calibrations.presentation.charts.columns import Column, in_time
 from calibrations.presentation.charts.history import Life
 from calibrations.presentation.charts.noise import TIME, Scaled, measured_points
-from calibrations.presentation.residual import Shown
+from calibrations.presentation.residual import Column, Shown, in_time
 from calibrations.presentation.text import estimate_text, labelled, minus, prefixed, unit
 from procedures.session import Dwell
 from rig.services.history import Calibration, Quantity

@@ -18,8 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from drivers.transport.faults import Fault, Kind
-from drivers.transport.wire_faults import EFFECTS, kinds_of
+from drivers.transport.faults import EFFECTS, Fault, Kind, kinds_of
 from tests.rig.enduring import BENCH, FAULTS, PROCEDURES, endured, moment
 
 PAGE = Path(__file__).parents[2] / "docs" / "faults.md"

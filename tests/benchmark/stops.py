@@ -20,8 +20,7 @@ from drivers.clock import WallClock, serve_forever
 from drivers.oriental_az import registers as az
 from drivers.oriental_az.twin import Drive
 from drivers.transport import Links
-from drivers.transport.faults import Fault
-from drivers.transport.wire_faults import faults_of
+from drivers.transport.faults import Fault, faults_of
 from rig.bench import read_bench
 from rig.instruments.guard import GuardedClock
 from rig.instruments.instruments import Rig

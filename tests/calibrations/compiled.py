@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from calibrations.compensation import c99
-from calibrations.compensation.about import Origin
-from calibrations.compensation.document import make_vectors
+from calibrations.compensation.document import Origin, make_vectors
 from calibrations.compensation.inverse import Compensation
 from calibrations.table import Array
 

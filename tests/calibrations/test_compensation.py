@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from calibrations.compensation.about import coverage_text, uncertainty_text
+from calibrations.compensation.document import coverage_text, uncertainty_text
 from calibrations.compensation.forward import INVERTED, LEFT_OUT, NOISE, OF_THE_RIG, steps_of, trace_model
 from calibrations.compensation.inverse import Compensation, Range, invert_model
 from calibrations.effects import Effect

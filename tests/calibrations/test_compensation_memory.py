@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 from calibrations.compensation import python_source
-from calibrations.compensation.about import header_lines
 from calibrations.compensation.cost import memory_at
-from calibrations.compensation.document import make_vectors
+from calibrations.compensation.document import header_lines, make_vectors
 from calibrations.compensation.forward import FORCES, steps_of
 from calibrations.compensation.graph import evaluate_nodes
 from calibrations.compensation.inverse import invert_model

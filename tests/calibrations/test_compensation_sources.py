@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 
 from calibrations.compensation import document, python_source
-from calibrations.compensation.about import Origin, header_lines, round_up
-from calibrations.compensation.document import make_vectors
+from calibrations.compensation.document import Origin, header_lines, make_vectors, round_up
 from calibrations.compensation.graph import OPERATIONS
 from calibrations.compensation.inverse import Compensation, invert_model
 from calibrations.table import Array

@@ -9,7 +9,7 @@ from calibrations.fitting.determined import leverages, undetermined, unseen_vari
 from calibrations.loop import add, diagnose, discover
 from calibrations.model import Model
 from calibrations.model.file import read_model
-from calibrations.presentation.report.words import summary
+from calibrations.presentation.report.report import summary
 from calibrations.table import Table
 from tests.calibrations.test_real_data import mikoff, suarez, xsens
 

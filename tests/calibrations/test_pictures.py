@@ -19,10 +19,9 @@ from calibrations.model import Model
 from calibrations.model.file import read_model
 from calibrations.presentation.chart import Bars, Chart, Line, Panel, Points, Second
 from calibrations.presentation.charts import fit as charts
-from calibrations.presentation.charts.columns import telling_columns
 from calibrations.presentation.charts.discovery import MOST_CURVES, album, effect_chart, levels, tried, waterfall
 from calibrations.presentation.interactive import figure
-from calibrations.presentation.residual import pooled_milli
+from calibrations.presentation.residual import pooled_milli, telling_columns
 from calibrations.presentation.static import PictureError, compact, draw, inline, png, save, save_all, svg
 from calibrations.table import Array, Table
 from tests.calibrations.synthetic import components, poses, turns

@@ -20,8 +20,7 @@ from calibrations.loop import compare, discover
 from calibrations.model import Estimate, Model, Term
 from calibrations.model.file import read_model
 from calibrations.presentation.chart import Chart, Panel, Picture
-from calibrations.presentation.report.report import report
-from calibrations.presentation.report.words import next_takes, next_words, summary
+from calibrations.presentation.report.report import next_takes, next_words, report, summary
 from calibrations.presentation.residual import pooled_milli
 from calibrations.presentation.text import (
     estimate_text,

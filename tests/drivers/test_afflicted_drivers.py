@@ -12,8 +12,7 @@ import pytest
 from drivers.clock import SimulatedClock
 from drivers.errors import DriverError, LinkTimeout, NotSettled, Refused, StageAlarm, StreamError
 from drivers.transport import Links
-from drivers.transport.faults import Fault
-from drivers.transport.wire_faults import EFFECTS, faults_of
+from drivers.transport.faults import EFFECTS, Fault, faults_of
 
 DRIVERS = ["oriental_az", "labjack_t7", "omega_cn7500", "dpg2", "pi_e727"]
 LONGEST_S = 60.0  # simulated, for an identification and a self-test

@@ -7,9 +7,8 @@ from typing import Any
 
 import pytest
 
-from drivers.transport.faults import Fault, Faults, Kind
+from drivers.transport.faults import Fault, Faults, Kind, Said, Wire, disturbed, faults_of, kinds_of
 from drivers.transport.modbus_server import RTU, TCP
-from drivers.transport.wire_faults import Said, Wire, disturbed, faults_of, kinds_of
 
 DRIVERS = ["oriental_az", "labjack_t7", "omega_cn7500", "dpg2", "pi_e727"]
 KINDS = {"alarm": Kind("an alarm", 0x30), "stuck": Kind("does not move")}

@@ -14,8 +14,7 @@ from drivers.errors import InstrumentError, OverTemperature, SensorFault
 from drivers.omega_cn7500 import driver as omega_cn7500
 from drivers.omega_cn7500 import twin as omega_cn7500_twin
 from drivers.transport import Links
-from drivers.transport.faults import Fault
-from drivers.transport.wire_faults import faults_of
+from drivers.transport.faults import Fault, faults_of
 from drivers.world.config import WorldConfig
 from drivers.world.world import World
 

@@ -16,9 +16,8 @@ from drivers.labjack_t7 import driver as labjack_t7
 from drivers.labjack_t7 import twin as labjack_t7_twin
 from drivers.labjack_t7.driver import Settings
 from drivers.transport import Links
-from drivers.transport.faults import Fault
+from drivers.transport.faults import Fault, faults_of
 from drivers.transport.link import open_link
-from drivers.transport.wire_faults import faults_of
 
 STEP_V = 3.2e-4  # one code in the range of 10 V
 

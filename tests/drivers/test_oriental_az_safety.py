@@ -12,9 +12,8 @@ from drivers.errors import Interlocked, LimitError, NotSettled, StageAlarm
 from drivers.oriental_az import driver as oriental_az
 from drivers.oriental_az import twin as oriental_az_twin
 from drivers.transport import Links
-from drivers.transport.faults import Fault
+from drivers.transport.faults import Fault, faults_of
 from drivers.transport.server import Server
-from drivers.transport.wire_faults import faults_of
 
 LIMITED = oriental_az.Settings(steps_per_turn=36000, limits_deg=(-90.0, 100.0), own_limits=True)
 CARELESS = oriental_az.Settings(steps_per_turn=36000, limits_deg=(-1000.0, 1000.0))

@@ -16,8 +16,7 @@ from drivers.oriental_az import driver as oriental_az
 from drivers.oriental_az import twin as oriental_az_twin
 from drivers.oriental_az.driver import RotaryStage, Settings
 from drivers.transport import Links
-from drivers.transport.faults import Fault
-from drivers.transport.wire_faults import faults_of
+from drivers.transport.faults import Fault, faults_of
 from tests.drivers.conftest import SmallWorld
 
 ENDLESS = Settings(limits_deg=(-math.inf, math.inf), communication_timeout_s=1.0)

@@ -12,8 +12,7 @@ from typing import Any, Literal
 import numpy as np
 
 from drivers.errors import DriverError
-from drivers.transport.faults import Fault
-from drivers.transport.wire_faults import kinds_of
+from drivers.transport.faults import Fault, kinds_of
 from procedures.catalogue import paths
 from procedures.errors import ProcedureError
 from procedures.session import Reading

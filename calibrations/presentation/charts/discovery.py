@@ -26,7 +26,6 @@ from calibrations.presentation.chart import (
     Span,
     one,
 )
-from calibrations.presentation.charts.columns import choices, first_choices
 from calibrations.presentation.charts.fit import (
     MOST_ROWS,
     change_of,
@@ -40,7 +39,7 @@ from calibrations.presentation.charts.fit import (
     scale_of,
 )
 from calibrations.presentation.charts.motion import evaluation
-from calibrations.presentation.residual import Shown, milli_unit, pooled_milli
+from calibrations.presentation.residual import Shown, choices, first_choices, milli_unit, pooled_milli
 from calibrations.presentation.text import rounded
 
 BELOW = 0.5  # times the floor: where the logarithmic axis begins

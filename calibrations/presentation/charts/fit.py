@@ -34,15 +34,17 @@ from calibrations.presentation.chart import (
     stacked,
 )
 from calibrations.presentation.charts import motion
-from calibrations.presentation.charts.columns import (
+from calibrations.presentation.residual import (
     Column,
+    Shown,
     choices,
     columns,
     first_choices,
+    residual_unit,
     specific_force,
     telling_columns,
+    zero,
 )
-from calibrations.presentation.residual import Shown, residual_unit, zero
 from calibrations.table import MILLI, Array
 
 PALE = 3.0  # times the noise floor: below, noise alone stays pale

@@ -41,8 +41,8 @@ from calibrations.presentation.chart import (
     beside,
     one,
 )
-from calibrations.presentation.charts.columns import in_time
 from calibrations.presentation.charts.discovery import Level, Measure, waterfall
+from calibrations.presentation.residual import in_time
 from calibrations.presentation.text import rounded
 from calibrations.table import MILLI, Array
 

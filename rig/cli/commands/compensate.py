@@ -121,7 +121,7 @@ def _input(text: str) -> tuple[str, tuple[float, float]]:
 
 
 def _origin(model: str, name: str | None, text: str, program: str, date: str) -> Any:
-    from calibrations.compensation.about import Origin
+    from calibrations.compensation.document import Origin
 
     path = Path(model)
     digest = hashlib.sha256(path.read_bytes() if path.is_file() else text.encode()).hexdigest()
@@ -143,7 +143,13 @@ def _folder(out: Path) -> None:
 
 def _told(made: Compensation) -> list[str]:
     """What it does and what it costs, for people."""
-    from calibrations.compensation.about import coverage_text, error_text, operations_text, steps_text, uncertainty_text
+    from calibrations.compensation.document import (
+        coverage_text,
+        error_text,
+        operations_text,
+        steps_text,
+        uncertainty_text,
+    )
     from calibrations.compensation.forward import LEFT_OUT
 
     bound, costs = made.bound, made.costs

@@ -13,10 +13,9 @@ from calibrations.fit import Fit
 from calibrations.noise.allan import compare_deviations
 from calibrations.noise.fit import NoiseFit
 from calibrations.presentation.chart import Chart
-from calibrations.presentation.charts.columns import choices, first_choices
 from calibrations.presentation.charts.noise import scaled, units
 from calibrations.presentation.interactive import figure, height_px
-from calibrations.presentation.residual import Shown, residual_units
+from calibrations.presentation.residual import Shown, choices, first_choices, residual_units
 from calibrations.presentation.text import estimate_text, rounded, unit
 from rig.record import Record
 from rig.services.charts import deviations, difference, differences, residuals

@@ -10,11 +10,10 @@ from nicegui import events, ui
 
 from calibrations.presentation.chart import one
 from calibrations.presentation.charts import motion
-from calibrations.presentation.charts.columns import Column, choices, first_choices
 from calibrations.presentation.charts.discovery import levels, waterfall
 from calibrations.presentation.charts.fit import failure, measurement, most_telling, residual
 from calibrations.presentation.interactive import figure
-from calibrations.presentation.residual import Shown, residual_units
+from calibrations.presentation.residual import Column, Shown, choices, first_choices, residual_units
 from rig.web.parts import box, div, redraw, words
 
 if TYPE_CHECKING:
