@@ -87,11 +87,3 @@ def test_positions_that_cannot_be(
     (work / "bad.csv").write_text(f"{head}\n{rows}\n")
     for command in ("fit", "diagnose"):
         assert says in refused(command, "bad.csv", "--model", "linear")
-
-
-def test_fewer_poses_than_parameters(refused: Callable[..., str], work: Path, text: str) -> None:
-    (work / "few.csv").write_text("\n".join(text.splitlines()[:4]))
-    for command in ("fit", "compare", "diagnose", "discover"):
-        said = refused(command, "few.csv", "--model", "physical")
-        assert "few.csv: 3 rows cannot determine the" in said
-        assert "measure more poses, or take a smaller model" in said

@@ -39,12 +39,6 @@ def test_numbers_that_cannot_be(refused: Refused, work: Path, content: str, says
         assert says in refused(*command)
 
 
-def test_degrees_taken_for_radians(refused: Refused, work: Path) -> None:
-    (work / "bad.csv").write_text(poses())
-    said = refused("import", "bad.csv", "--column", "alpha_deg=alpha_deg:rad")
-    assert "reaches 5156.62 deg; no stage turns beyond 360 deg; state its unit" in said
-
-
 @pytest.mark.parametrize("size", [2 * LARGEST_BYTES, LARGEST_BYTES // 2])
 def test_a_huge_file_of_nothing_is_answered_at_once(
     refused: Refused, work: Path, size: int, monkeypatch: pytest.MonkeyPatch
@@ -55,15 +49,6 @@ def test_a_huge_file_of_nothing_is_answered_at_once(
     for command in ("fit", "import"):
         said = refused(command, "huge.csv")
         assert "the limit is 1 GiB" in said or "is not text (byte 0 is 0x00)" in said
-
-
-@pytest.mark.parametrize("unit", ["counts", "mV"])
-def test_a_model_in_another_unit_is_not_taken_for_volts(refused: Refused, work: Path, unit: str) -> None:
-    model = (work / "mine.yaml").read_text().replace("unit: V", f"unit: {unit}")
-    (work / "other.yaml").write_text(model)
-    for command in ("compare", "diagnose", "fit"):
-        said = refused(command, "good.csv", "--model", "other.yaml")
-        assert f"its values are for outputs in {unit}, and good.csv is in V; take a model that was fitted to" in said
 
 
 def test_a_compensation_is_not_written_for_a_model_whose_units_differ(refused: Refused, work: Path) -> None:

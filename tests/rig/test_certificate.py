@@ -96,23 +96,7 @@ def _page(rig: Rig, model: str, work: Path) -> str:
     return (work / "only.html").read_text()
 
 
-def test_what_is_asked_wrongly_is_refused(refused: Callable[..., str]) -> None:
-    words = ("--model", "linear", "--out")
-    assert 'certificates end in .html, .pdf or .xml, not in ".doc"' in refused(
-        "certificate", "good.csv", *words, "c.doc"
-    )
-    assert "there is no folder" in refused("certificate", "good.csv", *words, "nowhere/c")
-    assert "no such file" in refused("certificate", "nothing", *words, "c")
-
-
 def test_the_laboratory_is_no_part_of_what_a_run_depends_on() -> None:
     bench: dict[str, Any] = {"instruments": {}}
     one, other = (Bench.model_validate(bench | {"laboratory": {"name": name}}) for name in ("A", "B"))
     assert one.configuration("sweep", {}) == other.configuration("sweep", {})
-
-
-def test_a_still_record_is_refused_with_what_to_do(refused: Callable[..., str], work: Path) -> None:
-    rows = "".join(f"{k / 100},2.5,2.5\n" for k in range(200))
-    (work / "still.csv").write_text(f"t_s,vx_v,vy_v\n{rows}")
-    said = refused("certificate", "still.csv", "--model", "linear", "--out", "c.html")
-    assert "of poses, positions or rates, whose reference is known, and not of still. Certify a sweep" in said

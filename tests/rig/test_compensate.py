@@ -59,11 +59,3 @@ def test_what_it_leaves_of_unseen_poses_is_shown(rig: Rig, work: Path) -> None:
     ended = rig("compensate", "fitted.yaml", *words)
     assert "x: rms error" in ended.out
     assert "compensated" in (work / "left.svg").read_text()
-
-
-def test_what_it_cannot_do_is_refused_before_anything_is_written(refused: Callable[..., str], work: Path) -> None:
-    words = ("--language", "c", "--out", "made")
-    assert "mine: scale-factor has no value yet" in refused("compensate", "mine.yaml", *words)
-    assert "linear: has no values yet; `rig fit" in refused("compensate", "linear", *words)
-    assert "--picture draws what --data shows" in refused("compensate", "linear", *words, "--picture", "p.png")
-    assert "write NAME=LOW:HIGH" in refused("compensate", "linear", *words, "--input", "temperature_c=5")

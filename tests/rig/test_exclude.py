@@ -147,10 +147,6 @@ def test_what_cannot_be_is_refused(rig: Rig, run: str, words: tuple[str, ...], w
     assert events(run) == before
 
 
-def test_an_unknown_run_is_named(rig: Rig, run: str) -> None:
-    assert f"Did you mean '{run}'" in rig("exclude", f"{run[:-1]}?", "1", "--reason", "x").err
-
-
 def test_a_run_that_goes_on_is_left_alone(rig: Rig, run: str) -> None:
     with Record() as record, lease(record.folder, run, "it"):
         ended = rig("exclude", run, "1", "--reason", "x")

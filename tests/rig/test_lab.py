@@ -180,19 +180,10 @@ def test_a_password_is_nowhere(
         assert WORD not in str([held(lab, each.run) for each in lab.runs()])
 
 
-def test_a_bench_with_a_password_is_refused_with_its_key(bench_file: Callable[..., Path], rig: Rig) -> None:
-    file = bench_file({"lab": {"url": f"postgresql://rig7:{WORD}@lab/rigs"}})
-    assert "bench.yaml, key lab.url: the URL has a password" in rig("check", "--bench", str(file)).err
-
-
 def test_where_runs_are_pushed_is_no_part_of_what_they_depend_on(bench_file: Callable[..., Path]) -> None:
     lab = {"url": "postgresql://rig7@lab.example/rigs", "push": True}
     with_lab, without = (read_bench(bench_file({"lab": each})).configuration("sweep", {}) for each in (lab, None))
     assert with_lab == without
-
-
-def test_which_lab_it_is_must_be_said(rig: Rig) -> None:
-    assert "no lab is named: give --to postgresql://USER@HOST/DATABASE, set RIG_LAB" in rig("push").err
 
 
 def test_a_database_is_prepared_once_and_brought_up_to_date(server: Server, rig: Rig) -> None:

@@ -102,13 +102,6 @@ def test_a_bench_of_which_a_part_is_real_runs_in_real_time(
     assert ended.status == 0, ended.err
 
 
-def test_a_bench_without_twins_serves_nothing(rig: Callable[..., Any], bench_file: Callable[..., Path]) -> None:
-    alpha = {"driver": "oriental_az", "url": "serial:/dev/ttyUSB0"}
-    ended = rig("simulate", "--bench", str(bench_file({"instruments": {"alpha": alpha}})))
-    assert ended.status == 2
-    assert "url: simulated" in ended.err
-
-
 def test_pseudo_terminals_are_served_where_the_bench_asks(bench_file: Callable[..., Path]) -> None:
     instruments = yaml.safe_load(DEFAULT.read_text())["instruments"]
     roles = ("alpha", "beta", "oven")

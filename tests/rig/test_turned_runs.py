@@ -187,14 +187,6 @@ def test_a_plan_knows_ways_limits_and_mounts(rig: Rig) -> None:
     assert "outside its limits -400 .. 400 deg; nothing was sent. Ask for a slower or shorter turn" in refused.err
 
 
-def test_a_bench_without_the_channels_says_so(rig: Rig, bench_file: Callable[..., Path]) -> None:
-    adc = {"driver": "labjack_t7", "url": "simulated", "settings": {"channels": {"vx": 0, "vy": 1}}}
-    path = bench_file({"instruments": {"alpha": _stage(1), "beta": _stage(2), "adc": adc}, "d63": None})
-    refused = rig("plan", "magnetometer-turn", "--bench", str(path))
-    assert refused.status == 2
-    assert "adc: no input is wired to mx, my, mz; there are vx, vy. Name the inputs in the bench file" in refused.err
-
-
 def _stage(unit: int) -> dict[str, Any]:
     return {"driver": "oriental_az", "url": "simulated", "unit": unit}
 
