@@ -102,14 +102,13 @@ def rejection(found: Fit) -> Finding | None:
 
 def _implausible_zero(found: Fit) -> Finding | None:
     """A zero of a stage that is off by tens of degrees: angles are assigned wrongly, and no zero is off."""
-    for term in found.model.terms:
-        for e in term.estimates if term.name == "stage-zero-offset" else ():
-            if e.identified and abs(e.value) > TURNED_DEG:
-                return Finding(
-                    UNEXPLAINED,
-                    f"only a zero of {e.name} that is {e.value:+.3g} deg off would explain these poses, and no stage "
-                    f"has that; check the column {e.name}_deg, its zero and its sign, and the channels",
-                )
+    for e in found.model.estimates("stage-zero-offset"):
+        if e.identified and abs(e.value) > TURNED_DEG:
+            return Finding(
+                UNEXPLAINED,
+                f"only a zero of {e.name} that is {e.value:+.3g} deg off would explain these poses, and no stage "
+                f"has that; check the column {e.name}_deg, its zero and its sign, and the channels",
+            )
     return None
 
 

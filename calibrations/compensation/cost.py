@@ -58,7 +58,7 @@ def result_uncertainty(
     Over the specific force `a` (n, 3) of the rows of `table`, and that as far as `reach` goes on an axis; `beside` has
     the stated range of each input beside the outputs. Source  GUM 5.1.2.
     """
-    if not any(e.std and e.identified for term in model.terms for e in term.estimates):
+    if not any(e.std and e.identified for e in model.params.values()):
         return None
     inputs = {name: span for name, span in beside.items() if name not in FORCES}
     within = {name: _found_in(name, span, model) for name, span in inputs.items()}

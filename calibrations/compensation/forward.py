@@ -91,7 +91,7 @@ def measured_axes(model: Model) -> tuple[str, ...]:
 
     Raises ModelError for a model without values.
     """
-    named = {e.axis for term in model.terms for e in term.estimates}
+    named = {e.axis for e in model.params.values()}
     if empty := [term.name for term in model.terms if not term.estimates]:
         what = f"{empty[0]} has no value" if named else "has no values"
         raise ModelError(f"{model.name}: {what} yet; `rig fit DATA --model {model.name} --out FILE` gives it some")

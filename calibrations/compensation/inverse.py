@@ -189,9 +189,9 @@ def compensated_residual(made: Compensation, table: Table) -> Residual:
     axes = tuple(axis for axis in made.forward.axes if axis in table.axes)
     true = np.column_stack([a[:, AXES.index(axis)] for axis in axes])
     linear = fit(read_model(LINEAR_MODEL), replace(table, source=LINEAR_MODEL)).model
-    values = {(e.name, e.axis): e.value for term in linear.terms for e in term.estimates}
     by_hand = [
-        (table.outputs[:, table.axes.index(axis)] - values["bias", axis]) / values["scale", axis] for axis in axes
+        (table.outputs[:, table.axes.index(axis)] - linear[f"bias.{axis}"].value) / linear[f"scale-factor.{axis}"].value
+        for axis in axes
     ]
     unit = 1e3 * table.gravity_m_s2
     return Residual(

@@ -268,8 +268,7 @@ def _open(c: RowCandidate, best: RowCandidate, before: Fit) -> bool:
     """
     if best.name not in c.effect.contains:
         return True
-    term = next(term for term in added(before, c).model.terms if term.name == c.name)
-    return not all(e.identified for e in term.estimates)
+    return not all(e.identified for e in added(before, c).model.estimates(c.name))
 
 
 def _near(c: RowCandidate, best: RowCandidate) -> bool:

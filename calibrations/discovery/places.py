@@ -82,10 +82,9 @@ def scales(found: Fit) -> Array:
     """Output per g, or deg/s, of each channel; 1 for a residual in what is sensed."""
     if found.table.type.magnitude:
         return np.ones(1)
-    terms = [term for term in found.model.terms if term.name in ("scale-factor", "gyro-scale-factor")]
-    values = {e.axis: abs(e.value) for term in terms for e in term.estimates}
-    axes = [axis_of(channel) for channel in found.channels]
-    return np.array([values.get(axis, values.get("", found.problem.layout.nominal)) for axis in axes])
+    effect = "gyro-scale-factor" if found.table.type.turning else "scale-factor"
+    axes, nominal = [axis_of(channel) for channel in found.channels], found.problem.layout.nominal
+    return np.abs([found.model.value(f"{effect}.{axis}", nominal) for axis in axes])
 
 
 def axis_of(channel: str) -> str:

@@ -386,7 +386,7 @@ def _causes(steps: tuple[Step[Fit], ...]) -> tuple[str, ...]:
 
 def _require_new(found: Fit, name: str, model: str) -> None:
     """An expression has to add something that `model` does not have. Raises ModelError."""
-    estimates = next(term.estimates for term in found.model.terms if term.name == name)
+    estimates = found.model.estimates(name)
     if all(e.std is None for e in estimates):
         e = estimates[0]
         where = f" of {e.axis}" if e.axis else ""

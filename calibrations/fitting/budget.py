@@ -122,8 +122,7 @@ def row_gains(found: Fit) -> Array:
 def _of_type_a(found: Fit, G: Array, seen: float) -> list[Line]:
     """The fit's own covariance, in its parts; what the inputs leave in the residual, `seen`, is no noise."""
     noise, rows = found.noise, found.residual.size - len(found.theta)
-    stds = [e.std for term in found.model.terms for e in term.estimates]
-    everything = np.array([np.nan if std is None else std for std in stds]) ** 2
+    everything = np.array([np.nan if e.std is None else e.std for e in found.params.values()]) ** 2
     by_noise = everything / found.birge**2
     white = np.minimum(np.einsum("pcn,cn->p", G**2, noise.white**2), by_noise)
     scatter = np.minimum(np.einsum("pcn,c->p", G**2, noise.scatter**2), by_noise - white)

@@ -86,8 +86,8 @@ def lets_go(before: Fit, after: Fit) -> bool:
     """
     if not after.table.type.magnitude:
         return False
-    known = {(t.name, e.name, e.axis) for t in before.model.terms for e in t.estimates if e.identified}
-    return any((t.name, e.name, e.axis) in known and not e.identified for t in after.model.terms for e in t.estimates)
+    identified = {key for key, e in before.params.items() if e.identified}
+    return any(key in identified and not e.identified for key, e in after.params.items())
 
 
 def blind_to(found: Fit, effects: Mapping[str, Effect]) -> tuple[str, ...]:

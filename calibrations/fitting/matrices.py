@@ -83,8 +83,7 @@ def _covariance(found: Fit) -> Array:
     """Covariance of the parameters with the standard uncertainties that the model states; NaN where it has none."""
     cautious = cautiously(found)
     cov, _ = covariance(cautious.information, found.problem.layout.typical)
-    stated = [e.std for term in found.model.terms for e in term.estimates]
-    std = np.array([np.nan if s is None else s for s in stated])
+    std = np.array([np.nan if e.std is None else e.std for e in found.params.values()])
     size = np.sqrt(np.diag(cov))
     ratio = std / np.where(size > 0, size, 1.0)
     return np.asarray(cov * np.outer(ratio, ratio))

@@ -245,7 +245,7 @@ def information(found: Fit) -> Array:
     cautious = cautiously(found)
     white = cautious.information
     own = np.sqrt(np.diag(covariance(white, found.problem.layout.typical)[0]))
-    stated = np.array([e.std or 0.0 for term in found.model.terms for e in term.estimates])
+    stated = np.array([e.std or 0.0 for e in found.params.values()])
     wider = np.where((own > 0) & (stated > 0), stated / np.where(own > 0, own, 1.0), 1.0)
     return np.asarray((white.T @ white) / np.outer(wider, wider))
 

@@ -118,6 +118,17 @@ class Model(Shown):
         """The estimate of `key`, such as "bias.x". Raises UnknownParameter with the nearest key."""
         return self.params[key]
 
+    def value(self, key: str, default: float = 0.0) -> float:
+        """The value of `key`, or that of all axes where one serves them; `default` where the model has neither."""
+        if key in self.params:
+            return self.params[key].value
+        shared = self.params.get(key.rpartition(".")[0])
+        return shared.value if shared is not None and not shared.axis else default
+
+    def estimates(self, effect: str) -> tuple[Estimate, ...]:
+        """Those of one effect; () where the model does not have it, or no values yet."""
+        return next((term.estimates for term in self.terms if term.name == effect), ())
+
     def report(self) -> str:
         """The parameters as a table for people; the effects, where the model has no values yet."""
         rows = [(key, e.text) for key, e in self.params.items()]

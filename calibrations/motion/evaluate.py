@@ -95,12 +95,9 @@ def inverse_response(table: Table, model: Model, axis: int, band: Response) -> R
 
     A corner and a delay that the model holds take the place of the nominal ones.
     """
-    values = {
-        term.name: {e.axis: e.value for e in term.estimates} for term in model.terms if term.effect.kinds == ("motion",)
-    }
     name = table.axes[axis]
-    corner = corner_hz(table) + values.get("output-filter", {}).get(name, 0.0)
-    late = values.get("sampling-delay", {}).get(name, 0.0) - skew_s(table, axis)
+    corner = corner_hz(table) + model.value(f"output-filter.{name}")
+    late = model.value(f"sampling-delay.{name}") - skew_s(table, axis)
     low_pass, undelayed = first_order(corner), delay(-late)
     return lambda f: np.asarray(band(f) * undelayed(f) / low_pass(f))
 
@@ -234,8 +231,7 @@ def _noise_limit(
 
 def _per_g(model: Model) -> float:
     """Output of x per g."""
-    values = {e.axis: e.value for term in model.terms if term.name == "scale-factor" for e in term.estimates}
-    return abs(values.get("x", values.get("", 1.0)))
+    return abs(model.value("scale-factor.x", 1.0))
 
 
 def _motion_part(x: Array, record: Record, found: Reference) -> Array:

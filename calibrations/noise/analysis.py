@@ -150,9 +150,7 @@ class ChannelNoise:
 
     def _estimates(self, effect: Effect) -> list[Estimate]:
         """Of an effect's parameters in this channel, as every command shows them; none for an effect not in the fit."""
-        model = self.search.end.model
-        terms = (term for term in model.terms if term.name == effect.name)
-        return [each for term in terms for each in term.estimates if each.axis == self.axis]
+        return [each for each in self.search.end.model.estimates(effect.name) if each.axis == self.axis]
 
     def _beside(self, effect: Effect) -> list[Effect]:
         """The other processes of the fit, and those that may be present beside any."""

@@ -109,7 +109,7 @@ def places(found: NoiseFit) -> tuple[Place, ...]:
 def evaluate(model: Model, still: Still) -> NoiseFit | None:
     """The model with the values that it has; None where it has none. Raises DataError for a channel that it has not."""
     terms = noise_terms(model)
-    if not any(term.estimates for term in terms):
+    if not model.params:
         return None
     known = {(term.name, e.axis, e.name): e.value for term in terms for e in term.estimates}
     axes = {axis for _, axis, _ in known}

@@ -52,18 +52,16 @@ def with_noise(table: Table, model: Model) -> Table:
 
 def slow_processes(model: Model, axis: str, table: Table) -> Processes:
     """Those of one axis on the times of a table."""
-    values = {(term.name, e.name): e.value for term in model.terms for e in term.estimates if e.axis == axis}
-    if not values:
+    if not any(e.axis == axis for e in model.params.values()):
         raise ModelError(f"{model.name}: has no values for the axis {axis} of {table.source}")
     gaps_s = np.diff(np.sort(table.time_s))
     gap_s, span_s = float(np.median(gaps_s)), float(np.sum(gaps_s))
-    walk = values.get(("rate-random-walk", "coefficient"), 0.0)
+    walk = model.value(f"rate-random-walk.coefficient.{axis}")
     slowest_s = BEYOND * span_s
-    found = [*_flicker(values.get(("flicker-noise", "coefficient"), 0.0), gap_s / 2, slowest_s)]
+    found = [*_flicker(model.value(f"flicker-noise.coefficient.{axis}"), gap_s / 2, slowest_s)]
     found += [(walk * np.sqrt(slowest_s / 2), slowest_s)]
-    found += [
-        (values.get(("gauss-markov-noise", "sigma"), 0.0), values.get(("gauss-markov-noise", "time_constant"), 1.0))
-    ]
+    sigma, time_s = (model.value(f"gauss-markov-noise.{name}.{axis}") for name in ("sigma", "time_constant"))
+    found += [(sigma, time_s)]
     return tuple((float(std), float(tau_s)) for std, tau_s in found if std > 0)
 
 

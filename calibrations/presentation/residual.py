@@ -298,7 +298,5 @@ def residual_unit(fit: Fit) -> str:
 
 def zero(fit: Fit, c: int) -> float:
     """The output at 0 g: the model's bias, else the middle of what was measured."""
-    terms = [term for term in fit.model.terms if term.name == "bias"]
-    values = {e.axis: e.value for term in terms for e in term.estimates}
     measured = fit.table.outputs[:, c]
-    return float(values.get(fit.channels[c], (measured.max() + measured.min()) / 2))
+    return fit.model.value(f"bias.{fit.channels[c]}", float(measured.max() + measured.min()) / 2)

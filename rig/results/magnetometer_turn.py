@@ -22,7 +22,7 @@ from calibrations.noise.means import rms
 from calibrations.table import Array, Table
 from procedures.session import Pose
 from rig.record.measured import Measured, sensor_from_base
-from rig.results.result import Missing, Result, estimates, fitted, result
+from rig.results.result import Missing, Result, fitted, result
 
 AXES = "xyz"
 SOFT = ("xx", "yy", "xy", "xz", "yz")
@@ -97,8 +97,8 @@ def _all_missing(why: str) -> dict[str, Result | Missing]:
 
 def _by_ellipsoid(table: Table, poses: list[Pose]) -> dict[str, Result | Missing]:
     found = fitted(table, "magnetometer")
-    results = {f"hard-iron-{e.axis}": result(e) for e in estimates(found, "hard-iron")}
-    results |= {f"soft-iron-{e.name}": result(e) for e in estimates(found, "soft-iron")}
+    results = {f"hard-iron-{e.axis}": result(e) for e in found.model.estimates("hard-iron")}
+    results |= {f"soft-iron-{e.name}": result(e) for e in found.model.estimates("soft-iron")}
     results["left-by-ellipsoid"] = Result(float(1e3 * rms(found.residual)[0]), "per mille")
     return results | _elements(found, table, poses)
 
@@ -107,7 +107,7 @@ def _elements(found: Fit, table: Table, poses: list[Pose]) -> dict[str, Result |
     made = calibration_matrices(found)
     if made is None:
         return {name: Missing("the ellipsoid gives no calibration") for name in ELEMENTS.values()}
-    (strength,) = estimates(found, "field-strength")
+    (strength,) = found.model.estimates("field-strength")
     attitudes: Array = np.array([sensor_from_base(pose) for pose in poses])
     turned = field_elements(strength.value * made(table.outputs), attitudes, [p.path for p in poses])
     units = {"F": "V", "H": "V", "D": "deg", "I": "deg"}

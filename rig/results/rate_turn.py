@@ -7,7 +7,7 @@ from itertools import permutations
 from calibrations.noise.means import rms
 from procedures.questions import EDGES
 from rig.record.measured import Measured
-from rig.results.result import Missing, Result, estimates, fitted, result
+from rig.results.result import Missing, Result, fitted, result
 
 AXES = "xyz"
 PAIRS = tuple(own + other for own, other in permutations(AXES, 2))
@@ -32,14 +32,14 @@ def evaluate(measured: Measured) -> dict[str, Result | Missing]:
     """
     table = measured.table()
     found = fitted(table, "gyroscope", "gyro-misalignment", "gyro-g-sensitivity")
-    results = {f"gyro-bias-{e.axis}": result(e) for e in estimates(found, "gyro-bias")}
-    scales = {e.axis: e for e in estimates(found, "gyro-scale-factor")}
+    results = {f"gyro-bias-{e.axis}": result(e) for e in found.model.estimates("gyro-bias")}
+    scales = {e.axis: e for e in found.model.estimates("gyro-scale-factor")}
     results |= {f"gyro-scale-{axis}": result(scale) for axis, scale in scales.items()}
-    results |= {f"gyro-misalignment-{e.name}": result(e) for e in estimates(found, "gyro-misalignment")}
+    results |= {f"gyro-misalignment-{e.name}": result(e) for e in found.model.estimates("gyro-misalignment")}
     left = dict(zip(found.channels, rms(found.residual), strict=True))
     for axis, scale in scales.items():
         if scale.identified and scale.value:
-            for e in (e for e in estimates(found, "gyro-g-sensitivity") if e.axis == axis):
+            for e in (e for e in found.model.estimates("gyro-g-sensitivity") if e.axis == axis):
                 results[f"gyro-g-sensitivity-{axis}{e.name}"] = result(e, "(deg/s)/g", scale.value)
             results[f"rate-residual-{axis}"] = Result(abs(float(left[axis]) / scale.value), "deg/s")
     whole = measured.run.settings["mounts"] == len(EDGES)

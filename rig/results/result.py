@@ -8,7 +8,7 @@ Source    ISO 14253-1, JCGM 106: a guard band on both sides of the limit.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -80,13 +80,6 @@ def fitted(table: Table, model: str, *more: str) -> Fit:
         if effects[name].excluded(table) is None:
             start = start.with_effect(effects[name])
     return fit(start, table)
-
-
-def estimates(found: Fit, effect: str) -> Iterator[Estimate]:
-    """The parameters of one effect of a fitted model."""
-    for term in found.model.terms:
-        if term.name == effect:
-            yield from term.estimates
 
 
 def result(estimate: Estimate, unit: str | None = None, per: float = 1.0) -> Result | Missing:

@@ -232,9 +232,8 @@ def _beginning(lines: list[str]) -> tuple[set[str], list[str]]:
 
 def check_unit(model: Model, unit: str, source: str) -> None:
     """Raises ModelError where the values of a model are for outputs in another unit: counts or mV, not V."""
-    fitted = any(term.estimates for term in model.terms)
     ours, theirs = (UNITS.get(parse_unit(own), own) for own in (model.unit, unit))
-    if fitted and ours and ours != theirs:
+    if model.params and ours and ours != theirs:
         raise ModelError(
             f"{model.name}: its values are for outputs in {model.unit}, and {source} is in {unit}; "
             "take a model that was fitted to data in this unit, or a shipped one (`rig models`)"

@@ -8,16 +8,18 @@ from functools import cache
 import numpy as np
 import pytest
 
+from calibrations.compensation.forward import steps_of
 from calibrations.effects.catalogue import catalogue
 from calibrations.errors import DataError, ModelError
 from calibrations.fit import fit
-from calibrations.model import Model
+from calibrations.model import Estimate, Model, Term
+from calibrations.model.chain import respond, sensed, static_force
 from calibrations.model.file import read_model
-from calibrations.motion.evaluate import MotionResult, evaluate_motion
+from calibrations.motion.evaluate import MotionResult, acceleration, evaluate_motion
 from calibrations.presentation.chart import Line
 from calibrations.presentation.charts.motion import evaluation
 from calibrations.presentation.static import png
-from calibrations.table import Array, Table
+from calibrations.table import STANDARD_GRAVITY, Array, Table
 from tests.calibrations import shaken, synthetic
 
 KAPPA = np.array([[0.0, 0.010, 0.0512], [0.012, 0.0, 0.030]])  # x reads 30.6 mg too much at the paper's attitude
@@ -162,3 +164,25 @@ def test_a_line_above_the_motion_is_the_probes_hum() -> None:
     columns = {**table.columns, "displacement_m": table.column("displacement_m") + hum}
     found = evaluate_motion(Table.from_columns("motion", columns, table.constants), *models(), still())
     assert found.rmse_physical.value == pytest.approx(result().rmse_physical.value, rel=0.01)
+
+
+def test_a_turned_sensor_on_a_tilted_stage_shows_the_acceleration_of_its_reference_edge() -> None:
+    """Misalignment acts on gravity and on the motion; only gravity at the true angle of the stage is subtracted."""
+    motion_m_s2 = np.array([0.0, 0.4, -1.5, 2.0])
+    angles = {"alpha_deg": np.full(4, 70.0), "beta_deg": np.full(4, 35.0)}
+    columns = {**angles, "t_s": np.arange(4.0), "displacement_m": np.zeros(4)}
+    values = {"bias": 2.5, "scale-factor": 1.2, "axis-misalignment": 4.0, "stage-zero-offset": 3.0}
+    model = Model("turned", tuple(_term(name, value) for name, value in values.items()))
+    steps = steps_of(model)
+    poses = Table.from_columns("poses", {**angles, "vx_v": np.zeros(4), "vy_v": np.zeros(4)})
+    a = static_force(poses, steps)
+    a[:, 0] += motion_m_s2 / STANDARD_GRAVITY
+    vx_v, vy_v, _ = respond(sensed(a, poses, steps), poses, steps).T
+    table = Table.from_columns("motion", {**columns, "vx_v": vx_v, "vy_v": vy_v})
+    np.testing.assert_allclose(acceleration(table, model), motion_m_s2, atol=1e-6)
+
+
+def _term(name: str, value: float) -> Term:
+    effect = catalogue()[name]
+    axes = {p.name: ("x", "y", "z") if p.per_axis else ("",) for p in effect.parameters}
+    return Term(effect, estimates=tuple(Estimate(p, axis, value, 0.0, "") for p, each in axes.items() for axis in each))

@@ -65,7 +65,7 @@ def command(
     earlier, of = given, Path(model).name
     if before is not None:
         earlier, of = read_model(before, effects), Path(before).name
-    fresh = any(term.estimates for term in earlier.terms) and earlier.provenance.get("data_sha256") != table.digest
+    fresh = bool(earlier.params) and earlier.provenance.get("data_sha256") != table.digest
     found = fit(given, table)
     figured = figures(found, earlier if fresh else None, limits(data, bench))
     since = str(earlier.provenance.get("created", "of unknown date"))[:10]
