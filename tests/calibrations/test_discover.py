@@ -8,7 +8,7 @@ import pytest
 from calibrations.discovery.results import Discovery
 from calibrations.discovery.search import find_path
 from calibrations.effects.catalogue import catalogue
-from calibrations.loop import add, discover
+from calibrations.loop import add, diagnose, discover
 from calibrations.model.file import read_model
 from calibrations.table import Array, Table
 from tests.calibrations.synthetic import components, poses, turns
@@ -140,3 +140,13 @@ def test_the_effect_that_a_person_chooses_is_added_whatever_it_is_worth() -> Non
     assert wrong.verdict == "unexplained"
     assert wrong.steps[0].held_out_after > 0.9 * wrong.steps[0].held_out_before
     assert right.start.model.effects == LINEAR.effects
+
+
+def test_a_drift_may_be_an_unlogged_temperature() -> None:
+    """The table has times and no temperature: a drift in time cannot be separated from a temperature effect."""
+    columns = turns()
+    x, y, _ = components(columns)
+    drift = 3e-4 * columns["t_s"] / columns["t_s"].max()
+    best = diagnose(poses(columns, 2.5 + x + drift, 2.5 + y - drift), LINEAR).candidates[0]
+    assert best.name in ("bias-drift", "warm-up-bias")
+    assert "temperature-bias" in best.indistinguishable_from

@@ -124,3 +124,8 @@ def test_a_candidate_that_the_model_holds_reduces_nothing() -> None:
     held = model @ rng.standard_normal((3, 2))
     assert reductions(model, residual, [held, np.zeros((200, 1))]) == pytest.approx([0.0, 0.0], abs=1e-12)
     assert len(reductions(model, residual, [])) == 0
+
+
+def test_a_repeated_column_counts_once(fitted: Fit) -> None:
+    column = np.random.default_rng(19).standard_normal((*fitted.residual.shape, 1))
+    assert Screen(fitted).basis(np.concatenate([column, 2 * column], axis=2)).shape[1] == 1
