@@ -23,7 +23,7 @@ def comparison_text(result: Comparison[Any]) -> str:
     elif result.adequate:
         parts.append(data.complete)
     else:
-        parts.append("It fails, worst first:\n" + "\n".join(f"  {place.text}" for place in result.fails))
+        parts.append("The model fails here, worst first:\n" + "\n".join(f"  {place.text}" for place in result.fails))
     return "\n\n".join(parts)
 
 

@@ -87,16 +87,16 @@ def _short_help(path: Path) -> str:
 @click.command(cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(package_name="inertial-rig", prog_name="rig")
 def rig() -> None:
-    """Calibrate inertial sensors on a rig, and find the physical effect that their model misses.
+    """Calibrate inertial sensors on a rig, and find physical effects that their model misses.
 
-    DATA is a file or a run of the record; MODEL a shipped model's name or a file. `rig demo` shows the whole
-    story on a simulated rig.
+    DATA is a file or a run of the record. MODEL is the name of a shipped model or a file. `rig demo` shows a
+    calibration on the simulated rig.
     """
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run one command and leave the process with the contract's exit status; errors are one message."""
-    # Before numpy is imported: the matrices are small, and threads that spin for one another slow a busy machine.
+    """Run one command and exit with its status; an error is one message."""
+    # Before numpy is imported: the matrices are small, and threads that wait for each other slow a busy machine.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
     def call() -> Any:

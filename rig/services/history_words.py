@@ -1,4 +1,4 @@
-"""What is said of a sensor's life, by `rig history` and on its page."""
+"""Sentences on the history of a sensor, for `rig history` and its page."""
 
 from __future__ import annotations
 
@@ -12,43 +12,43 @@ Written = Callable[[float, int], str]
 
 
 def summary(life: History) -> str:
-    """How many calibrations, of which days, by which model."""
+    """Number, period and model of the calibrations."""
     of = life.calibrations
     if len(of) == 1:
-        return f"{life.sensor}: one calibration, {of[0].day}, by the model {life.model}"
-    return f"{life.sensor}: {len(of)} calibrations from {of[0].day} to {of[-1].day}, by the model {life.model}"
+        return f"{life.sensor}: one calibration, {of[0].day}, model {life.model}"
+    return f"{life.sensor}: {len(of)} calibrations from {of[0].day} to {of[-1].day}, model {life.model}"
 
 
 def next_due(life: History, limit_is_given: str) -> str:
-    """When the next calibration is due, or what that takes; `limit_is_given` is how a person gives a limit."""
+    """The date of the next calibration, or what is needed to compute it; `limit_is_given` shows how to give a limit."""
     if life.due is not None:
         names = ", ".join(q.name for q in life.quantities if q.due == life.due)
-        return f"Next calibration due on {life.due}: {names} may then be beyond what is allowed."
+        return f"Next calibration due on {life.due}: {names} may exceed the limit then."
     if all(q.allowed is None for q in life.quantities):
-        return f"When the next calibration is due needs a limit: {limit_is_given}, or limits.results of the bench file."
+        return f"A due date needs a limit: {limit_is_given}, or limits.results in the bench file."
     if all(q.line is None for q in life.quantities):
-        return "When the next calibration is due shows from three calibrations on, at different times."
-    return "No calibration is due within ten years by the drift that these show."
+        return "A due date needs three calibrations at different times."
+    return "With this drift no calibration is due within ten years."
 
 
 def near(calibration: Calibration, age_days: float, on: date) -> str:
-    """Which calibration is closest to a day, and how far from it."""
+    """The calibration closest to a day, and its distance in days."""
     side = "before" if age_days >= 0 else "after"
     return f"Closest to {on}: {calibration.data}, {calibration.day}, {abs(age_days):.0f} days {side}."
 
 
 def but_stale(why: str) -> str:
-    """The warning."""
-    return f"But it is stale: {why}."
+    """The warning about a stale calibration."""
+    return f"This calibration is stale: {why}."
 
 
 def significance(line: Stability) -> str:
-    """What is to be said after a drift that may be none."""
+    """A remark after a drift that is not significant."""
     return "" if line.drifts else ", not significant"
 
 
 def chart_verdict(q: Quantity) -> str:
-    """Of its control charts; how far they are while their baseline is not complete; nothing where there is none."""
+    """Verdict of the control chart, with its progress while the baseline is incomplete; empty without a chart."""
     if q.chart is None:
         return ""
     progress = f", {len(q.chart.values)} of {q.chart.judged}" if q.chart.verdict == "baseline" else ""
@@ -56,7 +56,7 @@ def chart_verdict(q: Quantity) -> str:
 
 
 def agreements(of: Compared, written: Written) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Head and rows of a table: every quantity that both have; `written` is how a number is to so many digits."""
+    """Head and rows of a table of the shared quantities; `written` formats a number to a number of digits."""
     head = ("quantity", of.one, of.other, "difference", "U", "unit", "E_n", "")
     return head, [_agreement(name, unit, each, written) for name, (unit, each) in of.rows.items()]
 

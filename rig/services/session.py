@@ -74,7 +74,7 @@ class ModelSession:
     def written(self, name: str, text: str) -> Effect:
         """An effect of one's own, as an expression. Raises ModelError, ExpressionError with the place in the text."""
         if name in self.effects:
-            raise ModelError(f"{name} is in the catalogue already; give yours another name")
+            raise ModelError(f"{name} is already in the catalogue; give yours another name")
         return self.data.expression(name, text)
 
     def with_step(self, step: Step[Any]) -> ModelSession:

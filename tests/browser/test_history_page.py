@@ -124,7 +124,7 @@ def test_the_closest_to_a_day_and_whether_it_is_stale(workbench: Workbench, runs
         calibration, age_days = closest(found.calibrations, on := date.fromisoformat(on))
         expect(page.get_by_text(near(calibration, age_days, on))).to_be_visible()
         why = stale(found, calibration, age_days)
-        expect(page.get_by_text("But it is stale")).to_have_text([but_stale(why)] if why else [])
+        expect(page.get_by_text("This calibration is stale")).to_have_text([but_stale(why)] if why else [])
     assert why is not None
     to = page.get_by_role("link", name="Its model")
     expect(to).to_have_attribute("href", f"/?data={runs[-1]}&model=linear")

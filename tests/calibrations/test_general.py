@@ -94,7 +94,7 @@ def test_a_fit_tells_it_in_words_and_as_json() -> None:
     found = fit(read_model("magnetometer"), turned.sap6("HC"))
     text = "\n".join(command.calibration_lines(found))
     assert "General calibration, G_c = M (S G_r + b), from uT to field (Book 17.3)" in text
-    assert "The Book's way, from the extremes: hard iron -0.1625, -2.0938, -12.31" in text
+    assert "Method of the Book, from the extremes: hard iron -0.1625, -2.0938, -12.31" in text
     whole = json.loads(json.dumps(command.calibration_document(found), allow_nan=False))
     assert whole["by_hand"]["hard_iron"] == pytest.approx([-0.1625, -2.09375, -12.3125])
     document = whole["calibration"]

@@ -28,7 +28,7 @@ import pytest
         (("good.csv", "--kind", "positions"), 'good.csv: a table of positions needs the column "ax"'),
         (
             ("good.csv", "--constant", "gravity"),
-            '"gravity": a constant is given as KEY=VALUE, such as gravity_m_s2=9.81744',
+            '"gravity": write a constant as KEY=VALUE, such as gravity_m_s2=9.81744',
         ),
         (("empty.csv",), "empty.csv: the file is empty"),
         (("cut.csv.gz",), "cut.csv.gz: cannot be read as text"),

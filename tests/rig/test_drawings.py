@@ -109,7 +109,7 @@ def test_the_command_writes_the_file_and_says_what_the_sensor_feels(rig: Rig, tm
     assert "in g: x +0.0000, y +0.7071, z +0.7071" in ended.out
     document = json.loads(rig("draw", "--alpha", "90", "--flip", "1", "--json").out)
     assert document["specific_force_g"] == {"x": 1.0, "y": 0.0, "z": 0.0}
-    assert "o pin 1" in rig("draw").out
+    assert "o: pin 1" in rig("draw").out
 
 
 def test_the_drawing_in_the_readme_is_todays() -> None:
@@ -118,7 +118,7 @@ def test_the_drawing_in_the_readme_is_todays() -> None:
 
 
 def test_what_cannot_be_drawn_is_refused(rig: Rig, tmp_path: Path) -> None:
-    assert "nan is no angle" in rig("draw", "--alpha", "nan").err
+    assert "nan is not an angle" in rig("draw", "--alpha", "nan").err
     for name in ("a.pdf", "a"):
         ended = rig("draw", "--out", str(tmp_path / name))
         assert (ended.status, ended.out) == (2, "")

@@ -58,12 +58,12 @@ def test_results_are_those_of_the_other_poses_and_come_back(rig: Rig, run: str) 
 
 def test_it_is_said_in_words(rig: Rig, run: str) -> None:
     text = rig("exclude", run, "5", "--reason", "a lorry passed").out
-    assert f"{run}: pose 5 is left out: a lorry passed\nresults: evaluated again" in text
+    assert f"{run}: pose 5 excluded: a lorry passed\nresults: evaluated again" in text
     assert "noise-rms-x" in text
     shown = rig("show", run, "--poses").out
     assert "Left out: pose 5 (a lorry passed)" in shown
     assert shown.rstrip().splitlines()[-2].endswith("a lorry passed")
-    assert rig("exclude", run, "5", "--include").out.startswith(f"{run}: pose 5 is taken in again")
+    assert rig("exclude", run, "5", "--include").out.startswith(f"{run}: pose 5 included again")
 
 
 def test_what_the_other_poses_still_determine_is_given_and_the_rest_is_named(rig: Rig, run: str) -> None:
@@ -131,9 +131,9 @@ def test_what_the_procedure_gave_itself_stays(tmp_path: Path) -> None:
     ("words", "why"),
     [
         (("99", "--reason", "x"), "has no pose 99; `rig show .* --poses` lists"),
-        (("1",), "say why the pose is left out"),
-        (("1", "--reason", " "), "say why"),
-        (("1", "--reason", "x", "--include"), "say why"),
+        (("1",), "give a reason"),
+        (("1", "--reason", " "), "give a reason"),
+        (("1", "--reason", "x", "--include"), "give a reason"),
         (("one", "--reason", "x"), "'one' is not a valid integer"),
     ],
 )

@@ -95,10 +95,10 @@ def test_before_a_run_one_screen_says_all_of_it() -> None:
         "518 poses",
         "56:",
         "alpha 90, beta 0 to 360 deg: 37 poses  A+ to B-",
-        "from -5 to 365 deg; its limits are -400 to 400 deg",
-        "not at -20 to 85 C; where the table is tilted by more than 0.3 deg",
-        "MB on the disk, where 2.0 GB are free",
-        "[ ] the cables are free to turn",
+        "from -5 to 365 deg; the limits are -400 to 400 deg",
+        "not at -20 to 85 C; if the tilt of the table exceeds 0.3 deg",
+        "MB on the disk; 2.0 GB are free",
+        "[ ] the cables can follow",
         "[ ] the level lies on the table",
         "of simulated time",
     ):
@@ -107,7 +107,7 @@ def test_before_a_run_one_screen_says_all_of_it() -> None:
 
 
 def test_a_disk_that_is_too_small_is_said() -> None:
-    assert "there is not enough room" in shown(before(planned(), SWEEP, read_bench(), 1000, TODAY))
+    assert "not enough space" in shown(before(planned(), SWEEP, read_bench(), 1000, TODAY))
 
 
 def test_a_certificate_that_is_expired_is_said() -> None:
@@ -137,7 +137,7 @@ def test_room_is_measured_where_the_folder_will_be(tmp_path: Path) -> None:
 
 def test_a_run_begins_or_is_cancelled(said: Callable[..., None], rig_home: Path) -> None:
     said("perhaps", "cancel")
-    with guide()[0] as shown_to, pytest.raises(Declined, match="cancelled before it began"):
+    with guide()[0] as shown_to, pytest.raises(Declined, match="cancelled before the start"):
         shown_to.planned(planned())
     said("go")
     with guide()[0] as shown_to:
@@ -330,7 +330,8 @@ def test_who_is_not_at_a_terminal_is_not_asked(outcome: Outcome) -> None:
         assert watch.interrupted(outcome) == "end"
         assert watch.ask(MOUNTED, "yes") == "yes"
         with pytest.raises(
-            NoAnswer, match=r'to answer "Is it mounted\?"; put `mounting: ...` \(yes or no\) into a file'
+            NoAnswer,
+            match=r'the question "Is it mounted\?" has no answer; write `mounting: ...` \(yes or no\) into a file',
         ):
             watch.ask(MOUNTED, None)
 

@@ -33,13 +33,13 @@ def test_a_mapping_is_confirmed_corrected_and_can_be_repeated(file: Path, rig: C
         for question, answer in (
             (r"\[poses\]: ", ""),
             (r"Zeit .*\[-\]: ", "times"),
-            (r'"times" is none of our columns.*Zeit .*\[-\]: ', "t_s:min"),
+            (r'"times" is not a column name.*Zeit .*\[-\]: ', "t_s:min"),
             (r"inclination +90 \.\. 90 +\[alpha_deg\]: ", ""),
             (r"table .*\[beta_deg\]: ", "V"),
             (r'in deg; "table" in V cannot be converted to it.*table .*\[beta_deg\]: ', "alpha_deg"),
-            (r"alpha_deg is taken already.*table .*\[beta_deg\]: ", ""),
+            (r"alpha_deg is already the name.*table .*\[beta_deg\]: ", ""),
             (r"Ux .*\[vx_v:mV\]: ", "uV"),
-            (r"The same again, without questions:\s+rig ([^\r\n]*)", None),
+            (r"To repeat this import without questions:\s+rig ([^\r\n]*)", None),
         ):
             terminal.expect(question)
             if answer is not None:

@@ -209,7 +209,7 @@ def test_verify_says_what_has_changed(rig: Rig, server: Server, database: str) -
         run = a_run(own)
     url = server.url(database)
     rig("push", run, "--to", url)
-    assert rig("push", "--verify", "--to", url).out == "1 runs as they arrived, 0 on their way\n"
+    assert rig("push", "--verify", "--to", url).out == "1 runs unchanged, 0 incomplete\n"
     rig("exclude", run, "3", "--reason", "no", "--record", url)
     ended = rig("push", "--verify", "--to", url, "--json")
     assert (ended.status, json.loads(ended.out)["changed"]) == (1, [run])

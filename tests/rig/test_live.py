@@ -83,7 +83,7 @@ def test_what_fails_ends_it_and_what_was_measured_stays(rig: Callable[..., Ended
     with Record() as record:
         (run,) = record.runs()
     assert (run.state, 0 < run.rows < 54) == ("failed", True)
-    assert f"To go on: rig resume {run.run}, then rig discover {run.run}" in ended.err
+    assert f"To continue: rig resume {run.run}, then rig discover {run.run}" in ended.err
     assert ended.out == ""
 
 

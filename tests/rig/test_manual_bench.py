@@ -101,7 +101,8 @@ def test_where_nobody_turns_a_real_stage_the_run_stops_and_goes_on_later(rig: Ri
     document = json.loads(ended.out)
     assert (ended.status, document["state"], document["poses"]) == (4, "stopped", 0)
     assert (
-        'nobody is there to answer "Turn alpha to 90 deg. What does its dial show?"; put `alpha-90: ...`' in ended.err
+        'the question "Turn alpha to 90 deg. What does its dial show?" has no answer; write `alpha-90: ...`'
+        in ended.err
     )
     asked = {f"beta-{deg}": "yes" for deg in (-5, 0, 180, 360, 365)} | {"alpha-90": "90.083", "beta-dial": 0}
     ended = rig("resume", document["run"], "--answers", file(asked, "all.yaml"), "--unattended", "--json")
@@ -162,4 +163,4 @@ def test_only_what_has_a_wire_is_served(rig: Rig, file: Callable[..., str]) -> N
     del document["instruments"]["adc"]
     ended = rig("simulate", "--bench", file(document))
     assert ended.status == 2
-    assert "alpha, beta: turned by hand, so there is nothing to serve" in ended.err
+    assert "alpha, beta: moved by hand, so it is not served" in ended.err

@@ -141,7 +141,7 @@ def test_the_commands_print_it(rig: Callable[..., Ended], tmp_path: Path) -> Non
     for command in ("diagnose", "discover"):
         said = rig(command, data).out
         assert "    rig run sweep --face both --step-deg 45 --inclinations-deg 90,30,150\n    14:" in said
-        assert "standard deviations apart, told with a probability of 99.9 %, by its own data" in said
+        assert "standard deviations, correct with a probability of 99.9 %, from its own data" in said
 
 
 @pytest.mark.usefixtures("rig_home")

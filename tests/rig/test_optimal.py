@@ -20,7 +20,7 @@ from procedures.pose_list import format_poses
 from procedures.session import Pose
 from procedures.settings import parse
 from rig.bench import read_bench
-from rig.cli.commands.plan import document, lines
+from rig.cli.commands.plan import optimal_document, optimal_lines
 from rig.errors import PlanError
 from rig.planning.optimal import AGAIN, CHECK, DESIGN, Optimal, most_relative, optimal, relative
 from rig.planning.planned import EXCHANGE_S, from_home_s, moves_s
@@ -119,14 +119,14 @@ def test_a_sweep_that_tells_nothing_is_no_standard() -> None:
 
 
 def test_people_are_told_what_it_saves_and_how_to_run_it() -> None:
-    text = "\n".join(lines(chosen("physical"), None))
+    text = "\n".join(optimal_lines(chosen("physical"), None))
     assert "physical, 16 parameters: I-optimal poses" in text
-    assert "x less rig time at equal worst standard error" in text
+    assert "times less rig time for the same worst standard error" in text
     assert f"rig run sweep --pose-list poses.csv --dwell-s {chosen('physical').equal.dwell_s:g}" in text
 
 
 def test_the_printed_run_is_of_the_bench_that_was_planned_on() -> None:
-    *_, last = lines(chosen("physical"), "my poses.csv", "worm.yaml")
+    *_, last = optimal_lines(chosen("physical"), "my poses.csv", "worm.yaml")
     dwell = f"--dwell-s {chosen('physical').equal.dwell_s:g}"
     assert last == f"Run them:  rig run sweep --pose-list 'my poses.csv' {dwell} --bench worm.yaml"
 
@@ -134,7 +134,7 @@ def test_the_printed_run_is_of_the_bench_that_was_planned_on() -> None:
 def test_what_no_sweep_tells_has_no_ratio() -> None:
     oven = read_model("linear").with_effect(catalogue()["temperature-bias"])  # a sweep keeps its temperature
     found = optimal(read_bench(), find("sweep"), settings(**COARSE), oven, 40, "I")
-    assert document(found)["same_dwell"]["errors"]["temperature-bias slope x"] is None
+    assert optimal_document(found)["same_dwell"]["errors"]["temperature-bias slope x"] is None
 
 
 def test_the_command_writes_poses_that_a_run_takes(rig: Callable[..., Any], tmp_path: Path) -> None:

@@ -88,9 +88,9 @@ def test_the_model_file_holds_the_effect(rig: Rig, data: str, here: Path) -> Non
 REFUSED = [
     (["a*sn(beta)", "--name", "own"], r'column 3: there is no function "sn"; did you mean "sin"\?\n .*\n +\^'),
     (["a*ax", "--name", "own-scale"], "adds nothing that linear does not have"),
-    (["a*sin(5*beta)", "--name", "hysteresis"], "hysteresis is in the catalogue already"),
+    (["a*sin(5*beta)", "--name", "hysteresis"], "hysteresis is already in the catalogue"),
     (["a*sin(5*beta)", "--name", "My Effect"], "cannot name an effect"),
-    (["a*sin(5*beta)"], "is no name of an effect; if it is an expression, name it"),
+    (["a*sin(5*beta)"], "if this is an expression, give it a name"),
     (["histeresis"], 'unknown effect "histeresis"; did you mean "hysteresis"'),
     (["nowhere.py"], "there is no such file"),
 ]
@@ -133,7 +133,7 @@ def test_a_python_file_is_an_effect_too(rig: Rig, data: str, here: Path) -> None
     told = rig("add", "five_waves.py", "--model", "linear", "--data", data, "--out", "m2.yaml", "--json")
     assert told.status == 0, told.err
     assert json.loads(told.out)["steps"][0]["excess_after"] < 1.15
-    assert "keep five_waves.py in the folder" in told.err
+    assert "keep five_waves.py in the effects folder" in told.err
     refused = rig("compare", data, "--model", "m2.yaml")  # a model file runs nothing: the folder has to be named
     assert refused.status == 2
     assert 'unknown effect "five-waves"' in refused.err

@@ -74,7 +74,7 @@ def test_a_cancelled_run_leaves_nothing() -> None:
     with at_terminal("run", "sweep", *SMALL_ARGUMENTS) as terminal:
         terminal.expect("Begin.*:")
         terminal.sendline("cancel")
-        terminal.expect("nothing was moved and nothing recorded")
+        terminal.expect("nothing moved and nothing was recorded")
         terminal.expect(pexpect.EOF)
     assert terminal.exitstatus == 4
     with Record() as record:
@@ -87,7 +87,7 @@ def test_ctrl_c_stops_and_a_person_has_it_go_on(wish: str, excluded: list[str]) 
     with begun(*LONG) as terminal:
         terminal.expect(UNDER_WAY)
         press_ctrl_c(terminal)
-        terminal.expect("What now.*:")
+        terminal.expect("Continue.*:")
         assert only_run()[0].state == "stopped"
         terminal.sendline(wish)
         terminal.expect(f"complete, {LONG_POSES + len(excluded)} poses", timeout=120)
@@ -114,7 +114,7 @@ def test_the_menu_ends_a_run_that_can_be_resumed(end: str) -> None:
     with begun(*LONG) as terminal:
         terminal.expect(UNDER_WAY)
         press_ctrl_c(terminal)
-        terminal.expect("What now.*:")
+        terminal.expect("Continue.*:")
         ENDS[end](terminal)
         terminal.expect("`rig resume .*` continues the run")
         terminal.expect(pexpect.EOF)
@@ -131,7 +131,7 @@ def test_sigterm_ends_a_guided_run_without_a_menu() -> None:
         terminal.kill(signal.SIGTERM)
         terminal.expect("stopped by SIGTERM")
         terminal.expect(pexpect.EOF)
-        assert "What now" not in (terminal.before or "")
+        assert "Continue?" not in (terminal.before or "")
     assert terminal.exitstatus == 4
     assert only_run()[0].state == "stopped"
 
@@ -143,7 +143,7 @@ def test_a_refusal_is_no_end() -> None:
         terminal.expect("Is the sensor mounted face up.*:")
         terminal.sendline("no")
         terminal.expect("is no; correct this")
-        terminal.expect("What now.*:")
+        terminal.expect("Continue.*:")
         terminal.sendline("resume")
         terminal.expect("Is the sensor mounted face up.*:")
         terminal.sendline("yes")

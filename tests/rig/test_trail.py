@@ -54,7 +54,7 @@ def test_an_effect_of_ones_own_is_tried_like_any_other(turned: ModelSession) -> 
     assert step.after.pooled_excess < step.before.pooled_excess
     with pytest.raises(ExpressionError, match='did you mean "beta"'):
         turned.written("mine", "a*sin(5*betta)")
-    with pytest.raises(ModelError, match="in the catalogue already"):
+    with pytest.raises(ModelError, match="already in the catalogue"):
         turned.written("bias", "a*sin(5*beta)")
 
 

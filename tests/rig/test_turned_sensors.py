@@ -63,7 +63,7 @@ def test_a_single_turn_is_told_what_it_cannot_show(rig: Rig, tmp_path: Path) -> 
     said = rig("fit", turn)
     assert "hard-iron and soft-iron cannot be asked" in said.out
     assert "hard iron 5, -3 uT; soft iron in the plane: radii 22 and 18 uT" in said.out
-    assert "of z itself nothing is known: turn the sensor over" in said.out
+    assert "hard iron of z is unknown: also turn the sensor" in said.out
     refused = rig("fit", turn, "--model", "magnetometer")
     assert refused.status == 2
     assert "hard-iron is not fitted: the orientations cover too little of the sphere" in refused.err

@@ -51,7 +51,7 @@ def stops_and_says(outcome: Outcome, stopped: list[str]) -> None:
     assert isinstance(outcome.error, NoAnswer)
     assert status_of(outcome.error) == 4
     assert (outcome.run.state, outcome.moving, stopped) == ("stopped", (), ["all"])
-    assert "nobody is there to answer" in str(outcome.run.message)
+    assert "has no answer" in str(outcome.run.message)
     assert "--answers" in str(outcome.run.message)
 
 

@@ -18,18 +18,18 @@ FORMS = (".html", ".pdf", ".xml")
 
 @click.command("certificate")
 @click.argument("data")
-@click.option("--model", required=True, help="The model whose parameters are certified, as DATA find them.")
+@click.option("--model", required=True, help="The certificate states the parameters of this model, fitted to DATA.")
 @click.option(
     "--out",
     type=click.Path(dir_okay=False, path_type=Path),
     required=True,
-    help="A file with .html, .pdf or .xml; a name without these gives all three.",
+    help="A file that ends in .html, .pdf or .xml; any other name gives all three.",
 )
 @click.option(
-    "--as-found", "before", help="The model file in use until now. Default: --model, if other data gave it values."
+    "--as-found", "before", help="The model file in use before. Default: --model, if it has values from other data."
 )
-@click.option("--number", default="", help="The certificate's number. Default: the run's, and a digest.")
-@click.option("--customer", default="", help="Who asked for it.")
+@click.option("--number", default="", help="Number of the certificate. Default: the run and a digest.")
+@click.option("--customer", default="", help="The customer.")
 @bench_option
 @json_option
 def command(
@@ -42,10 +42,10 @@ def command(
     bench_file: Path | None,
     as_json: bool,
 ) -> int:
-    """Draw up a calibration certificate of DATA: results, uncertainties and their budgets, as found and as left.
+    """Write a calibration certificate for DATA: results and uncertainty budgets, as found and as left.
 
-    Limits of the bench file (limits.results, such as bias-x) are judged by guarded acceptance. Exit status 1: a result
-    is beyond its limit, or the data cannot be used and no certificate is written.
+    Results are compared with the limits of the bench file (limits.results, such as bias-x) by guarded acceptance. Exit
+    status 1: a result exceeds its limit, or the data cannot be used and no certificate is written.
     """
     from calibrations.fit import fit
     from calibrations.model.file import read_model
@@ -66,32 +66,32 @@ def command(
     if before is not None:
         earlier, of = read_model(before, effects), Path(before).name
     fresh = bool(earlier.params) and earlier.provenance.get("data_sha256") != table.digest
-    found = fit(given, table)
-    figured = figures(found, earlier if fresh else None, limits(data, bench))
+    fitted = fit(given, table)
+    figured = figures(fitted, earlier if fresh else None, limits(data, bench))
     since = str(earlier.provenance.get("created", "of unknown date"))[:10]
-    said = Asked(number, customer, f"the model {of}, {since}" if fresh else "")
-    made = issue(data, found, figured, bench, said)
+    details = Asked(number, customer, f"the model {of}, {since}" if fresh else "")
+    certificate = issue(data, fitted, figured, bench, details)
     for path in paths:
-        _write(path, made)
+        _write(path, certificate)
     failed = [o.name for o in figured.outcomes if o.decision is not None and o.decision.statement == "fail"]
     if as_json:
-        emit(document(made) | {"files": [str(path) for path in paths]})
+        emit(document(certificate) | {"files": [str(path) for path in paths]})
     else:
-        click.echo("\n".join([*_told(made), *(f"written: {path}" for path in paths)]))
+        click.echo("\n".join([*_lines(certificate), *(f"written: {path}" for path in paths)]))
     return int(bool(failed))
 
 
 def _paths(out: Path) -> list[Path]:
-    """The files that are asked for. Raises OutputError for another ending, and where there is no folder."""
+    """The files to write. Raises OutputError for another ending or a missing folder."""
     if out.suffix and out.suffix not in FORMS and not out.suffix[1:].isdigit():
-        raise OutputError(f'{out}: certificates end in .html, .pdf or .xml, not in "{out.suffix}"')
+        raise OutputError(f'{out}: a certificate ends in .html, .pdf or .xml, not in "{out.suffix}"')
     if not out.parent.is_dir():
-        raise OutputError(f"{out}: there is no folder {out.parent}; make it, or name another file")
+        raise OutputError(f"{out}: there is no folder {out.parent}; make it, or give another file")
     return [out] if out.suffix in FORMS else [out.with_name(out.name + form) for form in FORMS]
 
 
-def _write(path: Path, made: Certificate) -> None:
-    """One form of the certificate; its writer is imported only here."""
+def _write(path: Path, certificate: Certificate) -> None:
+    """Write one format of the certificate."""
     from calibrations.presentation.certificate.dcc import dcc
     from calibrations.presentation.certificate.pages import html
     from rig.files import write_whole
@@ -99,17 +99,17 @@ def _write(path: Path, made: Certificate) -> None:
     if path.suffix == ".pdf":
         from calibrations.presentation.certificate.pages import pdf
 
-        write_whole(path, pdf(made))
+        write_whole(path, pdf(certificate))
     else:
-        write_whole(path, {".html": html, ".xml": dcc}[path.suffix](made))
+        write_whole(path, {".html": html, ".xml": dcc}[path.suffix](certificate))
 
 
-def _told(made: Certificate) -> list[str]:
+def _lines(certificate: Certificate) -> list[str]:
     from calibrations.presentation.certificate.sections import results_table, verdict
     from calibrations.presentation.text import columns
 
-    table = results_table(made)
-    told = verdict(made)
-    conformity = f"; conformity: {told}" if told else ""
-    head = f"{made.headline}, No. {made.number}{conformity}"
-    return [head, "", columns(table.head, table.rows), "", *made.figures.remarks, *made.remarks]
+    table = results_table(certificate)
+    conformity = verdict(certificate)
+    remark = f"; conformity: {conformity}" if conformity else ""
+    head = f"{certificate.headline}, No. {certificate.number}{remark}"
+    return [head, "", columns(table.head, table.rows), "", *certificate.figures.remarks, *certificate.remarks]

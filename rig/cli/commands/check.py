@@ -1,4 +1,4 @@
-"""check: connect to every instrument of the bench, identify and test it; when certificates are due."""
+"""check: connect to every instrument of the bench, identify and test it; list certificates."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ NOT_MET, FAILED = 1, 3
 
 @click.command("check")
 @bench_option
-@click.option("--example", is_flag=True, help="Print the simulated rig's bench file, to begin your own with.")
+@click.option("--example", is_flag=True, help="Print the bench file of the simulated rig, as a start for your own.")
 @json_option
 def command(bench_file: Path | None, example: bool, as_json: bool) -> int:
-    """Connect to every instrument of the bench, identify it and let it test itself.
+    """Connect to every instrument of the bench, identify it and run its self-test.
 
-    Exit status 1: an instrument's certificate has expired. 3: an instrument does not answer, or fails its test.
+    Exit status 1: an instrument's certificate has expired. 3: an instrument does not answer, or fails its self-test.
     """
     if example:
         click.echo(DEFAULT.read_text(encoding="utf-8"), nl=False)
@@ -34,14 +34,17 @@ def command(bench_file: Path | None, example: bool, as_json: bool) -> int:
     found, due = checked(bench), certificates(bench)
     late = expired(bench, datetime.now(UTC).date())
     if as_json:
-        papers = {name: {"number": each.number, "due": each.due.isoformat()} for name, each in due.items()}
-        told = {"instruments": _document(found), "certificates": papers, EXPIRED: late}
-        emit({"schema": "rig.check/1", "bench": bench.name, **told})
+        papers = {
+            name: {"number": certificate.number, "due": certificate.due.isoformat()}
+            for name, certificate in due.items()
+        }
+        document = {"instruments": _document(found), "certificates": papers, EXPIRED: late}
+        emit({"schema": "rig.check/1", "bench": bench.name, **document})
     else:
         rows = [row for role, (identity, tests) in found.items() for row in _rows(role, identity, tests)]
         click.echo(columns(("role", "instrument", "check", "result", "detail"), rows))
-        for name, each in due.items():
-            click.echo(f"{name}: certificate {each.number}, due {each.due}")
+        for name, certificate in due.items():
+            click.echo(f"{name}: certificate {certificate.number}, due {certificate.due}")
         notes(f"{fault}; have it calibrated again" for fault in late)
     if not all(test.ok for _, tests in found.values() for test in tests):
         return FAILED

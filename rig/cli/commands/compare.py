@@ -1,4 +1,4 @@
-"""compare: the model beside the measurement, and where it fails."""
+"""compare: compare a model with data, and show where it fails."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 @check_option
 @request_options
 def command(request: Request, check: bool, as_json: bool) -> int:
-    """Set a model beside DATA (a file or a run) and say where it fails. A model without values is fitted first."""
+    """Compare a model with DATA (a file or a run), and show where it fails. A model without values is fitted first."""
     from calibrations.discovery.verdict import Verdict
     from calibrations.documents import comparison_document
     from rig.cli.terminal.words import warning
@@ -34,7 +34,7 @@ def command(request: Request, check: bool, as_json: bool) -> int:
     else:
         click.echo(result.report())
         if result.rejection is None and not result.adequate:
-            click.echo(f"\nWhich effect is missing: rig diagnose {request.data} --model {name}")
+            click.echo(f"\nTo find the missing effect: rig diagnose {request.data} --model {name}")
         for line in filter(None, (question.data.note, *warning(cautions))):
             click.echo(f"\n{line}")
     silent = result.rejection is not None and result.rejection.verdict == Verdict.NO_RESPONSE

@@ -1,4 +1,4 @@
-"""compensate: write a model's inverse as source text, for the product that the sensor goes into."""
+"""compensate: write the inverse of a model as source code for the product."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 @click.argument("model")
 @click.option("--language", type=click.Choice(["c", "python", "json"]), required=True)
 @click.option("--out", type=click.Path(file_okay=False, path_type=Path), required=True, help="Write into this folder.")
-@click.option("--name", help="Name of files and functions. Default: that of the model file.")
+@click.option("--name", help="Name of files and functions. Default: the name of the model file.")
 @click.option("--precision", type=click.Choice(["double", "float"]), default="double", show_default=True)
-@click.option("--range", "reach", type=float, help="Largest value of each axis, g (deg/s; field as 1). Default: 1.5.")
+@click.option("--range", "reach", type=float, help="Largest value of each axis in g (deg/s; field = 1). Default: 1.5.")
 @click.option(
     "--input",
     "given",
@@ -33,8 +33,10 @@ if TYPE_CHECKING:
     help="Range of another input, such as temperature_c=0:60.",
 )
 @click.option("--leave-out", "without", multiple=True, metavar="EFFECT", help="Leave an effect out.")
-@click.option("--data", help="Set the compensation beside these unseen poses, and a linear model fitted to them.")
-@click.option("--picture", type=click.Path(dir_okay=False, path_type=Path), help="Draw what --data shows.")
+@click.option("--data", help="Test the compensation on these poses, compared with a linear model fitted to them.")
+@click.option(
+    "--picture", type=click.Path(dir_okay=False, path_type=Path), help="Write a picture of the test to this file."
+)
 @bench_option
 @json_option
 def command(
@@ -51,10 +53,10 @@ def command(
     bench_file: Path | None,
     as_json: bool,
 ) -> None:
-    """Write the inverse of MODEL: from voltages to acceleration along the reference axes.
+    """Write the inverse of MODEL: from voltages to accelerations along the reference axes.
 
-    Every effect that can be inverted at run time is; of the others the source says what leaving them out costs. The
-    number of steps is fixed, and proved to be enough over the whole range.
+    The code corrects every effect that can be inverted at run time; for the others it states the error that remains.
+    The number of steps is fixed, with a proof that it is enough over the whole range.
     """
     from calibrations.compensation.document import make_vectors, summary
     from calibrations.compensation.inverse import compensated_residual, invert_model
@@ -64,7 +66,7 @@ def command(
     from rig.services.provenance import program, today
 
     if picture is not None and data is None:
-        raise click.UsageError("--picture draws what --data shows: give --data DATA")
+        raise click.UsageError("--picture shows the test of --data: also give --data DATA")
     effects = effects_of(bench_file)
     found = read_model(model, effects)
     made = invert_model(found, _range(found, reach, given), without, precision)
@@ -90,7 +92,7 @@ def command(
         emit(summary(made, origin) | {"files": paths, "residual": beside.document() if beside else None})
     else:
         click.echo(
-            "\n".join([*_told(made), *(beside.lines() if beside else []), *(f"written: {path}" for path in paths)])
+            "\n".join([*_lines(made), *(beside.lines() if beside else []), *(f"written: {path}" for path in paths)])
         )
 
 
@@ -129,7 +131,7 @@ def _origin(model: str, name: str | None, text: str, program: str, date: str) ->
 
 
 def _identifier(name: str) -> str:
-    """A name that C and Python take."""
+    """A valid name in C and Python."""
     made = re.sub(r"\W+", "_", name, flags=re.ASCII).strip("_").lower()
     return made if made[:1].isalpha() else f"sensor_{made}".rstrip("_")
 
@@ -138,11 +140,11 @@ def _folder(out: Path) -> None:
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise OutputError(f"{out}: the folder cannot be made: {error.strerror}; name another") from None
+        raise OutputError(f"{out}: cannot make the folder: {error.strerror}; give another folder") from None
 
 
-def _told(made: Compensation) -> list[str]:
-    """What it does and what it costs, for people."""
+def _lines(made: Compensation) -> list[str]:
+    """Method, proof and remaining errors, in words."""
     from calibrations.compensation.document import (
         coverage_text,
         error_text,
@@ -153,20 +155,20 @@ def _told(made: Compensation) -> list[str]:
     from calibrations.compensation.forward import LEFT_OUT
 
     bound, costs = made.bound, made.costs
-    method = f"{steps_text(made)}, {operations_text(made)}; each comes nearer by {bound.q:.2g} at least"
-    lines = [f"{made.model.name}: {method}, proved within +-{made.range.reach:g} {made.unit}."]
+    method = f"{steps_text(made)}, {operations_text(made)}; each step reduces the error to {bound.q:.2g} of it or less"
+    lines = [f"{made.model.name}: {method}, proved for +-{made.range.reach:g} {made.unit}."]
     for fate in made.forward.fates:
         if fate.how == LEFT_OUT:
             size = costs.left_out[fate.effect]
             cost = (
-                f"costs {error_text(size.rms, made.unit)} rms, {error_text(size.most, made.unit)} at most"
+                f"error {error_text(size.rms, made.unit)} rms, {error_text(size.most, made.unit)} at most"
                 if size
-                else "cost not known"
+                else "error unknown"
             )
-            lines.append(f"Left out: {fate.effect}: {fate.why}; {cost}.")
+            lines.append(f"Not corrected: {fate.effect}: {fate.why}; {cost}.")
     if costs.out_of_gravity is not None:
         lines.append(
-            "az is not measured; found from gravity it costs "
+            "az is not measured; its value from gravity has an error of "
             f"{error_text(costs.out_of_gravity.most, made.unit)} at most."
         )
     return [*lines, uncertainty_text(made), coverage_text(made)]

@@ -1,4 +1,4 @@
-"""control: the control charts of the check standard, and whether the rig is in control."""
+"""control: control charts of the check standard; is the rig in control?"""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ OUT = "out of control"
     show_default=True,
     help="Runs that set the limits.",
 )
-@click.option("--since", metavar="RUN", help="Begin with this run, such as the first one after a repair.")
+@click.option("--since", metavar="RUN", help="Start with this run, for example the first one after a repair.")
 @click.option("--pictures", "folder", type=click.Path(file_okay=False, path_type=Path), help="Write the charts here.")
 @click.option("--format", "form", type=click.Choice(["png", "svg"]), default="png", show_default=True)
 @json_option
 def command(sensor: str | None, baseline: int, since: str | None, folder: Path | None, form: str, as_json: bool) -> int:
-    """Chart every `rig run check-standard` of SENSOR (its serial number), or of all check standards.
+    """Show control charts of `rig run check-standard` for SENSOR (its serial number), or for all check standards.
 
-    The first runs set the limits; a later one beyond them is out of control, and so is a slow drift of their weighted
-    mean. Exit status 1: out of control.
+    The first runs set the limits. A later run outside them is out of control; so is a slow drift of the weighted mean.
+    Exit status 1: out of control.
     """
     with Record.to_read() as record:
         found = controlled(record.runs(), sensor, baseline, since)
@@ -48,7 +48,7 @@ def command(sensor: str | None, baseline: int, since: str | None, folder: Path |
 
 
 def _verdict(found: list[Controlled]) -> str:
-    """Of all charts: the worst of theirs."""
+    """The worst verdict of all charts."""
     verdicts = {each.chart.verdict for each in found}
     return next(verdict for verdict in (OUT, "in control", "baseline") if verdict in verdicts)
 
@@ -62,14 +62,14 @@ def _row(each: Controlled) -> tuple[str, ...]:
 
 
 def _signals(each: Controlled) -> list[str]:
-    """A line for every run that is beyond a limit."""
+    """A line for every run outside a limit."""
     chart, name = each.chart, f"{each.sensor} {each.quantity}"
     jumps = [
         f"{each.runs[k]}: {name} is {(chart.values[k] - chart.centre) / chart.sigma:+.1f} sigma from the centre"
         for k in chart.jumps
     ]
     first = chart.drifts[:1]
-    return jumps + [f"{each.runs[k]}: {name} has drifted: its weighted mean is beyond its limit" for k in first]
+    return jumps + [f"{each.runs[k]}: {name} has drifted: its weighted mean is outside the limit" for k in first]
 
 
 def _document(each: Controlled) -> dict[str, Any]:

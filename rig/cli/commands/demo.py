@@ -1,4 +1,4 @@
-"""demo: the whole story on the simulated rig: sweep, compare, diagnose, add, the error falls, a report."""
+"""demo: a calibration on the simulated rig: sweep, compare, diagnose, add, report."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from rig.cli.terminal.output import emit, json_option, note
     default="rig-demo",
     show_default=True,
     type=click.Path(file_okay=False, path_type=Path),
-    help="Where the model and the report are written.",
+    help="Folder for the model and the report.",
 )
 @json_option
 def command(folder: Path, as_json: bool) -> None:
-    """Sweep a simulated sensor, find what its linear model misses, add it, and watch the error fall."""
+    """Sweep a simulated sensor, find the effects that its linear model misses, add them, and write a report."""
     from calibrations.documents import discovery_document
     from calibrations.loop import compare, discover
     from calibrations.model.file import read_model
@@ -40,9 +40,9 @@ def command(folder: Path, as_json: bool) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise click.UsageError(f"{folder}: cannot be made: {error.strerror}") from None
+        raise click.UsageError(f"{folder}: cannot make the folder: {error.strerror}") from None
 
-    note("1  Sweep: both stages turn a simulated ADXL203 through 518 poses, every byte over the instruments' wires.")
+    note("1  Sweep: both stages move a simulated ADXL203 through 518 poses, over the protocols of the instruments.")
     sweep, bench = find("sweep"), read_bench()
     with watching(sweep, bench, False, None) as watch, Record() as record:
         outcome = start(record, bench, sweep, parse(sweep, {}), watch)
@@ -51,19 +51,19 @@ def command(folder: Path, as_json: bool) -> None:
     run = outcome.run.run
     table, linear = load(run), read_model("linear")
 
-    note("2  Compare: the manufacturer's linear model beside the measurement.")
-    beside = compare(table, linear)
-    places = "\n".join(f"   {place.text}" for place in beside.fails[:3])
-    note(f"\n{shown(beside.data.error_table(beside.fit))}\n\n{places}\n")
+    note("2  Compare: the linear model of the manufacturer and the measurement.")
+    comparison = compare(table, linear)
+    places = "\n".join(f"   {place.text}" for place in comparison.fails[:3])
+    note(f"\n{shown(comparison.data.error_table(comparison.fit))}\n\n{places}\n")
 
-    note("3  Diagnose and add, until nothing is missing.\n")
-    found = discover(table, linear)
+    note("3  Diagnose and add until no effect is missing.\n")
+    discovery_result = discover(table, linear)
     model, page = folder / "model.yaml", folder / "report.html"
-    write_model(found.end, linear, model, note)
-    write_whole(page, report(found, beside, today(), program(), album(found, beside)))
+    write_model(discovery_result.end, linear, model, note)
+    write_whole(page, report(discovery_result, comparison, today(), program(), album(discovery_result, comparison)))
     if as_json:
-        emit({**discovery_document(found, str(model)), "run": run, "report": str(page)})
+        emit({**discovery_document(discovery_result, str(model)), "run": run, "report": str(page)})
         return
-    click.echo(discovery(found))
-    click.echo(f"\n4  Look: {page} shows where the model failed and how the error fell; {model} is the new model.\n")
+    click.echo(discovery(discovery_result))
+    click.echo(f"\n4  Report: {page} shows where the model failed and how the error fell; {model} is the new model.\n")
     click.echo(f"The run is {run}. Try: rig diagnose {run}, rig effects, rig import YOUR.csv")

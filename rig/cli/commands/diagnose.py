@@ -1,4 +1,4 @@
-"""diagnose: which physical effect the model is missing."""
+"""diagnose: find the physical effect that a model misses."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def command(request: Request, check: bool, as_json: bool) -> int:
     """Find the physical effect that a model misses on DATA (a file or a run)."""
     from calibrations.discovery.verdict import Verdict
     from calibrations.documents import diagnosis_document
-    from rig.cli.terminal.words import own_effect, planned, told, warning
+    from rig.cli.terminal.words import own_effect, pattern_advice, planned, warning
     from rig.services.load import loaded
 
     question = loaded(request, note)
@@ -37,7 +37,7 @@ def command(request: Request, check: bool, as_json: bool) -> int:
         emit(diagnosis_document(result, name) | {"own_effect": own})
         notes(warning([result.caution]))
     else:
-        click.echo("\n".join([_text(result, name, request), *told(result.pattern, name, request)]))
+        click.echo("\n".join([_text(result, name, request), *pattern_advice(result.pattern, name, request)]))
     return int(result.verdict is Verdict.NO_RESPONSE or (check and result.verdict is not Verdict.ADEQUATE))
 
 

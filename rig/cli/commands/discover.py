@@ -1,4 +1,4 @@
-"""discover: add missing effects until none is missing."""
+"""discover: add missing effects until no effect is missing."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 @click.argument("data", nargs=-1)
 @model_option
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="Write the final model to this file.")
-@click.option("--live", is_flag=True, help="Measure on the bench, and choose what to measure next.")
+@click.option("--live", is_flag=True, help="Measure on the bench, and choose the next experiment.")
 @click.option("--time", "minutes", type=click.FloatRange(min=0, min_open=True), help="Rig time for --live, minutes.")
 @watch_options
 @check_option
@@ -36,52 +36,52 @@ def command(
     check: bool,
     as_json: bool,
 ) -> int:
-    """Diagnose and add until nothing is missing on DATA (a file or a run; several are judged together).
+    """Diagnose DATA (a file or a run, or several together) and add effects until no effect is missing.
 
-    With --live there is no DATA: it is measured, little by little, until one explanation stands or the time is used up
-    (without --time: as long as the standard sweep takes).
+    With --live there is no DATA: the program measures in steps until more data do not change the result, or until
+    the time is over (default: the duration of the standard sweep).
     """
     if live:
         from rig.cli.terminal.live import discover_live
 
         if several:
-            raise click.UsageError("--live measures its own data; leave out DATA, or --live")
+            raise click.UsageError("--live measures its own data; remove DATA or --live")
         return discover_live(request, out, minutes, unattended, answers, check, as_json)
     if not several:
-        raise click.UsageError("name DATA (a file or a run), or --live to measure it")
+        raise click.UsageError("give DATA (a file or a run), or --live to measure")
     return _discover(request, several, out, check, as_json)
 
 
 def _discover(request: Request, several: tuple[str, ...], out: Path | None, check: bool, as_json: bool) -> int:
     from calibrations.discovery.verdict import Verdict
     from calibrations.documents import discovery_document
-    from rig.cli.terminal.words import discovery, own_effect, parameters, planned, told, warning
+    from rig.cli.terminal.words import discovery, own_effect, parameters, pattern_advice, planned, warning
     from rig.services.load import loaded
     from rig.services.provenance import write_model
 
     question = loaded(request, note, out)
     data = question.data if len(several) == 1 else _together(several, request, question)
     result = planned(data.discover(question.model, question.effects), request, question.effects)
-    written = write_model(result.end, question.model, out, note)
-    reached = str(written) if written else request.model or question.model.name
+    path = write_model(result.end, question.model, out, note)
+    reached = str(path) if path else request.model or question.model.name
     own = (result.pattern if len(several) == 1 else None, reached, request)
     if as_json:
-        emit(discovery_document(result, str(written) if written else None) | {"own_effect": own_effect(*own)})
+        emit(discovery_document(result, str(path) if path else None) | {"own_effect": own_effect(*own)})
         notes(warning([result.caution]))
     else:
-        lines = "\n".join([discovery(result), *told(*own)])
+        lines = "\n".join([discovery(result), *pattern_advice(*own)])
         click.echo(f"{data.description}\n\n{lines}\n\n{parameters(result.end.model)}")
-        if written is not None:
-            click.echo(f"\nwritten to {written}")
+        if path is not None:
+            click.echo(f"\nwritten: {path}")
     return int(result.verdict is Verdict.NO_RESPONSE or (check and result.verdict is not Verdict.ADEQUATE))
 
 
 def _together(several: tuple[str, ...], request: Request, question: Loaded) -> Dataset[Any]:
-    """Several data as one table."""
+    """Several data sets as one table."""
     from calibrations.discovery.rows import Rows
     from rig.services.load import with_known_noise
     from rig.services.tables import load_all
 
     if question.data.form != "rows":
-        raise click.UsageError("still records are judged one at a time; name one")
+        raise click.UsageError("still records are analysed one at a time; give one")
     return Rows(with_known_noise(load_all(several, note), request.noise, question.effects))

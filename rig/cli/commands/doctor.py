@@ -1,4 +1,4 @@
-"""doctor: look after this installation, and collect what a maintainer needs into one archive."""
+"""doctor: check this installation, and write an archive for a maintainer."""
 
 from __future__ import annotations
 
@@ -21,21 +21,23 @@ from rig.services.health import Finding, findings, last_run, list_runs, versions
 
 
 @click.command("doctor")
-@click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="The archive; else named by the time.")
-@click.option("--run", "run", help="The run whose log goes into it; else the newest.")
+@click.option(
+    "--out", type=click.Path(dir_okay=False, path_type=Path), help="The archive. Default: a name with the time."
+)
+@click.option("--run", "run", help="The run whose log goes into the archive. Default: the newest.")
 @click.option(
     "--recover",
     "folder",
     type=click.Path(file_okay=False, path_type=Path),
-    help="Copy what can be read of a damaged record into a new one in this folder, and do nothing else.",
+    help="Only copy the readable rows of a damaged record to a new record in this folder.",
 )
 @bench_option
 @json_option
 def command(out: Path | None, run: str | None, folder: Path | None, bench_file: Path | None, as_json: bool) -> int:
-    """Check packages, disk and record (1: something is wrong), and write an archive for a maintainer.
+    """Check packages, disk and record, and write an archive for a maintainer. Exit status 1: a check fails.
 
-    It holds versions, the checks, the list of runs, the bench, and one run's log; no samples, and no secrets: what a
-    bench file calls a password, a token or a key is left out. Look into it before you send it.
+    The archive has versions, checks, the list of runs, the bench, and the log of one run. It has no samples, and no
+    passwords, tokens or keys of the bench file. Look at it before you send it.
     """
     if folder is not None:
         return _recovered(folder, as_json)
@@ -49,12 +51,12 @@ def command(out: Path | None, run: str | None, folder: Path | None, bench_file: 
     else:
         rows = [(each.what, "ok" if each.ok else "WRONG", each.detail) for each in found]
         click.echo(columns(("check", "", ""), rows))
-        click.echo(f"\n{archive}: {', '.join(sorted(parts))}. It has no samples; look into it before you send it.")
+        click.echo(f"\n{archive}: {', '.join(sorted(parts))}. It has no samples; look at it before you send it.")
     return int(not all(each.ok for each in found))
 
 
 def _parts(found: list[Finding], run: str | None, bench_file: Path | None) -> Mapping[str, Any]:
-    """The archive's files, as JSON documents by name."""
+    """The files of the archive: JSON documents by name."""
     parts: dict[str, Any] = {"versions.json": versions(), "checks.json": [vars(each) for each in found]}
     parts["runs.json"] = list_runs()
     try:
@@ -74,11 +76,11 @@ def _write(archive: Path, parts: Mapping[str, Any]) -> None:
             for name, document in parts.items():
                 file.writestr(name, json.dumps(document, indent=1, default=str))
     except OSError as error:
-        raise OutputError(f"{archive}: cannot be written: {error.strerror}; name another with --out") from None
+        raise OutputError(f"{archive}: cannot write the file: {error.strerror}; give another with --out") from None
 
 
 def _recovered(folder: Path, as_json: bool) -> int:
-    """Tell what was copied, and what is lost."""
+    """Recover the record; print the copied and the lost rows."""
     done = recover(home() / "record.db", folder)
     lost = [*(f"some rows of {table}" for table in done.damaged), *(f"the samples of {pose}" for pose in done.spoilt)]
     if as_json:

@@ -1,4 +1,4 @@
-"""draw: how the stages stand and how the sensor is mounted, as an SVG file or in the terminal."""
+"""draw: draw the stages and the mounting of the sensor, as an SVG file or in the terminal."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ def _svg(context: click.Context, parameter: click.Parameter, out: Path | None) -
 
 def _finite(context: click.Context, parameter: click.Parameter, deg: float) -> float:  # noqa: ARG001
     if not math.isfinite(deg):
-        raise click.BadParameter(f"{deg:g} is no angle")
+        raise click.BadParameter(f"{deg:g} is not an angle")
     return deg
 
 
 @click.command("draw")
 @click.option("--alpha", default=0.0, callback=_finite, metavar="DEG", help="Angle of alpha, which tilts the table.")
 @click.option("--beta", default=0.0, callback=_finite, metavar="DEG", help="Angle of beta, which turns the table.")
-@click.option("--mount", default=0.0, callback=_finite, metavar="DEG", help="Turn of the sensor about its z axis.")
+@click.option("--mount", default=0.0, callback=_finite, metavar="DEG", help="Rotation of the sensor about its z axis.")
 @click.option("--flip", default=0, type=click.IntRange(0, 1), help="1: the sensor is mounted face down.")
 @click.option(
     "--out",
@@ -35,9 +35,9 @@ def _finite(context: click.Context, parameter: click.Parameter, deg: float) -> f
 )
 @json_option
 def command(alpha: float, beta: float, mount: float, flip: int, out: Path | None, as_json: bool) -> None:
-    """Draw how the stages stand and how the sensor is mounted, and say what it feels there at rest.
+    """Draw the stages and the mounting of the sensor, and print its specific force at rest.
 
-    Without --out, a sketch of the table in the terminal.
+    Without --out, a sketch of the table appears in the terminal.
     """
     from rig.drawings import Attitude, page, sketch
     from rig.files import write_whole
@@ -49,6 +49,6 @@ def command(alpha: float, beta: float, mount: float, flip: int, out: Path | None
     if as_json:
         emit({"schema": "rig.drawing/1", "out": str(out) if out else None, "specific_force_g": force_g})
         return
-    felt = ", ".join(f"{axis} {value:+.4f}" for axis, value in force_g.items())
-    shown = [f"written: {out}"] if out else [*sketch(attitude), "o pin 1; from above the table"]
-    click.echo("\n".join([attitude.words, *shown, f"At rest it feels, in g: {felt}"]))
+    specific_force = ", ".join(f"{axis} {value:+.4f}" for axis, value in force_g.items())
+    shown = [f"written: {out}"] if out else [*sketch(attitude), "o: pin 1; view from above the table"]
+    click.echo("\n".join([attitude.words, *shown, f"Specific force at rest, in g: {specific_force}"]))

@@ -1,4 +1,4 @@
-"""effects: the catalogue of physical effects."""
+"""effects: list the catalogue of physical effects, or show one."""
 
 from __future__ import annotations
 
@@ -50,4 +50,4 @@ def command(effect: str | None, bench_file: Path | None, as_json: bool) -> None:
         more = (("At run time", known_at_run_time(e)), ("Source", e.source))
         click.echo("\n".join(f"{title}: {text}" for title, text in (*parts, *more) if text))
     else:
-        click.echo(columns(("effect", "acts on", "what happens"), [(e.name, e.acts_on, e.summary) for e in shown]))
+        click.echo(columns(("effect", "acts on", "description"), [(e.name, e.acts_on, e.summary) for e in shown]))

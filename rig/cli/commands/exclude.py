@@ -1,4 +1,4 @@
-"""exclude: leave a pose out of every analysis, with a reason that stays; or take it in again."""
+"""exclude: exclude a pose from every analysis, with a reason, or include it again."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from rig.cli.terminal.output import emit, json_option
 @click.command("exclude")
 @click.argument("run")
 @click.argument("pose", type=click.IntRange(min=0))
-@click.option("--reason", metavar="TEXT", help="Why it is left out; it is kept with the run.")
-@click.option("--include", is_flag=True, help="Take the pose in again.")
+@click.option("--reason", metavar="TEXT", help="The reason; the record stores it.")
+@click.option("--include", is_flag=True, help="Include the pose again.")
 @json_option
 def command(run: str, pose: int, reason: str | None, include: bool, as_json: bool) -> None:
-    """Leave pose number POSE of RUN out of every analysis.
+    """Exclude pose number POSE of RUN from every analysis.
 
-    The pose stays in the record, with the reason and the date. The results of a complete run are evaluated again; a
-    run that was stopped measures the pose again when it is resumed. `rig show RUN --poses` has the numbers.
+    The pose stays in the record, with the reason and the date. The results of a complete run are computed again; an
+    incomplete run measures the pose again on `rig resume`. `rig show RUN --poses` lists the numbers.
     """
     if include == bool(reason and reason.strip()):
-        raise click.UsageError("say why the pose is left out (--reason TEXT), or take it in again (--include)")
+        raise click.UsageError("give a reason (--reason TEXT), or include the pose again (--include)")
     from rig.record import Record
     from rig.services.exclusion import RESULTS, exclude
     from rig.services.next_steps import results_table
@@ -33,8 +33,8 @@ def command(run: str, pose: int, reason: str | None, include: bool, as_json: boo
         said = None if include else reason
         emit({"schema": "rig.exclude/1", "run": run, "pose": pose, "excluded": said, "results": found.results})
         return
-    done = "is taken in again" if include else f"is left out: {reason}"
+    state = "included again" if include else f"excluded: {reason}"
     after = [f"results: {told[-1]}", *results_table(found.results)] if found.state == "complete" and told else []
     if found.state != "complete" and not include:
         after = [f"Next: rig resume {run} measures it again"]
-    click.echo("\n".join([f"{run}: pose {pose} {done}", *after]))
+    click.echo("\n".join([f"{run}: pose {pose} {state}", *after]))

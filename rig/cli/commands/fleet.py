@@ -1,4 +1,4 @@
-"""fleet: what thousands of sensors miss, by batch and by rig, and their calibrations in the light of siblings."""
+"""fleet: find the missing effects of thousands of sensors, and calibrate each with the statistics of its batch."""
 
 from __future__ import annotations
 
@@ -21,20 +21,26 @@ if TYPE_CHECKING:
 
 @click.group("fleet")
 def command() -> None:
-    """Judge and calibrate many sensors at once.
+    """Analyse and calibrate many sensors at once.
 
     SOURCES are an index (a CSV file with the columns sensor, batch, rig, file), a folder of tables, tables, or runs;
-    without any, the last complete run of every sensor in the record. What was worked out is in the record, so a command
-    that was stopped goes on where it was when it is given again.
+    without SOURCES, the last complete run of every sensor in the record. The record stores every result, so a stopped
+    command continues when you repeat it.
     """
 
 
 def _fleet_options(function: Callable[..., Any]) -> Callable[..., Any]:
     options = (
         click.argument("sources", nargs=-1),
-        click.option("--scheduler", metavar="tcp://HOST:PORT", help="Dask's scheduler; else a local cluster."),
-        click.option("--workers", type=click.IntRange(min=1), help="Of the local cluster; else one for each core."),
-        click.option("--report", type=click.Path(dir_okay=False, path_type=Path), help="Write a page on the fleet."),
+        click.option("--scheduler", metavar="tcp://HOST:PORT", help="Dask scheduler. Default: a local cluster."),
+        click.option(
+            "--workers", type=click.IntRange(min=1), help="Size of the local cluster. Default: one worker a core."
+        ),
+        click.option(
+            "--report",
+            type=click.Path(dir_okay=False, path_type=Path),
+            help="Write a report on the fleet to this HTML file.",
+        ),
         bench_option,
         json_option,
     )
@@ -45,8 +51,10 @@ def _fleet_options(function: Callable[..., Any]) -> Callable[..., Any]:
 
 @command.command("discover")
 @_fleet_options
-@click.option("--model", default="linear", show_default=True, help="That sensors are held against: a name or a file.")
-@click.option("--out", type=click.Path(file_okay=False, path_type=Path), help="Write each batch's model here.")
+@click.option("--model", default="linear", show_default=True, help="Model to test: a name or a file.")
+@click.option(
+    "--out", type=click.Path(file_okay=False, path_type=Path), help="Write the model of each batch into this folder."
+)
 def discover(
     sources: tuple[str, ...],
     scheduler: str | None,
@@ -57,7 +65,7 @@ def discover(
     model: str,
     out: Path | None,
 ) -> None:
-    """Find what the sensors of SOURCES miss: effects of batches, errors of rigs, and sensors unlike their siblings."""
+    """Find effects that batches miss, errors of rigs, and sensors unlike the others of their batch."""
     from calibrations.model.file import dump_model, read_model
     from rig.files import require_out, write_whole
     from rig.fleet.calibrate import write_guide
@@ -86,7 +94,9 @@ def discover(
 @command.command("calibrate")
 @_fleet_options
 @click.option("--model", default="linear", show_default=True, help="A name, a file, or the folder of fleet discover.")
-@click.option("--out", type=click.Path(file_okay=False, path_type=Path), help="Write each sensor's model here.")
+@click.option(
+    "--out", type=click.Path(file_okay=False, path_type=Path), help="Write the model of each sensor into this folder."
+)
 def calibrate(
     sources: tuple[str, ...],
     scheduler: str | None,
@@ -97,7 +107,7 @@ def calibrate(
     model: str,
     out: Path | None,
 ) -> None:
-    """Calibrate the sensors of SOURCES, each in the light of its batch, with intervals that hold 95 %."""
+    """Calibrate the sensors of SOURCES with the statistics of their batch, with 95 % intervals."""
     from calibrations.model.file import dump_model
     from rig.files import require_out, write_whole
     from rig.fleet.calibrate import calibrate_fleet, made_folder, models, read_guide, safe
@@ -122,13 +132,13 @@ def calibrate(
     if as_json:
         emit(calibration_document(found, model) | {"written": [str(path) for path in written]})
     else:
-        told = [f"written: {len(written)} files, such as {written[-1]}"] if written else []
-        click.echo("\n".join([*calibration(found), *told]))
+        paths = [f"written: {len(written)} files, such as {written[-1]}"] if written else []
+        click.echo("\n".join([*calibration(found), *paths]))
 
 
 @contextmanager
 def _fleet(sources: Sequence[str], scheduler: str | None, workers: int | None) -> Iterator[tuple[Fleet, list[Member]]]:
-    """The workers and the sensors; how far it is goes to standard error, in steps of a tenth."""
+    """The workers and the sensors; progress goes to standard error."""
     from rig.fleet.crew import crew
     from rig.fleet.members import fleet_of
     from rig.fleet.questions import Fleet
@@ -141,19 +151,19 @@ def _fleet(sources: Sequence[str], scheduler: str | None, workers: int | None) -
 
 
 class _Steps:
-    """Tells every tenth of a round."""
+    """Prints the progress at every tenth of a round."""
 
     def __init__(self) -> None:
-        self._told = (0, 0)
+        self._printed = (0, 0)
 
     def __call__(self, done: int, of: int) -> None:
         step = (of, 10 * done // of)
-        if step != self._told:
-            self._told = step
-            note(f"{done} of {of} sensors looked at")
+        if step != self._printed:
+            self._printed = step
+            note(f"{done} of {of} sensors analysed")
 
 
-# What fleets come to, in words for a terminal.
+# Results in words.
 
 
 MOST_SENSORS = 20
@@ -161,7 +171,7 @@ VERDICTS = ("adequate", "effect-missing", "ambiguous", "unexplained", "no-respon
 
 
 def population(found: Population, model: str) -> Iterator[str]:
-    """Of `rig fleet discover`."""
+    """The result of `rig fleet discover`."""
     counts = ", ".join(f"{found.verdicts[v]} {v}" for v in VERDICTS if found.verdicts[v])
     yield f"{model} on {len(found.sensors)} sensors: {counts}"
     rows = [
@@ -169,7 +179,7 @@ def population(found: Population, model: str) -> Iterator[str]:
         for each in found.batches
     ]
     yield ""
-    yield columns(("batch", "sensors", "all its sensors miss", "some of them"), rows)
+    yield columns(("batch", "sensors", "missing in all", "missing in some"), rows)
     yield from _rigs(found)
     yield from _persons([each for each in found.sensors if each.needs_a_person])
 
@@ -191,7 +201,7 @@ def _rigs(found: Population) -> Iterator[str]:
     beyond = [error for error in found.rigs if error.beyond]
     if beyond:
         yield ""
-        yield "Errors of rigs, against the median of the rigs; poses were corrected by them:"
+        yield "Errors of rigs relative to their median; the poses were corrected for them:"
         rows = [
             (
                 e.rig,
@@ -206,11 +216,11 @@ def _rigs(found: Population) -> Iterator[str]:
     rigs = {rig for group in found.unconnected for rig in group}
     if len(rigs) == 1:
         yield ""
-        yield "All were measured on one rig: an error of its stages cannot be told from one that all sensors have."
+        yield "All sensors were measured on one rig: an error of its stages looks like an error of all sensors."
     elif len(found.unconnected) > 1:
         yield ""
         groups = "; ".join(joined(group) for group in found.unconnected)
-        yield f"No batch was measured on two of these groups of rigs, which cannot be compared: {groups}."
+        yield f"These groups of rigs cannot be compared, because no batch was measured on two of them: {groups}."
 
 
 def _persons(sensors: list[SensorVerdict]) -> Iterator[str]:
@@ -218,19 +228,20 @@ def _persons(sensors: list[SensorVerdict]) -> Iterator[str]:
         return
     yield ""
     order = sorted(sensors, key=lambda each: (VERDICTS.index(each.verdict), len(each.own)), reverse=True)
-    yield f"{len(order)} sensors need a person{f', {MOST_SENSORS} of them' if len(order) > MOST_SENSORS else ''}:"
+    more = f"; the first {MOST_SENSORS}" if len(order) > MOST_SENSORS else ""
+    yield f"{len(order)} sensors need a decision by a person{more}:"
     rows = [(each.sensor, each.batch or "-", each.rig or "-", each.verdict, why(each)) for each in order[:MOST_SENSORS]]
     yield columns(("sensor", "batch", "rig", "verdict", "why"), rows)
 
 
 def why(each: SensorVerdict) -> str:
-    """What is the matter with a sensor."""
+    """The reason why a sensor needs a person."""
     named = [_with_rivals(name, each.rivals.get(name, ())) for name in (each.own or each.effects)]
     return "; ".join(filter(None, (", ".join(named), each.remark))) or "-"
 
 
 def calibration(found: Calibration) -> Iterator[str]:
-    """Of `rig fleet calibrate`."""
+    """The result of `rig fleet calibrate`."""
     for batch in found.batches:
         yield from (*_batch(batch), "")
     for member, fault in found.faults.items():
@@ -247,9 +258,9 @@ def _batch(batch: Calibrated) -> Iterator[str]:
         mean = concise(each.mean * size, each.mean_std * size, unit)
         apart = [m.sensor for m, alone in zip(batch.members, each.apart, strict=True) if alone]
         rows.append((effect, name, axis or "-", mean, f"{each.spread * size:.2g} {unit}", f"{gain:.2f}", _named(apart)))
-    yield columns(("effect", "parameter", "axis", "mean", "spread", "std / alone", "unlike the others"), rows)
+    yield columns(("effect", "parameter", "axis", "mean", "spread", "std / alone", "outliers"), rows)
     if out:
-        yield f"Not described by this model: {_named(out)}; `rig fleet discover` says what they miss."
+        yield f"This model does not describe: {_named(out)}; `rig fleet discover` finds their missing effects."
 
 
 def _gains(batch: Calibrated) -> list[float]:

@@ -1,4 +1,4 @@
-"""history: a sensor's calibrations over its life, their stability, and when the next one is due."""
+"""history: all calibrations of a sensor, their stability, and the date of the next one."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from rig.services.history import (
 )
 from rig.services.history_words import agreements, but_stale, chart_verdict, near, next_due, significance, summary
 
-Near = tuple[Calibration, float] | None  # the calibration closest to a day, and how many days older it is
+Near = tuple[Calibration, float] | None  # the calibration closest to a day, and its age on that day in days
 
 
 DAY = click.DateTime(["%Y-%m-%d"])
@@ -40,17 +40,28 @@ DAY = click.DateTime(["%Y-%m-%d"])
 
 @click.command("history")
 @click.argument("sensor")
-@click.option("--model", default="linear", show_default=True, help="By which every run is calibrated.")
-@click.option("--quantity", "chosen", multiple=True, metavar="NAME", help="Only this one; again for more.")
-@click.option("--limit", "given", multiple=True, metavar="NAME=CHANGE", help="Greatest change from the last one.")
+@click.option("--model", default="linear", show_default=True, help="Model for the calibration of every run.")
+@click.option("--quantity", "chosen", multiple=True, metavar="NAME", help="Only this quantity; repeatable.")
 @click.option(
-    "--baseline", type=click.IntRange(min=FEWEST_RUNS), default=BASELINE_RUNS, help="Calibrations that set the charts."
+    "--limit",
+    "given",
+    multiple=True,
+    metavar="NAME=CHANGE",
+    help="Largest allowed change since the last calibration; repeatable.",
 )
-@click.option("--at", "on", type=DAY, help="The calibration closest to this day, and whether it is stale.")
+@click.option(
+    "--baseline",
+    type=click.IntRange(min=FEWEST_RUNS),
+    default=BASELINE_RUNS,
+    help="Number of calibrations that set the control limits.",
+)
+@click.option("--at", "on", type=DAY, help="Find the calibration closest to this day, and check its age.")
 @click.option("--between", nargs=2, type=DAY, help="Compare the calibrations closest to two days.")
-@click.option("--beside", help="Compare with another sensor's last calibration.")
-@click.option("--rigs", nargs=2, help="Compare two rigs, by their names, by all calibrations of this sensor on them.")
-@click.option("--pictures", "folder", type=click.Path(file_okay=False, path_type=Path), help="Draw it here.")
+@click.option("--beside", help="Compare with the last calibration of another sensor.")
+@click.option("--rigs", nargs=2, help="Compare two rigs by all calibrations of this sensor on them.")
+@click.option(
+    "--pictures", "folder", type=click.Path(file_okay=False, path_type=Path), help="Write pictures into this folder."
+)
 @click.option("--format", "form", type=click.Choice(["png", "svg"]), default="png", show_default=True)
 @bench_option
 @json_option
@@ -69,18 +80,18 @@ def command(
     bench_file: Path | None,
     as_json: bool,
 ) -> int:
-    """Show the life of SENSOR (its serial number): every calibration in the record, drift, control charts, due dates.
+    """Show the calibrations of SENSOR (its serial number): drift, control charts, due dates.
 
-    The next calibration is due when what the drift may come to leaves its limit: of the bench file (limits.results), or
-    --limit. Exit status 1: stale at --at, or a comparison that does not agree.
+    The next calibration is due when the drift with its uncertainty may exceed a limit: limits.results in the bench
+    file, or --limit. Exit status 1: the calibration at --at is stale, or a comparison does not agree.
     """
     from calibrations.model.file import read_model
     from rig.services.load import effects_of
 
     read = read_model(model, effects_of(bench_file))
-    said = changes(given)
+    limits = changes(given)
     with Record.to_read() as record:
-        found = _only(history(record, sensor, read, limits_of(bench_file) | said, baseline), chosen, said)
+        found = _only(history(record, sensor, read, limits_of(bench_file) | limits, baseline), chosen, limits)
         last = latest(record, beside, read) if beside is not None else None
     compared = [] if beside is None or last is None else [compare_sensors(found, beside, last)]
     compared += [compare_days(found, *(day.date() for day in between))] if between else []
@@ -93,31 +104,31 @@ def command(
     if as_json:
         emit(document(found, near, why, compared))
     else:
-        told = [*lines(found), *near_lines(near, day, why), *compared_lines(compared)]
-        click.echo("\n".join([*told, *(f"written: {path}" for path in written)]))
+        text = [*lines(found), *near_lines(near, day, why), *compared_lines(compared)]
+        click.echo("\n".join([*text, *(f"written: {path}" for path in written)]))
     return int(why is not None or not all(each.agree for each in compared))
 
 
 def _only(found: History, chosen: Sequence[str], limited: Iterable[str]) -> History:
-    """With the chosen quantities alone. Raises UsageError for one that is not there, chosen or limited."""
+    """The history of the chosen quantities. Raises UsageError for an unknown quantity."""
     from drivers.errors import did_you_mean
 
     known = [q.name for q in found.quantities]
     for name in (*chosen, *limited):
         if name not in known:
-            raise click.UsageError(f"no quantity {name!r} by the model {found.model}.{did_you_mean(name, known)}")
+            raise click.UsageError(f"the model {found.model} has no quantity {name!r}.{did_you_mean(name, known)}")
     kept = tuple(q for q in found.quantities if not chosen or q.name in chosen)
     return replace(found, quantities=kept)
 
 
 def _of_chosen(compared: Compared, found: History) -> Compared:
-    """The rows of the quantities that are shown."""
+    """The rows of the chosen quantities."""
     names = {q.name for q in found.quantities}
     return replace(compared, rows={name: row for name, row in compared.rows.items() if name in names})
 
 
 def _draw(found: History, folder: Path, form: str) -> list[Path]:
-    """Its life, and a control chart of each quantity."""
+    """The calibrations over time, and a control chart of each quantity."""
     from calibrations.presentation.charts.history import control_charts, lives
     from calibrations.presentation.static import save_all
     from rig.services.charts import life_of
@@ -129,7 +140,7 @@ def _draw(found: History, folder: Path, form: str) -> list[Path]:
     return save_all(figures, folder, form)
 
 
-# What `rig history` prints of a sensor's life, as tables and as JSON; its sentences are also those of the page.
+# The history as tables and as JSON; the page uses the same sentences.
 
 
 def lines(found: History) -> Iterator[str]:
@@ -144,7 +155,7 @@ def lines(found: History) -> Iterator[str]:
     yield next_due(found, "--limit bias-x=0.005")
     yield from (f"{each.data}: {each.expired}." for each in of if each.expired)
     for data, why in found.passed_over.items():
-        note(f"Passed over: {data}: {why}")
+        note(f"Not used: {data}: {why}")
 
 
 def _row(each: Calibration, quantities: Sequence[Quantity]) -> tuple[str, ...]:
@@ -174,7 +185,7 @@ def near_lines(closest: Near, on: date | None, why: str | None) -> Iterator[str]
 
 def compared_lines(compared: Sequence[Compared]) -> Iterator[str]:
     for each in compared:
-        yield f"\n{each.one} beside {each.other}"
+        yield f"\n{each.one} compared with {each.other}"
         yield columns(*agreements(each, lambda value, digits: f"{value:.{digits}g}"))
 
 

@@ -1,4 +1,4 @@
-"""import: take a file into the record as a run."""
+"""import: store a file in the record as a run."""
 
 from __future__ import annotations
 
@@ -30,15 +30,17 @@ CHOICES = {
 @click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
 @click.option("--kind", type=click.Choice(["poses", "positions", "motion", "still", "rates"]), help="Kind of table.")
 @click.option(
-    "--column", "mapped", multiple=True, metavar="NAME=THEIRS:UNIT", help="Our name for one of their columns."
+    "--column", "mapped", multiple=True, metavar="NAME=THEIRS:UNIT", help="Name a column of the file; repeatable."
 )
-@click.option("--constant", "given", multiple=True, metavar="KEY=VALUE", help="Such as gravity_m_s2=9.81744.")
+@click.option(
+    "--constant", "given", multiple=True, metavar="KEY=VALUE", help="A constant, such as gravity_m_s2=9.81744."
+)
 @json_option
 def command(file: Path, kind: str | None, mapped: tuple[str, ...], given: tuple[str, ...], as_json: bool) -> None:
-    """Take FILE into the record. A raw log becomes the means of what it holds still.
+    """Store FILE in the record. A raw log is averaged over its still intervals.
 
-    A column is named by the file's header, or by its number from 1 where there is none. At a terminal the program
-    proposes what is not given, and asks.
+    THEIRS is a name in the file's header, or a column number from 1 if the file has no header. In a terminal the
+    program proposes names for unknown columns and asks.
     """
     from calibrations.importing.files import open_text_file
     from calibrations.importing.foreign import import_sheet, needs_mapping
@@ -47,19 +49,16 @@ def command(file: Path, kind: str | None, mapped: tuple[str, ...], given: tuple[
     from rig.record import Record
     from rig.services.tables import averaged
 
-    laid, columns, constants = (
-        read_sheet(open_text_file(file)),
-        [ColumnMapping.parse(m) for m in mapped],
-        _constants(given),
-    )
-    if sys.stdin.isatty() and sys.stderr.isatty() and needs_mapping(laid, kind, columns):
-        kind, columns = ask_mapping(laid, kind, columns, given)
-    taken = import_sheet(laid, kind, columns, constants)
-    table = averaged(taken.table, note)
+    sheet = read_sheet(open_text_file(file))
+    columns, constants = [ColumnMapping.parse(text) for text in mapped], _constants(given)
+    if sys.stdin.isatty() and sys.stderr.isatty() and needs_mapping(sheet, kind, columns):
+        kind, columns = ask_mapping(sheet, kind, columns, given)
+    imported = import_sheet(sheet, kind, columns, constants)
+    table = averaged(imported.table, note)
     with Record.to_read() as record:
-        run = record.add_table(table, taken.settings)
+        run = record.add_table(table, imported.settings)
     if table.content == "positions" and {"ax", "mx"} <= set(table.columns):
-        note("Its accelerometer is meant; with --constant triad=m its magnetometer is.")
+        note("The run has the accelerometer; with --constant triad=m it has the magnetometer.")
     if as_json:
         names = [*table.columns, *table.labels]
         emit({"schema": "rig.import/1", "run": run, "kind": table.kind, "rows": table.n, "columns": names})
@@ -73,7 +72,7 @@ def _constants(given: tuple[str, ...]) -> dict[str, str | float]:
     for text in given:
         key, equals, value = text.partition("=")
         if not equals:
-            raise click.UsageError(f'"{text}": a constant is given as KEY=VALUE, such as gravity_m_s2=9.81744')
+            raise click.UsageError(f'"{text}": write a constant as KEY=VALUE, such as gravity_m_s2=9.81744')
         try:
             constants[key] = float(value)
         except ValueError:
@@ -81,72 +80,77 @@ def _constants(given: tuple[str, ...]) -> dict[str, str | float]:
     return constants
 
 
-# A person at a terminal says which column of a file is what; a proposal is there to be confirmed.
+# Questions to a person about the columns of a file.
 
 
 def ask_mapping(
-    laid: Sheet, kind: str | None, mapped: Sequence[ColumnMapping], constants: Sequence[str]
+    sheet: Sheet, kind: str | None, mapped: Sequence[ColumnMapping], constants: Sequence[str]
 ) -> tuple[str, list[ColumnMapping]]:
-    """The kind of table and the whole mapping, as the person confirms it; the command that repeats it is printed.
+    """The kind of table and the mapping, confirmed by a person; prints the command that repeats the import.
 
-    Raises click.Abort where the person gives up.
+    Raises click.Abort if the person gives up.
     """
-    note(f"{laid.name} has columns that are not called as here. Which is what?")
+    note(f"{sheet.name} has columns with unknown names. Name them.")
     if kind is None:
         kinds = click.Choice(sorted(CHOICES))
-        told = "Held at known stage angles (poses), put down by hand (positions), turned (rates), or shaken (motion)"
-        kind = str(click.prompt(told, default=likely_kind(laid, mapped), type=kinds, err=True))
+        question = (
+            "Known stage angles (poses), still positions by hand (positions), rotation (rates), vibration (motion)"
+        )
+        kind = str(click.prompt(question, default=likely_kind(sheet, mapped), type=kinds, err=True))
     note(
-        f"\nOur columns: {CHOICES.get(kind, '')}\nEnter takes what stands in brackets, {LEAVE} none; or type a column,"
+        f"\nColumn names: {CHOICES.get(kind, '')}\n"
+        f"Enter accepts the proposal in brackets, {LEAVE} skips the column. Or type a name,"
     )
-    note("with a unit where it is another (vx_v:mV), or a unit alone (mV).\n")
-    whole = _columns(laid, kind, mapped)
-    while lacking := missing_columns(kind, laid, whole):
-        note(f"\nA table of {kind} needs {', '.join(lacking)} too. Once more:\n")
-        whole = _columns(laid, kind, mapped)
-    note(f"\nThe same again, without questions:\n    {import_command(laid, kind, whole, constants)}\n")
+    note("with a unit if it differs (vx_v:mV), or only a unit (mV).\n")
+    whole = _columns(sheet, kind, mapped)
+    while lacking := missing_columns(kind, sheet, whole):
+        note(f"\nA table of {kind} also needs {', '.join(lacking)}. Again:\n")
+        whole = _columns(sheet, kind, mapped)
+    note(f"\nTo repeat this import without questions:\n    {import_command(sheet, kind, whole, constants)}\n")
     return kind, whole
 
 
-def _columns(laid: Sheet, kind: str, mapped: Sequence[ColumnMapping]) -> list[ColumnMapping]:
-    """One question for each column that has no name of ours."""
+def _columns(sheet: Sheet, kind: str, mapped: Sequence[ColumnMapping]) -> list[ColumnMapping]:
+    """Ask for the name of each unknown column."""
     whole = list(mapped)
-    proposals = {m.theirs: m for m in propose_mapping(laid, kind, mapped)}
-    open_ones = [t for t, bare in zip(laid.header, laid.bare, strict=True) if bare not in NUMBERS]
+    proposals = {m.theirs: m for m in propose_mapping(sheet, kind, mapped)}
+    open_ones = [t for t, bare in zip(sheet.header, sheet.bare, strict=True) if bare not in NUMBERS]
     for theirs in open_ones:
-        if theirs not in {m.theirs for m in mapped} and (m := _column(laid, theirs, proposals.get(theirs), whole)):
+        if theirs not in {m.theirs for m in mapped} and (m := _column(sheet, theirs, proposals.get(theirs), whole)):
             whole.append(m)
     return whole
 
 
 def _column(
-    laid: Sheet, theirs: str, proposal: ColumnMapping | None, before: Sequence[ColumnMapping]
+    sheet: Sheet, theirs: str, proposal: ColumnMapping | None, before: Sequence[ColumnMapping]
 ) -> ColumnMapping | None:
-    """What a person calls one column; asked until it can be."""
-    values = sample_values(laid, theirs)
-    shown = f"{values.min():g} .. {values.max():g}" if len(values) else f'"{laid.sample[0][laid.header.index(theirs)]}"'
+    """Ask for the name of one column until the answer is valid."""
+    values = sample_values(sheet, theirs)
+    shown = (
+        f"{values.min():g} .. {values.max():g}" if len(values) else f'"{sheet.sample[0][sheet.header.index(theirs)]}"'
+    )
     default = proposal.text.partition("=")[0] + (f":{proposal.unit}" if proposal.unit else "") if proposal else LEAVE
     while True:
         answer = str(click.prompt(f"  {theirs:16} {shown:24}", default=default, err=True)).strip()
         try:
-            return _understood(answer, theirs, proposal, before, laid.name)
+            return _parse_answer(answer, theirs, proposal, before, sheet.name)
         except DataError as error:
             note(f"    {error}")
 
 
-def _understood(
+def _parse_answer(
     answer: str, theirs: str, proposal: ColumnMapping | None, before: Sequence[ColumnMapping], source: str
 ) -> ColumnMapping | None:
-    """The column that `answer` means, None for none. Raises DataError."""
+    """The column for an answer, None if it is skipped. Raises DataError."""
     if answer == LEAVE:
         return None
     if proposal is not None and parse_unit(answer) and answer not in NUMBERS:
         return check_unit(replace(proposal, unit=parse_unit(answer)), source)
     name, colon, unit = answer.partition(":")
     if name not in NUMBERS | {PATH}:
-        raise DataError(f'"{name}" is none of our columns{nearest(name, " ".join(CHOICES.values()).split())}')
+        raise DataError(f'"{name}" is not a column name{nearest(name, " ".join(CHOICES.values()).split())}')
     if name in {m.name for m in before}:
-        raise DataError(f"{name} is taken already")
+        raise DataError(f"{name} is already the name of another column")
     if colon and not parse_unit(unit):
-        raise DataError(f'"{unit}" is no unit that is known here')
+        raise DataError(f'"{unit}" is not a known unit')
     return check_unit(ColumnMapping(name, theirs, parse_unit(unit)), source)

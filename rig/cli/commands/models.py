@@ -1,4 +1,4 @@
-"""models: the models that come with the program."""
+"""models: list the shipped models."""
 
 from __future__ import annotations
 

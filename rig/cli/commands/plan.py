@@ -1,4 +1,4 @@
-"""plan: dry run of a procedure: every move, its limits, duration; touches nothing."""
+"""plan: dry run of a procedure: every move, its limits, its duration; nothing moves."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ from rig.planning.sweep_range import Judged
 PLANS = ("", "standard sweep", "chosen, same dwell", "chosen, same error")
 
 
-FEW_STEPS = 120  # that are read through rather than summed up
-FIRST, LAST = 14, 4  # stretches of a long plan that are shown
+FEW_STEPS = 120  # longer plans are summarised
+FIRST, LAST = 14, 4  # stretches of a long plan that are shown at its beginning and its end
 
 
 @contextmanager
-def _nothing_stopped() -> Iterator[None]:
-    """What a run would be stopped for is bad input here: a plan moves nothing."""
+def _limits_as_bad_input() -> Iterator[None]:
+    """Report a limit that would stop a run as bad input, because a plan moves nothing."""
     try:
         yield
     except (LimitError, SafetyLimit) as refused:
@@ -48,15 +48,17 @@ def _nothing_stopped() -> Iterator[None]:
 @click.command("plan", context_settings=PASS_ON)
 @click.argument("procedure")
 @settings_arguments
-@click.option("--moves", is_flag=True, help="Every move and every record, however many.")
-@click.option("--optimal", is_flag=True, help="Of a sweep: poses chosen for --model, beside the standard ones.")
+@click.option("--moves", is_flag=True, help="List every move and every recording.")
+@click.option(
+    "--optimal", is_flag=True, help="For sweep: choose poses for --model, and compare them with the standard ones."
+)
 @model_option
-@click.option("--poses", type=int, help="How many to choose, at most 60. Default: a quarter.")
+@click.option("--poses", type=int, help="Number of poses to choose, at most 60. Default: a quarter.")
 @click.option("--criterion", type=click.Choice(["D", "I"]), help="D: joint uncertainty; I, the default: prediction.")
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="Write the poses to this file.")
 @bench_option
 @json_option
-@_nothing_stopped()
+@_limits_as_bad_input()
 def command(
     procedure: str,
     given: tuple[str, ...],
@@ -70,19 +72,19 @@ def command(
     bench_file: Path | None,
     as_json: bool,
 ) -> None:
-    """Print every move that PROCEDURE would make, the limits it stays within, and how long it takes.
+    """Print every move that PROCEDURE would make, the limits, and the duration. Nothing moves.
 
-    A long plan is summed up; --moves prints all of it. Settings of the procedure are options: `rig plan sweep
-    --step-deg 30`. Nothing is touched. --out writes the poses, for `rig run sweep --pose-list`.
+    A long plan is summarised; --moves prints all of it. Settings of the procedure are options: `rig plan sweep
+    --step-deg 30`. --out writes the poses, for `rig run sweep --pose-list`.
 
-    --optimal chooses the poses of a sweep for a model, so that it takes less time to know as much. The settings are
-    those of the standard sweep beside it, whose range the chosen poses have.
+    --optimal chooses the poses of a sweep for a model, so that the same uncertainty takes less rig time. The settings
+    are those of the standard sweep for comparison; the chosen poses stay in its range.
     """
     bench = read_bench(bench_file)
     found = find(procedure, bench.folders.procedures)
     settings = parse(found, read_settings(given, pairs, found.defaults))
     if optimal:
-        _optimal(bench, found, settings, Asked(model, poses, criterion, out, bench_file, as_json))
+        _optimal(bench, found, settings, OptimalOptions(model, poses, criterion, out, bench_file, as_json))
         return
     if model or poses or criterion:
         raise click.UsageError("--model, --poses and --criterion go with --optimal")
@@ -97,8 +99,8 @@ def command(
 
 
 @dataclass(frozen=True)
-class Asked:
-    """What is asked of chosen poses; None where nothing is said."""
+class OptimalOptions:
+    """Options of --optimal; None where the default applies."""
 
     model: str | None
     poses: int | None
@@ -108,23 +110,23 @@ class Asked:
     as_json: bool
 
 
-def _optimal(bench: Bench, procedure: Procedure, settings: Mapping[str, Any], asked: Asked) -> None:
-    """Choose poses for a model, and print them beside the standard sweep. Raises UsageError for what is no sweep."""
+def _optimal(bench: Bench, procedure: Procedure, settings: Mapping[str, Any], options: OptimalOptions) -> None:
+    """Choose poses for a model, and compare them with the standard sweep. Raises UsageError without a grid."""
     from calibrations.effects.catalogue import catalogue
     from calibrations.model.file import read_model
     from rig.planning.optimal import optimal as chosen
 
     if procedure.name != "sweep" or settings["pose_list"]:
-        raise click.UsageError("--optimal chooses the poses of a sweep over a grid")
-    model = read_model(asked.model or "linear", catalogue(bench.folders.effects))
-    found = chosen(bench, procedure, settings, model, asked.poses, asked.criterion or "I")
-    if asked.out is not None:
-        _write_poses(asked.out, found.equal.plan)
-    if asked.as_json:
-        emit(_document(found.equal.plan) | {"optimal": document(found)})
+        raise click.UsageError("--optimal is for a sweep over a grid, without --pose-list")
+    model = read_model(options.model or "linear", catalogue(bench.folders.effects))
+    found = chosen(bench, procedure, settings, model, options.poses, options.criterion or "I")
+    if options.out is not None:
+        _write_poses(options.out, found.equal.plan)
+    if options.as_json:
+        emit(_document(found.equal.plan) | {"optimal": optimal_document(found)})
     else:
-        files = (str(path) if path else None for path in (asked.out, asked.bench_file))
-        click.echo("\n".join(lines(found, *files)))
+        files = (str(path) if path else None for path in (options.out, options.bench_file))
+        click.echo("\n".join(optimal_lines(found, *files)))
 
 
 def _write_poses(out: Path, planned: Plan) -> None:
@@ -138,12 +140,12 @@ def _steps(planned: Plan) -> list[str]:
 
 
 def _summary(planned: Plan) -> list[str]:
-    """The stretches, the middle ones of very many left out, and how to see all."""
+    """The stretches; the middle of a long list is left out."""
     lines = [line for stretch in stretches(planned) for line in _lines(stretch)]
     left_out = len(lines) - FIRST - LAST
     if left_out > 1:
-        lines[FIRST:-LAST] = [f"{'...':>9}  {left_out} lines like these"]
-    return [*lines, f"Each of its {len(planned.steps)} moves and records: the same command with --moves"]
+        lines[FIRST:-LAST] = [f"{'...':>9}  {left_out} similar lines"]
+    return [*lines, f"All {len(planned.steps)} moves and recordings: the same command with --moves"]
 
 
 def _lines(stretch: Stretch) -> list[str]:
@@ -152,7 +154,7 @@ def _lines(stretch: Stretch) -> list[str]:
 
 
 def _end(planned: Plan) -> list[str]:
-    """What it asks a person, how far the stages turn, how long it takes and what it leaves on the disk."""
+    """Questions, reach of the stages, duration and size on the disk."""
     asked = [f"asks  {question}" for question in planned.questions]
     reach = [
         f"{role} from {low:g} to {high:g} deg, within its limits {least:g} to {most:g} deg"
@@ -180,27 +182,27 @@ def _document(planned: Plan) -> dict[str, object]:
     }
 
 
-# What `rig plan sweep --optimal` says: the chosen poses beside the standard sweep, in words and as JSON.
+# `rig plan sweep --optimal`: the chosen poses compared with the standard sweep, in words and as JSON.
 
 
-def lines(found: Optimal, out: str | None, bench: str | None = None) -> Iterator[str]:
-    """For people; `out` is the file that the poses were written to, `bench` the bench file that was named."""
+def optimal_lines(found: Optimal, out: str | None, bench: str | None = None) -> Iterator[str]:
+    """In words; `out` is the file of the poses, `bench` the bench file."""
     model, count = found.over.fit.model.name, len(found.over.fit.theta)
     yield f"{model}, {count} parameters: {found.criterion}-optimal poses in the range of the standard sweep"
     yield ""
     yield columns(PLANS, _rows(found, (found.standard, found.short, found.equal)))
     yield ""
-    yield f"{found.times_less:.1f} x less rig time at equal worst standard error: {_worst(found)}."
-    yield f"{_times(found.times_less_for_all)} with no parameter less certain than after the sweep: {_longest(found)}."
+    yield f"{found.times_less:.1f} times less rig time for the same worst standard error ({_worst(found)})."
+    yield f"{_times(found.times_less_for_all)} if no parameter may be less certain: {_longest(found)}."
     if lost := [found.over.name(k) for k, known in enumerate(found.standard.told) if not known]:
-        yield f"The standard sweep does not tell {', '.join(lost)}: left out of account."
+        yield f"The standard sweep cannot determine {', '.join(lost)}; the comparison ignores them."
     yield ""
     yield from map(wrap_text, _about(found))
     yield ""
     yield from _how_to_run(found, out, bench)
 
 
-def document(found: Optimal) -> dict[str, Any]:
+def optimal_document(found: Optimal) -> dict[str, Any]:
     """The key `optimal` of the plan's document."""
     return {
         "model": found.over.fit.model.name,
@@ -226,21 +228,21 @@ def _percent(ratio: float) -> str:
 
 def _rows(found: Optimal, plans: Sequence[Judged]) -> list[tuple[str, ...]]:
     return [
-        ("poses", *(str(each.plan.poses) for each in plans)),
-        ("dwell", *(f"{each.dwell_s:g} s" for each in plans)),
-        ("rig time", *(duration(each.plan.duration_s) for each in plans)),
-        ("worst standard error", *(_percent(relative(found.standard, each)) for each in plans)),
-        ("each error, at most", *(_percent(most_relative(found.standard, each)) for each in plans)),
+        ("poses", *(str(candidate.plan.poses) for candidate in plans)),
+        ("dwell", *(f"{candidate.dwell_s:g} s" for candidate in plans)),
+        ("rig time", *(duration(candidate.plan.duration_s) for candidate in plans)),
+        ("worst standard error", *(_percent(relative(found.standard, candidate)) for candidate in plans)),
+        ("candidate error, at most", *(_percent(most_relative(found.standard, candidate)) for candidate in plans)),
     ]
 
 
 def _worst(found: Optimal) -> str:
-    before, after = (found.over.name(found.worst(each)) for each in (found.standard, found.equal))
-    return before if before == after else f"{before}, now {after}"
+    before, after = (found.over.name(found.worst(candidate)) for candidate in (found.standard, found.equal))
+    return before if before == after else f"{before} before, {after} now"
 
 
 def _times(ratio: float) -> str:
-    return f"{ratio:.1f} x less" if ratio >= 1 else f"{1 / ratio:.1f} x more"
+    return f"{ratio:.1f} times less" if ratio >= 1 else f"{1 / ratio:.1f} times more"
 
 
 def _longest(found: Optimal) -> str:
@@ -248,15 +250,15 @@ def _longest(found: Optimal) -> str:
 
 
 def _about(found: Optimal) -> Iterator[str]:
-    """What the poses are for, and what their order does to a drift."""
+    """Purpose of the poses, and the effect of their order on a drift."""
     paths = Counter(pose.path for pose in found.equal.poses)
     yield (
-        f"{paths[DESIGN]} poses for the model, {paths[AGAIN]} of them once more, so that the noise shows in the data "
-        f"themselves, and {paths[CHECK]} to check the model on, which the errors above do without."
+        f"{paths[DESIGN]} poses are for the model. {paths[AGAIN]} of them are measured twice, which shows the noise. "
+        f"{paths[CHECK]} more poses check the model; the errors above do not use them."
     )
     yield (
-        f"In their order height and time correlate by {found.height_correlation:.2f}. A drift fitted beside the model "
-        f"would add at most {100 * found.drift_loss:.1f} % to the variance of a parameter."
+        f"In this order height and time have a correlation of {found.height_correlation:.2f}. A drift fitted with the "
+        f"model would add at most {100 * found.drift_loss:.1f} % to the variance of a parameter."
     )
 
 
@@ -267,17 +269,17 @@ def _how_to_run(found: Optimal, out: str | None, bench: str | None) -> Iterator[
     words += ["--bench", bench] if bench else []
     yield f"Run them:  {shlex.join(words)}"
     if out is None:
-        yield "           once the same command with --out poses.csv has written them"
+        yield "           after the same command with --out poses.csv"
 
 
-def _of_plan(found: Optimal, each: Judged) -> dict[str, Any]:
-    with np.errstate(invalid="ignore"):  # what neither tells is infinitely uncertain by both
-        ratios = [float(ratio) for ratio in each.errors / found.standard.errors]
+def _of_plan(found: Optimal, candidate: Judged) -> dict[str, Any]:
+    with np.errstate(invalid="ignore"):  # a parameter that neither determines has infinite uncertainty
+        ratios = [float(ratio) for ratio in candidate.errors / found.standard.errors]
     return {
-        "poses": each.plan.poses,
-        "dwell_s": each.dwell_s,
-        "duration_s": each.plan.duration_s,
-        "worst_error": relative(found.standard, each),
-        "worst_parameter": found.over.name(found.worst(each)),
+        "poses": candidate.plan.poses,
+        "dwell_s": candidate.dwell_s,
+        "duration_s": candidate.plan.duration_s,
+        "worst_error": relative(found.standard, candidate),
+        "worst_parameter": found.over.name(found.worst(candidate)),
         "errors": {found.over.name(k): ratio if math.isfinite(ratio) else None for k, ratio in enumerate(ratios)},
     }

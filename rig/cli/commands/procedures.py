@@ -1,4 +1,4 @@
-"""procedures: list the procedures, what each is for, and its settings."""
+"""procedures: list the procedures with their purposes and settings."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from rig.cli.terminal.output import bench_option, emit, json_option
 @bench_option
 @json_option
 def command(bench_file: Path | None, as_json: bool) -> None:
-    """List the procedures, shipped and your own: what each is for, and its settings with their defaults."""
+    """List the shipped procedures and your own, with their purposes and the defaults of their settings."""
     folder = read_bench(bench_file).folders.procedures
     found = [find(name, folder) for name in paths(folder)]
     if as_json:
@@ -36,7 +36,7 @@ def _text(procedure: Procedure) -> str:
 
 
 def _written(value: Any) -> str:
-    """A default as it would be written on the command line."""
+    """The text of a default on the command line."""
     if isinstance(value, tuple):
         return ",".join(f"{part:g}" for part in value)
     return f"{value:g}" if isinstance(value, float) else str(value)

@@ -1,4 +1,4 @@
-"""push: bring finished runs into the lab's record, a PostgreSQL database that many rigs share."""
+"""push: copy finished runs to the lab's record, a PostgreSQL database of many rigs."""
 
 from __future__ import annotations
 
@@ -28,20 +28,24 @@ def _given(context: click.Context, _: click.Parameter, url: str | None) -> str |
 @click.option(
     "--to", "given", envvar=LAB, callback=_given, metavar="URL", help=f"postgresql://USER@HOST/DATABASE; else {LAB}."
 )
-@click.option("--prepare", "prepares", is_flag=True, help="Make the record and its roles, as the database's owner.")
-@click.option("--verify", "verifies", is_flag=True, help="Compute the digest of every run in the lab again.")
+@click.option(
+    "--prepare", "prepares", is_flag=True, help="Create the record and its roles, as the owner of the database."
+)
+@click.option(
+    "--verify", "verifies", is_flag=True, help="Recompute and compare the digest of every run in the lab's record."
+)
 @bench_option
 @json_option
 def command(
     named: tuple[str, ...], given: str | None, prepares: bool, verifies: bool, bench_file: Path | None, as_json: bool
 ) -> int:
-    """Push RUNS, or all finished runs that the lab does not have as they are here.
+    """Push RUNS, or all finished runs that the lab does not have or has in another version.
 
-    The lab is that of --to, of RIG_LAB, or of the bench file (lab: {url: ...}). What a cut left half is gone on with,
-    and what is there is not sent again. Exit status 1: --verify found a run that has changed since it arrived.
+    The lab's record is named by --to, by RIG_LAB, or in the bench file (lab: {url: ...}). After an interruption the
+    command continues; it sends nothing twice. Exit status 1: --verify found a run that has changed since it arrived.
     """
     if (prepares or verifies) and named:
-        raise click.UsageError("--prepare and --verify are for the whole record; leave out the runs")
+        raise click.UsageError("--prepare and --verify apply to the whole record; remove the runs")
     url = _lab(given, bench_file)
     if prepares:
         _prepare(url, as_json)
@@ -54,8 +58,8 @@ def _lab(given: str | None, bench_file: Path | None) -> URL:
         given = lab.url
     if given is None:
         raise click.UsageError(
-            f"no lab is named: give --to postgresql://USER@HOST/DATABASE, set {LAB}, or name a bench file with "
-            "`lab: {url: ...}`"
+            "the lab's record is not known: give --to postgresql://USER@HOST/DATABASE, "
+            f"set {LAB}, or give a bench file with `lab: {{url: ...}}`"
         )
     return lab_url(given)
 
@@ -66,7 +70,7 @@ def _push(url: URL, named: tuple[str, ...], as_json: bool) -> int:
         waiting = unsent(own, lab, named)
         for number, run in enumerate(waiting, 1):
             done.append(push(own, lab, run))
-            note(f"{number} of {len(waiting)}: {_told(done[-1])}")
+            note(f"{number} of {len(waiting)}: {_description(done[-1])}")
     if as_json:
         emit({"schema": "rig.push/1", "to": shown(url), "runs": [vars(each) for each in done]})
     else:
@@ -74,7 +78,7 @@ def _push(url: URL, named: tuple[str, ...], as_json: bool) -> int:
     return 0
 
 
-def _told(pushed: Pushed) -> str:
+def _description(pushed: Pushed) -> str:
     return pushed.run if pushed.name == pushed.run else f"{pushed.run}, in the lab {pushed.name}"
 
 
@@ -83,8 +87,8 @@ def _prepare(url: URL, as_json: bool) -> None:
     if as_json:
         emit({"schema": "rig.prepared/1", "to": shown(url), "before": before})
         return
-    how = f"the record, of schema {before}, is up to date" if before else "the record is made"
-    click.echo(f"{shown(url)}: {how}. Give each rig and each reader a role of its own:")
+    how = f"the record, schema {before}, is up to date" if before else "created the record"
+    click.echo(f"{shown(url)}: {how}. Give each rig and each reader its own role:")
     click.echo(f"  CREATE ROLE rig7 LOGIN PASSWORD '...' IN ROLE {WRITER};   -- pushes, reads")
     click.echo(f"  CREATE ROLE anna LOGIN PASSWORD '...' IN ROLE {READER};   -- reads")
 
@@ -95,7 +99,7 @@ def _verify(url: URL, as_json: bool) -> int:
     if as_json:
         emit({"schema": "rig.verified/1", "record": shown(url), **vars(found)})
     else:
-        click.echo(f"{len(found.sound)} runs as they arrived, {len(found.on_their_way)} on their way")
+        click.echo(f"{len(found.sound)} runs unchanged, {len(found.on_their_way)} incomplete")
         for run in found.changed:
-            click.echo(f"{run}: has changed since it arrived; `rig show {run} --record URL` tells what was done")
+            click.echo(f"{run}: has changed since it arrived; `rig show {run} --record URL` lists its events")
     return int(bool(found.changed))

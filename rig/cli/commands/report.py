@@ -1,4 +1,4 @@
-"""report: one self-contained page on data and model, or its pictures as files."""
+"""report: write a self-contained page on data and model, or its pictures."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 @click.option("--format", "form", type=click.Choice(["png", "svg"]), default="png", show_default=True)
 @request_options
 def command(request: Request, out: Path | None, folder: Path | None, form: str, as_json: bool) -> None:
-    """Write a page on DATA (a file or a run) and a model: what the model misses, and the model with it.
+    """Write a page on DATA (a file or a run) and a model: missing effects, and the completed model.
 
-    The page is one file that needs no network. Of a soak it shows the night, unless a model is named. --pictures
-    writes its pictures, with or without the page.
+    The page is one file and needs no network. For a soak without --model it shows the soak. --pictures writes the
+    pictures, with or without the page.
     """
     if out is None and folder is None:
         raise click.UsageError("nothing to write: give --out FILE.html, --pictures FOLDER, or both")

@@ -1,4 +1,4 @@
-"""resume: go on with a run that was interrupted, at its first missing pose."""
+"""resume: continue an interrupted run at its first missing pose."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import click
 from procedures.catalogue import find
 from rig.bench import Bench, read_bench
 from rig.cli.terminal.output import bench_option, json_option, note, watch_options
-from rig.cli.terminal.watch import tell, trace_option, watching
+from rig.cli.terminal.watch import print_end, trace_option, watching
 from rig.record import Record
 from rig.record.push import push_after
 from rig.runs.runner import Outcome, resume
@@ -24,17 +24,17 @@ from rig.runs.runner import Outcome, resume
 def command(
     run: str, unattended: bool, answers: Path | None, trace: bool, bench_file: Path | None, as_json: bool
 ) -> int:
-    """Go on with RUN at its first missing pose, on the bench that it was begun with.
+    """Continue RUN at its first missing pose, on the bench of its first part.
 
-    With --bench the run goes on only if that file is still the same.
+    With --bench, the run continues only if that bench file has not changed.
     """
     bench = read_bench(bench_file) if bench_file else None
     with Record.to_find(run, own=True) as record:
         found = record.run(run)
         if found.state == "complete":
-            return tell(record, Outcome(found), as_json)
+            return print_end(record, Outcome(found), as_json)
         own = Bench.model_validate(found.bench)
         with watching(find(found.procedure, own.folders.procedures), own, unattended, answers) as watch:
             outcome = resume(record, found.run, watch, bench, trace)
         push_after(record, outcome.run, (bench or own).lab, note)
-        return tell(record, outcome, as_json)
+        return print_end(record, outcome, as_json)

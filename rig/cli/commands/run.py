@@ -1,4 +1,4 @@
-"""run: run a procedure on the bench into the record, guided or --unattended."""
+"""run: run a procedure on the bench, guided or --unattended, and record it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from procedures.settings import parse
 from rig.bench import read_bench
 from rig.cli.terminal.options import PASS_ON, read_settings, settings_arguments
 from rig.cli.terminal.output import bench_option, json_option, note, watch_options
-from rig.cli.terminal.watch import tell, trace_option, watching
+from rig.cli.terminal.watch import print_end, trace_option, watching
 from rig.record import Record
 from rig.record.push import push_after
 from rig.runs.runner import start
@@ -34,10 +34,10 @@ def command(
     bench_file: Path | None,
     as_json: bool,
 ) -> int:
-    """Run PROCEDURE on the bench into the record.
+    """Run PROCEDURE on the bench and record it.
 
-    Settings of the procedure are options: `rig run sweep --step-deg 30`. Ctrl-C stops the stages at once, and asks
-    in a terminal whether to go on; `rig resume` goes on later.
+    Settings of the procedure are options: `rig run sweep --step-deg 30`. Ctrl-C stops the stages at once; in a terminal
+    the program then asks whether to continue. `rig resume` continues later.
     """
     bench = read_bench(bench_file)
     found = find(procedure, bench.folders.procedures)
@@ -46,4 +46,4 @@ def command(
         with watching(found, bench, unattended, answers) as watch:
             outcome = start(record, bench, found, settings, watch, trace=trace)
         push_after(record, outcome.run, bench.lab, note)
-        return tell(record, outcome, as_json)
+        return print_end(record, outcome, as_json)

@@ -1,4 +1,4 @@
-"""runs: list the record, newest first."""
+"""runs: list the runs of the record, newest first."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def command(as_json: bool) -> None:
         rows = [(run.run, run.state, run.kind, run.extent, run.source) for run in runs]
         click.echo(columns(("run", "state", "kind", "holds", "source"), rows))
     else:
-        click.echo("The record is empty. `rig run sweep` makes a first run, `rig import FILE` takes in a file.")
+        click.echo("The record is empty. `rig run sweep` makes a run, `rig import FILE` stores a file.")
 
 
 def _document(run: Run) -> dict[str, object]:

@@ -1,4 +1,4 @@
-"""show: one run: how it was made, how it ended, what it measured."""
+"""show: show one run: its settings, its events, its results."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ Ranges = Mapping[str, tuple[float, float]]
 
 @click.command("show")
 @click.argument("run")
-@click.option("--poses", is_flag=True, help="List every pose with its number, and why it is left out where it is.")
-@click.option("--log", "wants_log", is_flag=True, help="List what happened step by step, and when.")
+@click.option("--poses", is_flag=True, help="List every pose with its number, and the reason if it is excluded.")
+@click.option("--log", "wants_log", is_flag=True, help="List the log: every step with its time.")
 @json_option
 def command(run: str, poses: bool, wants_log: bool, as_json: bool) -> None:
-    """Show how RUN was made, how it ended, its results, and the range of each of its columns."""
+    """Show the settings, events and results of RUN, and the range of each column."""
     with Record.to_find(run) as record:
         found = record.run(run)
         run = found.run
@@ -45,15 +45,15 @@ def command(run: str, poses: bool, wants_log: bool, as_json: bool) -> None:
     else:
         after = [*results_table(found.results), *next_steps(found, left_out)]
         after += [
-            f"{count} runs of the sensor {name} are in the record: rig history {name}" for name, count in known.items()
+            f"The record has {count} runs of the sensor {name}: rig history {name}" for name, count in known.items()
         ]
-        told = [_event(event, found.message) for event in events]
-        parts = (_head(found), after, _columns(ranges), told, _listed(listed or []), _logged(lines))
+        history = [_event(event, found.message) for event in events]
+        parts = (_head(found), after, _columns(ranges), history, _listed(listed or []), _logged(lines))
         click.echo("\n\n".join("\n".join(part) for part in parts if part))
 
 
 def _ranges(record: Record, run: Run) -> Ranges:
-    """The least and greatest value of each column; nothing where the poses make no table yet."""
+    """Minimum and maximum of each column; empty while the poses make no table."""
     found: dict[str, tuple[float, float]] = {}
     sensors: list[str | None] = [*sensors_of(run)]
     for sensor in sensors or [None]:
@@ -67,7 +67,7 @@ def _ranges(record: Record, run: Run) -> Ranges:
 
 
 def _pose(number: int, kept: Kept) -> dict[str, Any]:
-    """One pose as JSON; its outputs are means, V."""
+    """One pose as JSON; outputs are means in V."""
     names = ("alpha_deg", "beta_deg", "direction", "mount_deg", "flip", "up", "rate_deg_s")
     angles = {name: getattr(kept.pose, name) for name in names}
     about = {"t_s": kept.t_s, "temperature_c": kept.temperature_c, "excluded": kept.excluded}
@@ -79,12 +79,12 @@ def _head(run: Run) -> list[str]:
     ended = f"{run.state} {run.ended or ''}".strip()
     head = [f"{run.run}: {run.procedure}, {ended}, {run.extent}, a table of {run.kind}", f"from {run.source}"]
     why = [run.message] if run.message else []
-    why += [f"But {run.constants[EXPIRED]}."] if EXPIRED in run.constants else []
+    why += [f"Remark: {run.constants[EXPIRED]}."] if EXPIRED in run.constants else []
     return [*head, *why, *_settings(run.settings)]
 
 
 def _settings(settings: Mapping[str, Any]) -> Iterator[str]:
-    """Each setting in a line; of a mapping, such as that of an imported file's columns, each entry."""
+    """A line for each setting; for a mapping, such as the columns of an imported file, a line for each entry."""
     for name, value in settings.items():
         if isinstance(value, Mapping):
             yield from (f"  {name}: {key} = {each}" for key, each in value.items())
@@ -101,13 +101,13 @@ def _columns(ranges: Ranges) -> list[str]:
 
 
 def _event(event: Event, message: str | None) -> str:
-    """When, what, and its text but for the run's message, which stands above already."""
-    said = f": {event.text}" if event.text and not (message or "").endswith(event.text) else ""
-    return f"  {event.at[:19].replace('T', ' ')}  {event.what}{said}"
+    """Time, kind and text of an event; without the text that is already shown as the message of the run."""
+    text = f": {event.text}" if event.text and not (message or "").endswith(event.text) else ""
+    return f"  {event.at[:19].replace('T', ' ')}  {event.what}{text}"
 
 
 def _logged(lines: Sequence[Line]) -> Iterator[str]:
-    """Each line with its time of day (UTC) and the rig's clock."""
+    """Each line with its time of day (UTC) and the clock of the rig."""
     for line in lines:
         yield f"  {line.at[11:23]}  {line.clock_s:10.3f} s  {line.who}  {line.what}: {line.text}"
 
@@ -130,7 +130,7 @@ def _listed(poses: Sequence[Mapping[str, Any]]) -> list[str]:
         )
         for pose in poses
     ]
-    head = ("pose", "alpha", "beta", "path", "t", *(f"{name} V" for name in channels), "C", "left out because")
+    head = ("pose", "alpha", "beta", "path", "t", *(f"{name} V" for name in channels), "C", "excluded because")
     return columns(head, rows).splitlines()
 
 

@@ -29,8 +29,7 @@ from rig.instruments.wiring import serve, world_of
 def command(bench_file: Path | None, as_json: bool) -> None:
     """Serve the simulated instruments of the bench in real time until Ctrl-C; print their addresses.
 
-    `url: simulated:rtu+tcp://127.0.0.1:5021` in the bench file fixes a port, `simulated:pty:` asks for a
-    pseudo-terminal.
+    In the bench file, `url: simulated:rtu+tcp://127.0.0.1:5021` sets a port, `simulated:pty:` a pseudo-terminal.
     """
     bench = read_bench(bench_file)
     with ExitStack() as stack:
@@ -47,28 +46,30 @@ def command(bench_file: Path | None, as_json: bool) -> None:
 
 @contextmanager
 def _signalled() -> Iterator[list[int]]:
-    """The signals that asked for the end so far; inside, none of them ends the process by itself."""
-    came: list[int] = []
+    """The stop signals received so far; inside, they do not end the process."""
+    received: list[int] = []
 
     def end(number: int, frame: FrameType | None) -> None:  # noqa: ARG001
-        came.append(number)
+        received.append(number)
 
     before = {each: signal.signal(each, end) for each in (signal.SIGINT, signal.SIGTERM)}
     try:
-        yield came
+        yield received
     finally:
         for each, handler in before.items():
             signal.signal(each, handler)
 
 
 def _served(bench: Bench, servers: list[Server]) -> dict[str, Address]:
-    """Where each role is served; a stage that is turned by hand is not. Raises BenchError where nothing is."""
+    """The address of each role, without stages that a person moves. Raises BenchError if nothing can be served."""
     addresses = {role: address for server in servers for role, address in server.addresses.items()}
     by_hand = sorted(role for role, address in addresses.items() if address.url == PERSON)
     if by_hand:
-        note(f"{', '.join(by_hand)}: turned by hand, so there is nothing to serve")
+        note(f"{', '.join(by_hand)}: moved by hand, so it is not served")
     if len(by_hand) == len(addresses):
-        raise BenchError(f"no instrument of {bench.name!r} can be served; write `url: simulated` for one with a wire")
+        raise BenchError(
+            f"no instrument of {bench.name!r} can be served; write `url: simulated` for one with an interface"
+        )
     return {role: address for role, address in addresses.items() if role not in by_hand}
 
 

@@ -1,4 +1,4 @@
-"""web: the workbench in a browser: see where the model fails, click the missing effect, run and watch the rig."""
+"""web: the workbench in a browser: models, runs, record and comparison."""
 
 from __future__ import annotations
 
@@ -18,27 +18,32 @@ HERE = ("127.0.0.1", "localhost", "::1")
 
 
 @click.command("web")
-@click.option("--port", type=click.IntRange(1, 65535), help="Port to listen at; without it 8473, or any that is free.")
-@click.option("--host", default=HERE[0], show_default=True, help="Another address lets other machines in: see --help.")
+@click.option("--port", type=click.IntRange(1, 65535), help="Port. Default: 8473, or any free port.")
+@click.option(
+    "--host",
+    default=HERE[0],
+    show_default=True,
+    help="Address to listen at. Another address opens the workbench to other machines.",
+)
 @click.option("--no-open", is_flag=True, help="Print the address and open no browser.")
 @bench_option
 @json_option
 def command(port: int | None, host: str, no_open: bool, bench_file: Path | None, as_json: bool) -> None:
     """Serve the workbench until Ctrl-C; print its address, and open it in the browser.
 
-    The address holds a token, without which nothing is answered. Only this machine can reach it, unless --host names
-    another address: then whoever reads the network can read the token. A run that was started goes on when the server
-    ends.
+    The address contains a token; the server answers no request without it. Only this machine can connect, unless --host
+    gives another address: then anyone who can read the network traffic can read the token. A run continues after the
+    server ends.
     """
     from rig.bench import read_bench
     from rig.web.desk import Desk
     from rig.web.server import serve
 
-    read_bench(bench_file)  # told now rather than on a page
+    read_bench(bench_file)  # an error appears here and not on a page
     if host not in HERE:
         note(
-            f"Listening at {host}: other machines can reach the workbench, and the rig with it. Nothing is encrypted; "
-            "over a network that others use, leave out --host and come by `ssh -L`."
+            f"Listening at {host}: other machines can reach the workbench and the rig. Nothing is encrypted; "
+            "in a shared network, leave out --host and connect by `ssh -L`."
         )
 
     def ready(place: Place) -> None:

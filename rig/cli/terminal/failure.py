@@ -1,4 +1,4 @@
-"""How a failed command ends: one message on standard error and the contract's exit status, no traceback.
+"""The end of a failed command: one message on standard error and an exit status, no traceback.
 
 0 done | 1 done, and a limit or check was not met | 2 bad usage or bad input
 3 an instrument failed | 4 stopped by a person or a safety limit | 70 a fault of this program
@@ -14,8 +14,8 @@ from typing import Any
 
 import click
 
-# The rooms' error trees, by name, so that nothing is imported for this. The most special class along an
-# error's bases counts; an error with an `exit_status` of its own needs no line here.
+# Exit statuses by the name of the error class, so that nothing is imported. The most specific base class of an error
+# counts; an error with its own attribute `exit_status` needs no line here.
 STATUS = {
     "calibrations.errors.CalibrationError": 2,
     "calibrations.errors.UnusableData": 1,
@@ -31,7 +31,7 @@ BROKEN_PIPE = 141  # as a shell reports SIGPIPE
 
 
 def exit_status(call: Callable[[], Any]) -> int:
-    """Run `call`; its whole number, or 0, is the status. Any error is told in one message."""
+    """Run `call`; an integer that it returns is the status, else 0. Prints one message for an error."""
     try:
         returned = call()
         sys.stdout.flush()
@@ -44,7 +44,7 @@ def exit_status(call: Callable[[], Any]) -> int:
         error.show()
         return error.exit_code
     except (KeyboardInterrupt, click.Abort):
-        return _told("stopped", 4)
+        return _print("stopped", 4)
     except Exception as error:
         return _failed(error)
     return returned if isinstance(returned, int) else 0
@@ -55,15 +55,15 @@ def _failed(error: Exception) -> int:
     if os.environ.get("RIG_DEBUG"):
         traceback.print_exc()
     if isinstance(error, OSError) and error.strerror:
-        return _told(_of_file(error), status)
+        return _print(_of_file(error), status)
     if status != PROGRAM_FAULT:
-        return _told(str(error), status)
+        return _print(str(error), status)
     text = f"{type(error).__name__}: {error}".rstrip(": ")
-    return _told(f"a fault of this program: {text}. RIG_DEBUG=1 shows where.", status)
+    return _print(f"a fault of this program: {text}. RIG_DEBUG=1 shows where.", status)
 
 
 def status_of(error: BaseException) -> int:
-    """The exit status that belongs to `error`."""
+    """The exit status of an error."""
     own = getattr(error, "exit_status", None)
     if isinstance(own, int):
         return own
@@ -74,13 +74,13 @@ def status_of(error: BaseException) -> int:
 
 
 def _of_file(error: OSError) -> str:
-    """What the operating system refused, with the file and what to do."""
+    """The message of an error of the operating system."""
     what = (error.strerror or "").lower()
     if error.filename is None:
-        return f"the operating system refuses: {what}; free what is full or busy, and try again"
-    return f"{error.filename}: cannot be used: {what}; check its name and its permissions, or name another"
+        return f"the operating system reports: {what}; free the full or busy resource, and try again"
+    return f"{error.filename}: cannot use the file: {what}; check its name and permissions, or give another"
 
 
-def _told(message: str, status: int) -> int:
+def _print(message: str, status: int) -> int:
     click.echo(f"rig: {message}", err=True)
     return status

@@ -1,4 +1,4 @@
-"""The guided terminal: shown what will happen, what happens and how it is, asked what only a person can know."""
+"""The guided terminal: shows the plan, the progress and the values of a run, and asks a person questions."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ from rig.runs.observer import Sight
 from rig.runs.runner import Outcome, Wish
 
 BEGIN = Choice("begin", "Begin?", choices=("go", "cancel"))
-GO_ON = Choice("interrupted", "What now?", choices=("resume", "repeat", "end"))
+NEXT = Choice("interrupted", "Continue?", choices=("resume", "repeat", "end"))
 FRAMES_HZ = 8
 
 
 class Guide:
-    """Shows a run on standard error while it goes on."""
+    """Shows a run on standard error while it runs."""
 
     def __init__(
         self, procedure: Procedure, bench: Bench, answers: Mapping[str, str], console: Console | None = None
@@ -55,15 +55,15 @@ class Guide:
         self._live.stop()
 
     def planned(self, plan: Plan) -> None:
-        """One screen of what will happen; raises Declined where the person cancels it."""
+        """Show the plan on one screen; raises Declined if the person cancels it."""
         self._sight.planned(plan)
         self._console.print(before(plan, self._procedure, self._bench, free_bytes(home()), datetime.now(UTC).date()))
         self._draw(mounting(plan), "mounting")
         if self.ask(BEGIN, "go") == "cancel":
-            raise Declined("cancelled before it began; nothing was moved and nothing recorded")
+            raise Declined("cancelled before the start; nothing moved and nothing was recorded")
 
     def begun(self, run: str) -> None:
-        """The run begins, or goes on."""
+        """The run begins or continues."""
         self._sight.begun(f"{self._procedure.name}  {run}", run)
         self._live.start()
 
@@ -74,7 +74,7 @@ class Guide:
         self._sight.expect(total, done)
 
     def kept(self, kept: Kept) -> None:
-        """The last dwell's values, beside what was usual before it."""
+        """Show the values of the last dwell, compared with the dwells before it."""
         self._sight.kept(kept)
 
     def read(self, reading: Reading) -> None:
@@ -82,49 +82,49 @@ class Guide:
         self._console.print(f"{reading.name} = {reading.value:g} {reading.unit}", highlight=False)
 
     def ask(self, question: Question, instead: str | None) -> str:
-        """Asked until the answer makes sense; a simulated bench's answer is proposed."""
+        """Ask until the answer is valid; the answer of a simulated bench is the proposal."""
         if question.name in self._answers:
             return self._answers[question.name]
-        with self._aside():
+        with self._hidden():
             if (attitude := drawing_of(question)) is not None:
                 self._draw(attitude, question.name)
-            return self._asked(question, instead)
+            return self._prompt(question, instead)
 
     def interrupted(self, outcome: Outcome) -> Wish:
-        """The menu of a run that stands still."""
+        """The menu of an interrupted run."""
         self._live.stop()
         for complaint in outcome.moving:
             self._console.print(complaint, style="bold red", highlight=False)
         self._console.print(str(outcome.error), style="yellow", highlight=False)
         self._console.print(_choices(self._sight.seen.kept, outcome))
         try:
-            return cast(Wish, self._asked(GO_ON, "resume"))
+            return cast(Wish, self._prompt(NEXT, "resume"))
         except NoAnswer:
             return "end"
 
     @contextmanager
-    def _aside(self) -> Iterator[None]:
-        """The live screen gives way to a question."""
+    def _hidden(self) -> Iterator[None]:
+        """Hide the live screen during a question."""
         shown = self._live.is_started
         self._live.stop()
         yield
         if shown:
             self._live.start()
 
-    def _asked(self, question: Question, instead: str | None) -> str:
+    def _prompt(self, question: Question, instead: str | None) -> str:
         text = f"{question.text} ({question.accepts})"
         while True:
             try:
                 given = Prompt.ask(Text(text), console=self._console, default=instead or "")
             except EOFError:
-                raise NoAnswer(f'the terminal was closed at "{question.text}"; resume the run') from None
+                raise NoAnswer(f'the terminal was closed at the question "{question.text}"; resume the run') from None
             try:
                 return question.checked(given)
             except BadAnswer as refused:
                 self._console.print(str(refused), style="yellow", highlight=False)
 
     def _draw(self, attitude: Attitude, name: str) -> None:
-        """How to mount the sensor, unless that is on the screen already; the whole drawing is a file in the home."""
+        """Show the mounting of the sensor if it has changed; write the complete drawing to a file."""
         if attitude == self._drawn:
             return
         folder = home() / "drawings"
@@ -138,10 +138,10 @@ class Guide:
 
 
 def _choices(kept: Kept | None, outcome: Outcome) -> Text:
-    """What each answer means."""
+    """The meaning of each answer."""
     last = "" if kept is None else f" (alpha {kept.pose.alpha_deg:g}, beta {kept.pose.beta_deg:g} deg)"
     return Text(
-        "  resume  goes on with the pose that was under way\n"
-        f"  repeat  measures the last kept pose{last} once more too; the first stays in the record, excluded\n"
-        f"  end     leaves it for now: rig resume {outcome.run.run}"
+        "  resume  continues with the interrupted pose\n"
+        f"  repeat  also repeats the last recorded pose{last}; the record keeps the first one, excluded\n"
+        f"  end     ends for now; later: rig resume {outcome.run.run}"
     )

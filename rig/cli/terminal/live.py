@@ -1,4 +1,4 @@
-"""`rig discover --live`: what is told while it measures and diagnoses in turns, and how it ends."""
+"""`rig discover --live`: measure and diagnose in turns, with messages after each step and at the end."""
 
 from __future__ import annotations
 
@@ -9,10 +9,8 @@ from typing import Any
 import click
 
 from calibrations.design.experiment import Experiment
-from calibrations.discovery.results import Discovery
 from calibrations.discovery.verdict import Verdict
 from calibrations.documents import discovery_document
-from calibrations.fit import Fit
 from calibrations.model.file import read_model
 from calibrations.presentation.text import duration, joined
 from calibrations.table import Table
@@ -34,8 +32,8 @@ from rig.services.tables import begun, joined_runs
 
 
 @dataclass
-class Taken:
-    """Runs experiments on the bench as `rig run` does, one after the other; keeps their names."""
+class Experiments:
+    """Runs experiments on the bench like `rig run`, and keeps the names of the runs."""
 
     record: Record
     bench: Bench
@@ -44,7 +42,7 @@ class Taken:
     runs: list[str] = field(default_factory=list)
 
     def measure(self, experiment: Experiment) -> tuple[str, Table]:
-        """Run it; its run's name, and all data so far. Raises what ended the run."""
+        """Run an experiment. Returns the run and the table of all runs so far. Raises the error that ended the run."""
         procedure = find(experiment.procedure, self.bench.folders.procedures)
         settings = parse(procedure, experiment.settings)
         with watching(procedure, self.bench, self.unattended, self.answers) as watch:
@@ -57,17 +55,17 @@ class Taken:
         return outcome.run.run, self._all()
 
     def stopped(self) -> None:
-        """Tell what there is, to somebody who has stopped it between two runs."""
+        """Print the runs so far, after a stop between two runs."""
         if self.runs:
-            note(f"What was measured is in the record. To see what it says: rig discover {' '.join(self.runs)}")
+            note(f"The record has the measurements. Next: rig discover {' '.join(self.runs)}")
 
     def _all(self) -> Table:
         measured = [Measured(self.record, self.record.run(run), self.bench.first_sensor) for run in self.runs]
         return joined_runs([m.part("poses") for m in measured], [begun(self.record, run) for run in self.runs])
 
     def _advise(self, interrupted: str) -> None:
-        note(f"What was measured is in the record: {joined([*self.runs, interrupted])}.")
-        note(f"To go on: rig resume {interrupted}, then rig discover {' '.join([*self.runs, interrupted])}")
+        note(f"The record has the measurements: {joined([*self.runs, interrupted])}.")
+        note(f"To continue: rig resume {interrupted}, then rig discover {' '.join([*self.runs, interrupted])}")
 
 
 def discover_live(
@@ -79,65 +77,60 @@ def discover_live(
     check: bool,
     as_json: bool,
 ) -> int:
-    """The command, from the bench file to the verdict; its exit status."""
+    """The command. Returns its exit status."""
     bench_file = request.bench_file
     bench, effects = read_bench(bench_file), effects_of(bench_file)
     if out is not None:
         require_out(out, request.model, bench_file)
     given = read_model(request.model or "linear", effects)
     with Record() as record:
-        taken = Taken(record, bench, unattended, answers)
-        live = Live(bench, bench_file, given, effects, 60 * (minutes or 0.0), taken.measure)
+        experiments = Experiments(record, bench, unattended, answers)
+        live = Live(bench, bench_file, given, effects, 60 * (minutes or 0.0), experiments.measure)
         standard_s = live.planned(STANDARD).duration_s or 0.0
         live = live if minutes else replace(live, time_s=standard_s)
         if (first_s := live.planned(FIRST).duration_s or 0.0) > live.time_s:
             raise click.UsageError(
-                f"--time {minutes:g}: the first measurement takes {first_s / 60:.1f} minutes; give more"
+                f"--time {minutes:g}: the first measurement takes {first_s / 60:.1f} minutes; give more time"
             )
         done: list[Measurement] = []
         try:
             for measurement in live.measurements():
                 done.append(measurement)
-                note(told(done, live.time_s))
+                note(progress(done, live.time_s))
         except KeyboardInterrupt:
-            taken.stopped()
+            experiments.stopped()
             raise
     found = done[-1].found
-    written = write_model(found.end, given, out, note)
+    path = write_model(found.end, given, out, note)
     if as_json:
-        emit(document(done, standard_s, written))
+        emit(document(done, standard_s, path))
         notes(warning([found.caution]))
     else:
-        click.echo(_end(done, live, standard_s, written))
+        click.echo(_end(done, live, standard_s, path))
     return int(found.verdict is Verdict.NO_RESPONSE or (check and found.verdict is not Verdict.ADEQUATE))
 
 
-def told(done: list[Measurement], time_s: float) -> str:
-    """After a measurement: what was learned, what is next and why, the time that is left."""
+def progress(done: list[Measurement], time_s: float) -> str:
+    """After a measurement: the verdict, the next experiment with its reason, the remaining time."""
     now = done[-1]
-    lines = [f"{now.run}: {now.found.end.table.n} poses in {duration(now.used_s)} so far. {learned(now.found)}"]
+    lines = [f"{now.run}: {now.found.end.table.n} poses in {duration(now.used_s)} so far. {now.found.judgement.text}"]
     if now.following is not None:
         e, left = now.following, duration(time_s - now.used_s)
-        lines.append(f"Next, {duration(e.duration_s or 0.0)} of the {left} that are left: {e.command}\n    {e.why}")
+        lines.append(f"Next, {duration(e.duration_s or 0.0)} of the remaining {left}: {e.command}\n    {e.why}")
     return "\n".join(lines)
 
 
-def learned(found: Discovery[Fit]) -> str:
-    """The verdict so far, in a line."""
-    return found.judgement.text
-
-
 def ending(done: list[Measurement], time_s: float) -> str:
-    """Why it ended."""
+    """The reason for the end."""
     if stands(done):
-        return "The explanation stands: the last data left it as it was."
+        return "The last measurement did not change the result."
     if done[-1].found.next_experiment is not None:
-        return "What is left in doubt needs more than the time that is left, or more than this bench."
-    return f"The time is used up ({duration(time_s)}), or nothing is left that would help."
+        return "The open question needs more time than remains, or another bench."
+    return f"The time is over ({duration(time_s)}), or no experiment would help."
 
 
 def document(done: list[Measurement], standard_s: float, out: Path | None) -> dict[str, Any]:
-    """`rig.discovery/1`, with what was run for it."""
+    """The document `rig.discovery/1`, with the experiments."""
     experiments = [
         {
             "procedure": m.experiment.procedure,
@@ -156,10 +149,10 @@ def document(done: list[Measurement], standard_s: float, out: Path | None) -> di
 
 
 def _end(done: list[Measurement], live: Live, standard_s: float, out: Path | None) -> str:
-    """The verdict, the causes, the model, and the rig time beside that of the standard sweep."""
+    """Verdict, causes, model, and the rig time compared with that of the standard sweep."""
     found, used_s = done[-1].found, done[-1].used_s
     data = f"{found.end.table.n} poses of {joined(m.run for m in done)}"
     time = f"Rig time {duration(used_s)}; the standard sweep takes {duration(standard_s)}."
-    again = f"The same again: rig discover {' '.join(m.run for m in done)}"
+    again = f"To repeat the analysis: rig discover {' '.join(m.run for m in done)}"
     parts = [data, discovery(found), parameters(found.end.model), f"{ending(done, live.time_s)} {time}\n{again}"]
-    return "\n\n".join([*parts, *([f"written to {out}"] if out else [])])
+    return "\n\n".join([*parts, *([f"written: {out}"] if out else [])])

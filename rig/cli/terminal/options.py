@@ -23,7 +23,7 @@ TAKE_IT = frozenset(
 
 
 def with_record(command: click.Command) -> click.Command:
-    """The command, with the option where it is one of those, or where what it groups is."""
+    """Add the option --record to a command, or to the commands of a group, that reads runs."""
     if isinstance(command, click.Group):
         for each in command.commands.values():
             with_record(each)
@@ -33,19 +33,19 @@ def with_record(command: click.Command) -> click.Command:
 
 
 def _chosen(context: click.Context, _: click.Parameter, url: str | None) -> None:
-    """For as long as the command lasts, the environment says so: the processes that it starts go by it too."""
+    """Set the environment variable for the duration of the command, also for processes that it starts."""
     if url is not None:
         require_no_password(url, RECORD)
         context.with_resource(_environment(url))
 
 
 def require_no_password(url: str, instead: str) -> None:
-    """Raises RecordError for a URL with a password: everybody on the machine can read how a command was called."""
-    from rig.record.lab import has_password, lab_url  # who names no lab needs no driver
+    """Raises RecordError for a URL with a password: all users of the machine can read the words of a command."""
+    from rig.record.lab import has_password, lab_url  # slow to import; only needed with a URL
 
     if has_password(lab_url(url)):
         raise RecordError(
-            "the URL holds a password, and everybody on this machine can read the words of a command; leave it to "
+            "the URL has a password, and all users of this machine can read the words of a command; put it into "
             f"~/.pgpass or PGPASSWORD, or give the URL as {instead}"
         )
 
@@ -64,7 +64,7 @@ def _environment(url: str) -> Iterator[None]:
 
 OPTION = click.Option(
     ["--record"], metavar="URL", expose_value=False, callback=_chosen, is_eager=True,
-    help=f"Of the lab, postgresql://USER@HOST/DATABASE, to read from; else {RECORD}, else the rig's own.",
+    help=f"Read from the lab's record, postgresql://USER@HOST/DATABASE. Default: {RECORD}, else the rig's record.",
 )  # fmt: skip
 
 
@@ -72,20 +72,20 @@ OPTION = click.Option(
 
 
 def settings_arguments(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Gives a command `given` (the rest of its line) and `pairs` (of `--set`); `read_settings` joins them."""
+    """Arguments `given` (the rest of the line) and `pairs` (from `--set`); `read_settings` joins them."""
     function = click.argument("given", nargs=-1, type=click.UNPROCESSED, metavar="[--SETTING VALUE]...")(function)
     return click.option("--set", "pairs", multiple=True, metavar="NAME=VALUE", help="A setting; may be repeated.")(
         function
     )
 
 
-PASS_ON = {"ignore_unknown_options": True}  # of a command whose procedure has options of its own
+PASS_ON = {"ignore_unknown_options": True}  # for commands whose procedure has its own options
 
 
 def read_settings(given: Sequence[str], pairs: Sequence[str], defaults: Mapping[str, Any]) -> dict[str, str]:
-    """Settings by name, as text; one that is yes or no by its default means yes where no value follows.
+    """Settings by name, as text; a switch without a value means yes.
 
-    Raises UsageError for a line that is not made of `--name value`.
+    Raises UsageError for words other than `--name value`.
     """
     settings = dict(_pair(pair) for pair in pairs)
     rest = list(given)
@@ -119,18 +119,18 @@ OPTIONS = (
     bench_option,
     click.option(
         "--noise",
-        help="A noise model of this sensor, fitted to a still record: slow noise is then known, and not guessed.",
+        help="Noise model of this sensor, fitted to a still record; it replaces the estimate of the slow noise.",
     ),
-    click.option("--channel", help="Of a still record: vx, vy ... Default: every axis."),
+    click.option("--channel", help="Channel of a still record: vx, vy ... Default: every axis."),
     click.option("--rate", "rate_hz", type=Positive(), help="Samples a second, for an array (.npy)."),
     json_option,
 )
 
 
 def request_options(function: Callable[..., Any]) -> Callable[..., Any]:
-    """--bench, --noise, --channel and --rate go, with the command's own DATA and --model, into `request`; and --json.
+    """Options --bench, --noise, --channel, --rate and --json; with DATA and --model they make the argument `request`.
 
-    Of several DATA the request is about the first, and the command gets them all as `several`.
+    With several DATA the request has the first, and the argument `several` has all of them.
     """
 
     @wraps(function)

@@ -1,4 +1,4 @@
-"""What commands print: text for people, or with `--json` exactly one document on standard output."""
+"""Output of commands: text for people, or with `--json` one document on standard output."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ bench_option = click.option(
 
 def watch_options(function: Callable[..., Any]) -> Callable[..., Any]:
     """--unattended and --answers."""
-    function = click.option("--unattended", is_flag=True, help="Ask nobody, show only the end.")(function)
+    function = click.option("--unattended", is_flag=True, help="Ask no questions, show only the end.")(function)
     path = click.Path(dir_okay=False, path_type=Path)
-    return click.option("--answers", type=path, help="A YAML file that answers the questions to a person.")(function)
+    return click.option("--answers", type=path, help="A YAML file with answers to the questions.")(function)
 
 
 class Positive(click.FloatRange):
-    """A number above 0 that is one: neither infinite nor none."""
+    """A finite number above 0."""
 
     name = "positive number"
 
@@ -41,21 +41,21 @@ class Positive(click.FloatRange):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         number = float(super().convert(value, param, ctx))
         if not math.isfinite(number):
-            self.fail(f"{value} is no number to compute with; give one above 0", param, ctx)
+            self.fail(f"{value} is not a finite number; give one above 0", param, ctx)
         return number
 
 
 def emit(document: dict[str, Any]) -> None:
-    """Print the one JSON document. Raises ValueError for NaN or infinity, which JSON does not have."""
+    """Print the JSON document. Raises ValueError for NaN and infinity, which JSON does not have."""
     click.echo(json.dumps(document, allow_nan=False, ensure_ascii=False))
 
 
 def note(text: str) -> None:
-    """Progress and remarks: to standard error, so that standard output stays the result's."""
+    """Print progress or a remark to standard error; standard output is for results."""
     click.echo(text, err=True)
 
 
 def notes(lines: Iterable[str]) -> None:
-    """Several remarks, or none."""
+    """Print several remarks."""
     for line in lines:
         note(line)

@@ -28,21 +28,21 @@ STYLES = {"": "green", "near its limit": "yellow", "beyond its limit": "bold red
 
 
 def gauge(value: float, low: float, high: float) -> Text:
-    """`├────────●───┤`: where `value` is from `low` to `high`; beyond them it stands at the end."""
+    """`├────────●───┤`: the position of `value` between `low` and `high`; outside them at the end."""
     share = (value - low) / (high - low) if math.isfinite(value) and high > low else 1.0
     place = 1 + round(min(max(share, 0.0), 1.0) * (WIDTH - 3))
     mark = ("●", STYLES[nearness(value, low, high)])
     return Text.assemble(("├" + "─" * (place - 1), "dim"), mark, ("─" * (WIDTH - 2 - place) + "┤", "dim"))
 
 
-# The one screen of a run: what happens now, how far it is, live values against their limits.
+# The live screen: present step, progress, values with their limits.
 
 
 Row = tuple[RenderableType, ...]
 
 
 def screen(seen: Seen, now_s: float) -> RenderableType:
-    """The screen at `now_s` of the wall's clock."""
+    """The screen at `now_s` of the wall clock."""
     shown = Table.grid(padding=(0, 2))
     for row in _rows(seen):
         shown.add_row(*row)
@@ -51,7 +51,7 @@ def screen(seen: Seen, now_s: float) -> RenderableType:
 
 
 def _heading(seen: Seen, now_s: float) -> Table:
-    """What happens now, and at the right how far it is."""
+    """The present step, and the progress at the right."""
     heading = Table.grid(expand=True)
     heading.add_column(ratio=1)
     heading.add_column(justify="right")
@@ -60,7 +60,7 @@ def _heading(seen: Seen, now_s: float) -> Table:
 
 
 def _rows(seen: Seen) -> Iterator[Row]:
-    """A row for each live value: its name, what it is, where it is between its limits, a remark."""
+    """A row for each value: name, value, position between its limits, remark."""
     yield from (_row(value) for value in values(seen))
     if seen.kept is not None:
         yield "", Text(f"t = {duration(seen.kept.t_s)}", style="dim")
@@ -77,7 +77,7 @@ def _bar(value: float, low: float, high: float) -> Text:
     return Text.assemble((f"{low:>6.4g} ", "dim"), gauge(value, low, high), (f" {high:.4g}", "dim"))
 
 
-# What a technician sees before a run: what it will do, how long, how far the stages turn, what to check by hand.
+# The plan before a run: actions, duration, reach of the stages, checks by hand.
 
 
 FACTS = re.compile(r"^(Excites|Blind to)\s+(.*(?:\n\s+.*)*)", re.MULTILINE)
@@ -85,12 +85,12 @@ MOST_STRETCHES = 6
 
 
 def before(plan: Plan, procedure: Procedure, bench: Bench, free_bytes: int, today: date) -> RenderableType:
-    """The whole screen; `free_bytes` is the room on the record's disk."""
+    """The screen before a run; `free_bytes` is the free space on the disk of the record."""
     facts = Table.grid(padding=(0, 2))
     for name, text in _facts(plan, procedure, bench, free_bytes):
         facts.add_row(Text(name, style="bold"), text)
     for text in expired(bench, today):
-        facts.add_row(Text("Expired", style="bold yellow"), f"{text}: the run will be marked")
+        facts.add_row(Text("Expired", style="bold yellow"), f"{text}: the run will carry a remark")
     summary = Text(procedure.summary[:1].upper() + procedure.summary[1:] + ".")
     check = Text("\n".join(f"[ ] {line}" for line in checks(plan)))
     by_hand = Group(Text("\nCheck by hand", style="bold"), check)
@@ -100,61 +100,61 @@ def before(plan: Plan, procedure: Procedure, bench: Bench, free_bytes: int, toda
 def _facts(plan: Plan, procedure: Procedure, bench: Bench, free_bytes: int) -> Iterator[tuple[str, str]]:
     for match in FACTS.finditer(procedure.doc):
         yield match[1], " ".join(match[2].split())
-    time = " of simulated time, which is faster" if bench.simulated else ""
+    time = " of simulated time, which passes faster" if bench.simulated else ""
     yield "Takes", f"{duration(plan.duration_s)}{time}, {plan.poses} poses"
     yield "Does", "\n".join(_does(plan))
     for role, ((low, high), (least, most)) in plan.reach.items():
-        yield f"Turns {role}", f"from {low:g} to {high:g} deg; its limits are {least:g} to {most:g} deg"
+        yield f"Turns {role}", f"from {low:g} to {high:g} deg; the limits are {least:g} to {most:g} deg"
     yield "Stops", "; ".join(_stops(bench))
     if asked := Counter(re.sub(r"-\d+$", "", question.name) for question in plan.asked):
         yield "Asks you", ", ".join(f"{name} ({n} times)" if n > 1 else name for name, n in asked.items())
-    room = "" if free_bytes > plan.bytes else ": there is not enough room"
-    yield "Keeps", f"{size(plan.bytes)} on the disk, where {size(free_bytes)} are free{room}"
+    space = "" if free_bytes > plan.bytes else ": not enough space"
+    yield "Stores", f"{size(plan.bytes)} on the disk; {size(free_bytes)} are free{space}"
 
 
 def _does(plan: Plan) -> list[str]:
     lines = [stretch.words for stretch in stretches(plan)]
     if len(lines) > MOST_STRETCHES:
         lines[MOST_STRETCHES - 1 :] = [f"and {len(lines) - MOST_STRETCHES + 1} more: rig plan {plan.procedure}"]
-    return lines or ["keeps readings, and no pose"]
+    return lines or ["records readings and no pose"]
 
 
 def _stops(bench: Bench) -> list[str]:
     low, high = bench.limits.temperature_c
     level_deg = bench.limits.level_deg
-    tilt = [] if level_deg is None else [f"where the table is tilted by more than {level_deg:g} deg"]
-    return [f"where the sensor is not at {low:g} to {high:g} C", *tilt]
+    tilt = [] if level_deg is None else [f"if the tilt of the table exceeds {level_deg:g} deg"]
+    return [f"if the sensor is not at {low:g} to {high:g} C", *tilt]
 
 
 def checks(plan: Plan) -> list[str]:
-    """What only a person can see, before anything moves."""
-    whats = [step.what for step in plan.steps]
+    """Checks that only a person can do, before anything moves."""
+    actions = [step.what for step in plan.steps]
     level = any("level" in question.name for question in plan.asked)
     lines = [
-        "the cables are free to turn as far as the stages do, and nothing and nobody is in their way",
-        "the sensor is screwed down as drawn, its pin 1 where the drawing has it",
+        "the cables can follow the stages over the whole range, and nothing and nobody is in the way",
+        "the sensor is fastened as in the drawing, with pin 1 at the drawn place",
     ]
-    if any("level is read" in what for what in whats):
+    if any("level is read" in action for action in actions):
         lines.append("the level lies on the table and is switched on")
     if level:
-        lines.append("a level lies on the table: you will read it")
-    if "oven on" in whats:
-        lines.append("the oven is closed, and what is in it can bear its temperatures")
-    if any("positioner swings" in what for what in whats):
+        lines.append("a level lies on the table; you will read it")
+    if "oven on" in actions:
+        lines.append("the oven is closed, and everything in it withstands the temperatures")
+    if any("positioner swings" in action for action in actions):
         lines.append("the nano-positioner's carriage is free to move")
     return lines
 
 
 def mounting(plan: Plan) -> Attitude:
-    """How the sensor is mounted first: as the first question with a drawing says, or else the first pose."""
+    """The first mounting of the sensor: from the first question with a drawing, else from the first pose."""
     drawn = [attitude for question in plan.asked if (attitude := drawing_of(question)) is not None]
     posed = [Attitude(mount_deg=held.pose.mount_deg, flip=held.pose.flip) for held in plan.held]
     return next(iter([*drawn, *posed]), Attitude())
 
 
 def drawn(attitude: Attitude, file: Path) -> RenderableType:
-    """The sketch beside its legend; `file` is the drawing for a browser."""
+    """The sketch with its legend; `file` is the complete drawing."""
     beside = Table.grid(padding=(0, 3))
-    legend = f"\n{attitude.words}\n\nThe table from above at alpha 0:\nx, y  axes of the sensor\no     pin 1\n\n{file}"
+    legend = f"\n{attitude.words}\n\nTable at alpha 0, from above:\nx, y  axes of the sensor\no     pin 1\n\n{file}"
     beside.add_row(Text("\n".join(sketch(attitude))), Text(legend, overflow="fold"))
     return beside

@@ -1,4 +1,4 @@
-"""Looking on while a procedure runs, guided in a terminal or quietly; and telling how it ended."""
+"""Observers of a run, guided in a terminal or unattended; and the message at its end."""
 
 from __future__ import annotations
 
@@ -29,17 +29,17 @@ trace_option = click.option("--trace", is_flag=True, help="Log every message to 
 
 
 class Quiet:
-    """Nobody looks on. A question takes its answer from the file, or from the technician of a simulated bench.
+    """An unattended run. Answers come from the file, or from the simulated technician of a simulated bench.
 
-    What a soak will come to is told on standard error, after every reversal; of other runs, what their poses tell so
-    far, after every path.
+    Standard error has the forecast of a soak after every reversal, and for other runs the result so far after every
+    path.
     """
 
     def __init__(self, answers: Mapping[str, str], follower: SoakWatch | SoFar | None = None) -> None:
         self._answers, self._follower = answers, follower
 
     def planned(self, plan: Plan) -> None:
-        """It is done as it is planned."""
+        """An unattended run needs no confirmation."""
 
     def begun(self, run: str) -> None:
         note(f"run {run}")
@@ -47,42 +47,42 @@ class Quiet:
             self._follower.begun(run)
 
     def doing(self, text: str) -> None:
-        """Nobody reads it."""
+        """Not shown."""
 
     def expect(self, total: int, done: int) -> None:
-        note(f"{total - done} of {total} poses to come")
+        note(f"{total - done} of {total} poses remain")
 
     def kept(self, kept: Kept) -> None:
-        """The record has it."""
-        if self._follower and (told := self._follower.told(kept)):
-            note(told)
+        """Print the forecast or the result so far."""
+        if self._follower and (text := self._follower.told(kept)):
+            note(text)
 
     def read(self, reading: Reading) -> None:
-        """The record has it."""
+        """Not shown; the record has it."""
 
     def ask(self, question: Question, instead: str | None) -> str:
         given = self._answers.get(question.name, instead)
         if given is None:
             raise NoAnswer(
-                f'nobody is there to answer "{question.text}"; put `{question.name}: ...` ({question.accepts}) into a '
-                "file for --answers, or run it in a terminal without --unattended"
+                f'the question "{question.text}" has no answer; write `{question.name}: ...` ({question.accepts}) '
+                "into a file for --answers, or run in a terminal without --unattended"
             )
         return given
 
     def interrupted(self, outcome: Outcome) -> Wish:  # noqa: ARG002
-        """Nobody is there who could put it right."""
+        """An unattended run ends: nobody can decide."""
         return "end"
 
 
 @contextmanager
 def watching(procedure: Procedure, bench: Bench, unattended: bool, answers: Path | None) -> Iterator[Watch]:
-    """Who looks on: a person in a terminal, unless the run is unattended or nobody is there; pages beside them."""
+    """The observer of a run: a person in a terminal, or nobody for an unattended run; pages observe in parallel."""
     given = _answers(answers)
     if unattended or not (sys.stdin.isatty() and sys.stderr.isatty()):
         with Beside(Quiet(given, soak_watch(procedure.name) or SoFar()), procedure.name, bench, "nobody") as watch:
             yield watch
         return
-    from rig.cli.terminal.guide import Guide  # rich is only imported where somebody sees it
+    from rig.cli.terminal.guide import Guide  # only a terminal needs rich
 
     with Guide(procedure, bench, given) as guide, Beside(guide, procedure.name, bench, "terminal") as watch:
         yield watch
@@ -94,22 +94,22 @@ def _answers(path: Path | None) -> dict[str, str]:
     try:
         document = load_yaml(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise BadAnswer(f"{path}: the file of answers cannot be read: {error.strerror}") from None
+        raise BadAnswer(f"{path}: cannot read the file of answers: {error.strerror}") from None
     except ValueError as error:
-        raise BadAnswer(f"{path}: is not a YAML file: {error}") from None
+        raise BadAnswer(f"{path}: this is not a YAML file: {error}") from None
     if not isinstance(document, dict):
         raise BadAnswer(f"{path}: a file of answers is a mapping, such as `mounting: yes`")
     return {str(name): str(answer) for name, answer in document.items()}
 
 
-def tell(record: Record, outcome: Outcome, as_json: bool) -> int:
-    """The end of a run, and its exit status: 1 without results, or with one beyond its limit. Raises its error."""
+def print_end(record: Record, outcome: Outcome, as_json: bool) -> int:
+    """Print the end of a run; raises its error. Returns 1 if results are missing or exceed a limit, else 0."""
     run = outcome.run
     if as_json:
         head = {"schema": "rig.run/1", "run": run.run, "procedure": run.procedure, "state": run.state}
         emit({**head, "poses": run.rows, "results": run.results, EXPIRED: run.constants.get(EXPIRED)})
     else:
-        mark = [f"But {run.constants[EXPIRED]}."] if EXPIRED in run.constants else []
+        mark = [f"Remark: {run.constants[EXPIRED]}."] if EXPIRED in run.constants else []
         after = next_steps(run, record.excluded(run.run))
         click.echo("\n".join([f"{run.run}: {run.state}, {run.extent}", *results_table(run.results), *mark, *after]))
     if outcome.error is not None:

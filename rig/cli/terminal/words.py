@@ -1,4 +1,4 @@
-"""Results in words, for a terminal: numbers to the digits that their uncertainty leaves them."""
+"""Results as text for a terminal."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def table(cells: Cells) -> str:
 
 
 def planned(result: Answer, request: Request, effects: Mapping[str, Effect]) -> Answer:
-    """The answer with its next experiment as a command; remarks go to standard error."""
+    """The result with its next experiment as a command; remarks go to standard error."""
     return next_experiment.planned(result, request, effects, note)
 
 
@@ -56,16 +56,16 @@ def discovery(result: Discovery[Any]) -> str:
 
 
 def addition(result: Discovery[Any], data: str, out: Path) -> str:
-    """The error with one effect added, and whether more is missing."""
+    """The error with one more effect, and the verdict."""
     text = discovery(result)
     if result.verdict not in (Verdict.ADEQUATE, Verdict.NO_RESPONSE):
-        text += f"\nWhich effect is missing: rig diagnose {data} --model {out}"
+        text += f"\nTo find the missing effect: rig diagnose {data} --model {out}"
     return text
 
 
 def experiment(e: Experiment, data: str) -> list[str]:
-    """Why the next experiment can tell, its command line, what it takes, and what it is expected to bring."""
-    lines = [f"{'To tell them apart' if e.separates else 'What to do next'}: {e.why}."]
+    """The next experiment: reason, command, duration, expected result."""
+    lines = [f"{'To separate them' if e.separates else 'Next experiment'}: {e.why}."]
     if e.command:
         takes = [duration(e.duration_s)] if e.duration_s else []
         lines += [f"    {e.command}", f"    {', '.join([*takes, _brings(e.expected, data)])}"]
@@ -73,44 +73,46 @@ def experiment(e: Experiment, data: str) -> list[str]:
 
 
 def _brings(expected: Expected | None, data: str) -> str:
-    """What an experiment is expected to tell, by its own data where they are enough."""
+    """Expected result of an experiment, from its own data if they are enough."""
     if expected is None:
-        return "what it will tell is not computed"
+        return "its result cannot be predicted"
     from calibrations.design.expected import pairs_separated
 
     alone = expected.probability_alone >= CERTAIN_PROBABILITY
     value = expected.alone if alone else expected.together
-    judged = "by its own data" if alone else f"by all together: rig discover {data.replace(' + ', ' ')} ITS-RUN"
+    source = "from its own data" if alone else f"from all data: rig discover {data.replace(' + ', ' ')} NEW-RUN"
     chance = min(100 * pairs_separated(value), 99.9)
-    return f"{math.sqrt(value):.3g} standard deviations apart, told with a probability of {chance:.3g} %, {judged}"
+    return (
+        f"separation {math.sqrt(value):.3g} standard deviations, correct with a probability of {chance:.3g} %, {source}"
+    )
 
 
 def warning(cautions: Iterable[str | None]) -> list[str]:
-    """Lines that keep a reader from trusting a small error, where there is reason to."""
-    return [f"But {caution}." for caution in cautions if caution]
+    """Warnings against a small error that means little."""
+    return [f"Caution: {caution}." for caution in cautions if caution]
 
 
 def paper(table: Table) -> str:
-    """The paper's stepwise estimate on the same data, or why there is none."""
+    """The stepwise estimate of the paper on the same data, or the reason why there is none."""
     from calibrations.analyses.stepwise import estimate_stepwise  # of `fit` on poses alone
 
     try:
         result = estimate_stepwise(table)
     except DataError as error:
-        return f"The paper's stepwise estimate cannot be made: {error}"
+        return f"No stepwise estimate (Ang): {error}"
     rows = [
         (axis, quantity(result.linear_rmse_v[k], "V"), quantity(result.rmse_v[k], "V"), f"{tilt.twice_mg:.3g} mg")
         for k, (axis, tilt) in enumerate(zip("xy", result.tilts, strict=True))
     ]
-    head = ("axis", "manufacturer (1)-(3)", "paper (4)-(17)", "tilt that (20)-(21) would correct twice")
-    return "The paper's stepwise estimate on the same data, rms error:\n" + columns(head, rows)
+    head = ("axis", "manufacturer (1)-(3)", "paper (4)-(17)", "tilt corrected twice by (20)-(21)")
+    return "Stepwise estimate (Ang) on the same data, rms error:\n" + columns(head, rows)
 
 
-# What is left of a residual as an effect of one's own: the command that adds it to the model.
+# A pattern of the residual as an effect of your own.
 
 
 def own_effect(pattern: Pattern | None, model: str, request: Request) -> dict[str, Any] | None:
-    """The pattern as `expression`, `name`, and the `command` that adds it to `model`; None where it cannot be one."""
+    """Expression, name, and the command that adds the pattern to `model`; None without an expression."""
     if pattern is None or not pattern.expression:
         return None
     words = ["rig", "add", pattern.expression, "--name", pattern.name, "--model", model, "--data", request.data]
@@ -118,13 +120,13 @@ def own_effect(pattern: Pattern | None, model: str, request: Request) -> dict[st
     return {"expression": pattern.expression, "name": pattern.name, "command": shlex.join(words)}
 
 
-def told(pattern: Pattern | None, model: str, request: Request) -> list[str]:
-    """What a person may do about what is left."""
+def pattern_advice(pattern: Pattern | None, model: str, request: Request) -> list[str]:
+    """What a person can do about a pattern of the residual."""
     if found := own_effect(pattern, model, request):
         return [
-            "To take it into the model as an effect of your own (and then see what is left):",
+            "To add this pattern to the model as your own effect:",
             f"    {found['command']}",
         ]
     if pattern is not None and pattern.poses and not Path(data := request.data).exists():
-        return [f"Look at them: rig show {data} --poses. rig exclude {data} POSE leaves one out, with a reason."]
+        return [f"Look at these poses: rig show {data} --poses. rig exclude {data} POSE excludes one, with a reason."]
     return []
