@@ -66,6 +66,7 @@ def comparison_document(result: Comparison[F], model: str) -> Document:
             for p in result.fails
         ],
         **_rejected(result.rejection),
+        "missing": list(result.given.missing) if result.given is not None else None,
     }
 
 

@@ -41,7 +41,7 @@ def compare(data: Table, model: Model) -> Comparison[Fit]: ...
 def compare(data: Still, model: Model) -> Comparison[NoiseFit]: ...
 def compare(data: Table | Still, model: Model) -> Comparison[Any]:
     """The model as it is, or fitted first where it has no values yet. Raises what `fit` raises."""
-    return dataset(data).compare(model)
+    return dataset(data).compare(model, catalogue())
 
 
 @overload

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Generic
 
-from calibrations.criteria import MOST_BY_FORM
 from calibrations.discovery.results import Candidate, Comparison, Diagnosis, Discovery, F, Findings, Place, Step
 from calibrations.effects import Effect
 from calibrations.errors import ModelError
@@ -28,7 +27,6 @@ class Dataset(ABC, Generic[F]):
     floor: str  # what errors are multiples of
     unseen: str  # data that a fit did not use
     complete: str  # a comparison without a failing place, in words
-    most_left: float = MOST_BY_FORM  # part of the excess variance that may be the form of the effects added
 
     @property
     @abstractmethod
@@ -201,10 +199,20 @@ class Dataset(ABC, Generic[F]):
         """Why a fit of these data may mislead."""
         return []
 
-    def compare(self, model: Model) -> Comparison[F]:
-        """The model as it is, or fitted first where it has no values yet."""
+    def noise_known(self, found: F) -> bool:  # noqa: ARG002
+        """Whether the noise is known independently of what a fit leaves."""
+        return True
+
+    def compare(self, model: Model, effects: Mapping[str, Effect] | None = None) -> Comparison[F]:
+        """The model as it is, or fitted first where it has no values yet.
+
+        `effects` are searched for where only the residual measures the noise.
+        """
         found = self.evaluate(model) or self.fit(model)
-        return Comparison(self, found, self.places(found), self.rejection(found))
+        compared = Comparison(self, found, self.places(found), self.rejection(found))
+        if effects is None or not compared.adequate or self.noise_known(found):
+            return compared
+        return replace(compared, given=self.diagnose(model, effects).judgement)
 
     def diagnose(self, model: Model, effects: Mapping[str, Effect]) -> Diagnosis[F]:
         """What the model misses."""

@@ -93,17 +93,22 @@ class Place:
 
 @dataclass(frozen=True, repr=False)
 class Comparison(Result, Generic[F]):
-    """A model beside data: its fit, and the places where it fails, worst first."""
+    """A model beside data: its fit, and the places where it fails, worst first.
+
+    Where the residual is the only measure of the noise it cannot fail, and a search for effects judges the model.
+    """
 
     data: Dataset[F]
     fit: F
     fails: tuple[Place, ...]
     rejection: Finding | None = None  # why the data cannot be used
+    given: Judgement | None = None  # by a search for effects, where the residual is the only measure of the noise
 
     @property
     def adequate(self) -> bool:
-        """Whether the model fails nowhere, on data that can be used."""
-        return not self.fails and self.rejection is None
+        """Whether the model fails nowhere, on data that can be used, and a search finds no effect missing."""
+        missing = self.given is not None and self.given.verdict is not Verdict.ADEQUATE
+        return not self.fails and self.rejection is None and not missing
 
     def report(self) -> str:
         """The error of each channel, and the places where the model fails."""
@@ -255,7 +260,6 @@ class Findings(Generic[F]):
             "alternatives": self.alternatives,
             "left": self.left,
             "share_left": self.end.share_left(self.origin),
-            "most_left": self.data.most_left,
             "spoilt": self.spoilt,
             "unresponsive": self.unresponsive,
             "searched": self.searched,

@@ -102,6 +102,10 @@ class Rows(Dataset[Fit]):
         """The model with its values."""
         return evaluate(model, self.table)
 
+    def noise_known(self, found: Fit) -> bool:
+        """Whether it follows from the samples of each row."""
+        return found.noise.known
+
     def places(self, found: Fit) -> tuple[Place, ...]:
         """Stretches of columns."""
         return places(found)

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from enum import StrEnum
+from enum import Enum, StrEnum
 
 from calibrations.criteria import MATERIAL, MOST_BY_FORM, MOST_UNEXPLAINED, SIGNIFICANT
 from calibrations.presentation.text import joined
@@ -55,7 +55,6 @@ class Judgement:
     alternatives  effects that the data cannot separate from a missing or added one
     left          what no effect explains, in words
     share_left    part of the excess variance at the start of the search that stays
-    most_left     greatest such part that may be the form of the effects added, and no further cause
     spoilt        whether that part makes every effect of the search doubtful
     unresponsive  whether that part is an output that does not follow the poses
     searched      whether further effects were searched for after the last one was added
@@ -73,7 +72,6 @@ class Judgement:
     alternatives: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     left: str | None = None
     share_left: float = 0.0
-    most_left: float = MOST_BY_FORM
     spoilt: bool = False
     unresponsive: bool = False
     searched: bool = True
@@ -101,17 +99,43 @@ class Judgement:
         return headline(self)
 
 
+class Residual(Enum):
+    """What a residual is, by the part of the excess variance that no effect explains.
+
+    The forms of effects are approximate, so that a small part may belong to a named cause. A larger one is a further
+    cause. Where it is larger still, the named effects have not explained the data, and any of them may be wrong.
+    """
+
+    NOISE = "noise"
+    FORM = "the form of a named cause, or a further cause"
+    CAUSE = "a further cause"
+    DOUBT = "a cause that makes the named effects doubtful"
+
+    @classmethod
+    def of(cls, j: Judgement) -> Residual:
+        """By one scale for every model and every kind of data."""
+        if j.left is None:
+            return cls.NOISE
+        if j.spoilt or j.share_left > MOST_UNEXPLAINED:
+            return cls.DOUBT
+        return cls.FORM if j.share_left <= MOST_BY_FORM else cls.CAUSE
+
+
 def decide(j: Judgement) -> Verdict:
-    """The verdict on a model. Every command, page and document asks this function."""
+    """The verdict on a model. Every command, page and document asks this function.
+
+    Named effects are missing from a given model unless the residual makes them doubtful. A final model is complete up
+    to the form of its causes, or a further cause is unexplained.
+    """
+    residual = Residual.of(j)
     if j.unresponsive:
         return Verdict.NO_RESPONSE
-    most = MOST_UNEXPLAINED if j.missing else j.most_left
-    if j.left is not None and (j.spoilt or j.share_left > most):
+    if residual is Residual.DOUBT or (residual is Residual.CAUSE and not j.missing):
         return Verdict.UNEXPLAINED
     inseparable = any(j.alternatives.get(name) for name in (*j.missing, *j.added))
     if j.missing:
         return Verdict.AMBIGUOUS if inseparable else Verdict.EFFECT_MISSING
-    if j.left is not None or inseparable or j.undetermined is not None or _incomplete(j):
+    if residual is Residual.FORM or inseparable or j.undetermined is not None or _incomplete(j):
         return Verdict.AMBIGUOUS
     return Verdict.ADEQUATE
 

@@ -1,24 +1,21 @@
 """The noise of a still record as `rig noise` reports it: coefficients with bounds, and their JSON document.
 
 The processes, lines and disturbances are those of `search`, so that every command gives the same answer. A process that
-is identified has the estimate of the final fit. Any other process has an upper bound: the coefficient at which twice
-the log-likelihood falls by BOUND below its maximum, all other processes refitted (profile likelihood).
-
-Source  Cox and Hinkley, Theoretical Statistics, 7.2: intervals from the profile likelihood.
+is identified has the estimate of the final fit. Any other process has an upper bound by the profile likelihood, as in
+the parameter tables of every command (`fit.upper_bound`), but beside slow noise that a model need not hold.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.optimize import brentq
 from scipy.special import chdtri
 
-from calibrations.criteria import COVERAGE, IDENTIFIED, INTERVAL_STDS, SPOILT_BY
+from calibrations.criteria import COVERAGE, INTERVAL_STDS, SPOILT_BY
 from calibrations.effects.catalogue import catalogue
 from calibrations.effects.effect import Effect
 from calibrations.model import Estimate
@@ -27,8 +24,8 @@ from calibrations.noise.allan import deviation, variance_parts
 from calibrations.noise.channel_spectrum import Line
 from calibrations.noise.deviations import OCTAVE_KINDS, OVERLAPPING, Curve
 from calibrations.noise.disturbances import MISFITS, Disturbance, disturbance_document, disturbances
-from calibrations.noise.fit import fit_effects
-from calibrations.noise.likelihood import ChannelFit, effect_spectrum, log_likelihood, maximise_from
+from calibrations.noise.fit import upper_bound
+from calibrations.noise.likelihood import ChannelFit
 from calibrations.noise.record import Channel, Still
 from calibrations.noise.samples import CONSTANT, WILD, Hidden, hidden_in
 from calibrations.noise.search import Search, search
@@ -223,35 +220,6 @@ class NoiseAnalysis(Result):
 def analyse(still: Still, effects: Mapping[str, Effect] | None = None) -> NoiseAnalysis:
     """The noise of every channel of a still record."""
     return NoiseAnalysis(still, search(still, read_model(MODEL), catalogue() if effects is None else effects))
-
-
-def upper_bound(fit: ChannelFit, effect: Effect, beside: Sequence[Effect]) -> tuple[float, float, dict[str, float]]:
-    """(most likely coefficient, its upper bound with 95 %, all its parameters), other effects beside it refitted."""
-    most = fit_effects(fit, (*beside, effect))
-    strength = effect.parameters[0].name
-    column, *others = (
-        effect_spectrum(each, fit.parts, {**most.values[each.name], each.parameters[0].name: 1.0})
-        for each in (effect, *beside)
-    )
-    power = most.values[effect.name][strength] ** 2
-    G = np.column_stack(others) if others else None
-    start = np.array([most.values[each.name][each.parameters[0].name] ** 2 for each in beside])
-
-    def loss(log_power: float) -> float:
-        base = np.exp(log_power) * column
-        if G is None:
-            value = log_likelihood(base, fit.seen, fit.freedom)
-        else:
-            value = maximise_from(start.copy(), G, fit.seen, fit.freedom, base)[1]
-        return 2 * (most.log_likelihood - float(value)) - IDENTIFIED
-
-    weight = column / most.expected
-    low = float(np.log(max(power, 1e-3 / np.sqrt(np.sum(fit.freedom * weight**2)))))
-    high = low + 1.0
-    while loss(high) < 0:
-        low, high = high, high + 1.0
-    bound = float(brentq(loss, low, high, xtol=0.02)) if loss(low) < 0 else low
-    return float(np.sqrt(power)), float(np.exp(bound / 2)), most.values[effect.name]
 
 
 def _channels(record: Still, found: Search) -> dict[str, ChannelNoise]:

@@ -11,7 +11,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from calibrations.criteria import MOST_UNEXPLAINED
 from calibrations.discovery.dataset import Cells, Dataset
 from calibrations.discovery.results import Candidate, Comparison, Diagnosis, Discovery, Findings, Place, Step
 from calibrations.discovery.verdict import Verdict
@@ -66,7 +65,6 @@ class StillRecord(Dataset[NoiseFit]):
     floor = "chance"
     unseen = "the other half of the record"
     complete = "The model fails nowhere: the differences are chance."
-    most_left = MOST_UNEXPLAINED  # the form of a process is known; what it leaves is a process of another form
 
     @property
     def source(self) -> str:

@@ -4,10 +4,12 @@ The spectrum is linear in the squares of the effects' strengths, which `maximise
 constant) is searched on a grid and refined. Lines are found before, one after another.
 
 An effect is identified in a channel if the fit without it loses more than criteria.IDENTIFIED of twice the
-log-likelihood. Otherwise it may be absent, and an upper bound is given.
+log-likelihood. Otherwise it may be absent, and has an upper bound by the profile likelihood.
 
 Uncertainties follow from Fisher's information on all parameters together. Where the model does not describe the
 spectrum, the Birge ratio widens them. Uncertainties of a line are those of Rife and Boorstyn.
+
+Source  Cox and Hinkley, Theoretical Statistics, 7.2: intervals from the profile likelihood.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.optimize import minimize_scalar
+from scipy.optimize import brentq, minimize_scalar
 
 from calibrations.criteria import IDENTIFIED, INTERVAL_STDS
 from calibrations.effects import Effect
@@ -29,6 +31,7 @@ from calibrations.noise.likelihood import (
     Values,
     effect_spectrum,
     information,
+    log_likelihood,
     maximise,
     maximise_from,
     profile,
@@ -38,7 +41,6 @@ from calibrations.noise.record import Channel, Still
 from calibrations.noise.samples import hidden_in
 from calibrations.table import Array
 
-ONE_SIDED_STDS = 1.645  # standard deviations of a one-sided bound of 95 %
 DERIVATIVE_STEP = 1e-3  # of a value, for the derivative
 
 
@@ -60,19 +62,25 @@ def estimates(found: ChannelFit, effect: Effect, unit: str, deviations: Deviatio
 
 def _spectrum_estimates(found: ChannelFit, effect: Effect, unit: str, deviations: Deviations) -> Iterator[Estimate]:
     strength, values, axis = effect.parameters[0], found.values[effect.name], found.channel.axis
-    power, of_power = values[strength.name] ** 2, deviations[effect.name, strength.name]
-    identified = gain_of(found, effect) > IDENTIFIED
-    below = float(np.sqrt(power + ONE_SIDED_STDS * of_power))
+    of_power = deviations[effect.name, strength.name]
+    if gain_of(found, effect) <= IDENTIFIED:
+        yield from _unidentified(found, effect, unit)
+        return
     for p in effect.parameters:
-        own = p.unit.replace("{out}", unit)
-        if not identified:
-            why = f"this record does not tell it from none; {strength.name} is below {below:.2g} {own}"
-            std = below / ONE_SIDED_STDS if p is strength else None
-            yield Estimate(p.name, axis, values[p.name], std, own, False, why if p is strength else "there may be none")
-        elif p is strength:
-            yield Estimate(p.name, axis, values[p.name], of_power / (2 * values[p.name]), own)
-        else:
-            yield Estimate(p.name, axis, values[p.name], deviations[effect.name, p.name], own)
+        value = values[p.name]
+        std = of_power / (2 * value) if p is strength else deviations[effect.name, p.name]
+        yield Estimate(p.name, axis, value, std, p.unit.replace("{out}", unit))
+
+
+def _unidentified(found: ChannelFit, effect: Effect, unit: str) -> Iterator[Estimate]:
+    """A process that may be absent: the bound of its strength; its shape means nothing."""
+    strength, values, axis = effect.parameters[0], found.values[effect.name], found.channel.axis
+    value, below, _ = upper_bound(found, effect, [other for other in found.effects if other is not effect])
+    own = strength.unit.replace("{out}", unit)
+    why = f"the process may be absent: {strength.name} is below {below:.2g} {own} (95 %)"
+    yield Estimate(strength.name, axis, value, (below - value) / INTERVAL_STDS, own, False, why)
+    for p in effect.parameters[1:]:
+        yield Estimate(p.name, axis, values[p.name], None, p.unit, False, "the process may be absent")
 
 
 def gain_of(found: ChannelFit, effect: Effect) -> float:
@@ -87,6 +95,41 @@ def gain_of(found: ChannelFit, effect: Effect) -> float:
         return np.inf
     lost = 2 * (found.log_likelihood - fit_effects(found, rest).log_likelihood)
     return float(lost / max(1.0, found.excess) ** 2)
+
+
+def upper_bound(fit: ChannelFit, effect: Effect, beside: Sequence[Effect]) -> tuple[float, float, dict[str, float]]:
+    """(most likely coefficient, its upper bound with 95 %, all its parameters), other effects beside it refitted.
+
+    At the bound, twice the log-likelihood is criteria.IDENTIFIED below its maximum, times the squared excess where the
+    model does not describe the spectrum.
+    """
+    most = fit_effects(fit, (*beside, effect))
+    fall = IDENTIFIED * max(1.0, fit.excess) ** 2
+    column, *others = (unit_spectrum(each, fit.parts, _shape(each, most)) for each in (effect, *beside))
+    power = most.values[effect.name][effect.parameters[0].name] ** 2
+    G = np.column_stack(others) if others else None
+    start = np.array([most.values[each.name][each.parameters[0].name] ** 2 for each in beside])
+
+    def loss(log_power: float) -> float:
+        base = np.exp(log_power) * column
+        if G is None:
+            value = log_likelihood(base, fit.seen, fit.freedom)
+        else:
+            value = maximise_from(start.copy(), G, fit.seen, fit.freedom, base)[1]
+        return 2 * (most.log_likelihood - float(value)) - fall
+
+    weight = column / most.expected
+    low = float(np.log(max(power, 1e-3 / np.sqrt(np.sum(fit.freedom * weight**2)))))
+    high = low + 1.0
+    while loss(high) < 0:
+        low, high = high, high + 1.0
+    bound = float(brentq(loss, low, high, xtol=0.02)) if loss(low) < 0 else low
+    return float(np.sqrt(power)), float(np.exp(bound / 2)), most.values[effect.name]
+
+
+def _shape(effect: Effect, found: ChannelFit) -> Values:
+    """Its fitted parameters but the strength."""
+    return {p.name: found.values[effect.name][p.name] for p in effect.parameters[1:]}
 
 
 def power_deviations(found: ChannelFit) -> Deviations:

@@ -16,7 +16,7 @@ from functools import cached_property
 
 import numpy as np
 
-from calibrations.criteria import AT_LONGEST_TIME, INSEPARABLE, MOST_PATTERNS
+from calibrations.criteria import AT_LONGEST_TIME, IDENTIFIED, INSEPARABLE, MOST_PATTERNS
 from calibrations.discovery.results import Candidate
 from calibrations.effects import Effect
 from calibrations.model import Model
@@ -26,6 +26,7 @@ from calibrations.noise.fit import (
     NoiseFit,
     find_lines,
     fit,
+    gain_of,
     most_lines,
     noise_terms,
     shape_grid,
@@ -123,7 +124,7 @@ class Search:
             swapped = self.mixtures.of([*rest, other])
             if effect.name in other.contains and _at_longest_shape(swapped, other):
                 continue
-            if self.mixture.gain - swapped.gain < INSEPARABLE and not _is_absent(swapped, other):
+            if self.mixture.gain - swapped.gain < INSEPARABLE and _is_identified(swapped, other):
                 found.append(other.name)
         return found
 
@@ -133,9 +134,9 @@ def _gain_of_lines(lines: Lines) -> float:
     return float(sum((line.amplitude / line.std) ** 2 for line in lines))
 
 
-def _is_absent(mixture: Mixture, effect: Effect) -> bool:
-    """Whether an effect of a mixture adds nothing in any channel."""
-    return all(each.values[effect.name][effect.parameters[0].name] == 0 for each in mixture.channels)
+def _is_identified(mixture: Mixture, effect: Effect) -> bool:
+    """Whether an effect of a mixture is identified in a channel, as in a table of parameters."""
+    return any(gain_of(each, effect) > IDENTIFIED for each in mixture.channels)
 
 
 def _at_longest_shape(mixture: Mixture, effect: Effect) -> bool:

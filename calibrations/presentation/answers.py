@@ -10,6 +10,7 @@ from calibrations.documents import why
 from calibrations.presentation.text import columns
 
 MOST_CANDIDATES = 6
+SELF_JUDGED = "The noise is known from this residual only, so that the error alone shows no failure."
 
 
 def comparison_text(result: Comparison[Any]) -> str:
@@ -20,8 +21,10 @@ def comparison_text(result: Comparison[Any]) -> str:
         parts.append(columns(*further))
     if result.rejection is not None:
         parts.append(f"This data cannot be used: {result.rejection.verdict}: {result.rejection.text}.")
+    elif result.given is not None:
+        parts.append(f"{SELF_JUDGED} {result.given.text}")
     elif result.adequate:
-        parts.append(data.complete)
+        parts.append(data.complete if data.noise_known(result.fit) else SELF_JUDGED)
     else:
         parts.append("The model fails here, worst first:\n" + "\n".join(f"  {place.text}" for place in result.fails))
     return "\n\n".join(parts)

@@ -9,7 +9,7 @@ import pytest
 
 from calibrations.discovery.places import scales
 from calibrations.fit import fit
-from calibrations.loop import compare
+from calibrations.loop import compare, diagnose
 from calibrations.model.file import read_model
 from calibrations.table import Array, Table
 from tests.calibrations import synthetic
@@ -77,3 +77,27 @@ def test_so_few_poses_that_any_misfit_could_be_slow_noise_are_no_excuse() -> Non
     found = compare(few, read_model("linear"))
     assert np.all(found.fit.excess > 100)
     assert not found.adequate
+
+
+def positions(scale_y: float) -> Table:
+    """Directions at random, without the scatter of the samples."""
+    random = np.random.default_rng(0)
+    u = random.standard_normal((40, 3))
+    a = u / np.linalg.norm(u, axis=1, keepdims=True) * [1.0, scale_y, 1.0] + 1e-3 * random.standard_normal((40, 3))
+    return Table.from_columns("positions", dict(zip(("ax", "ay", "az"), a.T, strict=True)), {"unit": "g"}, "made")
+
+
+def test_a_residual_that_measures_its_own_noise_is_judged_by_the_search() -> None:
+    data, model = positions(1.003), read_model("common-scale")
+    found, asked = compare(data, model), diagnose(data, model)
+    assert found.fails == ()
+    assert asked.missing
+    assert found.given == asked.judgement
+    assert not found.adequate
+    assert "fails nowhere" not in found.report()
+    assert asked.judgement.text in found.report()
+    assert found.to_dict()["missing"] == list(asked.missing)
+    clean = compare(positions(1.0), model)
+    assert clean.adequate
+    assert "fails nowhere" not in clean.report()
+    assert compare(table(), read_model("linear")).given is None

@@ -7,6 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from calibrations.discovery.results import Diagnosis, Discovery
+from calibrations.discovery.verdict import Residual
 from calibrations.documents import diagnosis_document, discovery_document
 from calibrations.effects.catalogue import catalogue
 from calibrations.loop import add, diagnose, discover
@@ -51,6 +52,8 @@ CASES = {
 def test_diagnosis_and_discovery_say_the_same(name: str) -> None:
     asked, found = both(CASES[name](np.random.default_rng(0)))
     same = "adequate" if asked.verdict == "effect-missing" else asked.verdict
+    if Residual.of(found.judgement) is Residual.CAUSE:  # the named effects are missing; with them, a cause still is
+        same = "unexplained"
     assert (same, asked.missing) == (found.verdict, found.causes)
     one, other = diagnosis_document(asked, "still"), discovery_document(found, None)
     for key in ("alternatives", "reason", "residual_structure", "next_experiment", "disturbances"):

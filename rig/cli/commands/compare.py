@@ -26,7 +26,7 @@ def command(request: Request, check: bool, as_json: bool) -> int:
     from rig.services.load import loaded
 
     question = loaded(request, note)
-    result = question.data.compare(question.model)
+    result = question.data.compare(question.model, question.effects)
     name, cautions = request.model or question.model.name, question.data.cautions(result.fit)
     if as_json:
         emit(comparison_document(result, name))

@@ -63,7 +63,7 @@ def command(request: Request, out: Path | None, check: bool, as_json: bool) -> i
     if reason is not None and reason.verdict == Verdict.NO_RESPONSE:
         return 1
     unsure = data.undetermined(found) is not None
-    return int(check and (unsure or not data.compare(found.model).adequate))
+    return int(check and (unsure or not data.compare(found.model, question.effects).adequate))
 
 
 @dataclass(frozen=True)
