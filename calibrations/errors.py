@@ -19,11 +19,11 @@ from collections.abc import Iterable
 
 
 class CalibrationError(Exception):
-    """Bad input to the library; the message says what, where and what to do."""
+    """Bad input to the library; the message gives problem, place and remedy."""
 
 
 class DataError(CalibrationError):
-    """A table cannot be what it says it is."""
+    """A table does not fit its declared kind."""
 
 
 class MissingColumn(DataError):

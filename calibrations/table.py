@@ -96,7 +96,7 @@ class Table:
     def content(self) -> str:
         """What an effect may be defined for: the kind; of positions, "fields" where a magnetometer was turned.
 
-        Where an accelerometer was read beside it, the constant `triad: m` says that the magnetometer is meant.
+        With an accelerometer in the same table, the constant `triad: m` selects the magnetometer.
         """
         if self.kind != "positions" or "mx" not in self.columns:
             return self.kind

@@ -39,7 +39,7 @@ class Wire(Protocol):
 
 
 class Peer(Protocol):
-    """A passive server: it acts only when it is told what time it is."""
+    """A passive server: it acts only when it is given the time."""
 
     def filenos(self) -> Sequence[int]:
         """Descriptors to listen on."""

@@ -5,21 +5,21 @@
     ├── LinkError          the wire
     │   ├── LinkRefused    it cannot be opened, or the other side closed it
     │   ├── LinkTimeout    silence
-    │   ├── BadFrame       bytes that are no answer: CRC, length, function code
+    │   ├── BadFrame       bytes that are not an answer: CRC, length, function code
     │   ├── WrongUnit      another unit of the bus answered
     │   └── Refused        the instrument understood and declined: a Modbus exception, a GCS error
     ├── InstrumentError    the instrument
     │   ├── StageAlarm     the drive stands still with an alarm
-    │   ├── StageLost      the stage does not know where it is any more
+    │   ├── StageLost      the stage has lost its coordinates
     │   ├── Interlocked    an emergency stop or a guard is open, or a limit of the drive itself is not the one set
     │   ├── NotSettled     the stage did not arrive
-    │   ├── StreamError    scans were lost, or packets are not what was asked for
+    │   ├── StreamError    scans were lost, or packets are not the requested ones
     │   ├── OverRange      the converter was at an end of its range
-    │   ├── OverTemperature  the oven is hotter than it may become
+    │   ├── OverTemperature  the oven is hotter than its limit
     │   └── SensorFault    the thermometer gives no temperature, the displacement sensor no distance
     └── ClockStuck         a simulated instrument's bytes never arrived: a bound in real time, a defect of ours
 
-Each says what happened, where (instrument and register), and what to do.
+Each message gives what happened, where (instrument and register), and what to do.
 """
 
 from __future__ import annotations
@@ -50,15 +50,15 @@ class LinkRefused(LinkError):
 
 
 class LinkTimeout(LinkError):
-    """Nothing was heard in time."""
+    """No answer in time."""
 
 
 class BadFrame(LinkError):
-    """Bytes came, but no valid answer."""
+    """The received bytes are not a valid answer."""
 
 
 class WrongUnit(LinkError):
-    """A valid answer of a unit that was not asked."""
+    """A valid answer from another unit."""
 
 
 class Refused(LinkError):
@@ -86,7 +86,7 @@ class StageLost(InstrumentError):
 
 
 class Interlocked(InstrumentError):
-    """What keeps the rig safe says no: an open contact, a stop input, a limit that the drive has not taken."""
+    """A safety device prevents motion: an open contact, a stop input, a limit that the drive has not accepted."""
 
     exit_status = 4  # a safety limit
 
@@ -96,15 +96,15 @@ class NotSettled(InstrumentError):
 
 
 class StreamError(InstrumentError):
-    """The record has a gap, or is not the record that was asked for."""
+    """The record has a gap, or is not the requested one."""
 
 
 class OverRange(InstrumentError):
-    """Samples at an end of the converter's range: what they stand for is not known."""
+    """Samples at an end of the converter's range: the voltage is not known."""
 
 
 class OverTemperature(InstrumentError):
-    """The oven shows more than what is in it can bear."""
+    """The oven is hotter than its contents may become."""
 
     exit_status = 4  # a safety limit
 

@@ -1,4 +1,4 @@
-"""What every instrument can say about itself."""
+"""Identity and self-test of every instrument."""
 
 from __future__ import annotations
 

@@ -170,7 +170,5 @@ def fit_trend(times: Array, values: Array) -> tuple[float, float]:
     """(slope, its standard error from the scatter about the line), shape (n,) each. Raises TooFewRows."""
     if len(times) < FEWEST_FOR_DRIFT:
         raise TooFewRows(f"a trend needs at least {FEWEST_FOR_DRIFT} measurements; there are {len(times)}")
-    away = times - times.mean()
-    slope = float(away @ values / (away @ away))
-    left = values - values.mean() - slope * away
-    return slope, float(np.sqrt(left @ left / (len(times) - 2) / (away @ away)))
+    theta, covariance, squares = _line(times - times.mean(), values, np.ones_like(values), 0.0)
+    return float(theta[1]), float(np.sqrt(covariance[1, 1] * squares / (len(times) - 2)))

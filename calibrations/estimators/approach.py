@@ -49,8 +49,8 @@ SLOW_RMS = (
 SHAPES = (
     (1.0, (1.0, 1.0, 1.0, 1.0, 1.0), 0.0, 0.45),  # flicker
     (0.2, (0.5, 1.0, 2.0, 4.0, 4.0), 0.0, 0.15),  # the slower the larger
-    (1.0, (1.0, 0.3, 0.3, 0.3, 0.3), 0.0, 0.15),  # of seconds to minutes, beside weaker flicker
-    (0.0, (1.0, 1.0, 0.5, 0.7, 0.7), 0.0, 0.1),  # of minutes, beside weaker flicker of hours
+    (1.0, (1.0, 0.3, 0.3, 0.3, 0.3), 0.0, 0.15),  # seconds to minutes, with weaker flicker
+    (0.0, (1.0, 1.0, 0.5, 0.7, 0.7), 0.0, 0.1),  # minutes, with weaker flicker of hours
     (0.0, (0.0, 1.0, 1.0, 0.8, 0.8), 0.0, 0.1),  # of hours, likewise
     (1.0, (1.0, 1.0, 1.0, 1.0, 1.0), 3.0, 0.05),
 )
@@ -91,7 +91,7 @@ class Bank:
 
     @property
     def noise(self) -> float:
-        """Standard deviation of one value about what it comes to, slow noise and room included."""
+        """Standard deviation of one value about its final value, with slow noise and room temperature."""
         return float(np.sqrt(self.weight @ (1 + np.sum(self.slow**2, axis=1) + self.scatter**2 + self.room**2)))
 
     @property

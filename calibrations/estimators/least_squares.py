@@ -35,7 +35,7 @@ class Estimate:
 
     @property
     def scattered(self) -> Array:
-        """Standard errors (n,) where no variance is known: noise is what is left over. NaN where nothing is."""
+        """Standard errors (n,) by the variance of the residual; NaN without a residual."""
         variance = self.square / self.freedom if self.freedom > 0 else np.nan
         return np.asarray(np.sqrt(variance * np.diag(self.covariance)))
 
@@ -64,12 +64,12 @@ def least_squares(matrix: Array, measured: Array, variances: Array | float = 1.0
 #
 # Source  Book (18.1)-(18.8); Bierman, Factorization Methods (1977), V.
 
-UNDETERMINED_SHARE = 1e-6  # share of an unknown in what the measurements do not tell
+UNDETERMINED_SHARE = 1e-6  # share of an unknown in the undetermined directions
 
 
 @dataclass(frozen=True)
 class Recursive:
-    """What `count` measurements of n unknowns told: `triangle` (n + 1, n + 1) is the factor of (H, z), weighted."""
+    """Information of `count` measurements on n unknowns; `triangle` (n + 1, n + 1): factor of (H, z), weighted."""
 
     triangle: Array
     count: int = 0
@@ -86,7 +86,7 @@ class Recursive:
         return replace(self, triangle=triangle, count=self.count + 1)
 
     def estimate(self) -> Estimate:
-        """The unknowns so far; NaN those that the measurements do not tell, whose sum with others may be known."""
+        """The unknowns so far; NaN where undetermined; its sum with others may be determined."""
         n = len(self.triangle) - 1
         size = np.linalg.norm(self.triangle[:, :n], axis=0)
         size[size == 0] = 1.0

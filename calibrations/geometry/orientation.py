@@ -31,7 +31,7 @@ class Pose:
 
 @lru_cache(maxsize=2)
 def nominal_pose(table: Table) -> Pose:
-    """The pose that the stages report; level where a table of motion does not say."""
+    """The pose that the stages report; level if a table of motion gives none."""
     return Pose(
         np.radians(table.optional("alpha_deg", 0.0)),
         np.radians(table.optional("beta_deg", 0.0)),

@@ -40,7 +40,7 @@ def turn_axes(table: Table) -> Array:
     found = np.abs(rate_slopes(table))
     if found.max() < LEAST_MAIN_SLOPE * np.linalg.norm(found):
         raise DataError(
-            f"{table.source}: more than one output follows the rate, and nothing tells the axis of each turn; add the "
+            f"{table.source}: more than one output follows the rate, and the axis of each turn is not known; add the "
             "columns axis_x, axis_y, axis_z (1, 0, 0 for a turn about x), or ax, ay, az"
         )
     return np.tile(np.eye(3)[np.argmax(found)], (table.n, 1))

@@ -120,6 +120,7 @@ def _moving_std(samples: Array, width: int) -> Array:
 
 
 def _runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Begin and end (exclusive) of each run of true values."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
@@ -249,8 +250,7 @@ def _windows(log: Table, width: int) -> list[tuple[int, int]]:
         still &= _span(log.columns[name], width) <= JITTER_DEG
     changes = np.cumsum(_changed(log))
     still &= changes[width - 1 :] == changes[:starts]
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(np.int8)))
-    return [(int(a), int(b) + width - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    return [(begin, end + width - 1) for begin, end in _runs(still)]
 
 
 def _span(values: Array, width: int) -> Array:

@@ -166,7 +166,7 @@ def evaluate_motion(table: Table, linear: Model, physical: Model, still: Table |
     times_s = record.times_s(table.time_s)
     found = reference_acceleration(times_s, part.column("displacement_m"), record.rate_hz)
     if not found.moves:
-        raise DataError(f"{table.source}: the displacement holds no motion that stands out of its noise")
+        raise DataError(f"{table.source}: the displacement shows no motion above its noise")
     band = correct_at(butterworth(record.rate_hz), found.at_hz)
     true = 1e3 * apply_response(found.acceleration_m_s2, record.rate_hz, band)
     paper = 1e3 * paper_reference(part.column("displacement_m"), record.rate_hz, found.at_hz)

@@ -34,17 +34,17 @@ from calibrations.table import Array
 #     x(t) = offset + amplitude cos(2 pi f t + phase)
 #
 # Three parameters with the frequency given, four with the frequency fitted too: ISO 16063-11, IEEE Std 1057.
-# Uncertainties follow from the density of the residual beside the line, so that they hold for correlated noise as
+# Uncertainties follow from the density of the residual near the line, so that they hold for correlated noise as
 # well; for white noise they are the Cramer-Rao bound.
 
 NEIGHBOURS = 100  # lines on each side that the density is taken from
-OWN_LINES = 3  # beside the frequency, that the fitted sine has taken up
+OWN_LINES = 3  # besides the frequency, which the fitted sine takes
 ROUNDS = 12
 
 
 @dataclass(frozen=True)
 class Sine:
-    """A sine with standard uncertainties. `density` is the one-sided density of the residual beside it."""
+    """A sine with standard uncertainties. `density` is the one-sided density of the residual near it."""
 
     frequency_hz: float
     amplitude: float
@@ -72,7 +72,7 @@ def fit_four_parameter(t_s: Array, x: Array, frequency_hz: float | None = None) 
 
 
 def find_sines(t_s: Array, x: Array) -> tuple[Sine, ...]:
-    """The lines that stand out of a record, the most prominent first, each fitted beside the others."""
+    """The significant lines of a record, the most prominent first, fitted jointly."""
     found: list[Sine] = []
     left = x
     while len(found) < MOST_SINES:
@@ -186,7 +186,7 @@ class Smoothed:
         return np.asarray(1 / (1 + self.ratio * (2 * np.sin(np.pi * f / rate_hz)) ** (2 * ORDER)), dtype=complex)
 
     def corner_hz(self, rate_hz: float) -> float:
-        """Where half of the amplitude is left."""
+        """Frequency at which half of the amplitude remains."""
         return float(rate_hz / np.pi * np.arcsin(min(1.0, self.ratio ** (-1 / (2 * ORDER)) / 2)))
 
     def edge_s(self, rate_hz: float) -> float:
@@ -268,7 +268,7 @@ class Reference:
 
     @property
     def moves(self) -> bool:
-        """Whether there is motion that stands out of the displacement's noise."""
+        """Whether there is motion above the displacement's noise."""
         return bool(self.lines) or float(np.std(self.rest.values)) > self.rest.noise_std
 
 

@@ -1,4 +1,4 @@
-"""What stands between the transducer and a sample: the output filter at its nominal corner, and the sampling's skew.
+"""Between transducer and sample: the output filter at its nominal corner, and the sampling's skew.
 
 The converter takes the channels of one scan in turn: the sensor's axes `skew_x_s`, `skew_y_s`, `skew_z_s` after the
 displacement (constants of the table, 0 where not given).
@@ -52,7 +52,7 @@ def find_records(table: Table) -> tuple[Record, ...]:
     t = table.column("t_s")
     if np.any(np.diff(t) < 0):
         row = int(np.argmax(np.diff(t) < 0)) + 2
-        raise DataError(f'{table.source}: row {row}, column "t_s" falls; samples stand in order of time')
+        raise DataError(f'{table.source}: row {row}, column "t_s" falls; samples must be in order of time')
     if table.n < 2 or not t[-1] > t[0]:
         raise TooFewRows(f"{table.source}: {table.n} samples at one time are no record of a motion")
     step = float(np.median(np.diff(t))) or float(t[-1] - t[0]) / (table.n - 1)
@@ -149,7 +149,7 @@ def band_rms(density: Array, f: Array, response: Response) -> float:
     return float(np.sqrt(np.trapezoid(density * np.abs(response(f)) ** 2, f)))
 
 
-NOMINAL_CORNER_HZ = 15.07  # 32 kOhm and 0.33 uF, Ang V, where the table does not say
+NOMINAL_CORNER_HZ = 15.07  # 32 kOhm and 0.33 uF, Ang V, if the table gives none
 
 
 def corner_hz(table: Table) -> float:

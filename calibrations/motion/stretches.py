@@ -1,4 +1,4 @@
-"""The lines of a motion, as templates of what they make of the output, and the noise beside them.
+"""The lines of a motion as templates of the output, and the noise near them.
 
 The white noise of a line is the density of the output beside it, freed of all that follows the motion: a noise model
 without parameters (Pintelon and Schoukens, System Identification: A Frequency Domain Approach, 2012).
@@ -73,7 +73,7 @@ def _rest(samples: Table, left: Array, beside: bool) -> Line:
 
 
 def noise_density(samples: Table, lines: Sequence[Line], axis: int) -> Array:
-    """One-sided density of one axis beside 0 Hz and beside each line, shape (1 + lines,)."""
+    """One-sided density of one axis near 0 Hz and near each line, shape (1 + lines,)."""
     low_pass = first_order(corner_hz(samples))
     pieces = [_spectrum(samples, lines, axis, record.rows, record.rate_hz) for record in find_records(samples)]
     f = np.concatenate([piece[0] for piece in pieces])
@@ -165,7 +165,7 @@ def make_stretches(table: Table) -> Stretches:
 
 
 def _shown(samples: Table, lines: tuple[Line, ...], cuts: list[tuple[int, int]], expected: Array) -> tuple[Line, ...]:
-    """The lines that stand out of a row's noise in one stretch at least; the strongest in any case."""
+    """The lines above a row's noise in at least one stretch; the strongest line always."""
     there = np.abs((_weights(lines, cuts, samples.n) @ expected).reshape(-1, len(cuts)))
     white = _white(samples, lines, cuts)[: len(there)]
     seen = np.any(there > LEAST_LINE_WEIGHT * white, axis=1)
@@ -216,7 +216,7 @@ def _expected(samples: Table) -> Array:
 
 
 def _slope(samples: Table, expected: Array) -> float:
-    """Output of x per g of the motion, beside each record's mean."""
+    """Output of x per g of the motion, without each record's mean."""
     v, h = samples.outputs[:, 0].copy(), expected.copy()
     for record in find_records(samples):
         v[record.rows] -= v[record.rows].mean()
@@ -259,7 +259,7 @@ def _weights(lines: Sequence[Line], cuts: list[tuple[int, int]], n: int) -> csr_
 
 
 def _white(samples: Table, lines: Sequence[Line], cuts: list[tuple[int, int]]) -> Array:
-    """Standard deviation of each part by white noise, shape (channels, rows): the density beside its line."""
+    """Standard deviation of each part by white noise, shape (channels, rows): the density near its line."""
     rate_hz = find_records(samples)[0].rate_hz
     lengths = np.array([b - a for a, b in cuts])
     density = np.array([noise_density(samples, lines, axis) for axis in range(len(samples.axes))])

@@ -41,7 +41,7 @@ class Settings:
     interval_s: float = 0.1  # from one to the next
     accuracy_deg: float = 0.1  # of the rig's level (Ang V)
     unrest_deg: float = 0.02  # standard deviation of the readings above which the level still swings
-    patience_s: float = 10.0  # for it to come to rest
+    patience_s: float = 10.0  # to come to rest
     frozen: int = 30  # so many equal readings are one that has stuck
     range_deg: float = 30.0  # each way; of the model NS-30 [M]
 
@@ -58,7 +58,7 @@ class Reading:
     """Inclination of the level's axes, in deg, positive where the axis' positive end is up.
 
     `std_deg` is the standard deviation of either mean, of `n` readings: from their scatter, and never less than that
-    of the last digit's rounding. `accuracy_deg` is what the level is trusted to beside it.
+    of the last digit's rounding. `accuracy_deg` is the accuracy of the level without that rounding.
     """
 
     x_deg: float
@@ -78,7 +78,7 @@ class Level:
         self._silence()
 
     def identify(self) -> Identity:
-        """Version and serial number, as it tells them. Raises LinkTimeout, BadFrame."""
+        """Version and serial number, as the level reports them. Raises LinkTimeout, BadFrame."""
         self._silence()
         version, serial = self._ask(VERSION, NAMED, "version")
         return Identity("MEAS DPG2", serial, version)
@@ -125,7 +125,7 @@ class Level:
                 return False
             raise NotSettled(
                 f"{self.name}: after {self.settings.patience_s:g} s readings still scatter by {scatter_deg:.3f} deg",
-                "Wait until the plate stands still, and keep machines that shake it away",
+                "Wait until the plate is at rest, and keep machines that shake it away",
             )
         if len(taken) >= self.settings.frozen and len(set(taken[-self.settings.frozen :])) == 1:
             raise self._stuck(*taken[-1])
@@ -133,8 +133,8 @@ class Level:
 
     def _stuck(self, x_deg: float, y_deg: float) -> InstrumentError:
         return InstrumentError(
-            f"{self.name}: x {x_deg:+.3f}, y {y_deg:+.3f} deg came {self.settings.frozen} times in a row",
-            "Switch the level off and on; if it is a quiet one, set `frozen` higher in the bench file",
+            f"{self.name}: x {x_deg:+.3f}, y {y_deg:+.3f} deg was received {self.settings.frozen} times in a row",
+            "Switch the level off and on; if the level has very low noise, increase `frozen` in the bench file",
         )
 
     def _one(self) -> tuple[float, float]:
@@ -144,12 +144,12 @@ class Level:
             if not text[-1].isdigit():
                 raise InstrumentError(
                     f"{self.name}: the {axis} axis is beyond its range of {self.settings.range_deg:g} deg ({text})",
-                    "Turn alpha to 0, and see that the level lies flat on the table",
+                    "Turn alpha to 0, and check that the level lies flat on the table",
                 )
         return float(shown[0]), float(shown[1])
 
     def _silence(self) -> None:
-        """Stop it, and throw away what it was saying. Whether it heard that, the next answer tells."""
+        """Stop its output and discard it. The next answer shows whether the level received the command."""
         self._link.write(STOP)
         self._link.discard(QUIET_S)
 
@@ -157,7 +157,7 @@ class Level:
         """The two parts of the first whole `answer`. Raises LinkTimeout after silence, BadFrame after other bytes."""
         heard = b""
         for _ in range(ATTEMPTS):
-            self._link.discard()  # a late answer, or what a level says that did not hear the stop
+            self._link.discard()  # a late answer, or output of a level that did not receive the stop
             self._link.write(command)
             heard, found = self._listen(answer)
             if found:
@@ -168,7 +168,7 @@ class Level:
         raise LinkTimeout(f"{where}: no answer within {TIMEOUT_S:g} s, {ATTEMPTS} times", REMEDY)
 
     def _listen(self, answer: re.Pattern[bytes]) -> tuple[bytes, re.Match[bytes] | None]:
-        """What is heard until the whole answer is there, or time is over."""
+        """The bytes received until the answer is complete or the time is over."""
         heard, deadline = b"", self._clock.now() + TIMEOUT_S
         while (left_s := deadline - self._clock.now()) > 0 and (more := self._link.read(left_s)):
             heard += more

@@ -37,7 +37,7 @@ class World(Protocol):
 
 
 class Inclinometer:
-    """One level on a line of its own. Wakes talking; nobody hears what it says into an open line, or a full one."""
+    """One level on a line of its own. It sends from power-on; bytes into an open or a full line are lost."""
 
     def __init__(self, world: World, settings: Settings, port: Port) -> None:
         self.faults = Faults()
@@ -99,7 +99,7 @@ class Inclinometer:
         return f"{deg:+07.3f}" if abs(deg) <= self._range_deg else 7 * "+-"[deg < 0]
 
     def _heard_all(self, connection: Connection) -> bool:
-        """Whether what was said before has gone out by now."""
+        """Whether all earlier bytes are sent."""
         connection.emit(self._next_s)
         return not connection.is_behind(self._next_s)
 

@@ -51,7 +51,7 @@ class Settings:
         if not self.channels or not set(self.wired.values()) <= set(range(t7.INPUTS)):
             raise ValueError(f"channels must name analog inputs, 0 to {t7.INPUTS - 1}, and at least one")
         if twice := self.channels.keys() & self.on_request.keys():
-            raise ValueError(f"{', '.join(sorted(twice))} is a channel anyway; leave it out of on_request")
+            raise ValueError(f"{', '.join(sorted(twice))} is a channel already; remove it from on_request")
         if not 0 < self.rate_hz * len(self.channels) <= t7.MOST_SAMPLES_PER_S:
             raise ValueError(f"rate_hz must give at most {t7.MOST_SAMPLES_PER_S} samples a second in all")
         if self.range_v not in t7.RANGES_V:
@@ -140,12 +140,12 @@ class T7:
         self._unit.write(t7.dio(self.settings.power_dio), int(on))
 
     def look(self) -> None:
-        """Raises Interlocked where a contact that must be closed is open: what others look at while they wait."""
+        """Raises Interlocked where a contact that must be closed is open. Waiting code calls it repeatedly."""
         if self.settings.interlocks and (contacts := self._open_interlocks()):
             lines = ", ".join(f"{name} (DIO{self.settings.interlocks[name]})" for name in contacts)
             raise Interlocked(
                 f"{self.name}: the interlock {lines} is open",
-                "Pull out the emergency stop and close the guards; when nobody is near, resume the run",
+                "Release the emergency stop and close the guards; when nobody is near the rig, resume the run",
             )
 
     def _open_interlocks(self) -> list[str]:
@@ -183,7 +183,7 @@ class T7:
     def stream(self, duration_s: float, block_s: float) -> Generator[Samples, None, None]:
         """Record all channels for `duration_s` without a gap, and hand it out in blocks of `block_s`.
 
-        Both are rounded to whole scans; the last block holds what is left. The device takes one record, so the
+        Both are rounded to whole scans; the last block holds the rest. The device takes one record, so the
         samples are the same whatever `block_s` is. Take the next block within a few seconds, before the
         buffers of network and device are full. Closing the iterator ends the stream.
 
@@ -204,13 +204,13 @@ class T7:
                 self._require_in_range(codes, channels)
                 yield Samples(self._volts[codes], channels, rate_hz, start_s + first / rate_hz)
         except BaseException:
-            with contextlib.suppress(DriverError):  # what went wrong first is to be told
+            with contextlib.suppress(DriverError):  # the first error is reported
                 self._stop()
             raise
         self._stop()
 
     def _require_in_range(self, codes: NDArray[np.uint16], channels: tuple[str, ...]) -> None:
-        """A sample at an end of the range stands for any voltage beyond it, and its mean for none at all."""
+        """A sample at an end of the range may be any voltage beyond it, so a mean with such samples has no meaning."""
         if codes.min() > 0 and codes.max() < t7.HIGHEST_CODE:
             return
         count = np.count_nonzero((codes == 0) | (codes == t7.HIGHEST_CODE), axis=0)
@@ -255,7 +255,7 @@ class T7:
             raise Refused(f"{refused.what}; device error {detail}: {why}", refused.remedy, refused.code) from refused
 
     def _prepare_inputs(self) -> None:
-        """End a stream that a dead program left behind; ranges and ground of all that is wired."""
+        """End a stream of a crashed program; set range and ground of all wired inputs."""
         self._stop()
         for number in self.settings.wired.values():
             self._unit.write(t7.ain_range(number), self.settings.range_v)
@@ -283,13 +283,13 @@ def _joined(blocks: Sequence[Samples]) -> Samples:
 
 
 def _scans_per_packet(scans: int, channels: int) -> int:
-    """Large packets, of a size that lets the last one end with the record or soon after: nobody waits for more."""
+    """Large packets, of a size with which the last one ends with the record or soon after, so that no time is lost."""
     most = min(scans, t7.MOST_SAMPLES_PER_PACKET // channels)
     return min(range(most, most // 2, -1), key=lambda size: -scans % size)
 
 
 def connect(address: Address, links: Links, settings: Settings, name: str) -> T7:
-    """The converter at `address`; its stream is on port 702 of the same host unless `stream_url` says else.
+    """The converter at `address`; its stream is on port 702 of the same host unless `stream_url` is given.
 
     Raises LinkRefused when a port cannot be opened, and the errors of a first exchange.
     """

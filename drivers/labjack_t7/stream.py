@@ -1,4 +1,4 @@
-"""LabJack T7: the receiving end of a running stream. Bytes are fetched as they fall due, scans come out.
+"""LabJack T7: the receiving end of a running stream, from bytes to scans.
 
 It waits in bounded time: bytes are due at the rate of the stream, and a device that is late by PATIENCE_S is silent.
 One whose last bytes come late, though none is missing, has not sampled all the time: its clock stood still, or it left
@@ -74,7 +74,9 @@ class Packets:
         for field, value in zip(fields, expected, strict=True):
             if (wrong := np.flatnonzero(packets[field] != value)).size:
                 found = f"packet {self._seen + wrong[0]} has {field} {packets[field][wrong[0]]} instead of {value}"
-                raise StreamError(f"{self._name}: {found}", "Let no other program use the device's stream, then repeat")
+                raise StreamError(
+                    f"{self._name}: {found}", "Close other programs that use the device's stream, then repeat"
+                )
 
     def _require_no_loss(self, packets: NDArray[np.void]) -> None:
         status = packets["status"]
@@ -92,7 +94,7 @@ class Packets:
         steps = np.mod(np.diff(numbers), 65536)
         if (gaps := np.flatnonzero(steps != 1)).size:
             step, before = int(steps[gaps[0]]), self._seen - len(self._last) + gaps[0]
-            wrong = "are missing" if 1 < step < 32768 else "come twice or out of order"
+            wrong = "are missing" if 1 < step < 32768 else "are repeated or out of order"
             raise StreamError(f"{self._name}: packets {wrong} after packet {before} of the record", REMEDY)
         self._last = numbers[-1:]
 
@@ -194,14 +196,14 @@ class Reception:
     def _require_in_time(self) -> None:
         if self._late_s > LATE_S + self._drift_s():
             raise StreamError(
-                f"{self._name}: scans came {self._late_s:.2f} s later than the rate of the stream says",
-                "Find out whether its clock stood still or it left out scans, and what keeps network or computer busy",
+                f"{self._name}: scans arrived {self._late_s:.2f} s later than the rate of the stream requires",
+                "Check whether its clock stopped or it skipped scans, and whether network or computer are overloaded",
             )
 
     def _complain(self, wanted: int) -> None:
-        self._packets.codes(self._data)  # the status of what came may say why
+        self._packets.codes(self._data)  # the status of the received packets may contain the reason
         before = self._decoded * self._size
         raise LinkTimeout(
-            f"{self._name}: the stream fell silent after {before + len(self._data)} of {before + wanted} bytes",
+            f"{self._name}: the stream stopped after {before + len(self._data)} of {before + wanted} bytes",
             "Check network and power of the device, and that no other program uses its stream",
         )

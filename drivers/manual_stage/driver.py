@@ -57,7 +57,7 @@ class Settings:
 
 
 class ManualStage:
-    """A stage that stands where a person says it stands."""
+    """A stage whose angle a person sets and reads."""
 
     def __init__(self, person: PersonLink, settings: Settings, name: str) -> None:
         self.name = name
@@ -78,7 +78,7 @@ class ManualStage:
         """Nothing to release."""
 
     def angle_deg(self) -> float:
-        """What the dial showed last; a person is asked where nobody has read it yet."""
+        """The last reading of the dial; asks a person if there is none yet."""
         if self.read_deg is None:
             low, high = self.settings.limits_deg
             text = f"What does the dial of {self.name} show?"
@@ -93,14 +93,14 @@ class ManualStage:
         """There is nothing to seek."""
 
     def move_to(self, angle_deg: float) -> None:
-        """Have a person turn it to `angle_deg`; nobody is asked where it was set to that already.
+        """Have a person turn it to `angle_deg`; asks nobody if it is set to that angle already.
 
         Raises LimitError before anybody is asked, NotSettled for a reading elsewhere, and what comes from the person.
         """
         self._require_within_limits(angle_deg)
         if angle_deg == self._set_deg:
             return
-        self._set_deg, self.read_deg = math.nan, None  # half done, it stands anywhere
+        self._set_deg, self.read_deg = math.nan, None  # the angle of an interrupted move is not known
         reach = self.settings.tolerance_deg
         text = f"Turn {self.name} to {angle_deg:g} deg. What does its dial show?"
         name = f"{self.name}-{angle_deg:g}"
@@ -127,8 +127,8 @@ class ManualStage:
         low, high = self.settings.limits_deg
         if not low <= angle_deg <= high:  # NaN is outside as well
             raise LimitError(
-                f"{self.name}: {angle_deg:g} deg is outside its limits {low:g} .. {high:g} deg; nobody was asked",
-                "Ask for an angle within the limits, or change them in the bench file after looking at the cables",
+                f"{self.name}: {angle_deg:g} deg is outside its limits {low:g} .. {high:g} deg; no request was made",
+                "Ask for an angle within the limits, or change them in the bench file after checking the cables",
             )
 
 

@@ -14,23 +14,23 @@ PERSON = "person"  # the url of an instrument whose wire is a person
 
 
 class Person(Protocol):
-    """Somebody who does what is asked, and tells what they see then."""
+    """A person who follows instructions and reports readings."""
 
     def ask(self, name: str, text: str, unit: str, low: float, high: float, expected: float | None = None) -> float:
         """What they read, in `unit` and from `low` to `high`; `name` is the question's key in a file of answers.
 
-        A confirmation stands for the `expected` number. Raises what whoever runs the rig raises where nobody answers.
+        A confirmation means the `expected` number. Without an answer, raises the error of the calling program.
         """
 
 
 class PersonLink:
-    """The place at the rig: questions go to whoever stands there."""
+    """A link to the person at the rig."""
 
     def __init__(self) -> None:
         self.attended_by: Person | None = None
 
     def ask(self, name: str, text: str, unit: str, low: float, high: float, expected: float | None = None) -> float:
-        """As `Person.ask`. Raises LinkRefused where nobody stands at the rig."""
+        """As `Person.ask`. Raises LinkRefused if no person is connected."""
         if self.attended_by is None:
-            raise LinkRefused(f'nobody stands at the rig to be asked "{text}"', "Ask within a run")
+            raise LinkRefused(f'no person is at the rig to answer "{text}"', "Ask within a run")
         return self.attended_by.ask(name, text, unit, low, high, expected)

@@ -19,7 +19,7 @@ SET_POINT = Register(0x1001, "int16", "set point", "C", 0.1)
 CONTROL_METHOD = Register(0x1005, "uint16", "control method")
 METHODS = ("PID", "on/off", "manual", "ramp and soak")
 RUN_BIT = 0x0814
-ARRIVED_K = 5.0  # from the set point: nearer to it the temperature may well stand still
+ARRIVED_K = 5.0  # from the set point: closer to it the temperature may be constant
 NO_TEMPERATURE = {  # what the process value shows instead of a temperature [M]
     0x8002: "it has no reading yet",
     0x8003: "no thermocouple is connected",
@@ -55,8 +55,8 @@ class Oven:
         self.name = unit.name
         self.settings = settings
         self._unit, self._clock = unit, clock
-        self._told_c: float | None = None  # the set point that it was told
-        self._running = False  # whether it was told to run
+        self._told_c: float | None = None  # the last set point sent
+        self._running = False  # whether it was switched on
         self._shown_c, self._since_s = math.nan, 0.0  # the last temperature, and since when
 
     def identify(self) -> Identity:
@@ -129,8 +129,8 @@ class Oven:
             self._shown_c, self._since_s = shown_c, self._clock.now()
         elif (still_s := self._clock.now() - self._since_s) > self.settings.stale_s:
             raise SensorFault(
-                f"{self.name}: has shown {shown_c:.1f} C for {still_s:.0f} s on its way to {self._told_c:g} C",
-                "Check that the thermocouple is in its place and the heater heats; switch the controller off and on",
+                f"{self.name}: has shown {shown_c:.1f} C for {still_s:.0f} s while approaching {self._told_c:g} C",
+                "Check the place of the thermocouple and the heater; switch the controller off and on",
             )
 
 

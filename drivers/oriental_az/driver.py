@@ -44,7 +44,7 @@ class Turn:
 
 
 class RotaryStage:
-    """A stage that is told angles in deg and stands at them."""
+    """A stage that is moved to angles in deg and holds them."""
 
     def __init__(self, unit: Unit, links: Links, settings: Settings) -> None:
         self.name = unit.name
@@ -61,7 +61,7 @@ class RotaryStage:
         return Identity("Oriental Motor AZ")
 
     def self_test(self) -> list[Check]:
-        """Alarm, line, coordinates, temperatures. A stage that is not homed yet is in order, and says so."""
+        """Alarm, line, coordinates, temperatures. A stage that is not homed yet passes, with a remark."""
         alarm, error = self.alarm(), int(self._unit.read(az.COMMUNICATION_ERROR))
         driver_c, motor_c = self._unit.read_block(az.DRIVER_TEMPERATURE, az.MOTOR_TEMPERATURE)
         referenced = self.referenced()
@@ -94,7 +94,7 @@ class RotaryStage:
         self._require_no_alarm(self.alarm())
 
     def move_to(self, angle_deg: float) -> None:
-        """Turn to `angle_deg` and return when it stands there.
+        """Turn to `angle_deg` and return when it is at rest there.
 
         Raises LimitError before anything is sent, StageAlarm, StageLost, NotSettled, and the errors of the link.
         """
@@ -102,7 +102,7 @@ class RotaryStage:
             self.wait()
 
     def start(self, angle_deg: float) -> bool:
-        """Start turning to `angle_deg` and return at once; False where it stands there already.
+        """Start turning to `angle_deg` and return at once; False if it is there already.
 
         With a communication time-out, `wait` must follow within it. Raises LimitError before anything is sent,
         StageAlarm, StageLost, Interlocked.
@@ -147,7 +147,7 @@ class RotaryStage:
             else:
                 self.wait()
         except BaseException:
-            with suppress(DriverError):  # what went wrong first is to be told
+            with suppress(DriverError):  # the first error is reported
                 self.stop()
             raise
 
@@ -176,7 +176,7 @@ class RotaryStage:
     def halt(self) -> None:
         """Let it brake, whatever it is doing, and return at once; `stop` must follow."""
         self._holds_target = False
-        self._unit.write(az.INPUTS, az.STOP, retries=0)  # others wait to be told
+        self._unit.write(az.INPUTS, az.STOP, retries=0)  # the other drives wait for their commands
 
     def stop(self) -> None:
         """Brake to a standstill, whatever the stage is doing. An alarm is no reason to doubt a standstill."""
@@ -203,7 +203,7 @@ class RotaryStage:
         if not low <= angle_deg <= high:  # NaN is outside as well
             raise LimitError(
                 f"{self.name}: {angle_deg:g} deg is outside its limits {low:g} .. {high:g} deg; nothing was sent",
-                "Ask for an angle within the limits, or change them in the bench file after looking at the cables",
+                "Ask for an angle within the limits, or change them in the bench file after checking the cables",
             )
 
     def _require_at_target(self, remedy: str) -> None:
@@ -211,7 +211,7 @@ class RotaryStage:
         angle_deg = self.angle_deg()
         if abs(angle_deg - self._target_deg) > self.settings.settle_deg:
             raise NotSettled(
-                f"{self.name}: stands at {angle_deg:.3f} deg instead of {self._target_deg:.3f} deg, "
+                f"{self.name}: is at {angle_deg:.3f} deg instead of {self._target_deg:.3f} deg, "
                 f"more than {self.settings.settle_deg:g} deg away",
                 remedy,
             )
@@ -232,14 +232,14 @@ class RotaryStage:
         return outputs
 
     def _require_ready(self, outputs: int) -> None:
-        """A drive that stands without an alarm and yet is not ready is kept from moving."""
+        """Raises Interlocked for a drive at rest without an alarm that is not ready to move."""
         deadline = self._clock.now() + READY_S
         while not outputs & az.READY:
             if self._clock.now() >= deadline:
                 raise Interlocked(
-                    f"{self.name}: stands without an alarm and is not ready to move: its stop input is on, "
+                    f"{self.name}: is at rest without an alarm and is not ready to move: its stop input is on, "
                     "or its motor is without current",
-                    "Pull out the emergency stop and close the guards; when nobody is near, resume the run",
+                    "Release the emergency stop and close the guards; when nobody is near the rig, resume the run",
                 )
             self._clock.sleep(POLL_S)
             outputs = self._status()
@@ -252,9 +252,9 @@ class RotaryStage:
         wanted = (az.BRAKE_AND_ALARM, high, low)
         self._unit.write_block(*zip(az.OWN_LIMITS, wanted, strict=True))
         if (found := self._unit.read_block(*az.OWN_LIMITS)) != list(wanted):
-            told = ", ".join(f"{value:g} in {register}" for register, value in zip(az.OWN_LIMITS, found, strict=True))
+            shown = ", ".join(f"{value:g} in {register}" for register, value in zip(az.OWN_LIMITS, found, strict=True))
             raise Interlocked(
-                f"{self.name}: has not taken its own limits of {low} .. {high} steps: it shows {told}",
+                f"{self.name}: has not accepted its limits of {low} .. {high} steps: it shows {shown}",
                 "Compare the addresses with the drive's manual, or take own_limits out of the bench file",
             )
         self._limited = True
@@ -267,7 +267,7 @@ class RotaryStage:
                 else "the alarm needs a power cycle"
             )
             raise StageAlarm(
-                f"{self.name}: stands still with alarm {alarm.code:02X}, {alarm.text}",
+                f"{self.name}: has stopped with alarm {alarm.code:02X}, {alarm.text}",
                 f"{alarm.remedy}; {how}",
                 alarm.code,
             )
@@ -313,7 +313,7 @@ class RotaryStage:
             )
 
     def _watch(self, on: bool) -> None:
-        """Have the drive watch over its controller, or not: while it stands, nobody needs to talk to it."""
+        """Switch the drive's communication timeout on or off; at rest it is off, as nothing is sent then."""
         if self.settings.communication_timeout_s:
             self._unit.write(self.settings.communication_timeout, on * self.settings.communication_timeout_s)
 
@@ -353,7 +353,7 @@ class RotaryStage:
 
 
 def _stands(outputs: int, wanted: int) -> bool:
-    """Whether it stands still with the `wanted` outputs on."""
+    """Whether it is at rest with the `wanted` outputs on."""
     return not outputs & az.MOVE and outputs & wanted == wanted
 
 

@@ -24,7 +24,7 @@ CURRENT = Register(0x0064, "uint32", "operating current", "%", 0.1)
 TRIGGER = Register(0x0066, "int32", "trigger of the direct data operation")
 DIRECT = (DATA_NUMBER, TYPE, POSITION, SPEED, ACCELERATION, DECELERATION, CURRENT, TRIGGER)
 ABSOLUTE, FROM_COMMAND, FROM_FEEDBACK = 1, 2, 3  # operation types
-CONTINUOUS = 7  # at a position that goes on and on, the way that the sign of the speed says, until STOP
+CONTINUOUS = 7  # endless turning until STOP; the sign of the speed is the direction
 TRIGGER_ALL = 1
 
 # Remote inputs and outputs: one bit each in the lower word.
@@ -109,10 +109,10 @@ def alarm_of(code: int) -> Alarm | None:
     """The alarm of a code; None for 0."""
     if code == 0:
         return None
-    return Alarm(code, *_WORDS.get(code, ("an alarm that this program does not know", "Look it up in the manual")))
+    return Alarm(code, *_WORDS.get(code, ("an alarm unknown to this program", "Look it up in the manual")))
 
 
-# Oriental Motor AZ: what a bench file says of a stage, and what follows from it: times and ways of its moves.
+# Oriental Motor AZ: settings of a stage in a bench file; times and paths of its moves.
 
 
 LEAD_S, TAIL_S = 0.2, 0.5  # at constant rate before a turn, for the motor to settle, and after it, for late records
@@ -136,7 +136,7 @@ class Settings:
     steps_per_turn: int = 18000  # 1.2 arcmin a step [M]
     limits_deg: tuple[float, float] = (-400.0, 400.0)
     speed_deg_s: float = 30.0
-    speed_limit_deg_s: float = 1200.0  # 200 r/min of a DGII's table [M]; less for what stands on it
+    speed_limit_deg_s: float = 1200.0  # 200 r/min of a DGII's table [M]; less with a load
     acceleration_deg_s2: float = 60.0
     settle_deg: float = 0.05
     current_percent: float = 100.0
@@ -151,7 +151,7 @@ class Settings:
         if not self.limits_deg[0] < self.limits_deg[1]:
             raise ValueError("limits_deg must be the lower limit, then the upper one")
         if self.own_limits and not all(map(math.isfinite, self.limits_deg)):
-            raise ValueError("own_limits needs limits_deg that are numbers of degrees, both of them")
+            raise ValueError("own_limits needs both numbers of limits_deg")
         if self.speed_deg_s > self.speed_limit_deg_s:
             raise ValueError(f"speed_deg_s must be at most speed_limit_deg_s, {self.speed_limit_deg_s:g}")
         if self.communication_timeout_s and not 0.5 <= self.communication_timeout_s <= 10:
@@ -174,13 +174,13 @@ class Settings:
         """
         if not 0 < abs(self.rate_deg_s(rate_deg_s)) <= self.speed_limit_deg_s:
             raise LimitError(
-                f"{name}: {abs(rate_deg_s):g} deg/s is no rate of this stage, whose limit is "
+                f"{name}: {abs(rate_deg_s):g} deg/s is not a rate of this stage; its limit is "
                 f"{self.speed_limit_deg_s:g} deg/s; nothing was sent",
-                "Ask for a slower turn, or change speed_limit_deg_s in the bench file after looking at what turns",
+                "Ask for a slower turn, or change speed_limit_deg_s in the bench file after checking the load",
             )
         if self.endless and not self.communication_timeout_s:
             raise LimitError(
-                f"{name}: has no limits, and would turn for ever should this program die; nothing was sent",
+                f"{name}: has no limits and would not stop if this program crashes; nothing was sent",
                 "Set communication_timeout_s in the bench file, so that the drive stops by itself, or set limits_deg",
             )
         speed, way = abs(rate_deg_s), math.copysign(1.0, last_deg - first_deg)
@@ -189,10 +189,11 @@ class Settings:
         low, high = self.limits_deg
         if not (low <= min(ends) and max(ends) <= high):  # NaN is outside as well
             raise LimitError(
-                f"{name}: a turn from {first_deg:g} to {last_deg:g} deg at {speed:g} deg/s takes run-up and braking, "
-                f"{ends[0]:g} .. {ends[1]:g} deg in all, outside its limits {low:g} .. {high:g} deg; nothing was sent",
-                "Ask for a slower or shorter turn, raise acceleration_deg_s2 if the load can bear it, or widen "
-                "limits_deg in the bench file after looking at the cables",
+                f"{name}: a turn from {first_deg:g} to {last_deg:g} deg at {speed:g} deg/s needs, with "
+                f"acceleration and braking, {ends[0]:g} .. {ends[1]:g} deg in all, outside its limits "
+                f"{low:g} .. {high:g} deg; nothing was sent",
+                "Ask for a slower or shorter turn, raise acceleration_deg_s2 if the load permits, or widen "
+                "limits_deg in the bench file after checking the cables",
             )
         return ends
 

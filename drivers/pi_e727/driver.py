@@ -60,7 +60,7 @@ class Settings:
         if frequency_hz > self.limit_hz:
             raise LimitError(
                 f"{name}: {frequency_hz:g} Hz is above its limit of {self.limit_hz:g} Hz; nothing was moved",
-                "Ask for a lower frequency, or change limit_hz in the bench file after looking at what is mounted",
+                "Ask for a lower frequency, or change limit_hz in the bench file after checking the mounted load",
             )
         return Wave.near(frequency_hz, cycle_s, self.wave_points)
 
@@ -94,23 +94,23 @@ class Wave:
 
 
 class Positioner:
-    """A stage on flexures that is told places in um and stands or swings there."""
+    """A flexure stage that is moved to positions in um or oscillates about them."""
 
     def __init__(self, gcs: Gcs, settings: Settings) -> None:
         self.name = gcs.name
         self.settings = settings
         self._gcs, self._clock = gcs, gcs.link.clock
-        self._swinging: str | None = None  # the axis that it was told to swing
+        self._swinging: str | None = None  # the axis that oscillates
         self._gcs.error()  # what went wrong before is not ours
 
     def identify(self) -> Identity:
-        """Maker's model, serial number and firmware as the controller tells them."""
+        """Maker's model, serial number and firmware as the controller reports them."""
         parts = [part.strip() for part in ",".join(self._gcs.ask(e727.IDENTITY)).split(",")]
         _, model, serial, firmware = [*parts, "", "", "", ""][:4]
         return Identity(f"PI {model}", serial, firmware)
 
     def self_test(self) -> list[Check]:
-        """Model, axes, travel, readiness. A servo that is off is in order, and is said."""
+        """Model, axes, travel, readiness. A servo that is off passes, with a remark."""
         model, known, ids = self.identify().model, self._gcs.ask(e727.AXES), self.settings.axes.values()
         low, high = self._travel_um()
         lower, upper = self.settings.limits_um
@@ -138,7 +138,7 @@ class Positioner:
         return self._gcs.number(f"{e727.POSITION} {self._id(axis)}")
 
     def move_to(self, axis: str, um: float) -> None:
-        """Move one axis to `um` and return when it stands there.
+        """Move one axis to `um` and return when it is at rest there.
 
         Raises LimitError before anything is sent, Refused with the controller's error, NotSettled.
         """
@@ -149,7 +149,7 @@ class Positioner:
         here = self.position_um(axis)
         if not abs(here - um) <= self.settings.settle_um:
             raise NotSettled(
-                f"{self.name}: {axis} stands at {here:.3f} um instead of {um:.3f} um, "
+                f"{self.name}: {axis} is at {here:.3f} um instead of {um:.3f} um, "
                 f"more than {self.settings.settle_um:g} um away",
                 "Take the load off the stage, check the servo's settings, then repeat the move",
             )
@@ -178,22 +178,22 @@ class Positioner:
         count = int(self._gcs.number(f"{e727.RECORDED_POINTS} {place}"))
         if not count:
             remedy = "Let the axis oscillate first, for longer than one sample of the recorder"
-            raise StreamError(f"{self.name}: nothing of {axis} is recorded", remedy)
+            raise StreamError(f"{self.name}: there is no record of {axis}", remedy)
         header, rows = self._gcs.rows(f"{e727.RECORDED} 1 {count} {place}")
         if len(rows) != count or not all(len(row) == 1 for row in rows) or "SAMPLE_TIME" not in header:
             what = f"{self.name}: the record of {axis} has {len(rows)} rows instead of {count}"
-            raise StreamError(what, "Let no other program use the controller, then repeat")
+            raise StreamError(what, "Close other programs that use the controller, then repeat")
         return Recording(np.array(rows)[:, 0], float(header["SAMPLE_TIME"]))
 
     def require_steady(self) -> None:
-        """Raises StreamError where an oscillation that was begun has ended by itself."""
+        """Raises StreamError where an oscillation that was begun has stopped."""
         if self._swinging is None:
             return
         playing = int(self._gcs.ask_byte(e727.WAVES), 16)
         if not playing >> (self._place(self._swinging) - 1) & 1:
             raise StreamError(
-                f"{self.name}: the oscillation of {self._swinging} has ended by itself",
-                "Find out whether the controller was without power or somebody stopped it, then resume the run",
+                f"{self.name}: the oscillation of {self._swinging} has stopped",
+                "Check whether the controller lost power or somebody stopped it, then resume the run",
             )
 
     def halt(self) -> None:
@@ -232,7 +232,7 @@ class Positioner:
         if not low <= um <= high:  # NaN is outside as well
             raise LimitError(
                 f"{self.name}: {axis} = {um:g} um is outside its limits {low:g} .. {high:g} um; nothing was sent",
-                "Ask for places within the limits: an oscillation reaches half its width to each side of its centre",
+                "Ask for positions within the limits; an oscillation extends half its width to each side of its centre",
             )
 
     def _require_swing(self, peak_to_peak_um: float) -> None:

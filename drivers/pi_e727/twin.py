@@ -32,7 +32,7 @@ PARAMETERS = {  # identifier: (value, type, name), the same for every axis
 
 
 class Controller:
-    """One controller. It remembers one error, and forgets it when it tells it."""
+    """One controller. It stores one error and clears it when it is read."""
 
     def __init__(self, world: World, settings: Settings) -> None:
         self._axes = Axes(world, settings.axes)
@@ -124,7 +124,7 @@ class Controller:
         return f"{error}\n"
 
     def _parameters(self, arguments: Sequence[str]) -> str:
-        """`SPA? item identifier ...`; an identifier is told as it was asked for."""
+        """`SPA? item identifier ...`; an identifier is answered as it was sent."""
         return lines(f"{item} {text}={PARAMETERS[p][0]}" for item, text, p in self._identified(groups(arguments, 2)))
 
     def _refuse_parameter(self, arguments: Sequence[str]) -> None:

@@ -127,7 +127,7 @@ class Axes:
         return now_s < self._settled_s[axis] or self.faults.size("busy", now_s) is not None
 
     def shown_um(self, axis: str, now_s: float) -> float:
-        """What the controller says of its position."""
+        """The position that the controller reports."""
         return float(self.measured_um(axis, now_s)[0]) + (self.faults.size("lies", now_s) or 0.0)
 
     def _on_target(self, axis: str, now_s: float) -> bool:

@@ -73,7 +73,7 @@ class Url:
         except ValueError as error:
             raise LinkRefused(f"{_shown(text)} is not the address of a wire ({error})", REMEDY) from error
         if "@" in parts.netloc:
-            raise LinkRefused(f"{_shown(text)} has a user, whom no wire asks for", REMEDY)
+            raise LinkRefused(f"{_shown(text)} has a user name, which a wire does not need", REMEDY)
         if options or not url._complete():
             raise LinkRefused(f"{_shown(text)} is not the address of a wire", REMEDY)
         return url
@@ -115,5 +115,5 @@ class Url:
 
 
 def _shown(text: str) -> str:
-    """As it may be printed: who and by which password is left out."""
+    """The address without user and password, for messages."""
     return repr(USER.sub("//***@", text))

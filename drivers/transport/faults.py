@@ -51,7 +51,7 @@ class Fault:
             raise ValueError("size must be a number")
 
     def happens(self, *moment: float) -> bool:
-        """Whether it is there at this moment, as its probability has it."""
+        """Whether it is present at this moment, by its probability."""
         draw = f"{self.what} {self.seed} {moment}"
         return self.probability == 1 or Random(draw).random() < self.probability  # noqa: S311 - nothing is secret
 
@@ -118,7 +118,7 @@ class Faults:
         return None
 
     def once(self, what: str, now_s: float) -> Strike | None:
-        """A fault that has begun and has not been told yet."""
+        """A fault that has begun and is not reported yet."""
         for k, (fault, size) in enumerate(self._faults):
             begun = k not in self._struck and fault.has_begun(now_s, self._asked)
             if fault.what == what and begun and fault.happens(self._asked):
@@ -142,7 +142,7 @@ class Faults:
         self._asked, self._struck, self._held = state["asked"], list(state["struck"]), dict(state["held"])
 
 
-# Faults of a wire: what becomes of the bytes that a simulated instrument says. One pure function each.
+# Faults of a wire: one pure function each, applied to the bytes that a simulated instrument sends.
 
 
 END = b""  # as a read that finds nothing
@@ -162,8 +162,8 @@ class Said(NamedTuple):
 class Wire:
     """What faults have to know of a wire.
 
-    `mends` is whether it has checksums of its own, as TCP has. Where several units share it, `unit_of` tells whose a
-    message is; `of_unit` is the same message of another unit.
+    `mends` is whether it has checksums of its own, as TCP has. Where several units share it, `unit_of` gives that of a
+    message; `of_unit` is the same message of another unit.
     """
 
     mends: bool
@@ -180,7 +180,7 @@ def nothing(_said: Said, _size: float, _wire: Wire) -> list[Said]:
 
 
 def the_end(said: Said, _size: float, _wire: Wire) -> list[Said]:
-    """The connection ends where it would have come."""
+    """The connection closes in place of the answer."""
     return [Said(END, said.due_s)]
 
 

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from drivers.errors import BadFrame, LinkTimeout, Refused
 from drivers.transport.link import Link
 
-TIMEOUT_S = 1.0  # of silence; the longest answers come in many pieces
+TIMEOUT_S = 1.0  # without a byte; the longest answers arrive in many pieces
 LONGEST_S = 300.0  # of one answer: all that a recorder holds, over a serial line
 QUIET_S = 0.02  # after which nothing more of an interrupted answer comes
 LATIN = "latin-1"  # one character is one byte
@@ -26,7 +26,7 @@ class Gcs:
     def __init__(self, link: Link, name: str, explain: Callable[[int], tuple[str, str]]) -> None:
         self.name, self.link = name, link
         self._explain = explain
-        self._owed = False  # whether the answer to an earlier question may still come
+        self._owed = False  # whether the answer to an earlier question may still arrive
 
     def tell(self, command: str) -> None:
         """Send a command that has no answer. Raises Refused with the controller's error."""
@@ -91,7 +91,7 @@ class Gcs:
             raise self._odd(question, text) from None
 
     def _send(self, text: str) -> None:
-        """Send `text`; what has come unasked, or comes too late, is the answer to something else."""
+        """Send `text`; discard earlier bytes: they are not the answer to it."""
         self.link.discard(TIMEOUT_S if self._owed else 0.0)
         self._owed = False
         self.link.write(text.encode(LATIN))
@@ -112,7 +112,7 @@ class Gcs:
         return LinkTimeout(f"{self.name}: no answer to {question} within {TIMEOUT_S:g} s on {self.link.url}", REMEDY)
 
     def _odd(self, question: str, answer: str) -> BadFrame:
-        return BadFrame(f"{self.name}: {answer[:40]!r} is no answer to {question}", REMEDY)
+        return BadFrame(f"{self.name}: {answer[:40]!r} is not an answer to {question}", REMEDY)
 
     def _require_no_error(self, command: str) -> None:
         if code := self.error():

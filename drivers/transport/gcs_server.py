@@ -15,7 +15,7 @@ Value = TypeVar("Value")
 
 
 class Refusal(Exception):
-    """Raised by a device that does not do what it is told: its error becomes `code`."""
+    """Raised by a device that refuses a command: its error becomes `code`."""
 
     def __init__(self, code: int) -> None:
         super().__init__(f"error {code}")

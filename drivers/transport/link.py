@@ -22,7 +22,9 @@ from drivers.transport.address import Url
 
 CONNECT_TIMEOUT_S = 5.0
 DISCARD_S = 1.0
-Tap = Callable[[float, str, Literal["sent", "heard"], bytes], None]  # told of every message: when, on whose wire, what
+Tap = Callable[
+    [float, str, Literal["sent", "heard"], bytes], None
+]  # called with every message: time, instrument, direction, bytes
 LOST = (OSError, termios.error, serial.SerialException)  # what a dead connection raises
 
 
@@ -66,7 +68,7 @@ class Link:
     """
 
     def __init__(self, url: Url, clock: Clock, name: str = "", tap: Tap | None = None) -> None:
-        """`name` is the instrument's, for its errors. Raises LinkRefused when nobody is there."""
+        """`name` is the instrument's, for its errors. Raises LinkRefused when nothing answers there."""
         self.url, self.clock = url.text, clock
         self._parsed, self._place = url, f"{name}: {url.text}" if name else url.text
         self.users, self._tap = [name] if name else [], tap  # instruments whose wire it is
@@ -103,7 +105,7 @@ class Link:
     def discard(self, quiet_s: float = 0.0) -> int:
         """Throw away what arrives until it has been quiet for `quiet_s`; the number of bytes.
 
-        Gives up on a line that babbles for DISCARD_S: the next answer will tell.
+        Stops after DISCARD_S on a line that keeps sending; the next answer shows whether it is usable.
         """
         count, deadline = 0, self.clock.now() + DISCARD_S
         while self.clock.now() <= deadline and (data := self.read(quiet_s)):
@@ -206,7 +208,7 @@ def connection_key(client: tuple[str, int], server: tuple[str, int]) -> str:
 
 
 def open_link(url: str, clock: Clock, name: str = "", tap: Tap | None = None) -> Link:
-    """Open a wire. Raises LinkRefused when nobody is there, or the url is not one."""
+    """Open a wire. Raises LinkRefused when nothing answers there, or for an invalid url."""
     return Link(Url.parse(url), clock, name, tap)
 
 

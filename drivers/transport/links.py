@@ -13,7 +13,7 @@ class Links:
     """Opens every wire once: instruments with the same url share it, as two drives share their RS-485 line."""
 
     def __init__(self, clock: Clock, tap: Tap | None = None) -> None:
-        """`tap` is told of every message."""
+        """`tap` is called with every message."""
         self.clock = clock
         self._tap = tap
         self.person = PersonLink()

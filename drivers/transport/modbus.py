@@ -68,7 +68,7 @@ class Register:
         return list(struct.unpack(f">{self.count}H", packed))
 
 
-logging.getLogger("pymodbus").addHandler(logging.NullHandler())  # what it says of a bad frame, our errors say better
+logging.getLogger("pymodbus").addHandler(logging.NullHandler())  # our errors describe bad frames
 
 TIMEOUT_S = 0.5  # for one answer; the slowest instrument needs a tenth of it
 LATE_S = 2 * TIMEOUT_S  # of quiet, after which no answer to an earlier request comes any more
@@ -101,7 +101,7 @@ class Bus:
         self._framer = FramerRTU(decoder) if self._url.rtu else FramerSocket(decoder)
         self._look_at = ON_A_LINE if self._url.rtu else ON_A_NETWORK
         self._transaction = 0
-        self._owed = False  # whether answers may still come to what was asked before
+        self._owed = False  # whether answers to earlier requests may still arrive
 
     def ask(self, request: ModbusPDU, unit: int, what: str, retries: int = RETRIES) -> ModbusPDU:
         """The answer of `unit`; `what` begins every error, as in 'alpha: reading register 0x0080 (alarm)'.
@@ -121,7 +121,7 @@ class Bus:
             raise LinkRefused(f"{what}: {lost.what}", lost.remedy) from lost
 
     def _let_late_answers_pass(self, request: ModbusPDU) -> None:
-        """RTU frames do not tell what they answer: one that comes too late must not be taken for the next question's.
+        """RTU frames do not identify their request: a late answer must not be taken for that of the next request.
 
         The echo of a write names its register, so a write, which may be a stop, need not wait.
         """
@@ -144,7 +144,7 @@ class Bus:
         if answer.isError() and answer.function_code & 0x7F == request.function_code:
             raise _refused(what, answer.exception_code)
         if not _fits(request, answer):
-            raise self._bad_frame(what, "the answer to another request came")
+            raise self._bad_frame(what, "received the answer to another request")
         return answer
 
     def _receive(self, what: str) -> ModbusPDU:
@@ -232,7 +232,7 @@ class Unit:
 
 
 def _fits(request: ModbusPDU, answer: ModbusPDU) -> bool:
-    """Whether the answer is that of this request: a late one of another may come first on a serial line."""
+    """Whether the answer is that of this request: on a serial line a late answer to another may arrive first."""
     if answer.function_code != request.function_code:
         return False
     if isinstance(request, ReadHoldingRegistersRequest):

@@ -28,13 +28,13 @@ SILENCE_S = 0.05  # ends an RTU frame: generous, since a computer sends a frame 
 
 
 class Twin(Protocol):
-    """What a server needs of a simulated instrument beside its answers."""
+    """The interface of a simulated instrument for its server, except its answers."""
 
     def advance(self, now_s: float) -> None:
         """Compute what happened up to `now_s`."""
 
     def due_s(self) -> float:
-        """When it has something to say unasked; infinity for never."""
+        """When it next sends by itself, s; infinity for never."""
 
     def state(self) -> dict[str, Any]:
         """What a resumed run needs, JSON-able."""
@@ -63,7 +63,7 @@ class Connection:
     def read(self, now_s: float, patience_s: float) -> bool:
         """Take in what is there; False at the end of the connection.
 
-        What came more than `patience_s` before it is half a request that nobody will complete.
+        Bytes received more than `patience_s` earlier are an incomplete request and are discarded.
         """
         if now_s - self._heard_s > patience_s:
             self.inbox.clear()
@@ -212,7 +212,7 @@ class Port:
             self.connections[client.fileno()] = Connection(client.fileno(), key, client.close, self._leaving)
 
     def _open_pty(self) -> str:
-        """A raw pseudo-terminal; its far end is kept open, so that clients may come and go."""
+        """A raw pseudo-terminal; its far end stays open, so that clients can reconnect."""
         near, far = pty.openpty()
         tty.setraw(far)
         os.set_blocking(near, False)

@@ -1,4 +1,4 @@
-"""Friction inside the suspension: Maxwell slip elements beside the spring.
+"""Friction inside the suspension: Maxwell slip elements parallel to the spring.
 
 Each element is a weak spring that ends in a sliding contact: it follows the mass, and slips once it is
 stretched by its limit. Four of them, with limits of 1/4 to 4/4 of the largest, make a smooth loop.

@@ -52,11 +52,11 @@ class Batch:
             world.move_stage(axis, trajectory)
 
     def motor_angle_deg(self, axis: str) -> float:
-        """Where the motor of `axis` stands now."""
+        """The present angle of the motor of `axis`."""
         return self._first.motor_angle_deg(axis)
 
     def move_positioner(self, axis: str, command: Command) -> float:
-        """Let the carriage, which carries all sensors, follow `command`; when it will stand still."""
+        """Let the carriage, which carries all sensors, follow `command`; returns when it will be at rest."""
         return max(world.move_positioner(axis, command) for world in self._worlds.values())
 
     def positioner_um(self, axis: str, times_s: ArrayLike | None = None) -> Floats:

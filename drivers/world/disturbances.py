@@ -1,4 +1,4 @@
-"""What nobody expects: faults that follow no law of a good sensor. All are off by default.
+"""Disturbances that follow no law of a good sensor. All are off by default.
 
 Each displaces the mass a little: charge that arrives on the plates at one moment; a cable that tugs
 in one sector of beta; a mount with two seats, which gravity rocks from one to the other; a lid that
@@ -16,7 +16,7 @@ from drivers.world.state import State
 
 @dataclass(frozen=True)
 class Oddities:
-    """Displacements in pm (8 pm are about 1 mg), both axes alike unless said otherwise."""
+    """Displacements in pm (8 pm are about 1 mg), equal on both axes unless stated otherwise."""
 
     charge_pm: float = 0.0  # from `charge_s` on
     charge_s: float = 1800.0

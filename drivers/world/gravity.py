@@ -18,7 +18,7 @@ from drivers.world.kernel import Floats, kernel
 
 @dataclass(frozen=True)
 class Base:
-    """How the rig's base stands in the laboratory."""
+    """Orientation of the rig's base in the laboratory."""
 
     tilt_x_deg: float = 0.0  # turn of the base about its x axis
     tilt_y_deg: float = 0.0  # turn of the base about its y axis
@@ -51,7 +51,7 @@ def vertical(base: Base) -> Floats:
 def mounting(package: Package, mount_deg: float, flip: int, up: str = "z") -> Floats:
     """Package from table, shape (3, 3): the mount's turn, face down if `flip`, on edge, the package's own rotation.
 
-    `up` names the edge that stands along the table's normal; with x up, y and z lie along the table's x and y.
+    `up` names the edge along the table's normal; with x up, y and z lie along the table's x and y.
     """
     face = np.diag([1.0, -1.0, -1.0]) if flip else np.eye(3)
     edge = np.roll(np.eye(3), "zxy".index(up), axis=0)
@@ -86,7 +86,7 @@ def across(turn: Floats, x: float, y: float, z: float) -> tuple[float, float, fl
     )
 
 
-# A digital level on the turntable: how the surface of its liquid stands to the plate that it lies on.
+# A digital level on the turntable: the angle between its liquid's surface and the plate below it.
 #
 # The liquid is at right angles to the specific force, so an axis shows by how much its positive end is the higher one:
 # atan2(a_x, a_z) and atan2(a_y, a_z). Upside down that is more than 90 deg.

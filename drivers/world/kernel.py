@@ -54,7 +54,7 @@ def _cache_folder() -> str:
 def record(values: Values) -> Values:
     """A record with the names and values of a (nested) dataclass of numbers and arrays.
 
-    It stands in for the dataclass: the same names hold the same kinds of values, and can be set.
+    It replaces the dataclass: the same names and types of values, but mutable.
     """
     return cast(Values, np.array([_contents(values)], dtype=_layout(values))[0])
 

@@ -60,13 +60,13 @@ def near_magnet_ut(magnet: Magnet) -> tuple[float, float, float]:
 
 @kernel
 def near_iron_ut(iron: Iron, bx: float, by: float, bz: float) -> tuple[float, float, float]:
-    """The field (bx, by, bz) as it is beside the iron."""
+    """The field (bx, by, bz) near the iron."""
     share = iron.radius_mm**3 * (iron.permeability_ratio - 1) / (iron.permeability_ratio + 2) / UT_PER_MOMENT
     dx, dy, dz = dipole_ut(iron.x_mm, iron.y_mm, iron.z_mm, share * bx, share * by, share * bz)
     return bx + dx, by + dy, bz + dz
 
 
-# Where the rig stands on the earth: its rotation, its magnetic field, and what iron and magnets of the rig make of it.
+# Place of the rig on the earth: earth's rotation and magnetic field, changed by iron and magnets of the rig.
 #
 # The frame is the rig's: x along its base, at `heading_deg` from true north, y to the left of it, z upward. A turn
 # of the base about its tilts is that of `gravity.vertical`.
@@ -76,7 +76,7 @@ SIDEREAL_DAY_S = 86164.0905
 
 @dataclass(frozen=True)
 class Laboratory:
-    """Pittsburgh, as far as nothing else is said. Magnet and iron stand with the rig, at (x, y, z) from the sensor."""
+    """Pittsburgh by default. Magnet and iron are fixed to the rig, at (x, y, z) from the sensor."""
 
     latitude_deg: float = 40.443
     heading_deg: float = 25.0  # of the base's x axis, clockwise from true north

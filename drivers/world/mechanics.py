@@ -46,7 +46,7 @@ def run_to(world: State, config: WorldConfig, t_ns: int, step_ns: int, room: Gen
 
 @kernel
 def next_event_ns(world: State, step_ns: int) -> int:
-    """The next tick, or the next step of a stage or carriage that moves, or the moment at which it stands."""
+    """The next tick, or the next step of a stage or carriage that moves, or the moment at which it comes to rest."""
     event = (world.ticks + 1) * TICK_NS
     for axis in range(2):
         rest = world.rest_ns[axis]
@@ -126,7 +126,7 @@ def true_angles_rad(world: State, stages: Stages) -> tuple[float, float]:
 
 @kernel
 def shake(world: State, config: WorldConfig) -> None:
-    """What the floor's shaking comes to at both outputs, as the sensor stands now."""
+    """Floor vibration at both outputs, at the present orientation of the sensor."""
     alpha, beta = true_angles_rad(world, config.stages)
     gx, gy, _ = gravity.felt_g(acceleration_g(config.floor), world.mount, alpha, beta)
     gain_x, _ = passed(config.floor, noise.filter_s(config.noise.x))
@@ -174,7 +174,7 @@ def moved_nm(
     return own_nm - stuck + drawn + charged + disturbances.stopped_nm(odd, own_nm)
 
 
-# What turns with the table beside the accelerometer: a magnetometer and a gyroscope on one board.
+# A magnetometer and a gyroscope on one board, which turn with the table.
 #
 # Angular rate of the board in its own frame: the table's, that of its inclination, and the earth's. Vectors of the base
 # go Ry(alpha), then Rz(beta); so a table whose angle grows turns the other way about its own normal.
@@ -182,7 +182,7 @@ def moved_nm(
 
 @kernel
 def update_turned(world: State, config: WorldConfig, t_ns: int, warmer_k: float) -> None:
-    """From where the tables stand at `t_ns` to the volts of both sensors, without noise."""
+    """Volts of both sensors at the angles of the tables at `t_ns`, without noise."""
     alpha = stage.true_angle_rad(config.stages.alpha, world.table_deg[0])
     beta = stage.true_angle_rad(config.stages.beta, world.table_deg[1])
     fx, fy, fz = gravity.felt_g(world.field_ut, world.board, alpha, beta)

@@ -62,7 +62,7 @@ def zeros(*shape: int) -> Callable[[], Any]:
 
 @dataclass
 class Fluctuation:
-    """Where the noise of one output stands, and what its filter holds. Times in ns of world time."""
+    """State of the noise of one output and of its filter. Times in ns of world time."""
 
     flicker_v: Floats = field(default_factory=zeros(len(FLICKER_S)))
     walk_v: float = 0.0
@@ -96,7 +96,7 @@ def ticked_v(noise: Noise) -> float:
 
 
 def begin(own: Fluctuation, noise: Noise, random: Generator) -> None:
-    """Draw where the traps and the wander stand; white noise is drawn beside it."""
+    """Draw the state of traps and wander; white noise is drawn separately."""
     traps_v = np.array([trap_v(noise, release_s) for release_s in FLICKER_S])
     own.flicker_v = traps_v * random.standard_normal(len(FLICKER_S))
     if ticked_v(noise):

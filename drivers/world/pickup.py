@@ -59,7 +59,7 @@ FAST = len(FAST_S) + 1  # and the wander
 
 @dataclass
 class Pickup:
-    """What one output picks up, and where that stands. Times in ns of world time."""
+    """State of the disturbances that one output picks up. Times in ns of world time."""
 
     is_any: int = 0  # 1 where anything of this is on
     t_ns: int = 0  # of the last sample
@@ -80,7 +80,7 @@ def process(noise: Noise, k: int) -> tuple[float, float]:
 
 
 def begin(own: Pickup, noise: Noise, shaking: Floor, random: Generator) -> None:
-    """Draw where it stands at time 0; nothing is drawn for what is off."""
+    """Draw the state at time 0; draws nothing for disturbances that are off."""
     amplitudes_v = [process(noise, k)[0] for k in range(FAST)]
     own.fast_v = np.array([rms * random.standard_normal() if rms else 0.0 for rms in amplitudes_v])
     own.left_v_s = noise.pulse_v_s * random.random() if noise.pulse_v_s else 0.0

@@ -27,7 +27,7 @@ AXES = ("x", "y", "z")
 PIECES = 2  # a command, and standing where it ended
 TERMS = 8  # of a piece: start, place, rate, amplitude, angular frequency, phase, and both parts of the exponential
 FOREVER_S = 1e9
-FORGOTTEN = 25.0  # time constants after which nothing is left of a beginning: 1e-11 of it
+FORGOTTEN = 25.0  # time constants after which 1e-11 of the initial deviation remains
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ def at_rest(at_um: float = 0.0) -> Floats:
 
 
 def following(positioner: Positioner, pieces: Floats, command: Command) -> tuple[Floats, float]:
-    """The motion from the command's start on, given the motion until then; and when nothing of it is left, in s."""
+    """The motion from the command's start on, given the motion until then; and when it has decayed, in s."""
     new = np.zeros((PIECES, TERMS))
     new[0, :6] = _settled(positioner, command)
     _begin(positioner, new[0], pieces)

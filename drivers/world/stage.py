@@ -111,7 +111,7 @@ class Trajectory:
 
 
 def at_rest(angle_deg: float) -> Trajectory:
-    """A stage that stands at `angle_deg`."""
+    """A stage at rest at `angle_deg`."""
     return Trajectory(0.0, angle_deg, angle_deg, 1.0, 1.0)
 
 
@@ -150,7 +150,7 @@ def motor_angle_deg(pieces: Floats, t_s: float) -> float:
 
 @kernel
 def engaged_deg(stage: Stage, table_deg: float, motor_deg: float) -> float:
-    """Where the table stands behind the gear play, given where it stood."""
+    """The angle of the table behind the gear play, from its previous angle."""
     half = stage.play_deg / 2
     return min(max(table_deg, motor_deg - half), motor_deg + half)
 

@@ -80,7 +80,7 @@ def sensed_v(tines: Tines, rate_deg_s: float, load_g: float, warmer_k: float) ->
     return tines.zero_v + tines.volts_per_nm * moved_nm / (1 - (moved_nm / tines.gap_nm) ** 2)
 
 
-# A magnetometer: three Hall plates on one board, beside a magnet and iron that turn with them.
+# A magnetometer: three Hall plates on one board, with a magnet and iron that turn with them.
 #
 # field of the place -> changed by iron and a magnet -> part along each plate's normal -> Hall voltage -> amplifier
 #
@@ -99,7 +99,7 @@ class HallPlate:
 
 @dataclass(frozen=True)
 class Magnetometer:
-    """The plates, how the chip lies on the board, and what lies beside it, in the board's frame."""
+    """The plates, how the chip lies on the board, and the magnet and iron near it, in the board's frame."""
 
     x: HallPlate = field(default_factory=HallPlate)
     y: HallPlate = field(default_factory=HallPlate)

@@ -64,7 +64,7 @@ class Plan:
     """What the rig does at each of n poses."""
 
     motions: Floats  # (n, 2, pieces, 4) of alpha and beta, see stage
-    rest_ns: Ints  # (n, 2) when each stage stands
+    rest_ns: Ints  # (n, 2) when each stage is at rest
     dwell_ns: Ints  # (n, 2) start and end of the dwell
     mounts: Floats  # (n, 3, 3) package from table
 

@@ -52,14 +52,14 @@ class World:
         self._world.rest_ns[number] = round(1e9 * trajectory.end_s)
 
     def motor_angle_deg(self, axis: str) -> float:
-        """Where the motor of `axis` stands now."""
+        """The present angle of the motor of `axis`."""
         return float(stage.motor_angle_deg(self._world.pieces[_place(axis, stage.AXES, "stage")], self.now_s))
 
     def move_positioner(self, axis: str, command: positioner.Command) -> float:
         """Let the carriage follow `command` along the table's `axis` ("x", "y", "z") from now on.
 
         Its acceleration adds to the specific force of the sensor, which is mounted on it. Gives the time in s
-        at which it will stand still.
+        at which it will be at rest.
         """
         number, numbers = _place(axis, positioner.AXES, "axis of the positioner"), self._numbers
         mechanics.interrupt(self._world, numbers)
@@ -81,7 +81,7 @@ class World:
     def mount_sensor(self, mount_deg: float = 0.0, flip: int = 0, up: str = "z") -> None:
         """Put the sensor on the table turned by `mount_deg` about its normal, face down if `flip`; see seating.
 
-        `up` is the edge of the board that stands along the normal, see `gravity.mounting`.
+        `up` is the edge of the board along the normal, see `gravity.mounting`.
 
         Like `power`, it shows in the outputs from the next tick on, within 0.1 s.
         """

@@ -101,7 +101,7 @@ class PlannedStage:
         if not low <= deg <= high:
             raise LimitError(
                 f"{self._name}: {deg:g} deg is outside its limits {low:g} .. {high:g} deg; nothing was moved",
-                "Choose other settings, or change limits_deg in the bench file after looking at the cables",
+                "Choose other settings, or change limits_deg in the bench file after checking the cables",
             )
         if deg != self._at_deg:
             move_s = self._settings.move_s(abs(deg - self._at_deg))

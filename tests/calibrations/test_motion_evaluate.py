@@ -129,7 +129,7 @@ def _two_lines() -> Table:
 def test_models_without_values_and_records_without_motion_are_said() -> None:
     with pytest.raises(ModelError, match="the model linear has no values yet; fit it to a sweep of the same sensor"):
         evaluate_motion(shaken_rig(), read_model("linear"), models()[1])
-    with pytest.raises(DataError, match="holds no motion that stands out of its noise"):
+    with pytest.raises(DataError, match="shows no motion above its noise"):
         evaluate_motion(shaken.record(((1e-12, 10.0),)), *models())
     mirrored = {**shaken_rig().columns, "displacement_m": -shaken_rig().column("displacement_m")}
     with pytest.raises(DataError, match="falls where the sensor's acceleration along x rises; change its sign"):

@@ -61,10 +61,10 @@ def test_what_can_still_be_read_is_read(afflicted: Callable[..., Any], name: str
 
 
 STREAMS = [
-    ("duplicated-packet", "alpha: packets come twice or out of order after packet 1 of the record"),
+    ("duplicated-packet", "alpha: packets are repeated or out of order after packet 1 of the record"),
     ("swapped-packets", "alpha: packets are missing after packet 0 of the record"),
     ("lost-packet", "alpha: packets are missing after packet 0 of the record"),
-    ("clock-step", r"alpha: scans came 0\.50 s later than the rate of the stream says. Find out whether its clock"),
+    ("clock-step", r"alpha: scans arrived 0\.50 s later than the rate of the stream requires. Check whether its clock"),
 ]
 
 
@@ -190,8 +190,8 @@ def at_fifty(afflicted: Callable[..., Any], fault: Fault) -> tuple[Any, Simulate
     ("what", "error", "said"),
     [
         ("restart", Refused, "error 5, the servo is off, or the axis is not referenced. Switch the servo on"),
-        ("stuck", NotSettled, r"x stands at 50.0\d\d um instead of 20.000 um"),
-        ("lies", NotSettled, r"x stands at 21.0\d\d um|x stands at 20.9\d\d um"),
+        ("stuck", NotSettled, r"x is at 50.0\d\d um instead of 20.000 um"),
+        ("lies", NotSettled, r"x is at 21.0\d\d um|x is at 20.9\d\d um"),
         ("refuses", Refused, "error 17, a value is out of range"),
         ("silence", LinkTimeout, "alpha: no answer to ERR"),
     ],
@@ -220,7 +220,7 @@ def test_an_oscillation_that_ends_by_itself_is_noticed_and_a_stop_is_none(afflic
     clock.sleep(1.0)
     positioner.require_steady()
     clock.sleep(3.0)
-    with pytest.raises(StreamError, match=r"alpha: the oscillation of x has ended by itself. Find out"):
+    with pytest.raises(StreamError, match=r"alpha: the oscillation of x has stopped. Check whether"):
         positioner.require_steady()
     positioner.stop()
     positioner.require_steady()

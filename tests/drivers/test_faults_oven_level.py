@@ -71,7 +71,7 @@ def test_a_thermometer_that_has_stuck_is_found_while_the_heater_follows_it(
     oven: Callable[..., Any], world: World, clock: SimulatedClock
 ) -> None:
     stuck = oven(Fault("stale", at_s=100.0))
-    with pytest.raises(SensorFault, match=r"oven: has shown \d\d\.\d C for 3\d\d s on its way to 60 C. Check that"):
+    with pytest.raises(SensorFault, match=r"oven: has shown \d\d\.\d C for 3\d\d s while approaching 60 C. Check the"):
         heating(stuck, clock, 60.0, 20.0, 7200.0)
     assert clock.now() < 500.0
     stuck.run(False)
@@ -103,7 +103,10 @@ def test_a_controller_that_was_without_power_does_not_heat(oven: Callable[..., A
 
 @pytest.mark.parametrize(
     ("what", "said"),
-    [("stale", "came 30 times in a row. Switch the level off and on"), ("out-of-range", "x axis is beyond its range")],
+    [
+        ("stale", "was received 30 times in a row. Switch the level off and on"),
+        ("out-of-range", "x axis is beyond its range"),
+    ],
 )
 def test_a_level_that_shows_nothing_new_or_nothing_at_all(
     world: World, clock: SimulatedClock, what: str, said: str

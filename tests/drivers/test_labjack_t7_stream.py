@@ -170,7 +170,7 @@ def test_a_device_that_falls_silent_is_given_up_a_second_after_its_bytes_were_du
     link = device(packet(0) + packet(1)[:7])
     stream = reception(link)
     stream.take(2)
-    with pytest.raises(LinkTimeout, match="fell silent after 31 of 48 bytes"):
+    with pytest.raises(LinkTimeout, match="stopped after 31 of 48 bytes"):
         stream.take(2)
     assert link.clock.now() == pytest.approx(2.0 + labjack_t7_reception.PATIENCE_S, abs=1e-3)
 

@@ -196,7 +196,7 @@ def test_interlocks_are_closed_whatever_else_is_switched(guarded: Callable[..., 
 
 def test_an_open_interlock_is_named_with_its_line(guarded: Callable[..., labjack_t7.T7]) -> None:
     converter = guarded(Fault("open-interlock", size=7))
-    with pytest.raises(Interlocked, match=r"adc: the interlock door \(DIO7\) is open. Pull out the emergency stop"):
+    with pytest.raises(Interlocked, match=r"adc: the interlock door \(DIO7\) is open. Release the emergency stop"):
         converter.look()
     assert converter.self_test()[-1] == Check("interlocks", False, "open: door")
 

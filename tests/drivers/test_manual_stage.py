@@ -76,13 +76,13 @@ def test_a_reading_elsewhere_is_no_arrival_and_leaves_the_stage_unknown() -> Non
 def test_beyond_its_limits_nobody_is_asked() -> None:
     person = Person(lambda expected: 0.0)
     for angle_deg in (401.0, float("nan")):
-        with pytest.raises(LimitError, match="nobody was asked"):
+        with pytest.raises(LimitError, match="no request was made"):
             stage(person).move_to(angle_deg)
     assert not person.asked
 
 
 def test_where_nobody_stands_at_the_rig_it_says_so() -> None:
-    with pytest.raises(LinkRefused, match="nobody stands at the rig"):
+    with pytest.raises(LinkRefused, match="no person is at the rig"):
         stage(None).move_to(1.0)
     with pytest.raises(LinkRefused, match="Write `url: person`"):
         connect(Address("tcp://127.0.0.1:1"), Links(SimulatedClock()), Settings(), "alpha")

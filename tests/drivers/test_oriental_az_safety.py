@@ -69,7 +69,7 @@ def test_limits_that_the_drive_does_not_take_are_found_before_the_first_move(
 ) -> None:
     limited = stage()
     monkeypatch.setattr(oriental_az_twin.Drive, "write_words", lambda *_: None)
-    with pytest.raises(Interlocked, match=r"has not taken its own limits of -9000 .. 10000 steps: it shows 0 in reg"):
+    with pytest.raises(Interlocked, match=r"has not accepted its limits of -9000 .. 10000 steps: it shows 0 in reg"):
         limited.start(50.0)
 
 
@@ -80,12 +80,14 @@ def test_a_stop_input_brakes_the_stage_and_keeps_it_from_starting(
     moving = stage()
     server.afflict("alpha", faults_of("oriental_az", [Fault("e-stop", at_s=clock.now() + 1.0, for_s=60.0)]))
     moving.start(90.0)
-    with pytest.raises(Interlocked, match="alpha: stands without an alarm and is not ready to move: its stop input"):
+    with pytest.raises(
+        Interlocked, match="alpha: is at rest without an alarm and is not ready to move: its stop input"
+    ):
         moving.wait()
     stood_deg = small_world.motor_angle_deg("alpha")
     assert 10.0 < stood_deg < 60.0
     for act in (moving.require_steady, lambda: moving.start(90.0)):
-        with pytest.raises(Interlocked, match="Pull out the emergency stop"):
+        with pytest.raises(Interlocked, match="Release the emergency stop"):
             act()
     clock.sleep(60.0)
     assert small_world.motor_angle_deg("alpha") == stood_deg, "it does not go on by itself"
@@ -104,7 +106,7 @@ def test_a_stage_moved_by_another_program_is_not_steady(stage: Make) -> None:
     mine.move_to(10.0)
     mine.require_steady()
     other.move_to(10.06)
-    with pytest.raises(NotSettled, match=r"alpha: stands at 10.060 deg instead of 10.000 deg, more than 0.05 deg away"):
+    with pytest.raises(NotSettled, match=r"alpha: is at 10.060 deg instead of 10.000 deg, more than 0.05 deg away"):
         mine.require_steady()
     mine.stop()
     mine.require_steady()  # a stop replaces the command

@@ -79,13 +79,13 @@ def test_a_rate_is_a_whole_number_of_steps_a_second(stage: Stages) -> None:
 @pytest.mark.parametrize(
     ("settings", "rate", "words"),
     [
-        (Settings(), 1201.0, "1201 deg/s is no rate of this stage, whose limit is 1200 deg/s; nothing was sent"),
-        (Settings(), 0.0, "0 deg/s is no rate"),
+        (Settings(), 1201.0, "1201 deg/s is not a rate of this stage; its limit is 1200 deg/s; nothing was sent"),
+        (Settings(), 0.0, "0 deg/s is not a rate"),
         (Settings(), 200.0, r"outside its limits -400 .. 400 deg; nothing was sent. Ask for a slower"),
         (
             dataclasses.replace(ENDLESS, communication_timeout_s=0.0),
             20.0,
-            "would turn for ever should this program die",
+            "would not stop if this program crashes",
         ),
     ],
 )

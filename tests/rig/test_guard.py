@@ -123,10 +123,10 @@ def stops() -> Iterator[list[float]]:
 
 
 FOUND = [  # what is noticed while something else is waited for
-    ("adc", Fault("open-interlock", at_s=26.6), 4, "adc: the interlock e-stop (DIO4) is open. Pull out the emergency"),
+    ("adc", Fault("open-interlock", at_s=26.6), 4, "adc: the interlock e-stop (DIO4) is open. Release the emergency"),
     ("adc", Fault("open-interlock", at_s=24.0, size=5), 4, "adc: the interlock door (DIO5) is open."),
-    ("alpha", Fault("alarm", at_s=20.0), 3, "alpha: stands still with alarm 30, overload."),
-    ("beta", Fault("alarm", at_s=25.3), 3, "beta: stands still with alarm 30, overload."),
+    ("alpha", Fault("alarm", at_s=20.0), 3, "alpha: has stopped with alarm 30, overload."),
+    ("beta", Fault("alarm", at_s=25.3), 3, "beta: has stopped with alarm 30, overload."),
 ]
 
 

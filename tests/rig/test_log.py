@@ -45,7 +45,7 @@ def test_a_run_tells_what_it_did_what_stopped_it_and_that_it_went_on(rig: Callab
     assert told[0] == "begun"
     assert told.count("kept") == POSES
     error = told.index("error")
-    assert lines[error].text.startswith("StageAlarm: alpha: stands still with alarm 30")
+    assert lines[error].text.startswith("StageAlarm: alpha: has stopped with alarm 30")
     assert [(line.what, line.text) for line in lines[error + 1 : error + 3]] == [
         ("stopped", "all instruments are at rest"),
         ("begun", f"sweep at pose {kept}"),

@@ -124,7 +124,7 @@ def test_a_run_may_be_interrupted_again_and_again() -> None:
 def test_a_failing_instrument_leaves_a_run_that_can_be_resumed() -> None:
     with Record() as record:
         whole = run_small(record).run.run
-        alarm = StageAlarm("beta: stands still with alarm 30", "Look at the stage", 0x30)
+        alarm = StageAlarm("beta: has stopped with alarm 30", "Look at the stage", 0x30)
         failed = run_small(record, watch=Interrupting(4, raising(alarm)))
         assert (failed.run.state, failed.error) == ("failed", alarm)
         assert "alarm 30" in (failed.run.message or "")

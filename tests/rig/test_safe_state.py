@@ -65,9 +65,9 @@ def test_a_procedure_endures_a_fault_at_a_random_moment(procedure: str, role: st
 
 
 LIMITS = [  # a fault of an instrument, the exit status, and what is said
-    ("sweep", "alpha", Fault("alarm", at_s=25.0), 3, "alpha: stands still with alarm 30, overload. Free the stage"),
+    ("sweep", "alpha", Fault("alarm", at_s=25.0), 3, "alpha: has stopped with alarm 30, overload. Free the stage"),
     ("sweep", "beta", Fault("alarm", at_s=27.0, size=0x28), 3, "the alarm needs a power cycle"),
-    ("sweep", "beta", Fault("stuck", at_s=25.0), 3, "beta: stands at"),
+    ("sweep", "beta", Fault("stuck", at_s=25.0), 3, "beta: is at"),
     ("sweep", "beta", Fault("lies", at_s=25.0, size=0.2), 3, "more than 0.05 deg away. Free the stage"),
     ("sweep", "beta", Fault("busy", at_s=24.0), 3, "beta: is still moving, or not in position, after 2 s. Look"),
     ("sweep", "alpha", Fault("busy", at_s=26.3), 3, "alpha: has not stood still. Find out what moves it"),
@@ -79,19 +79,19 @@ LIMITS = [  # a fault of an instrument, the exit status, and what is said
     ("sweep", "adc", Fault("overflow", at_s=25.0, size=7), 3, "adc: its buffer ran over and it skipped 7 scans"),
     ("sweep", "adc", Fault("buffer-full", at_s=25.0), 3, "adc: its buffer ran over and the stream stopped"),
     ("sweep", "adc", Fault("lost-packet", at_s=25.0), 3, "adc: packets are missing after packet 0 of the record"),
-    ("sweep", "adc", Fault("stall", at_s=25.0), 3, "adc: the stream fell silent after 0 of"),
+    ("sweep", "adc", Fault("stall", at_s=25.0), 3, "adc: the stream stopped after 0 of"),
     ("sweep", "adc", Fault("over-range", at_s=25.0), 3, "adc: vx (AIN0) was beyond its range of 10 V in 1 of 100"),
     ("sweep", "adc", Fault("restart", at_s=25.9), 3, "the connection is lost (the other side closed it). Check"),
     ("sweep", "adc", Fault("endless", at_s=25.0), 3, "a stream is running already"),
     ("sweep", "oven", Fault("no-temperature", at_s=25.0), 3, "oven: no thermocouple is connected. Check"),
     ("sweep", "oven", Fault("lies", at_s=25.0), 4, "C, more than 10 K above its limit 85 C. Switch the heater off"),
-    ("sweep", "level", Fault("stale", at_s=1.0), 3, "came 30 times in a row. Switch the level off and on"),
+    ("sweep", "level", Fault("stale", at_s=1.0), 3, "was received 30 times in a row. Switch the level off and on"),
     ("sweep", "level", Fault("out-of-range", at_s=1.0), 3, "level: the x axis is beyond its range of 30 deg"),
     ("sweep", "level", Fault("lies", at_s=6.0), 4, "the table is tilted by -0.4"),
-    ("motion", "positioner", Fault("restart", at_s=259.5), 3, "positioner: the oscillation of x has ended by itself."),
+    ("motion", "positioner", Fault("restart", at_s=259.5), 3, "positioner: the oscillation of x has stopped."),
     ("motion", "positioner", Fault("refuses", at_s=9.0), 3, "positioner: SVO 1 1 2 1 3 1: error 17, a value is out of"),
-    ("motion", "positioner", Fault("stuck", at_s=9.0), 3, "positioner: x stands at"),
-    ("temperature-cycle", "oven", Fault("stale", at_s=30.0), 3, "C for 300 s on its way to 40 C. Check that the"),
+    ("motion", "positioner", Fault("stuck", at_s=9.0), 3, "positioner: x is at"),
+    ("temperature-cycle", "oven", Fault("stale", at_s=30.0), 3, "C for 300 s while approaching 40 C. Check that the"),
     ("temperature-cycle", "oven", Fault("runaway", at_s=700.0), 4, "oven: the sensor is at "),
 ]
 
@@ -131,7 +131,7 @@ def test_a_pose_is_not_kept_where_another_program_moved_its_stage(
     monkeypatch.setattr(T7, "acquire_with", acquired)
     with Record() as record:
         stopped = short(record, BENCH, "sweep")
-        assert "alpha: stands at 93.000 deg instead of 90.000 deg" in str(stopped.error)
+        assert "alpha: is at 93.000 deg instead of 90.000 deg" in str(stopped.error)
         assert "then `rig resume` measures this pose again" in str(stopped.error)
         assert (stopped.run.state, stopped.run.rows, status_of(stopped.error or Exception())) == ("failed", 2, 3)
         done = resume(record, stopped.run.run, Onlooker())

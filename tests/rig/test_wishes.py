@@ -43,7 +43,7 @@ def interrupt() -> None:
 
 
 def alarm() -> None:
-    raise StageAlarm("beta: stands still with alarm 30", "Look at the stage", 0x30)
+    raise StageAlarm("beta: has stopped with alarm 30", "Look at the stage", 0x30)
 
 
 def measured(record: Record, run: str) -> list[object]:

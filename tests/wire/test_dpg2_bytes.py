@@ -167,7 +167,9 @@ def test_a_level_that_never_rests(level: Levels, clock: SimulatedClock) -> None:
 
 
 def test_a_reading_that_has_stuck(level: Levels) -> None:
-    with pytest.raises(InstrumentError, match=r"x \+1.000, y -0.000 deg came 30 times in a row. Switch the level off"):
+    with pytest.raises(
+        InstrumentError, match=r"x \+1.000, y -0.000 deg was received 30 times in a row. Switch the level off"
+    ):
         level({b"R": PAIRS[:1]}, Settings(readings=10)).read()
     stuck_after_a_swing = level({b"R": [PAIRS[1], PAIRS[0]]}, Settings(readings=10))
     assert stuck_after_a_swing.read().n == 10  # one of them differs

@@ -103,7 +103,7 @@ def test_lost_scans_are_an_error_and_the_stream_is_stopped(converter: Converters
 
 
 def test_a_silent_stream_is_a_time_out_and_the_stream_is_stopped(converter: Converters, clock: SimulatedClock) -> None:
-    with pytest.raises(LinkTimeout, match="adc: the stream fell silent after 10 of 24 bytes"):
+    with pytest.raises(LinkTimeout, match="adc: the stream stopped after 10 of 24 bytes"):
         converter(ACQUIRE, PACKET[:29]).acquire(0.004)
     assert clock.now() < 2.5
 

@@ -76,7 +76,7 @@ def test_outside_its_limits_nothing_is_sent(stage: Stages, angle: float) -> None
 
 def test_arrival_is_measured_not_assumed(stage: Stages) -> None:
     exchanges = [*START, (ASK_STATUS, HOMED), (ASK_POSITION, AT_8400)]
-    with pytest.raises(NotSettled, match=r"alpha: stands at 84.000 deg instead of 85.000 deg"):
+    with pytest.raises(NotSettled, match=r"alpha: is at 84.000 deg instead of 85.000 deg"):
         stage(exchanges).move_to(85.0)
 
 

@@ -84,7 +84,7 @@ def test_a_move_waits_until_on_target_and_looks_where_it_is(positioner: Position
 
 def test_arrival_is_measured_not_assumed(positioner: Positioners) -> None:
     exchanges = [*done("MOV 1 40.000000\n"), *told("ONT? 1\n", "1=1\n"), *told("POS? 1\n", "1=40.0210\n")]
-    with pytest.raises(NotSettled, match=r"positioner: x stands at 40.021 um instead of 40.000 um"):
+    with pytest.raises(NotSettled, match=r"positioner: x is at 40.021 um instead of 40.000 um"):
         positioner(*exchanges).move_to("x", 40.0)
 
 
@@ -129,7 +129,7 @@ def test_silence_ends_and_names_the_instrument(positioner: Positioners, clock: S
 
 @pytest.mark.parametrize(
     ("answer", "words"),
-    [("1=4", r"the answer to POS\? 1 breaks off after 3 bytes"), ("1=4O.0\n", r"'4O.0' is no answer to POS\? 1")],
+    [("1=4", r"the answer to POS\? 1 breaks off after 3 bytes"), ("1=4O.0\n", r"'4O.0' is not an answer to POS\? 1")],
 )
 def test_an_answer_that_is_none(positioner: Positioners, answer: str, words: str) -> None:
     exchanges = [("POS? 1\n", answer)] if answer == "1=4" else told("POS? 1\n", answer)
@@ -213,7 +213,7 @@ def test_a_record_has_a_header_and_rows(positioner: Positioners) -> None:
 
 
 def test_a_record_of_nothing(positioner: Positioners) -> None:
-    with pytest.raises(StreamError, match=r"positioner: nothing of x is recorded. Let the axis oscillate first"):
+    with pytest.raises(StreamError, match=r"positioner: there is no record of x. Let the axis oscillate first"):
         positioner(*told("DRL? 1\n", "1=0\n")).recorded("x")
 
 
@@ -224,7 +224,7 @@ def test_a_record_that_is_too_short(positioner: Positioners) -> None:
 
 
 def test_a_stop_in_the_middle_of_an_answer(positioner: Positioners) -> None:
-    """What is left of a long record is no answer to what follows."""
+    """What is left of a long record is not an answer to what follows."""
     rest = "20.4734 \n20.6183 \n20.7000\n"
     positioner(("\x18", rest), ("ERR?\n", "10\n"), ("\x09", "0\n"), ("\x05", "0\n")).stop()
 
