@@ -19,8 +19,7 @@ from calibrations.fitting.identifiability import RELATIVE_RANK, estimates
 from calibrations.model import Model
 from calibrations.model.model import Parameters
 from calibrations.noise.means import Noise, rms, white_only
-from calibrations.noise.means_fit import estimate
-from calibrations.noise.means_uncertainty import widening
+from calibrations.noise.means_fit import estimate, widening
 from calibrations.presentation.result import Result
 from calibrations.presentation.text import columns, quantity
 from calibrations.problem import Problem

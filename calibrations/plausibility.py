@@ -43,8 +43,7 @@ from calibrations.criteria import (
 from calibrations.discovery.verdict import Verdict
 from calibrations.fit import Fit
 from calibrations.geometry.orientation import Pose, nominal_pose, specific_force
-from calibrations.noise.mean_noise import white_std
-from calibrations.noise.means import rms
+from calibrations.noise.means import rms, white_std
 from calibrations.table import AXES, Array, Table
 
 NO_RESPONSE, UNEXPLAINED, DOUBTFUL = Verdict.NO_RESPONSE.value, Verdict.UNEXPLAINED.value, "doubtful"

@@ -23,8 +23,7 @@ from calibrations.model import Model
 from calibrations.model.chain import Near, Step, backward, forward
 from calibrations.model.parameters import Layout
 from calibrations.motion.stretches import Stretches, make_stretches
-from calibrations.noise.mean_noise import norm_std, white_std
-from calibrations.noise.means import Processes
+from calibrations.noise.means import Processes, norm_std, white_std
 from calibrations.noise.table_noise import scatter
 from calibrations.table import Array, Table
 from calibrations.tables import FITTED

@@ -21,8 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrations.errors import DataError
-from calibrations.noise.mean_noise import white_std
-from calibrations.noise.means import Noise, white_only
+from calibrations.noise.means import Noise, white_only, white_std
 from calibrations.noise.means_fit import estimate
 from calibrations.table import Array, Table
 

@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 from calibrations.criteria import UPRIGHT_COSINE
 from calibrations.errors import DataError
 from calibrations.estimators.least_squares import least_squares
-from calibrations.noise.mean_noise import white_std
-from calibrations.noise.means import rms
+from calibrations.noise.means import rms, white_std
 from calibrations.table import Array, Table
 
 # Bias and scale factor of a triad of accelerometers from its six faces, each axis from its own pair.

@@ -20,14 +20,13 @@ from scipy.special import fdtrc
 
 from calibrations.criteria import INSEPARABLE, MATERIAL, MOST_BY_FORM, SAME_SHAPE, SIGNIFICANT
 from calibrations.discovery.results import Candidate
-from calibrations.discovery.significance import Screen, Search, of_search
+from calibrations.discovery.significance import Screen, Search, of_search, twice_log_likelihood
 from calibrations.effects import Effect
 from calibrations.fit import Fit, refit
 from calibrations.geometry.sphere import magnetometer_coverage_warning
 from calibrations.model.parameters import Layout
 from calibrations.noise.means import rms
 from calibrations.noise.means_fit import gains
-from calibrations.noise.means_likelihood import twice_log_likelihood
 from calibrations.problem import Problem
 from calibrations.table import Array
 

@@ -27,12 +27,11 @@ from calibrations.criteria import (
     SIGNIFICANT,
 )
 from calibrations.discovery.candidates import RowCandidate, added, best_pair, candidates, with_rivals
-from calibrations.discovery.significance import chance
+from calibrations.discovery.significance import chance, likelihood
 from calibrations.effects import Effect
 from calibrations.fit import Fit, refit
 from calibrations.fitting.determined import lets_go
 from calibrations.noise.means import rms
-from calibrations.noise.means_likelihood import likelihood
 
 
 @dataclass(frozen=True)

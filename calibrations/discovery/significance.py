@@ -16,6 +16,7 @@ from scipy.special import chdtrc, fdtrc
 
 from calibrations.criteria import NOT_SHOWN
 from calibrations.fit import Fit
+from calibrations.noise.means_fit import deviance
 from calibrations.table import Array
 
 DRAWS = 300
@@ -186,3 +187,13 @@ def _freed(columns: Array, basis: Array) -> Array:
 def chance(statistic: float, rank: int) -> float:
     """Chance that noise alone gives a sum of squares as large, with `rank` degrees of freedom."""
     return float(chdtrc(max(rank, 1), statistic))
+
+
+def twice_log_likelihood(fit: Fit) -> float:
+    """Restricted, up to a constant of the data."""
+    return -deviance(fit.noise, fit.residual, fit.jacobian, np.zeros((fit.table.n, 0)))
+
+
+def likelihood(fit: Fit) -> float:
+    """The same, a parameter costing log(rows) (Schwarz)."""
+    return twice_log_likelihood(fit) - len(fit.theta) * float(np.log(fit.residual.size))

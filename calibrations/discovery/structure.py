@@ -28,8 +28,7 @@ from calibrations.discovery.outliers import told
 from calibrations.discovery.patterns import Pattern, one_sided, patterns, per_channel
 from calibrations.discovery.significance import Screen, Search
 from calibrations.fit import Fit
-from calibrations.noise.mean_noise import correlation_known
-from calibrations.noise.means import rms
+from calibrations.noise.means import correlation_known, rms
 from calibrations.plausibility import UNEXPLAINED, Finding
 from calibrations.table import Array
 

@@ -25,7 +25,7 @@ from calibrations.criteria import (
 )
 from calibrations.errors import DataError, MissingConstant
 from calibrations.importing.sessions import average_sections, is_section_log
-from calibrations.noise.mean_noise import measured_inflation
+from calibrations.noise.means import measured_inflation
 from calibrations.table import Array, Constant, Table
 
 # Still intervals of a raw log: a table of positions from samples of a sensor that was put down again and again.

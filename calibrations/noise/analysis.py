@@ -20,12 +20,12 @@ from calibrations.effects.catalogue import catalogue
 from calibrations.effects.effect import Effect
 from calibrations.model import Estimate
 from calibrations.model.file import read_model
-from calibrations.noise.allan import deviation, variance_parts
-from calibrations.noise.channel_spectrum import Line
+from calibrations.noise.comparison import deviation, variance_parts
 from calibrations.noise.deviations import OCTAVE_KINDS, OVERLAPPING, Curve
-from calibrations.noise.disturbances import MISFITS, Disturbance, disturbance_document, disturbances
+from calibrations.noise.doubts import MISFITS, Disturbance, disturbance_document, disturbances
 from calibrations.noise.fit import upper_bound
 from calibrations.noise.likelihood import ChannelFit
+from calibrations.noise.lines import Line
 from calibrations.noise.record import Channel, Still
 from calibrations.noise.samples import CONSTANT, WILD, Hidden, hidden_in
 from calibrations.noise.search import Search, search

@@ -18,9 +18,11 @@ from calibrations.effects import Effect
 from calibrations.effects.catalogue import catalogue
 from calibrations.errors import ModelError
 from calibrations.model import Model
-from calibrations.noise.allan import compare_deviations
-from calibrations.noise.answer import (
+from calibrations.noise.comparison import compare_deviations, evaluate, places
+from calibrations.noise.doubts import (
     alternatives,
+    disturbance_document,
+    disturbances,
     disturbed,
     filter_text,
     next_of,
@@ -28,13 +30,10 @@ from calibrations.noise.answer import (
     reason_of,
     structure_of,
 )
-from calibrations.noise.disturbances import disturbance_document, disturbances
 from calibrations.noise.fit import NoiseFit, fit
-from calibrations.noise.places import evaluate, places
-from calibrations.noise.record import Still
+from calibrations.noise.record import Still, of_record
 from calibrations.noise.search import Search, candidates, search
-from calibrations.noise.words import of_record, sentence
-from calibrations.presentation.text import quantity, rounded
+from calibrations.presentation.text import quantity, rounded, sentence
 
 if TYPE_CHECKING:
     from calibrations.presentation.chart import Chart

@@ -55,27 +55,6 @@ from calibrations.noise.kernels import (
 )
 from calibrations.table import Array
 
-# Allan deviations at octave times in one pass over a record of any length, with degrees of freedom and intervals.
-#
-# Up to 32 samples every overlap is used. A longer time is divided into 32 bins, and windows begin at each: for white
-# noise the variance of the estimate is 1.0012 times that of every overlap, for redder noise less. (Of phase noise
-# alone,
-# such as quantisation noise, more overlap gives more information; `deviations` has it.) The mean is not part of any
-# number that is kept: only differences from the first block are summed, and only over a few thousand bins.
-#
-# A variance is distributed as chi-square over its degrees of freedom:
-#
-#     edf = z(0)^2 / mean over all pairs of windows of z(t)^2       z: autocovariance of the differences, t: their lag
-#
-# z follows from the power law of the noise, S(f) ~ f^alpha, which follows from the correlation of neighbouring means:
-# fractionally integrated noise of order d < 1/2 has the lag-1 autocorrelation d / (1 - d), and alpha = -2 d; redder
-# noise
-# is differenced first.
-#
-# Source  Greenhall, IEEE Trans. UFFC 50 (2003): stride; Greenhall and Riley, Proc. 35th PTTI (2003): degrees of
-# freedom;
-#         Riley and Greenhall, Proc. 18th EFTF (2004): noise type; NIST SP 1065, 5.2 to 5.5.
-
 OVERLAPPING = "overlapping"  # the kind that models are compared with
 BLOCK = 1 << 17  # samples that are taken at a time
 OCTAVE_KINDS: Mapping[str, tuple[int, float]] = MappingProxyType(  # kept squares, divisor

@@ -25,7 +25,6 @@ from calibrations.criteria import IDENTIFIED, INTERVAL_STDS
 from calibrations.effects import Effect
 from calibrations.errors import ModelError
 from calibrations.model import Estimate, Model, Term
-from calibrations.noise.channel_spectrum import Line, bands, strongest_line
 from calibrations.noise.likelihood import (
     ChannelFit,
     Values,
@@ -37,6 +36,7 @@ from calibrations.noise.likelihood import (
     profile,
     unit_spectrum,
 )
+from calibrations.noise.lines import Line, bands, strongest_line
 from calibrations.noise.record import Channel, Still
 from calibrations.noise.samples import hidden_in
 from calibrations.table import Array
@@ -158,12 +158,6 @@ def _line_estimates(found: ChannelFit, unit: str) -> Iterator[Estimate]:
         why = f"no line stands out; one of less than {found.line_bound:.2g} {unit} would not"
         yield Estimate("amplitude_1", axis, 0.0, float(found.line_bound / INTERVAL_STDS), unit, False, why)
 
-
-# A noise model fitted to a still record: coefficients of every channel by Whittle's likelihood, with uncertainties.
-#
-# The spectrum is linear in the squares of the effects' strengths, which are found by `whittle.maximise`; the shape of
-# an
-# effect that has one (a time constant) is searched for. Lines are found first, one after another.
 
 ROUNDS = 2  # over the shapes, where a model has several
 

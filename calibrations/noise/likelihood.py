@@ -21,19 +21,10 @@ from scipy.special import chdtri, digamma
 
 from calibrations.effects import Effect
 from calibrations.effects import Values as EffectValues
-from calibrations.noise.channel_spectrum import Line, Lines
+from calibrations.noise.lines import Line, Lines
 from calibrations.noise.record import Channel
 from calibrations.noise.spectrum import Bands
 from calibrations.table import Array
-
-# Coefficients of a spectrum that is a sum of known shapes, none of them negative, by maximum likelihood.
-#
-#     log L = -1/2 sum nu (log S + I/S)        S = G theta: expected, I: seen with nu degrees of freedom
-#
-# Fisher's scoring is a least-squares fit with the weights nu / (2 S^2), repeated; a step that does not raise the
-# likelihood is halved. A few multiplicative steps before, each of which raises it from anywhere, come near enough.
-#
-# Source  Whittle, Ark. Mat. 2 (1953); Fevotte, Bertin and Durrieu, Neural Comput. 21 (2009): multiplicative steps.
 
 MULTIPLICATIVE_STEPS, SCORING_STEPS, SWEEPS = 20, 100, 200
 CONVERGED = 1e-9  # log-likelihood that a step gains

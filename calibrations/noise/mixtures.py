@@ -76,13 +76,6 @@ def _orthogonal_units(columns: Array, fit: ChannelFit) -> Array:
     return np.asarray(free / np.linalg.norm(free, axis=0))
 
 
-# Every mixture of noise effects beside a model, and the one that the record makes most likely for its price.
-#
-# The price of an effect is the gain in log-likelihood that noise alone would make so rarely that over the whole
-# search
-# nothing is named by chance. Mixtures are few, and all are tried: what is named does not depend on the order.
-
-
 @dataclass(frozen=True)
 class Mixture:
     """Effects beside a model, fitted to each channel; the gain over the model, and that less the effects' prices."""

@@ -23,11 +23,11 @@ from scipy.optimize import minimize_scalar
 from calibrations.criteria import FEWEST_ORDINATES, FEWEST_SAMPLES
 from calibrations.errors import DataError, TooFewRows
 from calibrations.noise.deviations import OCTAVE_KINDS, OVERLAPPING, Curve, Octaves
-from calibrations.noise.processes import Sampling
 from calibrations.noise.samples import Ends, Oddity, Outliers, Steps, Stuck, hidden_in, oddities
-from calibrations.noise.spectrum import Means, Segments, Welch
+from calibrations.noise.spectrum import Means, Sampling, Segments, Welch
 from calibrations.table import Array
 
+HOUR_S = 3600.0
 LOG_RATIOS = (-12.0, 16.0)  # of the variances of scatter and of a level's steps, that are looked through
 SLOPES = (0.5, 1.0, 1.5, 2.0)  # of a level's spectrum in powers of the frequency: 1 flickers, 2 walks
 NODES = ((-(3**0.5), 1 / 6), (0.0, 2 / 3), (3**0.5, 1 / 6))  # of a normal distribution, and weights (Gauss, Hermite)
@@ -349,3 +349,10 @@ def logged_columns(blocks: Mapping[str, Sequence[Array]], n: int) -> dict[str, L
     """What was read beside n samples, in blocks; none of what is constant, which tells nothing."""
     every = {name: logged_column(each, n) for name, each in blocks.items()}
     return {name: column for name, column in every.items() if column is not None}
+
+
+def of_record(still: Still) -> str:
+    """What record it is: samples, rate, length."""
+    hours = still.length_s / HOUR_S
+    length = f"{hours:.3g} h" if hours >= 1 else f"{still.length_s:.4g} s"
+    return f"{still.n} samples of {still.source} at {still.rate_hz:.6g} Hz ({length})"

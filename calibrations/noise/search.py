@@ -20,7 +20,6 @@ from calibrations.criteria import AT_LONGEST_TIME, IDENTIFIED, INSEPARABLE, MOST
 from calibrations.discovery.results import Candidate
 from calibrations.effects import Effect
 from calibrations.model import Model
-from calibrations.noise.channel_spectrum import Lines
 from calibrations.noise.deviations import Curve, octaves
 from calibrations.noise.fit import (
     NoiseFit,
@@ -33,18 +32,10 @@ from calibrations.noise.fit import (
     without_effects,
 )
 from calibrations.noise.likelihood import ChannelFit
+from calibrations.noise.lines import Lines
 from calibrations.noise.mixtures import Mixture, Mixtures, chance, likelihood, tube
-from calibrations.noise.patterns import FOLLOWS, Pattern, pattern_of, refitted
+from calibrations.noise.patterns import FOLLOWS, Pattern, Telegraph, pattern_of, refitted, telegraph_of
 from calibrations.noise.record import Channel, Still
-from calibrations.noise.telegraph import Telegraph, telegraph_of
-
-# What a noise model is missing on a record: lines, a mixture of processes, and what is no process at all.
-#
-# 1. lines that stand out above the widest mixture are taken off, if the catalogue can name them;
-# 2. every mixture beside the model is fitted to what is left (`mixtures`);
-# 3. a step, a drift, or what follows a logged column is taken off as well where it makes needless a process that
-# would
-#    stand for it; and once more, as long as there is one.
 
 
 @dataclass(frozen=True)

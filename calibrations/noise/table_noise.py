@@ -24,8 +24,7 @@ from calibrations.errors import DataError, ModelError
 from calibrations.geometry.rate_table import rate_deg_s, specific_force_g
 from calibrations.geometry.sphere import SOFT_IRON, coverage_fault
 from calibrations.model import Model
-from calibrations.noise.mean_noise import white_std
-from calibrations.noise.means import BEYOND, Processes
+from calibrations.noise.means import BEYOND, Processes, white_std
 from calibrations.table import AXES, Array, Table
 from calibrations.tables import KINDS
 
@@ -71,16 +70,6 @@ def _flicker(coefficient: float, fastest_s: float, slowest_s: float) -> Processe
     taus_s = np.geomspace(fastest_s, slowest_s, count)
     std = coefficient * np.sqrt(np.log(taus_s[1] / taus_s[0]) / np.pi)
     return tuple((std, tau_s) for tau_s in taus_s.tolist())
-
-
-# The noise of magnetometers and gyroscopes whose samples' scatter is not in the table: what the widest form leaves.
-#
-# Without it a model's own residual would be its noise, and nothing could be missing. For fields the form is an
-# ellipsoid,
-# for rates every output as a linear function of the rates and, where they were measured, of the specific forces. What
-# lies beyond these forms counts as noise, so that it is rather taken as too large.
-#
-# Source  Draper and Smith, Applied Regression Analysis, on lack of fit: pure error by the widest model.
 
 
 def scatter(table: Table) -> Array | None:

@@ -215,3 +215,8 @@ def times_ten_to(power: int) -> str:
 def minus(text: str) -> str:
     """The text with true minus signs."""
     return text.replace("-", "−")
+
+
+def sentence(text: str) -> str:
+    """The text as a sentence."""
+    return f"{text[0].upper()}{text[1:]}." if text else ""

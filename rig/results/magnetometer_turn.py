@@ -17,8 +17,7 @@ from calibrations.errors import DataError
 from calibrations.fit import Fit
 from calibrations.fitting.matrices import calibration_matrices
 from calibrations.geometry.sphere import magnetometer_coverage_warning
-from calibrations.noise.mean_noise import white_std
-from calibrations.noise.means import rms
+from calibrations.noise.means import rms, white_std
 from calibrations.table import Array, Table
 from procedures.session import Pose
 from rig.record.measured import Measured, sensor_from_base

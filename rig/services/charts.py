@@ -8,7 +8,7 @@ from datetime import date
 
 import numpy as np
 
-from calibrations.noise.allan import DeviationComparison
+from calibrations.noise.comparison import DeviationComparison
 from calibrations.presentation.chart import (
     CANDIDATE,
     MEASURED,

@@ -22,7 +22,7 @@ from calibrations.importing.units import UNITS, parse_unit
 from calibrations.model import Model
 from calibrations.model.file import read_model
 from calibrations.noise import table_noise
-from calibrations.noise.mean_noise import correlation_known
+from calibrations.noise.means import correlation_known
 from calibrations.noise.table_noise import with_noise
 from calibrations.plausibility import doubt
 from calibrations.table import Table

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from calibrations.errors import DataError, TooFewRows
 from calibrations.noise.analysis import ChannelNoise, analyse
-from calibrations.noise.channel_spectrum import fast_lines
-from calibrations.noise.disturbances import misfit_of
+from calibrations.noise.doubts import misfit_of
+from calibrations.noise.lines import fast_lines
 from calibrations.noise.record import Samples, reduce_record
 from calibrations.noise.samples import hidden_in
 from tests.calibrations import noises

@@ -7,10 +7,20 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from calibrations.noise.allan import line_variance, quadrature
+from calibrations.noise.comparison import line_variance, quadrature
 from calibrations.noise.deviations import deviations
-from calibrations.noise.processes import Sampling, gauss_markov, random_walk
-from calibrations.noise.spectrum import LENGTH, MOST_MEANS, Means, Welch, fast_bands, flickering, slow_bands
+from calibrations.noise.spectrum import (
+    LENGTH,
+    MOST_MEANS,
+    Means,
+    Sampling,
+    Welch,
+    fast_bands,
+    flickering,
+    gauss_markov,
+    random_walk,
+    slow_bands,
+)
 from tests.calibrations import noises
 
 N, RECORDS = 2048, 60

@@ -13,12 +13,11 @@ from calibrations.errors import DataError, ModelError, TooFewRows
 from calibrations.loop import add, compare, diagnose, discover
 from calibrations.model import Model
 from calibrations.model.file import dump_model, parse_model, read_model
-from calibrations.noise.allan import compare_deviations, deviation
-from calibrations.noise.channel_spectrum import Line
+from calibrations.noise.comparison import FREQUENCY, TIME, compare_deviations, deviation
 from calibrations.noise.fit import fit, without_effects
+from calibrations.noise.lines import Line
 from calibrations.noise.mixtures import chance, least_gain
 from calibrations.noise.patterns import pattern_of
-from calibrations.noise.places import FREQUENCY, TIME
 from calibrations.noise.record import Samples, Still, reduce_record
 from calibrations.table import Array
 from tests.calibrations import noises

@@ -13,7 +13,7 @@ from calibrations.documents import diagnosis_document
 from calibrations.fit import fit
 from calibrations.loop import diagnose, discover
 from calibrations.model.file import read_model
-from calibrations.noise.mean_noise import white_std
+from calibrations.noise.means import white_std
 from calibrations.table import Array, Table
 from tests.hidden import rigs, sampled
 from tests.hidden.intervals import CAUSES

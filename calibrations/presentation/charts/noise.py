@@ -9,14 +9,14 @@ import numpy as np
 
 from calibrations.criteria import COVERAGE
 from calibrations.discovery.results import Discovery, Step
-from calibrations.noise.allan import DeviationComparison, deviation, variance_parts
 from calibrations.noise.analysis import ChannelNoise, NoiseAnalysis
+from calibrations.noise.comparison import DeviationComparison, deviation, variance_parts
 from calibrations.noise.dataset import mismatch
 from calibrations.noise.deviations import Curve
 from calibrations.noise.fit import NoiseFit
 from calibrations.noise.likelihood import ChannelFit
-from calibrations.noise.processes import GAUSS_MARKOV
 from calibrations.noise.record import Channel, Still
+from calibrations.noise.spectrum import GAUSS_MARKOV
 from calibrations.presentation.chart import (
     AMBER,
     BLUE,

@@ -18,13 +18,12 @@ from calibrations.effects.catalogue import catalogue
 from calibrations.geometry.orientation import other_in_plane
 from calibrations.geometry.rate_table import rate_deg_s
 from calibrations.model.chain import Step, force, forward, respond, sensed
-from calibrations.noise.allan import deviation
-from calibrations.noise.channel_spectrum import Line as Sinusoid
+from calibrations.noise.comparison import deviation
 from calibrations.noise.likelihood import ChannelFit, effect_lines
 from calibrations.noise.likelihood import Values as NoiseValues
-from calibrations.noise.processes import Sampling
+from calibrations.noise.lines import Line as Sinusoid
 from calibrations.noise.record import Channel
-from calibrations.noise.spectrum import Welch, slow_bands
+from calibrations.noise.spectrum import Sampling, Welch, slow_bands
 from calibrations.presentation.chart import BLUE, GREEN, INK, QUIET, VERMILION, Axis, Chart, Dash, Line, Panel, Rule
 from calibrations.presentation.charts.noise import root
 from calibrations.table import AXES, Array, Table

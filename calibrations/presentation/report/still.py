@@ -9,7 +9,7 @@ from calibrations.discovery.results import Comparison, Discovery
 from calibrations.model import Estimate
 from calibrations.noise.dataset import CLEANED, mismatch
 from calibrations.noise.fit import NoiseFit
-from calibrations.noise.words import of_record
+from calibrations.noise.record import of_record
 from calibrations.presentation.chart import Picture
 from calibrations.presentation.report.page import figure, page
 from calibrations.presentation.text import capital, estimate_text, joined, probability, rounded, unit

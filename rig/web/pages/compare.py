@@ -10,7 +10,7 @@ from nicegui import ui
 
 from calibrations.discovery.results import FittedModel
 from calibrations.fit import Fit
-from calibrations.noise.allan import compare_deviations
+from calibrations.noise.comparison import compare_deviations
 from calibrations.noise.fit import NoiseFit
 from calibrations.presentation.chart import Chart
 from calibrations.presentation.charts.noise import scaled, units

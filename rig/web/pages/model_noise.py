@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from nicegui import ui
 
-from calibrations.noise.allan import compare_deviations
+from calibrations.noise.comparison import compare_deviations
 from calibrations.presentation.chart import one
 from calibrations.presentation.charts.noise import (
     Drawn,

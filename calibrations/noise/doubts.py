@@ -1,4 +1,11 @@
-"""From a search on a still record to a verdict: what is in doubt, why, and which experiment decides it.
+"""What a search on a still record leaves in doubt: disturbances, rival processes, and the experiment that decides.
+
+A disturbance is everything in a still record that is not a noise process:
+
+pattern          a step, a drift, a settling, an output that follows a logged column; removed before the fit
+odd samples      wild samples, a stretch of equal samples, noise below one converter step; reported
+two levels       random telegraph noise, which has the spectrum of a Gauss-Markov process; reported
+misfit           a line, a noise level that changes with time, a stretch of the spectrum that no process explains
 
 Two noise processes are separated by a longer record. Its bands are computed as one explanation expects them, and the
 other explanation is fitted to them; the deviance of that fit is twice the information between the two. Both directions
@@ -14,32 +21,99 @@ Source  Kullback and Leibler, Ann. Math. Statist. 22 (1951).
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from calibrations.criteria import CERTAIN_PROBABILITY, LEAST_WHITE, LONGEST_RECORD_S, SLOWEST_FILTER_HZ
+from calibrations.criteria import CERTAIN_PROBABILITY, LEAST_WHITE, LONGEST_RECORD_S, SIGNIFICANT, SLOWEST_FILTER_HZ
 from calibrations.design.expected import Expected, pairs_separated
 from calibrations.design.experiment import TWO_HZ, Experiment, experiment_by_physics
-from calibrations.noise.disturbances import MISFITS, disturbances
+from calibrations.noise.comparison import noise_levels, stretches
 from calibrations.noise.fit import fit_effects
 from calibrations.noise.likelihood import ChannelFit
-from calibrations.noise.patterns import DRIFT, FOLLOWS, SETTLING, STEP, Pattern
-from calibrations.noise.processes import GAUSS_MARKOV
+from calibrations.noise.lines import Line, strongest_line
+from calibrations.noise.patterns import DRIFT, FOLLOWS, SETTLING, STEP, TWO_LEVELS, Pattern
 from calibrations.noise.record import Channel
 from calibrations.noise.samples import hidden_in
 from calibrations.noise.search import Search
-from calibrations.noise.spectrum import Bands, slow_bands
+from calibrations.noise.spectrum import GAUSS_MARKOV, Bands, slow_bands
 
-# The experiment that tells what a still record does not.
-#
-# Two noise processes take a longer record. A record of any length is foreseen as its bands with what the one
-# explanation
-# expects in them; the other is fitted to these as well as it can be, and the deviance that it leaves is twice the
-# information between the two. Both ways are asked, and the worse one counts. What no noise is takes what changes its
-# cause, or the same record again.
-#
-# Source  Kullback and Leibler, Ann. Math. Statist. 22 (1951).
+LINE, LEVEL, STRETCH = "line", "level", "spectrum"
+MISFITS = (LINE, LEVEL, STRETCH)
+
+
+@dataclass(frozen=True)
+class Disturbance:
+    """One disturbance of one channel.
+
+    kind     such as `step`, `follows`, `wild-samples`, `level`
+    matters  whether it changes the noise coefficients by more than their uncertainty
+    pattern  what was removed from the record, if it was
+    """
+
+    kind: str
+    axis: str
+    text: str
+    matters: bool = True
+    pattern: Pattern | None = None
+
+
+def disturbances(search: Search) -> tuple[Disturbance, ...]:
+    """All disturbances: removed patterns, two levels, odd samples; a misfit only where none of these matters."""
+    patterns = [Disturbance(each.kind, each.axis, each.text, True, each) for each in search.patterns]
+    two_levels = [Disturbance(TWO_LEVELS, each.axis, each.text, False) for each in search.telegraphs]
+    odd = [
+        Disturbance(each.kind, channel.axis, f"of {channel.axis}, {each.text}", each.matters)
+        for channel in search.still.channels
+        for each in channel.oddities
+    ]
+    known = (*patterns, *two_levels, *odd)
+    if any(each.matters for each in known):
+        return known
+    misfit = misfit_of(search.end.channels)
+    return known if misfit is None else (*known, misfit)
+
+
+def misfit_of(channels: tuple[ChannelFit, ...]) -> Disturbance | None:
+    """The first misfit that chance does not explain, over all channels."""
+    limit = SIGNIFICANT / (len(MISFITS) * len(channels))
+    each = (_line(fit) or _level(fit, limit) or _stretch(fit, limit) for fit in channels)
+    return next((misfit for misfit in each if misfit is not None), None)
+
+
+def disturbance_document(disturbance: Disturbance) -> dict[str, Any]:
+    """One entry of `disturbances` in every JSON document on a still record."""
+    entry = {name: getattr(disturbance, name) for name in ("kind", "axis", "text", "matters")}
+    pattern = disturbance.pattern
+    if pattern is None:
+        return entry
+    return entry | {
+        "text": pattern.plain,
+        "column": pattern.cause or None,
+        "value": pattern.size,
+        "std": pattern.std,
+        "cannot_be_told_from": [rival.plain for rival in pattern.rivals],
+    }
+
+
+def _line(fit: ChannelFit) -> Disturbance | None:
+    line = strongest_line(fit.channel, fit.lines, fit.level)
+    if not isinstance(line, Line):
+        return None
+    axis = fit.channel.axis
+    return Disturbance(LINE, axis, f"a line of {axis} at {line.frequency_hz:.6g} Hz, of amplitude {line.amplitude:.3g}")
+
+
+def _level(fit: ChannelFit, limit: float) -> Disturbance | None:
+    level = noise_levels(fit)
+    return Disturbance(LEVEL, level.axis, level.text) if level is not None and level.chance < limit else None
+
+
+def _stretch(fit: ChannelFit, limit: float) -> Disturbance | None:
+    worst = stretches(fit, most=1)[0]
+    return Disturbance(STRETCH, worst.axis, worst.text) if worst.chance < limit else None
+
 
 LONGER = (2, 4, 8, 16, 32, 64)  # times the record at hand
 MEANS = 1 << 14  # of a record that is foreseen
@@ -140,12 +214,6 @@ def longer_channel(channel: Channel, length_s: float) -> Channel:
 def _slow(channel: Channel) -> Bands:
     return slow_bands(channel.means, channel.sampling, channel.corner_hz)
 
-
-# White noise behind a low-pass that nobody stated: a single pole on white noise is a Gauss-Markov process.
-#
-# No still record tells the two apart. Where all that is fast comes from the one process, or its corner is where
-# outputs
-# are filtered, the low-pass is named beside it.
 
 OUTPUT_FILTER = "output-filter"
 WHITE = "white-noise"

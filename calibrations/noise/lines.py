@@ -21,17 +21,9 @@ from scipy.optimize import minimize_scalar
 from scipy.special import chdtrc
 
 from calibrations.criteria import FALSE_LINE, FEWEST_FAST_STRETCHES, FEWEST_PERIODS, MOST_FAST_LINES
-from calibrations.noise.processes import Sampling
 from calibrations.noise.record import Channel
-from calibrations.noise.spectrum import LENGTH, WINDOW, Bands, fast_bands, slow_bands
+from calibrations.noise.spectrum import LENGTH, WINDOW, Bands, Sampling, fast_bands, slow_bands
 from calibrations.table import Array
-
-# Sinusoids in noise: lines of a spectrum that stand out from what is expected around them.
-#
-# A line counts where noise alone, over all frequencies looked at, would have one as high once in a thousand records.
-#
-# Source  Rife and Boorstyn, IEEE Trans. Inf. Theory 20 (1974): frequency and amplitude of a tone, and their
-# variances.
 
 LOBE = 3  # ordinates on each side that a line reaches under the window
 AROUND = 65  # ordinates that tell the noise around a line
