@@ -1,4 +1,4 @@
-"""What lies open on the desk. The server has one: a page that is closed and opened again finds everything as it was."""
+"""State of the workbench that all pages share: a page that is closed and opened again shows the same."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from rig.record import Record, Run
 if TYPE_CHECKING:
     from rig.services.session import ModelSession
 
-MOST_OPEN = 6  # sessions that are kept: each holds its data
-MODELS = "models"  # the folder in the home where the workbench saves models
-FILES = "files"  # the folder of files that were given to the workbench
+MOST_OPEN = 6  # sessions in memory, each with its data
+MODELS = "models"  # folder of models saved by the workbench
+FILES = "files"  # folder of uploaded files
 
 
 @dataclass
 class Desk:
-    """`dark`: None as the browser likes it. `sessions`: the open model sessions, by data and model, last used last."""
+    """`dark`: None follows the browser. `sessions`: the open model sessions by data and model, in the order of use."""
 
     bench_file: Path | None
     dark: bool | None = None
     sessions: OrderedDict[tuple[str, str], ModelSession] = field(default_factory=OrderedDict)
 
     def open(self, data: str, model: str) -> ModelSession:
-        """The open session, or a new one; `model` "" is the one by default. Raises what `model_session` raises."""
+        """The open session, or a new one; `model` "" is the default model. Raises the errors of `model_session`."""
         from rig.services.request import Request
         from rig.services.session import model_session
 
@@ -38,20 +38,20 @@ class Desk:
         return found
 
     def keep(self, data: str, model: str, session: ModelSession) -> None:
-        """How far the model has grown."""
+        """Store the present state of a session."""
         self.sessions[data, model] = session
         self.sessions.move_to_end((data, model))
         while len(self.sessions) > MOST_OPEN:
             self.sessions.popitem(last=False)
 
     def forget(self, data: str) -> None:
-        """Begin anew with `data`, which may have changed."""
+        """Close the sessions of `data`, which may have changed."""
         for key in [key for key in self.sessions if key[0] == data]:
             del self.sessions[key]
 
 
 def runs() -> list[Run]:
-    """Every run, newest first; none where nothing is recorded yet. Raises RecordError."""
+    """All runs, newest first; empty without a record. Raises RecordError."""
     if not Record.is_there():
         return []
     with Record.to_read() as record:
@@ -59,7 +59,7 @@ def runs() -> list[Run]:
 
 
 def lab_read() -> str | None:
-    """The lab's record, for people, where the workbench shows that instead of the rig's own."""
+    """The name of the lab's record if the workbench reads it, else None."""
     if not (url := os.environ.get(RECORD)):
         return None
     from rig.record.lab import lab_url, shown
@@ -68,7 +68,7 @@ def lab_read() -> str | None:
 
 
 def models(chosen: str = "", default: str = "by kind of data") -> dict[str, str]:
-    """The models to choose from, by name or file, with names for people; "" is that by default."""
+    """The available models by name or file, with their labels; "" is the default model."""
     from calibrations.model.file import shipped_names
 
     found = {"": default, **{name: name for name in shipped_names()}, **saved_models()}
@@ -76,5 +76,5 @@ def models(chosen: str = "", default: str = "by kind of data") -> dict[str, str]
 
 
 def saved_models() -> dict[str, str]:
-    """Models that the workbench saved: their files, and names for people."""
+    """Files of models saved by the workbench, with their labels."""
     return {str(path): f"{path.stem} (saved)" for path in sorted((home() / MODELS).glob("*.yaml"))}

@@ -1,4 +1,4 @@
-"""What all pages share: the way between them, the run that is under way, light and dark, and the keys."""
+"""The frame of all pages: navigation, the present run, colours, keys."""
 
 from __future__ import annotations
 
@@ -18,37 +18,39 @@ from rig.runs.background.status import Status
 from rig.web.desk import Desk, lab_read
 from rig.web.parts import message
 
-# The run that is under way, in the head of every page: how far it is, pause and stop.
+# The present run in the head of every page: progress, pause and stop.
 
 LOOK_S = 0.5
 PHASES = {"starting": "starts", "running": "runs", "asking": "asks you", "paused": "is paused"}
 
 
 class Strip:
-    """Looks at the status twice a second; shows nothing where nothing is under way."""
+    """Reads the status twice a second; hidden without a present run."""
 
     def __init__(self) -> None:
         with ui.element("div").classes("under-way").props("role=status") as self.box:
             self.link = ui.link("", "/run")
-            self.pause = ui.button("Pause", icon="pause", on_click=lambda: steer(control.pause)).props("outline dense")
-            self.stop = ui.button("Stop", icon="stop", color="negative", on_click=lambda: steer(control.stop))
+            self.pause = ui.button("Pause", icon="pause", on_click=lambda: control_run(control.pause)).props(
+                "outline dense"
+            )
+            self.stop = ui.button("Stop", icon="stop", color="negative", on_click=lambda: control_run(control.stop))
             self.stop.props("unelevated dense")
         ui.timer(LOOK_S, self.look)
         self.look()
 
     def look(self) -> None:
-        """Show how it stands now."""
+        """Show the present status."""
         status = control.latest()
-        going = status is not None and status.phase != "ended"
-        self.box.set_visibility(going)
-        if status is not None and going:
+        active = status is not None and status.phase != "ended"
+        self.box.set_visibility(active)
+        if status is not None and active:
             count = f" {status.done}/{status.total}" if status.total else ""
             self.link.set_text(f"{status.procedure}{count} {PHASES[status.phase]}")
             self.pause.set_visibility(status.phase == "running" and status.seat != "nobody")
 
 
-def steer(how: Callable[[Status], None]) -> None:
-    """Do something to the run that is under way, and say where that is not possible."""
+def control_run(how: Callable[[Status], None]) -> None:
+    """Apply an action to the present run; show a message if it is not possible."""
     status = control.latest()
     if status is None:
         return
@@ -59,15 +61,15 @@ def steer(how: Callable[[Status], None]) -> None:
 
 
 STATIC = Path(__file__).parent / "static"
-WAYS = {"/": "Model", "/run": "Run", "/record": "Record", "/history": "History"}
-THEMES = {None: ("brightness_auto", "light or dark as the browser likes it"), False: ("light_mode", "light"),
+PAGES = {"/": "Model", "/run": "Run", "/record": "Record", "/history": "History"}
+THEMES = {None: ("brightness_auto", "as the browser"), False: ("light_mode", "light"),
           True: ("dark_mode", "dark")}  # fmt: skip
 NEXT = {None: False, False: True, True: None}
 
 
 @dataclass(frozen=True)
 class Key:
-    """What a key does on a page, in words and by doing it."""
+    """A key of a page: its description and its action."""
 
     does: str
     act: Callable[[], Any]
@@ -80,17 +82,19 @@ def static_files() -> None:
 
 @contextmanager
 def frame(desk: Desk, here: str) -> Iterator[dict[str, Key]]:
-    """A page's head; inside, its content, and the keys that the page may add its own to."""
-    keys = {str(k): Key(f"go to {title}", partial(ui.navigate.to, to)) for k, (to, title) in enumerate(WAYS.items(), 1)}
+    """The head of a page; the body adds content and keys."""
+    keys = {
+        str(k): Key(f"go to {title}", partial(ui.navigate.to, to)) for k, (to, title) in enumerate(PAGES.items(), 1)
+    }
     ui.add_head_html('<link rel="stylesheet" href="/static/workbench.css">')
     ui.colors(primary="#0067a3", negative="#b3261e")
     with ui.element("header").classes("bar"):
         ui.label("rig workbench").classes("name")
         with ui.element("nav").classes("ways"):
-            for to, title in WAYS.items():
+            for to, title in PAGES.items():
                 ui.link(title, to).classes("here" if to == here else "")
         if (lab := lab_read()) is not None:
-            ui.label(f"reads {lab}").classes("quiet small")
+            ui.label(f"record: {lab}").classes("quiet small")
         ui.element("div").classes("space")
         Strip()
         _keys(keys)
@@ -100,7 +104,7 @@ def frame(desk: Desk, here: str) -> Iterator[dict[str, Key]]:
 
 
 def _theme(desk: Desk) -> None:
-    """The switch between light, dark, and as the browser likes it; kept as long as the server runs."""
+    """The switch between light, dark, and the setting of the browser; the server remembers it."""
     dark = ui.dark_mode(desk.dark)
 
     def switch() -> None:
@@ -120,15 +124,15 @@ def _theme(desk: Desk) -> None:
 
 
 def _keys(keys: Mapping[str, Key]) -> None:
-    """Does what a key is for, and lists the keys under `?`."""
+    """Run the actions of keys, and list the keys under `?`."""
 
     def listed() -> None:
         with ui.dialog() as dialog, ui.card():
             ui.label("Keys").classes("title")
             with ui.element("div").classes("facts"):
-                for key, each in keys.items():
-                    ui.label(key).classes("k number")
-                    ui.label(each.does)
+                for name, key in keys.items():
+                    ui.label(name).classes("k number")
+                    ui.label(key.does)
         dialog.open()
 
     async def pressed(event: KeyEventArguments) -> None:
@@ -136,8 +140,8 @@ def _keys(keys: Mapping[str, Key]) -> None:
             return
         if event.key.name == "?":
             listed()
-        elif (each := keys.get(event.key.name)) is not None:
-            done = each.act()
+        elif (key := keys.get(event.key.name)) is not None:
+            done = key.act()
             if done is not None:
                 await done
 

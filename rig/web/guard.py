@@ -1,8 +1,8 @@
-"""Who may speak to the workbench: whoever has its token, by its own name, from its own pages.
+"""Access control: requests need the token, the host name of the workbench, and its own pages as origin.
 
-A browser runs pages of strangers too. Such a page can send requests to 127.0.0.1, but it does not know the token, it
-cannot send our cookie along (SameSite), and a name of its own that it lets point to 127.0.0.1 is none of ours (DNS
-rebinding). All of this holds for websockets as for requests. What the pages themselves may load is only ours, too.
+A page of another site can send requests to 127.0.0.1, but it does not know the token, it cannot send the cookie
+(SameSite), and its own host name for 127.0.0.1 is refused (DNS rebinding). The same holds for websockets. The pages of
+the workbench load nothing from other hosts.
 """
 
 from __future__ import annotations
@@ -38,13 +38,13 @@ HEADERS = (
     (b"cross-origin-opener-policy", b"same-origin"),
     (b"cross-origin-resource-policy", b"same-origin"),
 )
-UNKNOWN = "This page needs its token. Open the address that `rig web` printed; a new start has a new one."
-ELSEWHERE = "This address is not the workbench's own. Open the one that `rig web` printed."
+UNKNOWN = "This page needs a token. Open the address that `rig web` printed; every start has a new one."
+ELSEWHERE = "This is not the address of the workbench. Open the address that `rig web` printed."
 
 
 @dataclass(frozen=True)
 class Guard:
-    """`app` for those who have `token` and come by one of `hosts` ("127.0.0.1:8473")."""
+    """Serves `app` to requests with `token` and one of `hosts` ("127.0.0.1:8473")."""
 
     app: ASGIApp
     token: str
@@ -67,11 +67,11 @@ class Guard:
 
     @property
     def cookie(self) -> str:
-        """Its name; cookies are shared by all ports of a host, so the port is part of it."""
+        """The name of the cookie, with the port: all ports of a host share their cookies."""
         return f"rig-{min(self.hosts).rpartition(':')[2]}"
 
     def _is_ours(self, headers: Mapping[str, str]) -> bool:
-        """Whether the request was sent to one of our names and, where it says from where, from there."""
+        """Whether the host is ours, and the origin, if there is one, is the same host."""
         host, origin = headers.get("host", ""), headers.get("origin")
         return host in self.hosts and origin in (None, f"http://{host}")
 
@@ -79,7 +79,7 @@ class Guard:
         return hmac.compare_digest(given.encode(), self.token.encode())
 
     async def _let_in(self, scope: Scope, send: Send, query: Mapping[str, str]) -> None:
-        """The token becomes a cookie, and leaves the address, which a history keeps and a person may pass on."""
+        """Move the token from the address to a cookie, because addresses are stored and passed on."""
         place = scope["path"] + (f"?{urlencode(query)}" if query else "")
         cookie = f"{self.cookie}={self.token}; HttpOnly; SameSite=Strict; Path=/"
         given = [(b"location", place.encode()), (b"set-cookie", cookie.encode()), (b"content-length", b"0")]
@@ -88,7 +88,7 @@ class Guard:
 
 
 def names(host: str, port: int) -> frozenset[str]:
-    """The names by which a server at `host` and `port` is asked for."""
+    """The host names of a server at `host` and `port`."""
     own: Iterable[str] = ("127.0.0.1", "localhost") if host in ("127.0.0.1", "localhost") else (host,)
     return frozenset(f"{name}:{port}" for name in own)
 

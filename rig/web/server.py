@@ -1,4 +1,4 @@
-"""The workbench's server: one process, one address, pages for whoever has the token."""
+"""The server of the workbench: one process, one address, access with a token."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from rig.web.guard import TOKEN, Guard, names
 from rig.web.pages import register
 
 LOCAL = "127.0.0.1"
-PORT = 8473  # taken where it is free, so that a page that was left open finds its server again
+PORT = 8473  # preferred, so that an open page finds a restarted server
 TOKEN_BYTES = 24
 TITLE = "rig workbench"
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where the workbench listens, and the token that lets a browser in."""
+    """Address of the workbench, and the token for access."""
 
     host: str
     port: int
@@ -40,15 +40,15 @@ class Place:
 
 
 def serve(desk: Desk, host: str, port: int | None, ready: Callable[[Place], None]) -> None:
-    """Serve until SIGINT or SIGTERM; `ready` is told the address as soon as pages can be opened.
+    """Serve until SIGINT or SIGTERM; calls `ready` with the address when pages can be opened.
 
-    Raises RigError where the address cannot be had; without `port` another is taken instead.
+    Raises RigError if the address is not available; without `port` any free port is used.
     """
     listener = _listen(host, port)
     place = Place(host, listener.getsockname()[1], secrets.token_urlsafe(TOKEN_BYTES))
     app = FastAPI(openapi_url=None)
     register(desk)
-    run.process_pool_start_method = "spawn"  # nothing is computed there; this keeps it from saying so
+    run.process_pool_start_method = "spawn"  # the pool is not used; this avoids a warning
     ui.run_with(
         app,
         title=TITLE,
@@ -62,12 +62,12 @@ def serve(desk: Desk, host: str, port: int | None, ready: Callable[[Place], None
     config = uvicorn.Config(
         guarded, log_level="warning", access_log=False, timeout_graceful_shutdown=1, ws_max_size=1 << 24
     )
-    with _signals_end_it(), listener:
+    with _ignored_signals(), listener:
         _Server(config, lambda: ready(place)).run(sockets=[listener])
 
 
 class _Server(uvicorn.Server):
-    """A server that says when it is up."""
+    """A server that reports when it is ready."""
 
     def __init__(self, config: uvicorn.Config, ready: Callable[[], None]) -> None:
         super().__init__(config)
@@ -79,7 +79,7 @@ class _Server(uvicorn.Server):
 
 
 def _listen(host: str, port: int | None) -> socket.socket:
-    """A socket at the address asked for. Raises RigError."""
+    """A socket at the address. Raises RigError."""
     listener = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
@@ -89,19 +89,19 @@ def _listen(host: str, port: int | None) -> socket.socket:
             listener.bind((host, 0))
             return listener
         listener.close()
-        raise RigError(f"cannot listen at {host}:{port}: {error.strerror}; name another --port or --host") from None
+        raise RigError(f"cannot listen at {host}:{port}: {error.strerror}; give another --port or --host") from None
     return listener
 
 
 @contextmanager
-def _signals_end_it() -> Iterator[None]:
-    """A signal ends the server, which raises it again afterwards: inside it then does nothing more."""
+def _ignored_signals() -> Iterator[None]:
+    """Ignore the signals that uvicorn raises again after it has ended the server."""
 
-    def nothing_more(number: int, frame: FrameType | None) -> None: ...
+    def ignore(number: int, frame: FrameType | None) -> None: ...
 
-    before = {each: signal.signal(each, nothing_more) for each in (signal.SIGINT, signal.SIGTERM)}
+    before = {number: signal.signal(number, ignore) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield
     finally:
-        for each, handler in before.items():
-            signal.signal(each, handler)
+        for number, handler in before.items():
+            signal.signal(number, handler)

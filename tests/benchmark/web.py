@@ -80,7 +80,7 @@ def _served() -> Iterator[tuple[str, subprocess.Popen[str]]]:
 def _first_page(browser: Browser) -> float:
     with _served() as (url, _):
         page = browser.new_page()
-        took = _timed(page, url, "text=Nothing is measured yet")
+        took = _timed(page, url, "text=There are no measurements yet")
         page.close()
     return took
 

@@ -19,14 +19,14 @@ from tests.rig.lives import calibrated
 
 pytestmark = pytest.mark.slow
 
-LIFE = "Its life"
+LIFE = "Calibrations over time"
 BIASES_V = (2.5, 2.501, 2.502, 2.503, 2.504, 2.510)  # 1 mV a year, and then a jump
 ASKED = "/history?sensor=17&limit=bias-x%3D0.02&baseline=3&at=2024-08-01"
 
 
 def test_an_empty_record_says_what_to_do(workbench: Workbench) -> None:
     page = workbench.visit("/history")
-    expect(page.get_by_text("No sensor is calibrated yet")).to_be_visible()
+    expect(page.get_by_text("No sensor has a calibration yet")).to_be_visible()
     expect(page.get_by_text("# serial: 17")).to_be_visible()
     expect(page.get_by_role("button", name="Measure")).to_be_visible()
 
@@ -73,14 +73,14 @@ def test_a_life_says_what_the_command_says_and_its_points_lead_to_their_runs(
     page.get_by_role("row", name=runs[0]).get_by_role("link", name="ADXL203 17").click()
     dots(page, LIFE, 6)
     expect(page.locator(".verdict .headline")).to_have_text(next_due(life(), LIMIT_IS_GIVEN))
-    page.get_by_label("Greatest change of bias-x (V)").fill("0.02")
+    page.get_by_label("Largest change of bias-x (V)").fill("0.02")
     expect(page.locator(".verdict .headline")).to_have_text(next_due(life(0.02), LIMIT_IS_GIVEN))
     expect(page.locator(f"[aria-label='{LIFE}'] .annotation-text")).to_have_text(
         ["lowest allowed", "highest allowed", f"due {life(0.02).due}"]
     )
     expect(page.locator(".verdict")).to_contain_text(summary(life()))
     expect(page.locator(".verdict")).to_contain_text("baseline, 6 of 20")
-    page.get_by_label("Baseline of the charts").fill("3")
+    page.get_by_label("Chart baseline").fill("3")
     expect(page.locator(".verdict")).to_contain_text("Out of control: bias-x.")
     assert symbols(page, LIFE) == ["circle"] * 4 + ["diamond"] * 2
     assert symbols(page, "Individuals") == ["circle-open"] * 3 + ["circle", "diamond", "diamond"]
@@ -100,12 +100,12 @@ def test_what_is_asked_is_in_the_address_and_on_the_keys(workbench: Workbench, r
     expect(page.get_by_label("Day", exact=True)).to_have_value("2024-08-01")
     workbench.shot(page, "history")
     page.keyboard.press("?")
-    expect(page.get_by_role("dialog")).to_contain_text("the next quantity")
+    expect(page.get_by_role("dialog")).to_contain_text("next quantity")
     page.keyboard.press("Escape")
     expect(page.get_by_role("dialog")).to_have_count(0)
     page.keyboard.press("q")
     expect(page.locator(f"[aria-label='{LIFE}'] .ytitle")).to_have_text("bias-y (V)")
-    expect(page.get_by_label("Greatest change of bias-y (V)")).to_have_value("")  # the limit is the other one's
+    expect(page.get_by_label("Largest change of bias-y (V)")).to_have_value("")  # the limit is the other one's
     expect(page).to_have_url(re.compile("quantity=bias-y&limit=bias-x%3D0.02"))
     page.get_by_label("Light or dark").click(click_count=2)
     expect(page.locator("body.body--dark")).to_be_attached()
@@ -143,7 +143,7 @@ def test_two_days_two_rigs_and_another_sensor_are_compared(workbench: Workbench,
     day = page.get_by_label("One day")
     day.fill("2020-02-30")
     compare.click()
-    expect(page.get_by_role("alert")).to_contain_text("'2020-02-30' is no day")
+    expect(page.get_by_role("alert")).to_contain_text("'2020-02-30' is not a date")
     day.fill("2020-02-28")
     compare.click()
     both = page.get_by_role("link", name="One model fitted to both")
@@ -152,11 +152,11 @@ def test_two_days_two_rigs_and_another_sensor_are_compared(workbench: Workbench,
 
 def test_what_cannot_be_shown_and_what_to_do(workbench: Workbench, runs: list[str]) -> None:
     page = workbench.visit("/history?sensor=18")
-    expect(page.get_by_text("Control charts show from two calibrations on, a drift from three")).to_be_visible()
+    expect(page.get_by_text("A control chart needs two calibrations, a drift three")).to_be_visible()
     for asked, told in (
         ("sensor=170", "no calibration of the sensor '170' in the record. Did you mean '17'?"),
         ("sensor=18&model=gyroscope", "Its runs are none by this model"),
-        ("sensor=17&baseline=one", "baseline=one: write how many calibrations set the charts, 2 at least"),
+        ("sensor=17&baseline=one", "baseline=one: give the number of calibrations for the limits, at least 2"),
     ):
         page.goto(f"{workbench.origin}/history?{asked}")
         expect(page.get_by_role("alert")).to_contain_text(told)

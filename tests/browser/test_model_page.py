@@ -50,8 +50,14 @@ def test_a_hidden_effect_is_found_added_saved_and_undone(workbench: Workbench, t
     data = hidden(tmp_path, "package turned")
     page = looked_at(workbench, data, "misses axis-misalignment")
     card = page.locator(".card.first")
-    for told in ("a <- R(theta)^T a", "opposite signs", "above 99.9 %", "Cannot be told from", "× the noise floor"):
-        expect(card).to_contain_text(told)
+    for text in (
+        "a <- R(theta)^T a",
+        "opposite signs",
+        "above 99.9 %",
+        "Cannot be separated from",
+        "× the noise floor",
+    ):
+        expect(card).to_contain_text(text)
     expect(page.get_by_text("axis-misalignment", exact=True)).to_have_count(2)  # the card, and its curve
     expect(page.locator(BARS)).to_have_count(1)
     workbench.shot(page, "model")
@@ -80,7 +86,7 @@ def test_a_hidden_effect_is_found_added_saved_and_undone(workbench: Workbench, t
 
 def test_an_effect_of_ones_own_with_a_mistake_and_then_right(workbench: Workbench, tmp_path: Path) -> None:
     page = looked_at(workbench, unexplained(tmp_path, "worm gear"), "No effect of the catalogue explains the residual")
-    text, add = page.get_by_label("Expression"), page.get_by_role("button", name="Add it")
+    text, add = page.get_by_label("Expression"), page.get_by_role("button", name="Add effect")
     expect(text).to_have_value(re.compile("sin"))  # what is left proposes itself
     text.fill("a*sin(5*betta) + b*cos(5*beta)")
     expect(page.locator(".fault").last).to_contain_text('did you mean "beta"')
@@ -136,7 +142,7 @@ def test_a_search_is_told_cancelled_and_begun_again(
     expect(page.get_by_text("The search was cancelled.")).to_be_visible()
     expect(page.locator(".verdict .headline").first).to_have_text("Not diagnosed")
     (tmp_path / "go").touch()
-    page.get_by_role("button", name="Look for what is missing").click()
+    page.get_by_role("button", name="Search for missing effects").click()
     expect(page.locator(".verdict .headline").first).to_contain_text("o effect is missing")
     page.close()
 
@@ -149,7 +155,7 @@ def test_selection_units_axes_and_poses(workbench: Workbench, tmp_path: Path) ->
         faded = f"[aria-label='{picture}'] .points path[style*='opacity: 0.2']"
         expect(page.locator(faded).first).to_be_attached()
     workbench.shot(page, "brushed")
-    page.get_by_role("button", name="Select nothing").click()
+    page.get_by_role("button", name="Clear selection").click()
     expect(page.locator("[aria-label='Residuals'] .points path[style*='opacity: 0.2']")).to_have_count(0)
     label = page.locator("[aria-label='Residuals'] .ytitle")
     expect(label).to_have_text("residual of x (mV)")
@@ -172,22 +178,22 @@ def test_selected_poses_are_left_out_with_a_reason_and_taken_in_again(workbench:
     page = workbench.visit(f"/?data={run.run}")
     expect(page.locator(".verdict .detail")).to_contain_text(f"on {run.rows} poses")
     brushed(page, "Residual pattern")
-    page.get_by_role("button", name="Leave out").click()
+    page.get_by_role("button", name="Exclude").click()
     dialog = page.get_by_role("dialog")
-    dialog.get_by_role("button", name="Leave out").click()
-    expect(dialog.get_by_text("Say why")).to_be_visible()
-    dialog.get_by_label("Why").fill("a lorry passed")
-    dialog.get_by_role("button", name="Leave out").click()
-    expect(page.get_by_text("left out of every analysis")).to_be_visible()
+    dialog.get_by_role("button", name="Exclude").click()
+    expect(dialog.get_by_text("Give a reason")).to_be_visible()
+    dialog.get_by_label("Reason").fill("a lorry passed")
+    dialog.get_by_role("button", name="Exclude").click()
+    expect(page.get_by_text("excluded from every analysis")).to_be_visible()
     with Record() as record:
         out = record.excluded(run.run)
     assert out
     assert set(out.values()) == {"a lorry passed"}
     expect(page.locator(".verdict .detail")).to_contain_text(f"on {run.rows - len(out)} poses")
     page.goto(f"{workbench.origin}/record/{run.run}")
-    expect(page.get_by_text("Poses that are left out")).to_be_visible()
-    page.get_by_role("button", name="Take in again").first.click()
-    expect(page.get_by_role("button", name="Take in again")).to_have_count(len(out) - 1)
+    expect(page.get_by_text("Excluded poses")).to_be_visible()
+    page.get_by_role("button", name="Include again").first.click()
+    expect(page.get_by_role("button", name="Include again")).to_have_count(len(out) - 1)
 
 
 def test_what_cannot_be_looked_at_says_what_to_do_and_the_next_path_is_read(

@@ -43,8 +43,8 @@ def test_runs_are_searched_and_one_is_opened_and_noted(workbench: Workbench, run
     page.get_by_role("cell", name=runs[2]).click()
     expect(page.get_by_text("its process was killed").first).to_be_visible()
     expect(page.locator("[aria-label='the run over time'] .points path")).to_have_count(1)
-    page.get_by_label("A note").fill("the door was open")
-    page.get_by_role("button", name="Keep").click()
+    page.get_by_label("Note").fill("the door was open")
+    page.get_by_role("button", name="Save").click()
     expect(page.get_by_role("cell", name="the door was open")).to_be_visible()
     with Record() as record:
         assert [(event.what, event.text) for event in record.events(runs[2])] == [("note", "the door was open")]
@@ -59,7 +59,7 @@ def test_two_runs_are_compared(workbench: Workbench, runs: list[str]) -> None:
     page.get_by_role("button", name="Compare").click()
     expect(page.get_by_text("Parameters of linear", exact=True)).to_be_visible()
     expect(page.get_by_role("cell", name="scale-factor scale x")).to_be_visible()
-    for picture, dots in (("How the parameters of linear differ", 4), (BOTH, 2 * 518), (DIFFERENCE, 518)):
+    for picture, dots in (("Differences of the parameters of linear", 4), (BOTH, 2 * 518), (DIFFERENCE, 518)):
         expect(page.locator(f"[aria-label='{picture}'] .points path")).to_have_count(dots)
     label = page.locator(f"[aria-label='{DIFFERENCE}'] .ytitle")
     expect(label).to_have_text("second − first, x (mV)")

@@ -32,7 +32,7 @@ def started(workbench: Workbench, path: str) -> Page:
 
 def test_a_newcomer_gets_from_the_empty_record_to_the_falling_error(workbench: Workbench) -> None:
     page = workbench.visit("/")
-    expect(page.get_by_text("Nothing is measured yet")).to_be_visible()
+    expect(page.get_by_text("There are no measurements yet")).to_be_visible()
     workbench.shot(page, "empty")
     page.get_by_role("button", name="Measure").click()
     page.get_by_label("step (deg)").fill("30")  # long enough that the run lasts while its page is looked at
@@ -47,7 +47,7 @@ def test_a_newcomer_gets_from_the_empty_record_to_the_falling_error(workbench: W
     workbench.shot(page, "running")
     phase(page, "complete")
     expect(page.locator(".live .q-linear-progress__model")).to_have_class(re.compile("without-transition"))
-    page.get_by_role("button", name="See the model").click()
+    page.get_by_role("button", name="Open the model").click()
     page.get_by_role("button", name="Add axis-misalignment").click()
     expect(page.locator(BARS)).to_have_count(2)
 
@@ -65,11 +65,11 @@ def test_a_run_is_paused_left_alone_opened_again_and_stopped(workbench: Workbenc
     page.get_by_role("link", name="soak").first.click()
     phase(page, "paused")
     workbench.shot(page, "paused")
-    page.get_by_role("button", name="Go on").click()
+    page.get_by_role("button", name="Continue").click()
     phase(page, "running")
     page.get_by_role("button", name="Stop").first.click()
     phase(page, "stopped")
-    expect(page.get_by_text("Stopped by a person. Resume goes on where it was.")).to_be_visible()
+    expect(page.get_by_text("Stopped by a person. Resume continues at the same pose.")).to_be_visible()
     expect(page.get_by_role("button", name="Resume")).to_be_visible()
     expect(page.get_by_role("button", name="Stop")).to_have_count(0)
     with Record() as record:
@@ -82,7 +82,7 @@ def test_a_run_of_a_terminal_is_watched_and_stopped(workbench: Workbench) -> Non
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as terminal:
         page = workbench.visit("/run")
         phase(page, "running")
-        expect(page.get_by_text("unattended: a pause would end it")).to_be_visible()
+        expect(page.get_by_text("unattended and cannot pause")).to_be_visible()
         expect(page.locator(".values").get_by_text("as usual").first).to_be_visible()
         expect(page.get_by_role("button", name="Pause")).to_have_count(0)
         page.get_by_role("button", name="Stop").first.click()

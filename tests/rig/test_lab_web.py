@@ -133,7 +133,7 @@ def test_who_may_only_read_is_told_so_and_nothing_is_written(
 
     async def visit(user: User) -> None:
         await user.should_see(run)
-        user.find("A note").type("a lorry").trigger("keydown.enter")
+        user.find("Note").type("a lorry").trigger("keydown.enter")
         await user.should_see("anna has no permission for this")
         await user.should_see("the owner can grant it rig_writer")
         assert WORD not in str(user.notify.messages)
@@ -152,7 +152,7 @@ def test_a_pose_is_left_out_where_it_is_read(
 
     async def take_in_again(user: User) -> None:
         await user.should_see("pose 3: a lorry")
-        user.find(kind=ui.button, content="Take in again").click()
+        user.find(kind=ui.button, content="Include again").click()
         for _ in range(100):
             if not server.sql("SELECT 1 FROM poses WHERE excluded IS NOT NULL", database):
                 return

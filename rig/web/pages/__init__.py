@@ -1,4 +1,4 @@
-"""The workbench's pages, one a file: each registers itself for its address."""
+"""The pages of the workbench: each registers itself for its address."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from rig.web.pages import compare, history, model, record, run, run_record
 
 
 def register(desk: Desk) -> None:
-    """All pages, on one desk."""
+    """Register all pages."""
     static_files()
     for page in (model, run, record, run_record, compare, history):
         page.register(desk)

@@ -1,4 +1,4 @@
-"""Two runs, or two sensors, beside each other: their results, and one model fitted to both, in tables and pictures."""
+"""Compare page: results of two runs or two sensors, and one model fitted to both, in tables and pictures."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ from rig.web.desk import Desk, models
 from rig.web.frame import Key, frame
 from rig.web.parts import box, div, failed, message, off_loop, redraw, table, waiting, words
 
-# The pictures of the page Compare, of one axis at a time: of two tables, and of two still records.
+# Pictures of one axis: for two tables, or for two still records.
 
 RESIDUALS, DIFFERENCE = "Residuals of both", "Difference second − first at common poses"
 ALLAN = "Allan deviation of both, and the model fitted to each"
 
 
 @dataclass(frozen=True)
-class Both:
-    """What there is to draw: axes, units, titles; `draw` makes the charts of an axis, as what is sensed or not."""
+class Comparison:
+    """Axes, units and titles of the pictures; `draw` makes the charts of an axis in one of the units."""
 
     axes: Sequence[str]
     units: dict[bool, str]
@@ -42,20 +42,22 @@ class Both:
 
 
 class Pictures:
-    """Draws one axis in one unit."""
+    """The pictures of one axis in one unit."""
 
-    def __init__(self, both: Both) -> None:
-        self.both = both
+    def __init__(self, comparison: Comparison) -> None:
+        self.comparison = comparison
         with box("controls row-of"):
-            self.axis = ui.select(dict(enumerate(both.axes)), label="axis", value=0, on_change=self.draw)
+            self.axis = ui.select(dict(enumerate(comparison.axes)), label="axis", value=0, on_change=self.draw)
             self.axis.props("dense options-dense").style("min-width: 120px")
-            self.unit = ui.toggle(both.units, value=next(iter(both.units)), on_change=self.draw).props("dense no-caps")
-            self.unit.set_visibility(len(both.units) > 1)
-            words("● first, ◇ second. Draw a box in a picture to zoom into it; a double click zooms out.",
+            self.unit = ui.toggle(comparison.units, value=next(iter(comparison.units)), on_change=self.draw).props(
+                "dense no-caps"
+            )
+            self.unit.set_visibility(len(comparison.units) > 1)
+            words("● first, ◇ second. Drag a box in a picture to zoom in; double-click to zoom out.",
                   "told quiet small")  # fmt: skip
         self.plots: list[ui.plotly] = []
-        with div("two" if len(both.titles) > 1 else ""):
-            for title in both.titles:
+        with div("two" if len(comparison.titles) > 1 else ""):
+            for title in comparison.titles:
                 with box("picture"):
                     words(title, "title")
                     plot = ui.plotly({"data": [], "layout": {}}).classes("tall-plot").props(f'aria-label="{title}"')
@@ -63,23 +65,23 @@ class Pictures:
         self.draw()
 
     def draw(self) -> None:
-        """All of them anew."""
-        charts = self.both.draw(int(self.axis.value or 0), bool(self.unit.value))
+        """Draw all pictures again."""
+        charts = self.comparison.draw(int(self.axis.value or 0), bool(self.unit.value))
         for plot, chart in zip(self.plots, charts, strict=True):
             redraw(plot, figure(chart, f"{self.axis.value} {self.unit.value}"))
 
     def next_axis(self) -> None:
-        """The next channel."""
-        self.axis.set_value((int(self.axis.value or 0) + 1) % len(self.both.axes))
+        """Select the next channel."""
+        self.axis.set_value((int(self.axis.value or 0) + 1) % len(self.comparison.axes))
 
     def other_unit(self) -> None:
-        """V to g, or back."""
-        if len(self.both.units) > 1:
+        """Switch between V and g."""
+        if len(self.comparison.units) > 1:
             self.unit.set_value(not self.unit.value)
 
 
-def of_both(found: tuple[FittedModel, FittedModel]) -> Both:
-    """Those that go with what was fitted."""
+def comparison_of(found: tuple[FittedModel, FittedModel]) -> Comparison:
+    """The pictures for two fits."""
     first, second = found
     if isinstance(first, NoiseFit) and isinstance(second, NoiseFit):
         return _of_noise(first, second)
@@ -88,8 +90,8 @@ def of_both(found: tuple[FittedModel, FittedModel]) -> Both:
     raise TypeError(found)
 
 
-def _of_rows(first: Fit, second: Fit) -> Both:
-    """Residuals, and where both have the same poses the difference of what was measured there."""
+def _of_rows(first: Fit, second: Fit) -> Comparison:
+    """Residuals, and the difference of the measurements at common poses."""
     shared = again(first, second)
     columns, there = choices(first), choices(second)
     x, _ = first_choices([name for name in columns if name in there])
@@ -101,11 +103,11 @@ def _of_rows(first: Fit, second: Fit) -> Both:
 
     titles = [RESIDUALS] if shared is None else [RESIDUALS, DIFFERENCE]
     axes = [name for name in first.channels if name in second.channels]
-    return Both(axes, residual_units(first), titles, draw)
+    return Comparison(axes, residual_units(first), titles, draw)
 
 
-def _of_noise(first: NoiseFit, second: NoiseFit) -> Both:
-    """How both average."""
+def _of_noise(first: NoiseFit, second: NoiseFit) -> Comparison:
+    """Allan deviations of both records."""
     axes = [axis for axis in first.still.axes if axis in second.still.axes]
     there = [{each.channel.axis: each for each in found.channels} for found in (first, second)]
     offered = units(first.still) if units(first.still) == units(second.still) else {False: first.still.unit}
@@ -117,10 +119,10 @@ def _of_noise(first: NoiseFit, second: NoiseFit) -> Both:
         into = (scaled(first.still, axis, in_sensed), scaled(second.still, axis, in_sensed))
         return [deviations(curves, into)]
 
-    return Both(axes, offered, [ALLAN], draw)
+    return Comparison(axes, offered, [ALLAN], draw)
 
 
-HEAD = ("", "first ●", "second ◇", "second − first", "in its uncertainties")
+HEAD = ("", "first ●", "second ◇", "second − first", "in std uncertainties")
 
 
 def register(desk: Desk) -> None:
@@ -143,22 +145,22 @@ def register(desk: Desk) -> None:
                     found = await off_loop(both, one, other, notes.append)
                 except Exception as error:
                     fitted.clear()
-                    failed("No model can be fitted to both", message(error))
+                    failed("Cannot fit one model to both", message(error))
                     return
                 fitted.clear()
                 _parameters(found[0].model.name, parameters_of(*found))
-                pictures = Pictures(of_both(found))
+                pictures = Pictures(comparison_of(found))
                 for note in dict.fromkeys(notes):
                     with box("note"):
                         words(note, "small")
-            keys["x"] = Key("the next axis", pictures.next_axis)
-            keys["g"] = Key("V, or g", pictures.other_unit)
+            keys["x"] = Key("next axis", pictures.next_axis)
+            keys["g"] = Key("switch between V and g", pictures.other_unit)
 
         ui.timer(0.0, fit, once=True)
 
 
 def _head(first: str, second: str, model: str) -> None:
-    """Which two, by which model, and the other way round."""
+    """The two runs, the model, and a button that swaps the runs."""
 
     def to(one: str, other: str, by: str) -> None:
         given = {"first": one, "second": other, **({"model": by} if by else {})}
@@ -177,7 +179,7 @@ def _head(first: str, second: str, model: str) -> None:
 
 
 def _results(first: str, second: str) -> None:
-    """Those of the runs themselves."""
+    """The results of the runs."""
     words("Results", "title")
     names = [data.partition("/") for data in (first, second)]
     try:
@@ -185,36 +187,36 @@ def _results(first: str, second: str) -> None:
             one, other = (record.run(run) for run, _, _ in names)
         pairs = results_of(one, other, (names[0][2], names[1][2]))
     except Exception as error:
-        failed("Their results cannot be compared", message(error))
+        failed("Cannot compare the results", message(error))
         return
     if pairs:
         table(HEAD, [_row(pair) for pair in pairs])
     else:
-        words("Their procedures gave none in common.", "quiet")
+        words("These runs have no results in common.", "quiet")
 
 
 def _parameters(model: str, pairs: list[Pair]) -> None:
-    """The model's, as a picture and in numbers."""
+    """The parameters of the model, as a picture and in numbers."""
     chart = differences(pairs)
-    title = f"How the parameters of {model} differ"
+    title = f"Differences of the parameters of {model}"
     with div("two beside"):
         with box("picture"):
             words(title, "title")
             plot = ui.plotly(figure(chart, "differences", False)).props(f'aria-label="{title}"')
             plot.style(f"height: {height_px(chart)}px; width: 100%")
-            words("Second less first, with two standard uncertainties each way; ◆ differ beyond that.", "quiet small")
+            words("Second minus first, with ± two standard uncertainties; ◆ differs by more.", "quiet small")
         with box("stack"):
             words(f"Parameters of {model}", "title")
             table(HEAD, [_row(pair) for pair in pairs])
 
 
 def _row(pair: Pair) -> tuple[str, ...]:
-    of = unit(pair.unit)
+    label = unit(pair.unit)
     times = "unknown" if pair.deviations is None else rounded(pair.deviations, 2)
     return (
         pair.name,
-        f"{estimate_text(pair.first, pair.first_std)} {of}",
-        f"{estimate_text(pair.second, pair.second_std)} {of}",
-        f"{estimate_text(pair.difference, pair.std)} {of}",
-        f"{times}{'  ← differ' if pair.differ else ''}",
+        f"{estimate_text(pair.first, pair.first_std)} {label}",
+        f"{estimate_text(pair.second, pair.second_std)} {label}",
+        f"{estimate_text(pair.difference, pair.std)} {label}",
+        f"{times}{'  ← differs' if pair.differ else ''}",
     )

@@ -1,4 +1,4 @@
-"""What the page of a sensor's life is asked. Its address says it by the options of `rig history`."""
+"""Parts of the history page: the request in its address, comparisons, pictures, tables."""
 
 from __future__ import annotations
 
@@ -38,8 +38,11 @@ MODEL = "linear"
 
 
 @dataclass(frozen=True)
-class Asked:
-    """`sensor` "" is none, `quantity` "" the first; `limits` are greatest changes, `at` the day that is asked for."""
+class HistoryRequest:
+    """The request in an address, with the options of `rig history`.
+
+    `sensor` "" means none, `quantity` "" the first one; `limits` are the largest changes; `at` is a day.
+    """
 
     sensor: str = ""
     model: str = MODEL
@@ -50,8 +53,8 @@ class Asked:
 
     @property
     def address(self) -> str:
-        """Of the page; what is as by default is left out."""
-        said = {
+        """The address, without default values."""
+        options = {
             "sensor": self.sensor,
             "model": self.model if self.model != MODEL else "",
             "quantity": self.quantity,
@@ -59,13 +62,13 @@ class Asked:
             "baseline": str(self.baseline) if self.baseline != BASELINE_RUNS else "",
             "at": str(self.at) if str(self.at) != today() else "",
         }
-        given = urlencode({name: value for name, value in said.items() if value}, doseq=True)
-        return f"/history?{given}" if given else "/history"
+        query = urlencode({name: value for name, value in options.items() if value}, doseq=True)
+        return f"/history?{query}" if query else "/history"
 
 
-def asked(query: QueryParams) -> Asked:
-    """What an address asks. Raises RigError."""
-    return Asked(
+def parse_request(query: QueryParams) -> HistoryRequest:
+    """The request of an address. Raises RigError."""
+    return HistoryRequest(
         query.get("sensor", ""),
         query.get("model", "") or MODEL,
         query.get("quantity", ""),
@@ -76,28 +79,28 @@ def asked(query: QueryParams) -> Asked:
 
 
 def day(text: str) -> date:
-    """A day as it is written. Raises RigError."""
+    """The date of a text. Raises RigError."""
     try:
         return date.fromisoformat(text)
     except ValueError:
-        raise RigError(f"{text!r} is no day: write it as {today()}") from None
+        raise RigError(f"{text!r} is not a date: write it like {today()}") from None
 
 
 def _baseline(text: str) -> int:
     if not text.isdecimal() or int(text) < FEWEST_RUNS:
-        raise RigError(f"baseline={text}: write how many calibrations set the charts, {FEWEST_RUNS} at least")
+        raise RigError(f"baseline={text}: give the number of calibrations for the limits, at least {FEWEST_RUNS}")
     return int(text)
 
 
-# Two calibrations beside each other: of two days, with another sensor, of two rigs.
+# Comparison of two calibrations: of two days, with another sensor, of two rigs.
 
 DAYS, SENSOR, RIGS = "two days", "another sensor", "two rigs"
-NOTHING = "There is one calibration, on one rig, and no other sensor in the record: nothing to compare with yet."
-E_N = "U: expanded uncertainty of the difference (k = 2). They agree where E_n, the difference over U, is at most 1."
+NOTHING = "The record has one calibration on one rig and no other sensor, so there is nothing to compare yet."
+E_N = "U: expanded uncertainty of the difference (k = 2). They agree if E_n, the difference divided by U, is at most 1."
 
 
-class Beside:
-    """Asks what to compare with what; `last_of` is the last calibration of another sensor, `model` the one of all."""
+class CompareBox:
+    """Selects and compares two calibrations; `last_of` gives the last calibration of another sensor."""
 
     def __init__(
         self, life: History, sensors: Sequence[str], model: str, last_of: Callable[[str], Calibration]
@@ -121,7 +124,7 @@ class Beside:
         self._fields()
 
     def _fields(self) -> None:
-        """Those of what is chosen."""
+        """Show the fields of the selected kind of comparison."""
         of = self.life.calibrations
         self.fields.clear()
         self.result.clear()
@@ -135,14 +138,14 @@ class Beside:
                 self.two = [_select(name, self.rigs, k) for k, name in enumerate(("One rig", "Another"))]
 
     async def compare(self) -> None:
-        """The difference of every quantity that both have."""
+        """Compare the shared quantities."""
         said = [str(each.value) for each in self.two]
         try:
             found = await off_loop(self._compared, said)
         except Exception as error:
             self.result.clear()
             with self.result:
-                failed("These cannot be compared", message(error))
+                failed("Cannot compare these calibrations", message(error))
             return
         self.result.clear()
         with self.result:
@@ -157,7 +160,7 @@ class Beside:
 
 
 def _show(found: Compared, model: str) -> None:
-    """What the difference is, in numbers; two runs lead to one model fitted to both, in pictures."""
+    """Show a comparison in numbers; two runs have a link to the compare page."""
     apart = [name for name, (_, each) in found.rows.items() if not each.agrees]
     with div("row-of"):
         words("do not agree" if apart else "agree", f"chip {'bad' if apart else 'good'}")
@@ -175,11 +178,11 @@ def _select(name: str, of: Sequence[str], first: int) -> ui.select:
     return ui.select(list(of), label=name, value=of[first]).props("dense options-dense").style("min-width: 130px")
 
 
-# The pictures of a sensor's life: one quantity over time, and its control charts. A click on a point opens its run.
+# Pictures: one quantity over time, and its control charts. A click on a point opens its run.
 
-LIFE = "Its life"
+LIFE = "Calibrations over time"
 CLICKED = "(e) => { const k = e && e.points && e.points[0].customdata; if (k) emit(k) }"
-FEW = "Control charts show from two calibrations on, a drift from three: measure this sensor again."
+FEW = "A control chart needs two calibrations, a drift three: measure this sensor again."
 
 
 def model_of(data: str, model: str) -> str:
@@ -187,8 +190,8 @@ def model_of(data: str, model: str) -> str:
     return f"/?{urlencode({'data': data, 'model': model})}"
 
 
-class LifePictures:
-    """Draws one quantity. `model` is that of the life, to which a point leads."""
+class HistoryPictures:
+    """Pictures of one quantity. A point links to the page of its run with `model`."""
 
     def __init__(self, model: str) -> None:
         self.model = model
@@ -196,7 +199,7 @@ class LifePictures:
             with box("picture wide"):
                 self.title = words(LIFE, "title")
                 self.life = self._plot(LIFE)
-                self.told = words("", "quiet small")
+                self.text_box = words("", "quiet small")
             self.few = box("wide state")
             with self.few:
                 words(FEW, "quiet")
@@ -209,9 +212,9 @@ class LifePictures:
                 self.boxes.append(place)
 
     def show(self, q: Quantity) -> None:
-        """All of them anew."""
+        """Draw all pictures again."""
         redraw(self.life, figure(_bare(life(life_of(q))), f"life {q.name}"))
-        self.told.set_text(_legend(q))
+        self.text_box.set_text(_legend(q))
         self.few.set_visibility(q.chart is None)
         for place in self.boxes:
             place.set_visibility(q.chart is not None)
@@ -230,32 +233,32 @@ class LifePictures:
 
 
 def _bare(panel: Panel) -> Chart:
-    """The panel without its title, which is above the picture."""
+    """The panel without its title, which the page shows above the picture."""
     return one(replace(panel, title="", remark=""))
 
 
 def _legend(q: Quantity) -> str:
-    """What the signs mean that are there."""
-    signs = ["● a calibration, with two standard uncertainties each way"]
+    """The legend of the symbols in the picture."""
+    signs = ["● a calibration, ± two standard uncertainties"]
     if q.chart is not None and q.chart.signals:
-        signs.append("◆ one beyond the limits of a chart")
+        signs.append("◆ outside the limits of a control chart")
     if q.line is None:
-        signs.append("a drift shows from three calibrations on, at different times")
+        signs.append("a drift needs three calibrations at different times")
     else:
-        signs.append("line and band: the drift, and the 95 % interval of the value then")
+        signs.append("line and band: drift, with 95 % interval of the value")
     if q.allowed is not None:
-        signs.append("broken lines: what is allowed")
-    return f"{'; '.join(signs)}. A click on a point opens its model."
+        signs.append("broken lines: limits")
+    return f"{'; '.join(signs)}. Click on a point to open its model."
 
 
-# What the page of a sensor's life says: how it stands, which calibration is closest to a day, and the tables.
+# Summary, the calibration closest to a day, and the tables.
 
-LIMIT_IS_GIVEN = "the greatest change, in its field above"
+LIMIT_IS_GIVEN = "the largest change, in the field above"
 OUT = "out of control"
 
 
-def standing(found: History, q: Quantity) -> None:
-    """When the next calibration is due, what is out of control, and the numbers of the quantity that is shown."""
+def summary_of(found: History, q: Quantity) -> None:
+    """The date of the next calibration, quantities out of control, and numbers of the shown quantity."""
     out = [each.name for each in found.quantities if each.chart is not None and each.chart.verdict == OUT]
     overdue = found.due is not None and str(found.due) < today()
     good = found.due is not None and not out and not overdue
@@ -275,45 +278,45 @@ def standing(found: History, q: Quantity) -> None:
                     words(f"{what}, {q.name}", "quiet small")
 
 
-class Closest:
-    """The calibration closest to a day, and whether it is stale then."""
+class ClosestBox:
+    """The calibration closest to a day, with a warning if it is stale."""
 
-    def __init__(self, wanted: Asked, changed: Callable[[], None]) -> None:
-        self.model = wanted.model
+    def __init__(self, request: HistoryRequest, changed: Callable[[], None]) -> None:
+        self.model = request.model
         with box("stack"):
             words("Closest to a day", "title")
-            self.input = ui.date_input("Day", value=str(wanted.at), on_change=changed).props("dense debounce=300")
-            self.told = div("stack").props("role=status")
+            self.input = ui.date_input("Day", value=str(request.at), on_change=changed).props("dense debounce=300")
+            self.text_box = div("stack").props("role=status")
 
     @property
     def day(self) -> date | None:
-        """None while it is being written."""
+        """The date in the field; None while it is incomplete."""
         try:
             return day(str(self.input.value))
         except RigError:
             return None
 
     def focus(self) -> None:
-        """Write a day."""
+        """Move the focus to the field."""
         self.input.run_method("focus")
 
     def show(self, found: History) -> None:
-        """By the limits as they are."""
-        self.told.clear()
+        """Show the closest calibration with the present limits."""
+        self.text_box.clear()
         if self.day is None:
             return
         calibration, age_days = closest(found.calibrations, self.day)
         why = stale(found, calibration, age_days)
-        with self.told:
+        with self.text_box:
             words(near(calibration, age_days, self.day), "small")
             if why is not None:
                 with box("note"):
                     words(for_page(but_stale(why)), "small")
-            ui.link("Its model", model_of(calibration.data, self.model)).classes("small")
+            ui.link("Open its model", model_of(calibration.data, self.model)).classes("small")
 
 
 def quantities_table(found: History) -> None:
-    """Every quantity: its last value, drift, scatter, charts, limits, due date."""
+    """Table of quantities: last value, drift, scatter, control charts, limits, due date."""
     head = ("quantity", "last", "drift a year", "scatter", "control charts", "allowed", "due")
     with box("stack wide-table"):
         words("All quantities", "title")
@@ -321,7 +324,7 @@ def quantities_table(found: History) -> None:
 
 
 def calibrations_table(found: History, model: str) -> None:
-    """Every calibration: its run, which leads to its model, its rig, its values."""
+    """Table of calibrations: run with a link to its model, rig, values."""
     titles = [f"{q.name} ({unit(q.unit)})" if q.unit != "1" else q.name for q in found.quantities]
     with box("stack wide-table"):
         words("All calibrations", "title")

@@ -1,4 +1,4 @@
-"""Model: see where it fails, click the missing effect, watch the error fall."""
+"""Model page: where the model fails, the missing effect, the error after each step."""
 
 from __future__ import annotations
 
@@ -35,20 +35,20 @@ def register(desk: Desk) -> None:
 
 
 class Workbench:
-    """One open page: data, the model that grows on it, pictures, and what is missing."""
+    """One open page: data, model session, pictures, candidates."""
 
     def __init__(self, desk: Desk, data: str, model: str) -> None:
         self.desk, self.data, self.model = desk, data, model
         self.session: ModelSession | None = None
         self.search = Counted({})
-        self.turn = 0  # answers to questions that were asked before the last one are let go
+        self.turn = 0  # results of older requests are ignored
         self.diagnoses: dict[tuple[str, ...], Diagnosis[Any]] = {}
 
     def build(self) -> None:
-        """The page, laid out; what takes long is asked for as soon as the browser shows it."""
+        """Build the page; long computations start when the browser shows it."""
         try:
             self.data = self.data or _newest()
-        except RecordError as error:  # such as a lab that is away
+        except RecordError as error:  # for example a lab that does not answer
             with frame(self.desk, "/"):
                 failed("The record cannot be read", message(error))
             return
@@ -67,42 +67,42 @@ class Workbench:
         ui.timer(0.0, self.open, once=True)
 
     def _lay_out(self, form: str) -> None:
-        """The places of pictures and candidates, as the kind of data wants them."""
+        """Place pictures and candidates for the kind of data."""
         self.analysis.clear()
         with self.analysis:
             rows = form == "rows"
-            self.pictures: Pictures | NoisePictures = Pictures(self._leaving_out()) if rows else NoisePictures()
+            self.pictures: Pictures | NoisePictures = Pictures(self._exclude_dialog()) if rows else NoisePictures()
             self.missing = Missing(self, own=rows)
-        self.keys["a"] = Key("add the effect that is looked at", self.missing.add_shown)
+        self.keys["a"] = Key("add the shown effect", self.missing.add_shown)
         self.keys["u"] = Key("undo the last effect", self.undo)
-        self.keys["x"] = Key("the next axis", self.pictures.next_axis)
-        self.keys["g"] = Key("V, or g", self.pictures.other_unit)
-        self.keys["l"] = Key("leave out what is selected", self.pictures.leave_selected)
-        self.keys["Escape"] = Key("select nothing", partial(self.pictures.select, []))
+        self.keys["x"] = Key("next axis", self.pictures.next_axis)
+        self.keys["g"] = Key("switch between V and g", self.pictures.other_unit)
+        self.keys["l"] = Key("exclude the selected poses", self.pictures.leave_selected)
+        self.keys["Escape"] = Key("clear the selection", partial(self.pictures.select, []))
 
-    def _leaving_out(self) -> Callable[[Sequence[int]], None] | None:
-        """What asks why selected poses are to be left out; None where the data are no run of the rig."""
+    def _exclude_dialog(self) -> Callable[[Sequence[int]], None] | None:
+        """The dialog that excludes selected poses; None for data that are not a run of the rig."""
         return partial(run_record.ask, self.data, done=self.afresh) if numbered_run(self.data) else None
 
     def afresh(self) -> None:
-        """Read the data again, which have changed."""
+        """Read the changed data again."""
         self.desk.forget(self.data)
         self.go(self.data, self.model)
 
     def go(self, data: str, model: str) -> None:
-        """Another address: data and model are part of it, so that it can be kept and passed on."""
+        """Go to the address of data and model."""
         given = {name: value for name, value in (("data", data), ("model", model)) if value}
         ui.navigate.to(f"/?{urlencode(given)}" if given else "/")
 
     async def open(self) -> None:
-        """Read the data, fit the model, and show how far it had grown."""
+        """Read the data, fit the model, and show the session."""
         self.verdict.wait(f"Reading {self.data} and fitting the model")
         try:
             session = await off_loop(self.desk.open, self.data, self.model)
         except Exception as error:
             self.body.clear()
             with self.body:
-                failed(f"{self.data} cannot be looked at with this model", message(error))
+                failed(f"Cannot use this model with {self.data}", message(error))
             return
         self._lay_out(session.data.form)
         self.chosen.opened(session)
@@ -110,12 +110,12 @@ class Workbench:
             with self.notes, box("note"):
                 words(note, "small")
         if found := run_record.left_out(self.data):
-            with self.notes, ui.expansion(f"{len(found)} left out of every analysis").props("dense").classes("box"):
+            with self.notes, ui.expansion(f"{len(found)} excluded from every analysis").props("dense").classes("box"):
                 run_record.listed(self.data, self.afresh)
         await self.show(session)
 
     async def show(self, session: ModelSession) -> None:
-        """Pictures and error of the model as it is now; then, when it is found, what it misses."""
+        """Show pictures and error of the present model, then its missing effects."""
         self.turn += 1
         turn = self.turn
         self.session = session
@@ -129,12 +129,12 @@ class Workbench:
         await self._diagnose(session, turn)
 
     async def _diagnose(self, session: ModelSession, turn: int) -> None:
-        self.search.cancelled = True  # the one before, which nobody waits for any more
+        self.search.cancelled = True  # the result of the previous search is not needed
         key = session.names
         if key not in self.diagnoses:
             self.search = Counted(session.effects)
             self.missing.wait(self.search)
-            self.verdict.wait("Looking for what is missing")
+            self.verdict.wait("Searching for missing effects")
             try:
                 self.diagnoses[key] = await off_loop(session.among(self.search).diagnosed)
             except Cancelled:
@@ -148,26 +148,26 @@ class Workbench:
             await self.missing.show(self.diagnoses[key])
 
     def cancel(self) -> None:
-        """Wait no longer for what is missing."""
+        """Cancel the search for missing effects."""
         self.turn += 1
         self.search.cancelled = True
         self.verdict.cancelled()
         self.missing.cancelled()
 
     async def again(self) -> None:
-        """Look for what is missing after all."""
+        """Start the cancelled search again."""
         if self.session is not None:
             await self._diagnose(self.session, self.turn)
 
     async def add(self, step: Step[Any]) -> None:
-        """The model gains an effect."""
+        """Add an effect to the model."""
         if self.session is not None:
             if (effect := step.after.model.terms[-1].effect).expression:
                 self.session = self.session.among({**self.session.effects, effect.name: effect})
             await self.show(self.session.with_step(step))
 
     async def undo(self) -> None:
-        """The last effect is taken back."""
+        """Remove the last effect."""
         if self.session is not None and self.session.steps:
             last = self.session.steps[-1].name
             self.diagnoses = {key: found for key, found in self.diagnoses.items() if last not in key}
@@ -175,21 +175,21 @@ class Workbench:
 
 
 def _nothing() -> None:
-    """The empty record, and the way on."""
+    """The page of an empty record."""
     why = (
-        "Measure on the rig, which is simulated until you name your instruments; or open a table of your own with the "
+        "Measure on the rig (simulated, until a bench file names your instruments), or open your own table in the "
         "field above."
     )
-    with state("Nothing is measured yet", why):
+    with state("There are no measurements yet", why):
         ui.button("Measure", icon="play_arrow", on_click=lambda: ui.navigate.to("/run?procedure=sweep"))
 
 
 def _newest() -> str:
-    """The newest run of one sensor; "" where there is none."""
+    """The newest run of one sensor; "" without one."""
     return next((run.run for run in runs() if run.rows and not run.bench.get("sensors")), "")
 
 
-# The verdict: one sentence, and the numbers that it rests on.
+# The verdict: one sentence and its numbers.
 
 
 LOOKS = {
@@ -203,7 +203,7 @@ MOST_PLACES = 3
 
 
 class VerdictBox:
-    """The head of the page: the verdict and its numbers."""
+    """The box with the verdict and its numbers."""
 
     def __init__(self) -> None:
         with box("verdict").props("role=status aria-live=polite") as self.box:
@@ -215,7 +215,7 @@ class VerdictBox:
             self.numbers = div("row-of numbers")
 
     def error(self, compared: Comparison[Any], session: ModelSession) -> None:
-        """How large the error is, and where it is largest: known before anything is diagnosed."""
+        """Show the error and where it is largest, before the diagnosis."""
         self.numbers.clear()
         with self.numbers:
             for name, value in session.data.figures(compared.fit).items():
@@ -225,31 +225,31 @@ class VerdictBox:
         self._show(_failing(compared))
 
     def wait(self, what: str) -> None:
-        """The verdict is on its way."""
+        """Show that the verdict is not known yet."""
         self.headline.set_text(f"{what} ...")
         self.box.classes(remove="good bad doubt")
 
     def found(self, result: Diagnosis[Any]) -> None:
-        """The verdict."""
+        """Show the verdict."""
         self.headline.set_text(for_page(result.judgement.text))
         if result.caution:
-            self._show(f"But {result.caution}. {self.detail.text}")
+            self._show(f"Caution: {result.caution}. {self.detail.text}")
         self.box.classes(remove="good bad doubt", add=LOOKS[result.verdict])
 
     def cancelled(self) -> None:
-        """The search was cancelled."""
+        """Show that the search was cancelled."""
         self.headline.set_text("Not diagnosed")
         self.box.classes(remove="good bad doubt")
 
     def _show(self, text: str) -> None:
-        """A line; all of it when it is pointed at."""
+        """Show a line, with the complete text as a tooltip."""
         self.detail.set_text(for_page(text))
         self.whole.set_text(self.detail.text)
 
 
 def _failing(compared: Comparison[Any]) -> str:
-    """The data, and the places where the model fails."""
+    """The data and the places where the model fails."""
     places = "; ".join(place.text for place in compared.fails[:MOST_PLACES])
     what = f"{compared.fit.model.name} on {compared.data.description}"
-    text = f"{what}. Fails: {places}." if places else f"{what}. No place stands out."
+    text = f"{what}. Fails: {places}." if places else f"{what}. No place fails."
     return " ".join(filter(None, (text, compared.data.note)))

@@ -1,4 +1,4 @@
-"""The head of the page Model: which data, which model; undo, save, report."""
+"""The head of the model page: data, model, undo, save, report."""
 
 from __future__ import annotations
 
@@ -21,26 +21,26 @@ MOST_BYTES = 200_000_000
 
 
 class Choice:
-    """Selects data and model by going to their address; acts on the model that is there."""
+    """Fields for data and model, and buttons for the present model."""
 
     def __init__(self, page: Workbench) -> None:
         self.page = page
         with box("chosen"):
-            self.data = ui.input("Data: a run, or a file's path", value=page.data).classes("data").props("dense")
-            self.data.on("keydown.enter", lambda: self._chose(str(self.data.value).strip(), page.model))
+            self.data = ui.input("Data: a run, or the path of a file", value=page.data).classes("data").props("dense")
+            self.data.on("keydown.enter", lambda: self._open(str(self.data.value).strip(), page.model))
             with self.data.add_slot("append"):
                 ui.button(icon="arrow_drop_down").props("flat dense round aria-label='Runs of the record'")
                 with ui.menu(), ui.element("div").classes("runs"):
                     for run, label in _runs().items():
-                        ui.menu_item(label, on_click=lambda run=run: self._chose(run, page.model))
+                        ui.menu_item(label, on_click=lambda run=run: self._open(run, page.model))
             self.model = ui.select(
                 models(page.model),
                 label="Model",
                 value=page.model,
-                on_change=lambda e: self._chose(page.data, e.value),
+                on_change=lambda e: self._open(page.data, e.value),
             ).props("dense options-dense")
             ui.button(icon="upload_file", on_click=self._ask_file).props("flat dense aria-label='Open a file'").tooltip(
-                "Open a file of this computer"
+                "Open a file from this computer"
             )
             ui.button(icon="refresh", on_click=page.afresh).props("flat dense aria-label='Read again'").tooltip(
                 "Read the data again"
@@ -51,20 +51,20 @@ class Choice:
         for button in (self.undo, self.save, self.report):
             button.disable()
 
-    def _chose(self, data: str | None, model: str | None) -> None:
+    def _open(self, data: str | None, model: str | None) -> None:
         if (data or "", model or "") != (self.page.data, self.page.model):
             self.page.go(data or "", model or "")
 
     def opened(self, session: ModelSession) -> None:
-        """What lies open has a name, even where the address has none."""
+        """Show the names of the open data and model, also if the address has none."""
         self.data.set_value(self.page.data)
         if not self.page.model:
-            self.model.set_options(models(default=f"{session.model.name} (by default)"), value="")
+            self.model.set_options(models(default=f"{session.model.name} (default)"), value="")
         self.save.enable()
         self.report.enable()
 
     def grown(self, session: ModelSession) -> None:
-        """Undo is there as soon as there is something to undo."""
+        """Enable Undo if the session has steps."""
         self.undo.set_enabled(bool(session.steps))
         self.undo.set_text(f"Undo {session.steps[-1].name}" if session.steps else "Undo")
 
@@ -84,11 +84,11 @@ class Choice:
         self.page.go(str(path), "")
 
     def _ask_name(self) -> None:
-        """A name for the model; the file is then there for this page and for the command line."""
+        """Ask for a name and save the model for pages and command line."""
         with ui.dialog() as dialog, ui.card().style("min-width: 420px"):
-            words("Save the model as it is now", "title")
+            words("Save the present model", "title")
             name = ui.input("Name", value="complete").props("autofocus").classes("grow")
-            where = words(f"It is written to {home() / MODELS}.", "quiet small")
+            where = words(f"Folder: {home() / MODELS}", "quiet small")
 
             def save() -> None:
                 try:
@@ -125,12 +125,12 @@ class Choice:
         return path
 
     async def _report(self) -> None:
-        """The report of `rig report`, as a file of the browser's."""
+        """Download the report, as from `rig report`."""
         from rig.services.report import reported
         from rig.services.request import Request
 
         page, session = self.page, self.page.session
-        hint = ui.notification("Making the report: all pictures, all candidates", spinner=True, timeout=None)
+        hint = ui.notification("Making the report", spinner=True, timeout=None)
         try:
             notes: list[str] = []
             _, made = await off_loop(

@@ -1,4 +1,4 @@
-"""What is missing: the candidates as cards, the next experiment, what is left unexplained, an effect of one's own."""
+"""Missing effects on the model page: candidates, next experiment, and an effect of your own."""
 
 from __future__ import annotations
 
@@ -21,35 +21,35 @@ if TYPE_CHECKING:
     from rig.web.parts import Counted
 
 
-FIRST = 6  # cards that are shown at once
+FIRST = 6  # cards without unfolding the rest
 PROGRESS_S = 0.15
 
 
 class Missing:
-    """The side of the page on which a person decides."""
+    """The candidates, with buttons to add them."""
 
     def __init__(self, page: Workbench, own: bool) -> None:
         self.page = page
         self.looked_at: Candidate | None = None
         self.tried: dict[str, Step[Any]] = {}
         with div("side"):
-            words("What is missing", "title")
+            words("Missing effects", "title")
             self.cards = div("stack")
             self.own = Own(page)
         self.own.box.set_visibility(own)
 
     @property
     def unit(self) -> str:
-        """Of the outputs."""
+        """Unit of the outputs."""
         return self.page.session.unit if self.page.session is not None else ""
 
     def wait(self, counted: Counted) -> None:
-        """A search is on its way: how far it is."""
+        """Show the progress of the search."""
         self.cards.clear()
         self.own.begin()
         with self.cards, box():
             hint = waiting(counted.text)
-            bar = ui.linear_progress(0.0, show_value=False).props("aria-label='share of the round'")
+            bar = ui.linear_progress(0.0, show_value=False).props("aria-label='progress of the round'")
 
             def tell() -> None:
                 hint.set_text(counted.text)
@@ -61,11 +61,11 @@ class Missing:
                 ui.skeleton(height="58px").style("margin-top: 8px")
 
     def cancelled(self) -> None:
-        """Nobody wanted to wait; an effect of one's own can be tried all the same."""
+        """The search was cancelled; an effect of your own can still be tested."""
         self.cards.clear()
         with self.cards, box("stack"):
             words("The search was cancelled.", "quiet")
-            ui.button("Look for what is missing", icon="search", on_click=self.page.again).props("dense outline")
+            ui.button("Search for missing effects", icon="search", on_click=self.page.again).props("dense outline")
 
     def fail(self, why: str) -> None:
         """The search ended in an error."""
@@ -74,7 +74,7 @@ class Missing:
             failed("The search for effects failed", why)
 
     async def show(self, result: Diagnosis[Any]) -> None:
-        """The candidates, best first; the best is looked at where there is one to add."""
+        """Show the candidates, best first, and the curve of the best if an effect is missing."""
         self.cards.clear()
         self.tried, self.looked_at = {}, None
         self.own.begin(result.pattern if result.verdict is Verdict.UNEXPLAINED else None)
@@ -107,12 +107,12 @@ class Missing:
                 Card(self, c, result, best=False)
 
     async def _next(self, result: Diagnosis[Any]) -> None:
-        """The experiment that would tell, planned on the bench."""
+        """The next experiment, planned on the bench."""
         page, notes = self.page, list[str]()
         assert page.session is not None  # noqa: S101 a diagnosis is of a trail
         with box("note"):
             words("Next experiment", "title")
-            hint = waiting("Planning it on the bench")
+            hint = waiting("Planning on the bench")
         try:
             found = await off_loop(page.session.with_next, result, notes.append)
             experiment = found.next_experiment
@@ -121,7 +121,9 @@ class Missing:
             given = {name: _written(value) for name, value in experiment.settings.items()}
             to = f"/run?{urlencode({'procedure': experiment.procedure, **given})}"
             with hint.parent_slot.parent:  # type: ignore[union-attr]
-                ui.button("Prepare it", icon="science", on_click=lambda: ui.navigate.to(to)).props("outline dense")
+                ui.button("Prepare this run", icon="science", on_click=lambda: ui.navigate.to(to)).props(
+                    "outline dense"
+                )
         except Exception as error:
             hint.set_text(message(error))
 
@@ -133,7 +135,7 @@ class Missing:
             self.page.pictures.consider(step)
 
     async def step_of(self, c: Candidate) -> Step[Any] | None:
-        """The candidate fitted in full; None where that fails, which is told."""
+        """The complete fit of a candidate; None if it fails, with a message."""
         session = self.page.session
         if c.name not in self.tried and session is not None:
             try:
@@ -143,19 +145,19 @@ class Missing:
         return self.tried.get(c.name)
 
     async def add_shown(self) -> None:
-        """Add what is looked at."""
+        """Add the shown candidate."""
         if self.looked_at is not None:
             await self.add(self.looked_at)
 
     async def add(self, c: Candidate) -> None:
-        """The model gains this effect."""
+        """Add this effect to the model."""
         step = await self.step_of(c)
         if step is not None:
             await self.page.add(step)
 
 
 class Card:
-    """One candidate: what it is, what it does to the error, and the button that adds it."""
+    """One candidate: description, error before and after, and the button to add it."""
 
     def __init__(self, side: Missing, c: Candidate, result: Diagnosis[Any], best: bool) -> None:
         self.side, self.c = side, c
@@ -168,12 +170,12 @@ class Card:
             self.body = div("body")
             self.body.set_visibility(False)
             with self.body:
-                self._told(result)
+                self._describe(result)
                 with div("row-of"):
                     ui.button(f"Add {c.name}", icon="add", on_click=lambda: side.add(c)).props("dense unelevated")
-                    ui.button("Show its curve", on_click=lambda: side.look_at(c)).props("dense flat")
+                    ui.button("Show the curve", on_click=lambda: side.look_at(c)).props("dense flat")
 
-    def _told(self, result: Diagnosis[Any]) -> None:
+    def _describe(self, result: Diagnosis[Any]) -> None:
         c = self.c
         words(capital(c.effect.summary))
         words(formula(c.effect.formula, self.side.unit), "formula")
@@ -185,19 +187,19 @@ class Card:
                 "Symptom": capital(c.effect.symptom),
                 **result.findings.data.facts(c, result),
                 "Probability": chances(c),
-                "Cannot be told from": rivals or "nothing in the catalogue",
+                "Cannot be separated from": rivals or "nothing in the catalogue",
                 "Source": c.effect.source or "–",
             }
         )
 
     async def open(self) -> None:
-        """Unfold the card, and draw the candidate's curve."""
+        """Unfold the card and draw the curve."""
         self.body.set_visibility(True)
         self.head.props("aria-expanded=true")
         await self.side.look_at(self.c)
 
     async def toggle(self) -> None:
-        """Unfold or fold."""
+        """Unfold or fold the card."""
         if self.body.visible:
             self.body.set_visibility(False)
             self.head.props("aria-expanded=false")
@@ -211,13 +213,13 @@ def _written(value: object) -> str:
 
 
 def chances(c: Candidate) -> str:
-    """The probability of a candidate, and the chance of so large a gain where nothing is missing."""
-    beyond = "" if c.p_value < SIGNIFICANT else ", which is not significant"
-    return f"{share(c.probability)}; by chance {probability(c.p_value)}{beyond}"
+    """The probability of a candidate, and the p-value of its gain."""
+    beyond = "" if c.p_value < SIGNIFICANT else ", not significant"
+    return f"{share(c.probability)}; p = {probability(c.p_value)}{beyond}"
 
 
 def share(probability: float) -> str:
-    """A probability, which is only approximate: neither certain nor impossible."""
+    """An approximate probability in words: never 0 or 100 %."""
     for limit, text in ((0.999, "above 99.9 %"), (0.99, "above 99 %")):
         if probability > limit:
             return text
@@ -225,14 +227,13 @@ def share(probability: float) -> str:
 
 
 def formula(text: str, unit: str) -> str:
-    """A formula with the data's unit; a remark beside it comes in a line of its own, as a card is narrow."""
+    """A formula with the unit of the data; a remark gets its own line, because the card is narrow."""
     return re.sub(r" {3,}", "\n", text.replace("{out}", unit)).replace("\n\n", "\n")
 
 
-# An effect of one's own: a line of arithmetic, tried as it is written, with its faults pointed at.
+# An effect of your own: an expression, tested as you type, with its errors.
 
 
-PAUSE_S = 0.35  # without a keystroke, before what is written is tried
 HELP = (
     "alpha, beta (rad), alpha_deg, beta_deg, ax ay az (g), t (s), temperature (°C), supply (V), direction, any other "
     "column; every other name is a parameter. Before +=: v, vx, vy, vz, alpha_deg or beta_deg."
@@ -240,59 +241,59 @@ HELP = (
 
 
 class Own:
-    """The field, its preview and its errors."""
+    """Field, preview and errors of an expression."""
 
     def __init__(self, page: Workbench) -> None:
-        self.page, self.asked = page, 0
+        self.page, self.turn = page, 0
         self.step: Step[Any] | None = None
         with box("own") as self.box:
-            words("An effect of your own", "title")
+            words("Your own effect", "title")
             self.hint = words("", "quiet small")
             self.text = ui.input("Expression, such as a*sin(5*beta) + b*cos(5*beta)").props("dense debounce=350")
             self.text.classes("formula").on_value_change(self.tries)
             self.name = ui.input("Name", value="my-effect", on_change=self.tries).props("dense debounce=350")
-            self.said = words("", "fault")
+            self.fault = words("", "fault")
             self.fall = words("", "fall small")
             with ui.element("div").classes("row-of"):
-                self.add = ui.button("Add it", icon="add", on_click=self._add).props("dense unelevated")
-                with ui.button(icon="help_outline").props("flat round dense aria-label='What can be written'"):
+                self.add = ui.button("Add effect", icon="add", on_click=self._add).props("dense unelevated")
+                with ui.button(icon="help_outline").props("flat round dense aria-label='Names in an expression'"):
                     ui.tooltip(HELP).props("max-width=360px")
         self.add.disable()
 
     def begin(self, pattern: Pattern | None = None) -> None:
-        """A new state of the model; what is left unexplained proposes itself as an expression."""
-        self.step, self.asked = None, self.asked + 1
+        """Start with a new state of the model; an unexplained pattern is the proposal."""
+        self.step, self.turn = None, self.turn + 1
         self.add.disable()
-        self.said.set_text("")
+        self.fault.set_text("")
         self.fall.set_text("")
         proposed = pattern is not None and bool(pattern.expression)
         self.box.classes(add="proposed" if proposed else "", remove="" if proposed else "proposed")
-        self.hint.set_text("What is left looks like this; try it, or write something better." if proposed else "")
+        self.hint.set_text("This expression fits the remaining error. Test it, or write another." if proposed else "")
         self.text.set_value(pattern.expression if pattern is not None and proposed else "")
         if pattern is not None and proposed:
             self.name.set_value(pattern.name)
 
     async def tries(self) -> None:
-        """Fit what is written, and show its curve and what it does to the error; or where it is wrong."""
-        self.asked += 1
-        asked, text, session = self.asked, str(self.text.value or "").strip(), self.page.session
+        """Fit the expression and show its curve and the error, or the place of a mistake."""
+        self.turn += 1
+        turn, text, session = self.turn, str(self.text.value or "").strip(), self.page.session
         self.step = None
         self.add.disable()
-        self.said.set_text("")
+        self.fault.set_text("")
         self.fall.set_text("")
         if not text or session is None:
             return
-        self.fall.set_text("trying ...")
+        self.fall.set_text("fitting ...")
         try:
             effect = session.written(str(self.name.value or "").strip(), text)
             step = await off_loop(session.tried, effect)
             unseen = await off_loop(lambda: step.after.held_out_excess)
         except Exception as error:
-            if asked == self.asked:
+            if turn == self.turn:
                 self.fall.set_text("")
-                self.said.set_text(message(error))
+                self.fault.set_text(message(error))
             return
-        if asked == self.asked:
+        if turn == self.turn:
             self._preview(step, unseen)
 
     def _preview(self, step: Step[Any], unseen: float) -> None:

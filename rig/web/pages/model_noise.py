@@ -1,5 +1,4 @@
-"""The five pictures of the page Model of a still record: Allan deviation, spectrum, where they fail, the fall,
-and the record over time."""
+"""The pictures of the model page for a still record: Allan deviation, spectrum, ratio, error by model, record."""
 
 from __future__ import annotations
 
@@ -39,7 +38,7 @@ TITLES = {
 
 
 class NoisePictures:
-    """Draws a noise model beside its record, one axis at a time."""
+    """Pictures of a noise model and its record, one axis at a time."""
 
     def __init__(self) -> None:
         self.compared: Comparison[NoiseFit] | None = None
@@ -51,7 +50,7 @@ class NoisePictures:
                 self.unit = ui.toggle({False: "V"}, value=False, on_change=self.draw).props("dense no-caps")
                 self.considered = ui.button(icon="close", on_click=lambda: self.consider(None)).props("flat dense")
                 self.considered.set_visibility(False)
-                words("Draw a box in a picture to zoom into it; a double click zooms out.", "told quiet small")
+                words("Drag a box in a picture to zoom in; double-click to zoom out.", "told quiet small")
             self.plots: dict[str, ui.plotly] = {}
             for name, title in TITLES.items():
                 with box("picture wide" if name == "record" else "picture"):
@@ -60,7 +59,7 @@ class NoisePictures:
                     self.plots[name] = plot.props(f'aria-label="{title}"')
 
     def show(self, compared: Comparison[NoiseFit], session: ModelSession) -> None:
-        """A new fit."""
+        """Show a new fit."""
         self.compared, self.session, self.step = compared, session, None
         axes = dict(enumerate(compared.fit.still.axes))
         self.axis.set_options(axes, value=min(int(self.axis.value or 0), len(axes) - 1))
@@ -71,14 +70,14 @@ class NoisePictures:
         self.draw()
 
     def consider(self, step: Step[NoiseFit] | None) -> None:
-        """Draw what the model would be with an effect; None takes it away."""
+        """Also draw the model with one more effect; None removes it."""
         self.step = step
         self.considered.set_visibility(step is not None)
         self.considered.set_text("" if step is None else f"with {step.name}")
         self.draw()
 
     def draw(self) -> None:
-        """All pictures anew."""
+        """Draw all pictures again."""
         if self.compared is None or self.session is None:
             return
         c, still = int(self.axis.value or 0), self.compared.fit.still
@@ -99,17 +98,17 @@ class NoisePictures:
         redraw(self.plots["waterfall"], figure(steps_chart(self.session.start, self.session.steps), "waterfall", False))
 
     def next_axis(self) -> None:
-        """The next channel."""
+        """Select the next channel."""
         if self.compared is not None:
             self.axis.set_value((int(self.axis.value or 0) + 1) % len(self.compared.fit.channels))
 
     def other_unit(self) -> None:
-        """V to g, or back, where the scale factor is known."""
+        """Switch between V and g, if the scale factor is known."""
         if len(self.unit.options) > 1:
             self.unit.set_value(not self.unit.value)
 
     def select(self, points: Sequence[int]) -> None:
-        """Averaging times have no poses to be selected."""
+        """No effect: averaging times are not poses."""
 
     def leave_selected(self) -> None:
-        """Nor left out."""
+        """No effect: averaging times cannot be excluded."""

@@ -1,4 +1,4 @@
-"""The four pictures of the page Model, linked: what is selected in one is selected in all."""
+"""The four pictures of the model page: a selection in one appears in all."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from calibrations.fit import Fit
     from rig.services.session import ModelSession
 
-LONG = 4  # letters of a channel's name
+LONG = 4  # letters in a channel name
 LINKED = ("measurement", "residual", "failure")
 TITLES = {
     "measurement": "Measurement and model",
@@ -29,17 +29,17 @@ TITLES = {
     "failure": "Residual pattern",
     "waterfall": "Error by model",
 }
-FOLLOWED = "followed"  # the column that a candidate's curve follows
+FOLLOWED = "followed"  # the column against which the curve of a candidate is drawn
 POINTS = (
     "(e) => { if (e && e.points) emit(e.points.map(p => p.customdata).filter(k => k !== undefined && k !== null)) }"
 )
 
 
 class Pictures:
-    """Draws a fit; knows what it is drawn against, in which unit, and which rows are selected."""
+    """Pictures of a fit: axis, unit, column and selected rows."""
 
     def __init__(self, leave_out: Callable[[Sequence[int]], None] | None) -> None:
-        """`leave_out` is told the numbers of the rows that are selected; None where they can be left out by nobody."""
+        """`leave_out` receives the numbers of selected rows; None if they cannot be excluded."""
         self.leave_out = leave_out
         self.fit: Fit | None = None
         self.session: ModelSession | None = None
@@ -59,15 +59,15 @@ class Pictures:
             self.unit = ui.toggle({False: "V", True: "g"}, value=False, on_change=self.draw).props("dense no-caps")
             self.x = self._column("against")
             self.colour = self._column("coloured by")
-            self.told = words("", "told quiet small")
-            self.clear = ui.button("Select nothing", on_click=lambda: self.select([])).props("flat dense")
-            self.leave = ui.button("Leave out", icon="block", on_click=self.leave_selected).props("flat dense")
+            self.hint = words("", "told quiet small")
+            self.clear = ui.button("Clear selection", on_click=lambda: self.select([])).props("flat dense")
+            self.leave = ui.button("Exclude", icon="block", on_click=self.leave_selected).props("flat dense")
             for button in (self.clear, self.leave):
                 button.set_visibility(False)
 
     def _column(self, label: str) -> ui.select:
         picked = ui.select({}, label=label, on_change=self.draw).style("min-width: 150px")
-        return picked.props("dense options-dense stack-label")  # a label that floats up late lies over the value
+        return picked.props("dense options-dense stack-label")  # a label that floats up late covers the value
 
     def _picture(self, name: str) -> None:
         with box("picture"):
@@ -86,13 +86,13 @@ class Pictures:
             plot.on("plotly_deselect", lambda: self.select([]), js_handler="() => emit()")
 
     def show(self, compared: Comparison[Fit], session: ModelSession) -> None:
-        """A new fit: what was chosen stays chosen where it can."""
+        """Show a new fit; selections stay if possible."""
         fit = compared.fit
         if self.fit is None or self.fit.table.n != fit.table.n:
             self.selected = []
         self.fit, self.session, self.step = fit, session, None
         self.columns = choices(fit)
-        self.falling.set_text(f"{TITLES['waterfall']}; ◆ on {fit.table.type.rows} that the fit did not see")
+        self.falling.set_text(f"{TITLES['waterfall']}; ◆ on {fit.table.type.rows} not used in the fit")
         x, colour = first_choices(list(self.columns))
         self._offer(fit.channels)
         self.unit.set_options(residual_units(fit), value=fit.table.type.magnitude or bool(self.unit.value))
@@ -104,7 +104,7 @@ class Pictures:
         self.draw()
 
     def _offer(self, channels: Sequence[str]) -> None:
-        """The channels: buttons where their names are short, else a list."""
+        """Offer the channels: buttons for short names, else a list."""
         value = min(self.c, len(channels) - 1)
         if max(map(len, channels)) > LONG and isinstance(self.axis, ui.toggle):
             with self.axis.parent_slot.parent:  # type: ignore[union-attr] # it has a place
@@ -116,7 +116,7 @@ class Pictures:
         self.axis.set_visibility(len(channels) > 1)
 
     def consider(self, step: Step[Fit] | None) -> None:
-        """Draw the curve of an effect through the residual, against what it follows; None takes it away."""
+        """Draw the curve of an effect in the residual against its column; None removes it."""
         self.step = step
         self.columns.pop(FOLLOWED, None)
         if step is not None:
@@ -134,17 +134,17 @@ class Pictures:
 
     @property
     def c(self) -> int:
-        """The channel that is shown."""
+        """The shown channel."""
         return int(self.axis.value or 0)
 
     @property
     def shown(self) -> Shown:
-        """The rows as they are drawn."""
+        """The drawn rows."""
         assert self.fit is not None  # noqa: S101 nothing is drawn before there is a fit
         return Shown(self.fit, min(self.c, len(self.fit.channels) - 1), bool(self.unit.value))
 
     def draw(self) -> None:
-        """All pictures anew."""
+        """Draw all pictures again."""
         if self.fit is None or self.session is None or self.x.value not in self.columns:
             return
         session, shown, colour = (
@@ -152,7 +152,7 @@ class Pictures:
             self.shown,
             self.columns.get(self.colour.value or "", self.columns[self.x.value]),
         )
-        moving = shown.fit.table.type.moving  # its samples are drawn, which are no rows
+        moving = shown.fit.table.type.moving  # samples are drawn, not rows
         plain = self.columns[self.x.value if self.x.value != FOLLOWED else next(iter(self.columns))]
         panels = {
             "measurement": motion.measurement(shown) if moving else measurement(shown, plain, colour),
@@ -170,17 +170,17 @@ class Pictures:
         self._tell(shown)
 
     def next_axis(self) -> None:
-        """The next channel."""
+        """Select the next channel."""
         if self.fit is not None:
             self.axis.set_value((self.c + 1) % len(self.fit.channels))
 
     def other_unit(self) -> None:
-        """V to g, or back."""
+        """Switch between V and g."""
         if len(self.unit.options) > 1:
             self.unit.set_value(not self.unit.value)
 
     def leave_selected(self) -> None:
-        """Ask whether what is selected is to be left out."""
+        """Open the dialog that excludes the selected rows."""
         if self.selected and self.fit is not None and self.leave_out is not None:
             self.leave_out([int(number) for number in self.fit.table.numbered(self.shown.rows[self.selected])])
 
@@ -188,7 +188,7 @@ class Pictures:
         self.select(event.args if isinstance(event.args, list) else [])
 
     def select(self, points: Sequence[int]) -> None:
-        """Mark these points in all pictures; none unmarks all."""
+        """Select points in all pictures; an empty list clears the selection."""
         if self.fit is None:
             return
         self.selected = sorted({int(point) for point in points})
@@ -203,13 +203,13 @@ class Pictures:
         self._tell(self.shown)
 
     def _tell(self, shown: Shown) -> None:
-        """What is selected, or that not all is drawn, or what can be done."""
+        """Show the selection, a remark on thinned points, or a hint."""
         self.clear.set_visibility(bool(self.selected))
         self.leave.set_visibility(bool(self.selected) and self.leave_out is not None)
-        hint = f"Draw a box in a picture to select {shown.fit.table.type.rows} in all of them."
-        self.told.set_text(shown.summary(self.selected) if self.selected else shown.thinned or hint)
+        hint = f"Drag a box in a picture to select {shown.fit.table.type.rows} in all pictures."
+        self.hint.set_text(shown.summary(self.selected) if self.selected else shown.thinned or hint)
 
 
 def _dots(figure: dict[str, Any]) -> Any:
-    """The number of the trace whose points can be selected; None where there is none."""
+    """The index of the trace with selectable points, or None."""
     return next((k for k, trace in enumerate(figure["data"]) if "customdata" in trace), None)

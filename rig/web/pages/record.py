@@ -1,4 +1,4 @@
-"""Record: all runs, searched; two of them, or two sensors, compared."""
+"""Record page: a table of all runs with a search; selection of two for a comparison."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from rig.record import Run
 from rig.services.history import calibrating, members
 from rig.web.desk import Desk, runs
 from rig.web.frame import frame
-from rig.web.pages.history_results import Asked
+from rig.web.pages.history_results import HistoryRequest
 from rig.web.parts import LINKED, box, div, failed, message, state, words
 
 COLUMNS: list[dict[str, object]] = [
     {"name": "name", "label": "run", "field": "name", "align": "left", "sortable": True},
     {"name": "procedure", "label": "procedure", "field": "procedure", "align": "left", "sortable": True},
     {"name": "state", "label": "state", "field": "state", "align": "left", "sortable": True},
-    {"name": "extent", "label": "holds", "field": "extent", "align": "left"},
-    {"name": "created", "label": "begun (UTC)", "field": "created", "align": "left", "sortable": True},
+    {"name": "extent", "label": "content", "field": "extent", "align": "left"},
+    {"name": "created", "label": "start (UTC)", "field": "created", "align": "left", "sortable": True},
     {"name": "sensor", "label": "sensor", "field": "sensor", "align": "left", "sortable": True},
     {"name": "source", "label": "bench or file", "field": "source", "align": "left", "sortable": True},
 ]
@@ -40,19 +40,19 @@ def register(desk: Desk) -> None:
             if found:
                 Runs(found)
             else:
-                with state("The record is empty", "A run of the rig is kept here, with every sample, as is a file that "
-                           "`rig import` takes in."):  # fmt: skip
+                with state("The record is empty", "It stores every run of the rig with all samples, and files "
+                           "imported with `rig import`."):  # fmt: skip
                     ui.button("Measure", icon="play_arrow", on_click=lambda: ui.navigate.to("/run"))
 
 
 class Runs:
-    """The list: a click opens a run, two marked ones are compared."""
+    """The table: a click opens a run; two selected runs can be compared."""
 
     def __init__(self, found: list[Run]) -> None:
         with box("stack"):
             with div("row-of"):
                 search = ui.input("Search: run, procedure, sensor, file").props("dense clearable").classes("grow")
-                self.hint = words("Mark two to compare them.", "quiet small")
+                self.hint = words("Select two to compare them.", "quiet small")
                 self.compare = ui.button("Compare", icon="compare_arrows", on_click=self._compare)
             known = calibrating(found)
             rows = [row for run in found for row in _rows(run, known)]
@@ -68,7 +68,7 @@ class Runs:
         self.compare.set_enabled(len(self.table.selected) == 2)
 
     def _compare(self) -> None:
-        """The older one is the first, whichever was marked first."""
+        """Compare the selected runs; the older one is the first."""
         newest_first = [row["name"] for row in self.table.rows]
         second, first = sorted((row["name"] for row in self.table.selected), key=newest_first.index)
         ui.navigate.to(f"/compare?{urlencode({'first': first, 'second': second})}")
@@ -78,7 +78,7 @@ class Runs:
 
 
 def _rows(run: Run, calibrated: Container[str]) -> list[dict[str, str]]:
-    """A row for a run; of a batch, one for each sensor. A sensor that was calibrated leads to its life."""
+    """A row for a run, or for each sensor of a batch; a calibrated sensor has a link to its history."""
     about = {"procedure": run.procedure, "state": run.state, "extent": run.extent, "source": run.source}
     about["created"] = run.created[:19].replace("T", " ")
     of = {member: sensor for sensor, member in members(run).items()}
@@ -87,7 +87,7 @@ def _rows(run: Run, calibrated: Container[str]) -> list[dict[str, str]]:
         {
             "name": f"{run.run}/{name}" if name else run.run,
             "sensor": _named(run.bench["sensors"][name] if name else run.constants),
-            "to": Asked(of[name]).address if of.get(name) in calibrated else "",
+            "to": HistoryRequest(of[name]).address if of.get(name) in calibrated else "",
             **about,
         }
         for name in names
@@ -95,6 +95,6 @@ def _rows(run: Run, calibrated: Container[str]) -> list[dict[str, str]]:
 
 
 def _named(of: object) -> str:
-    """Name and serial number of a sensor, as far as they are known."""
+    """Name and serial number of a sensor, if known."""
     known = dict(of) if isinstance(of, dict) else {}
     return " ".join(str(known[key]) for key in ("sensor", "name", "serial") if known.get(key))

@@ -1,6 +1,6 @@
-"""The run that is under way: where it is, what it measures, what it asks; pause, go on, stop.
+"""The present run: progress, values and questions; pause, continue, stop.
 
-All of it is read anew from the process's status and the record, so a page that is opened later shows the same.
+The page reads the status of the process and the record again, so a page that is opened later shows the same.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from nicegui import ui
 from rig.drawings import Attitude, page
 from rig.runs.background import control
 from rig.runs.background.status import Asked, Status
-from rig.web.frame import steer
+from rig.web.frame import control_run
 from rig.web.pages.run_record import OverTime
 from rig.web.parts import box, div, failed, for_page, off_loop, words
 
@@ -28,14 +28,14 @@ PHASES = {
 }
 SEATS = {
     "page": "",
-    "terminal": "It was begun in a terminal: Pause brings it to rest, and the terminal asks how it goes on.",
-    "nobody": "It was begun in a terminal, unattended: a pause would end it. Stop brings it to rest; resume it later.",
+    "terminal": "This run was started in a terminal. Pause stops the motion; the terminal then asks how to continue.",
+    "nobody": "This run is unattended and cannot pause. Stop ends it; you can resume it later.",
 }
 ENDS = {"complete": "good", "stopped": "doubt", "failed": "bad"}
 
 
 class Live:
-    """Looks at the status as long as the page is open."""
+    """Reads and shows the status while the page is open."""
 
     def __init__(self) -> None:
         self.status: Status | None = None
@@ -58,46 +58,48 @@ class Live:
         ui.timer(LOOK_S, self.look)
 
     def buttons(self) -> None:
-        """What can be done to it; what makes no sense now is not shown."""
-        self.pause = ui.button("Pause", icon="pause", on_click=lambda: steer(control.pause)).props("outline dense")
-        self.resume = ui.button("Go on", icon="play_arrow", on_click=lambda: self.wish("resume")).props("dense")
-        self.repeat = ui.button("Repeat the last pose", icon="replay", on_click=lambda: self.wish("repeat"))
+        """Buttons; those without effect in the present state are hidden."""
+        self.pause = ui.button("Pause", icon="pause", on_click=lambda: control_run(control.pause)).props(
+            "outline dense"
+        )
+        self.resume = ui.button("Continue", icon="play_arrow", on_click=lambda: self.decide("resume")).props("dense")
+        self.repeat = ui.button("Repeat the last pose", icon="replay", on_click=lambda: self.decide("repeat"))
         self.repeat.props("outline dense")
-        self.stop = ui.button("Stop", icon="stop", color="negative", on_click=lambda: steer(control.stop))
+        self.stop = ui.button("Stop", icon="stop", color="negative", on_click=lambda: control_run(control.stop))
         self.stop.props("unelevated dense")
         self.again = ui.button("Resume", icon="play_arrow", on_click=self.go_on).props("outline dense")
-        self.see = ui.button("See the model", icon="insights", on_click=self._see).props("dense")
+        self.see = ui.button("Open the model", icon="insights", on_click=self._see).props("dense")
 
-    def wish(self, what: str) -> None:
-        """How a paused run goes on."""
-        steer(lambda status: control.answer(status, what))
+    def decide(self, what: str) -> None:
+        """Send a decision to a paused run."""
+        control_run(lambda status: control.answer(status, what))
 
     def pause_or_go_on(self) -> None:
-        """One key for both."""
+        """Pause a running run, or continue a paused one."""
         if self.status is not None and self.status.phase == "paused":
-            self.wish("resume")
+            self.decide("resume")
         elif self.status is not None and self.status.phase == "running":
-            steer(control.pause)
+            control_run(control.pause)
 
     def _enlarge(self) -> None:
-        """The drawing, as large as the window."""
+        """Show the drawing in the whole window."""
         if self.status is not None and self.status.attitude:
             with ui.dialog() as dialog, ui.card().classes("enlarged attitude").on("click", dialog.close):
                 ui.html(_drawn(self.status.attitude), sanitize=False)
             dialog.open()
 
     def _see(self) -> None:
-        """What the run measured, beside a model."""
+        """Open the model page for the data of the run."""
         if self.status is not None:
             ui.navigate.to(f"/?{urlencode({'data': self.status.run})}")
 
     async def go_on(self) -> None:
-        """Resume a run that has ended before its time."""
+        """Resume an incomplete run."""
         if (status := self.status) is not None and status.run:
             await off_loop(control.go_on, status.run, status.procedure, None, False)
 
     async def look(self) -> None:
-        """Show how it stands; only what has changed is sent."""
+        """Show the present status; only changes are sent."""
         status = control.latest()
         self.box.set_visibility(status is not None)
         if status is None:
@@ -109,23 +111,23 @@ class Live:
 
     def _show(self, status: Status, before: Status | None) -> None:
         word, look = PHASES.get(status.phase, (status.state or "ended", ENDS.get(status.state, "plain")))
-        going = status.phase != "ended"
+        active = status.phase != "ended"
         self.title.set_text(f"{status.procedure} on {status.bench}")
         self.phase.set_text(word)
         self.phase.classes(remove="good bad doubt plain", add=look)
-        self.now.set_text(status.now if going else "")
+        self.now.set_text(status.now if active else "")
         self.bar.set_value(status.done / status.total if status.total else 0.0)
         poses = f"{status.done} of {status.total} poses" if status.total else ""
-        self.count.set_text("; ".join(filter(None, (poses, status.left if going else ""))))
+        self.count.set_text("; ".join(filter(None, (poses, status.left if active else ""))))
         self._links(status)
         paused = status.phase == "paused" and status.seat == "page"
         self.pause.set_visibility(status.phase == "running" and status.seat != "nobody")
         self.resume.set_visibility(paused)
         self.repeat.set_visibility(paused)
-        self.hint.set_text(SEATS[status.seat] if going else "")
-        self.stop.set_visibility(going)
+        self.hint.set_text(SEATS[status.seat] if active else "")
+        self.stop.set_visibility(active)
         self.see.set_visibility(status.state == "complete")
-        self.again.set_visibility(not going and status.state == "stopped" and bool(status.run))
+        self.again.set_visibility(not active and status.state == "stopped" and bool(status.run))
         if before is None or (before.error, before.moving) != (status.error, status.moving):
             self._alarm(status)
         if before is None or before.asked != status.asked:
@@ -143,7 +145,7 @@ class Live:
             if status.moving:
                 failed("Not at rest", "\n".join(status.moving))
             if status.error:
-                failed("Why it stands still" if status.phase == "paused" else "How it ended", _ended(status))
+                failed("Reason for the pause" if status.phase == "paused" else "Reason for the end", _ended(status))
 
     def _ask(self, asked: Asked | None, here: bool) -> None:
         self.question.clear()
@@ -159,10 +161,10 @@ class Live:
             if here:
                 self._answers(asked)
             else:
-                words("Answer it in the terminal that the run was begun in.", "quiet")
+                words("Answer this question in the terminal of the run.", "quiet")
 
     def _answers(self, asked: Asked) -> None:
-        """A button for each answer, or a field."""
+        """A button for each choice, or a field."""
         with div("row-of"):
             for choice in asked.choices:
                 ui.button(choice, on_click=partial(self._answer, choice))
@@ -172,10 +174,10 @@ class Live:
                 ui.button("Answer", on_click=lambda: self._answer(str(typed.value)))
 
     def _answer(self, text: str) -> None:
-        steer(lambda status: control.answer(status, text))
+        control_run(lambda status: control.answer(status, text))
 
     def _values(self, status: Status) -> None:
-        """The last values, each between its limits."""
+        """The last values with their limits."""
         self.values.clear()
         with self.values, ui.element("table").classes("plain-table"):
             for value in status.values:
@@ -193,14 +195,14 @@ class Live:
 
 
 def _ended(status: Status) -> str:
-    """Why; of a run that a person stopped on a page, what can be done on a page."""
+    """The error; for a run stopped on a page, the next step."""
     if status.state == "stopped" and status.error.startswith("stopped by SIGTERM"):
-        return "Stopped by a person. Resume goes on where it was."
+        return "Stopped by a person. Resume continues at the same pose."
     return status.error
 
 
 def _limits(value: Mapping[str, Any]) -> str:
-    """The lowest and the highest that is allowed, in the value's own unit."""
+    """The limits of a value, in its unit."""
     if value["limits"] is None:
         return ""
     low, high = value["limits"]

@@ -24,14 +24,14 @@ from rig.services.report import reported
 from rig.services.request import Request
 from rig.web.desk import Desk
 from rig.web.frame import frame
-from rig.web.pages.history_results import Asked
+from rig.web.pages.history_results import HistoryRequest
 from rig.web.parts import box, div, facts, failed, message, off_loop, setting_label, setting_text, table, words
 
 MOST_NAMED = 8
 
 
 def left_out(data: str) -> dict[int, str]:
-    """Why each pose of what lies open is left out, by its number; none of what is no run of the rig."""
+    """Reasons of excluded poses by number; empty for data that are not a run of the rig."""
     run = numbered_run(data)
     if run is None:
         return {}
@@ -40,13 +40,13 @@ def left_out(data: str) -> dict[int, str]:
 
 
 def ask(data: str, numbers: Sequence[int], done: Callable[[], None]) -> None:
-    """Why these poses are to be left out; then they are, and `done` is called."""
+    """Ask for a reason, exclude the poses, and call `done`."""
     named = joined([str(number) for number in numbers[:MOST_NAMED]])
     more = f" and {len(numbers) - MOST_NAMED} more" if len(numbers) > MOST_NAMED else ""
     with ui.dialog() as dialog, ui.card().style("min-width: 420px"):
-        words(f"Leave out pose {named}{more}" if len(numbers) == 1 else f"Leave out poses {named}{more}", "title")
-        words("They stay in the record, with the reason, and can be taken in again.", "quiet small")
-        reason = ui.input("Why").props("autofocus").classes("grow")
+        words(f"Exclude pose {named}{more}" if len(numbers) == 1 else f"Exclude poses {named}{more}", "title")
+        words("The record keeps the poses and the reason; you can include them again.", "quiet small")
+        reason = ui.input("Reason").props("autofocus").classes("grow")
         wrong = words("", "fault")
 
         async def leave() -> None:
@@ -54,26 +54,26 @@ def ask(data: str, numbers: Sequence[int], done: Callable[[], None]) -> None:
                 dialog.close()
                 await change(data, numbers, why, done)
             else:
-                wrong.set_text("Say why: whoever reads the record later wants to know.")
+                wrong.set_text("Give a reason; later readers of the record need it.")
 
         reason.on("keydown.enter", leave)
         with div("row-of"):
-            ui.button("Leave out", on_click=leave)
+            ui.button("Exclude", on_click=leave)
             ui.button("Cancel", on_click=dialog.close).props("flat")
     dialog.open()
 
 
 def listed(data: str, done: Callable[[], None]) -> None:
-    """Those that are left out, each with its reason and a button that takes it in again."""
+    """The excluded poses with their reasons, each with a button to include it again."""
     for number, why in left_out(data).items():
         with div("row-of"):
             words(f"pose {number}: {why}", "small grow")
             again = partial(change, data, [number], None, done)
-            ui.button("Take in again", icon="undo", on_click=again).props("dense flat")
+            ui.button("Include again", icon="undo", on_click=again).props("dense flat")
 
 
 async def change(data: str, numbers: Sequence[int], reason: str | None, done: Callable[[], None]) -> None:
-    """Leave poses out, or take them in again."""
+    """Exclude poses, or include them again."""
     try:
         await off_loop(_change, data, numbers, reason)
     except Exception as error:
@@ -85,21 +85,21 @@ async def change(data: str, numbers: Sequence[int], reason: str | None, done: Ca
 def _change(data: str, numbers: Sequence[int], reason: str | None) -> None:
     run = numbered_run(data)
     if run is None:
-        raise RecordError(f"{data} is no run of the rig: put a column `excluded` into the file")
+        raise RecordError(f"{data} is not a run of the rig; add a column `excluded` to the file")
     with Record.to_find(run) as record:
         exclude(record, run, numbers, reason)
 
 
-# What a run has measured so far, over time: a picture that grows with the run, and does not grow for ever.
+# The measurements of a run over time, in a bounded number of points.
 
 
 class OverTime:
-    """Follows a run in the record; thinned, so that a night is no larger than an hour."""
+    """Follows a run in the record; a long run has no more points than a short one."""
 
     def __init__(self) -> None:
         self.run, self.last = "", -1
         self.courses: dict[str, Course] = {}
-        self.chosen = False  # a person has said of which kind
+        self.chosen = False  # a person has selected the kind of pose
         with div("row-of"):
             self.kind = ui.select([], label="of", on_change=self.draw).props("dense options-dense")
             self.name = ui.select([], label="over time", on_change=self.draw).props("dense options-dense")
@@ -110,7 +110,7 @@ class OverTime:
         self.plot: ui.plotly | None = None
 
     async def follow(self, run: str) -> None:
-        """Take in what is new of `run`."""
+        """Add the new dwells of `run`."""
         if run != self.run:
             self.run, self.last, self.courses, self.plot, self.chosen = run, -1, {}, None, False
             self.place.clear()
@@ -131,7 +131,7 @@ class OverTime:
         self.chosen = True
 
     def _offer(self) -> None:
-        """The kinds of poses and the quantities that there are; those with most until a person chooses."""
+        """Offer the kinds of poses and the quantities; the most frequent kind, until a person selects one."""
         kinds = {kind: kind or "poses" for kind in self.courses}
         most = max(self.courses, key=lambda kind: len(self.courses[kind].parts))
         value = self.kind.value if self.chosen and self.kind.value in kinds else most
@@ -144,7 +144,7 @@ class OverTime:
         self.name.set_visibility(True)
 
     def draw(self) -> None:
-        """The picture anew."""
+        """Draw the picture again."""
         course = self.courses.get(str(self.kind.value or ""))
         if course is None or self.name.value not in course.names:
             return
@@ -152,7 +152,7 @@ class OverTime:
         self.lay_out().update_figure(figure(course_chart(course, name), name))
 
     def lay_out(self) -> ui.plotly:
-        """The picture's place, where it was not made yet: the browser can fetch what draws it meanwhile."""
+        """The plot; made at the first call, so that the browser loads Plotly early."""
         if self.plot is None:
             with self.place:
                 self.plot = ui.plotly({"data": [], "layout": {}}).classes("live-plot")
@@ -165,7 +165,7 @@ def _new(run: str, after: int) -> list[tuple[int, Any]]:
         return record.dwells(run, after)
 
 
-# One run of the record: how it was made, what it measured, what people noted; export and report.
+# The page of one run: settings, results, notes, export and report.
 
 LOOKS = {"pass": "good", "fail": "bad", "marginal": "doubt"}
 FORMATS = {"csv": "csv", "event-model": "jsonl"}
@@ -183,14 +183,14 @@ def register(desk: Desk) -> None:
                     found, excluded = record.run(run), record.excluded(run)
                     known = lives(found, record.runs())
             except Exception as error:
-                failed("No such run", message(error))
+                failed("There is no such run", message(error))
                 ui.link("All runs", "/record")
                 return
             OneRun(desk, found, excluded, known)
 
 
 class OneRun:
-    """All that is known of it."""
+    """The page of one run."""
 
     def __init__(self, desk: Desk, run: Run, excluded: dict[int, str], known: Mapping[str, int]) -> None:
         self.desk, self.run = desk, run
@@ -203,11 +203,11 @@ class OneRun:
                     for line in next_steps(run, excluded):
                         words(line, "quiet small")
                     for sensor, count in known.items():
-                        ui.link(f"{count} runs of the sensor {sensor}: its life", Asked(sensor).address).classes(
-                            "small"
-                        )
+                        ui.link(
+                            f"{count} runs of the sensor {sensor}: history", HistoryRequest(sensor).address
+                        ).classes("small")
                 with box("stack"):
-                    words("How it was made", "title")
+                    words("Settings", "title")
                     facts({name: value[:SHOWN] for name, value in _made(run).items() if value})
             with div("stack"):
                 with box("stack"):
@@ -217,7 +217,7 @@ class OneRun:
                         self.over_time.lay_out()
                 if excluded:
                     with box("stack"):
-                        words("Poses that are left out", "title")
+                        words("Excluded poses", "title")
                         listed(run.run, ui.navigate.reload)
                 with box("stack"):
                     self._notes()
@@ -240,24 +240,24 @@ class OneRun:
                 ui.button(kind, icon="download", on_click=lambda kind=kind: self._export(kind)).props("dense outline")
 
     def _notes(self) -> None:
-        words("What happened, and notes", "title")
+        words("Events and notes", "title")
         self.events = div("stack")
         with div("row-of"):
-            note = ui.input("A note").props("dense").classes("grow")
+            note = ui.input("Note").props("dense").classes("grow")
 
             def keep() -> None:
                 if text := str(note.value or "").strip():
                     try:
                         with Record.to_read() as record:
                             record.note(self.run.run, "note", text)
-                    except RecordError as error:  # such as the lab's, which this role may only read
+                    except RecordError as error:  # for example the lab's record with a role that may only read
                         ui.notify(message(error), type="negative")
                         return
                     note.set_value("")
                     self._show_events()
 
             note.on("keydown.enter", keep)
-            ui.button("Keep", on_click=keep).props("dense outline")
+            ui.button("Save", on_click=keep).props("dense outline")
         self._show_events()
 
     def _show_events(self) -> None:
@@ -266,12 +266,12 @@ class OneRun:
         self.events.clear()
         with self.events:
             if found:
-                table(("when (UTC)", "what", ""), [_event(event) for event in found])
+                table(("time (UTC)", "event", ""), [_event(event) for event in found])
             else:
-                words("Nothing was noted.", "quiet small")
+                words("No events.", "quiet small")
 
     async def _export(self, kind: str) -> None:
-        """A file of the browser's."""
+        """Download the run in a format."""
         try:
             with TemporaryDirectory() as folder:
                 path = Path(folder) / f"{self.run.run}.{FORMATS[kind]}"
@@ -294,7 +294,7 @@ class OneRun:
 
 def _results(run: Run) -> None:
     if not run.results:
-        words("Its procedure gives none by itself." if run.state == "complete" else "It is not complete.", "quiet")
+        words("This procedure has no results." if run.state == "complete" else "The run is not complete.", "quiet")
         return
     with ui.element("table").classes("plain-table"):
         for name, result in run.results.items():
@@ -310,11 +310,13 @@ def _results(run: Run) -> None:
 
 
 def _made(run: Run) -> dict[str, str]:
-    said = {role: " ".join(str(part) for part in each.values() if part) for role, each in run.identities.items()}
+    identities = {
+        role: " ".join(str(part) for part in identity.values() if part) for role, identity in run.identities.items()
+    }
     why = {"message": run.message} if run.message else {}
     settings = {setting_label(name): setting_text(value) for name, value in run.settings.items()}
     known = {setting_label(name): setting_text(value) for name, value in run.constants.items()}
-    return {"procedure": run.procedure, "bench or file": run.source, **why, **settings, **said, **known}
+    return {"procedure": run.procedure, "bench or file": run.source, **why, **settings, **identities, **known}
 
 
 def _event(event: Event) -> tuple[str, str, str]:
