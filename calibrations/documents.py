@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from calibrations.discovery.dataset import Dataset
+from calibrations.discovery.plausibility import Finding
 from calibrations.discovery.results import Candidate, Comparison, Diagnosis, Discovery, F, Step
 from calibrations.model import Model
-from calibrations.plausibility import Finding
 
 if TYPE_CHECKING:
     from calibrations.design.expected import Expected

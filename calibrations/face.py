@@ -11,8 +11,8 @@ import numpy as np
 from calibrations.compensation.inverse import invert_model
 from calibrations.discovery.results import Comparison, Diagnosis, Discovery
 from calibrations.errors import DataError
-from calibrations.fit import Fit
-from calibrations.fit import fit as fitted
+from calibrations.fitting.fit import Fit
+from calibrations.fitting.fit import fit as fitted
 from calibrations.importing.foreign import read_csv
 from calibrations.loop import compare as compared
 from calibrations.loop import diagnose as diagnosed

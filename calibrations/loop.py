@@ -10,7 +10,7 @@ from calibrations.discovery.results import Comparison, Diagnosis, Discovery
 from calibrations.discovery.rows import Rows
 from calibrations.effects import Effect
 from calibrations.effects.catalogue import catalogue
-from calibrations.fit import Fit
+from calibrations.fitting.fit import Fit
 from calibrations.model import Model
 from calibrations.table import Table
 

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrations.criteria import LEAST_TAU_RATIO, WALK_RATIO
-from calibrations.noise.means import correlated, rms
+from calibrations.means.noise import correlated, rms
 from calibrations.table import Array
 
 TAUS = 40  # time constants on the grid

@@ -24,7 +24,7 @@ from calibrations.analyses.tumble import estimate_tumbles
 from calibrations.criteria import COVERAGE_FACTOR, LONGEST_MOVE_S, MOST_KNOWN_WIDTH, MOST_SURPRISE, REACHED_K
 from calibrations.errors import DataError
 from calibrations.estimators.approach import HOUR_S, LEVEL, LN_TAU, REST, SLOW, Bank, make_bank
-from calibrations.noise.means import white_std
+from calibrations.means.noise import white_std
 from calibrations.table import Array, Table
 
 STRETCH_S, STRETCHES = 300.0, 3  # of the still record: a value is the mean of so much, or of a third of a hold

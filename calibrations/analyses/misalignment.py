@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrations.errors import DataError
-from calibrations.noise.means import Noise, white_only, white_std
-from calibrations.noise.means_fit import estimate
+from calibrations.fitting.noise_fit import estimate
+from calibrations.means.noise import Noise, white_only, white_std
 from calibrations.table import Array, Table
 
 # The directions of the sensing axes from a search for the extreme output, and the correction that they call for.

@@ -32,8 +32,8 @@ from calibrations.criteria import (
     SPARE_VALUES,
 )
 from calibrations.errors import TooFewRows
+from calibrations.means.noise import rms
 from calibrations.noise.deviations import deviations
-from calibrations.noise.means import rms
 from calibrations.table import Array, Table
 
 # Steady state after switching on: when it is reached, how far the output drifts until then, and how fast.

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from calibrations.errors import DataError
 from calibrations.geometry.orientation import nominal_pose, specific_force
 from calibrations.importing.foreign import require_kind
-from calibrations.noise.means import rms
+from calibrations.means.noise import rms
 from calibrations.table import Array, Table
 
 # The poses that Ang's equations single out: an axis held up and held down at each inclination, the turn at 90 deg.

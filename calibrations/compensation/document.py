@@ -25,8 +25,8 @@ from calibrations.compensation.inverse import Compensation
 from calibrations.compensation.program import Line
 from calibrations.documents import parameters_document
 from calibrations.model import Estimate
-from calibrations.presentation.text import as_written
 from calibrations.table import Array
+from calibrations.text import as_written
 
 WIDTH = 112
 UPWARD = Context(prec=3, rounding=ROUND_CEILING)  # bounds are not rounded down

@@ -24,13 +24,13 @@ from calibrations.compensation.forward import (
 from calibrations.compensation.graph import variable_names
 from calibrations.compensation.program import Program, write_program
 from calibrations.errors import DataError, ModelError
-from calibrations.fit import fit
+from calibrations.fitting.fit import fit
+from calibrations.means.noise import rms
 from calibrations.model import Model
 from calibrations.model.chain import force, sensed
 from calibrations.model.file import read_model
-from calibrations.noise.means import rms
-from calibrations.presentation.text import rounded
 from calibrations.table import AXES, Array, Table
+from calibrations.text import rounded
 
 DEFAULT_REACH = {
     "g": 1.5,

@@ -21,14 +21,14 @@ from scipy.special import ndtr
 from calibrations.criteria import INSEPARABLE, NAMED_GAIN
 from calibrations.design.optimal_design import noise_on_rows
 from calibrations.errors import DataError, MissingColumn
-from calibrations.fit import Fit
+from calibrations.fitting.fit import Fit
+from calibrations.fitting.problem import Problem
 from calibrations.geometry.orientation import nominal_pose, specific_force
 from calibrations.joined import joined
+from calibrations.means.noise import white_only
 from calibrations.model import Model
 from calibrations.model.chain import forward
 from calibrations.model.parameters import Layout
-from calibrations.noise.means import white_only
-from calibrations.problem import Problem
 from calibrations.table import AXES, Array, Constant, Table
 from calibrations.tables import KINDS
 

@@ -16,10 +16,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrations.fit import Fit
+from calibrations.fitting.fit import Fit
 from calibrations.fitting.identifiability import RELATIVE_RANK, UNDETERMINED
-from calibrations.noise.means import Noise, rms
-from calibrations.problem import Problem
+from calibrations.fitting.problem import Problem
+from calibrations.means.noise import Noise, rms
 from calibrations.table import Array, Table
 
 

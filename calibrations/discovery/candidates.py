@@ -22,12 +22,12 @@ from calibrations.criteria import INSEPARABLE, MATERIAL, MOST_BY_FORM, SAME_SHAP
 from calibrations.discovery.results import Candidate
 from calibrations.discovery.significance import Screen, Search, of_search, twice_log_likelihood
 from calibrations.effects import Effect
-from calibrations.fit import Fit, refit
+from calibrations.fitting.fit import Fit, refit
+from calibrations.fitting.noise_fit import gains
+from calibrations.fitting.problem import Problem
 from calibrations.geometry.sphere import magnetometer_coverage_warning
+from calibrations.means.noise import rms
 from calibrations.model.parameters import Layout
-from calibrations.noise.means import rms
-from calibrations.noise.means_fit import gains
-from calibrations.problem import Problem
 from calibrations.table import Array
 
 OFFSETS = {"bias", "hard-iron", "gyro-bias"}

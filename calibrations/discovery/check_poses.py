@@ -19,10 +19,10 @@ from scipy.special import chdtrc, fdtrc
 
 from calibrations.criteria import CHECK_SIGNIFICANT, FEWEST_CHECKS
 from calibrations.errors import DataError, TooFewRows
-from calibrations.fit import Fit, fit
+from calibrations.fitting.fit import Fit, fit
 from calibrations.fitting.identifiability import covariance
+from calibrations.fitting.problem import Problem
 from calibrations.model import Model
-from calibrations.problem import Problem
 from calibrations.table import Array, Table
 
 MARK = "check"  # what the path of a check pose begins with

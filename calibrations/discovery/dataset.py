@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Generic
 
+from calibrations.discovery.plausibility import Finding
 from calibrations.discovery.results import Candidate, Comparison, Diagnosis, Discovery, F, Findings, Place, Step
 from calibrations.effects import Effect
 from calibrations.errors import ModelError
 from calibrations.model import Model
-from calibrations.plausibility import Finding
 
 if TYPE_CHECKING:
     from calibrations.presentation.chart import Chart

@@ -15,11 +15,12 @@ from scipy.special import chdtrc
 
 from calibrations.criteria import MATERIAL, MOST_SLOW_NOISE, ONE_SIDED, SIGNIFICANT, STANDS_OUT
 from calibrations.discovery.results import Place
-from calibrations.fit import Fit
+from calibrations.fitting.fit import Fit
+from calibrations.fitting.sensed import axis_of, scales
+from calibrations.means.noise import rms
 from calibrations.model.chain import backward
-from calibrations.noise.means import rms
-from calibrations.presentation.text import interval
 from calibrations.table import MILLI, Array, Table
+from calibrations.text import interval
 
 MOST_PLACES = 8
 PARTS = 8  # of a column without a natural grid
@@ -76,20 +77,6 @@ class _Stretch:
 def places(found: Fit) -> tuple[Place, ...]:
     """The worst places where a model fails."""
     return tuple(each.place for each in _fails(found)[:MOST_PLACES])
-
-
-def scales(found: Fit) -> Array:
-    """Output per g, or deg/s, of each channel; 1 for a residual in what is sensed."""
-    if found.table.type.magnitude:
-        return np.ones(1)
-    effect = "gyro-scale-factor" if found.table.type.turning else "scale-factor"
-    axes, nominal = [axis_of(channel) for channel in found.channels], found.problem.layout.nominal
-    return np.abs([found.model.value(f"{effect}.{axis}", nominal) for axis in axes])
-
-
-def axis_of(channel: str) -> str:
-    """The axis that a channel belongs to: "x" of "x in phase at 10 Hz"; itself where it has no parts."""
-    return channel.partition(" ")[0]
 
 
 def _fails(found: Fit) -> list[_Stretch]:

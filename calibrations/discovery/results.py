@@ -21,7 +21,7 @@ from calibrations.criteria import LIKELY, NOTEWORTHY
 from calibrations.discovery.verdict import Closest, Judgement, Verdict
 from calibrations.effects import Effect
 from calibrations.model import Model
-from calibrations.presentation.result import Result
+from calibrations.result import Result
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from calibrations.design.experiment import Experiment
     from calibrations.discovery.dataset import Dataset
     from calibrations.discovery.patterns import Pattern
-    from calibrations.plausibility import Finding
+    from calibrations.discovery.plausibility import Finding
     from calibrations.presentation.chart import Chart
 
 

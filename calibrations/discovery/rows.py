@@ -18,7 +18,8 @@ from calibrations.design.experiment import separating_experiment
 from calibrations.discovery.candidates import candidates, with_rivals
 from calibrations.discovery.dataset import Cells, Dataset
 from calibrations.discovery.outliers import caution, fit_without, kept, told
-from calibrations.discovery.places import axis_of, places
+from calibrations.discovery.places import places
+from calibrations.discovery.plausibility import Finding, refusal, rejection
 from calibrations.discovery.results import Candidate, Diagnosis, Discovery, Findings, Place, Step
 from calibrations.discovery.search import Path, Settled, cost, find_path, first_order, recounted, settled
 from calibrations.discovery.structure import plainer, structure_of
@@ -26,14 +27,13 @@ from calibrations.discovery.verdict import Verdict
 from calibrations.effects import Effect
 from calibrations.effects.expression_effect import effect_for
 from calibrations.errors import ModelError
-from calibrations.fit import Fit, evaluate, fit, refit
 from calibrations.fitting.determined import blind_to, undetermined
+from calibrations.fitting.fit import Fit, evaluate, fit, refit
+from calibrations.fitting.sensed import axis_of, milli_unit, pooled_milli
+from calibrations.means.noise import rms
 from calibrations.model import Model
-from calibrations.noise.means import rms
-from calibrations.plausibility import Finding, refusal, rejection
-from calibrations.presentation.residual import milli_unit, pooled_milli
-from calibrations.presentation.text import quantity, rounded
 from calibrations.table import Array, Table
+from calibrations.text import quantity, rounded
 
 if TYPE_CHECKING:
     from calibrations.presentation.chart import Chart

@@ -29,9 +29,9 @@ from calibrations.criteria import (
 from calibrations.discovery.candidates import RowCandidate, added, best_pair, candidates, with_rivals
 from calibrations.discovery.significance import chance, likelihood
 from calibrations.effects import Effect
-from calibrations.fit import Fit, refit
 from calibrations.fitting.determined import lets_go
-from calibrations.noise.means import rms
+from calibrations.fitting.fit import Fit, refit
+from calibrations.means.noise import rms
 
 
 @dataclass(frozen=True)

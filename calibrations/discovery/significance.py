@@ -15,8 +15,8 @@ import numpy as np
 from scipy.special import chdtrc, fdtrc
 
 from calibrations.criteria import NOT_SHOWN
-from calibrations.fit import Fit
-from calibrations.noise.means_fit import deviance
+from calibrations.fitting.fit import Fit
+from calibrations.fitting.noise_fit import deviance
 from calibrations.table import Array
 
 DRAWS = 300

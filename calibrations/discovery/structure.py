@@ -26,10 +26,10 @@ from calibrations.criteria import (
 )
 from calibrations.discovery.outliers import told
 from calibrations.discovery.patterns import Pattern, one_sided, patterns, per_channel
+from calibrations.discovery.plausibility import UNEXPLAINED, Finding
 from calibrations.discovery.significance import Screen, Search
-from calibrations.fit import Fit
-from calibrations.noise.means import correlation_known, rms
-from calibrations.plausibility import UNEXPLAINED, Finding
+from calibrations.fitting.fit import Fit
+from calibrations.means.noise import correlation_known, rms
 from calibrations.table import Array
 
 FINALISTS = 6  # patterns that are sharpened

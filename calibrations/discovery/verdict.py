@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 from enum import Enum, StrEnum
 
 from calibrations.criteria import MATERIAL, MOST_BY_FORM, MOST_UNEXPLAINED, SIGNIFICANT
-from calibrations.presentation.text import joined
+from calibrations.text import joined
 
 
 class Verdict(StrEnum):

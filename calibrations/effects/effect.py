@@ -39,7 +39,7 @@ from calibrations.table import Array, Table
 from calibrations.tables import KINDS, Kind
 
 if TYPE_CHECKING:
-    from calibrations.noise.spectrum import Bands
+    from calibrations.spectrum import Bands
 
 HOOKS = ("pose", "force", "transduction", "output", "spectrum", "lines")  # places, in the order of the signal chain
 OF_ACCELEROMETERS = tuple(name for name, kind in KINDS.items() if kind.fitted and kind.input_unit == "g")

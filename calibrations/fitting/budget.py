@@ -25,10 +25,10 @@ from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from calibrations.criteria import COVERAGE
-from calibrations.fit import Fit, cautiously
+from calibrations.fitting.fit import Fit, cautiously
 from calibrations.fitting.identifiability import covariance, gain
 from calibrations.fitting.inputs import Contribution
-from calibrations.noise.means import Noise
+from calibrations.means.noise import Noise
 from calibrations.table import Array
 
 SLOW_NOISE = "slow noise"

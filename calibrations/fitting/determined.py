@@ -20,11 +20,11 @@ from numpy.typing import NDArray
 
 from calibrations.criteria import MOST_UNCERTAIN
 from calibrations.effects import Effect
-from calibrations.fit import Fit
+from calibrations.fitting.fit import Fit
 from calibrations.fitting.identifiability import UNDETERMINED, covariance
+from calibrations.fitting.problem import Problem
 from calibrations.geometry.sphere import magnetometer_coverage_warning
 from calibrations.model.parameters import Layout
-from calibrations.problem import Problem
 from calibrations.table import Array
 
 ROUNDING = 1e-9  # of a leverage

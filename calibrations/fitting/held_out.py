@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrations.noise.means import Noise, rms
+from calibrations.means.noise import Noise, rms
 from calibrations.table import Array, Table
 
 FOLDS = 10

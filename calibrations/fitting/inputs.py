@@ -25,8 +25,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrations.effects import Effect, Values
+from calibrations.fitting.problem import Problem
 from calibrations.geometry.orientation import Pose, rotation
-from calibrations.problem import Problem
 from calibrations.table import Array, Table
 
 Derivative = Callable[[Problem, Array], Array]  # (problem, theta) -> d residual / d input, (channels, n)

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calibrations.fit import Fit, cautiously
+from calibrations.fitting.fit import Fit, cautiously
 from calibrations.fitting.identifiability import covariance
 from calibrations.model.chain import respond, sensed
 from calibrations.table import Array

@@ -27,11 +27,11 @@ from calibrations.discovery.patterns import patterns
 from calibrations.discovery.significance import Screen, Search, of_search
 from calibrations.discovery.structure import without_slow
 from calibrations.effects import Effect
-from calibrations.fit import Fit, cautiously
+from calibrations.fitting.fit import Fit, cautiously
 from calibrations.fitting.identifiability import covariance
+from calibrations.fitting.noise_fit import gains
+from calibrations.fitting.problem import Problem
 from calibrations.model import Model
-from calibrations.noise.means_fit import gains
-from calibrations.problem import Problem
 from calibrations.table import Array, Table
 
 ANGLES = ("alpha_deg", "beta_deg", "direction", "mount_deg", "flip")

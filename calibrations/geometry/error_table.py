@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 
 from calibrations.criteria import LONGEST_GAP_DEG, POINT_REACH_DEG
 from calibrations.errors import DataError
-from calibrations.importing.files import open_text_file
+from calibrations.files import open_text_file
 from calibrations.table import Array
 
 COLUMN_NAMES = ("angle_deg", "error_deg", "std_deg")

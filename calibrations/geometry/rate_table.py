@@ -14,9 +14,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from calibrations.analyses.tumble import estimate_faces
 from calibrations.criteria import LEAST_MAIN_SLOPE, LEAST_OTHER_AXIS, UPRIGHT_COSINE
 from calibrations.errors import DataError
+from calibrations.geometry.faces import estimate_faces
 from calibrations.table import AXES, Array, Table
 
 EARTH_DEG_S = np.degrees(7.292115e-5)

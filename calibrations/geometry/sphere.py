@@ -13,7 +13,6 @@ from __future__ import annotations
 import numpy as np
 
 from calibrations.criteria import MOST_WORSE_COVERED
-from calibrations.importing.raw_logs import sphere_centre
 from calibrations.table import Array, Table
 
 HARD_IRON, SOFT_IRON = 1, 2  # highest degree of what they add to the magnitude
@@ -49,6 +48,17 @@ def directions(table: Table) -> Array:
     """Unit vectors (n, 3) from the centre of the sphere fitted to the outputs."""
     away = table.outputs - sphere_centre(table.outputs)
     return np.asarray(away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), np.finfo(float).tiny))
+
+
+def sphere_centre(means: Array) -> Array:
+    """Centre of the sphere through the means: |m|^2 = 2 m.c + const, linear in c."""
+    middle: Array = means.mean(axis=0)
+    offsets = means - middle
+    if len(means) < 5:
+        return middle
+    A = np.column_stack([2 * offsets, np.ones(len(means))])
+    solution: Array = np.linalg.lstsq(A, np.sum(offsets**2, axis=1), rcond=None)[0]
+    return np.asarray(middle + solution[:3], dtype=np.float64)
 
 
 def sphere_radius(table: Table) -> float:

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from calibrations.errors import DataError, MissingColumn, nearest
-from calibrations.importing.files import open_text_file, text_source
+from calibrations.files import open_text_file, text_source
 from calibrations.importing.plausible import check_at_rest, find_unit_doubts
 from calibrations.importing.proposal import import_command, missing_columns, suggest_import
 from calibrations.importing.sessions import RATE, is_session, sample_rates

@@ -24,7 +24,7 @@ from calibrations.criteria import (
     STILL_G,
 )
 from calibrations.errors import DataError
-from calibrations.importing.raw_logs import sphere_centre
+from calibrations.geometry.sphere import sphere_centre
 from calibrations.importing.units import column_unit
 from calibrations.table import NUMBERS, Array, Table
 

@@ -24,8 +24,9 @@ from calibrations.criteria import (
     SHORTEST_STILL_S,
 )
 from calibrations.errors import DataError, MissingConstant
+from calibrations.geometry.sphere import sphere_centre
 from calibrations.importing.sessions import average_sections, is_section_log
-from calibrations.noise.means import measured_inflation
+from calibrations.means.noise import measured_inflation
 from calibrations.table import Array, Constant, Table
 
 # Still intervals of a raw log: a table of positions from samples of a sensor that was put down again and again.
@@ -78,17 +79,6 @@ def _is_alike(samples: Array, bounds: list[tuple[int, int]]) -> bool:
     means = np.array([samples[first:last].mean(axis=0) for first, last in bounds])
     noise = np.median([np.linalg.norm(samples[first:last].std(axis=0)) for first, last in bounds])
     return bool(np.linalg.norm(means.std(axis=0)) < LEAST_TURNED_SPREAD * noise)
-
-
-def sphere_centre(means: Array) -> Array:
-    """Centre of the sphere through the means: |m|^2 = 2 m.c + const, linear in c."""
-    middle: Array = means.mean(axis=0)
-    offsets = means - middle
-    if len(means) < 5:
-        return middle
-    A = np.column_stack([2 * offsets, np.ones(len(means))])
-    solution: Array = np.linalg.lstsq(A, np.sum(offsets**2, axis=1), rcond=None)[0]
-    return np.asarray(middle + solution[:3], dtype=np.float64)
 
 
 def is_raw_log(table: Table) -> bool:

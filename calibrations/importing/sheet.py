@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from calibrations.errors import DataError
-from calibrations.importing.files import Source, text_source
+from calibrations.files import Source, text_source
 from calibrations.importing.units import parse_unit, split_unit
 from calibrations.table import Array, Constant
 

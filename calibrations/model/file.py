@@ -13,7 +13,7 @@ from calibrations.effects import Effect
 from calibrations.effects.catalogue import catalogue, find
 from calibrations.effects.expression_effect import own_effect
 from calibrations.errors import ModelError, UnknownName, nearest
-from calibrations.importing.files import load_yaml
+from calibrations.files import load_yaml
 from calibrations.model import Estimate, Model, Term
 from calibrations.table import NUMBERS
 

@@ -11,9 +11,9 @@ from functools import cached_property
 
 from calibrations.effects import Effect
 from calibrations.errors import UnknownParameter, nearest
-from calibrations.presentation.result import Shown
-from calibrations.presentation.text import columns, concise
+from calibrations.result import Shown
 from calibrations.table import Table
+from calibrations.text import columns, concise
 
 NOT_FITTED = 'the model has no values yet, and none for "{}"; fit it to data first'
 

@@ -29,7 +29,7 @@ from calibrations.noise.lines import Line
 from calibrations.noise.record import Channel, Still
 from calibrations.noise.samples import CONSTANT, WILD, Hidden, hidden_in
 from calibrations.noise.search import Search, search
-from calibrations.presentation.result import Result
+from calibrations.result import Result
 from calibrations.table import Array
 
 if TYPE_CHECKING:

@@ -34,7 +34,7 @@ from calibrations.noise.fit import NoiseFit, noise_terms, without_effects
 from calibrations.noise.likelihood import ChannelFit, Values, effect_lines, effect_spectrum
 from calibrations.noise.lines import Line, means_without
 from calibrations.noise.record import Channel, Still
-from calibrations.noise.spectrum import Bands, Sampling
+from calibrations.spectrum import Bands, Sampling
 from calibrations.table import Array
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)

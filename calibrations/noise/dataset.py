@@ -33,7 +33,7 @@ from calibrations.noise.doubts import (
 from calibrations.noise.fit import NoiseFit, fit
 from calibrations.noise.record import Still, of_record
 from calibrations.noise.search import Search, candidates, search
-from calibrations.presentation.text import quantity, rounded, sentence
+from calibrations.text import quantity, rounded, sentence
 
 if TYPE_CHECKING:
     from calibrations.presentation.chart import Chart

@@ -37,7 +37,7 @@ from calibrations.noise.patterns import DRIFT, FOLLOWS, SETTLING, STEP, TWO_LEVE
 from calibrations.noise.record import Channel
 from calibrations.noise.samples import hidden_in
 from calibrations.noise.search import Search
-from calibrations.noise.spectrum import GAUSS_MARKOV, Bands, slow_bands
+from calibrations.spectrum import GAUSS_MARKOV, Bands, slow_bands
 
 LINE, LEVEL, STRETCH = "line", "level", "spectrum"
 MISFITS = (LINE, LEVEL, STRETCH)

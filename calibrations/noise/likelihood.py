@@ -23,7 +23,7 @@ from calibrations.effects import Effect
 from calibrations.effects import Values as EffectValues
 from calibrations.noise.lines import Line, Lines
 from calibrations.noise.record import Channel
-from calibrations.noise.spectrum import Bands
+from calibrations.spectrum import Bands
 from calibrations.table import Array
 
 MULTIPLICATIVE_STEPS, SCORING_STEPS, SWEEPS = 20, 100, 200

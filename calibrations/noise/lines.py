@@ -22,7 +22,7 @@ from scipy.special import chdtrc
 
 from calibrations.criteria import FALSE_LINE, FEWEST_FAST_STRETCHES, FEWEST_PERIODS, MOST_FAST_LINES
 from calibrations.noise.record import Channel
-from calibrations.noise.spectrum import LENGTH, WINDOW, Bands, Sampling, fast_bands, slow_bands
+from calibrations.spectrum import LENGTH, WINDOW, Bands, Sampling, fast_bands, slow_bands
 from calibrations.table import Array
 
 LOBE = 3  # ordinates on each side that a line reaches under the window

@@ -24,7 +24,7 @@ from calibrations.criteria import FEWEST_ORDINATES, FEWEST_SAMPLES
 from calibrations.errors import DataError, TooFewRows
 from calibrations.noise.deviations import OCTAVE_KINDS, OVERLAPPING, Curve, Octaves
 from calibrations.noise.samples import Ends, Oddity, Outliers, Steps, Stuck, hidden_in, oddities
-from calibrations.noise.spectrum import Means, Sampling, Segments, Welch
+from calibrations.spectrum import Means, Sampling, Segments, Welch
 from calibrations.table import Array
 
 HOUR_S = 3600.0

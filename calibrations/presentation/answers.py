@@ -7,7 +7,7 @@ from typing import Any
 
 from calibrations.discovery.results import Comparison, Diagnosis, Discovery
 from calibrations.documents import why
-from calibrations.presentation.text import columns
+from calibrations.text import columns
 
 MOST_CANDIDATES = 6
 SELF_JUDGED = "The noise is known from this residual only, so that the error alone shows no failure."

@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 
 from calibrations.presentation import chart as c
-from calibrations.presentation.text import exponent, tick_text
+from calibrations.text import exponent, tick_text
 
 Figure = dict[str, Any]
 Trace = dict[str, Any]

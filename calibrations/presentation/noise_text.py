@@ -11,7 +11,7 @@ from calibrations.noise.deviations import minimum_s
 from calibrations.noise.patterns import TWO_LEVELS
 from calibrations.noise.record import Sensed
 from calibrations.noise.samples import COARSE
-from calibrations.presentation.text import columns, duration, exponent, sentence
+from calibrations.text import columns, duration, exponent, sentence
 
 PREFIXES = ((1.0, ""), (1e3, "m"), (1e6, "u"), (1e9, "n"), (1e12, "p"))
 MEANS = {

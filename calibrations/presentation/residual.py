@@ -9,14 +9,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrations.discovery.places import scales
 from calibrations.effects import Effect
-from calibrations.fit import Fit
+from calibrations.fitting.fit import Fit
+from calibrations.fitting.sensed import milli_unit, scales
 from calibrations.geometry.orientation import other_in_plane, out_of_plane
+from calibrations.means.noise import rms
 from calibrations.model.chain import backward, force
-from calibrations.noise.means import rms
-from calibrations.presentation.text import minus, rounded
 from calibrations.table import AXES, MILLI, Array, Table
+from calibrations.text import minus, rounded
 
 LENGTHS = ((7200.0, 3600.0, "h"), (180.0, 60.0, "min"), (-1.0, 1.0, "s"))  # longer than, unit, its name
 RESOLUTION_C = 0.01  # a smaller range of temperatures is that of a constant one
@@ -156,22 +156,6 @@ def named(column: str) -> str:
         return NAMES[column]
     head, _, last = column.rpartition("_")
     return f"{head.replace('_', ' ')} ({UNITS[last]})" if head and last in UNITS else column.replace("_", " ")
-
-
-def milli_unit(fit: Fit) -> str:
-    """The unit of `in_milli`."""
-    return MILLI[fit.table.input_unit]
-
-
-def in_milli(values: Array, fit: Fit) -> Array:
-    """Values per channel, in the residual's unit, as mg, thousandths of the field, or mdeg/s."""
-    return np.asarray(1e3 * values / scales(fit))
-
-
-def pooled_milli(fit: Fit) -> tuple[float, float]:
-    """Rms of the residual over all channels, and the noise floor, in the unit of `in_milli`."""
-    error, floor = in_milli(fit.rmse, fit), in_milli(fit.noise.floor, fit)
-    return float(np.sqrt(np.mean(error**2))), float(np.sqrt(np.mean(floor**2)))
 
 
 MOST = 4000  # rows that are drawn; more would make a page slow and a picture no clearer

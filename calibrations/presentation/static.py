@@ -22,7 +22,7 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator, NullF
 
 from calibrations.errors import CalibrationError
 from calibrations.presentation import chart as c
-from calibrations.presentation.text import tick_text
+from calibrations.text import tick_text
 
 RC: Any = {
     "font.family": ["DejaVu Sans"],

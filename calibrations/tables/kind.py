@@ -1,6 +1,6 @@
 """What may differ between kinds of measured data: facts and words, the same members for every kind.
 
-How a model is fitted to rows of a kind is in `calibrations.problem`; how they are drawn, in `presentation.charts`.
+The residual of each kind is in `calibrations.fitting.problem`, its charts are in `calibrations.presentation.charts`.
 """
 
 from __future__ import annotations

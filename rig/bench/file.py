@@ -10,8 +10,8 @@ from typing import Any
 from pydantic import ValidationError
 
 from calibrations.errors import DataError
+from calibrations.files import load_yaml
 from calibrations.geometry.error_table import ErrorTable, Point, read_error_table
-from calibrations.importing.files import load_yaml
 from drivers.philtec_d63 import Curve
 from rig.bench.bench import Bench
 from rig.bench.check import check, check_values, describe_error

@@ -11,7 +11,7 @@ from calibrations.fleet.batch import Population
 from calibrations.presentation.certificate.terms import name as result_name
 from calibrations.presentation.charts.fleet import Spread
 from calibrations.presentation.report.fleet import calibration_report, population_report
-from calibrations.presentation.text import estimate_text, rounded
+from calibrations.text import estimate_text, rounded
 from rig.fleet.calibrate import Calibrated, Calibration
 from rig.fleet.worker import effects_of
 from rig.services.provenance import program, today

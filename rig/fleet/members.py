@@ -19,10 +19,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from calibrations.errors import DataError
-from calibrations.importing.files import open_text_file
-from calibrations.presentation.text import as_written
+from calibrations.files import open_text_file
 from calibrations.table import NUMBERS
 from calibrations.tables import MEANS
+from calibrations.text import as_written
 from rig.errors import RigError, UnknownRun
 from rig.record import Record, Run
 from rig.services.history import members

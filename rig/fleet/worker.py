@@ -21,16 +21,16 @@ from calibrations.discovery.results import Diagnosis
 from calibrations.effects import Effect
 from calibrations.effects.catalogue import LOG, catalogue
 from calibrations.errors import CalibrationError, DataError, ModelError
-from calibrations.fit import Fit
+from calibrations.fitting.fit import Fit
 from calibrations.fleet.look import Score, Screening, SharedDesigns, StageScore, screen_sensor
 from calibrations.fleet.rigs import StageErrors, correct_stage_errors
 from calibrations.importing.foreign import parse_csv
 from calibrations.loop import diagnose
 from calibrations.model import Model
 from calibrations.model.file import parse_model
-from calibrations.presentation.text import joined
 from calibrations.table import Table
 from calibrations.tables import FITTED, MEANS
+from calibrations.text import joined
 from rig.errors import RigError
 from rig.services.load import LONGEST_BEGINNING, channels_alone, check_unit
 from rig.services.load import effects_of as checked

@@ -20,7 +20,7 @@ from calibrations.design.experiment import MENU, Experiment
 from calibrations.discovery.results import Diagnosis, Discovery
 from calibrations.effects import Effect
 from calibrations.errors import CalibrationError
-from calibrations.fit import Fit, refit
+from calibrations.fitting.fit import Fit, refit
 from calibrations.tables import KINDS
 from drivers.errors import LimitError
 from procedures.catalogue import find

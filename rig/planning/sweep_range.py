@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from calibrations.design.expected import assume_sensor, predict_data
 from calibrations.design.optimal_design import covariance_of, information, scale_rows
 from calibrations.discovery.check_poses import MARK
-from calibrations.fit import Fit
+from calibrations.fitting.fit import Fit
 from calibrations.geometry.orientation import nominal_pose, specific_force
 from calibrations.model import Model
 from calibrations.table import AXES, Array, Table

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from calibrations.geometry.error_table import ErrorTable
-from calibrations.noise.means import measured_inflation
+from calibrations.means.noise import measured_inflation
 from calibrations.table import Array, Table
 from calibrations.tables import KINDS
 from procedures.session import Samples

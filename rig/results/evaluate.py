@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from calibrations.errors import CalibrationError
-from calibrations.presentation.text import joined
+from calibrations.text import joined
 from rig.bench import Bench
 from rig.errors import RecordError
 from rig.record import Record, Run

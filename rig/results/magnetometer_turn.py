@@ -14,10 +14,10 @@ from calibrations.analyses.magnetometer_turn import (
     level_elements_by_extremes,
 )
 from calibrations.errors import DataError
-from calibrations.fit import Fit
+from calibrations.fitting.fit import Fit
 from calibrations.fitting.matrices import calibration_matrices
 from calibrations.geometry.sphere import magnetometer_coverage_warning
-from calibrations.noise.means import rms, white_std
+from calibrations.means.noise import rms, white_std
 from calibrations.table import Array, Table
 from procedures.session import Pose
 from rig.record.measured import Measured, sensor_from_base

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from calibrations.motion.evaluate import MotionResult, evaluate_motion, fit_physical, linear_from_turns
+from calibrations.analyses.motion import MotionResult, evaluate_motion, fit_physical, linear_from_turns
 from procedures.motion import SWEEP
 from rig.record.measured import Measured
 from rig.results.result import Result

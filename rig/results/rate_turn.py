@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from itertools import permutations
 
-from calibrations.noise.means import rms
+from calibrations.means.noise import rms
 from procedures.questions import EDGES
 from rig.record.measured import Measured
 from rig.results.result import Missing, Result, fitted, result

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from calibrations.effects.catalogue import catalogue
-from calibrations.fit import Fit, fit
+from calibrations.fitting.fit import Fit, fit
 from calibrations.model import Estimate
 from calibrations.model.file import read_model
 from calibrations.table import Table

@@ -14,7 +14,7 @@ from pathlib import Path
 from calibrations.design.experiment import ADDITIONS, MENU, Experiment
 from calibrations.discovery.results import Discovery
 from calibrations.effects import Effect
-from calibrations.fit import Fit
+from calibrations.fitting.fit import Fit
 from calibrations.loop import discover
 from calibrations.model import Model
 from calibrations.table import Table

@@ -15,7 +15,7 @@ from typing import Literal, Protocol
 import numpy as np
 
 from calibrations.analyses.forecast import Forecast
-from calibrations.presentation.text import duration
+from calibrations.text import duration
 from procedures.level_check import reversal
 from procedures.questions import Question
 from procedures.session import Limits, Reading

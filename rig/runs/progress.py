@@ -18,8 +18,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from calibrations.estimators.least_squares import Recursive
-from calibrations.presentation.text import estimate_text
 from calibrations.table import Array
+from calibrations.text import estimate_text
 from procedures.questions import EDGES
 from procedures.session import Dwell, Pose
 from rig.record import Kept, Record

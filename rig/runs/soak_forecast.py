@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from calibrations.analyses.forecast import LATEST_STEADY_S, STRETCH_S, Forecast, SoakForecast, filter_soak
 from calibrations.analyses.soak import HOLD, HOUR_S, REVERSAL
-from calibrations.presentation.text import rounded
+from calibrations.text import rounded
 from procedures.session import Dwell
 from procedures.tumbles import tumble
 from rig.record import Kept, Record

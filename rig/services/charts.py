@@ -27,7 +27,7 @@ from calibrations.presentation.chart import (
 from calibrations.presentation.charts.history import Life
 from calibrations.presentation.charts.noise import TIME, Scaled, measured_points
 from calibrations.presentation.residual import Column, Shown, in_time
-from calibrations.presentation.text import estimate_text, labelled, minus, prefixed, unit
+from calibrations.text import estimate_text, labelled, minus, prefixed, unit
 from procedures.session import Dwell
 from rig.services.history import Calibration, Quantity
 from rig.services.two_runs import DIFFERENT, Again, Pair

@@ -18,13 +18,13 @@ from calibrations.analyses.control_chart import Chart, control_chart
 from calibrations.analyses.stability import Agreement, Stability, compare_values, fit_stability
 from calibrations.criteria import BASELINE_RUNS, FEWEST_FOR_DRIFT, FEWEST_RUNS
 from calibrations.errors import CalibrationError, DataError
-from calibrations.fit import fit
+from calibrations.fitting.fit import fit
+from calibrations.fitting.problem import check_kind
+from calibrations.means.noise import rms
 from calibrations.model import Model
-from calibrations.noise.means import rms
 from calibrations.presentation.certificate.terms import name as result_name
-from calibrations.presentation.text import as_written
-from calibrations.problem import check_kind
 from calibrations.tables import MEANS
+from calibrations.text import as_written
 from drivers.errors import did_you_mean
 from rig.bench.certificates import EXPIRED
 from rig.errors import RecordError, RigError

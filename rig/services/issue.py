@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from calibrations.fit import Fit
+from calibrations.fitting.fit import Fit
 from calibrations.model.file import dump_model
 from calibrations.presentation.certificate.content import (
     UNSTATED,
@@ -24,8 +24,8 @@ from calibrations.presentation.certificate.content import (
     Laboratory,
     Sample,
 )
-from calibrations.presentation.text import as_written
 from calibrations.table import Table
+from calibrations.text import as_written
 from rig.bench import Bench
 from rig.bench.certificates import EXPIRED, certificates
 from rig.errors import UnknownRun

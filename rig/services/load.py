@@ -13,18 +13,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrations.discovery.dataset import Dataset
+from calibrations.discovery.plausibility import doubt
 from calibrations.discovery.rows import Rows
 from calibrations.effects import Effect
 from calibrations.effects.catalogue import catalogue
 from calibrations.errors import DataError, ModelError
+from calibrations.fitting import table_noise
+from calibrations.fitting.table_noise import with_noise
 from calibrations.geometry.rate_table import earth_rate_warning
 from calibrations.importing.units import UNITS, parse_unit
+from calibrations.means.noise import correlation_known
 from calibrations.model import Model
 from calibrations.model.file import read_model
-from calibrations.noise import table_noise
-from calibrations.noise.means import correlation_known
-from calibrations.noise.table_noise import with_noise
-from calibrations.plausibility import doubt
 from calibrations.table import Table
 from rig.errors import UnknownRun
 from rig.files import require_out

@@ -6,8 +6,8 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from calibrations.presentation.text import bound, columns, concise, joined
 from calibrations.tables import FITTED
+from calibrations.text import bound, columns, concise, joined
 from rig.record import Run
 
 SPREADS = re.compile("tolerance|wander")  # uncertainties themselves: two digits

@@ -8,11 +8,11 @@ from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 
+from calibrations.discovery.plausibility import NO_RESPONSE, refusal
 from calibrations.discovery.results import FittedModel
 from calibrations.errors import UnusableData
 from calibrations.model import Model
 from calibrations.model.file import dump_model
-from calibrations.plausibility import NO_RESPONSE, refusal
 from calibrations.table import NUMBERS, Table
 from rig.files import write_whole
 

@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from calibrations.analyses.motion import MotionResult
 from calibrations.discovery.verdict import Verdict
 from calibrations.errors import UnusableData
-from calibrations.motion.evaluate import MotionResult
 from rig.record import Record
 from rig.record.measured import Measured
 from rig.results.motion import beside_displacement

@@ -13,7 +13,8 @@ from pathlib import Path
 
 import atheris
 
-COMPILED = ["drivers.world", "calibrations.kernels"]  # by numba, which does not know what Atheris adds
+# by numba, which does not know what Atheris adds
+COMPILED = ["drivers.world", "calibrations.effects.kernels", "calibrations.means.whitening"]
 
 with atheris.instrument_imports(include=["calibrations", "drivers", "rig", "pymodbus", "yaml"], exclude=COMPILED):
     from tests.fuzz.files import remove

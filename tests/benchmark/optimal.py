@@ -14,7 +14,7 @@ import numpy as np
 
 from calibrations.discovery.check_poses import MARK, unseen
 from calibrations.effects.catalogue import catalogue
-from calibrations.fit import fit
+from calibrations.fitting.fit import fit
 from calibrations.loop import diagnose
 from calibrations.model import Model
 from calibrations.model.file import read_model

@@ -14,9 +14,9 @@ import numpy as np
 
 from calibrations.discovery.significance import reductions
 from calibrations.effects.catalogue import catalogue
-from calibrations.fit import Fit, fit
+from calibrations.fitting.fit import Fit, fit
+from calibrations.fitting.problem import Problem
 from calibrations.model.file import read_model
-from calibrations.problem import Problem
 from calibrations.table import Array, Table
 from tests.benchmark.timed import seconds
 

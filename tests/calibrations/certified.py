@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 
-from calibrations.fit import Fit, fit
+from calibrations.fitting.fit import Fit, fit
 from calibrations.model import Model
 from calibrations.model.file import read_model
 from calibrations.presentation.certificate.content import Certificate, Condition, Instrument, Laboratory, Sample

@@ -13,7 +13,7 @@ from calibrations.errors import DataError
 from calibrations.loop import compare, diagnose, discover
 from calibrations.model.file import read_model
 from calibrations.noise.record import Samples, reduce_record
-from calibrations.presentation.result import Result
+from calibrations.result import Result
 from tests.calibrations import synthetic
 
 SCHEMAS = {"compare": "rig.comparison/1", "diagnose": "rig.diagnosis/1", "discover": "rig.discovery/1"}

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from calibrations.design.expected import SAMPLE_STD_V, assume_sensor
 from calibrations.effects.catalogue import catalogue
-from calibrations.fit import Fit, fit
+from calibrations.fitting.fit import Fit, fit
 from calibrations.model.file import read_model
 from tests.calibrations.synthetic import components, poses, turns
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from calibrations.effects.catalogue import catalogue
-from calibrations.fit import fit
 from calibrations.fitting.determined import blind_to
+from calibrations.fitting.fit import fit
 from calibrations.model.file import read_model
 from calibrations.table import Table
 from tests.calibrations.synthetic import components, poses, turns

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from calibrations.effects.catalogue import catalogue
-from calibrations.fit import fit
 from calibrations.fitting.budget import Budget, Line, make_budget, slow_freedom
+from calibrations.fitting.fit import fit
 from calibrations.fitting.inputs import input_contributions
 from calibrations.geometry.orientation import rotation
+from calibrations.means.noise import Noise
 from calibrations.model import Model
 from calibrations.model.file import read_model
-from calibrations.noise.means import Noise
 from calibrations.table import Array, Table
 from tests.calibrations import synthetic
 from tests.calibrations.test_real_data import mikoff

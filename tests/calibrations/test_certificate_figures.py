@@ -9,8 +9,8 @@ import pytest
 
 from calibrations.effects.catalogue import catalogue
 from calibrations.errors import DataError, ModelError
-from calibrations.fit import fit
 from calibrations.fitting.budget import Budget, Line, make_budget, parameter_correlation
+from calibrations.fitting.fit import fit
 from calibrations.fitting.inputs import input_contributions
 from calibrations.model.file import read_model
 from calibrations.presentation.certificate.content import decide

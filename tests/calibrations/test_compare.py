@@ -7,8 +7,8 @@ import re
 import numpy as np
 import pytest
 
-from calibrations.discovery.places import scales
-from calibrations.fit import fit
+from calibrations.fitting.fit import fit
+from calibrations.fitting.sensed import scales
 from calibrations.loop import compare, diagnose
 from calibrations.model.file import read_model
 from calibrations.table import Array, Table

@@ -15,8 +15,8 @@ from calibrations.compensation.document import header_lines, make_vectors
 from calibrations.compensation.forward import FORCES, steps_of
 from calibrations.compensation.graph import evaluate_nodes
 from calibrations.compensation.inverse import invert_model
+from calibrations.effects.kernels import slip
 from calibrations.geometry.orientation import nominal_pose, specific_force
-from calibrations.kernels import slip
 from calibrations.model.chain import respond
 from calibrations.table import Table
 from tests.calibrations.compiled import COMPILERS, FOLLOWING, ORIGIN, build, through, written

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from calibrations.effects.catalogue import catalogue
-from calibrations.fit import fit
 from calibrations.fitting.determined import leverages, undetermined, unseen_variance
+from calibrations.fitting.fit import fit
 from calibrations.loop import add, diagnose, discover
 from calibrations.model import Model
 from calibrations.model.file import read_model

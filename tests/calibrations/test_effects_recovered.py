@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import norm
 
 from calibrations.effects.catalogue import catalogue
-from calibrations.fit import fit
+from calibrations.fitting.fit import fit
 from calibrations.model.file import read_model
 from calibrations.table import Array, Table
 from tests.calibrations import synthetic

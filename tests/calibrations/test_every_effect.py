@@ -11,9 +11,9 @@ from scipy.spatial.transform import Rotation
 from calibrations.effects import HOOKS, Effect, Parameter, Values
 from calibrations.effects.catalogue import catalogue, find
 from calibrations.errors import ModelError, UnknownName
-from calibrations.fit import fit
+from calibrations.fitting.fit import fit
+from calibrations.fitting.problem import Problem
 from calibrations.model.file import read_model
-from calibrations.problem import Problem
 from calibrations.table import Array, Table
 from tests.calibrations import shaken, synthetic
 

@@ -8,7 +8,7 @@ import pytest
 from calibrations.criteria import CERTAIN_PROBABILITY
 from calibrations.design.expected import Expected, expected_gain, pairs_separated, predict_data, vary_one_way
 from calibrations.effects.catalogue import catalogue
-from calibrations.fit import Fit, fit, refit
+from calibrations.fitting.fit import Fit, fit, refit
 from calibrations.joined import joined
 from calibrations.model import Model
 from calibrations.model.file import read_model

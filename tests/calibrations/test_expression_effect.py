@@ -11,7 +11,7 @@ from calibrations.effects import Effect
 from calibrations.effects.catalogue import catalogue
 from calibrations.effects.expression_effect import effect_for, own_effect
 from calibrations.errors import ExpressionError, ModelError
-from calibrations.fit import Fit, fit
+from calibrations.fitting.fit import Fit, fit
 from calibrations.loop import compare, diagnose
 from calibrations.model.file import dump_model, parse_model, read_model
 from calibrations.table import Array, Table

@@ -9,7 +9,7 @@ import pytest
 
 from calibrations.effects.catalogue import catalogue
 from calibrations.errors import ModelError, TooFewRows
-from calibrations.fit import evaluate, fit
+from calibrations.fitting.fit import evaluate, fit
 from calibrations.model.file import read_model
 from calibrations.model.parameters import Layout
 from calibrations.table import Table

@@ -13,7 +13,7 @@ from calibrations.discovery.candidates import candidates
 from calibrations.discovery.significance import Screen
 from calibrations.effects import Constant, Effect, Parameter, Values
 from calibrations.effects.catalogue import catalogue
-from calibrations.fit import fit
+from calibrations.fitting.fit import fit
 from calibrations.fleet.batch import find_batch_effects
 from calibrations.fleet.look import Score, Screening, SharedDesigns, information, screen_sensor
 from calibrations.fleet.rigs import Measured, RigError, correct_stage_errors, find_rig_errors, unconnected_rigs

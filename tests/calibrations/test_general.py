@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from calibrations.effects.catalogue import catalogue
-from calibrations.fit import fit
+from calibrations.fitting.fit import fit
 from calibrations.fitting.matrices import CalibrationMatrices, calibration_matrices
 from calibrations.model.file import read_model
 from calibrations.table import Array, Table

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from calibrations.fit import fit
+from calibrations.fitting.fit import fit
 from calibrations.fitting.held_out import folds, held_out
 from calibrations.geometry.orientation import nominal_pose, specific_force
+from calibrations.means.noise import white_only
 from calibrations.model.file import read_model
-from calibrations.noise.means import white_only
 from calibrations.table import Table
 from tests.calibrations import synthetic
 

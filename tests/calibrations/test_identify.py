@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from calibrations.effects.catalogue import catalogue
-from calibrations.fit import fit
+from calibrations.fitting.fit import fit
 from calibrations.fitting.identifiability import covariance
 from calibrations.model import Estimate, Model
 from calibrations.model.file import read_model

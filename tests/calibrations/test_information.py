@@ -11,9 +11,9 @@ from calibrations.design.expected import predict_data
 from calibrations.design.optimal_design import covariance_of, information
 from calibrations.effects.catalogue import catalogue
 from calibrations.errors import DataError, MissingColumn
-from calibrations.fit import Fit, fit
+from calibrations.fitting.fit import Fit, fit
+from calibrations.means.noise import white_only
 from calibrations.model.file import read_model
-from calibrations.noise.means import white_only
 from calibrations.table import Table
 from tests.calibrations.synthetic import NOISE_V, components, gauss_markov, poses, turns
 

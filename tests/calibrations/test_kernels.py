@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from calibrations.kernels import slip, whiten
-from calibrations.noise.means import Noise, rms, white_only
+from calibrations.effects.kernels import slip
+from calibrations.means.noise import Noise, rms, white_only
+from calibrations.means.whitening import whiten
 from calibrations.table import Array
 
 

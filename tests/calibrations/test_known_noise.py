@@ -7,12 +7,12 @@ import pytest
 
 from calibrations.effects.catalogue import catalogue
 from calibrations.errors import DataError, ModelError
-from calibrations.fit import fit
+from calibrations.fitting.fit import fit
+from calibrations.fitting.table_noise import slow_processes, with_noise
 from calibrations.loop import compare, diagnose
+from calibrations.means.noise import Noise, correlated
 from calibrations.model import Estimate, Model, Term
 from calibrations.model.file import read_model
-from calibrations.noise.means import Noise, correlated
-from calibrations.noise.table_noise import slow_processes, with_noise
 from calibrations.table import Table
 from tests.calibrations.hidden_noise import fractional
 from tests.calibrations.synthetic import NOISE_V, components, poses, turns

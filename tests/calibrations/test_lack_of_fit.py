@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from calibrations.fitting.smooth import ROWS_PER_COLUMN, smooth_columns
+from calibrations.geometry.smooth import ROWS_PER_COLUMN, smooth_columns
 from calibrations.table import Array, Table
 from tests.calibrations import synthetic
 

@@ -17,7 +17,7 @@ from calibrations.analyses.magnetometer_turn import (
 )
 from calibrations.effects.catalogue import catalogue
 from calibrations.errors import DataError, ModelError
-from calibrations.fit import fit
+from calibrations.fitting.fit import fit
 from calibrations.geometry.sphere import SOFT_IRON, coverage_fault, directions, harmonics, worst_ratio
 from calibrations.importing.raw_logs import is_raw_log, thin_by_direction
 from calibrations.loop import compare, diagnose, discover

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from calibrations.noise.means import inflation, measured_inflation, norm_std, white_std
+from calibrations.means.noise import inflation, measured_inflation, norm_std, white_std
 from calibrations.table import Array, Table
 
 FILTER = {"filter_corner_hz": 15.07, "sample_rate_hz": 1000.0}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from calibrations.errors import UnknownName
-from calibrations.fit import fit
+from calibrations.fitting.fit import fit
 from calibrations.model import Estimate, Model
 from calibrations.model.file import read_model
 from tests.calibrations import synthetic

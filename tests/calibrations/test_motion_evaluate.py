@@ -8,14 +8,14 @@ from functools import cache
 import numpy as np
 import pytest
 
+from calibrations.analyses.motion import MotionResult, acceleration, evaluate_motion
 from calibrations.compensation.forward import steps_of
 from calibrations.effects.catalogue import catalogue
 from calibrations.errors import DataError, ModelError
-from calibrations.fit import fit
+from calibrations.fitting.fit import fit
 from calibrations.model import Estimate, Model, Term
 from calibrations.model.chain import respond, sensed, static_force
 from calibrations.model.file import read_model
-from calibrations.motion.evaluate import MotionResult, acceleration, evaluate_motion
 from calibrations.presentation.chart import Line
 from calibrations.presentation.charts.motion import evaluation
 from calibrations.presentation.static import png

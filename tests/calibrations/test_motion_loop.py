@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from calibrations.documents import comparison_document
-from calibrations.fit import fit
+from calibrations.fitting.fit import fit
 from calibrations.loop import compare, diagnose, discover
 from calibrations.model import Model
 from calibrations.model.file import parse_model, read_model

@@ -7,9 +7,9 @@ import pytest
 
 from calibrations.effects import Values
 from calibrations.effects.catalogue import catalogue
+from calibrations.fitting.problem import Problem
 from calibrations.model.chain import Near, forward
 from calibrations.model.file import read_model
-from calibrations.problem import Problem
 from tests.calibrations import synthetic
 
 COLUMNS = synthetic.turns(inclinations_deg=(90, 30))

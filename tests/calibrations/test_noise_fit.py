@@ -9,8 +9,8 @@ import pytest
 from scipy.optimize import minimize
 
 from calibrations.criteria import INSEPARABLE
-from calibrations.noise.means import white_only
-from calibrations.noise.means_fit import FLICKER_PROCESSES, FLICKER_RATIOS, RATIOS, TIME_CONSTANTS, estimate, gains
+from calibrations.fitting.noise_fit import FLICKER_PROCESSES, FLICKER_RATIOS, RATIOS, TIME_CONSTANTS, estimate, gains
+from calibrations.means.noise import white_only
 from calibrations.table import Array
 from tests.calibrations import synthetic
 from tests.calibrations.test_kernels import covariance

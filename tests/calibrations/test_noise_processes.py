@@ -9,7 +9,7 @@ import pytest
 
 from calibrations.noise.comparison import line_variance, quadrature
 from calibrations.noise.deviations import deviations
-from calibrations.noise.spectrum import (
+from calibrations.spectrum import (
     LENGTH,
     MOST_MEANS,
     Means,

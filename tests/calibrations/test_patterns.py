@@ -7,7 +7,7 @@ import pytest
 
 from calibrations.discovery.patterns import patterns
 from calibrations.discovery.structure import structure_of
-from calibrations.fit import fit
+from calibrations.fitting.fit import fit
 from calibrations.model.file import read_model
 from calibrations.table import Array, Table
 from tests.calibrations import synthetic

@@ -13,7 +13,8 @@ import pytest
 
 from calibrations.discovery.results import Discovery, Step
 from calibrations.effects.catalogue import catalogue
-from calibrations.fit import Fit, fit
+from calibrations.fitting.fit import Fit, fit
+from calibrations.fitting.sensed import pooled_milli
 from calibrations.loop import compare, discover
 from calibrations.model import Model
 from calibrations.model.file import read_model
@@ -21,7 +22,7 @@ from calibrations.presentation.chart import Bars, Chart, Line, Panel, Points, Se
 from calibrations.presentation.charts import fit as charts
 from calibrations.presentation.charts.discovery import MOST_CURVES, album, effect_chart, levels, tried, waterfall
 from calibrations.presentation.interactive import figure
-from calibrations.presentation.residual import pooled_milli, telling_columns
+from calibrations.presentation.residual import telling_columns
 from calibrations.presentation.static import PictureError, compact, draw, inline, png, save, save_all, svg
 from calibrations.table import Array, Table
 from tests.calibrations.synthetic import components, poses, turns

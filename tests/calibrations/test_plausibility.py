@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
+from calibrations.discovery.plausibility import NO_RESPONSE, UNEXPLAINED, doubt, findings, refusal
 from calibrations.documents import comparison_document, diagnosis_document, discovery_document, fit_document
 from calibrations.effects.catalogue import catalogue
 from calibrations.errors import UnusableData
-from calibrations.fit import fit
+from calibrations.fitting.fit import fit
 from calibrations.loop import add, compare, dataset, diagnose, discover
 from calibrations.model.file import read_model
-from calibrations.plausibility import NO_RESPONSE, UNEXPLAINED, doubt, findings, refusal
 from calibrations.presentation.certificate.results import figures
 from calibrations.table import Array, Table
 from tests.calibrations.synthetic import NOISE_V, components, turns

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from calibrations.errors import DataError
-from calibrations.importing.files import text_source
+from calibrations.files import text_source
 from calibrations.importing.foreign import drop_duplicate_rows, import_sheet
 from calibrations.importing.plausible import gravity_unit, looks_like_radians
 from calibrations.importing.sheet import read_sheet

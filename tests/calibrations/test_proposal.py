@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from calibrations.errors import DataError, MissingColumn
-from calibrations.importing.files import text_source
+from calibrations.files import text_source
 from calibrations.importing.foreign import import_sheet, needs_mapping
 from calibrations.importing.proposal import import_command, likely_kind, propose_mapping
 from calibrations.importing.sheet import Sheet, read_sheet

@@ -9,7 +9,7 @@ import pytest
 
 from calibrations.effects import Effect
 from calibrations.effects.catalogue import catalogue
-from calibrations.fit import Fit, fit
+from calibrations.fitting.fit import Fit, fit
 from calibrations.importing.foreign import read_foreign
 from calibrations.importing.raw_logs import average_still_positions
 from calibrations.importing.units import ColumnMapping

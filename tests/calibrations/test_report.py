@@ -15,14 +15,15 @@ from calibrations.design.expected import Expected
 from calibrations.design.experiment import Experiment
 from calibrations.discovery.results import Comparison, Discovery
 from calibrations.effects.catalogue import catalogue
-from calibrations.fit import Fit
+from calibrations.fitting.fit import Fit
+from calibrations.fitting.sensed import pooled_milli
 from calibrations.loop import compare, discover
 from calibrations.model import Estimate, Model, Term
 from calibrations.model.file import read_model
 from calibrations.presentation.chart import Chart, Panel, Picture
 from calibrations.presentation.report.report import next_takes, next_words, report, summary
-from calibrations.presentation.residual import pooled_milli
-from calibrations.presentation.text import (
+from calibrations.table import Table
+from calibrations.text import (
     estimate_text,
     expanded_text,
     interval,
@@ -33,7 +34,6 @@ from calibrations.presentation.text import (
     unit,
     value_text,
 )
-from calibrations.table import Table
 from tests.calibrations.test_pictures import EFFECTS, by_hand, hand_table, warm, warm_table
 
 EMPTY = {"meta", "br", "link", "hr", "img"}

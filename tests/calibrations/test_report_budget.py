@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 
-from calibrations.fit import fit
+from calibrations.fitting.fit import fit
 from calibrations.loop import compare, discover
 from calibrations.model.file import read_model
 from calibrations.presentation.report.parameters import budget, budget_document

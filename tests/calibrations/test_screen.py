@@ -10,9 +10,9 @@ from scipy.stats import kstest
 
 from calibrations.criteria import NOT_SHOWN
 from calibrations.discovery.significance import Screen, Search, of_search, reductions
-from calibrations.fit import Fit, fit
+from calibrations.fitting.fit import Fit, fit
+from calibrations.means.noise import Noise
 from calibrations.model.file import read_model
-from calibrations.noise.means import Noise
 from calibrations.table import Array
 from tests.calibrations import synthetic
 from tests.calibrations.test_kernels import covariance

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from calibrations.errors import DataError
-from calibrations.importing.files import LARGEST_BYTES, open_text_file, text_source
+from calibrations.files import LARGEST_BYTES, open_text_file, text_source
 from calibrations.importing.foreign import parse_csv, read_csv
 from calibrations.importing.sheet import Sheet, read_cells, read_sheet
 

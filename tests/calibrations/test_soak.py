@@ -12,7 +12,7 @@ from calibrations.analyses.soak import analyse_soak
 from calibrations.errors import TooFewRows
 from calibrations.presentation.charts.soak import soak_album
 from calibrations.presentation.report.soak import soak_report
-from calibrations.presentation.text import estimate_text
+from calibrations.text import estimate_text
 from tests.calibrations.soaks import BLOCK_S, soak_table
 
 FACTS = {"sensor": "a <sensor>", "run": "a night"}

@@ -10,7 +10,7 @@ import pytest
 from calibrations.discovery.patterns import Pattern
 from calibrations.discovery.structure import structure_of
 from calibrations.effects.expression_effect import effect_for
-from calibrations.fit import Fit, fit
+from calibrations.fitting.fit import Fit, fit
 from calibrations.model.file import read_model
 from calibrations.table import Array, Table
 from tests.hidden import sampled

@@ -10,7 +10,7 @@ import pytest
 
 from calibrations.discovery.results import Diagnosis
 from calibrations.discovery.verdict import Judgement, Verdict
-from calibrations.fit import Fit
+from calibrations.fitting.fit import Fit
 from calibrations.loop import diagnose
 from calibrations.model.file import read_model
 from tests.calibrations import synthetic

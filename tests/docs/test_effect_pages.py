@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 
 from calibrations.effects.catalogue import catalogue
-from calibrations.pages import drawing, page, pages, write
+from calibrations.presentation.effect_pages import drawing, page, pages, write
 from tests.docs.markdown import ROOT
 
 FOLDER = ROOT / "docs" / "effects"
-REMEDY = "run: python -m calibrations.pages docs/effects"
+REMEDY = "run: python -m calibrations.presentation.effect_pages docs/effects"
 
 
 def test_there_is_a_page_for_each_effect_and_no_other() -> None:
@@ -45,7 +45,7 @@ def test_the_picture_is_up_to_date_and_small(name: str) -> None:
 
 def test_a_page_of_an_effect_that_is_no_more_is_removed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     one = {"bias": catalogue()["bias"]}
-    monkeypatch.setattr("calibrations.pages.catalogue", lambda: one)
+    monkeypatch.setattr("calibrations.presentation.effect_pages.catalogue", lambda: one)
     (tmp_path / "pictures").mkdir()
     for stale in ("phlogiston.md", "pictures/phlogiston.svg"):
         (tmp_path / stale).write_text("# phlogiston\n", encoding="utf-8")

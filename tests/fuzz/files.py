@@ -13,8 +13,8 @@ import numpy as np
 
 from calibrations.effects.expression_effect import own_effect
 from calibrations.errors import CalibrationError
+from calibrations.files import load_yaml, open_text_file, text_source
 from calibrations.geometry.error_table import ErrorTable, read_error_table
-from calibrations.importing.files import load_yaml, open_text_file, text_source
 from calibrations.importing.foreign import import_sheet, parse_csv
 from calibrations.importing.proposal import propose_mapping
 from calibrations.importing.sheet import read_sheet

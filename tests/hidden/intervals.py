@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibrations.effects.catalogue import catalogue
-from calibrations.fit import Fit, fit, refit
+from calibrations.fitting.fit import Fit, fit, refit
 from calibrations.model.file import read_model
 from calibrations.table import Array, Table
 from drivers.world.defects import DEFECTS

@@ -9,10 +9,10 @@ import pytest
 
 from calibrations.compensation.inverse import Compensation, compensated_residual, invert_model
 from calibrations.effects.catalogue import catalogue
-from calibrations.fit import fit
+from calibrations.fitting.fit import fit
 from calibrations.geometry.orientation import nominal_pose, specific_force
+from calibrations.means.noise import rms
 from calibrations.model.file import read_model
-from calibrations.noise.means import rms
 from calibrations.presentation.charts.motion import compensated
 from calibrations.presentation.static import save
 from calibrations.table import Array, Table

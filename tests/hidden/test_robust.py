@@ -10,10 +10,10 @@ import pytest
 from calibrations.discovery.outliers import gross
 from calibrations.discovery.results import Discovery
 from calibrations.documents import diagnosis_document
-from calibrations.fit import fit
+from calibrations.fitting.fit import fit
 from calibrations.loop import diagnose, discover
+from calibrations.means.noise import white_std
 from calibrations.model.file import read_model
-from calibrations.noise.means import white_std
 from calibrations.table import Array, Table
 from tests.hidden import rigs, sampled
 from tests.hidden.intervals import CAUSES

@@ -41,7 +41,7 @@ def test_a_file_that_may_not_be_read(refused: Callable[..., str], monkeypatch: p
     def bytes_of(path: Path) -> None:
         raise PermissionError(EACCES, "Permission denied", str(path))
 
-    monkeypatch.setattr("calibrations.importing.files._bytes", bytes_of)
+    monkeypatch.setattr("calibrations.files._bytes", bytes_of)
     assert "good.csv: cannot be read: Permission denied" in refused("compare", "good.csv", "--model", "linear")
 
 

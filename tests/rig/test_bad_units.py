@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from calibrations.importing.files import LARGEST_BYTES
+from calibrations.files import LARGEST_BYTES
 from tests.rig.test_analysis_models import OWN
 
 Refused = Callable[..., str]

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from calibrations.fit import Fit, fit
+from calibrations.fitting.fit import Fit, fit
 from calibrations.importing.foreign import write_csv
 from calibrations.model.file import read_model
 from calibrations.table import Table

@@ -15,7 +15,7 @@ from distributed import Client, LocalCluster
 from calibrations.discovery.candidates import candidates
 from calibrations.discovery.significance import Screen
 from calibrations.effects.catalogue import catalogue
-from calibrations.fit import fit
+from calibrations.fitting.fit import fit
 from calibrations.fleet.look import Score, Screening, SharedDesigns, screen_sensor
 from calibrations.importing.foreign import write_csv
 from calibrations.model.file import dump_model, read_model

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from rich.console import Console, RenderableType
 
-from calibrations.presentation.text import columns, duration, size
+from calibrations.text import columns, duration, size
 from procedures.catalogue import find
 from procedures.errors import Declined, NoAnswer
 from procedures.questions import Choice, Confirm, Mounting, Number

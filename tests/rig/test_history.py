@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from calibrations.fit import Fit, fit
+from calibrations.fitting.fit import Fit, fit
 from calibrations.model import Model
 from calibrations.model.file import read_model
 from calibrations.table import Table

@@ -13,7 +13,7 @@ import pytest
 from calibrations.design.experiment import Experiment
 from calibrations.discovery.results import Discovery
 from calibrations.effects.catalogue import catalogue
-from calibrations.fit import Fit
+from calibrations.fitting.fit import Fit
 from calibrations.loop import discover
 from calibrations.model.file import read_model
 from rig.bench import read_bench

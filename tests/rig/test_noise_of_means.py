@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from calibrations.noise.means import inflation, measured_inflation, white_std
+from calibrations.means.noise import inflation, measured_inflation, white_std
 from drivers.world.config import WorldConfig
 from drivers.world.world import World
 from procedures.session import Pose

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from calibrations.errors import DataError
-from calibrations.importing.files import text_source
+from calibrations.files import text_source
 from calibrations.importing.foreign import read_foreign
 from calibrations.importing.sheet import json_as_lines
 from tests.calibrations.turned import DATA

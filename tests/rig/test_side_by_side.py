@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from calibrations.fit import fit
+from calibrations.fitting.fit import fit
 from calibrations.model.file import read_model
 from calibrations.table import Table
 from rig.record import Record, Run

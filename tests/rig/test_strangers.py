@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 
+from calibrations import files
 from calibrations.errors import DataError, ModelError
-from calibrations.importing import files
-from calibrations.importing.files import LONGEST_YAML, load_yaml
+from calibrations.files import LONGEST_YAML, load_yaml
 from calibrations.model.file import parse_model
 from drivers.errors import LinkRefused
 from drivers.transport.address import Url

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from calibrations.criteria import SHORTEST_APPROACH_DEG
+from calibrations.effects.kernels import slip
 from calibrations.geometry.orientation import Pose as Angles
 from calibrations.geometry.orientation import specific_force
 from calibrations.geometry.stage_path import turning_points
-from calibrations.kernels import slip
 from calibrations.table import Array, Table
 from procedures.session import SHORTEST_APPROACH_DEG as SESSION_DEG
 from procedures.session import Limits, Pose, Session

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from calibrations.discovery.rows import Rows
-from calibrations.fit import fit
+from calibrations.fitting.fit import fit
 from calibrations.model.file import read_model
-from calibrations.presentation.text import concise
 from calibrations.table import Table
+from calibrations.text import concise
 from tests.calibrations.test_pictures import warm_table
 
 

@@ -1,5 +1,5 @@
 from calibrations.effects import Effect, Parameter, Values
-from calibrations.noise.spectrum import Bands
+from calibrations.spectrum import Bands
 from calibrations.table import Array
 
 

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from calibrations.effects import Effect, Parameter, Values
-from calibrations.noise.spectrum import Bands
+from calibrations.spectrum import Bands
 from calibrations.table import Array
 
 if TYPE_CHECKING:

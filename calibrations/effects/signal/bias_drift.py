@@ -1,7 +1,7 @@
 import numpy as np
 
 from calibrations.effects import Constant, Effect, Parameter, Values
-from calibrations.fitting.smooth import smooth_columns
+from calibrations.geometry.smooth import smooth_columns
 from calibrations.table import Array, Table
 
 HOUR_S = 3600.0

@@ -1,8 +1,7 @@
 import numpy as np
 
 from calibrations.effects import Effect, Parameter, Values
-from calibrations.geometry.sphere import HARD_IRON, coverage_fault
-from calibrations.importing.raw_logs import sphere_centre
+from calibrations.geometry.sphere import HARD_IRON, coverage_fault, sphere_centre
 from calibrations.table import Array, Table
 
 

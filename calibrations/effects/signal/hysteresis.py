@@ -3,9 +3,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from calibrations.effects import Effect, Parameter, Values
+from calibrations.effects.kernels import slip
 from calibrations.geometry.orientation import other_in_plane
 from calibrations.geometry.stage_path import turning_points
-from calibrations.kernels import slip
 from calibrations.table import Array, Table
 
 ELEMENTS = (np.arange(6) + 0.5) / 3 - 1  # midpoints of six equal parts of -1 .. 1

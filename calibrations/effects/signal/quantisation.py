@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from calibrations.effects import Effect, Parameter, Values
-from calibrations.fitting.smooth import smooth_columns
+from calibrations.geometry.smooth import smooth_columns
 from calibrations.table import Array, Table
 
 CODES = 3  # to either side, that noise may reach

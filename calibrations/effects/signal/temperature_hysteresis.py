@@ -3,7 +3,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from calibrations.effects import Constant, Effect, Parameter, Values
-from calibrations.kernels import play
+from calibrations.effects.kernels import play
 from calibrations.table import Array, Table
 
 PARTS = (0.05, 0.15, 0.35)  # of the range of temperatures: plays to begin with

@@ -23,20 +23,20 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
+from calibrations.discovery.plausibility import doubt, rejection
 from calibrations.discovery.structure import unexplained_scatter
 from calibrations.errors import ModelError, UnusableData
-from calibrations.fit import Fit, cautiously, evaluate
 from calibrations.fitting.budget import SLOW_NOISE, Budget, Line, make_budget, parameter_correlation, row_gains
+from calibrations.fitting.fit import Fit, cautiously, evaluate
 from calibrations.fitting.inputs import Contribution, input_contributions
+from calibrations.fitting.sensed import in_milli, milli_unit
+from calibrations.means.noise import Noise, rms
 from calibrations.model import Estimate, Model, Term
-from calibrations.noise.means import Noise, rms
-from calibrations.plausibility import doubt, rejection
 from calibrations.presentation.certificate.content import Error, Figures, Limit, Outcome, Simulated, Source, decide
 from calibrations.presentation.certificate.terms import name, term
-from calibrations.presentation.residual import in_milli, milli_unit
-from calibrations.presentation.text import exponent
 from calibrations.table import Array
 from calibrations.tables import MEANS
+from calibrations.text import exponent
 
 TRIALS = 2000
 STEPS = 2  # of the estimate: the model is nearly straight over its uncertainty

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from calibrations.presentation.certificate.content import RULE, Certificate, Decision, Outcome, Source
 from calibrations.presentation.certificate.results import CONSERVATIVE, WIDENED
-from calibrations.presentation.text import expanded_text, minus, rounded, unit, value_text
+from calibrations.text import expanded_text, minus, rounded, unit, value_text
 
 MANY = 1e4  # degrees of freedom, told as no limit
 END_SCATTER = 2.67  # of a normal's 97.5 % quantile, in its standard deviation, times the root of the trials

@@ -9,9 +9,10 @@ from typing import Protocol
 
 import numpy as np
 
+from calibrations.analyses.motion import MotionResult
 from calibrations.discovery.results import Comparison, Discovery, Step
-from calibrations.fit import Fit
-from calibrations.motion.evaluate import MotionResult
+from calibrations.fitting.fit import Fit
+from calibrations.fitting.sensed import milli_unit, pooled_milli
 from calibrations.presentation.chart import (
     GOOD,
     MEASURED,
@@ -39,8 +40,8 @@ from calibrations.presentation.charts.fit import (
     scale_of,
 )
 from calibrations.presentation.charts.motion import evaluation
-from calibrations.presentation.residual import Shown, choices, first_choices, milli_unit, pooled_milli
-from calibrations.presentation.text import rounded
+from calibrations.presentation.residual import Shown, choices, first_choices
+from calibrations.text import rounded
 
 BELOW = 0.5  # times the floor: where the logarithmic axis begins
 FEWEST = 4  # bars that there is room for: one alone is no thicker than they

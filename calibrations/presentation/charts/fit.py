@@ -12,10 +12,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrations.discovery.places import scales
 from calibrations.discovery.results import Step
-from calibrations.fit import Fit
-from calibrations.noise.means import rms
+from calibrations.fitting.fit import Fit
+from calibrations.fitting.sensed import scales
+from calibrations.means.noise import rms
 from calibrations.presentation.chart import (
     CANDIDATE,
     MODEL,

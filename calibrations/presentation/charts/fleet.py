@@ -24,8 +24,8 @@ from calibrations.presentation.chart import (
     one,
     stacked,
 )
-from calibrations.presentation.text import percent
 from calibrations.table import Array
+from calibrations.text import percent
 
 ROW = 0.32  # inches, of an effect or a rig
 WIDE = 0.28  # of a batch's place that its sensors are strewn over

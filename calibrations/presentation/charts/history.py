@@ -24,8 +24,8 @@ from calibrations.presentation.chart import (
     Symbol,
     stacked,
 )
-from calibrations.presentation.text import labelled, prefixed, rounded, unit
 from calibrations.table import Array
+from calibrations.text import labelled, prefixed, rounded, unit
 
 POINTS = 200
 AHEAD = 0.5  # of the time from first to last calibration: how far the drift is drawn beyond the last

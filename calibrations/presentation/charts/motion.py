@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calibrations.analyses.motion import MotionResult, Quantity
 from calibrations.compensation.inverse import Residual
-from calibrations.fit import Fit
+from calibrations.fitting.fit import Fit
+from calibrations.means.noise import rms
 from calibrations.model.chain import forward
-from calibrations.motion.evaluate import MotionResult, Quantity
 from calibrations.motion.stretches import Stretches, make_stretches
-from calibrations.noise.means import rms
 from calibrations.presentation.chart import (
     BLUE,
     CANDIDATE,
@@ -26,9 +26,9 @@ from calibrations.presentation.chart import (
     floor_band,
 )
 from calibrations.presentation.residual import Shown
-from calibrations.presentation.text import estimate_text as written
-from calibrations.presentation.text import rounded
 from calibrations.table import Array
+from calibrations.text import estimate_text as written
+from calibrations.text import rounded
 
 SHOWN_S = 0.5  # of the record: five periods of the paper's motion
 BINS = 40  # of a period

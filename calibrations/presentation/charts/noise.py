@@ -16,7 +16,6 @@ from calibrations.noise.deviations import Curve
 from calibrations.noise.fit import NoiseFit
 from calibrations.noise.likelihood import ChannelFit
 from calibrations.noise.record import Channel, Still
-from calibrations.noise.spectrum import GAUSS_MARKOV
 from calibrations.presentation.chart import (
     AMBER,
     BLUE,
@@ -43,8 +42,9 @@ from calibrations.presentation.chart import (
 )
 from calibrations.presentation.charts.discovery import Level, Measure, waterfall
 from calibrations.presentation.residual import in_time
-from calibrations.presentation.text import rounded
+from calibrations.spectrum import GAUSS_MARKOV
 from calibrations.table import MILLI, Array
+from calibrations.text import rounded
 
 POINTS = 160
 HEIGHT = 3.8

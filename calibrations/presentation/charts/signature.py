@@ -23,9 +23,9 @@ from calibrations.noise.likelihood import ChannelFit, effect_lines
 from calibrations.noise.likelihood import Values as NoiseValues
 from calibrations.noise.lines import Line as Sinusoid
 from calibrations.noise.record import Channel
-from calibrations.noise.spectrum import Sampling, Welch, slow_bands
 from calibrations.presentation.chart import BLUE, GREEN, INK, QUIET, VERMILION, Axis, Chart, Dash, Line, Panel, Rule
 from calibrations.presentation.charts.noise import root
+from calibrations.spectrum import Sampling, Welch, slow_bands
 from calibrations.table import AXES, Array, Table
 
 INCLINATIONS_DEG = (90.0, 30.0, 150.0, 60.0, 120.0)

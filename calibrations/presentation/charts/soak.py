@@ -31,8 +31,8 @@ from calibrations.presentation.chart import (
     one,
     stacked,
 )
-from calibrations.presentation.text import estimate_text, rounded
 from calibrations.table import Array
+from calibrations.text import estimate_text, rounded
 
 COLOURS = {"x": BLUE, "y": VERMILION}
 TIME = "time since power-on (h)"

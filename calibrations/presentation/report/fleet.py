@@ -9,7 +9,7 @@ from calibrations.fleet.batch import BatchVerdict, Population, SensorVerdict
 from calibrations.presentation.chart import Picture
 from calibrations.presentation.charts.fleet import Spread, rigs, shares, spreads
 from calibrations.presentation.report.page import figure, page
-from calibrations.presentation.text import estimate_text, joined, probability, rounded
+from calibrations.text import estimate_text, joined, probability, rounded
 
 MOST = 200  # sensors in a table of those that need a person
 ONE_RIG = "All were measured on one rig: an error of its stages cannot be told from one that all sensors have."

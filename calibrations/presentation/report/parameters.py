@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from calibrations.fit import Fit
 from calibrations.fitting.budget import Budget, Line, make_budget
+from calibrations.fitting.fit import Fit
 from calibrations.fitting.inputs import input_contributions
 from calibrations.fitting.matrices import calibration_matrices
 from calibrations.model import Estimate
-from calibrations.presentation.text import estimate_text, rounded, unit
+from calibrations.text import estimate_text, rounded, unit
 
 NEGLIGIBLE = 1e-3  # share of the combined uncertainty, from which on a source shows in its digits
 MANY = 1e4  # degrees of freedom, told as no limit

@@ -12,20 +12,20 @@ from typing import Any
 
 import numpy as np
 
+from calibrations.analyses.motion import MotionResult, Quantity
 from calibrations.criteria import CERTAIN_PROBABILITY, SIGNIFICANT
 from calibrations.design.expected import pairs_separated
 from calibrations.design.experiment import Experiment
 from calibrations.discovery.results import Candidate, Comparison, Discovery, Step
-from calibrations.fit import Fit
+from calibrations.fitting.fit import Fit
+from calibrations.fitting.sensed import in_milli, milli_unit, pooled_milli
 from calibrations.model import Estimate, Model
-from calibrations.motion.evaluate import MotionResult, Quantity
 from calibrations.motion.reference import Bias
 from calibrations.presentation.chart import Picture
 from calibrations.presentation.charts.discovery import album
 from calibrations.presentation.report import parameters
 from calibrations.presentation.report.page import figure, page
-from calibrations.presentation.residual import in_milli, milli_unit, pooled_milli
-from calibrations.presentation.text import capital, estimate_text, joined, minus, probability, rounded, unbroken, unit
+from calibrations.text import capital, estimate_text, joined, minus, probability, rounded, unbroken, unit
 
 LONG_MIN = 120  # longer durations are given in hours
 

@@ -13,7 +13,7 @@ from calibrations.analyses.soak import HOUR_S, Course, RecordGap, Soak
 from calibrations.presentation.chart import Picture
 from calibrations.presentation.charts.soak import soak_album
 from calibrations.presentation.report.page import figure, page
-from calibrations.presentation.text import bound, estimate_text, joined, minus, rounded
+from calibrations.text import bound, estimate_text, joined, minus, rounded
 
 WANDERED_K = 1.0  # peak to peak; ambient that changes by more is not constant
 

@@ -12,7 +12,7 @@ from calibrations.noise.fit import NoiseFit
 from calibrations.noise.record import of_record
 from calibrations.presentation.chart import Picture
 from calibrations.presentation.report.page import figure, page
-from calibrations.presentation.text import capital, estimate_text, joined, probability, rounded, unit
+from calibrations.text import capital, estimate_text, joined, probability, rounded, unit
 
 
 def still_report(

@@ -47,7 +47,7 @@ def command(
     Results are compared with the limits of the bench file (limits.results, such as bias-x) by guarded acceptance. Exit
     status 1: a result exceeds its limit, or the data cannot be used and no certificate is written.
     """
-    from calibrations.fit import fit
+    from calibrations.fitting.fit import fit
     from calibrations.model.file import read_model
     from calibrations.presentation.certificate.content import document
     from calibrations.presentation.certificate.results import figures, require_reference
@@ -106,7 +106,7 @@ def _write(path: Path, certificate: Certificate) -> None:
 
 def _lines(certificate: Certificate) -> list[str]:
     from calibrations.presentation.certificate.sections import results_table, verdict
-    from calibrations.presentation.text import columns
+    from calibrations.text import columns
 
     table = results_table(certificate)
     conformity = verdict(certificate)

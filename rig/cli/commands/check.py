@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from calibrations.presentation.text import columns
+from calibrations.text import columns
 from drivers.instrument import Check, Identity
 from rig.bench import DEFAULT, read_bench
 from rig.bench.certificates import EXPIRED, certificates, expired

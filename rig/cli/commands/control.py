@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from calibrations.criteria import BASELINE_RUNS, FEWEST_RUNS
-from calibrations.presentation.text import columns, concise
+from calibrations.text import columns, concise
 from rig.cli.terminal.output import emit, json_option
 from rig.record import Record
 from rig.services.control import Controlled, controlled

@@ -11,7 +11,7 @@ from typing import Any
 
 import click
 
-from calibrations.presentation.text import columns
+from calibrations.text import columns
 from rig.bench import read_bench
 from rig.cli.terminal.output import bench_option, emit, json_option
 from rig.errors import OutputError, RecordError

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from calibrations.presentation.text import columns
+from calibrations.text import columns
 from rig.cli.terminal.output import bench_option, emit, json_option
 
 

@@ -11,12 +11,12 @@ import click
 import numpy as np
 
 from calibrations.analyses.magnetometer_turn import correct_by_extremes, estimate_hard_iron, fit_ellipse
-from calibrations.analyses.tumble import Faces, estimate_faces
 from calibrations.discovery.check_poses import Check
-from calibrations.fit import Fit
+from calibrations.fitting.fit import Fit
 from calibrations.fitting.matrices import CalibrationMatrices, calibration_matrices
-from calibrations.presentation.text import columns, concise
+from calibrations.geometry.faces import Faces, estimate_faces
 from calibrations.table import Array, Table
+from calibrations.text import columns, concise
 from rig.cli.terminal.options import request_options
 from rig.cli.terminal.output import check_option, emit, model_option, note, notes
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from calibrations.fleet.batch import BatchEffect, Population, SensorVerdict
-from calibrations.presentation.text import columns, concise, joined, percent
+from calibrations.text import columns, concise, joined, percent
 from rig.cli.terminal.output import bench_option, emit, json_option, note
 from rig.fleet.calibrate import Calibrated, Calibration
 

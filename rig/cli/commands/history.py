@@ -12,7 +12,7 @@ import click
 
 from calibrations.analyses.stability import YEAR_DAYS, Agreement
 from calibrations.criteria import BASELINE_RUNS, FEWEST_RUNS
-from calibrations.presentation.text import columns, concise
+from calibrations.text import columns, concise
 from rig.cli.terminal.output import bench_option, emit, json_option, note
 from rig.record import Record
 from rig.services.history import (

@@ -42,7 +42,7 @@ def command(file: Path, kind: str | None, mapped: tuple[str, ...], given: tuple[
     THEIRS is a name in the file's header, or a column number from 1 if the file has no header. In a terminal the
     program proposes names for unknown columns and asks.
     """
-    from calibrations.importing.files import open_text_file
+    from calibrations.files import open_text_file
     from calibrations.importing.foreign import import_sheet, needs_mapping
     from calibrations.importing.sheet import read_sheet
     from calibrations.importing.units import ColumnMapping

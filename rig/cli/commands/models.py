@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from calibrations.presentation.text import columns
+from calibrations.text import columns
 from rig.cli.terminal.output import emit, json_option
 
 

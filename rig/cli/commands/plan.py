@@ -15,7 +15,7 @@ import click
 import numpy as np
 from click import wrap_text
 
-from calibrations.presentation.text import columns, duration, size
+from calibrations.text import columns, duration, size
 from drivers.errors import LimitError
 from procedures.catalogue import Procedure, find
 from procedures.errors import SafetyLimit

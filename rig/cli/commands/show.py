@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from calibrations.errors import CalibrationError
-from calibrations.presentation.text import columns, duration
+from calibrations.text import columns, duration
 from rig.bench.certificates import EXPIRED
 from rig.cli.terminal.output import emit, json_option
 from rig.errors import RecordError

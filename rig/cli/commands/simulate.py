@@ -12,7 +12,7 @@ from types import FrameType
 
 import click
 
-from calibrations.presentation.text import columns
+from calibrations.text import columns
 from drivers.clock import WallClock, serve_forever
 from drivers.manual_stage.person import PERSON
 from drivers.transport import Address

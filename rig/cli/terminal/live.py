@@ -12,8 +12,8 @@ from calibrations.design.experiment import Experiment
 from calibrations.discovery.verdict import Verdict
 from calibrations.documents import discovery_document
 from calibrations.model.file import read_model
-from calibrations.presentation.text import duration, joined
 from calibrations.table import Table
+from calibrations.text import duration, joined
 from procedures.catalogue import find
 from procedures.settings import parse
 from rig.bench import Bench, read_bench

@@ -15,7 +15,7 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from calibrations.presentation.text import duration, size
+from calibrations.text import duration, size
 from procedures.catalogue import Procedure
 from rig.bench import Bench
 from rig.bench.certificates import expired

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import click
 
-from calibrations.importing.files import load_yaml
+from calibrations.files import load_yaml
 from procedures.catalogue import Procedure
 from procedures.errors import BadAnswer, NoAnswer
 from procedures.questions import Question

@@ -18,8 +18,8 @@ from calibrations.effects import Effect
 from calibrations.errors import DataError
 from calibrations.model import Estimate, Model
 from calibrations.presentation.answers import discovery_text
-from calibrations.presentation.text import columns, concise, duration, quantity
 from calibrations.table import Table
+from calibrations.text import columns, concise, duration, quantity
 from rig.cli.terminal.output import note
 from rig.services import next_experiment
 from rig.services.next_experiment import Answer

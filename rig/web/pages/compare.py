@@ -9,14 +9,14 @@ from urllib.parse import urlencode
 from nicegui import ui
 
 from calibrations.discovery.results import FittedModel
-from calibrations.fit import Fit
+from calibrations.fitting.fit import Fit
 from calibrations.noise.comparison import compare_deviations
 from calibrations.noise.fit import NoiseFit
 from calibrations.presentation.chart import Chart
 from calibrations.presentation.charts.noise import scaled, units
 from calibrations.presentation.interactive import figure, height_px
 from calibrations.presentation.residual import Shown, choices, first_choices, residual_units
-from calibrations.presentation.text import estimate_text, rounded, unit
+from calibrations.text import estimate_text, rounded, unit
 from rig.record import Record
 from rig.services.charts import deviations, difference, differences, residuals
 from rig.services.request import Request

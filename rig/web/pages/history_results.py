@@ -15,7 +15,7 @@ from calibrations.criteria import BASELINE_RUNS, FEWEST_RUNS
 from calibrations.presentation.chart import Chart, Panel, one
 from calibrations.presentation.charts.history import EWMA, INDIVIDUALS, RANGES, control_panels, life
 from calibrations.presentation.interactive import figure
-from calibrations.presentation.text import estimate_text, minus, rounded, unit
+from calibrations.text import estimate_text, minus, rounded, unit
 from rig.errors import RigError
 from rig.services.charts import life_of
 from rig.services.history import (

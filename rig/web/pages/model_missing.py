@@ -11,7 +11,7 @@ from nicegui import ui
 from calibrations.criteria import SIGNIFICANT
 from calibrations.discovery.verdict import Verdict
 from calibrations.presentation.report.report import next_takes, next_words
-from calibrations.presentation.text import capital, probability, rounded
+from calibrations.text import capital, probability, rounded
 from rig.web.parts import box, div, facts, failed, message, off_loop, waiting, words
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from rig.web.parts import box, div, redraw, words
 
 if TYPE_CHECKING:
     from calibrations.discovery.results import Comparison, Step
-    from calibrations.fit import Fit
+    from calibrations.fitting.fit import Fit
     from rig.services.session import ModelSession
 
 LONG = 4  # letters in a channel name

@@ -10,7 +10,7 @@ from typing import Any
 from fastapi import Request
 from nicegui import ui
 
-from calibrations.presentation.text import duration, size
+from calibrations.text import duration, size
 from procedures.catalogue import Procedure, find, paths, summary
 from procedures.settings import choices, parse
 from rig.bench import Bench, read_bench

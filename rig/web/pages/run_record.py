@@ -12,7 +12,7 @@ from urllib.parse import urlencode
 from nicegui import ui
 
 from calibrations.presentation.interactive import figure
-from calibrations.presentation.text import bound, estimate_text, joined, unit
+from calibrations.text import bound, estimate_text, joined, unit
 from rig.errors import RecordError
 from rig.record import Event, Record, Run
 from rig.services.charts import Course, course_chart, kind_of

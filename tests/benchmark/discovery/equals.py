@@ -10,7 +10,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from calibrations.effects.catalogue import catalogue
-from calibrations.fit import Fit, fit, refit
+from calibrations.fitting.fit import Fit, fit, refit
 from calibrations.model.file import read_model
 from calibrations.table import Array, Table
 from tests.benchmark.discovery.cases import Truth

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibrations.effects.catalogue import catalogue
-from calibrations.fit import fit
+from calibrations.fitting.fit import fit
+from calibrations.fitting.problem import Problem
 from calibrations.model.file import read_model
-from calibrations.problem import Problem
 from calibrations.table import Array, Table
 
 SMALLEST = 1e-3  # of a column's length: less beside the base model is not there

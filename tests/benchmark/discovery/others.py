@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from calibrations.noise.means import white_std
+from calibrations.means.noise import white_std
 from calibrations.table import Table
 from drivers.world.defects import DEFECTS, UNEXPLAINED
 from tests.benchmark.discovery.cases import Truth

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from calibrations.discovery.results import Diagnosis, Discovery
+from calibrations.fitting.problem import Problem
 from calibrations.loop import diagnose, discover
 from calibrations.model import Model
 from calibrations.model.file import read_model
-from calibrations.problem import Problem
 from calibrations.table import Table
 from tests.benchmark.discovery.cases import Truth
 

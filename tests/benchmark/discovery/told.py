@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 from calibrations.effects.catalogue import catalogue
-from calibrations.fit import fit, refit
+from calibrations.fitting.fit import fit, refit
 from calibrations.model.file import read_model
 from calibrations.table import Table
 from tests.benchmark.discovery.cases import Truth

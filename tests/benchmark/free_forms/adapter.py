@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from calibrations.geometry.stage_path import last_turn, turning_points
-from calibrations.noise.means import white_std
+from calibrations.means.noise import white_std
 from calibrations.table import Array, Table
 from tests.benchmark.free_forms.measurement import Measurement
 

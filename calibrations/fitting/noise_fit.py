@@ -26,8 +26,8 @@ from numpy.typing import NDArray
 
 from calibrations.criteria import FEWEST_FOR_SLOW, INSEPARABLE, NOT_SHOWN
 from calibrations.fitting.identifiability import gain
-from calibrations.kernels import whiten
-from calibrations.noise.means import BEYOND, Noise, Processes, processes, rms
+from calibrations.means.noise import BEYOND, Noise, Processes, processes, rms
+from calibrations.means.whitening import whiten
 from calibrations.table import Array
 
 # Compiled loops over a grid of noises: on matrices of a few columns each, calls would cost more than the sums.

@@ -15,7 +15,8 @@ import numpy as np
 
 from calibrations.effects.catalogue import catalogue
 from calibrations.errors import DataError, ModelError
-from calibrations.fit import fit
+from calibrations.fitting.fit import fit
+from calibrations.means.noise import rms
 from calibrations.model import Estimate, Model
 from calibrations.model.chain import force, respond, sensed
 from calibrations.model.file import read_model
@@ -43,7 +44,6 @@ from calibrations.motion.spectrum import (
     periodogram,
     skew_s,
 )
-from calibrations.noise.means import rms
 from calibrations.table import Array, Table
 
 # Acceleration from the sensor's output: the output filter undone, and a model solved backwards.

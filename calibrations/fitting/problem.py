@@ -18,13 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrations.errors import DataError, ModelError, TooFewRows
-from calibrations.fitting.smooth import smooth_columns
+from calibrations.fitting.table_noise import scatter
+from calibrations.geometry.smooth import smooth_columns
+from calibrations.means.noise import Processes, norm_std, white_std
 from calibrations.model import Model
 from calibrations.model.chain import Near, Step, backward, forward
 from calibrations.model.parameters import Layout
 from calibrations.motion.stretches import Stretches, make_stretches
-from calibrations.noise.means import Processes, norm_std, white_std
-from calibrations.noise.table_noise import scatter
 from calibrations.table import Array, Table
 from calibrations.tables import FITTED
 

@@ -16,14 +16,14 @@ from scipy.optimize import OptimizeResult, least_squares
 
 from calibrations.fitting.held_out import folds, held_out
 from calibrations.fitting.identifiability import RELATIVE_RANK, estimates
+from calibrations.fitting.noise_fit import estimate, widening
+from calibrations.fitting.problem import Problem
+from calibrations.means.noise import Noise, rms, white_only
 from calibrations.model import Model
 from calibrations.model.model import Parameters
-from calibrations.noise.means import Noise, rms, white_only
-from calibrations.noise.means_fit import estimate, widening
-from calibrations.presentation.result import Result
-from calibrations.presentation.text import columns, quantity
-from calibrations.problem import Problem
+from calibrations.result import Result
 from calibrations.table import Array, Table
+from calibrations.text import columns, quantity
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -1,4 +1,6 @@
-"""A page of Markdown and a picture for each effect, made from its file: `python -m calibrations.pages docs/effects`.
+"""A page of Markdown and a picture for each effect, made from its file.
+
+    python -m calibrations.presentation.effect_pages docs/effects
 
 The file stays the only place where an effect is described; a test fails when a page is not what its file says.
 """
@@ -59,9 +61,9 @@ def index(effects: Mapping[str, Effect]) -> str:
     rows = "\n".join(_gallery(effect) for effect in effects.values())
     return (
         "# The catalogue of physical effects\n\n"
-        "Made by `python -m calibrations.pages docs/effects` from the files in `calibrations/effects`;\n"
-        "`rig effects NAME` shows the same in a terminal. The pictures show the residual of the linear\n"
-        "model without noise; those of noise show its contribution to white noise.\n\n"
+        "Made by `python -m calibrations.presentation.effect_pages docs/effects` from the files in\n"
+        "`calibrations/effects`; `rig effects NAME` shows the same in a terminal. The pictures show the residual of\n"
+        "the linear model without noise; those of noise show its contribution to white noise.\n\n"
         f"| effect | acts on | what happens | residual |\n| --- | --- | --- | --- |\n{rows}\n{SOURCES}"
     )
 

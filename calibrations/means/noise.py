@@ -24,7 +24,7 @@ from functools import cached_property
 import numpy as np
 
 from calibrations.criteria import NO_SCATTER
-from calibrations.kernels import whiten
+from calibrations.means.whitening import whiten
 from calibrations.table import Array, Table
 
 Processes = tuple[tuple[float, float], ...]  # (standard deviation, time constant in s) of Gauss-Markov processes

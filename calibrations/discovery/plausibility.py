@@ -41,9 +41,9 @@ from calibrations.criteria import (
     WEAK_RESPONSE,
 )
 from calibrations.discovery.verdict import Verdict
-from calibrations.fit import Fit
+from calibrations.fitting.fit import Fit
 from calibrations.geometry.orientation import Pose, nominal_pose, specific_force
-from calibrations.noise.means import rms, white_std
+from calibrations.means.noise import rms, white_std
 from calibrations.table import AXES, Array, Table
 
 NO_RESPONSE, UNEXPLAINED, DOUBTFUL = Verdict.NO_RESPONSE.value, Verdict.UNEXPLAINED.value, "doubtful"

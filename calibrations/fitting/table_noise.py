@@ -23,8 +23,8 @@ from calibrations.criteria import FEWEST_FREE_ROWS
 from calibrations.errors import DataError, ModelError
 from calibrations.geometry.rate_table import rate_deg_s, specific_force_g
 from calibrations.geometry.sphere import SOFT_IRON, coverage_fault
+from calibrations.means.noise import BEYOND, Processes, white_std
 from calibrations.model import Model
-from calibrations.noise.means import BEYOND, Processes, white_std
 from calibrations.table import AXES, Array, Table
 from calibrations.tables import KINDS
 
