@@ -13,35 +13,13 @@ A library of its own: tables in, frozen results out, no instrument needed.
     noise            noise of a still sensor
     compensate       outputs back to specific force
 
-The functions are in `calibrations.face` and load when they are used.
+The functions are in `calibrations.face`, and load what they need when they are called.
 """
 
 from __future__ import annotations
 
-import sys
-from types import ModuleType
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from calibrations.face import compare, compensate, diagnose, discover, fit, noise, read, table
+import calibrations.noise
+import calibrations.table  # noqa: F401 both are bound before the functions of the same names, which replace them
+from calibrations.face import compare, compensate, diagnose, discover, fit, noise, read, table
 
 __all__ = ["compare", "compensate", "diagnose", "discover", "fit", "noise", "read", "table"]
-
-
-class _Face(ModuleType):
-    """Keeps the public functions where the import system would replace them by submodules of the same name."""
-
-    def __setattr__(self, name: str, value: object) -> None:
-        if not (name in __all__ and isinstance(value, ModuleType)):
-            super().__setattr__(name, value)
-
-
-sys.modules[__name__].__class__ = _Face
-
-
-def __getattr__(name: str) -> Any:
-    if name not in __all__:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from calibrations import face
-
-    return getattr(face, name)

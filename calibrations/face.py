@@ -1,4 +1,4 @@
-"""The functions of `import calibrations as cal`."""
+"""The functions of `import calibrations as cal`. Each imports what it needs when it is called: the import is quick."""
 
 from __future__ import annotations
 
@@ -8,28 +8,22 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from calibrations.compensation.inverse import invert_model
-from calibrations.discovery.results import Comparison, Diagnosis, Discovery
 from calibrations.errors import DataError
-from calibrations.fitting.fit import Fit
-from calibrations.fitting.fit import fit as fitted
-from calibrations.importing.foreign import read_csv
-from calibrations.loop import compare as compared
-from calibrations.loop import diagnose as diagnosed
-from calibrations.loop import discover as discovered
-from calibrations.model import Model
-from calibrations.model.file import read_model
 from calibrations.table import AXES, Array, Constant, Table
 from calibrations.tables import KINDS
 
 if TYPE_CHECKING:
+    from calibrations.discovery.results import Comparison, Diagnosis, Discovery
+    from calibrations.fitting.fit import Fit
+    from calibrations.model import Model
     from calibrations.noise.analysis import NoiseAnalysis
     from calibrations.noise.record import Samples
+
+    GivenModel = Model | str | Path  # a model, the name of a shipped one, or a model file
 
 MOST_UNEVEN = 0.5  # of a step, by which steps of time may differ
 NOT_CHANNELS = ("t_s", "temperature_c", "supply_v")
 AXIS_OF = {name: axis for kind in KINDS.values() for name, axis in zip(kind.outputs, AXES, strict=False)} | {"v": "x"}
-GivenModel = Model | str | Path  # a model, the name of a shipped one, or a model file
 
 
 class Columns(Protocol):
@@ -41,6 +35,8 @@ class Columns(Protocol):
 
 def read(path: Path | str, kind: str | None = None) -> Table:
     """The table in a data file. Raises DataError naming file, line and column."""
+    from calibrations.importing.foreign import read_csv
+
     return read_csv(path, kind)
 
 
@@ -51,21 +47,29 @@ def table(columns: Columns, kind: str, constants: Mapping[str, Constant] | None 
 
 def fit(data: Table, model: GivenModel) -> Fit:
     """`model` with its parameters estimated from `data`."""
+    from calibrations.fitting.fit import fit as fitted
+
     return fitted(_model(model), data)
 
 
 def compare(data: Table, model: GivenModel) -> Comparison[Fit]:
     """`model` beside `data`, and where it fails."""
+    from calibrations.loop import compare as compared
+
     return compared(data, _model(model))
 
 
 def diagnose(data: Table, model: GivenModel) -> Diagnosis[Fit]:
     """Which physical effect `model` misses on `data`."""
+    from calibrations.loop import diagnose as diagnosed
+
     return diagnosed(data, _model(model))
 
 
 def discover(data: Table, model: GivenModel) -> Discovery[Fit]:
     """`model` with the effects that it misses on `data`, added one by one."""
+    from calibrations.loop import discover as discovered
+
     return discovered(data, _model(model))
 
 
@@ -88,6 +92,8 @@ def compensate(model: GivenModel, outputs: Array, **columns: Array) -> Array:
     `columns` are what the model follows beside the outputs, shape (n,): temperature_c, supply_v, t_s. Samples are taken
     independently of each other. Raises ModelError where the model has no values or cannot be inverted.
     """
+    from calibrations.compensation.inverse import invert_model
+
     made = invert_model(_model(model))
     values = np.atleast_2d(np.asarray(outputs, dtype=float))
     if made.program.remembered:
@@ -102,7 +108,9 @@ def compensate(model: GivenModel, outputs: Array, **columns: Array) -> Array:
 
 
 def _model(model: GivenModel) -> Model:
-    return model if isinstance(model, Model) else read_model(model)
+    from calibrations.model.file import read_model
+
+    return read_model(model) if isinstance(model, (str, Path)) else model
 
 
 def _channels(table: Table, rate_hz: float | None) -> Iterator[Samples]:

@@ -1,13 +1,11 @@
-"""Noise: of the samples of a still sensor, and of the means in a table of poses.
+"""The noise of a still sensor: its processes, and what is no process.
 
-Spectra     spectrum (processes; bands of a record), lines (sinusoids), deviations (Allan and others; `kernels`)
+Spectra     lines (sinusoids), deviations (Allan and others; `kernels`)
 Record      samples (wild, equal, clipped, hidden), record (one pass over the samples)
 Fit         likelihood (Whittle), fit (a model and its uncertainties), mixtures (all combinations of processes)
 Search      patterns (what is no process), search (what a model is missing), comparison (where it fails), doubts (what
             the record cannot decide, and the experiment that does)
 Results     analysis (`rig noise`), dataset (a still record in the search loop of all kinds of data)
-
-Means       means (white and slow noise as a value), means_fit (its estimation), table_noise (noise from elsewhere)
 
 Values are those of a rate: the output of the sensor. Literature on clocks calls their sum over time the phase.
 """
