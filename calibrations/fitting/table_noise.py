@@ -87,10 +87,12 @@ def scatter_remark(table: Table) -> str | None:
     if not form or white_std(table) is not None:
         return None
     if scatter(table) is None:
-        return "the noise of its means is not known, and its rows do not show it: what a model leaves is its noise"
+        return (
+            "the noise of the means is not known, and the rows do not show it: the residual of a model counts as noise"
+        )
     return (
-        f"the noise of its means is not known: what {form} leaves is taken for it, and nothing beyond "
-        f"is looked for; give {table.output_names[0]}_std, and so on, and n"
+        f"the noise of the means is not known: the residual of {form} counts as noise, and no effect is searched for "
+        f"in it; give {table.output_names[0]}_std, and so on, and n"
     )
 
 

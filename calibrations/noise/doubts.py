@@ -118,27 +118,25 @@ def _stretch(fit: ChannelFit, limit: float) -> Disturbance | None:
 LONGER = (2, 4, 8, 16, 32, 64)  # times the record at hand
 MEANS = 1 << 14  # of a record that is foreseen
 PROCEDURE = "noise-floor"
-LONGER_SEPARATES = "a longer record holds more periods of what is slow, where the two differ"
-REPEAT_SHOWS = (
-    "what a second record of the same length shows as well belongs to the sensor or the rig, the rest was an event"
-)
-MOTION_SHOWS = "a low-pass weakens an oscillation near its corner; noise of the sensor's own does not"
-OVEN_SHOWS = "what follows the temperature goes up and down with the oven, noise does not"
+LONGER_SEPARATES = "the two differ at low frequencies, of which a longer record holds more periods"
+REPEAT_SHOWS = "a disturbance of the sensor or the rig is in a second record of the same length too; an event is not"
+MOTION_SHOWS = "a low-pass weakens an oscillation near its corner; the noise of a sensor does not"
+OVEN_SHOWS = "an output that follows the temperature rises and falls with the oven; noise does not"
 CAUSES = {  # what a pattern is in a model of poses, by its kind and the column that it follows
     (FOLLOWS, "temperature_c"): "temperature-bias",
     (DRIFT, ""): "bias-drift",
     (SETTLING, ""): "warm-up-bias",
 }
-TAKEN_FOR = "rate-random-walk"  # what each of them looks like to a spectrum
+TAKEN_FOR = "rate-random-walk"  # the process with nearly the spectrum of each of them
 
 
 def repeat_record(length_s: float) -> Experiment:
-    """The same record once more."""
+    """The same record again."""
     return Experiment(PROCEDURE, {"duration_s": _round_up_to_tens(length_s)}, (), REPEAT_SHOWS)
 
 
 def experiment_for_pattern(pattern: Pattern, length_s: float) -> Experiment | None:
-    """What tells the cause of a pattern from its rivals, or from noise; None where the rig cannot change the cause."""
+    """The experiment that separates the cause of a pattern from its rivals, or from noise; None without one."""
     if pattern.kind == STEP:
         return repeat_record(length_s)
     cause, *others = (CAUSES.get((each.kind, each.cause)) for each in (pattern, *pattern.rivals))
@@ -151,7 +149,7 @@ def experiment_for_pattern(pattern: Pattern, length_s: float) -> Experiment | No
 
 
 def experiment_for_filter(name: str, corner_hz: float) -> Experiment | None:
-    """What tells a process from white noise behind a low-pass; None where the corner is beyond what the rig shakes."""
+    """The motion that separates a process from white noise behind a low-pass; None for a corner out of reach."""
     if not TWO_HZ[1] / 2 <= corner_hz <= 10 * TWO_HZ[0]:
         return None
     return Experiment("motion", {"frequency_hz": TWO_HZ}, ((name, "output-filter"),), MOTION_SHOWS)
@@ -162,8 +160,10 @@ def _round_up_to_tens(seconds: float) -> float:
 
 
 def separating_record(found: Search, named: tuple[str, ...]) -> Experiment | None:
-    """The shortest record that is certain to tell the first of them that is in doubt from its rivals, or else the
-    longest that one would wait for."""
+    """The shortest record that separates the first effect in doubt from its rivals with certainty.
+
+    None of them certain, the longest that is proposed.
+    """
     name, rivals = next(((name, found.rivals[name]) for name in named if found.rivals.get(name)), ("", ()))
     if not rivals:
         return None
@@ -182,7 +182,7 @@ def separating_record(found: Search, named: tuple[str, ...]) -> Experiment | Non
 
 
 def _information(found: Search, name: str, rivals: tuple[str, ...], length_s: float) -> float:
-    """Lambda of the pair that is hardest to tell apart, the harder way."""
+    """Lambda of the pair that is hardest to separate, in the direction with less information."""
     effects = {effect.name: effect for effect in found.mixtures.others}
     rest = [effect for effect in found.mixture.effects if effect.name != name]
     each = []
@@ -191,7 +191,7 @@ def _information(found: Search, name: str, rivals: tuple[str, ...], length_s: fl
         each += [
             sum(_deviance_of_wrong(*pair, length_s) for pair in zip(right.channels, wrong.channels, strict=True))
             for (right, own), (wrong, other) in (sides, sides[::-1])
-            if own.name not in other.contains  # what contains it can always take its form, and is then the less plain
+            if own.name not in other.contains  # a process that contains it can take its form
         ]
     return min(each)
 
@@ -220,7 +220,7 @@ WHITE = "white-noise"
 
 
 def possible_corner_hz(found: Search, name: str) -> float | None:
-    """The corner that a low-pass would have, were it what makes the process `name`; None where that is no question."""
+    """The corner of a low-pass that would explain the process `name`; None where no low-pass can."""
     if name != GAUSS_MARKOV:
         return None
     jumping = {telegraph.axis for telegraph in found.telegraphs}  # no filter makes two levels
@@ -230,7 +230,7 @@ def possible_corner_hz(found: Search, name: str) -> float | None:
 
 
 def filter_text(name: str, corner: float) -> str:
-    """Both explanations, and two ways to decide without an experiment of the rig."""
+    """Both explanations, and two ways to decide without the rig."""
     return (
         f"{name} cannot be separated from white noise behind a first-order low-pass of {corner:.3g} Hz "
         f"({OUTPUT_FILTER}): if the output has one, write `# filter_corner_hz: {corner:.3g}` above the table; or "
@@ -254,7 +254,7 @@ def structure_of(found: Search) -> str | None:
 
 
 def alternatives(found: Search, named: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
-    """What each of the named effects cannot be told from; a low-pass that the data do not state goes by its effect."""
+    """By named effect, those that the record cannot separate from it; a low-pass is named by its effect."""
     behind = {name: (OUTPUT_FILTER,) for name in named if possible_corner_hz(found, name) is not None}
     each = {name: (*found.rivals.get(name, ()), *behind.get(name, ())) for name in named}
     return {name: rivals for name, rivals in each.items() if rivals}
@@ -265,20 +265,20 @@ def reason_of(found: Search, doubts: Mapping[str, tuple[str, ...]], structure: s
     said = []
     for name, rivals in doubts.items():
         if processes := [rival for rival in rivals if rival != OUTPUT_FILTER]:
-            said.append(f"this record cannot tell {name} from {' or '.join(processes)}")
+            said.append(f"this record cannot separate {name} from {' or '.join(processes)}")
         if (corner := possible_corner_hz(found, name)) is not None:
             said.append(filter_text(name, corner))
     if structure is not None and found.still.hidden:
         said.append(structure)
     elif structure is not None:
-        said.append(f"there is something that no noise of the catalogue is: {structure}")
+        said.append(f"no noise of the catalogue explains: {structure}")
     return "; ".join(said) or None
 
 
 def next_of(found: Search, doubts: Mapping[str, tuple[str, ...]], structure: str | None) -> Experiment | None:
     """The experiment for the first doubt that one can settle."""
     if any(hidden_in(channel.oddities) for channel in found.still.channels):
-        return None  # what is to be done about it is said, and no run does it
+        return None  # the text says what to do, and no run does it
     if any(rival != OUTPUT_FILTER for rivals in doubts.values() for rival in rivals):
         return separating_record(found, tuple(doubts))
     shaken = (

@@ -155,7 +155,7 @@ def _line_estimates(found: ChannelFit, unit: str) -> Iterator[Estimate]:
         yield Estimate(f"amplitude_{k}", axis, float(line.amplitude), float(line.std), unit)
         yield Estimate(f"frequency_{k}", axis, float(line.frequency_hz), float(line.std_hz), "Hz")
     if not found.lines:
-        why = f"no line stands out; one of less than {found.line_bound:.2g} {unit} would not"
+        why = f"no line exceeds the noise; its amplitude is below {found.line_bound:.2g} {unit}"
         yield Estimate("amplitude_1", axis, 0.0, float(found.line_bound / INTERVAL_STDS), unit, False, why)
 
 
@@ -227,8 +227,8 @@ def noise_terms(model: Model) -> tuple[Term, ...]:
     terms = tuple(term for term in model.terms if term.effect.is_noise)
     if not terms:
         raise ModelError(
-            f"{model.name}: none of its effects is noise, and a still record shows noise alone; "
-            "take the model still, or one that began with it"
+            f"{model.name}: none of its effects is noise, and a still record shows only noise; "
+            "use the model still, or one made from it"
         )
     return terms
 
@@ -271,7 +271,7 @@ def find_lines(channel: Channel, beside: Sequence[Effect], most: int) -> Channel
 
 
 def without_effects(channel: Channel, lines: Iterable[Line] = ()) -> ChannelFit:
-    """One channel's spectrum less given lines, beside nothing."""
+    """One channel's spectrum less given lines, with no effect."""
     lines = tuple(lines)
     return ChannelFit(channel, bands(channel, lines), lines, (), {})
 

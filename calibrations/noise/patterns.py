@@ -74,7 +74,7 @@ class Pattern:
 
     @property
     def worth(self) -> float:
-        """What it gains beyond its price."""
+        """Gain beyond the price."""
         return self.gain - self.price
 
     @property
@@ -84,14 +84,14 @@ class Pattern:
 
     @property
     def certain(self) -> bool:
-        """Whether it is no chance beside whatever was fitted."""
+        """Whether chance is excluded, whatever else was fitted."""
         return self.worth > (0.0 if self.kind == FOLLOWS else PATTERN_CERTAIN)
 
     @property
     def text(self) -> str:
-        """In words, with what it cannot be told from."""
+        """In words, with the patterns that the record cannot separate from it."""
         others = " or ".join(each.plain for each in self.rivals)
-        return f"{self.plain} (on this record it cannot be told from {others})" if others else self.plain
+        return f"{self.plain} (this record cannot separate it from {others})" if others else self.plain
 
     def taken_off(self, channel: Channel) -> Channel:
         """The record without it."""
@@ -99,9 +99,9 @@ class Pattern:
 
 
 def pattern_of(found: ChannelFit) -> Pattern | None:
-    """The pattern that explains most of what one channel does, where it is no chance."""
+    """The pattern with the greatest gain in one channel; None where chance explains it."""
     if hidden_in(found.channel.oddities) is not None:
-        return None  # rounding makes steps and slopes of its own
+        return None  # rounding makes steps and slopes
     spectrum, unit = _Ordinates.of(found), found.channel.unit
     every = [
         _step(found.channel, spectrum, unit), *_courses(found.channel, spectrum, unit),
@@ -115,7 +115,7 @@ def pattern_of(found: ChannelFit) -> Pattern | None:
 
 
 def _best(every: Iterable[Pattern], kind: str, cause: str) -> Pattern:
-    """Of one kind."""
+    """The best pattern of one kind."""
     return max((each for each in every if (each.kind, each.cause) == (kind, cause)), key=lambda each: each.worth)
 
 
@@ -137,7 +137,7 @@ class _Ordinates:
         return cls(seen, found.level(f) / step_s, n)
 
     def coefficients(self, form: Array) -> Array:
-        """Of a form of the means (n,), shape (k,)."""
+        """Cosine coefficients (k,) of a form of the means (n,)."""
         return np.asarray(dct(form, type=2, norm="ortho")[1 : len(self.seen) + 1])
 
     def matched(self, form: Array) -> tuple[float, float, float]:
@@ -149,7 +149,7 @@ class _Ordinates:
 
 
 def _step(channel: Channel, by: _Ordinates, unit: str) -> Pattern:
-    """The step that explains most, at whatever mean."""
+    """The step with the greatest gain, over all places."""
     n, k = by.n, len(by.seen)
     per_step = _per_step(n, k)
     along, power = np.zeros(n - 1), np.zeros(n + 1)
@@ -181,7 +181,7 @@ def _per_step(n: int, k: int) -> Array:
 
 
 def _courses(channel: Channel, by: _Ordinates, unit: str) -> Iterator[Pattern]:
-    """A drift in a straight line, and the settling that explains most."""
+    """A straight drift, and the settling with the greatest gain."""
     n, axis = by.n, channel.axis
     tops, bottoms = matched_sums(_course_coefficients(n, len(by.seen)), by.seen / by.variance, 1 / by.variance)
     sizes, stds, gains = (each.tolist() for each in (tops / bottoms, bottoms**-0.5, tops**2 / bottoms))
@@ -224,7 +224,7 @@ def _course_coefficients(n: int, k: int) -> Array:
 
 
 def _followed(channel: Channel, by: _Ordinates, unit: str) -> Iterator[Pattern]:
-    """What follows a column, as it was read or without its scatter, at once or some time behind it."""
+    """Outputs that follow a column, as read or without its scatter, at once or with a lag."""
     price = PATTERN_AMPLITUDE + 2 * float(np.log(len(LAGS) * max(1, len(channel.logged))))
     for name, column in channel.logged.items():
         readings = ((column.read, 0.0), (column.level, column.doubt))
@@ -236,9 +236,9 @@ def _followed(channel: Channel, by: _Ordinates, unit: str) -> Iterator[Pattern]:
 
 
 def _lags(length_s: float) -> Iterator[tuple[float, str]]:
-    """Shares of the record, and how they are told."""
+    """Time constants as shares of the record, and the same in words."""
     for share in LAGS:
-        yield share, f", {share * length_s:.2g} s behind it" if share else ""
+        yield share, f", with a lag of {share * length_s:.2g} s" if share else ""
 
 
 def refitted(patterns: tuple[Pattern, ...], found: ChannelFit, whole: Channel) -> tuple[Pattern, ...]:
@@ -260,7 +260,7 @@ Path = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Telegraph:
-    """One channel's two levels, `apart` in its unit; how often it goes, and how long it stays at each, s."""
+    """Two levels of one channel: their distance, the number of jumps, and the mean time at each level, s."""
 
     axis: str
     unit: str
@@ -273,16 +273,16 @@ class Telegraph:
     def text(self) -> str:
         """In words."""
         return (
-            f"random telegraph noise (burst noise, popcorn): {self.axis} goes between two levels {self.apart:.3g} "
-            f"{self.unit} apart, {self.times} times, and stays at the upper one for {self.upper_s:.3g} s and at the "
-            f"lower for {self.lower_s:.3g} s on average; its spectrum is that of a Gauss-Markov process"
+            f"random telegraph noise (burst noise, popcorn): {self.axis} jumps between two levels {self.apart:.3g} "
+            f"{self.unit} apart, {self.times} times. It stays at the upper level for {self.upper_s:.3g} s and at the "
+            f"lower level for {self.lower_s:.3g} s on average. Its spectrum is that of a Gauss-Markov process"
         )
 
 
 def telegraph_of(found: ChannelFit) -> Telegraph | None:
-    """The two levels that a channel goes between; None where its processes do without."""
+    """The two levels of a channel; None where its processes explain it without them."""
     if hidden_in(found.channel.oddities) is not None:
-        return None  # rounding makes levels of its own
+        return None  # rounding makes levels
     values = means_without(found.channel, found.lines)
     widths = [width for width in WIDTHS if width <= len(values)]
     paths = [path for width in widths if (path := _path(values, width)) is not None]
@@ -297,7 +297,7 @@ def telegraph_of(found: ChannelFit) -> Telegraph | None:
 
 
 def _needless(left: ChannelFit) -> bool:
-    """Whether a slow process is not needed any more: of two levels, nothing of it is left."""
+    """Whether a slow process is needless without the two levels."""
     slow = [effect for effect in left.effects if effect.name not in FASTEST]
     rest = ([other for other in left.effects if other is not effect] for effect in slow)
     return any(2 * (left.log_likelihood - fit_effects(left, each).log_likelihood) < TWO_LEVELS_BETTER for each in rest)
@@ -315,7 +315,7 @@ def _telegraph(found: ChannelFit, values: Array, path: Path) -> Telegraph:
 
 
 def _path(values: Array, width: int) -> Path | None:
-    """The likeliest path of two levels that stand out of means over so many values; None where it hardly goes."""
+    """The likeliest path between levels found in means over `width` values; None where it hardly jumps."""
     low, high = two_means(values[: len(values) // width * width].reshape(-1, width).mean(axis=1))
     spread = float(np.std(np.diff(values))) / 2**0.5
     if not spread > 0 or not high > low:
@@ -330,7 +330,7 @@ def _levels(values: Array, path: Path) -> Array:
 
 
 def _path_price(path: Path) -> float:
-    """Twice the negative logarithm of a path's probability, as one that forgets how long it stayed."""
+    """Twice the negative logarithm of a path's probability, as a Markov chain."""
     kinds = np.bincount(2 * path[:-1] + path[1:], minlength=4).reshape(2, 2)
     return float(-2 * np.sum(xlogy(kinds, kinds / np.maximum(kinds.sum(axis=1, keepdims=True), 1))))
 

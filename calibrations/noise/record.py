@@ -39,7 +39,7 @@ FLAT = 2.0  # least curvature: a ratio is known to a factor of e, or its likelih
 class Logged:
     """Means (m,) of a column, over as many samples as the channel's, less their mean. `level`: without scatter.
 
-    `doubt`: the relative standard uncertainty of a slope on the level, by what is not known of the scatter.
+    `doubt`: relative standard uncertainty of a slope on the level, as the amount of scatter is uncertain.
     """
 
     read: Array
@@ -53,7 +53,7 @@ class Logged:
 
 
 def logged_column(blocks: Sequence[Array], n: int) -> Logged | None:
-    """Of what was read beside n samples, in blocks; None where it is constant or of another length."""
+    """A column read with n samples, in blocks; None where it is constant or of another length."""
     means, readings, last = Means(), 0, np.nan
     for block in blocks:
         means.add(block)
@@ -68,7 +68,8 @@ def logged_column(blocks: Sequence[Array], n: int) -> Logged | None:
 def without_scatter(read: Array, readings: int) -> tuple[Array, float]:
     """The level beneath the scatter of a column's means (m,), of which each of so many `readings` holds until the next.
 
-    Also the doubt of a slope on it. What is faster than the readings is left out: it tells nothing of their scatter.
+    Also the doubt of a slope on it. Frequencies above those of the readings say nothing of their scatter, and are left
+    out.
     """
     m = len(read)
     k = np.arange(1, min(m, readings))
@@ -147,7 +148,7 @@ class Reduction:
         return self.octaves.n
 
     def read(self, blocks: Iterable[Any], source: str) -> Iterable[Array]:
-        """Take in the samples, shape (n,) each, in order and without gaps; every block is handed on as float64.
+        """Add the samples, shape (n,) each, in order and without gaps; every block is returned as float64.
 
         Raises DataError naming the sample that is no number, or where the channel is constant or clipped; TooFewRows.
         """
@@ -161,7 +162,7 @@ class Reduction:
         self._ends.check(source)
 
     def oddities(self) -> tuple[Oddity, ...]:
-        """Samples that are no noise, and noise that the samples do not show."""
+        """Samples that are not noise, and noise below the converter's step."""
         curve = self.octaves.curve()
         hidden = self._steps.hidden(curve, self.rate_hz, self.corner_hz)
         between = float(curve.deviation[0] ** 2)
@@ -346,13 +347,13 @@ def _channel(samples: Samples, reduction: Reduction) -> Channel:
 
 
 def logged_columns(blocks: Mapping[str, Sequence[Array]], n: int) -> dict[str, Logged]:
-    """What was read beside n samples, in blocks; none of what is constant, which tells nothing."""
+    """Columns read with n samples, in blocks, without constant ones."""
     every = {name: logged_column(each, n) for name, each in blocks.items()}
     return {name: column for name, column in every.items() if column is not None}
 
 
 def of_record(still: Still) -> str:
-    """What record it is: samples, rate, length."""
+    """The record in words: samples, rate, length."""
     hours = still.length_s / HOUR_S
     length = f"{hours:.3g} h" if hours >= 1 else f"{still.length_s:.4g} s"
     return f"{still.n} samples of {still.source} at {still.rate_hz:.6g} Hz ({length})"

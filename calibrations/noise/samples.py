@@ -66,18 +66,18 @@ class Hidden:
         slow = "" if self.all else "; slow noise is larger, and its coefficients are given"
         fast = "" if self.all else ", from sample to sample,"
         return (
-            f"the noise{fast} is below the converter's step: the samples are at {at} {self.step:.4g} apart, so that "
-            f"its level is not known{slow}: amplify the output, take a smaller range or a finer converter, or add "
+            f"the noise{fast} is below the converter's step: the samples have {at} {self.step:.4g} apart, so that "
+            f"its level is not known{slow}. Amplify the output, choose a smaller range or a finer converter, or add "
             "noise of half a step or more (dither)"
         )
 
     def hides(self, process: str) -> bool:
-        """Whether a process of the catalogue cannot be told."""
+        """Whether the noise of a process is below the step."""
         return self.all or process in FASTEST
 
 
 class Steps:
-    """The step and the range of the values so far; blocks are added in order, `hidden` is asked at the end."""
+    """Step and range of the values so far. Add blocks in order, then call `hidden`."""
 
     def __init__(self) -> None:
         self._last, self._step = np.nan, np.inf
@@ -103,7 +103,7 @@ class Steps:
 
 
 def hidden_step(values: Array) -> float | None:
-    """The step that hides the noise of values (n,), whatever is slow in it; None where none does."""
+    """The step that hides the fast noise of values (n,); None where none does."""
     between = np.abs(np.diff(values))
     step = float(np.min(between, where=between > 0, initial=np.inf))
     return step if np.isfinite(step) and np.mean(between**2) / 2 < LEAST * step**2 else None
@@ -126,8 +126,8 @@ DECILE, NORMAL = 0.9, 1.6449  # and where it is in a normal distribution, in sta
 
 @dataclass(frozen=True)
 class Wild:
-    """How many samples are wild, the first and the wildest of them (numbers from 0), by how many standard deviations
-    that one is off, and what their squares come to, in the square of the values' unit."""
+    """Number of wild samples, the first and the wildest (numbers from 0), the deviation of the wildest in standard
+    deviations, and the sum of the squared deviations."""
 
     count: int = 0
     first: int = 0
@@ -137,7 +137,7 @@ class Wild:
 
 
 class Outliers:
-    """What was seen so far; blocks are added in order, `found` is asked at the end."""
+    """Wild samples so far. Add blocks in order, then call `found`."""
 
     def __init__(self) -> None:
         self._waiting = np.empty(0)
@@ -203,7 +203,7 @@ class Run:
 
 
 class Stuck:
-    """The runs so far; blocks are added in order, `found` is asked at the end."""
+    """Runs of equal samples so far. Add blocks in order, then call `found`."""
 
     def __init__(self) -> None:
         self._n, self._runs = 0, 0  # samples, and runs that have ended
@@ -227,7 +227,7 @@ class Stuck:
         self._n, self._last = self._n + len(samples), float(samples[-1])
 
     def found(self) -> Run | None:
-        """The longest run, where chance makes none like it."""
+        """The longest run; None where chance makes such runs."""
         longest = max(self._longest, self._present, key=lambda run: run.length)
         others = max(1, self._runs)
         by_chance = (self._n - longest.length) / others * (1 + np.log(others))
@@ -293,7 +293,7 @@ class Oddity:
 
 
 def hidden_in(found: Iterable[Oddity]) -> Hidden | None:
-    """The noise that a converter's steps hide; None where they hide none."""
+    """The noise below a converter's step; None where none is."""
     return next((each.hidden for each in found if each.hidden is not None), None)
 
 
@@ -306,7 +306,7 @@ def oddities(
         found.append(_wild(wild, n, rate_hz, variance))
     if stuck is not None and hidden is None:  # below a step, samples are the same for long
         start_s, length_s = stuck.start / rate_hz, stuck.length / rate_hz
-        text = f"{stuck.length} samples from t = {start_s:.6g} s on are all the same, for {length_s:.4g} s"
+        text = f"{stuck.length} samples from t = {start_s:.6g} s on are equal, for {length_s:.4g} s"
         found.append(Oddity(CONSTANT, text, stuck.length / n > _uncertain(n)))
     if hidden is not None:
         found.append(Oddity(COARSE, hidden.text, True, hidden))
@@ -315,9 +315,9 @@ def oddities(
 
 def _wild(wild: Wild, n: int, rate_hz: float, variance: float) -> Oddity:
     share = min(1.0, wild.power / (n * variance))
-    many = "a single sample is" if wild.count == 1 else f"{wild.count} single samples are"
+    many = "one sample is" if wild.count == 1 else f"{wild.count} samples are"
     text = (
-        f"{many} far from the neighbours, by {wild.deviations:.3g} standard deviations at "
+        f"{many} far from the neighbours: by up to {wild.deviations:.3g} standard deviations at "
         f"t = {wild.wildest / rate_hz:.6g} s (sample {wild.wildest + 1}): {100 * share:.2g} % of the noise's power"
     )
     return Oddity(WILD, text, share > _uncertain(n))

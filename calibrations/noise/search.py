@@ -40,7 +40,7 @@ from calibrations.noise.record import Channel, Still
 
 @dataclass(frozen=True)
 class Search:
-    """What was found beside a model: lines and patterns, taken off `still`, and mixtures of processes on the rest."""
+    """What a model lacks: lines and patterns, removed from `still`, and mixtures of processes in the rest."""
 
     still: Still
     model: Model
@@ -53,7 +53,7 @@ class Search:
 
     @property
     def mixture(self) -> Mixture:
-        """The one that is worth most."""
+        """The mixture with the greatest worth."""
         return self.mixtures.best
 
     @cached_property
@@ -64,9 +64,9 @@ class Search:
 
     @cached_property
     def gains(self) -> dict[str, float]:
-        """The effects that are missed, and twice the log-likelihood that the whole loses without each.
+        """Missing effects, and twice the log-likelihood that the final fit loses without each.
 
-        In the order in which each gains most beside those before it: so the error falls at once where it can.
+        Each one gains most on top of those before it, so that the error falls early.
         """
         each = {name: self.mixtures.lost_without(self.mixture, name) for name in self.mixture.names}
         if self.liner is not None:
@@ -74,14 +74,14 @@ class Search:
         return {name: each[name] for name in self._in_order(each)}
 
     def _of_lines(self) -> float:
-        """What the bands lose where lines are left in the record; of what is faster than the bands, nothing."""
+        """Twice the log-likelihood that the bands lose where lines stay in the record."""
         model = self.model
         for name in self.mixture.names:
             model = model.with_effect(self.effects[name])
         return 2 * (likelihood(self.mixture.channels) - fit(model, self.still).log_likelihood)
 
     def _in_order(self, each: Mapping[str, float]) -> Iterator[str]:
-        """Lines stand by themselves, and gain the same wherever they are added."""
+        """Lines gain the same in any order."""
         left, level = list(each), 0.0
         present: list[Effect] = []
         while left:
@@ -95,12 +95,12 @@ class Search:
 
     @cached_property
     def rivals(self) -> dict[str, tuple[str, ...]]:
-        """Of each process that is missed, those that would do as well in its place."""
+        """By missing process, those that explain the record as well in its place."""
         return {effect.name: tuple(self._rivals(effect)) for effect in self.mixture.effects}
 
     @cached_property
     def end(self) -> NoiseFit:
-        """The model with all that it misses."""
+        """The fit of the model with all missing effects."""
         model = self.model
         for name in self.gains:
             model = model.with_effect(self.effects[name])
@@ -131,7 +131,7 @@ def _is_identified(mixture: Mixture, effect: Effect) -> bool:
 
 
 def _at_longest_shape(mixture: Mixture, effect: Effect) -> bool:
-    """Whether an effect's shape is the longest that a record shows: it then is what it contains, by another name."""
+    """Whether an effect's shape is the longest that a record shows: it then is the process that it contains."""
     shape = effect.parameters[1].name
     return all(
         each.values[effect.name][shape] > AT_LONGEST_TIME * shape_grid(effect, shape, each.channel)[-1]
@@ -179,19 +179,19 @@ def _remove_next_pattern(found: Search, given: tuple[Effect, ...]) -> Search:
     logged = any(pattern.kind == FOLLOWS for pattern in best.patterns[len(found.patterns) :])
     least = _worth(found) + (0.0 if logged else INSEPARABLE)
     if _worth(best) <= least or likelihood(best.mixtures.base) < likelihood(found.mixtures.base):
-        return found  # what the model explains less well without was a part of the noise
+        return found  # without it the model explains less: it was noise
     fewer = len(best.gains) < len(found.gains)
     return best if fewer or logged or any(pattern.certain for pattern in sure) else found
 
 
 def _search_without(found: Search, patterns: tuple[Pattern, ...], given: tuple[Effect, ...]) -> Search:
-    """What is found without more patterns."""
+    """The search without further patterns."""
     rest = _search_once(without_patterns(found.still, patterns), found.model, found.effects, given)
     return replace(rest, patterns=found.patterns + patterns, telegraphs=found.telegraphs)
 
 
 def _patterns(found: Search, channels: tuple[ChannelFit, ...]) -> tuple[Pattern, ...]:
-    """The pattern that stands out in each channel, where one does. Between two levels there are steps enough."""
+    """The pattern of each channel that has one. A channel that jumps between two levels has steps anyway."""
     jumping = {telegraph.axis for telegraph in found.telegraphs}
     return tuple(filter(None, (pattern_of(each) for each in channels if each.channel.axis not in jumping)))
 

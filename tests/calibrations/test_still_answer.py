@@ -93,7 +93,7 @@ def test_what_is_added_has_its_doubts_and_an_experiment_too() -> None:
     record = CASES["few periods"](np.random.default_rng(0))
     found = add(catalogue()["rate-random-walk"], read_model("still"), record)
     assert (found.verdict, found.alternatives) == ("ambiguous", {"rate-random-walk": ("flicker-noise",)})
-    assert "cannot tell rate-random-walk from flicker-noise" in str(found.reason)
+    assert "cannot separate rate-random-walk from flicker-noise" in str(found.reason)
     assert found.next_experiment is not None
 
 

@@ -45,7 +45,7 @@ def test_slope_and_lag_are_those_of_the_sensor() -> None:
     (pattern,) = diagnose(beside(x, temperature_c=warm), read_model("still")).findings.search.patterns
     assert pattern.size == pytest.approx(-0.8, abs=5 * pattern.std)
     assert pattern.std < 0.05
-    assert float(pattern.plain.split("V/K, ")[1].split(" s behind")[0]) == pytest.approx(60, rel=0.4)
+    assert float(pattern.plain.split("with a lag of ")[1].split(" s")[0]) == pytest.approx(60, rel=0.4)
 
 
 def test_a_drift_that_the_temperature_shares_is_told_with_its_rival() -> None:
@@ -54,7 +54,7 @@ def test_a_drift_that_the_temperature_shares_is_told_with_its_rival() -> None:
     said = str(found(white(random) + 0.5 * along, temperature_c=np.round(along, 2)).residual_structure)
     assert "a drift of x by" in said
     assert "x follows temperature_c by" in said
-    assert "cannot be told from" in said
+    assert "cannot separate it from" in said
 
 
 def test_a_temperature_and_a_step_are_two_things() -> None:
@@ -90,7 +90,7 @@ def test_scatter_of_the_thermometer_does_not_hide_how_much_the_sensor_follows(sc
     read = warm + scatter * random.standard_normal(SAMPLES)
     pattern = followed(white(random) + 0.8 * warm, temperature_c=read)
     assert pattern.std < 0.05
-    assert "behind" not in pattern.plain
+    assert "lag" not in pattern.plain
 
 
 def test_a_jitter_that_the_sensor_feels_is_no_scatter() -> None:

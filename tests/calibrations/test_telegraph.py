@@ -78,7 +78,7 @@ def test_strong_popcorn_is_one_process_and_no_steps_and_nothing_taken_off_makes_
     assert (asked.verdict, asked.missing, asked.residual_structure) == ("effect-missing", ("gauss-markov-noise",), None)
     assert (found.verdict, found.findings.baseline) == ("adequate", found.start)
     assert [each["kind"] for each in diagnosis_document(asked, "still")["disturbances"]] == [TWO_LEVELS]
-    assert "x goes between two levels 0.00499 V apart" in asked.judgement.text
+    assert "x jumps between two levels 0.00499 V apart" in asked.judgement.text
 
 
 def test_steps_of_a_process_that_jumps_are_taken_off_only_where_the_model_is_better_without() -> None:

@@ -95,8 +95,8 @@ def test_other_deviations_and_the_spectrum_have_intervals(rig: Rig, folder: Path
         ("step", "step", "a step of +0.0", "rate-random-walk"),
         ("drift", "drift", "a drift of x by +", "rate-random-walk"),
         ("louder", "level", "the level of x changes with time", "white-noise"),
-        ("wild", "wild-samples", "of x, a single sample is far from the neighbours", "white-noise"),
-        ("stuck", "constant-stretch", "of x, 300 samples from t = 40 s on are all the same", "white-noise"),
+        ("wild", "wild-samples", "of x, one sample is far from the neighbours", "white-noise"),
+        ("stuck", "constant-stretch", "of x, 300 samples from t = 40 s on are equal", "white-noise"),
         ("warm", "follows", "x follows temperature_c by +0.1", "rate-random-walk"),
     ],
 )
@@ -293,14 +293,14 @@ def test_noise_below_the_converters_step_and_of_two_levels_is_said_first(rig: Ri
     trap = np.where(np.cumsum(random.random(6000) < 0.01) % 2, 0.0, 0.4)
     np.save("trap.npy", samples() + trap)
     coarse = rig("noise", "coarse.npy", "--rate", "50")
-    assert "Of x, the noise is below the converter's step: the samples are at 2 values 1 apart" in coarse.out
+    assert "Of x, the noise is below the converter's step: the samples have 2 values 1 apart" in coarse.out
     assert "flicker-noise       not known" in coarse.out
     assert "not noise:" not in coarse.out
     assert "cannot separate" not in coarse.err
     said = document(rig("noise", "trap.npy", "--rate", "50", "--json"))
     assert [each["kind"] for each in said["disturbances"]] == ["two-levels"]
     shown = rig("noise", "trap.npy", "--rate", "50").out
-    assert "Random telegraph noise (burst noise, popcorn): x goes between two levels 0.4" in shown
+    assert "Random telegraph noise (burst noise, popcorn): x jumps between two levels 0.4" in shown
     assert "not noise:" not in shown
     assert "averaging for longer does not help" not in rig("noise", "still.npy", "--rate", "50").out
 

@@ -39,7 +39,7 @@ def test_a_magnetometer_begins_with_the_field_alone(rig: Rig, magnetometer: str,
     hard, soft = found["steps"]
     assert hard["excess_before"] > 5 * hard["excess_after"]
     assert soft["excess_before"] > 20 * soft["excess_after"]
-    assert "what an ellipsoid leaves is taken for it" in said.err
+    assert "the residual of an ellipsoid counts as noise" in said.err
     again = json.loads(rig("fit", magnetometer, "--model", str(tmp_path / "found.yaml"), "--json").out)
     assert 1e3 * again["rmse"]["norm"] == pytest.approx(0.76, abs=0.01)
     assert np.shape(again["calibration"]["M"]["value"]) == (3, 3)
