@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Generic
 
 from calibrations.discovery.dataset import Dataset
-from calibrations.discovery.results import Comparison, Diagnosis, Findings, Step
+from calibrations.discovery.results import Comparison, Diagnosis, F, Findings, Step
 from calibrations.effects import Effect
 from calibrations.errors import ModelError
 from calibrations.model import Model
@@ -25,7 +25,7 @@ Names = tuple[str, ...]
 
 
 @dataclass(frozen=True)
-class ModelSession:
+class ModelSession(Generic[F]):
     """`model` on `data`, and the `steps` taken from there.
 
     `kept` are the data without gross outliers, `start` the fit to them. `effects` are those that may be added, `notes`
@@ -34,16 +34,16 @@ class ModelSession:
 
     request: Request
     model: Model
-    data: Dataset[Any]
-    kept: Dataset[Any]
+    data: Dataset[F]
+    kept: Dataset[F]
     effects: Mapping[str, Effect]
     notes: tuple[str, ...]
-    start: Any  # a fit of these data
-    steps: tuple[Step[Any], ...] = ()
-    plans: dict[Names, Findings[Any]] = field(default_factory=dict, compare=False)
+    start: F
+    steps: tuple[Step[F], ...] = ()
+    plans: dict[Names, Findings[F]] = field(default_factory=dict, compare=False)
 
     @property
-    def end(self) -> Any:
+    def end(self) -> F:
         """The fit of the model as it is now."""
         return self.steps[-1].after if self.steps else self.start
 
@@ -57,11 +57,11 @@ class ModelSession:
         """The effects added."""
         return tuple(step.name for step in self.steps)
 
-    def among(self, effects: Mapping[str, Effect]) -> ModelSession:
+    def among(self, effects: Mapping[str, Effect]) -> ModelSession[F]:
         """The same with other effects to be added."""
         return replace(self, effects=effects)
 
-    def tried(self, effect: Effect) -> Step[Any]:
+    def tried(self, effect: Effect) -> Step[F]:
         """The present model with one effect more, fitted. Raises ModelError where that says nothing new."""
         if self.end.model.holds(effect.name):
             raise ModelError(f"{effect.name} is in the model already")
@@ -77,15 +77,15 @@ class ModelSession:
             raise ModelError(f"{name} is already in the catalogue; give yours another name")
         return self.data.expression(name, text)
 
-    def with_step(self, step: Step[Any]) -> ModelSession:
+    def with_step(self, step: Step[F]) -> ModelSession[F]:
         """One step further."""
         return self._with((*self.steps, step))
 
-    def undone(self) -> ModelSession:
+    def undone(self) -> ModelSession[F]:
         """One step back; the beginning stays as it is."""
         return self._with(self.steps[:-1])
 
-    def _with(self, steps: tuple[Step[Any], ...]) -> ModelSession:
+    def _with(self, steps: tuple[Step[F], ...]) -> ModelSession[F]:
         start, steps = self.data.in_one_floor(self.start, steps)
         return replace(self, start=start, steps=steps)
 
@@ -93,17 +93,17 @@ class ModelSession:
         """The present model as a file keeps it, with its provenance."""
         return with_provenance(self.end, self.model)
 
-    def compared(self) -> Comparison[Any]:
+    def compared(self) -> Comparison[F]:
         """The present model beside the data: as given, where it came with values."""
         return self.kept.compare(self.end.model if self.steps else self.model)
 
-    def diagnosed(self) -> Diagnosis[Any]:
+    def diagnosed(self) -> Diagnosis[F]:
         """What the present model misses."""
         found = self._plan() or self._search()
         self.plans[self.names] = found
         return Diagnosis.of(found)
 
-    def _plan(self) -> Findings[Any] | None:
+    def _plan(self) -> Findings[F] | None:
         """The rest of the longest earlier search that the steps have followed; None where they left all of them."""
         for k in range(len(self.names), -1, -1):
             plan = self.plans.get(self.names[:k])
@@ -112,17 +112,17 @@ class ModelSession:
                 return plan if not rest else self.data.followed(plan, len(rest), self.effects)
         return None
 
-    def _search(self) -> Findings[Any]:
+    def _search(self) -> Findings[F]:
         if not self.steps:
             return self.data.search(self.model, self.effects)
         return self.data.search_on(self.end, self.start, self.effects)
 
-    def with_next(self, result: Diagnosis[Any], tell: Callable[[str], None]) -> Diagnosis[Any]:
+    def with_next(self, result: Diagnosis[F], tell: Callable[[str], None]) -> Diagnosis[F]:
         """The diagnosis with its next experiment planned on the bench; `tell` hears where that is another bench."""
         return planned(result, self.request, self.effects, tell)
 
 
-def model_session(request: Request) -> ModelSession:
+def model_session(request: Request) -> ModelSession[Any]:
     """The beginning: data (a file or a run) and a model by name or file. Raises what `loaded` and `fit` raise."""
     notes: list[str] = []
     found = loaded(request, notes.append)

@@ -6,7 +6,7 @@ import os
 from collections import OrderedDict
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rig.files import RECORD, home
 from rig.record import Record, Run
@@ -25,9 +25,9 @@ class Desk:
 
     bench_file: Path | None
     dark: bool | None = None
-    sessions: OrderedDict[tuple[str, str], ModelSession] = field(default_factory=OrderedDict)
+    sessions: OrderedDict[tuple[str, str], ModelSession[Any]] = field(default_factory=OrderedDict)
 
-    def open(self, data: str, model: str) -> ModelSession:
+    def open(self, data: str, model: str) -> ModelSession[Any]:
         """The open session, or a new one; `model` "" is the default model. Raises the errors of `model_session`."""
         from rig.services.request import Request
         from rig.services.session import model_session
@@ -37,7 +37,7 @@ class Desk:
         self.keep(data, model, found)
         return found
 
-    def keep(self, data: str, model: str, session: ModelSession) -> None:
+    def keep(self, data: str, model: str, session: ModelSession[Any]) -> None:
         """Store the present state of a session."""
         self.sessions[data, model] = session
         self.sessions.move_to_end((data, model))

@@ -98,7 +98,7 @@ class Answers:
         return made
 
     @cached_property
-    def session(self) -> tuple[ModelSession, list[Diagnosis[Any]]]:
+    def session(self) -> tuple[ModelSession[Any], list[Diagnosis[Any]]]:
         """The session that adds what it proposes until it proposes nothing, and its diagnoses."""
         session = model_session(Request(self.data))
         seen = [session.diagnosed()]

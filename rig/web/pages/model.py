@@ -39,7 +39,7 @@ class Workbench:
 
     def __init__(self, desk: Desk, data: str, model: str) -> None:
         self.desk, self.data, self.model = desk, data, model
-        self.session: ModelSession | None = None
+        self.session: ModelSession[Any] | None = None
         self.search = Counted({})
         self.turn = 0  # results of older requests are ignored
         self.diagnoses: dict[tuple[str, ...], Diagnosis[Any]] = {}
@@ -114,7 +114,7 @@ class Workbench:
                 run_record.listed(self.data, self.afresh)
         await self.show(session)
 
-    async def show(self, session: ModelSession) -> None:
+    async def show(self, session: ModelSession[Any]) -> None:
         """Show pictures and error of the present model, then its missing effects."""
         self.turn += 1
         turn = self.turn
@@ -128,7 +128,7 @@ class Workbench:
         self.chosen.grown(session)
         await self._diagnose(session, turn)
 
-    async def _diagnose(self, session: ModelSession, turn: int) -> None:
+    async def _diagnose(self, session: ModelSession[Any], turn: int) -> None:
         self.search.cancelled = True  # the result of the previous search is not needed
         key = session.names
         if key not in self.diagnoses:
@@ -214,7 +214,7 @@ class VerdictBox:
                     self.whole = ui.tooltip("").props("max-width=640px")
             self.numbers = div("row-of numbers")
 
-    def error(self, compared: Comparison[Any], session: ModelSession) -> None:
+    def error(self, compared: Comparison[Any], session: ModelSession[Any]) -> None:
         """Show the error and where it is largest, before the diagnosis."""
         self.numbers.clear()
         with self.numbers:

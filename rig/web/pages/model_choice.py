@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from nicegui import events, ui
 
@@ -55,7 +55,7 @@ class Choice:
         if (data or "", model or "") != (self.page.data, self.page.model):
             self.page.go(data or "", model or "")
 
-    def opened(self, session: ModelSession) -> None:
+    def opened(self, session: ModelSession[Any]) -> None:
         """Show the names of the open data and model, also if the address has none."""
         self.data.set_value(self.page.data)
         if not self.page.model:
@@ -63,7 +63,7 @@ class Choice:
         self.save.enable()
         self.report.enable()
 
-    def grown(self, session: ModelSession) -> None:
+    def grown(self, session: ModelSession[Any]) -> None:
         """Enable Undo if the session has steps."""
         self.undo.set_enabled(bool(session.steps))
         self.undo.set_text(f"Undo {session.steps[-1].name}" if session.steps else "Undo")

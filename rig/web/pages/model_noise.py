@@ -42,7 +42,7 @@ class NoisePictures:
 
     def __init__(self) -> None:
         self.compared: Comparison[NoiseFit] | None = None
-        self.session: ModelSession | None = None
+        self.session: ModelSession[NoiseFit] | None = None
         self.step: Step[NoiseFit] | None = None
         with div("pictures"):
             with box("controls row-of"):
@@ -58,7 +58,7 @@ class NoisePictures:
                     plot = ui.plotly({"data": [], "layout": {}}).classes("plot")
                     self.plots[name] = plot.props(f'aria-label="{title}"')
 
-    def show(self, compared: Comparison[NoiseFit], session: ModelSession) -> None:
+    def show(self, compared: Comparison[NoiseFit], session: ModelSession[NoiseFit]) -> None:
         """Show a new fit."""
         self.compared, self.session, self.step = compared, session, None
         axes = dict(enumerate(compared.fit.still.axes))

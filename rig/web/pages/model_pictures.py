@@ -42,7 +42,7 @@ class Pictures:
         """`leave_out` receives the numbers of selected rows; None if they cannot be excluded."""
         self.leave_out = leave_out
         self.fit: Fit | None = None
-        self.session: ModelSession | None = None
+        self.session: ModelSession[Fit] | None = None
         self.step: Step[Fit] | None = None
         self.columns: dict[str, Column] = {}
         self.selected: list[int] = []
@@ -85,7 +85,7 @@ class Pictures:
             plot.on("plotly_selected", self._brushed, js_handler=POINTS)
             plot.on("plotly_deselect", lambda: self.select([]), js_handler="() => emit()")
 
-    def show(self, compared: Comparison[Fit], session: ModelSession) -> None:
+    def show(self, compared: Comparison[Fit], session: ModelSession[Fit]) -> None:
         """Show a new fit; selections stay if possible."""
         fit = compared.fit
         if self.fit is None or self.fit.table.n != fit.table.n:
