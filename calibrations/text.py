@@ -16,7 +16,7 @@ SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 PREFIXED = ("V", "g", "deg", "K", "h", "s")  # units that take a prefix
 PREFIXES = ((1.0, ""), (1e3, "m"), (1e6, "µ"), (1e9, "n"))
 MOST_DECIMALS = 12  # of the concise form; smaller uncertainties are written out
-LARGE_STD = 100.0  # from here on the digits in brackets would stand before the decimal point
+LARGE_STD = 100.0  # from here on the digits in brackets would be before the decimal point
 
 
 # Values with their uncertainty

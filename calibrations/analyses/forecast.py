@@ -240,7 +240,7 @@ def soak_parts(table: Table) -> Iterator[Table]:
 
 
 def _time_to_tolerance_s(rest: Array, taus_s: Array, tolerance: float) -> Array:
-    """How long what is left to come stays beyond the tolerance, of each draw; `rest` and `taus_s` (n, 2)."""
+    """For each draw, how long the remaining drift is beyond the tolerance; `rest` and `taus_s` (n, 2)."""
     ahead = np.abs(np.sum(rest[:, None, :] * np.exp(-HORIZON_S[None, :, None] / taus_s[:, None, :]), axis=2))
     over = np.log(np.maximum(ahead, SMALLEST) / tolerance)
     last = len(HORIZON_S) - 1 - np.argmax(over[:, ::-1] > 0, axis=1)  # the last time at which it is beyond

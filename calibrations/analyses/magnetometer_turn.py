@@ -1,4 +1,4 @@
-"""Hard and soft iron by hand, as the Book does it: from the extremes of a full turn, beside the fit of an ellipsoid.
+"""Hard and soft iron by the method of the Book: from the extremes of a full turn, to compare with an ellipsoid fit.
 
     h = (max + min) / 2                                    of each axis: hard iron
     r = sqrt(x1^2 + y1^2), theta = atan2(y1, x1)           (17.11), (17.12): the point farthest from the middle
@@ -90,8 +90,8 @@ def correct_by_extremes(outputs: Array) -> Array:
 #
 # The calibrated outputs, turned back by what is known of the stages and the mount, are the field in the frame of the
 # rig: x along its base, z upward. Its elements are those of `field.py` with X = x, Y = -y, Z = -z. D is then no
-# declination, but the azimuth from the base's x axis, clockwise seen from above: where that axis points is the
-# laboratory's to say.
+# declination, but the azimuth from the base's x axis, clockwise seen from above: the laboratory
+# states where that axis points.
 #
 # Outputs of one turn err together, by how the sensor sits in its mount: uncertainties are from the scatter of the
 # turns.

@@ -30,7 +30,7 @@ from calibrations.table import Array, Table
 #     Theta_x = Ry(alpha_x) Rz(beta_x) [1 0 0]^T        Theta_y = Rx(alpha_y) Rz(beta_y) [0 1 0]^T
 #
 # Ang (18)-(21), with two misprints set right: x_ref is [1 0 0], not [0 0 1], and (20) subtracts theta_xy A_y, not
-# theta_yx A_y. The angles printed for y do not give the Theta_y printed beside them; a test keeps both facts.
+# theta_yx A_y. The printed angles for y do not give the printed Theta_y; a test keeps both facts.
 
 
 def search_angles_x(alpha_deg: float, beta_deg: float) -> tuple[float, float]:
@@ -160,7 +160,7 @@ class _Bracket:
     gap_s: Array
 
     def noise(self) -> Noise:
-        """White noise alone, as the samples of each dwell tell it."""
+        """White noise alone, from the samples of each dwell."""
         return white_only(None if self.white is None else self.white[None, :], self.gap_s, 1)
 
     def slow_noise(self) -> Noise:
@@ -169,7 +169,7 @@ class _Bracket:
         return estimate(self.noise(), residual[None], self.columns[None], np.zeros((len(residual), 0)))
 
     def solved(self, noise: Noise) -> tuple[Array, Array, float]:
-        """Factors of the columns (p,), their covariance (p, p), and the sum of squares that is left."""
+        """Factors of the columns (p,), their covariance (p, p), and the residual sum of squares."""
         whitened = noise.whiten(np.column_stack([self.columns, self.volts])[None])
         inverse = np.linalg.pinv(whitened[:, :-1])
         factors = inverse @ whitened[:, -1]
@@ -194,7 +194,7 @@ def _bracket(table: Table, axis: str, rounds: list[RowMask]) -> _Bracket:
 
 
 def _is_white(brackets: list[_Bracket]) -> bool:
-    """Whether white noise explains what is left of both axes, within one standard deviation of its chi-square.
+    """Whether white noise explains the residual of both axes, within one standard deviation of its chi-square.
 
     Slow noise that were always estimated would, where there is none, make the axes look less certain than they are.
     """
@@ -214,7 +214,7 @@ def _direction(bracket: _Bracket, noise: Noise) -> Direction:
 
 
 def _columns(table: Table, rows: Rows, centre_deg: float) -> Array:
-    """What acts on an output, shape (n, 10), or two more where the supply was measured; the loads come first."""
+    """Regressors of an output, shape (n, 10), or two more with a measured supply; the loads are first."""
     a, b = np.radians(table.column("alpha_deg")[rows]), np.radians(table.column("beta_deg")[rows] - centre_deg)
     loads = np.column_stack([np.sin(a) * np.cos(b), np.sin(a) * np.sin(b), np.cos(a)])
     sides = [np.sin(b), np.cos(a) * np.cos(b), np.cos(a) ** 2 * np.cos(b)]

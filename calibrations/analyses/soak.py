@@ -39,7 +39,7 @@ from calibrations.table import Array, Table
 # Steady state after switching on: when it is reached, how far the output drifts until then, and how fast.
 #
 # The steady-state time is the first after which the remaining drift stays within the expanded uncertainty (k = 2) of
-# one measured value, slow noise included: from then on no measurement tells the rest of the drift from noise. It is
+# one measured value, slow noise included: from then on no measurement separates the remaining drift from noise. It is
 # not reached where it lies beyond the record, or where the noise wanders for as long as the record.
 #
 # Source  Ang III.B, Fig. 10: about 7 h, 2 to 12 h over eight axes; JCGM 100, 5.1: propagation, 6.2: expanded
@@ -102,7 +102,7 @@ class SteadyState:
 
     @property
     def drift(self) -> Quantity:
-        """Change of the fitted value from the first time to the last; none, to the noise, where nothing stands out."""
+        """Change of the fitted value from the first time to the last; 0 where no drift is significant."""
         if not self.terms:
             return 0.0, float(np.sqrt(2) * self.noise)
         first, last = model_derivatives(self.parameters, np.array(self.span_s) - self.span_s[0])
@@ -172,7 +172,9 @@ def fit_steady_state(t_s: Array, values: Array, stds: Array) -> SteadyState:
     Each exponential must gain EXPONENTIAL_GAIN. Raises TooFewRows for fewer than FEWEST_APPROACH_VALUES.
     """
     if len(t_s) < FEWEST_APPROACH_VALUES:
-        raise TooFewRows(f"{len(t_s)} reversals tell no drift from noise; at least {FEWEST_APPROACH_VALUES} are needed")
+        raise TooFewRows(
+            f"{len(t_s)} reversals cannot separate drift from noise; at least {FEWEST_APPROACH_VALUES} are needed"
+        )
     middle, unit = float(values.mean()), float(values.std()) or 1.0
     series = Series(t_s - t_s[0], (values - middle) / unit, stds / unit)
     most = min(MOST_EXPONENTIALS, (len(t_s) - 1 - SPARE_VALUES) // 2)
@@ -214,7 +216,7 @@ class Course:
 
     @property
     def time_s(self) -> Quantity | None:
-        """Its steady-state time since power-on; None where it is not reached, or cannot be told."""
+        """Its steady-state time since power-on; None where it is not reached or not known."""
         return self.state.time_s if self.state else None
 
 

@@ -1,4 +1,4 @@
-"""The paper's own estimation, Ang (1)-(17), step by step and axis by axis; beside the joint one of `fit`.
+"""The paper's own estimation, Ang (1)-(17), step by step and axis by axis, to compare with the joint `fit`.
 
 Its terms overlap. A tilt of the sensing axis is linear in the other two components of gravity, and so ends up in p1
 and q1; the correction (20) by the angles of a search then takes it off a second time. `Tilt` says how much that is.
@@ -98,7 +98,7 @@ def _inclinations(a: Array) -> Array:
 # One sensing axis by Ang's equations: coefficients found one after another, each from its own part of the data.
 #
 #     B, SF       output along and against gravity at alpha = 90 deg                      (1)-(2)
-#     g(V_p)      quadratic in the other axis's output: what the line (8) leaves there    (9)-(11)
+#     g(V_p)      quadratic in the other axis's output: residual of the line (8)    (9)-(11)
 #     h(V_z)      quadratic in a_z: bias at an inclination less that at 90 deg            (12)-(13)
 #     SF(V_z)     quadratic in a_z: scale factor at an inclination                        (15), (17)
 #

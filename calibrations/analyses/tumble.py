@@ -2,7 +2,7 @@
 
     y = y0 + k (T - T0) + h s [+ d t]     s = 1/2 on the way up, the top included, -1/2 on the way down
 
-d is drift, told from hysteresis only where there is more than one cycle. What a straight line leaves (curvature, slow
+d is drift, separable from hysteresis only with more than one cycle. The residual of a straight line (curvature, slow
 noise) widens the standard errors, with few steps by Student's t.
 
 Source  IEEE 1293; JCGM 101, 6.4.9: the standard uncertainty of a t-distribution.
@@ -48,7 +48,7 @@ class Tumble:
 def estimate_tumbles(table: Table, axis: str) -> list[Tumble]:
     """All complete tumbles in order of time. Raises DataError if none is complete.
 
-    A tumble with a missing pose is left out: hysteresis cancels only if each position was reached from both sides.
+    A tumble with a missing pose is not used: hysteresis cancels only if each position was reached from both sides.
     """
     paths = np.array(table.labels.get("path", ()))
     begun = {name: np.flatnonzero(paths == name) for name in dict.fromkeys(paths.tolist()) if " " in name}

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from calibrations.compensation.graph import OPERATIONS, Node, sort_nodes, variable_names
 from calibrations.table import Array
 
-# What a graph can come to over a range, and how steeply: interval arithmetic, rounded outwards.
+# Values and slopes of a graph over a range: interval arithmetic, rounded outwards.
 #
 # A value is a pair of arrays (low, high), one entry for each box of the range; its slopes are such pairs with a row
 # for each variable, by the rules of derivatives. Where a function has a corner both slopes are in the interval, so

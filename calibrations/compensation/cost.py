@@ -56,7 +56,7 @@ def result_uncertainty(
     """By the standard uncertainties of the parameters, taken as independent; None where there are none.
 
     Over the specific force `a` (n, 3) of the rows of `table`, and that as far as `reach` goes on an axis; `beside` has
-    the stated range of each input beside the outputs. Source  GUM 5.1.2.
+    the stated range of each input besides the outputs. Source  GUM 5.1.2.
     """
     if not any(e.std and e.identified for e in model.params.values()):
         return None
@@ -72,7 +72,7 @@ def result_uncertainty(
 def _found_in(name: str, stated: Span, model: Model) -> Span:
     """Where an input was while the parameters were found, as far as that is within the stated range.
 
-    By what the model file says that the data covered, or its own reference; the whole range where neither is known.
+    The range that the data covered, by the model file, or its reference; the whole range if neither is known.
     """
     at = {key: value for term in model.terms for key, value in term.constants.items()}
     reference = at.get(REFERENCES.get(name, ""))
@@ -138,7 +138,7 @@ def _with(model: Model, i: int, j: int, by: float) -> Model:
 # The memory of a product at each row of a table, given the samples of the whole way to that row.
 #
 # Between poses the way is that of the stages, as the effects themselves have it (`calibrations.visits`); what is
-# sensed on it stands for what the product finds there, which is as close to it as at the poses.
+# sensed on it replaces the product's value there, which is as close to it as at the poses.
 
 
 def memory_at(table: Table, a: Array, forward: Forward) -> dict[str, Array]:
@@ -202,7 +202,7 @@ class Cost:
 def compensation_costs(
     model: Model, forward: Forward, program: Program, reach: float, unit: str, spans: Mapping[str, Span]
 ) -> Cost:
-    """All costs of a compensation, in `unit`; `spans` has the stated ranges of what is given beside the outputs."""
+    """All costs of a compensation, in `unit`; `spans` has the stated ranges of the inputs besides the outputs."""
     table = _sweep(model, spans)
     a = specific_force(nominal_pose(table)) * (1.0 if unit != "deg/s" else reach)
     fates = {fate.effect: fate.how for fate in forward.fates}

@@ -179,12 +179,12 @@ def coverage_text(made: Compensation) -> str:
             "The model file does not give the temperature, supply and time of its calibration. Outside of them "
             "the model is extrapolated."
         )
-    said = ", ".join(f"{name} {_span(name, known[name], made)}" for name in known)
+    covered = ", ".join(f"{name} {_span(name, known[name], made)}" for name in known)
     beyond = [
         name for name, (low, high) in made.beside.items()
         if name not in FORCES and (name not in known or low < known[name][0] or high > known[name][1])
     ]  # fmt: skip
-    text = f"Covered by the data of the calibration: {said}; beyond, the model is extrapolated"
+    text = f"Covered by the data of the calibration: {covered}; beyond, the model is extrapolated"
     return f"{text}. The stated range goes beyond in {', '.join(beyond)}." if beyond else f"{text}."
 
 

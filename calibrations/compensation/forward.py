@@ -50,7 +50,7 @@ FORCES = ("ax", "ay", "az")
 
 @dataclass(frozen=True)
 class Fate:
-    """The treatment of an effect, and the reason if it is left out."""
+    """The treatment of an effect, and the reason for leaving it out."""
 
     effect: str
     how: str
@@ -159,7 +159,7 @@ def _fate(step: Step, table: RunTime, without: Collection[str]) -> Fate:
         _outputs([step], table)
     except NotTraced as error:
         return Fate(effect.name, LEFT_OUT, str(error))
-    except ModelError as error:  # of a user's own file, whose faults are told as theirs
+    except ModelError as error:  # an error in a user's own file
         return Fate(effect.name, LEFT_OUT, str(error.__cause__ or error))
     return Fate(effect.name, INVERTED)
 

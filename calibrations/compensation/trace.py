@@ -1,7 +1,7 @@
-"""An array whose numbers are nodes: what numpy is asked to do with it is written down in place of being done.
+"""An array of graph nodes: numpy operations on it are recorded instead of computed.
 
-An effect's own function is called with it, so that its formula stands in one place. What only numbers can answer
-(a rounding, a sort, a column that no product has) raises NotTraced, and says what it was.
+The function of an effect is called with it, so that its formula is written once. An operation that needs numbers
+(rounding, sorting, a column that no product has) raises NotTraced with its name.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ HIGHEST_POWER = 8
 
 
 class NotTraced(CalibrationError):
-    """What an effect does cannot be written down."""
+    """The function of an effect cannot be traced."""
 
 
 class Traced(NDArrayOperatorsMixin):
@@ -59,10 +59,10 @@ class Traced(NDArrayOperatorsMixin):
         return Traced(self.nodes[key])
 
     def __array__(self, *_: Any, **__: Any) -> np.ndarray:
-        raise NotTraced("its function asks for numbers, as np.asarray and float do")
+        raise NotTraced("its function needs numbers, as np.asarray and float do")
 
     def __bool__(self) -> bool:
-        raise NotTraced("its function decides by what is known at run time only; take np.where")
+        raise NotTraced("its function branches on a value known at run time only; use np.where")
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
         if method != "__call__" or any(isinstance(out, np.ndarray) for out in options.get("out") or ()):
@@ -94,7 +94,7 @@ class Traced(NDArrayOperatorsMixin):
 
 @dataclass(frozen=True)
 class RunTime:
-    """What an effect may ask of a table, where there is only one row, and it is not measured yet.
+    """The table of an effect at run time: one row, not measured yet.
 
     Columns are inputs of the product, by their names; constants those of the model.
     """
@@ -156,7 +156,7 @@ def _power(base: Any, exponent: Any) -> Traced:
     e = np.unique(exponent) if not isinstance(exponent, Traced) else np.empty(0)
     if len(e) != 1 or abs(e[0]) > HIGHEST_POWER or (e[0] != 0.5 and e[0] % 1):
         raise NotTraced(
-            f"its function takes a power that is no whole number up to {HIGHEST_POWER}; take np.exp, np.log"
+            f"its function uses a power that is not a whole number up to {HIGHEST_POWER}; use np.exp, np.log"
         )
     return np.sqrt(base) if e[0] == 0.5 else _elementwise(lambda x: power(x, int(e[0])), base)
 
@@ -208,7 +208,7 @@ FUNCTIONS: Mapping[Callable[..., Any], Callable[..., Any]] = {
     np.ndim: lambda a: a.ndim,
 }
 
-# An effect of one line of arithmetic, written down as nodes.
+# An effect given by an expression, as nodes.
 
 # what numpy does for an operation of an expression; its guards against fits that go astray are not needed here
 AS_NUMPY: Mapping[str, Callable[..., Any]] = {

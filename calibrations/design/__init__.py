@@ -1,1 +1,1 @@
-"""Which poses to measure, and what they would tell: information, order, and how far apart rivals would lie."""
+"""Which poses to measure: their information, their order, and how well they separate rival effects."""

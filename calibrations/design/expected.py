@@ -1,4 +1,4 @@
-"""How far apart two explanations will lie in data that nobody has measured yet: T-optimality.
+"""Separation of two explanations in data not measured yet: T-optimality.
 
     lambda = min over theta of |W (f_best - f_rival(theta))|^2        W makes the noise white
 
@@ -58,12 +58,12 @@ class Expected:
 
     @property
     def probability_alone(self) -> float:
-        """Of finding that something is missing, and telling what, by its own data."""
+        """Of finding the missing effect by its own data alone."""
         return min(pairs_separated(self.alone), _beyond(self.visible, NAMED_GAIN))
 
 
 def expected_gain(best: Fit, rival: Fit, table: Table) -> Expected:
-    """What the foreseen `table` will tell of two explanations of the data at hand, whichever of them is right.
+    """How well the predicted `table` separates two explanations of the present data, whichever is right.
 
     Both are fits to the same data. Of the two cases, the best right and the rival right, the worse one counts. Times
     of `table` come after those of the data.
@@ -73,7 +73,7 @@ def expected_gain(best: Fit, rival: Fit, table: Table) -> Expected:
 
 
 def pairs_separated(noncentrality: float) -> float:
-    """Probability that the likelihood ratio will be beyond the odds at which two explanations are told apart."""
+    """Probability that the likelihood ratio exceeds the odds that separate two explanations."""
     return _beyond(noncentrality, INSEPARABLE)
 
 
@@ -167,7 +167,7 @@ def _values(layout: Layout) -> Array:
 # single samples and how many are averaged, both as in the data of the fit, so that a longer dwell counts for what it
 # is.
 
-PLANNED = ("t_s", "direction")  # a plan's own: no mean of other data stands for them
+PLANNED = ("t_s", "direction")  # a plan's own: the mean of other data does not replace them
 
 
 def predict_data(like: Fit, columns: Mapping[str, Array]) -> Table:
@@ -175,7 +175,7 @@ def predict_data(like: Fit, columns: Mapping[str, Array]) -> Table:
 
     `columns`, each of shape (n,): alpha_deg and beta_deg, and what else is planned of direction, flip, mount_deg, t_s,
     temperature_c, ...; `n` samples a mean, or `dwell_s` at the data's sample rate, else as many as the data's. Columns
-    that the model's effects need and nobody plans, such as temperature_c, are held at their mean in the data.
+    that the model's effects need and a plan does not set, such as temperature_c, are held at their mean in the data.
     Constants (filter corner, gravity, approach) are the data's.
 
     Raises DataError for a fit to another kind of table, and for `dwell_s` where no sample rate is known; MissingColumn
@@ -207,7 +207,7 @@ def _check_planned(like: Fit, table: Table) -> None:
 
 
 def _noise(like: Fit, columns: Mapping[str, Array], rows: int) -> dict[str, Array]:
-    """Standard deviation of samples, and how many a mean is of; nothing where the data does not tell."""
+    """Standard deviation of samples, and how many a mean is of; nothing where the data has none."""
     data = like.table
     usual = {name: float(np.median(data.column(name))) for name in _std_names(data)}
     if "n" in data and "n" not in columns:

@@ -1,4 +1,4 @@
-"""The experiment that tells apart two effects that the data at hand cannot.
+"""The experiment that separates two effects that the present data cannot separate.
 
 `separating` goes by the physics of the two alone. Where a bench is known, each experiment of MENU is planned on it, and
 `calibrations/design/expected.py` computes how far apart the two will lie.
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 TEMPERATURE_EFFECTS = {"temperature-bias", "temperature-scale", "temperature-hysteresis"}
 TIME_EFFECTS = {"warm-up-bias", "warm-up-scale", "bias-drift"}
-WARM_C = 45.0  # above what a powered sensor comes to in a room
+WARM_C = 45.0  # above the temperature of a powered sensor in a room
 LEVEL_EFFECTS = {"stage-zero-offset", "base-tilt"}
 DELAY_EFFECTS = {"output-filter", "sampling-delay"}
 TWO_HZ = [10.0, 4.0]  # the usual one, and one well below that is at the same stroke still above the noise
@@ -32,8 +32,7 @@ STAY_POWERED = 0.0  # s without power: the sensor stays on, and its warm-up goes
 class Experiment:
     """A procedure with settings, what it separates, and why it can.
 
-    Of a known bench also the command line, how long it takes, and what it is expected to tell, where its data can be
-    foreseen.
+    For a known bench also the command line, the duration, and the expected separation if its data can be predicted.
     """
 
     procedure: str
@@ -53,15 +52,15 @@ FINE = "full turns both ways at finely spaced inclinations, out of order, excite
 COARSE = "inclinations out of order: height does not follow time, and what depends on the angle returns with it"
 FACES = "mounted face down, an error of the sensor's axes turns with the sensor and one of the stage does not"
 LONGER = "longer dwells: the noise of each mean is half as large"
-LATER = "with the angles held, what still changes follows the time: an exponential comes to rest, a drift goes on"
-HELD = "in the oven the temperature is held, and what still changes follows the time"
-CYCLED = "the oven goes up and down again: what lags behind the temperature comes back another way, and time does not"
+LATER = "with fixed angles, all changes follow the time: an exponential settles, a drift continues"
+HELD = "the oven keeps the temperature constant, so all changes follow the time"
+CYCLED = "the oven heats and cools: an effect with a lag differs between both directions, an effect of time does not"
 TURNED_ROUND = "a level laid on the base shows the tilt of the base alone; an offset of alpha moves the table only"
 SHAKEN = "in a field of 1 g the squares of the three axes add up to a constant; motion along one axis does not"
-RECORDED = "these data have no temperature: with a thermometer read at each pose, they tell what follows it from time"
+RECORDED = "this data has no temperature: a thermometer read at each pose separates temperature from time"
 TWO_TONES = "a corner changes the size of an oscillation with its frequency, a delay only its phase"
 ALL_ROUND = "full turns on each edge, upward and downward, show every side of the sphere of directions"
-SIX_FACES = "turned about each edge both ways, and at rest on six faces, rate, specific force and time go separate ways"
+SIX_FACES = "turns about each edge in both directions and rests on six faces separate rate, specific force and time"
 
 MENU = (
     _of("sweep", COARSE, step_deg=30.0, inclinations_deg=FEW),
@@ -76,7 +75,7 @@ MENU = (
     _of("temperature-cycle", CYCLED, temperatures_c=[35.0, 50.0], soak_s=1200.0),
     _of("temperature-cycle", CYCLED),
 )
-ADDITIONS = (  # what tells nothing by itself, but much beside data that were taken face up
+ADDITIONS = (  # not useful alone, but together with data taken face up
     _of("sweep", FACES, face="down", step_deg=90.0, inclinations_deg=[90.0, 45.0]),
     _of("sweep", FACES, face="down", step_deg=45.0, inclinations_deg=FEW),
 )
@@ -93,7 +92,7 @@ def separating_experiment(name: str, rivals: Sequence[str], table: Table) -> Exp
 
 
 def experiment_by_physics(names: Set[str]) -> tuple[str, dict[str, object], str]:
-    """Procedure, settings, and why they tell effects of these names apart."""
+    """Procedure, settings, and why they separate effects of these names."""
     if names >= SQUARE_EFFECTS:
         return "motion", {}, SHAKEN
     if names & IRON_EFFECTS:

@@ -1,4 +1,4 @@
-"""How much planned poses would tell about a model's parameters: Fisher's information, to first order.
+"""Information of planned poses on a model's parameters: Fisher's information, to first order.
 
     M = J' Sigma^-1 J        J the model's derivatives at the fitted values, Sigma the noise foreseen
 
@@ -66,7 +66,7 @@ def _noise(fit: Fit, problem: Problem) -> Noise:
     return noise_on_rows(found, problem)
 
 
-# Which poses tell most about a model: D- and I-optimal designs, by exchange of one pose after another.
+# Poses with the most information on a model: D- and I-optimal designs, by exchange of one pose after another.
 #
 #     D   the greatest det M: the smallest volume of the parameters' joint uncertainty
 #     I   the least mean variance of what the model predicts over a range of poses: tr(M^-1 W)
@@ -75,7 +75,7 @@ def _noise(fit: Fit, problem: Problem) -> Noise:
 # candidates put in its place until no exchange helps, from several random beginnings: the optimum of each is local.
 #
 # Some of the chosen are then measured again, so that the noise is known from the data themselves (pure error) and a
-# lack of fit can be told from it; and poses far from all of them are added that no fit sees.
+# lack of fit can be separated from it; and poses far from all of them are added that no fit uses.
 #
 # Source  Fedorov, Theory of Optimal Experiments (1972), exchange; Atkinson, Donev and Tobias, Optimum Experimental
 #         Designs, with SAS (2007), ch. 10 to 12; Kennard and Stone, Technometrics 11 (1969), 137-148, poses far from

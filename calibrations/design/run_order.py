@@ -51,7 +51,7 @@ class Tour:
         return float(self.start_s[order[0]] + self.move_s[order[:-1], order[1:]].sum())
 
     def drift_loss(self, order: Order) -> float:
-        """How much the variance of the parameter that suffers most grows where a drift has to be fitted beside all.
+        """Largest growth of a parameter's variance when a drift is fitted too.
 
         Relative: 0 if no order of time is in the poses' order.
         """
@@ -88,7 +88,7 @@ class Tour:
 
     @cached_property
     def _trend(self) -> Array:
-        """Orthonormal polynomials over the places of an order that are seen at equal distances, (n, degrees)."""
+        """Orthonormal polynomials over the places of an order at equal distances, (n, degrees)."""
         u = np.linspace(-1.0, 1.0, len(self.rows))
         return np.asarray(np.linalg.qr(np.vander(u, max(DEGREES) + 1, increasing=True))[0][:, list(DEGREES)])
 

@@ -53,7 +53,7 @@ class BatchEffect:
 
 
 def find_batch_effects(looks: Sequence[Screening], of_stage: Container[str] = ()) -> list[BatchEffect]:
-    """The significant effects of a batch beside the model of `looks`, best first; none in a batch of too few.
+    """The significant effects of a batch in addition to the model of `looks`, best first; none in a batch of too few.
 
     Effects `of_stage` are of the rig, which every sensor finds as it is: they are asked for in common only.
     """
@@ -106,7 +106,7 @@ def _common(scores: list[Score], rank: int) -> tuple[float, float]:
     if not rank or n <= rank + 1:
         return 1.0, 0.0
     along = (vectors.T @ total)[kept][-rank:]
-    share = float(np.sum(along**2 / values[kept][-rank:])) / n  # of all that they say, what they say alike
+    share = float(np.sum(along**2 / values[kept][-rank:])) / n  # the common share of their information
     f = share / max(1 - share, 1e-12) * (n - rank) / rank
     information = sum((w * s.information for w, s in zip(weights, scores, strict=True)), np.zeros((u.shape[1],) * 2))
     gain = float(total @ np.linalg.pinv(information, rcond=1e-9, hermitian=True) @ total)

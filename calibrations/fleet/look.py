@@ -67,7 +67,7 @@ class SearchGroups:
 
 
 class SharedDesigns:
-    """The columns of the designs met lately, of `effects` beside one model."""
+    """The columns of the designs met lately, of `effects` in addition to one model."""
 
     def __init__(self, effects: Mapping[str, Effect]) -> None:
         self.effects = effects
@@ -149,7 +149,7 @@ def _trials(found: Fit, groups: list[Group]) -> float:
     return Search(screen, [screen.basis(group.of(found.table)) for group in groups]).trials
 
 
-# A look at one sensor: the model fitted, and how much each effect and each pattern could take off what is left.
+# A look at one sensor: the model fitted, and how much of the residual each effect and each pattern can explain.
 #
 # All candidates are judged at once from one Gram matrix: columns made white under the sensor's own noise and freed of
 # the
@@ -163,7 +163,7 @@ LEAST_RANK = 1e-10  # eigenvalue of a Gram matrix of columns of length 1: less i
 
 @dataclass(frozen=True, slots=True)  # a batch of a thousand sensors has 35,000
 class Score:
-    """One effect at one start, to first order beside the model: score (k,) and information (k, k) of its parameters.
+    """One effect at one start, to first order, added to the model: score (k,) and information (k, k) of its parameters.
 
     `statistic` is what the whitened sum of squares would fall by, `rank` its degrees of freedom, `p_value` how often
     noise alone does as much.
@@ -289,7 +289,7 @@ def statistics_of(grams: list[Array], scores: list[Array]) -> tuple[Array, Array
 
 
 def _beside_slow_noise(found: Fit, groups: SearchGroups, columns: list[Array], ranks: Array) -> Array:
-    """How often noise alone gains as much as each effect where the noise is fitted anew beside it.
+    """How often noise alone gains as much as each effect if the noise is fitted again with it.
 
     1 for patterns, where no slow noise was found, so that there is nothing to weigh an effect against, and for effects
     that would be nothing even without any slow noise.

@@ -41,23 +41,19 @@ def correct_stage_errors(table: Table, errors: StageErrors, effects: Mapping[str
     return replace(table, columns=MappingProxyType(columns))
 
 
-# Errors of rigs, found from the sensors that they measured: what all sensors of one rig share is the rig's.
+# Errors of rigs, from the sensors that they measured: an error common to all sensors of one rig is the rig's.
 #
-# One sensor cannot tell its own misalignment from its stage's zero offset. Over a fleet, parameter j of an effect on
-# the
-# pose, as sensor i of batch b on rig r shows it, is
+# The data of one sensor cannot separate its misalignment from its stage's zero offset. Over a fleet, parameter j of an
+# effect on the pose, by sensor i of batch b on rig r, is
 #
 #     y_i = beta_b + rho_r + e_i        var e_i = tau^2 + v_i
 #
-# with tau^2 what sensors of one batch differ by on one rig (Paule and Mandel), whatever of the sensor looks like it:
-# the
-# sensors are taken to have come to the rigs by chance. rho is tested by F (Knapp and Hartung, 2003). The strongest
-# effect
-# is taken, its rigs' values taken off, and the search goes on.
+# tau^2 is the variance between sensors of one batch on one rig (Paule and Mandel). The assignment of sensors to rigs
+# is assumed to be random. rho is tested by F (Knapp and Hartung, 2003). The values of the rigs for the strongest effect
+# are subtracted, and the search continues.
 #
-# What this cannot tell: an error that all rigs share from one of the sensors' design; a rig's from a batch's where
-# each
-# batch was on one rig. StageErrors are therefore told from the median of the rigs that batches connect.
+# Inseparable: an error common to all rigs from one of the sensors' design, and an error of a rig from one of a batch
+# where each batch was on one rig. Errors are therefore relative to the median of the rigs that batches connect.
 
 TO_STD = 1.4826
 DETERMINED = 1e-8  # share of an information matrix: less is not known
@@ -140,7 +136,7 @@ def _place(names: Sequence[tuple[str, str, str]], effect: str, parameter: str) -
 def _effect(
     fleet: Sequence[Measured], names: Sequence[tuple[str, str, str]], effect: str, taken: Mapping[str, Array]
 ) -> _Found:
-    """The errors of one effect, of every rig, beside what is taken off already."""
+    """The errors of one effect, of every rig, after the corrections made already."""
     mine = [k for k, name in enumerate(names) if name[0] == effect]
     sensors, values, variances, scores, informations = [], [], [], [], []
     for each in fleet:

@@ -196,21 +196,21 @@ class Pooled:
 
     @property
     def apart(self) -> Array:
-        """(n, p): whether a sensor's parameter is unlike those of all siblings, and stands alone."""
+        """(n, p): whether a sensor's parameter is unlike those of all siblings."""
         return np.column_stack([each.apart for each in self.parameters])
 
 
 def pool_siblings(theta: Array, information: Array, typical: Array) -> Pooled:
     """Pool estimates `theta` (n, p) with `information` (n, p, p); `typical` (p,) magnitudes."""
     known = information * np.outer(typical, typical) + NOTHING * np.eye(len(typical))
-    said = np.einsum("nij,nj->ni", known, theta / typical)
+    weighted = np.einsum("nij,nj->ni", known, theta / typical)
     prior, mean = np.full(theta.shape, WIDE**-2.0), np.zeros(theta.shape)
     found: list[Siblings] = []
     for _ in range(SWEEPS):
         before = prior.copy()
         found = []
         for k in range(theta.shape[1]):
-            found.append(fit_siblings(*_alone(known, said, prior, mean, k)))
+            found.append(fit_siblings(*_alone(known, weighted, prior, mean, k)))
             mean[:, k], prior[:, k] = _foretold(found[-1])
         if np.all(np.abs(prior / before - 1) < SETTLED):
             break
@@ -219,17 +219,17 @@ def pool_siblings(theta: Array, information: Array, typical: Array) -> Pooled:
     return Pooled(tuple(found), typical, np.where(std < WIDE, std, np.inf) * typical)
 
 
-def _alone(known: Array, said: Array, prior: Array, mean: Array, k: int) -> tuple[Array, Array]:
-    """Parameter k and its variance for each sensor, (n,), by its own data and what is foretold of its other ones."""
+def _alone(known: Array, weighted: Array, prior: Array, mean: Array, k: int) -> tuple[Array, Array]:
+    """Parameter k and its variance for each sensor, (n,), by its own data and the prior of its other parameters."""
     others = prior.copy()
     others[:, k] = 0.0
     total = known + others[:, :, None] * np.eye(known.shape[1])
     inverse = np.linalg.inv(total)[:, k]
-    return np.einsum("nj,nj->n", inverse, said + others * mean), np.asarray(inverse[:, k])
+    return np.einsum("nj,nj->n", inverse, weighted + others * mean), np.asarray(inverse[:, k])
 
 
 def _foretold(found: Siblings) -> tuple[Array | float, Array | float]:
-    """What the batch says of each sensor before its own data: mean and inverse variance; nothing of those apart."""
+    """Prior of each sensor from its batch: mean and inverse variance; none for outliers."""
     if not found.pooled:
         return 0.0, WIDE**-2.0
     precision = 1 / (found.variance + found.mean_std**2)

@@ -25,7 +25,7 @@ from calibrations.tables import KINDS
 
 AXIS = r"(?:^|[^a-z])(?P<axis>[xyz])(?:[^a-z]|$)"
 SCATTER = r"std|stdev|sigma|noise|scatter|deviation"
-# what a name says, the first that fits; {axis} is the letter x, y or z in it
+# meaning of a name, the first match; {axis} is the letter x, y or z in it
 NAME_PATTERNS: Mapping[str, Sequence[tuple[str, str]]] = {
     "poses": (
         (r"alpha|inclin|tilt|pitch|polar|elevation", "alpha_deg"),
@@ -113,7 +113,7 @@ def missing_columns(kind: str | None, laid: Sheet, mapped: Iterable[ColumnMappin
     """The columns that a table of this kind needs and that neither header nor mapping gives."""
     given = {m.name for m in mapped} | set(laid.bare)
     if kind == "rates" and "path" in given:
-        given.add("rate_deg_s")  # the sections of a session tell it
+        given.add("rate_deg_s")  # given by the sections of a session
     return [name for name in required_columns(kind, given) if name not in given]
 
 

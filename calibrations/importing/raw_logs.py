@@ -158,7 +158,7 @@ def thin_by_direction(log: Table) -> Table:
 #
 # Nobody repeats one pose for fifty rows on end where a row is a mean of seconds; a logger at 10 Hz or more does so in
 # each dwell of 5 s. So a table that does not count averaged samples is a log where its times follow each other as no
-# means can and the stages rest at all; without times, where most rows stand in such stretches. Poses measured twice
+# means can and the stages rest at all; without times, where most rows are in such stretches. Poses measured twice
 # or three times stay as they are, and so does a soak with a row every few seconds.
 
 SETTLE_S = 0.2  # dropped at each end of a dwell where the log shows the stages moving

@@ -192,7 +192,7 @@ class Chart:
     width: float = 10.0
     share_x: bool = False
     share_y: bool = False
-    bar: Scale | None = None  # of the colours, beside the panels
+    bar: Scale | None = None  # of the colours, to the right of the panels
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from calibrations.text import exponent, tick_text
 Figure = dict[str, Any]
 Trace = dict[str, Any]
 
-EDGE = "rgba(105,115,125,0.9)"  # tells pale and dark markers from white and dark paper
+EDGE = "rgba(105,115,125,0.9)"  # separates pale and dark markers from white and dark paper
 CONFIG = {
     "displaylogo": False,
     "responsive": True,

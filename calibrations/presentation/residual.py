@@ -71,7 +71,7 @@ def _sensed(fit: Fit, letter: str) -> list[Column]:
 
 
 def telling_columns(fit: Fit, effect: Effect) -> list[Column]:
-    """Columns that an effect may follow: the specific forces, beta, and what it needs beside them.
+    """Columns that an effect may follow: the specific forces, beta, and the columns that it needs.
 
     It cannot follow what it does not know, such as time: inclinations that follow one another would only seem so.
     """
@@ -226,26 +226,26 @@ class Shown:
 
     @cached_property
     def hover(self) -> list[str]:
-        """What each row tells: its pose, its time, what the model leaves."""
-        return [self._told(int(row)) for row in self.rows]
+        """Text of each row: pose, time, residual."""
+        return [self._text(int(row)) for row in self.rows]
 
     def summary(self, points: Sequence[int]) -> str:
         """Selected points, as a number, a range of angles and an error."""
         rows = self.rows[list(points)]
         left = self.factor * self.fit.residual[self.c, rows]
-        told = f"{len(rows)} of {self.fit.table.n} selected"
+        text = f"{len(rows)} of {self.fit.table.n} selected"
         for name in ("alpha_deg", "beta_deg"):
             if name in self.fit.table:
                 values = self.fit.table.column(name)[rows]
-                told += f", {NAMES[name][0]} {values.min():g} to {values.max():g}°"
+                text += f", {NAMES[name][0]} {values.min():g} to {values.max():g}°"
         times = rounded(float(rms(left)) / self.floor, 2)
-        return f"{told}: residual {minus(f'{left.mean():+.3g}')} {self.unit} on average, rms {times} × the noise floor"
+        return f"{text}: residual {minus(f'{left.mean():+.3g}')} {self.unit} on average, rms {times} × the noise floor"
 
     def place(self, row: int) -> str:
         """The pose of a row, and when it was."""
         return "<br>".join(_place(self.fit.table, row))
 
-    def _told(self, row: int) -> str:
+    def _text(self, row: int) -> str:
         left = float(self.fit.residual[self.c, row])
         times = rounded(abs(left) / float(self.fit.noise.floor[self.c]), 2)
         error = f"residual {minus(f'{self.factor * left:+.3g}')} {self.unit}, {times} × the noise floor"
@@ -263,10 +263,10 @@ def _place(table: Table, row: int) -> Iterator[str]:
         yield f"row {number}: {at['rate_deg_s']:g} deg/s"
     else:
         yield f"row {number}"
-    beside = [f"t = {at['t_s']:.0f} s"] if "t_s" in at else []
-    beside += [f"{at['temperature_c']:.2f} °C"] if "temperature_c" in at else []
-    if beside:
-        yield ", ".join(beside)
+    details = [f"t = {at['t_s']:.0f} s"] if "t_s" in at else []
+    details += [f"{at['temperature_c']:.2f} °C"] if "temperature_c" in at else []
+    if details:
+        yield ", ".join(details)
 
 
 def residual_units(fit: Fit) -> dict[bool, str]:

@@ -107,7 +107,7 @@ def png(chart: c.Chart) -> bytes:
 def inline(chart: c.Chart, name: str, words: str) -> str:
     """The chart as an SVG element for a page: it loads nothing, and its ids begin with `name`.
 
-    `words` describe it for those who cannot see it.
+    `words` describe it for screen readers.
     """
     text = svg(chart).decode()
     text = text[text.index("<svg") :].strip()
@@ -373,7 +373,7 @@ def sparing(text: str) -> str:
 
 
 def _classes(text: str) -> str:
-    """Styles that stand there often are written once."""
+    """Repeated styles are written once."""
     often = [s for s, n in Counter(re.findall(r' style="([^"]*)"', text)).items() if n >= OFTEN]
     for k, style in enumerate(often):
         text = text.replace(f' style="{style}"', f' class="s{k}"')

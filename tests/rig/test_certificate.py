@@ -87,7 +87,7 @@ def test_a_file_is_certified_without_a_rig(rig: Rig, work: Path) -> None:
         "does not say which laboratory",
     ):
         assert text in page
-    assert "As found is not known" in _page(rig, "linear", work)
+    assert "No values as found" in _page(rig, "linear", work)
 
 
 def _page(rig: Rig, model: str, work: Path) -> str:

@@ -28,7 +28,7 @@ from scipy.special import ndtr
 RULE = (
     "Decision rule: guarded acceptance (JCGM 106, 8.3.2) with a guard band of the expanded uncertainty U inside each "
     "limit. Pass: inside both limits by U or more. Conditional pass: inside, by less than U. Conditional fail: "
-    "outside, by less than U. Fail: outside by U or more. Of what passes, at most 2.5 % is beyond its limit."
+    "outside, by less than U. Fail: outside by U or more. Of the results that pass, at most 2.5 % are beyond a limit."
 )
 Limit = float | tuple[float, float]
 
@@ -60,7 +60,7 @@ UNSTATED = "not stated"
 
 @dataclass(frozen=True)
 class Laboratory:
-    """Who calibrates. `country` is its ISO 3166 code, ZZ where nobody said."""
+    """The calibrating laboratory. `country` is its ISO 3166 code, ZZ if not stated."""
 
     name: str = UNSTATED
     person: str = UNSTATED
@@ -125,8 +125,8 @@ class Simulated:
 
 @dataclass(frozen=True)
 class Outcome:
-    """One result. `found` is the value (and standard uncertainty) of the calibration before; `weights` says how much
-    each row of the data weighs in it, greatest first, by the row's number and as shares that add up to 1.
+    """One result. `found` is the value (and standard uncertainty) of the previous calibration. `weights` has the number
+    of each row of the data and its share in the result, greatest first; the shares add up to 1.
     """
 
     name: str
@@ -175,7 +175,7 @@ class Sample:
 
 @dataclass(frozen=True)
 class Figures:
-    """What a fit gives: results, errors, budget sources that nobody gave, trials of the simulation, remarks.
+    """What a fit gives: results, errors, budget sources not given, trials of the simulation, remarks.
 
     `correlations` has a row and a column for each of the results, in their order.
     """
@@ -220,13 +220,13 @@ class Certificate:
 
     @property
     def headline(self) -> str:
-        """What it is, and of what; a simulation is not passed off as a measurement."""
+        """Kind of document and sensor; a simulated calibration is named as such."""
         kind = "Simulated calibration, no certificate" if self.simulated else "Calibration certificate"
         return f"{kind}: {self.sensor}, {self.serial}"
 
 
 def document(c: Certificate) -> dict[str, Any]:
-    """Plain mappings; what has no limit is null."""
+    """Plain mappings; an infinite value is null."""
     whole = asdict(c)
     figures = whole.pop("figures")
     outcomes = [_outcome(o) for o in c.figures.outcomes]

@@ -76,9 +76,9 @@ def _administration(c: Certificate) -> ET.Element:
     customer = _in(data, "customer")
     _text(customer, "name", c.customer)
     _in(_in(customer, "location"), "countryCode", c.laboratory.country if c.customer == c.laboratory.name else "ZZ")
-    if said := (*c.figures.remarks, *c.remarks):
+    if remarks := (*c.figures.remarks, *c.remarks):
         statements = _in(data, "statements")
-        for text in said:
+        for text in remarks:
             _rich(_in(statements, "statement"), "declaration", [text])
     return data
 
@@ -183,11 +183,11 @@ def _about(o: Outcome, c: Certificate) -> ET.Element:
     ]
     _rich(budget, "declaration", [*lines, f"effective degrees of freedom {o.freedom:.4g}"])
     if o.decision is not None:
-        said = _in(data, "metaData")
-        _text(said, "name", "statement of conformity")
+        statement = _in(data, "metaData")
+        _text(statement, "name", "statement of conformity")
         limits = f"limits {factor * o.decision.low:.6g} to {factor * o.decision.high:.6g} {unit}"
-        _rich(said, "declaration", [limits, f"probability of conformity {o.decision.probability:.4f}"])
-        _in(said, "conformity", o.decision.statement)
+        _rich(statement, "declaration", [limits, f"probability of conformity {o.decision.probability:.4f}"])
+        _in(statement, "conformity", o.decision.statement)
     return data
 
 

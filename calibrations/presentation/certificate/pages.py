@@ -19,12 +19,12 @@ STATES = {"": "found", "pass": "adequate", "conditional pass": "ambiguous"}
 
 def html(c: Certificate) -> str:
     """The page as text; the same certificate gives the same page."""
-    told = verdict(c)
+    conformity = verdict(c)
     return page(
         "certificate.html",
         headline=c.headline,
-        verdict="simulated" if c.simulated else told or "calibrated",
-        state="ambiguous" if c.simulated else STATES.get(told, "unexplained"),
+        verdict="simulated" if c.simulated else conformity or "calibrated",
+        state="ambiguous" if c.simulated else STATES.get(conformity, "unexplained"),
         what=f"No. {c.number}, issued {c.issued}",
         summary=f"{c.sensor}, serial number {c.serial}, calibrated on {c.ended[:10]} by {c.laboratory.name}.",
         figures=[],
@@ -39,9 +39,9 @@ SIZE, SMALL, TINY = 9.0, 7.5, 6.5
 QUIET = (97, 110, 124)
 INK = (31, 41, 51)
 LINE = (217, 222, 228)
-TITLE_AND_ROWS = 16  # mm: a title does not stand alone at the foot of a page
-GAP = 3  # mm between a figure that stands to the right and the text of the next column
-LONGEST, ROOM = 34, 4  # letters of a cell, and what stands about it
+TITLE_AND_ROWS = 16  # mm: a title is not alone at the foot of a page
+GAP = 3  # mm between a right-aligned figure and the next column
+LONGEST, ROOM = 34, 4  # letters of a cell, and its margin
 
 
 class _Page(FPDF):
@@ -81,9 +81,9 @@ def _head(page: FPDF, c: Certificate) -> None:
     _write(page, c.laboratory.name, SMALL, QUIET)
     _write(page, c.headline, 16, INK, "B")
     _write(page, f"No. {c.number}, issued {c.issued}", SIZE, INK)
-    told = verdict(c)
-    conformity = f" Conformity with its limits: {told}." if told else ""
-    _write(page, f"{c.sensor}, serial number {c.serial}, calibrated on {c.ended[:10]}.{conformity}", SIZE + 1, INK)
+    conformity = verdict(c)
+    statement = f" Conformity with its limits: {conformity}." if conformity else ""
+    _write(page, f"{c.sensor}, serial number {c.serial}, calibrated on {c.ended[:10]}.{statement}", SIZE + 1, INK)
 
 
 def _section(page: FPDF, section: Section) -> None:

@@ -71,7 +71,7 @@ def tolerance(std: float) -> float:
 
 
 def verdict(value: float, expanded: float, std: float, low: float, high: float) -> str:
-    """What the simulated interval (low, high) says of value +- expanded: one of the three."""
+    """The verdict of the simulated interval (low, high) on value +- expanded."""
     beyond = expanded - (value - low), expanded - (high - value)
     if min(beyond) < -tolerance(std):
         return WIDENED
@@ -106,7 +106,7 @@ def _wandering(phi: Array, trials: int, rng: np.random.Generator) -> Array:
     return x
 
 
-MISFIT = 1.05  # Birge ratio from which on it is told
+MISFIT = 1.05  # Birge ratio from which on it is reported
 CERTAIN_K = 2.0  # coverage factor, where the degrees of freedom ask for no more
 
 
@@ -242,15 +242,15 @@ def _size(of: Fit, c: int, unit_of: Fit) -> tuple[float, float]:
 
 def _remarks(found: Fit) -> Iterator[str]:
     if (why := doubt(found.table)) is not None:
-        yield f"To be checked: {why}."
+        yield f"Check: {why}."
     if found.birge > MISFIT:
         yield (
-            f"The model leaves more than noise in the data (Birge ratio {found.birge:.2f}); the uncertainties are "
-            "widened by it, and the budget shows it as misfit."
+            f"The residual is larger than the noise (Birge ratio {found.birge:.2f}). The uncertainties are multiplied "
+            "by this ratio, and the budget lists it as misfit."
         )
     for each, e in _estimates(found.model):
         if not e.identified:
             what = f"{each.name} {f'{e.name} {e.axis}'.strip()}"
-            yield f"Not determined by these data, and not certified: {what} ({e.why})."
+            yield f"Not determined by these data and not certified: {what} ({e.why})."
     if not found.noise.known:
-        yield "The noise of single means is not known; what they scatter by stands for it."
+        yield "The noise of single means is not known; their scatter is used instead."

@@ -1,4 +1,4 @@
-"""A certificate as headings, facts and tables: one text, which HTML and PDF set each in its way."""
+"""A certificate as headings, facts and tables: one text for HTML and PDF."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from calibrations.presentation.certificate.content import RULE, Certificate, Dec
 from calibrations.presentation.certificate.results import CONSERVATIVE, WIDENED
 from calibrations.text import expanded_text, minus, rounded, unit, value_text
 
-MANY = 1e4  # degrees of freedom, told as no limit
+MANY = 1e4  # degrees of freedom from which on ∞ is written
 END_SCATTER = 2.67  # of a normal's 97.5 % quantile, in its standard deviation, times the root of the trials
 ROUNDING = 1e-6  # of a number of degrees of freedom
 NEGLIGIBLE = 1e-3  # of the combined uncertainty
 WIDE = 10  # columns of a correlation matrix side by side
-HEAVIEST = 3  # poses that weigh most, named with a result
+HEAVIEST = 3  # poses with the largest weight, given with a result
 METHOD = (
     "Terms and symbols as in IEEE Std 1293 (linear single-axis accelerometers) and IEEE Std 2700 (performance "
     "parameters of sensors). The parameters are estimated jointly, by least squares under the noise that the data "
@@ -23,30 +23,30 @@ METHOD = (
 )
 EXPANDED = (
     "As left. U is the expanded uncertainty for a coverage probability of about 95 %: k = 2, or Student's factor "
-    "for the effective degrees of freedom, cut to a whole number, where that is more; where it says widened, k is what "
-    "takes U as far as the check by simulation goes. g is the local gravity."
+    "for the effective degrees of freedom, cut to a whole number, if that is larger. Widened: k is increased so that U "
+    "reaches the interval of the check by simulation. g is the local gravity."
 )
 BUDGET = (
-    "After the GUM (JCGM 100): type A from the noise of the data themselves, type B from what is stated of inputs "
-    "that no data can show; effective degrees of freedom by Welch and Satterthwaite."
+    "After the GUM (JCGM 100). Type A: the noise of the data. Type B: the stated uncertainties of inputs that the data "
+    "cannot show. Effective degrees of freedom by Welch and Satterthwaite."
 )
 CORRELATED = (
-    "Results that follow from the same data are correlated: whoever computes something from several of them takes the "
-    "correlation coefficients into account (GUM 5.2.2)."
+    "Results from the same data are correlated. A quantity computed from several of them requires their correlation "
+    "coefficients (GUM 5.2.2)."
 )
 TRIALS = (
-    "The propagation of distributions (GUM Supplement 1, JCGM 101) with {trials} trials is set beside the budget. "
-    "Confirmed: both ends of the intervals agree within half a unit of u's first digit. Conservative: the budget "
-    "reaches further, as u is made larger where slow noise is not well known, and k where degrees of freedom are few; "
-    "the simulation has neither. Widened: the simulation reaches further, and U is taken as far. By chance, the ends "
-    "of simulated intervals scatter by {scatter:.2f} u."
+    "The budget is compared with the propagation of distributions (GUM Supplement 1, JCGM 101) with {trials} trials. "
+    "Confirmed: both ends of the intervals agree within half a unit of u's first digit. Conservative: the interval of "
+    "the budget is wider, because u includes the uncertainty of slow noise, and k the number of degrees of freedom; "
+    "the simulation includes neither. Widened: the simulated interval is wider, and U is increased to it. The ends of "
+    "simulated intervals have a random error of {scatter:.2f} u."
 )
 ROWS = (
-    "Every figure follows from the rows below, each the mean of a block of samples in the record. The digest is the "
-    "beginning of the SHA-256 of the block's samples; the machine-readable certificate has it whole, with the "
+    "All results follow from the rows below. Each row is the mean of a block of samples in the record. The digest is "
+    "the beginning of the SHA-256 of these samples; the machine-readable certificate has the whole digest and the "
     "weight of every row in every result."
 )
-NO_LIMITS = "No limits were given: nothing is said of conformity."
+NO_LIMITS = "No limits were given, so there is no statement of conformity."
 STATEMENTS = {
     "pass": "pass",
     "conditionalPass": "conditional pass",
@@ -57,7 +57,7 @@ STATEMENTS = {
 
 @dataclass(frozen=True)
 class Table:
-    """`numbers` are the columns that stand to the right. `long` may be folded where there is room to unfold it."""
+    """`numbers` are the columns aligned to the right. `long` tables are folded on pages."""
 
     title: str
     head: tuple[str, ...]
@@ -77,7 +77,7 @@ class Section:
 
 
 def sections(c: Certificate) -> list[Section]:
-    """Everything that the certificate says, in order."""
+    """All sections of the certificate, in order."""
     return [
         _identification(c),
         _procedure(c),
@@ -113,9 +113,7 @@ def _identification(c: Certificate) -> Section:
         ("manufacturer", c.manufacturer),
         ("rig", c.rig),
     )
-    tables = (
-        (Table("Instruments, and the certificates that their values are traceable by", head, rows),) if rows else ()
-    )
+    tables = (Table("Instruments and their certificates", head, rows),) if rows else ()
     return Section("Identification", (), facts, tables)
 
 
@@ -178,13 +176,13 @@ def _found(c: Certificate) -> Section:
     tables = [Table("Error of indication over the poses of this calibration", head, errors, (1, 2, 3, 4))]
     if changes:
         changed = ("quantity", "as found", "as left", "change", "unit", "change / U")
-        tables.insert(0, Table("Change since the calibration before", changed, changes, (1, 2, 3, 5)))
-    words = f"As found: by {c.before}." if c.before else "As found is not known: no earlier calibration was given."
+        tables.insert(0, Table("Change since the previous calibration", changed, changes, (1, 2, 3, 5)))
+    words = f"As found: by {c.before}." if c.before else "No values as found: no earlier calibration was given."
     return Section("As found and as left", (words,), (), tuple(tables))
 
 
 def _uncertainty(c: Certificate) -> Section:
-    head = ("source", "type", "its standard uncertainty", "sensitivity", "contribution", "ν")
+    head = ("source", "type", "standard uncertainty of the source", "sensitivity", "contribution", "ν")
     budgets = tuple(
         Table(
             f"{_name(o)}, {unit(o.unit) or '1'}", head, tuple(_line(s, o) for s in o.sources), (2, 3, 4, 5), long=True
@@ -200,11 +198,7 @@ def _uncertainty(c: Certificate) -> Section:
     check = ("quantity", "u by the budget", "u simulated", "U", "95 % simulated", "unit", "budget")
     words = (
         BUDGET,
-        *(
-            [f"Not given, and so not in these numbers: {', '.join(c.figures.not_given)}."]
-            if c.figures.not_given
-            else []
-        ),
+        *([f"Not given and not included: {', '.join(c.figures.not_given)}."] if c.figures.not_given else []),
         TRIALS.format(trials=c.figures.trials, scatter=END_SCATTER / math.sqrt(c.figures.trials)),
         *([CORRELATED] if len(c.figures.outcomes) > 1 else []),
     )
@@ -248,7 +242,7 @@ def _traceability(c: Certificate) -> Section:
         (ROWS,),
         facts,
         (
-            Table("Rows that weigh most in each result", ("quantity", "number of the row (its share)"), heavy),
+            Table("Rows with the largest weight in each result", ("quantity", "number of the row (its share)"), heavy),
             Table("Rows", ("row", "t, s", "pose", "mean outputs", "n", "SHA-256"), rows, (0, 1, 4), long=True),
         ),
     )

@@ -133,7 +133,7 @@ def effect_chart(step: Step[Fit]) -> Chart:
 
 
 def album(found: Discovery[Fit], compared: Comparison[Fit], motion: MotionResult | None = None) -> list[Picture]:
-    """Error by model, the given model beside its data, where it fails, and each effect's curve.
+    """Error by model, the given model and its data, the residual pattern, and each effect's curve.
 
     The result of a run of the procedure motion comes first, if it is given.
     """

@@ -1,4 +1,4 @@
-"""Charts of a fit: measurement beside model, the residual against a column, and where the model fails.
+"""Charts of a fit: measurement and model, the residual against a column, and the residual pattern.
 
 A panel shows one channel (`Shown`). A filled marker is a clockwise approach, an open one an anticlockwise approach;
 colours are the values of a second column.
@@ -114,9 +114,9 @@ def measurement(shown: Shown, x: Column, colour: Column) -> Panel:
     measured, model, label = _outputs(shown)
     hover = [f"{value:.6g}<br>{text}" for value, text in zip(measured[rows], shown.hover, strict=True)]
     dots = _dots(shown, x.values[c, rows], measured[rows], colour, hover)
-    told = "the model: %{y:.6g}"
+    curve_hover = "model: %{y:.6g}"
     if x.name == "beta":
-        lines = (Line(*_stretches(shown, x.values[c], model), width=1.2, hover=told),)
+        lines = (Line(*_stretches(shown, x.values[c], model), width=1.2, hover=curve_hover),)
         series = (*lines, dots)
     elif fit.table.type.magnitude:
         std = fit.noise.fast[0, rows]
@@ -258,7 +258,7 @@ def _map(shown: Shown) -> tuple[Array, Array, tuple[Axis, Axis]]:
 MOST_PARTS = 24  # of a column, for each direction
 ROWS_IN_A_PART = 6
 TELLING = 0.8  # part of the change's variance that a function of the column must give
-EQUAL = 0.02  # columns closer than this tell the same: the plainer cause is drawn
+EQUAL = 0.02  # columns closer than this are equal: the simpler cause is drawn
 
 
 def change_of(step: Step[Fit]) -> Array:

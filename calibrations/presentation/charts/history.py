@@ -134,8 +134,8 @@ def control_panels(
         factor, spelt = prefixed(unit(of), float(np.abs([values, high]).max()))
         numbers = np.arange(first, first + len(values), dtype=float)
         mine = None if keys is None else keys[first - 1 :]
-        told = [f"{text}: {rounded(v)} {spelt}" for text, v in zip(hover[first - 1 :], factor * values, strict=False)]
-        dots = _control_points(numbers, factor * values, beyond, judged, told, mine)
+        texts = [f"{text}: {rounded(v)} {spelt}" for text, v in zip(hover[first - 1 :], factor * values, strict=False)]
+        dots = _control_points(numbers, factor * values, beyond, judged, texts, mine)
         band = Band(numbers, factor * low, factor * high, steps=True)
         series = (band, Rule(0.0, width=0.7), Line(numbers, factor * values, colour=MEASURED, width=1), dots)
         made[title] = Panel(series, x, Axis(labelled(label, spelt)), title, remark)

@@ -67,9 +67,9 @@ def measurement(shown: Shown) -> Panel:
     """Output less its mean over a few periods; dots are measured, the line is the model."""
     axis = _axis(shown)
     found = waveform(shown.fit, axis)
-    told = [f"{y:.5g} at {x:.3f} s" for x, y in zip(found.at, shown.factor * found.measured, strict=True)]
-    line = Line(found.at, shown.factor * found.model, "model", hover="the model: %{y:.5g}")
-    dots = Points(found.at, shown.factor * found.measured, "measured", size=5, hover=told)
+    texts = [f"{y:.5g} at {x:.3f} s" for x, y in zip(found.at, shown.factor * found.measured, strict=True)]
+    line = Line(found.at, shown.factor * found.model, "model", hover="model: %{y:.5g}")
+    dots = Points(found.at, shown.factor * found.measured, "measured", size=5, hover=texts)
     return Panel((line, dots), Axis("time (s)"), Axis(f"{axis} − mean ({shown.unit})"), f"axis {axis}")
 
 
@@ -77,8 +77,8 @@ def failure(shown: Shown) -> Panel:
     """Mean residual over one period of the strongest line; the band is the noise of a mean."""
     axis = _axis(shown)
     found = over_a_period(shown.fit, axis)
-    told = "%{y:.3g} at %{x:.0f} deg"
-    line = Line(found.phase_deg, shown.factor * found.residual, colour=CANDIDATE, hover=told, markers=True)
+    hover = "%{y:.3g} at %{x:.0f} deg"
+    line = Line(found.phase_deg, shown.factor * found.residual, colour=CANDIDATE, hover=hover, markers=True)
     x = Axis(f"phase of the motion {found.line} (deg)", ticks="quarters")
     series = (*floor_band(shown.factor * found.floor), line)
     return Panel(series, x, Axis(f"mean residual of {axis} ({shown.unit})"), f"axis {axis}")

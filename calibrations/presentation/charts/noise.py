@@ -1,4 +1,4 @@
-"""Charts of noise: how it averages (Allan deviation), its spectrum, each beside a model, and the record over time."""
+"""Charts of noise: how it averages (Allan deviation), its spectrum, each with a model, and the record over time."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ from calibrations.text import rounded
 POINTS = 160
 HEIGHT = 3.8
 ROOM = 4.0  # above and below a spectrum
-MOST = 2000  # points of a record over time: more cannot be told apart across a page
+MOST = 2000  # points of a record over time: more are not visible on a page
 LESS = "after removing non-noise signals"
 SUM = "sum of the processes"
 TIME = "averaging time (s)"
@@ -101,7 +101,7 @@ def units(still: Still) -> dict[bool, str]:
     return {False: still.unit} | ({True: names.pop()} if known else {})
 
 
-# One channel beside noise models
+# One channel with noise models
 
 
 def allan(curve: Curve | DeviationComparison, into: Scaled, models: Sequence[Drawn], raw: Curve | None = None) -> Panel:

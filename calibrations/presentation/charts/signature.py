@@ -35,7 +35,7 @@ SAME = 0.02  # of its range
 DIGITS = 4  # decimals of mV: what lies beyond depends on the machine
 INCLINATIONS = ("#440154", "#3b528b", "#21918c", "#5ec962", "#c9d614")  # colours of 30 to 150 deg
 SMALL = 7.2  # inches: the width of a page of the catalogue
-CLOSE_S = (3.0, 4.0)  # of a motion, where its waves are to be seen
+CLOSE_S = (3.0, 4.0)  # of a motion, so that its waves are visible
 LABELS = {"t_s": "time (min)", "temperature_c": "temperature (°C)", "supply_v": "supply voltage (V)"}
 
 
@@ -84,7 +84,7 @@ def signature(effect: Effect) -> list[Part]:
 def _left(table: Table, change: Array, v: Array, name: str) -> Array:
     """The change of an output, V, less the straight line in that output that follows it best; mV.
 
-    Bias and scale factor are beside a model that has all but them.
+    For bias and scale factor, the model has all effects but these.
     """
     once = table.optional("beta_deg", 0.0) < 360.0  # the end of a turn is its beginning
     line = np.column_stack([np.ones(len(v)), v])
@@ -94,7 +94,7 @@ def _left(table: Table, change: Array, v: Array, name: str) -> Array:
 
 
 def _panel(effect: Effect, table: Table, a: Array, k: int, left: Array) -> Part:
-    """Over what the effect needs beside the angles, a force that what is left is a function of, or beta."""
+    """The column of the picture: one that the effect needs, a force that determines the residual, or beta."""
     axis, other = "xyz"[k], "yxx"[k]
     if table.type.moving:
         close = (table.time_s >= CLOSE_S[0]) & (table.time_s <= CLOSE_S[1])
@@ -194,7 +194,7 @@ class Curve:
 
 @dataclass(frozen=True)
 class Part:
-    """What is left of one axis, in `unit`, shape (n,), over a column of that shape, and the rows that lines join."""
+    """The residual of one axis, in `unit`, shape (n,), over a column of that shape, and the rows that lines join."""
 
     axis: str
     left: Array
@@ -282,7 +282,7 @@ def _turned_at_rates() -> Table:
 RATE_HZ, SAMPLES = 10.0, 1 << 15
 SPARE = 3  # of so many bands one is drawn
 WHITE = {"coefficient": 1.0}
-NOISE_SHOWN: dict[str, NoiseValues] = {  # beside white noise of 1 V/sqrt(Hz)
+NOISE_SHOWN: dict[str, NoiseValues] = {  # with white noise of 1 V/sqrt(Hz)
     "white-noise": {"coefficient": 2.0},
     "flicker-noise": {"coefficient": 0.5},
     "rate-random-walk": {"coefficient": 0.05},
@@ -293,7 +293,7 @@ NOISE_SHOWN: dict[str, NoiseValues] = {  # beside white noise of 1 V/sqrt(Hz)
 
 
 def shown_noise(effect: Effect) -> NoiseValues:
-    """Parameters that make the effect stand out of white noise of 1 unit/sqrt(Hz)."""
+    """Parameters that make the effect visible above white noise of 1 unit/sqrt(Hz)."""
     return NOISE_SHOWN.get(effect.name) or {
         p.name: 0.5 if p is effect.parameters[0] else 20.0 for p in effect.parameters
     }
@@ -301,15 +301,15 @@ def shown_noise(effect: Effect) -> NoiseValues:
 
 def noise_signature_chart(effect: Effect) -> Chart:
     """Left the Allan deviation, right the spectrum; broken without the effect."""
-    without, beside = _beside(None), _beside(effect)
+    without, added = _with_white(None), _with_white(effect)
     tau_s = np.geomspace(1, SAMPLES / 8, 70).round() / RATE_HZ
-    looks: tuple[tuple[ChannelFit, Dash, str], ...] = ((without, "dash", QUIET), (beside, "solid", BLUE))
+    looks: tuple[tuple[ChannelFit, Dash, str], ...] = ((without, "dash", QUIET), (added, "solid", BLUE))
     left = tuple(Line(tau_s, deviation(fit, tau_s), colour=colour, width=1.6, dash=dash) for fit, dash, colour in looks)
     right = tuple(
         Line(fit.frequency_hz[::SPARE], root(fit.expected)[::SPARE], colour=colour, width=1.6, dash=dash)
         for fit, dash, colour in looks
     )
-    lines = tuple(Rule(line.frequency_hz, "x", VERMILION, 1.6) for line in beside.lines)
+    lines = tuple(Rule(line.frequency_hz, "x", VERMILION, 1.6) for line in added.lines)
     panels = (_named(left, "averaging time (s)", "Allan deviation (V)"),
               _named((*right, *lines), "frequency (Hz)", "density (V/√Hz)"))  # fmt: skip
     return Chart((panels,), 1.95, SMALL)
@@ -320,8 +320,8 @@ def _named(series: tuple[Line | Rule, ...], x: str, y: str) -> Panel:
     return Panel(series, Axis(x, log=True), Axis(y, log=True, low=values.min() / 1.5, high=1.5 * values.max()))
 
 
-def _beside(effect: Effect | None) -> ChannelFit:
-    """White noise, with an effect or without, as a fit to a record that nobody measured."""
+def _with_white(effect: Effect | None) -> ChannelFit:
+    """White noise, with an effect or without, as a fit to a record without samples."""
     nothing = Channel("x", "V", RATE_HZ, np.inf, SAMPLES, np.zeros(SAMPLES), 1, Welch(RATE_HZ).segments())
     white = catalogue()["white-noise"]
     effects, values = [white], {white.name: dict(WHITE)}

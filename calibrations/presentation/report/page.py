@@ -1,4 +1,4 @@
-"""What every report is made on: one page that needs no network, with a verdict, a headline, figures and provenance."""
+"""The page of every report: no network, with verdict, headline, figures and provenance."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from calibrations.presentation.chart import Picture
 from calibrations.presentation.static import inline
 
 
-def page(template: str, **said: Any) -> str:
-    """The page as HTML text: what is said, in the words of `template`, which extends `page.html`."""
-    return _templates().get_template(template).render(said)
+def page(template: str, **values: Any) -> str:
+    """The page as HTML text: `values` in `template`, which extends `page.html`."""
+    return _templates().get_template(template).render(values)
 
 
 def figure(picture: Picture) -> dict[str, Any]:

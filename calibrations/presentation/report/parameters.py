@@ -14,7 +14,7 @@ from calibrations.model import Estimate
 from calibrations.text import estimate_text, rounded, unit
 
 NEGLIGIBLE = 1e-3  # share of the combined uncertainty, from which on a source shows in its digits
-MANY = 1e4  # degrees of freedom, told as no limit
+MANY = 1e4  # degrees of freedom from which on ∞ is written
 
 
 def budget(found: Fit) -> dict[str, Any] | None:

@@ -108,7 +108,7 @@ def report(
     pictures: Iterable[Picture] | None = None,
     motion: MotionResult | None = None,
 ) -> str:
-    """The page as HTML text. `beside` sets the model that was given beside the data; `pictures` are those of `album`.
+    """The page as HTML text. `beside` compares the given model with the data; `pictures` are those of `album`.
 
     `motion` is the comparison with the displacement sensor, for a run of that procedure.
     `date` and `program` (name and version) go into the provenance: the same arguments give the same page.
