@@ -13,7 +13,7 @@ from rig.instruments.instruments import Rig
 from rig.instruments.person import answer
 from rig.record import Kept, Record, Run
 from rig.record.measured import Measured, of_sensor
-from rig.runs.observer import Watch
+from rig.runs.observer import Observer
 
 
 def leave_as(rig: Rig, record: Record, run: str) -> None:
@@ -34,8 +34,8 @@ def leave_as(rig: Rig, record: Record, run: str) -> None:
 class RunHost:
     """The host of a session that records the measurements."""
 
-    def __init__(self, record: Record, rig: Rig, run: Run, watch: Watch, state: Mapping[str, Any] | None) -> None:
-        self._record, self._rig, self._run, self._watch = record, rig, run.run, watch
+    def __init__(self, record: Record, rig: Rig, run: Run, observer: Observer, state: Mapping[str, Any] | None) -> None:
+        self._record, self._rig, self._run, self._observer = record, rig, run.run, observer
         self._poses = record.poses(run.run)
         self._next = record.next_number(run.run)
         self._measured = Measured(record, run, rig.bench.first_sensor)
@@ -57,7 +57,7 @@ class RunHost:
         return self._record.readings(self._run)
 
     def expect(self, missing: int) -> None:
-        self._watch.expect(missing + len(self._poses), len(self._poses))
+        self._observer.expect(missing + len(self._poses), len(self._poses))
 
     def keep(self, pose: Pose, samples: Samples, temperature_c: float | None) -> None:
         middle_s = samples.start_s + len(samples.volts) / samples.rate_hz / 2
@@ -77,14 +77,14 @@ class RunHost:
         self._poses.append(pose)
         if self._dwells is not None:
             self._dwells.append(of_sensor(kept, self._measured.sensor).dwell)
-        self._watch.kept(kept)
+        self._observer.kept(kept)
 
     def keep_readings(self, *readings: Reading) -> None:
         for reading in readings:
             self._log("read", f"{reading.name} = {reading.value:g} {reading.unit}".rstrip())
         self._record.keep_readings(self._run, readings, self._state())
         for reading in readings:
-            self._watch.read(reading)
+            self._observer.read(reading)
 
     def keep_state(self) -> None:
         """Record the state of the bench before the first measurement."""
@@ -95,7 +95,7 @@ class RunHost:
         key = f"answer {question.name}"
         if key in self._answers and not question.repeated:
             return self._answers[key]
-        given = question.checked(self._watch.ask(question, answer(question, self._rig)))
+        given = question.checked(self._observer.ask(question, answer(question, self._rig)))
         if given != "no":  # a resumed run asks again after a no
             self._answers[key] = given
             self._record.note(self._run, key, given)
@@ -104,7 +104,7 @@ class RunHost:
 
     def doing(self, text: str) -> None:
         self._log("doing", text)
-        self._watch.doing(text)
+        self._observer.doing(text)
 
     def _log(self, what: str, text: str) -> None:
         self._record.log(self._run, self._rig.clock.now(), "run", what, text)

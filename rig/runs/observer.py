@@ -22,8 +22,8 @@ from procedures.session import Limits, Reading
 from rig.bench import Bench
 from rig.planning.plan import Plan
 from rig.record import Kept, Run
-from rig.runs.progress import SoFar, Way
-from rig.runs.soak_forecast import outlook, present, soak_watch
+from rig.runs.progress import Progress, RunningEstimates
+from rig.runs.soak_forecast import outlook, present, soak_forecaster
 
 UNUSUAL = 2.0  # ratio to the usual scatter, up or down, above which it is shown
 REMEMBERED = 200  # dwells of a kind for the usual scatter
@@ -31,7 +31,7 @@ NEAR = 0.1  # of the span: distance from a limit below which a value is marked
 
 
 @dataclass(frozen=True)
-class Seen:
+class RunView:
     """The view of a run at one moment.
 
     `usual_v`: usual scatter of dwells of this kind, by channel. `tilt`: readings of the level by name, deg. `foreseen`:
@@ -44,7 +44,7 @@ class Seen:
     range_v: float | None
     simulated: bool
     now: str = "connecting"
-    way: Way = field(default_factory=Way)
+    progress: Progress = field(default_factory=Progress)
     kept: Kept | None = None
     usual_v: Mapping[str, float] = field(default_factory=dict)
     tilt: Mapping[str, float] = field(default_factory=dict)
@@ -54,13 +54,13 @@ class Seen:
     @property
     def count(self) -> str:
         """The number of recorded poses and of all poses."""
-        return f"{self.way.done}/{self.way.total} poses" if self.way.total else ""
+        return f"{self.progress.done}/{self.progress.total} poses" if self.progress.total else ""
 
     def left(self, now_s: float) -> str:
         """Remaining time at `now_s` of the wall clock: from the pace so far, before that from the plan."""
-        if (left_s := self.way.left_s(now_s)) is not None:
+        if (left_s := self.progress.left_s(now_s)) is not None:
             return f"{duration(left_s)} left"
-        planned_s = self.way.planned_left_s()
+        planned_s = self.progress.planned_left_s()
         if planned_s is None:
             return ""
         return f"{duration(planned_s)} {'of simulated time ' if self.simulated else ''}left by the plan"
@@ -82,20 +82,20 @@ class Value:
         return nearness(self.reading, *self.limits) if self.limits else ""
 
 
-class Sight:
+class RunViewer:
     """Keeps the view of a run up to date with the events of the run."""
 
     def __init__(self, title: str, bench: Bench) -> None:
         adc = bench.instruments.get("adc")
         range_v = getattr(adc.typed_settings(), "range_v", None) if adc else None
-        self.seen = Seen(title, bench.limits, range_v, bench.simulated)
-        self._soak, self._so_far = soak_watch(title), SoFar()
+        self.view = RunView(title, bench.limits, range_v, bench.simulated)
+        self._soak, self._so_far = soak_forecaster(title), RunningEstimates()
         self._scatter: dict[tuple[str, str], deque[float]] = defaultdict(lambda: deque(maxlen=REMEMBERED))
 
     def planned(self, plan: Plan) -> None:
         """The plan of the run."""
-        way = replace(self.seen.way, at_s=tuple(held.start_s for held in plan.held), end_s=plan.duration_s)
-        self.seen = replace(self.seen, way=way)
+        progress = replace(self.view.progress, at_s=tuple(held.start_s for held in plan.held), end_s=plan.duration_s)
+        self.view = replace(self.view, progress=progress)
 
     def begun(self, title: str, run: str = "") -> None:
         """The run begins or continues; the title may be its id."""
@@ -103,13 +103,13 @@ class Sight:
             self._soak.begun(run or title)
         else:
             self._so_far.begun(run or title)
-        self.seen = replace(self.seen, title=title, way=self.seen.way.begin(time.monotonic()))
+        self.view = replace(self.view, title=title, progress=self.view.progress.begin(time.monotonic()))
 
     def doing(self, text: str) -> None:
-        self.seen = replace(self.seen, now=text)
+        self.view = replace(self.view, now=text)
 
     def expect(self, total: int, done: int) -> None:
-        self.seen = replace(self.seen, way=self.seen.way.expect(total, done))
+        self.view = replace(self.view, progress=self.view.progress.expect(total, done))
 
     def kept(self, kept: Kept) -> None:
         """Update the values with a new pose, and the usual scatter with the poses before it."""
@@ -120,12 +120,12 @@ class Sight:
             if before_it:
                 usual[name] = statistics.median(before_it)
             before_it.append(std)
-        foreseen = (self._soak.kept(kept) if self._soak else {}) or self.seen.foreseen
-        way, so_far = self.seen.way.step(time.monotonic()), self._so_far.kept(kept)
-        self.seen = replace(self.seen, kept=kept, usual_v=usual, foreseen=foreseen, so_far=so_far, way=way)
+        foreseen = (self._soak.kept(kept) if self._soak else {}) or self.view.foreseen
+        progress, so_far = self.view.progress.step(time.monotonic()), self._so_far.kept(kept)
+        self.view = replace(self.view, kept=kept, usual_v=usual, foreseen=foreseen, so_far=so_far, progress=progress)
 
     def read(self, reading: Reading) -> None:
-        self.seen = replace(self.seen, tilt={**self.seen.tilt, reading.name: reading.value})
+        self.view = replace(self.view, tilt={**self.view.tilt, reading.name: reading.value})
 
 
 def nearness(value: float, low: float, high: float) -> str:
@@ -136,33 +136,33 @@ def nearness(value: float, low: float, high: float) -> str:
     return "near its limit" if inside < NEAR * (high - low) else ""
 
 
-def values(seen: Seen) -> Iterator[Value]:
+def values(view: RunView) -> Iterator[Value]:
     """The live values: temperature, tilt, and each channel."""
-    kept = seen.kept
+    kept = view.kept
     if kept is not None and kept.temperature_c is not None:
-        yield Value("temperature", f"{kept.temperature_c:.1f} C", "", kept.temperature_c, seen.limits.temperature_c)
-    if (limit := seen.limits.level_deg) is not None:
+        yield Value("temperature", f"{kept.temperature_c:.1f} C", "", kept.temperature_c, view.limits.temperature_c)
+    if (limit := view.limits.level_deg) is not None:
         for axis in "xy":
-            if (tilt_deg := _tilt(seen.tilt, axis)) is not None:
+            if (tilt_deg := _tilt(view.tilt, axis)) is not None:
                 yield Value(f"level {axis}", f"{tilt_deg:.3f} deg", "", tilt_deg, (-limit, limit))
     if kept is not None:
         dwell, volts = kept.dwell, kept.samples.volts
         for name, column in zip(kept.samples.channels, volts.T, strict=True):
             farthest = float(column[np.argmax(np.abs(column))])
-            yield _channel(name, dwell.means[name], dwell.stds[name], farthest, seen)
-    for name, each in seen.foreseen.items():
+            yield _channel(name, dwell.means[name], dwell.stds[name], farthest, view)
+    for name, each in view.foreseen.items():
         yield Value(name, present(name, each), outlook(name, each))
-    for name, shown in seen.so_far.items():
+    for name, shown in view.so_far.items():
         yield Value(name, shown, "from the poses so far")
 
 
-def _channel(name: str, mean: float, std: float, farthest: float, seen: Seen) -> Value:
+def _channel(name: str, mean: float, std: float, farthest: float, view: RunView) -> Value:
     """A channel in V. Its largest sample is compared with the range of the converter."""
     scatter = f"rms {1e3 * std:.3f} mV"
-    if usual_v := seen.usual_v.get(name):
+    if usual_v := view.usual_v.get(name):
         ratio = std / usual_v
         scatter += f", {ratio:.2g} times the usual value" if not 1 / UNUSUAL <= ratio <= UNUSUAL else ", as usual"
-    limits = None if seen.range_v is None else (-seen.range_v, seen.range_v)
+    limits = None if view.range_v is None else (-view.range_v, view.range_v)
     return Value(name, f"{mean:.5f} V", scatter, farthest, limits)
 
 
@@ -172,10 +172,10 @@ def _tilt(read: Mapping[str, float], axis: str) -> float | None:
     return None if front is None or back is None else reversal(front, back)[0]
 
 
-Wish = Literal["resume", "repeat", "end"]
+Decision = Literal["resume", "repeat", "end"]
 
 
-class Watch(Protocol):
+class Observer(Protocol):
     """The observer of a run: a terminal, a page, a test."""
 
     def planned(self, plan: Plan) -> None:
@@ -190,7 +190,7 @@ class Watch(Protocol):
     def ask(self, question: Question, instead: str | None) -> str:
         """The checked answer of a person, or `instead` if nobody is there. Raises NoAnswer without any answer."""
 
-    def interrupted(self, outcome: Outcome) -> Wish:
+    def interrupted(self, outcome: Outcome) -> Decision:
         """The run is interrupted and the rig is at rest: resume the run, repeat its last pose first, or end it."""
 
 

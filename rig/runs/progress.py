@@ -38,7 +38,7 @@ class Law:
 
 
 @dataclass
-class SoFar:
+class RunningEstimates:
     """Estimates of the sensor from the poses of a run so far. There are none before `begun`."""
 
     law: Law | None = None
@@ -122,7 +122,7 @@ LAWS = {
 
 
 @dataclass(frozen=True)
-class Way:
+class Progress:
     """Progress and remaining time of a run: at first from the plan, later from the pace of the run.
 
     `at_s`: time of each pose in the plan, s; empty without a plan. `end_s`: end of the plan. `total`: number of poses.
@@ -138,16 +138,16 @@ class Way:
     began_s: float = 0.0
     kept_s: float = 0.0
 
-    def begin(self, now_s: float) -> Way:
+    def begin(self, now_s: float) -> Progress:
         """This process begins or continues the run."""
         return replace(self, total=0, first=0, done=0, began_s=now_s, kept_s=now_s)
 
-    def expect(self, total: int, done: int) -> Way:
+    def expect(self, total: int, done: int) -> Progress:
         """The number of poses of the procedure and of the record, for the whole run or for its next part."""
         first = done if not self.total else self.first
         return replace(self, total=max(total, len(self.at_s)), first=first, done=done)
 
-    def step(self, now_s: float) -> Way:
+    def step(self, now_s: float) -> Progress:
         """One more pose is recorded."""
         return replace(self, done=self.done + 1, kept_s=now_s)
 

@@ -29,10 +29,10 @@ from rig.planning.plan import plan
 from rig.record import Record, Run
 from rig.results import Result, documents, judged, returned
 from rig.runs.host import RunHost, leave_as
-from rig.runs.observer import Outcome, Watch, Wish
+from rig.runs.observer import Decision, Observer, Outcome
 from rig.runs.signals import Trace, stoppable
 
-__all__ = ["REPEATED", "Outcome", "RunHost", "Watch", "Wish", "resume", "start"]
+__all__ = ["REPEATED", "Decision", "Observer", "Outcome", "RunHost", "resume", "start"]
 
 REPEATED = "repeated by hand"
 
@@ -42,7 +42,7 @@ def start(
     bench: Bench,
     procedure: Procedure,
     settings: Mapping[str, Any],
-    watch: Watch,
+    observer: Observer,
     after: str | None = None,
     trace: bool = False,
 ) -> Outcome:
@@ -55,9 +55,11 @@ def start(
     """
     planned = plan(bench, procedure, settings)  # raises an error for a move outside the limits
     with stoppable():
-        watch.planned(planned)
+        observer.planned(planned)
         trail = Trace(record) if trace else None
-        return _as_wished(record, _begun(record, bench, procedure, settings, watch, after, trail), watch, trace)
+        return _after_decision(
+            record, _begun(record, bench, procedure, settings, observer, after, trail), observer, trace
+        )
 
 
 def _begun(
@@ -65,7 +67,7 @@ def _begun(
     bench: Bench,
     procedure: Procedure,
     settings: Mapping[str, Any],
-    watch: Watch,
+    observer: Observer,
     after: str | None,
     trace: Trace | None,
 ) -> Outcome:
@@ -89,19 +91,21 @@ def _begun(
         if after is not None:
             leave_as(rig, record, after)
         with _held(record, run):
-            return _carry_out(record, rig, record.run(run), procedure, watch)
+            return _carry_out(record, rig, record.run(run), procedure, observer)
 
 
-def resume(record: Record, run_id: str, watch: Watch, bench: Bench | None = None, trace: bool = False) -> Outcome:
+def resume(record: Record, run_id: str, observer: Observer, bench: Bench | None = None, trace: bool = False) -> Outcome:
     """Continue a run at its first missing pose, on the same bench.
 
     Raises Busy, RunMismatch if `bench` or an instrument is another one, and the errors of connection.
     """
     with stoppable():
-        return _as_wished(record, _resumed(record, run_id, watch, bench, trace), watch, trace)
+        return _after_decision(record, _resumed(record, run_id, observer, bench, trace), observer, trace)
 
 
-def _resumed(record: Record, run_id: str, watch: Watch, bench: Bench | None = None, trace: bool = False) -> Outcome:
+def _resumed(
+    record: Record, run_id: str, observer: Observer, bench: Bench | None = None, trace: bool = False
+) -> Outcome:
     run = record.run(run_id)
     if run.state == "complete":
         return Outcome(run)
@@ -114,29 +118,29 @@ def _resumed(record: Record, run_id: str, watch: Watch, bench: Bench | None = No
         if trail is not None:
             trail.begin(run_id)
         _same_instruments(run, rig)
-        return _carry_out(record, rig, run, procedure, watch)
+        return _carry_out(record, rig, run, procedure, observer)
 
 
-def _as_wished(record: Record, outcome: Outcome, watch: Watch, trace: bool) -> Outcome:
+def _after_decision(record: Record, outcome: Outcome, observer: Observer, trace: bool) -> Outcome:
     """Continue an interrupted run as long as the observer wants it."""
-    while outcome.error is not None and (wish := _wish(outcome, watch)) != "end":
+    while outcome.error is not None and (wish := _decision(outcome, observer)) != "end":
         run = outcome.run.run
         if wish == "repeat" and outcome.run.rows:
             record.exclude(run, record.next_number(run) - 1, REPEATED)
         try:
-            outcome = _resumed(record, run, watch, trace=trace)
+            outcome = _resumed(record, run, observer, trace=trace)
         except (DriverError, RigError) as error:  # such as an instrument that still does not answer
             outcome = Outcome(record.run(run), error)
     return outcome
 
 
-def _wish(outcome: Outcome, watch: Watch) -> Wish:
+def _decision(outcome: Outcome, observer: Observer) -> Decision:
     """The decision of a person. SIGTERM and SIGHUP end the run, and every signal during the question does."""
     if isinstance(outcome.error, Stopped) and outcome.error.by != "SIGINT":
         return "end"
     try:
         with stoppable():
-            return watch.interrupted(outcome)
+            return observer.interrupted(outcome)
     except KeyboardInterrupt:
         return "end"
 
@@ -145,7 +149,7 @@ def _held(record: Record, run: str) -> AbstractContextManager[None]:
     return lease(record.folder, run, f"run {run}")
 
 
-def _carry_out(record: Record, rig: Rig, run: Run, procedure: Procedure, watch: Watch) -> Outcome:
+def _carry_out(record: Record, rig: Rig, run: Run, procedure: Procedure, observer: Observer) -> Outcome:
     """The run itself. At its end the stages are at rest, and the record has its state, whatever happens."""
 
     def log(what: str, text: str) -> None:
@@ -154,8 +158,8 @@ def _carry_out(record: Record, rig: Rig, run: Run, procedure: Procedure, watch: 
     log("begun", f"{procedure.name} at pose {run.rows}")
     record.set_state(run.run, "running")
     try:
-        watch.begun(run.run)  # a person may end it from now on
-        own = _perform(record, rig, run, procedure, watch)
+        observer.begun(run.run)  # a person may end it from now on
+        own = _perform(record, rig, run, procedure, observer)
         results, why = (documents(own, rig.bench.result_limits), None) if own else judged(record, run)
     except BaseException as failure:
         error = _error_of(failure, run)
@@ -192,10 +196,10 @@ def _error_of(failure: BaseException, run: Run) -> Exception:
     return RuntimeError(f"{type(failure).__name__}: {failure}")
 
 
-def _perform(record: Record, rig: Rig, run: Run, procedure: Procedure, watch: Watch) -> Mapping[str, Result]:
+def _perform(record: Record, rig: Rig, run: Run, procedure: Procedure, observer: Observer) -> Mapping[str, Result]:
     """Execute the procedure in the last recorded state of the bench. Returns the results of the procedure."""
     state = record.state(run.run)
-    host = RunHost(record, rig, run, watch, state)
+    host = RunHost(record, rig, run, observer, state)
     session = rig.session(host)
     settings = parse(procedure, run.settings)
     rig.look()

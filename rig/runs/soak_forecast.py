@@ -54,7 +54,7 @@ class Follower:
 
 
 @dataclass
-class SoakWatch:
+class SoakForecaster:
     """The forecasts of all sensors of a soak. There are none before `begun`."""
 
     run: str = ""
@@ -88,9 +88,9 @@ class SoakWatch:
         return lines(forecasts) if (forecasts := self.kept(kept)) else ""
 
 
-def soak_watch(procedure: str) -> SoakWatch | None:
+def soak_forecaster(procedure: str) -> SoakForecaster | None:
     """The forecasts for a run of `procedure`; None if it is not a soak."""
-    return SoakWatch() if procedure == "soak" else None
+    return SoakForecaster() if procedure == "soak" else None
 
 
 def present(name: str, forecast: Forecast) -> str:

@@ -19,7 +19,7 @@ from procedures.session import Reading
 from procedures.settings import parse
 from rig.planning.plan import Plan
 from rig.record import Kept
-from rig.runs.runner import Outcome, Wish
+from rig.runs.runner import Decision, Outcome
 
 SMALL = {"step_deg": "90", "dwell_s": "0.2", "inclinations_deg": "90,45"}
 SMALL_ARGUMENTS = ("--step-deg", "90", "--dwell-s", "0.2", "--inclinations-deg", "90,45")
@@ -43,7 +43,7 @@ class Onlooker:
     said: list[str] = field(default_factory=list)
     expected: list[tuple[int, int]] = field(default_factory=list)
     seen: list[Kept] = field(default_factory=list)
-    wishes: list[Wish] = field(default_factory=list)
+    wishes: list[Decision] = field(default_factory=list)
     outcomes: list[Outcome] = field(default_factory=list)
     plan: Plan | None = None
 
@@ -70,7 +70,7 @@ class Onlooker:
         assert instead is not None
         return instead
 
-    def interrupted(self, outcome: Outcome) -> Wish:
+    def interrupted(self, outcome: Outcome) -> Decision:
         self.outcomes.append(outcome)
         return self.wishes.pop(0) if self.wishes else "end"
 

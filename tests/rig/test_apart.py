@@ -20,7 +20,7 @@ from rig.files import home
 from rig.lease import lease
 from rig.record import Kept, Record
 from rig.runs.background import control, process
-from rig.runs.background.control import Beside
+from rig.runs.background.control import PublishingObserver
 from rig.runs.background.status import KEPT, Asked, Order, Seat, Status, file, folder, keys, lock, read, tidy
 from rig.runs.runner import Outcome, start
 from tests.rig.rigging import POSES, SMALL
@@ -178,7 +178,7 @@ class Onlooker(Quiet):
 def in_a_terminal(onlooker: Onlooker, seat: Seat) -> Outcome:
     """A small sweep as `rig run` does it."""
     bench, sweep = read_bench(), find("sweep")
-    with Record() as record, Beside(onlooker, "sweep", bench, seat) as watch:
+    with Record() as record, PublishingObserver(onlooker, "sweep", bench, seat) as watch:
         return start(record, bench, sweep, parse(sweep, SMALL), watch)
 
 

@@ -27,8 +27,8 @@ from rig.errors import Stopped
 from rig.files import free_bytes
 from rig.planning.plan import Plan, plan
 from rig.record import Block, Kept, Record
-from rig.runs.observer import Seen, nearness
-from rig.runs.progress import Way
+from rig.runs.observer import RunView, nearness
+from rig.runs.progress import Progress
 from rig.runs.runner import Outcome
 from tests.rig.rigging import POSES, small_sweep
 
@@ -169,8 +169,8 @@ def test_it_shows_what_happens_progress_readings_and_time(run: str) -> None:
     assert "Ctrl-C stops the stages" in text
 
 
-def seen(**changes: Any) -> Seen:
-    return replace(Seen("sweep", Limits(level_deg=0.3), 10.0, False), **changes)
+def seen(**changes: Any) -> RunView:
+    return replace(RunView("sweep", Limits(level_deg=0.3), 10.0, False), **changes)
 
 
 def test_values_stand_between_their_limits_and_are_marked_near_them() -> None:
@@ -231,7 +231,7 @@ def test_what_is_no_number_is_beyond_its_limit() -> None:
 
 
 def test_time_left_is_that_of_the_plan_until_there_is_a_pace() -> None:
-    way = Way(at_s=(10.0, 20.0, 90.0), end_s=100.0).begin(0.0).expect(3, 0)
+    way = Progress(at_s=(10.0, 20.0, 90.0), end_s=100.0).begin(0.0).expect(3, 0)
     assert (way.planned_left_s(), way.left_s(5.0)) == (90.0, None)
     one = way.step(2.0)  # ten planned seconds took two
     assert one.left_s(2.0) == pytest.approx(16.0)
@@ -241,21 +241,21 @@ def test_time_left_is_that_of_the_plan_until_there_is_a_pace() -> None:
 
 
 def test_without_a_plan_poses_are_all_alike() -> None:
-    way = Way().begin(0.0).expect(8, 4)
+    way = Progress().begin(0.0).expect(8, 4)
     assert way.planned_left_s() is None
     assert way.step(3.0).left_s(3.0) == pytest.approx(9.0)
 
 
 def test_a_procedure_that_expects_part_by_part_has_the_plans_total() -> None:
-    way = Way(at_s=(0.0,) * 10, end_s=1.0).begin(0.0).expect(4, 0)
+    way = Progress(at_s=(0.0,) * 10, end_s=1.0).begin(0.0).expect(4, 0)
     assert way.total == 10
-    assert Way().begin(0.0).expect(4, 0).step(1.0).expect(10, 4).first == 0
+    assert Progress().begin(0.0).expect(4, 0).step(1.0).expect(10, 4).first == 0
 
 
 def test_simulated_time_is_said_to_be_that() -> None:
-    way = Way(at_s=(10.0,), end_s=60.0).expect(1, 0)
-    assert "0:50 left by the plan" in shown(screen(seen(way=way), 0.0))
-    assert "0:50 of simulated time left by the plan" in shown(screen(seen(way=way, simulated=True), 0.0))
+    way = Progress(at_s=(10.0,), end_s=60.0).expect(1, 0)
+    assert "0:50 left by the plan" in shown(screen(seen(progress=way), 0.0))
+    assert "0:50 of simulated time left by the plan" in shown(screen(seen(progress=way, simulated=True), 0.0))
 
 
 # questions

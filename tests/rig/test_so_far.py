@@ -13,7 +13,7 @@ from procedures.rate_turn import turns
 from procedures.session import Pose
 from rig.record import Block, Kept, Record
 from rig.record.measured import sensor_from_base, sensor_from_table, specific_force_g
-from rig.runs.progress import SoFar
+from rig.runs.progress import RunningEstimates
 
 NOISE_V = 1e-4
 
@@ -31,21 +31,21 @@ def kept(poses: Iterator[Pose], outputs: Mapping[str, Any], seed: int = 1) -> li
 def follower(rig_home: Any) -> Any:
     """Of a run of a kind that holds `before`."""
 
-    def begun(kind: str, before: list[Kept] | None = None) -> SoFar:
+    def begun(kind: str, before: list[Kept] | None = None) -> RunningEstimates:
         with Record() as record:
             run = record.begin(
                 "made", {}, bench={}, identities={}, configuration="", constants={}, source="made", kind=kind
             )
             for each in before or []:
                 record.keep(run, each.number, each, None)
-        told = SoFar()
+        told = RunningEstimates()
         told.begun(run)
         return told
 
     return begun
 
 
-def last(told: SoFar, poses: list[Kept]) -> dict[str, str]:
+def last(told: RunningEstimates, poses: list[Kept]) -> dict[str, str]:
     return [told.kept(each) for each in poses][-1]
 
 

@@ -21,7 +21,7 @@ from rig.record import Record
 from rig.record.measured import Measured
 from rig.results.evaluate import names
 from rig.results.soak import night
-from rig.runs.soak_forecast import SoakWatch, lines, outlook
+from rig.runs.soak_forecast import SoakForecaster, lines, outlook
 from tests.rig.nursery import Harm, Nursery
 
 pytestmark = pytest.mark.sockets
@@ -82,7 +82,7 @@ def test_a_soak_that_goes_on_is_foreseen_as_one_that_was_not_interrupted(rig: Ri
     run = json.loads(rig("run", *SHORT_RUN, "--block-s", "5", "--json").out)["run"]
     with Record(rig_home) as record:
         kept = list(record.kept(run))
-    whole, resumed = SoakWatch(), SoakWatch()
+    whole, resumed = SoakForecaster(), SoakForecaster()
     for watch in (whole, resumed):
         watch.begun(run)  # the record holds all of it
     begun = {name: each.forecast() for name, each in whole.followers[0].forecast.followed.items()}

@@ -18,7 +18,7 @@ from rig.errors import InstrumentFailed
 from rig.instruments.instruments import Rig
 from rig.planning.plan import Plan
 from rig.record import Kept, Record
-from rig.runs.runner import REPEATED, Outcome, Wish, start
+from rig.runs.runner import REPEATED, Decision, Outcome, start
 from tests.rig.rigging import POSES, Onlooker, small_sweep
 from tests.slow import first_fast
 
@@ -28,7 +28,7 @@ pytestmark = pytest.mark.sockets
 class Disturbed(Onlooker):
     """Something happens, once, when the pose `at` has been kept."""
 
-    def __init__(self, then: Callable[[], object], *wishes: Wish, at: int = 7) -> None:
+    def __init__(self, then: Callable[[], object], *wishes: Decision, at: int = 7) -> None:
         super().__init__(wishes=list(wishes))
         self._then, self._at = then, at
 
@@ -106,7 +106,7 @@ class Impatient(Disturbed):
 
     signal = signal.SIGINT
 
-    def interrupted(self, outcome: Outcome) -> Wish:
+    def interrupted(self, outcome: Outcome) -> Decision:
         signal.raise_signal(self.signal)
         return "resume"
 

@@ -44,8 +44,8 @@ def command(folder: Path, as_json: bool) -> None:
 
     note("1  Sweep: both stages move a simulated ADXL203 through 518 poses, over the protocols of the instruments.")
     sweep, bench = find("sweep"), read_bench()
-    with watching(sweep, bench, False, None) as watch, Record() as record:
-        outcome = start(record, bench, sweep, parse(sweep, {}), watch)
+    with watching(sweep, bench, False, None) as observer, Record() as record:
+        outcome = start(record, bench, sweep, parse(sweep, {}), observer)
     if outcome.error is not None:
         raise outcome.error
     run = outcome.run.run

@@ -34,7 +34,7 @@ def command(
         if found.state == "complete":
             return print_end(record, Outcome(found), as_json)
         own = Bench.model_validate(found.bench)
-        with watching(find(found.procedure, own.folders.procedures), own, unattended, answers) as watch:
-            outcome = resume(record, found.run, watch, bench, trace)
+        with watching(find(found.procedure, own.folders.procedures), own, unattended, answers) as observer:
+            outcome = resume(record, found.run, observer, bench, trace)
         push_after(record, outcome.run, (bench or own).lab, note)
         return print_end(record, outcome, as_json)

@@ -43,7 +43,7 @@ def command(
     found = find(procedure, bench.folders.procedures)
     settings = parse(found, read_settings(given, pairs, found.defaults))
     with Record() as record:
-        with watching(found, bench, unattended, answers) as watch:
-            outcome = start(record, bench, found, settings, watch, trace=trace)
+        with watching(found, bench, unattended, answers) as observer:
+            outcome = start(record, bench, found, settings, observer, trace=trace)
         push_after(record, outcome.run, bench.lab, note)
         return print_end(record, outcome, as_json)

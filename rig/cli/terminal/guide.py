@@ -24,8 +24,8 @@ from rig.drawings import Attitude, drawing_of, page
 from rig.files import free_bytes, home, write_whole
 from rig.planning.plan import Plan
 from rig.record import Kept
-from rig.runs.observer import Sight
-from rig.runs.runner import Outcome, Wish
+from rig.runs.observer import RunViewer
+from rig.runs.runner import Decision, Outcome
 
 BEGIN = Choice("begin", "Begin?", choices=("go", "cancel"))
 NEXT = Choice("interrupted", "Continue?", choices=("resume", "repeat", "end"))
@@ -41,7 +41,7 @@ class Guide:
         self._procedure, self._bench, self._answers = procedure, bench, answers
         self._console = console or Console(stderr=True)
         self._drawn: Attitude | None = None
-        self._sight = Sight(procedure.name, bench)
+        self._viewer = RunViewer(procedure.name, bench)
         self._live = Live(
             get_renderable=self._screen, console=self._console, refresh_per_second=FRAMES_HZ, transient=True
         )
@@ -56,7 +56,7 @@ class Guide:
 
     def planned(self, plan: Plan) -> None:
         """Show the plan on one screen; raises Declined if the person cancels it."""
-        self._sight.planned(plan)
+        self._viewer.planned(plan)
         self._console.print(before(plan, self._procedure, self._bench, free_bytes(home()), datetime.now(UTC).date()))
         self._draw(mounting(plan), "mounting")
         if self.ask(BEGIN, "go") == "cancel":
@@ -64,21 +64,21 @@ class Guide:
 
     def begun(self, run: str) -> None:
         """The run begins or continues."""
-        self._sight.begun(f"{self._procedure.name}  {run}", run)
+        self._viewer.begun(f"{self._procedure.name}  {run}", run)
         self._live.start()
 
     def doing(self, text: str) -> None:
-        self._sight.doing(text)
+        self._viewer.doing(text)
 
     def expect(self, total: int, done: int) -> None:
-        self._sight.expect(total, done)
+        self._viewer.expect(total, done)
 
     def kept(self, kept: Kept) -> None:
         """Show the values of the last dwell, compared with the dwells before it."""
-        self._sight.kept(kept)
+        self._viewer.kept(kept)
 
     def read(self, reading: Reading) -> None:
-        self._sight.read(reading)
+        self._viewer.read(reading)
         self._console.print(f"{reading.name} = {reading.value:g} {reading.unit}", highlight=False)
 
     def ask(self, question: Question, instead: str | None) -> str:
@@ -90,15 +90,15 @@ class Guide:
                 self._draw(attitude, question.name)
             return self._prompt(question, instead)
 
-    def interrupted(self, outcome: Outcome) -> Wish:
+    def interrupted(self, outcome: Outcome) -> Decision:
         """The menu of an interrupted run."""
         self._live.stop()
         for complaint in outcome.moving:
             self._console.print(complaint, style="bold red", highlight=False)
         self._console.print(str(outcome.error), style="yellow", highlight=False)
-        self._console.print(_choices(self._sight.seen.kept, outcome))
+        self._console.print(_choices(self._viewer.view.kept, outcome))
         try:
-            return cast(Wish, self._prompt(NEXT, "resume"))
+            return cast(Decision, self._prompt(NEXT, "resume"))
         except NoAnswer:
             return "end"
 
@@ -134,7 +134,7 @@ class Guide:
         self._drawn = attitude
 
     def _screen(self) -> RenderableType:
-        return screen(self._sight.seen, time.monotonic())
+        return screen(self._viewer.view, time.monotonic())
 
 
 def _choices(kept: Kept | None, outcome: Outcome) -> Text:

@@ -45,8 +45,10 @@ class Experiments:
         """Run an experiment. Returns the run and the table of all runs so far. Raises the error that ended the run."""
         procedure = find(experiment.procedure, self.bench.folders.procedures)
         settings = parse(procedure, experiment.settings)
-        with watching(procedure, self.bench, self.unattended, self.answers) as watch:
-            outcome = start(self.record, self.bench, procedure, settings, watch, self.runs[-1] if self.runs else None)
+        with watching(procedure, self.bench, self.unattended, self.answers) as observer:
+            outcome = start(
+                self.record, self.bench, procedure, settings, observer, self.runs[-1] if self.runs else None
+            )
         if outcome.error is not None:
             notes(outcome.moving)
             self._advise(outcome.run.run)

@@ -21,7 +21,7 @@ from rig.bench import Bench
 from rig.bench.certificates import expired
 from rig.drawings import Attitude, drawing_of, sketch
 from rig.planning.plan import Plan, stretches
-from rig.runs.observer import Seen, Value, nearness, values
+from rig.runs.observer import RunView, Value, nearness, values
 
 WIDTH = 15  # characters, the ends included
 STYLES = {"": "green", "near its limit": "yellow", "beyond its limit": "bold red"}
@@ -41,29 +41,29 @@ def gauge(value: float, low: float, high: float) -> Text:
 Row = tuple[RenderableType, ...]
 
 
-def screen(seen: Seen, now_s: float) -> RenderableType:
+def screen(view: RunView, now_s: float) -> RenderableType:
     """The screen at `now_s` of the wall clock."""
     shown = Table.grid(padding=(0, 2))
-    for row in _rows(seen):
+    for row in _rows(view):
         shown.add_row(*row)
-    body = Group(_heading(seen, now_s), ProgressBar(max(seen.way.total, 1), seen.way.done), Text(), shown)
-    return Panel(body, title=seen.title, subtitle="Ctrl-C stops the stages", title_align="left", subtitle_align="right")
+    body = Group(_heading(view, now_s), ProgressBar(max(view.progress.total, 1), view.progress.done), Text(), shown)
+    return Panel(body, title=view.title, subtitle="Ctrl-C stops the stages", title_align="left", subtitle_align="right")
 
 
-def _heading(seen: Seen, now_s: float) -> Table:
+def _heading(view: RunView, now_s: float) -> Table:
     """The present step, and the progress at the right."""
     heading = Table.grid(expand=True)
     heading.add_column(ratio=1)
     heading.add_column(justify="right")
-    heading.add_row(Text(seen.now, style="bold"), Text("  ".join(filter(None, (seen.count, seen.left(now_s))))))
+    heading.add_row(Text(view.now, style="bold"), Text("  ".join(filter(None, (view.count, view.left(now_s))))))
     return heading
 
 
-def _rows(seen: Seen) -> Iterator[Row]:
+def _rows(view: RunView) -> Iterator[Row]:
     """A row for each value: name, value, position between its limits, remark."""
-    yield from (_row(value) for value in values(seen))
-    if seen.kept is not None:
-        yield "", Text(f"t = {duration(seen.kept.t_s)}", style="dim")
+    yield from (_row(value) for value in values(view))
+    if view.kept is not None:
+        yield "", Text(f"t = {duration(view.kept.t_s)}", style="dim")
 
 
 def _row(value: Value) -> Row:
@@ -131,7 +131,7 @@ def checks(plan: Plan) -> list[str]:
     actions = [step.what for step in plan.steps]
     level = any("level" in question.name for question in plan.asked)
     lines = [
-        "the cables can follow the stages over the whole range, and nothing and nobody is in the way",
+        "the cables can follow the stages over the whole range, and nothing and nobody is in the progress",
         "the sensor is fastened as in the drawing, with pin 1 at the drawn place",
     ]
     if any("level is read" in action for action in actions):

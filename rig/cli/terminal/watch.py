@@ -19,10 +19,10 @@ from rig.bench.certificates import EXPIRED
 from rig.cli.terminal.output import emit, note, notes
 from rig.planning.plan import Plan
 from rig.record import Kept, Record
-from rig.runs.background.control import Beside
-from rig.runs.progress import SoFar
-from rig.runs.runner import Outcome, Watch, Wish
-from rig.runs.soak_forecast import SoakWatch, soak_watch
+from rig.runs.background.control import PublishingObserver
+from rig.runs.progress import RunningEstimates
+from rig.runs.runner import Decision, Observer, Outcome
+from rig.runs.soak_forecast import SoakForecaster, soak_forecaster
 from rig.services.next_steps import next_steps, results_table
 
 trace_option = click.option("--trace", is_flag=True, help="Log every message to and from instruments.")
@@ -35,7 +35,7 @@ class Quiet:
     path.
     """
 
-    def __init__(self, answers: Mapping[str, str], follower: SoakWatch | SoFar | None = None) -> None:
+    def __init__(self, answers: Mapping[str, str], follower: SoakForecaster | RunningEstimates | None = None) -> None:
         self._answers, self._follower = answers, follower
 
     def planned(self, plan: Plan) -> None:
@@ -69,23 +69,28 @@ class Quiet:
             )
         return given
 
-    def interrupted(self, outcome: Outcome) -> Wish:  # noqa: ARG002
+    def interrupted(self, outcome: Outcome) -> Decision:  # noqa: ARG002
         """An unattended run ends: nobody can decide."""
         return "end"
 
 
 @contextmanager
-def watching(procedure: Procedure, bench: Bench, unattended: bool, answers: Path | None) -> Iterator[Watch]:
+def watching(procedure: Procedure, bench: Bench, unattended: bool, answers: Path | None) -> Iterator[Observer]:
     """The observer of a run: a person in a terminal, or nobody for an unattended run; pages observe in parallel."""
     given = _answers(answers)
     if unattended or not (sys.stdin.isatty() and sys.stderr.isatty()):
-        with Beside(Quiet(given, soak_watch(procedure.name) or SoFar()), procedure.name, bench, "nobody") as watch:
-            yield watch
+        with PublishingObserver(
+            Quiet(given, soak_forecaster(procedure.name) or RunningEstimates()), procedure.name, bench, "nobody"
+        ) as observer:
+            yield observer
         return
     from rig.cli.terminal.guide import Guide  # only a terminal needs rich
 
-    with Guide(procedure, bench, given) as guide, Beside(guide, procedure.name, bench, "terminal") as watch:
-        yield watch
+    with (
+        Guide(procedure, bench, given) as guide,
+        PublishingObserver(guide, procedure.name, bench, "terminal") as observer,
+    ):
+        yield observer
 
 
 def _answers(path: Path | None) -> dict[str, str]:

@@ -26,31 +26,31 @@ from rig.runs.background.status import (
     Order,
     Seat,
     Status,
-    Teller,
-    asked_of,
+    StatusWriter,
     file,
     folder,
     keys,
     lock,
     new_key,
+    open_question,
     read,
     tidy,
 )
-from rig.runs.observer import Outcome, Watch, Wish
+from rig.runs.observer import Decision, Observer, Outcome
 
 P = ParamSpec("P")
 
 
-class Beside:
-    """An observer that forwards all events to `watch`, and publishes the status of the run.
+class PublishingObserver:
+    """An observer that forwards all events to `observer`, and publishes the status of the run.
 
     An error of the status file is ignored: it must not disturb the run.
     """
 
-    def __init__(self, watch: Watch, procedure: str, bench: Bench, seat: Seat) -> None:
-        self._watch, self._procedure = watch, procedure
+    def __init__(self, observer: Observer, procedure: str, bench: Bench, seat: Seat) -> None:
+        self._observer, self._procedure = observer, procedure
         self._key, self._run = new_key(), ""
-        self._teller = Teller(self._key, procedure, bench, seat)
+        self._writer = StatusWriter(self._key, procedure, bench, seat)
         self._held = ExitStack()
 
     def __enter__(self) -> Self:
@@ -65,8 +65,8 @@ class Beside:
         self._held.close()
 
     def planned(self, plan: Plan) -> None:
-        self._watch.planned(plan)
-        self._teller.planned(plan)
+        self._observer.planned(plan)
+        self._writer.planned(plan)
 
     def begun(self, run: str) -> None:
         if not self._run:
@@ -75,36 +75,36 @@ class Beside:
                 tidy()
                 self._held.enter_context(lease(home(), lock(self._key), f"an order, {self._procedure}"))
         self._run = run
-        self._watch.begun(run)
-        self._tell(self._teller.begun, run)
+        self._observer.begun(run)
+        self._publish(self._writer.begun, run)
 
     def doing(self, text: str) -> None:
-        self._watch.doing(text)
-        self._tell(self._teller.doing, text)
+        self._observer.doing(text)
+        self._publish(self._writer.doing, text)
 
     def expect(self, total: int, done: int) -> None:
-        self._watch.expect(total, done)
-        self._tell(self._teller.expect, total, done)
+        self._observer.expect(total, done)
+        self._publish(self._writer.expect, total, done)
 
     def kept(self, kept: Kept) -> None:
-        self._watch.kept(kept)
-        self._tell(self._teller.kept, kept)
+        self._observer.kept(kept)
+        self._publish(self._writer.kept, kept)
 
     def read(self, reading: Reading) -> None:
-        self._watch.read(reading)
-        self._tell(self._teller.read, reading)
+        self._observer.read(reading)
+        self._publish(self._writer.read, reading)
 
     def ask(self, question: Question, instead: str | None) -> str:
-        self._tell(self._teller.tell, phase="asking", asked=asked_of(question, instead or ""))
-        given = self._watch.ask(question, instead)
-        self._tell(self._teller.tell, phase="running", asked=None)
+        self._publish(self._writer.publish, phase="asking", asked=open_question(question, instead or ""))
+        given = self._observer.ask(question, instead)
+        self._publish(self._writer.publish, phase="running", asked=None)
         return given
 
-    def interrupted(self, outcome: Outcome) -> Wish:
-        self._tell(self._teller.tell, phase="paused", error=str(outcome.error), moving=outcome.moving)
-        return self._watch.interrupted(outcome)
+    def interrupted(self, outcome: Outcome) -> Decision:
+        self._publish(self._writer.publish, phase="paused", error=str(outcome.error), moving=outcome.moving)
+        return self._observer.interrupted(outcome)
 
-    def _tell(self, what: Callable[P, None], *args: P.args, **kwargs: P.kwargs) -> None:
+    def _publish(self, what: Callable[P, None], *args: P.args, **kwargs: P.kwargs) -> None:
         if self._run:
             with suppress(RigError, OSError):
                 what(*args, **kwargs)
@@ -112,7 +112,7 @@ class Beside:
     def _end(self) -> None:
         with Record() as record:
             run = record.run(self._run)
-        self._teller.tell(phase="ended", state=run.state, asked=None, error=run.message or "")
+        self._writer.publish(phase="ended", state=run.state, asked=None, error=run.message or "")
 
 
 # Control of background runs. Every process can control every run.

@@ -21,20 +21,20 @@ from rig.files import home
 from rig.lease import lease
 from rig.record import Record
 from rig.record.push import push_after
-from rig.runs.background.status import Order, Teller, asked_of, file, lock
-from rig.runs.runner import Outcome, Wish, resume, start
+from rig.runs.background.status import Order, StatusWriter, file, lock, open_question
+from rig.runs.runner import Decision, Outcome, resume, start
 
 LONGEST = 4096  # bytes of an answer, which a pipe hands over in one piece
 WISHES = Choice("interrupted", "What now?", choices=("resume", "repeat", "end"))
 
 
-class Attendant(Teller):
+class Attendant(StatusWriter):
     """The observer of a background run, which asks through a pipe."""
 
     def __init__(self, order: Order, bench: Bench) -> None:
         super().__init__(order.key, order.procedure, bench)
         self._order = order
-        self.tell()
+        self.publish()
 
     def ask(self, question: Question, instead: str | None) -> str:
         """The answer of a person, or of the simulated technician if nobody attends the run."""
@@ -42,18 +42,18 @@ class Attendant(Teller):
             return instead
         return self._answer(question, instead or "", "asking")
 
-    def interrupted(self, outcome: Outcome) -> Wish:
+    def interrupted(self, outcome: Outcome) -> Decision:
         """Wait at rest for the decision of a person."""
         by_a_person = isinstance(outcome.error, Stopped)
-        self.tell(error="" if by_a_person else str(outcome.error), moving=outcome.moving)
-        return cast(Wish, self._answer(WISHES, "resume", "paused"))
+        self.publish(error="" if by_a_person else str(outcome.error), moving=outcome.moving)
+        return cast(Decision, self._answer(WISHES, "resume", "paused"))
 
     def _answer(self, question: Question, proposed: str, phase: str) -> str:
         """Ask until the question accepts the answer."""
-        asked = asked_of(question, proposed)
+        asked = open_question(question, proposed)
         with _pipe(self._order.key) as heard:  # open before the status shows the question
             while True:
-                self.tell(phase=phase, asked=asked)
+                self.publish(phase=phase, asked=asked)
                 given = heard()
                 try:
                     checked = question.checked(given["text"]) if given.get("name") == question.name else None
@@ -61,7 +61,7 @@ class Attendant(Teller):
                     asked = replace(asked, refused=str(refused))
                     continue
                 if checked is not None:
-                    self.tell(phase="running", asked=None)
+                    self.publish(phase="running", asked=None)
                     return checked
 
 
@@ -88,16 +88,16 @@ def main(text: str) -> None:
     """Execute an order. The status has its end in any case."""
     order = Order.read(text)
     with lease(home(), lock(order.key), f"an order, {order.procedure}"), Record() as record:
-        teller = Attendant(order, read_bench(order.bench_path))
+        writer = Attendant(order, read_bench(order.bench_path))
         try:
-            outcome = _carried_out(order, record, teller)
+            outcome = _carried_out(order, record, writer)
         except KeyboardInterrupt as signal:  # before the run began, or between its parts
-            teller.tell(phase="ended", state="stopped", asked=None, error=f"stopped by {signal}")
+            writer.publish(phase="ended", state="stopped", asked=None, error=f"stopped by {signal}")
             return
         except Exception as error:
-            teller.tell(phase="ended", state="failed", asked=None, error=str(error))
+            writer.publish(phase="ended", state="failed", asked=None, error=str(error))
             raise
-        teller.tell(
+        writer.publish(
             phase="ended",
             state=outcome.run.state,
             asked=None,
@@ -107,12 +107,12 @@ def main(text: str) -> None:
         push_after(record, outcome.run, Bench.model_validate(outcome.run.bench).lab, print)
 
 
-def _carried_out(order: Order, record: Record, teller: Attendant) -> Outcome:
+def _carried_out(order: Order, record: Record, writer: Attendant) -> Outcome:
     if order.resume:
-        return resume(record, order.resume, teller)
+        return resume(record, order.resume, writer)
     bench = read_bench(order.bench_path)
     procedure = find(order.procedure, bench.folders.procedures)
-    return start(record, bench, procedure, parse(procedure, order.settings), teller)
+    return start(record, bench, procedure, parse(procedure, order.settings), writer)
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ from rig.files import home, write_whole
 from rig.lease import is_held
 from rig.planning.plan import Plan
 from rig.record import Kept
-from rig.runs.observer import Sight, values
+from rig.runs.observer import RunViewer, values
 
 FOLDER = "apart"
 
@@ -162,49 +162,51 @@ def _last_words(key: str) -> str:
     return log.splitlines()[-1] if log else "it was killed; `rig resume` continues its run"
 
 
-class Teller:
+class StatusWriter:
     """Publishes the events of a run in its status file. `seat`: where a person answers."""
 
     def __init__(self, key: str, procedure: str, bench: Bench, seat: Seat = "page") -> None:
-        self._sight = Sight(procedure, bench)
+        self._viewer = RunViewer(procedure, bench)
         self._status = Status(key, os.getpid(), procedure, bench.name, seat=seat)
 
-    def tell(self, **changes: Any) -> None:
+    def publish(self, **changes: Any) -> None:
         """Write the present status."""
-        seen = self._sight.seen
-        way, left = seen.way, seen.left(time.monotonic())
-        self._status = replace(self._status, now=seen.now, done=way.done, total=way.total, left=left, **changes)
+        view = self._viewer.view
+        progress, left = view.progress, view.left(time.monotonic())
+        self._status = replace(
+            self._status, now=view.now, done=progress.done, total=progress.total, left=left, **changes
+        )
         self._status.write()
 
     def planned(self, plan: Plan) -> None:
-        self._sight.planned(plan)
+        self._viewer.planned(plan)
 
     def begun(self, run: str) -> None:
-        self._sight.begun(run)
-        self.tell(phase="running", run=run, error="", moving=())
+        self._viewer.begun(run)
+        self.publish(phase="running", run=run, error="", moving=())
 
     def doing(self, text: str) -> None:
-        self._sight.doing(text)
-        self.tell()
+        self._viewer.doing(text)
+        self.publish()
 
     def expect(self, total: int, done: int) -> None:
-        self._sight.expect(total, done)
-        self.tell()
+        self._viewer.expect(total, done)
+        self.publish()
 
     def kept(self, kept: Kept) -> None:
-        self._sight.kept(kept)
+        self._viewer.kept(kept)
         stands = ("alpha_deg", "beta_deg", "mount_deg", "flip")
-        self.tell(values=self._values(), attitude={name: getattr(kept.pose, name) for name in stands})
+        self.publish(values=self._values(), attitude={name: getattr(kept.pose, name) for name in stands})
 
     def read(self, reading: Reading) -> None:
-        self._sight.read(reading)
-        self.tell(values=self._values())
+        self._viewer.read(reading)
+        self.publish(values=self._values())
 
     def _values(self) -> list[dict[str, Any]]:
-        return [{**asdict(value), "near": value.near} for value in values(self._sight.seen)]
+        return [{**asdict(value), "near": value.near} for value in values(self._viewer.view)]
 
 
-def asked_of(question: Question, proposed: str) -> Asked:
+def open_question(question: Question, proposed: str) -> Asked:
     """A question in the form of the status."""
     drawn = drawing_of(question)
     yes_or_no = ("yes", "no") if isinstance(question, Confirm) else ()
