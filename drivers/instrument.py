@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Protocol
+
+from drivers.errors import LimitError
+
+OUTSIDE_ANGLE = "Ask for an angle within the limits, or change them in the bench file after checking the cables"
 
 
 @dataclass(frozen=True)
@@ -35,3 +40,26 @@ class Instrument(Protocol):
     def self_test(self) -> list[Check]: ...
 
     def close(self) -> None: ...
+
+
+def require_positive(settings: object, *names: str) -> None:
+    """Raises ValueError with the names of the settings that are not positive and finite."""
+    if wrong := [name for name in names if not 0 < getattr(settings, name) < math.inf]:
+        raise ValueError(f"{', '.join(wrong)} must be positive")
+
+
+def require_range(settings: object, name: str) -> None:
+    """Raises ValueError where the setting `name` is not a lower limit and an upper one."""
+    low, high = getattr(settings, name)
+    if not low < high:
+        raise ValueError(f"{name} must be the lower limit, then the upper one")
+
+
+def require_within(
+    what: str, value: float, limits: tuple[float, float], unit: str, remedy: str, effect: str = "nothing was sent"
+) -> None:
+    """Raises LimitError for a `value` outside its limits; NaN is outside as well."""
+    low, high = limits
+    if not low <= value <= high:
+        outside = f"{value:g} {unit} is outside its limits {low:g} .. {high:g} {unit}"
+        raise LimitError(f"{what}{outside}; {effect}", remedy)

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from drivers.errors import BadFrame, InstrumentError, LinkTimeout, NotSettled
-from drivers.instrument import Check, Identity
+from drivers.instrument import Check, Identity, require_positive
 from drivers.transport import Address, Links
 from drivers.transport.link import Link
 
@@ -46,9 +46,7 @@ class Settings:
     range_deg: float = 30.0  # each way; of the model NS-30 [M]
 
     def __post_init__(self) -> None:
-        positive = ("interval_s", "accuracy_deg", "unrest_deg", "patience_s", "range_deg")
-        if wrong := [name for name in positive if not 0 < getattr(self, name) < math.inf]:
-            raise ValueError(f"{', '.join(wrong)} must be positive")
+        require_positive(self, "interval_s", "accuracy_deg", "unrest_deg", "patience_s", "range_deg")
         if not 1 <= self.readings < self.frozen:
             raise ValueError("readings must be at least 1, and frozen more than readings")
 

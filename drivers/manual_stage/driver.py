@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import NoReturn
 
 from drivers.errors import LimitError, LinkRefused, NotSettled
-from drivers.instrument import Check, Identity
+from drivers.instrument import OUTSIDE_ANGLE, Check, Identity, require_positive, require_range, require_within
 from drivers.manual_stage.person import PERSON, PersonLink
 from drivers.transport import Address, Links
 
@@ -32,13 +32,10 @@ class Settings:
     seconds_per_move: float = 20.0
 
     def __post_init__(self) -> None:
-        positive = ("resolution_deg", "tolerance_deg", "seconds_per_move")
-        if wrong := [name for name in positive if not 0 < getattr(self, name) < math.inf]:
-            raise ValueError(f"{', '.join(wrong)} must be positive")
+        require_positive(self, "resolution_deg", "tolerance_deg", "seconds_per_move")
         if self.tolerance_deg < self.resolution_deg:
             raise ValueError("tolerance_deg must not be less than resolution_deg")
-        if not self.limits_deg[0] < self.limits_deg[1]:
-            raise ValueError("limits_deg must be the lower limit, then the upper one")
+        require_range(self, "limits_deg")
 
     def move_s(self, distance_deg: float) -> float:  # noqa: ARG002 a hand is as quick on any way
         """How long a move takes."""
@@ -97,7 +94,9 @@ class ManualStage:
 
         Raises LimitError before anybody is asked, NotSettled for a reading elsewhere, and what comes from the person.
         """
-        self._require_within_limits(angle_deg)
+        require_within(
+            f"{self.name}: ", angle_deg, self.settings.limits_deg, "deg", OUTSIDE_ANGLE, "no request was made"
+        )
         if angle_deg == self._set_deg:
             return
         self._set_deg, self.read_deg = math.nan, None  # the angle of an interrupted move is not known
@@ -122,14 +121,6 @@ class ManualStage:
 
     def stop(self) -> None:
         """It turns only while a person turns it."""
-
-    def _require_within_limits(self, angle_deg: float) -> None:
-        low, high = self.settings.limits_deg
-        if not low <= angle_deg <= high:  # NaN is outside as well
-            raise LimitError(
-                f"{self.name}: {angle_deg:g} deg is outside its limits {low:g} .. {high:g} deg; no request was made",
-                "Ask for an angle within the limits, or change them in the bench file after checking the cables",
-            )
 
 
 def connect(address: Address, links: Links, settings: Settings, name: str) -> ManualStage:

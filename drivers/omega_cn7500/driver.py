@@ -9,8 +9,8 @@ import math
 from dataclasses import dataclass
 
 from drivers.clock import Clock
-from drivers.errors import LimitError, OverTemperature, SensorFault
-from drivers.instrument import Check, Identity
+from drivers.errors import OverTemperature, SensorFault
+from drivers.instrument import Check, Identity, require_range, require_within
 from drivers.transport import Address, Links
 from drivers.transport.modbus import Register, Unit
 
@@ -42,8 +42,7 @@ class Settings:
     stale_s: float = 300.0
 
     def __post_init__(self) -> None:
-        if not self.limits_c[0] < self.limits_c[1]:
-            raise ValueError("limits_c must be the lower limit, then the upper one")
+        require_range(self, "limits_c")
         if not (self.overshoot_k >= 0 and self.stale_s > 0):
             raise ValueError("overshoot_k must not be negative, stale_s must be positive")
 
@@ -96,12 +95,8 @@ class Oven:
 
     def set_temperature(self, temperature_c: float) -> None:
         """Give a new set point; raises LimitError before anything is sent."""
-        low, high = self.settings.limits_c
-        if not low <= temperature_c <= high:
-            raise LimitError(
-                f"{self.name}: {temperature_c:g} C is outside its limits {low:g} .. {high:g} C; nothing was sent",
-                "Ask for a temperature within the limits, or change them in the bench file",
-            )
+        remedy = "Ask for a temperature within the limits, or change them in the bench file"
+        require_within(f"{self.name}: ", temperature_c, self.settings.limits_c, "C", remedy)
         self._unit.write(SET_POINT, temperature_c)
         self._told_c = temperature_c
 

@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 
-from drivers.errors import DriverError, Interlocked, LimitError, NotSettled, StageAlarm, StageLost
-from drivers.instrument import Check, Identity
+from drivers.errors import DriverError, Interlocked, NotSettled, StageAlarm, StageLost
+from drivers.instrument import OUTSIDE_ANGLE, Check, Identity, require_within
 from drivers.oriental_az import registers as az
 from drivers.oriental_az.registers import LEAD_S, Alarm, Settings
 from drivers.transport import Address, Links
@@ -107,7 +107,7 @@ class RotaryStage:
         With a communication time-out, `wait` must follow within it. Raises LimitError before anything is sent,
         StageAlarm, StageLost, Interlocked.
         """
-        self._require_within_limits(angle_deg)
+        require_within(f"{self.name}: ", angle_deg, self.settings.limits_deg, "deg", OUTSIDE_ANGLE)
         return self._start(angle_deg, self.settings) is not None
 
     def wait(self) -> None:
@@ -197,14 +197,6 @@ class RotaryStage:
         self._unit.write(az.INPUTS, 0)
         self._poll_until(az.HOME_END, HOMING_S, "has not found its home")
         self._watch(False)
-
-    def _require_within_limits(self, angle_deg: float) -> None:
-        low, high = self.settings.limits_deg
-        if not low <= angle_deg <= high:  # NaN is outside as well
-            raise LimitError(
-                f"{self.name}: {angle_deg:g} deg is outside its limits {low:g} .. {high:g} deg; nothing was sent",
-                "Ask for an angle within the limits, or change them in the bench file after checking the cables",
-            )
 
     def _require_at_target(self, remedy: str) -> None:
         """Raises NotSettled where the encoder's angle is not that of the last move's command."""

@@ -11,6 +11,7 @@ import math
 from dataclasses import dataclass
 
 from drivers.errors import LimitError
+from drivers.instrument import require_positive, require_range
 from drivers.transport.modbus import Register
 
 # Direct data operation: written in one go; the trigger is last and starts the move.
@@ -145,11 +146,8 @@ class Settings:
     own_limits: bool = False
 
     def __post_init__(self) -> None:
-        positive = ("steps_per_turn", "speed_deg_s", "acceleration_deg_s2", "settle_deg", "current_percent")
-        if wrong := [name for name in positive if not getattr(self, name) > 0]:
-            raise ValueError(f"{', '.join(wrong)} must be positive")
-        if not self.limits_deg[0] < self.limits_deg[1]:
-            raise ValueError("limits_deg must be the lower limit, then the upper one")
+        require_positive(self, "steps_per_turn", "speed_deg_s", "acceleration_deg_s2", "settle_deg", "current_percent")
+        require_range(self, "limits_deg")
         if self.own_limits and not all(map(math.isfinite, self.limits_deg)):
             raise ValueError("own_limits needs both numbers of limits_deg")
         if self.speed_deg_s > self.speed_limit_deg_s:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.errors import LimitError, NotSettled, StreamError
-from drivers.instrument import Check, Identity
+from drivers.instrument import Check, Identity, require_positive, require_range, require_within
 from drivers.pi_e727 import parameters as e727
 from drivers.transport import Address, Links
 from drivers.transport.gcs import Gcs
@@ -23,6 +23,8 @@ POLL_S = 0.01
 PATIENCE_S = 5.0  # for an arrival: a full travel at any sensible speed
 STOPPING_S = 1.0
 FEWEST_POINTS = 20  # of a period: coarser is no sine
+
+OUTSIDE = "Ask for positions within the limits; an oscillation extends half its width to each side of its centre"
 
 
 @dataclass(frozen=True)
@@ -42,12 +44,8 @@ class Settings:
     def __post_init__(self) -> None:
         if not self.axes or len(set(self.axes.values())) < len(self.axes):
             raise ValueError("axes must name the controller's axes, each once, and at least one")
-        if not self.limits_um[0] < self.limits_um[1]:
-            raise ValueError("limits_um must be the lower limit, then the upper one")
-        if wrong := [
-            name for name in ("settle_um", "wave_points", "record_hz", "limit_hz") if not getattr(self, name) > 0
-        ]:
-            raise ValueError(f"{', '.join(wrong)} must be positive")
+        require_range(self, "limits_um")
+        require_positive(self, "settle_um", "wave_points", "record_hz", "limit_hz")
 
     def wave(self, name: str, frequency_hz: float, cycle_s: float = e727.USUAL_CYCLE_S) -> Wave:
         """How the controller `name` plays a frequency. Raises LimitError for one that it cannot play."""
@@ -228,12 +226,7 @@ class Positioner:
         return max(low.values()), min(high.values())
 
     def _require_within_limits(self, axis: str, um: float) -> None:
-        low, high = self.settings.limits_um
-        if not low <= um <= high:  # NaN is outside as well
-            raise LimitError(
-                f"{self.name}: {axis} = {um:g} um is outside its limits {low:g} .. {high:g} um; nothing was sent",
-                "Ask for positions within the limits; an oscillation extends half its width to each side of its centre",
-            )
+        require_within(f"{self.name}: {axis} = ", um, self.settings.limits_um, "um", OUTSIDE)
 
     def _require_swing(self, peak_to_peak_um: float) -> None:
         if not peak_to_peak_um > 0:
