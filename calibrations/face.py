@@ -97,7 +97,9 @@ def compensate(model: GivenModel, outputs: Array, **columns: Array) -> Array:
     made = invert_model(_model(model))
     values = np.atleast_2d(np.asarray(outputs, dtype=float))
     if made.program.remembered:
-        raise DataError(f"{made.model.name}: remembers earlier samples; use `rig compensate` for a product's source")
+        raise DataError(
+            f"{made.model.name}: has hysteresis, so its inverse needs earlier samples; use `rig compensate`"
+        )
     if values.shape[1] != len(made.forward.axes):
         raise DataError(f"outputs have shape {values.shape}; the model has the axes {', '.join(made.forward.axes)}")
     given = {**dict(zip((f"v{axis}" for axis in made.forward.axes), values.T, strict=True)), **columns}
@@ -124,7 +126,7 @@ def _channels(table: Table, rate_hz: float | None) -> Iterator[Samples]:
         steps_s = np.diff(table.time_s)
         rate_hz = 1 / float(np.median(steps_s))
         if np.ptp(steps_s) * rate_hz > MOST_UNEVEN:
-            raise DataError(f"{table.source}: t_s is uneven; `rig noise` closes gaps and says so")
+            raise DataError(f"{table.source}: t_s is uneven; `rig noise` can close gaps")
     corner_hz = table.number("filter_corner_hz", np.inf)
     for name in (name for name in table.columns if name not in NOT_CHANNELS):
         unit = "V" if name.endswith("_v") else str(table.constants.get("unit", "count"))

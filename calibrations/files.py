@@ -137,7 +137,7 @@ def load_yaml(text: str) -> Any:
         document = yaml.safe_load(text)
         _require_bounded(document)
     except RecursionError:
-        raise ValueError("its parts are nested too deeply") from None
+        raise ValueError("the document is nested too deeply") from None
     except (yaml.YAMLError, ArithmeticError, LookupError, TypeError, AttributeError) as error:
         raise ValueError(" ".join(str(error).split())) from None
     return document
@@ -157,7 +157,9 @@ def _require_bounded(document: Any) -> None:
         if (count := sizes[id(part)]) is None:
             raise ValueError("a part of the document contains itself")
         if count > MOST_YAML_PARTS:
-            raise ValueError(f"the document has more than {MOST_YAML_PARTS} parts; do not let aliases repeat aliases")
+            raise ValueError(
+                f"the document has more than {MOST_YAML_PARTS} parts; do not use aliases that contain aliases"
+            )
         return count
 
     size(document)

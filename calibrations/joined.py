@@ -27,7 +27,8 @@ def joined(tables: Sequence[Table]) -> Table:
         if (other.kind, other.axes, other.unit) != (first.kind, first.axes, first.unit):
             raise DataError(
                 f"{other.source}: is a table of {other.kind} along {', '.join(other.axes)}, {first.source} one of "
-                f"{first.kind} along {', '.join(first.axes)}; join tables that are alike"
+                f"{first.kind} along {', '.join(first.axes)}; only tables of the same kind and axes can be "
+                "analysed together"
             )
     columns = {name: np.concatenate([_column(t, name) for t in tables]) for name in _common(tables)}
     if "t_s" in columns:

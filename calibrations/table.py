@@ -235,7 +235,7 @@ def gravity_fault(value: Constant) -> str | None:
     scales = {"g": STANDARD_GRAVITY, "cm/s^2": 1e-2, "mm/s^2": 1e-3}
     likely = next((unit for unit, scale in scales.items() if low <= gravity * scale <= high), None)
     hint = f"it looks like {likely}; " if likely else ""
-    return f"{gravity:g}, not the gravity of a place on Earth; {hint}give it in m/s^2, {low} to {high}"
+    return f"{gravity:g}, which is not gravity at any place on Earth; {hint}give it in m/s^2, {low} to {high}"
 
 
 def _check_columns(table: Table) -> None:
@@ -267,7 +267,7 @@ def guess_kind(names: Iterable[str]) -> str:
     for name in names:
         close = difflib.get_close_matches(name, required, n=1, cutoff=0.65)
         if name not in required and name not in OPTIONAL and close:
-            raise MissingColumn(f'no kind of table has the column "{name}"; did you mean "{close[0]}"?')
+            raise MissingColumn(f'the column name is unknown: "{name}"; did you mean "{close[0]}"?')
     each = [(kind.name, wanted) for kind in FILE_KINDS.values() for wanted in kind.columns]
     kind, wanted = max(each, key=lambda e: sum(name in names for name in e[1]))
     missing = [name for name in wanted if name not in names]
@@ -275,6 +275,6 @@ def guess_kind(names: Iterable[str]) -> str:
         there = f"{kind} need {', '.join(wanted)}; there are: {', '.join(names)}"
         raise MissingColumn(f'the column "{missing[0]}" is missing: {there}')
     raise MissingColumn(
-        f"columns {', '.join(names)} are of no known kind of table; "
+        f"columns {', '.join(names)} do not fit any kind of table; "
         "poses need alpha_deg, beta_deg, vx_v; positions need ax, ay, az"
     )

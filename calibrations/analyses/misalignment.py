@@ -117,7 +117,9 @@ def estimate_directions(table: Table) -> dict[str, Direction]:
     """Of x and of y, from the rounds about the last centre. Raises DataError where no round is complete."""
     number = np.array([_number(path) for path in table.labels.get("path", ())])
     if len(number) != table.n or not table.n:
-        raise DataError(f"{table.source}: is no search for the axes: its poses have no rounds as their paths")
+        raise DataError(
+            f"{table.source}: is not a misalignment run: the column path has no rounds; take a run of `misalignment`"
+        )
     pose = np.column_stack([table.column("alpha_deg"), table.column("beta_deg")])
     rounds = [number == k for k in range(1, number.max() + 1)]
     complete = [rows for rows in rounds if rows.sum() == ROUND_ROWS + ROUND_ROWS // 3]

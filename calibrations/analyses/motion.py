@@ -177,7 +177,7 @@ def evaluate_motion(table: Table, linear: Model, physical: Model, still: Table |
     if np.dot(errors["physical"] + true, true - true.mean()) < 0:
         raise DataError(
             f'{table.source}: the column "displacement_m" falls where the sensor\'s acceleration along x rises; '
-            "change its sign: it grows towards the sensor's +x"
+            "change its sign: positive is towards +x of the sensor"
         )
     edge = int(np.ceil(EDGE_S * record.rate_hz))
     inner = slice(edge, len(true) - edge)

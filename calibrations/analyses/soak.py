@@ -315,7 +315,7 @@ def analyse_soak(table: Table, oven_c: float = 0.0) -> Soak:
         away = np.flatnonzero(np.abs(table.column("temperature_c") - oven_c) > REACHED_K)
         whole[: away[-1] + 1 if len(away) else 0] = False
     if not whole.any():
-        raise TooFewRows(f"{table.source}: holds no reversal; resume the run")
+        raise TooFewRows(f"{table.source}: has no reversal yet; resume the run")
     reversals = table.rows(_complete(table, whole))
     courses: dict[str, Course] = {}
     for axis in (axis for axis in table.axes if axis in AXES):

@@ -53,7 +53,7 @@ def estimate_tumbles(table: Table, axis: str) -> list[Tumble]:
     paths = np.array(table.labels.get("path", ()))
     begun = {name: np.flatnonzero(paths == name) for name in dict.fromkeys(paths.tolist()) if " " in name}
     if not begun:
-        raise DataError(f"{table.source}: there is no tumble yet; resume the run")
+        raise DataError(f"{table.source}: no tumble is complete yet; resume the run")
     missing = {name: _missing(table, rows) for name, rows in begun.items()}
     if all(missing.values()):
         name, where = next(iter(missing.items()))

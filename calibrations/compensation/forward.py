@@ -118,7 +118,7 @@ def known_at_run_time(effect: Effect) -> str:
         return f"inverted sample by sample; {effect.memory} numbers per axis are stored between samples"
     if effect.places & {"force", "transduction", "output"}:
         return "inverted"
-    return "dropped: it is the rig's" if "pose" in effect.places else NOTHING
+    return "dropped: it belongs to the rig, not to the sensor" if "pose" in effect.places else NOTHING
 
 
 def trace_model(model: Model, without: Collection[str] = ()) -> Forward:

@@ -131,11 +131,15 @@ def _why_not(model: Model, within: Range, without: Collection[str], precision: s
     inverted = [fate.effect for fate in trace_model(model, without).fates if fate.how == INVERTED]
     guilty = [n for n in inverted if _bound(trace_model(model, [*without, n]), within, precision) is not None]
     said = (
-        f"{model.name}: the inverse is not contractive within +-{within.reach:g} {unit}: no number of steps is "
-        "provably sufficient"
+        f"{model.name}: the inverse does not converge for certain within +-{within.reach:g} {unit}: no number of "
+        "steps is "
+        "proved to be enough"
     )
     if guilty:
-        return f"{said}. It is without {guilty[-1]}: use --leave-out {guilty[-1]}, which reports the error due to it"
+        return (
+            f"{said}. It converges without {guilty[-1]}: use --leave-out {guilty[-1]}, which reports the error "
+            "due to it"
+        )
     return f"{said}; take a smaller --range, or leave out the most nonlinear effect with --leave-out EFFECT"
 
 

@@ -183,7 +183,7 @@ def predict_data(like: Fit, columns: Mapping[str, Array]) -> Table:
     """
     data = like.table
     if not data.type.stage_angles:
-        raise DataError(f"{data.source}: a fit to {data.kind} foresees no poses; fit the model to poses")
+        raise DataError(f"{data.source}: a fit to {data.kind} cannot predict poses; fit the model to poses")
     names = KINDS["poses"].outputs[: len(data.axes)]
     given = {name: np.asarray(values, dtype=np.float64) for name, values in columns.items() if name != "dwell_s"}
     rows = len(given["alpha_deg"])
@@ -217,7 +217,7 @@ def _noise(like: Fit, columns: Mapping[str, Array], rows: int) -> dict[str, Arra
         return noise
     rate_hz = data.number("sample_rate_hz", 0.0)
     if not rate_hz:
-        raise DataError(f"{data.source}: no sample rate is known; plan `n`, or give `# sample_rate_hz: 1000`")
+        raise DataError(f"{data.source}: the sample rate is unknown; plan `n`, or give `# sample_rate_hz: 1000`")
     return noise | {"n": np.maximum(np.round(np.asarray(columns["dwell_s"]) * rate_hz), 1.0)}
 
 

@@ -113,5 +113,5 @@ def _standardised(found: Fit, problem: Problem) -> Array:
 def _white(problem: Problem) -> Array:
     """Standard deviations of the means, (axes, n). Raises DataError where nothing tells them."""
     if problem.white is None:
-        raise DataError(f"{problem.table.source}: the noise of its means is not known; it needs vx_std_v and n")
+        raise DataError(f"{problem.table.source}: the noise of the means is unknown; give the columns vx_std_v and n")
     return problem.white

@@ -128,7 +128,10 @@ class Dataset(ABC, Generic[F]):
 
     def expression(self, name: str, text: str) -> Effect:  # noqa: ARG002
         """An effect of one's own. Raises ModelError, ExpressionError with the place in the text."""
-        raise ModelError(f"{name}: an expression acts on rows, and {self.source} is a still record")
+        raise ModelError(
+            f"{name}: an expression cannot be added to a noise model, and {self.source} is a still record; use "
+            "poses, positions or rates"
+        )
 
     @property
     def foreseeable(self) -> bool:

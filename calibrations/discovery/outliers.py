@@ -22,10 +22,10 @@ from calibrations.model import Model
 from calibrations.table import Array, Table
 
 NEIGHBOURS = 6
-COUNTED = "(counted from 0, excluded ones too)"
+COUNTED = "(counted from 0, including excluded poses)"
 LEAVE_OUT = (
-    "look at them, then leave them out of every analysis (`rig exclude RUN POSE --reason TEXT`; in a file, a column "
-    "`excluded` that is 1)"
+    "check them; to leave them out of every analysis, use `rig exclude RUN POSE --reason TEXT`, or in a file a column "
+    "`excluded` with 1"
 )
 TO_STD = 1.4826  # median of absolute deviations to standard deviation
 

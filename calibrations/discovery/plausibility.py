@@ -151,7 +151,7 @@ def _silent(output: Array, stated: Response, k: int, name: str, floor: float | N
     if noise and fdtrc(3, n - 4, max(share, 0.0) / 3 / ((1 - share) / (n - 4))) < WEAK_RESPONSE:
         return None
     if noise:
-        return f"{name} holds noise only ({1e3 * spread:.3g} mV rms) while gravity along {AXES[k]} changes"
+        return f"{name} is only noise ({1e3 * spread:.3g} mV rms) while gravity along {AXES[k]} changes"
     return f"{name} does not follow the poses: they explain {share:.0%} of its variation of {1e3 * spread:.3g} mV rms"
 
 
@@ -368,6 +368,6 @@ def _astray(table: Table, found: Response, rows: list[int]) -> str:
     remedy = (
         "the channels are exchanged: exchange the columns vx_v and vy_v, or the channels in the bench file"
         if same
-        else "check how the sensor is turned on the stage (mount_deg) and which channel is which"
+        else "check how the sensor is mounted on the stage (mount_deg) and the assignment of the channels"
     )
     return f"{' and '.join(follow)}; {remedy}"

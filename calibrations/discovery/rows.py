@@ -148,9 +148,9 @@ class Rows(Dataset[Fit]):
         if not hidden:
             return None
         angles = found.table.column("alpha_deg") if found.table.type.stage_angles else np.arange(2.0)
-        one = f" They hold one inclination only, alpha = {angles[0]:g} deg; measure at others."
+        one = f" The data has only one inclination, alpha = {angles[0]:g} deg; measure at other inclinations."
         return (
-            f"With the model {found.model.name}, these effects cannot be tested on these data: {', '.join(hidden)}."
+            f"With the model {found.model.name}, these effects cannot be tested on this data: {', '.join(hidden)}."
             f"{'' if np.ptp(angles) else one}"
         )
 
@@ -394,7 +394,7 @@ def _require_new(found: Fit, name: str, model: str) -> None:
     if all(e.std is None for e in estimates):
         e = estimates[0]
         where = f" of {e.axis}" if e.axis else ""
-        raise ModelError(f"{name} adds nothing that {model} does not have: {e.name}{where}: {e.why}")
+        raise ModelError(f"{name} changes nothing that {model} cannot already describe: {e.name}{where}: {e.why}")
 
 
 def _by_axis(found: Fit, values: Array) -> dict[str, float]:

@@ -179,7 +179,7 @@ def _details(j: Judgement) -> Iterator[str]:
     elif j.left is not None and not j.spoilt:
         yield f"Remaining with them: {j.left}."
     if j.refinements:
-        yield f"For the form of these effects the model also holds {joined(j.refinements)}."
+        yield f"To describe the exact form of these effects, the model also has {joined(j.refinements)}."
     for name in (*j.missing, *j.added):
         if rivals := j.alternatives.get(name):
             yield f"This data cannot separate {name} from {joined(rivals, 'or')}."
@@ -197,5 +197,5 @@ def _remaining(j: Judgement) -> str:
     error = f"{with_them}Remaining error: {j.error:.3g} times {j.floor}"
     if j.left is None:
         return f"{error}. No search for further effects was made." if _incomplete(j) else f"{error}."
-    causes = f" This may be the form of {joined(j.added, 'or')}, or one more cause." if j.added else ""
+    causes = f" The cause may be the exact form of {joined(j.added, 'or')}, or one more effect." if j.added else ""
     return f"{error}: {j.left}.{causes}"

@@ -40,7 +40,7 @@ def catalogue(folder: Path | None = None) -> Mapping[str, Effect]:
             LOG.warning("the Python files in %s are run: the bench file names this folder for effects", folder)
         own = {e.name: e for e in _read_folder(folder, None)}
         if taken := sorted(effects.keys() & own.keys()):
-            raise ModelError(f"{folder}: {', '.join(taken)} is in the catalogue already; give your effect another name")
+            raise ModelError(f"{folder}: {', '.join(taken)} is already in the catalogue; give your effect another name")
         effects |= own
     for effect in effects.values():
         for other in (*effect.after, *effect.contains):
@@ -62,7 +62,7 @@ def read_effect(path: Path) -> Effect:
         raise ModelError(f"{path}: there is no such file; an effect of your own is a Python file")
     effect = _own(path)
     if effect.name in catalogue():
-        raise ModelError(f"{path}: {effect.name} is in the catalogue already; give the file another name")
+        raise ModelError(f"{path}: {effect.name} is already in the catalogue; give the file another name")
     return effect
 
 

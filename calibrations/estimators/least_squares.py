@@ -50,7 +50,7 @@ def least_squares(matrix: Array, measured: Array, variances: Array | float = 1.0
     triangle = np.asarray(np.linalg.qr(np.column_stack([matrix, measured]) / std[:, None], mode="r"))
     diagonal = np.abs(np.diag(triangle)[:n])
     if len(diagonal) < n or diagonal.min() <= SMALLEST_DIAGONAL * diagonal.max():
-        raise TooFewRows(f"the measurements do not determine {n} unknowns; measure more, or at other places")
+        raise TooFewRows(f"the measurements do not determine {n} unknowns; measure more, or at other conditions")
     inverse = solve_triangular(triangle[:n, :n], np.eye(n))
     left = triangle[n:, n]
     return Estimate(inverse @ triangle[:n, n], inverse @ inverse.T, float(left @ left), m - n)

@@ -62,8 +62,8 @@ def undetermined(found: Fit) -> str | None:
     rows = "positions" if found.table.type.magnitude else "rows"
     times = f"{np.sqrt(variance):.1f}" if variance < 1e4 else "many"
     return (
-        f"the {len(found.theta)} parameters are not identifiable from these {rows}: {found.table.n} of them, and an "
-        f"unseen one is predicted {times} times worse than noise alone would make it; measure at more orientations"
+        f"the {len(found.theta)} parameters are not identifiable from {found.table.n} {rows}: the prediction of "
+        f"another one is {times} times less certain than one measurement; measure at more orientations"
     )
 
 
@@ -73,9 +73,9 @@ def _unchecked(found: Fit, lone: NDArray[np.bool_]) -> str:
     paths = found.table.labels.get("path")
     which = [paths[k] for k in rows] if paths else [f"row {number}" for number in found.table.numbered(rows)]
     return (
-        f"nothing checks all of the {len(found.theta)} parameters: {lone.sum()} of the {lone.size} measured values "
-        f"({', '.join(which)}) are each the only one that tells a parameter, and are met whatever they are; measure "
-        "the like of them again"
+        f"the fit cannot check all of the {len(found.theta)} parameters: {lone.sum()} of the {lone.size} measured "
+        "values "
+        f"({', '.join(which)}) each determine one parameter alone; repeat these measurements"
     )
 
 

@@ -74,11 +74,11 @@ def _why_not(k: int, layout: Layout, std: Array, free: Array) -> str | None:
         partners = [_label(layout, s) for j, s in enumerate(layout.slots) if j != k and tied[j]]
         if not partners:
             return "it changes nothing in this data"
-        return f"on this data it cannot be told from {', '.join(partners)}"
+        return f"on this data it cannot be separated from {', '.join(partners)}"
     if std[k] >= layout.typical[k]:
         return (
-            f"not identifiable from these positions: its standard uncertainty {std[k]:.2g} is no smaller than what a "
-            f"sensor may show ({layout.typical[k]:.2g}); measure at more orientations"
+            f"not identifiable from these positions: its standard uncertainty {std[k]:.2g} is not smaller than a "
+            f"typical value ({layout.typical[k]:.2g}); measure at more orientations"
         )
     return None
 

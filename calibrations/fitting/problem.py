@@ -61,7 +61,8 @@ class Problem:
         model = model.for_table(table)
         if not model.terms:
             raise ModelError(
-                f"{table.source}: no effect of {model.name} is defined for {table.content}; `rig models` lists others"
+                f"{table.source}: no effect of the model {model.name} exists for {table.content}; `rig models` "
+                "lists others"
             )
         layout = Layout.of(model, table)
         found = problem(table, layout)
@@ -192,7 +193,7 @@ class RateProblem(Problem):
     @staticmethod
     def check(model: Model, table: Table) -> None:  # noqa: ARG004
         """Raises DataError for an output that never changes."""
-        _check_changes(table, "a table that turns changes each output that senses it")
+        _check_changes(table, "each gyroscope output must change when the table turns")
 
 
 class PositionProblem(Problem):
@@ -206,7 +207,7 @@ class PositionProblem(Problem):
                 f"{table.source}: models of positions need the columns ax, ay, az, or mx, my, mz; "
                 f"it has: {', '.join(table.columns)}"
             )
-        _check_changes(table, "positions turn each axis up and down")
+        _check_changes(table, "each axis must point up and down in the positions")
 
     @property
     def channels(self) -> tuple[str, ...]:

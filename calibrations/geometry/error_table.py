@@ -43,14 +43,14 @@ class ErrorTable:
     def __post_init__(self) -> None:
         values = np.array(self.points, dtype=np.float64).reshape(-1, len(COLUMN_NAMES))
         if not len(values):
-            raise DataError(f"an error table needs points: {', '.join(COLUMN_NAMES)}")
+            raise DataError(f"the error table is empty; give points with the columns {', '.join(COLUMN_NAMES)}")
         if not np.isfinite(values).all() or (values[:, 2] < 0).any():
-            raise DataError("an error table takes finite numbers, and standard uncertainties of 0 or more")
+            raise DataError("the error table has a value that is not finite, or a standard uncertainty below 0")
         angles, errors, _ = self._nodes
         back = np.flatnonzero(np.diff(angles + errors) <= 0)
         if back.size:
             at = angles[back[0]] % TURN_DEG
-            raise DataError(f"an error table makes the stage turn back after {at:g} deg; are its errors in deg?")
+            raise DataError(f"with this error table the stage turns backwards after {at:g} deg; are its errors in deg?")
 
     @cached_property
     def _nodes(self) -> tuple[Array, Array, Array]:
@@ -85,7 +85,7 @@ class ErrorTable:
             first = lost[0]
             raise DataError(
                 f"at {named[first]:g} deg the stage's error table has no point between {below[first]:g} and "
-                f"{above[first]:g} deg; measure there, or choose angles that it holds"
+                f"{above[first]:g} deg; measure there, or choose angles within the table"
             )
         return np.where(inside, at, near)
 

@@ -77,7 +77,7 @@ def specific_force_g(table: Table) -> Array:
         return (a - held.bias) / held.scale
     gravity = float(np.median(np.linalg.norm(a, axis=1)))
     if not gravity > 0:
-        raise DataError(f"{table.source}: ax, ay and az are 0; leave the columns out where no accelerometer was read")
+        raise DataError(f"{table.source}: ax, ay and az are 0; remove the columns if there was no accelerometer")
     return np.asarray(a / gravity)
 
 
@@ -86,8 +86,8 @@ def earth_rate_warning(table: Table) -> str | None:
     if not table.type.turning or "latitude_deg" in table.constants:
         return None
     return (
-        f"the earth's rotation, {EARTH_DEG_S:.4f} deg/s at most, is not taken off the rates, as the latitude is not "
-        "known: it is in the bias; give the constant latitude_deg"
+        f"the earth's rotation, {EARTH_DEG_S:.4f} deg/s at most, is part of the bias here, because the latitude is "
+        "unknown; give the constant latitude_deg"
     )
 
 
@@ -95,7 +95,8 @@ def _changing(table: Table) -> Array:
     rate = table.column("rate_deg_s")
     if not np.ptp(rate):
         raise DataError(
-            f'{table.source}: the column "rate_deg_s" never changes; a gyroscope is turned at several rates, both ways'
+            f'{table.source}: the column "rate_deg_s" never changes; turn the gyroscope at several rates, in both '
+            "directions"
         )
     return rate
 
@@ -120,7 +121,7 @@ def _upright(table: Table) -> Array:
     oblique = (np.abs(up[rows, nearest]) < UPRIGHT_COSINE) & (table.column("rate_deg_s") != 0)
     if oblique.any():
         raise DataError(
-            f"{table.source}: row {int(np.argmax(oblique)) + 1} was turned while no edge of the sensor stood upright; "
+            f"{table.source}: row {int(np.argmax(oblique)) + 1} is a turn without a vertical edge of the sensor; "
             "give the axis of each turn in the columns axis_x, axis_y, axis_z"
         )
     axis = np.zeros_like(up)

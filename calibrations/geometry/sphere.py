@@ -18,7 +18,7 @@ from calibrations.table import Array, Table
 HARD_IRON, SOFT_IRON = 1, 2  # highest degree of what they add to the magnitude
 REMEDIES = {
     HARD_IRON: "turn the sensor about two axes at least",
-    SOFT_IRON: "turn the sensor about three axes, each of its sides up and down",
+    SOFT_IRON: "turn the sensor about three axes, with each side up and down",
 }
 
 
@@ -27,10 +27,10 @@ def coverage_fault(table: Table, degree: int) -> str | None:
     found = worst_ratio(directions(table), degree)
     if found <= MOST_WORSE_COVERED:
         return None
-    times = f"{found:.0f} times worse than from as many on all sides, and {MOST_WORSE_COVERED:g} times is the limit"
-    known = times if found < 1e4 else "not at all"
+    times = f"{found:.0f} times less certain than with all directions covered (limit: {MOST_WORSE_COVERED:g} times)"
+    known = times if found < 1e4 else "unknown"
     return (
-        f"the orientations cover too little of the sphere: something in it would be known {known}; {REMEDIES[degree]}"
+        f"the orientations cover too little of the sphere: a combination of parameters is {known}; {REMEDIES[degree]}"
     )
 
 
@@ -40,7 +40,7 @@ def magnetometer_coverage_warning(table: Table) -> str | None:
         return None
     for degree, what in ((HARD_IRON, "hard-iron and soft-iron"), (SOFT_IRON, "soft-iron")):
         if why := coverage_fault(table, degree):
-            return f"{what} cannot be asked: {why}; until then every value is that of a sensor without it"
+            return f"{what} cannot be tested: {why}; the values assume a sensor without this effect"
     return None
 
 

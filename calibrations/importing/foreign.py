@@ -229,7 +229,7 @@ def drop_duplicate_rows(table: Table) -> tuple[Table, str | None]:
     what = "copies an earlier row" if len(copies) == 1 else "copy earlier rows"
     rows_said = f"row{'s' if len(copies) > 1 else ''} {', '.join(pairs)}{more}"
     return table.rows(np.sort(first)), (
-        f"{table.source}: {rows_said} {what} (same time, same digits); each is used once."
+        f"{table.source}: {rows_said} {what} (same time, same values); each is used once."
     )
 
 

@@ -327,7 +327,7 @@ def _suggestion(laid: Sheet, tried: Attempt) -> str:
     if tried.refused:
         return f"\nThe most likely import fails: {tried.refused}{line}"
     fill = f" (put {'; '.join(_placeholders(tried, free))})" if tried.lacking or tried.unknown else ""
-    return f"\nBy names and values, this import is likely{fill}:{line}"
+    return f"\nThe names and values suggest this import{fill}:{line}"
 
 
 def _placeholders(tried: Attempt, free: Sequence[str]) -> list[str]:

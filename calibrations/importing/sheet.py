@@ -69,7 +69,7 @@ def _written(document: Any, name: str) -> str:
         document = {key: [row.get(key) for row in document] for key in document[0]}
     arrays = {k: v for k, v in document.items() if isinstance(v, list) and v} if isinstance(document, dict) else {}
     if not arrays:
-        raise DataError(f"{name}: holds no arrays of measurements; {JSON_FORM}")
+        raise DataError(f"{name}: has no arrays of measurements; {JSON_FORM}")
     lengths = {key: len(values) for key, values in arrays.items()}
     if len(set(lengths.values())) > 1:
         raise DataError(f"{name}: arrays of different length: {lengths}")
@@ -177,7 +177,7 @@ def read_sheet(source: Source) -> Sheet:
         raise DataError(_another_width(source.name, *below[0], header))
     if not any(is_number(cell) for cells in sample for cell in cells):
         raise DataError(
-            f"{source.name}: holds no numbers in its first {len(sample)} rows; a table of measurements has a header "
+            f"{source.name}: has no numbers in its first {len(sample)} rows; a table of measurements has a header "
             "line with column names, and rows of numbers below it"
         )
     return Sheet(

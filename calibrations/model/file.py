@@ -96,7 +96,7 @@ def parse_model(text: str, source: str, effects: Mapping[str, Effect] | None = N
     names = [term.name for term in terms]
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
-        raise ModelError(f'{source}: the effect "{twice}" stands in the model twice')
+        raise ModelError(f'{source}: the effect "{twice}" occurs twice in the model')
     return Model(content.name, terms, content.unit, content.provenance, content.covered)
 
 
@@ -126,7 +126,7 @@ def _term(entry: _Effect, source: str, known: Mapping[str, Effect], unit: str) -
 
 def _known(entry: _Effect, source: str, known: Mapping[str, Effect]) -> Effect:
     if entry.columns:
-        raise ModelError(f"{source}: {entry.effect} has columns, and no expression that they stand in")
+        raise ModelError(f"{source}: {entry.effect} has columns but no expression that uses them")
     try:
         return find(entry.effect, known)
     except UnknownName as error:
@@ -138,7 +138,7 @@ def _known(entry: _Effect, source: str, known: Mapping[str, Effect]) -> Effect:
 def _written(entry: _Effect, source: str, known: Mapping[str, Effect]) -> Effect:
     """The effect of an expression: all of it is in the file, and nothing in the file is run."""
     if entry.effect in known:
-        raise ModelError(f"{source}: {entry.effect} is known already; an expression needs a name of its own")
+        raise ModelError(f"{source}: {entry.effect} is already the name of an effect; give the expression another name")
     try:
         return own_effect(entry.effect, entry.expression or "", tuple(entry.columns))
     except ModelError as error:
@@ -153,7 +153,7 @@ def _check_parameters(entry: _Effect, effect: Effect, where: str) -> None:
         if declared[p.name] and p.axis is None:
             raise ModelError(f'{where}: "{p.name}" has one value for each axis; it needs `axis: x`, y or z')
         if not declared[p.name] and p.axis is not None:
-            raise ModelError(f'{where}: "{p.name}" has one value and no axis; it stands for axis {p.axis}')
+            raise ModelError(f'{where}: "{p.name}" is one value for all axes; remove the key axis, which is {p.axis}')
     given = [(p.name, p.axis) for p in entry.parameters]
     if twice := next((key for key in given if given.count(key) > 1), None):
         raise ModelError(f"{where}: {' '.join(filter(None, twice))} is given twice")
@@ -172,7 +172,7 @@ def _unit(given: _Parameter, effect: Effect, unit: str, where: str) -> str:
         return own
     parameter = " ".join(filter(None, (f'the unit of "{given.name}"', given.axis)))
     if not known:
-        raise ModelError(f"{where}: {parameter} is {given.unit}; give the unit of the outputs too, such as `unit: V`")
+        raise ModelError(f"{where}: {parameter} is {given.unit}; also give the unit of the outputs, such as `unit: V`")
     condition = f" in a model with `unit: {unit}`" if "{out}" in declared else ""
     raise ModelError(
         f"{where}: {parameter} is {given.unit}, and must be {own}{condition}; "

@@ -15,7 +15,7 @@ from calibrations.result import Shown
 from calibrations.table import Table
 from calibrations.text import columns, concise
 
-NOT_FITTED = 'the model has no values yet, and none for "{}"; fit it to data first'
+NOT_FITTED = 'the model has no value for "{}"; fit it to data first'
 
 
 @dataclass(frozen=True)

@@ -89,7 +89,7 @@ def find_sines(t_s: Array, x: Array) -> tuple[Sine, ...]:
 def strongest_line(t_s: Array, x: Array) -> tuple[float, float]:
     """Frequency of the strongest line above drift, and its power over the median of its neighbours."""
     if len(x) < 8:
-        raise DataError(f"{len(x)} samples are too few for a sine; it takes 8")
+        raise DataError(f"{len(x)} samples are too few for a sine fit; at least 8 are needed")
     f, power = periodogram(x, (len(t_s) - 1) / float(np.ptp(t_s)))
     first = min(FEWEST_MOTION_PERIODS, len(f) - 2)
     k = first + int(np.argmax(power[first:-1]))
@@ -111,7 +111,7 @@ def _refit_each(t_s: Array, x: Array, found: list[Sine]) -> list[Sine]:
 
 def _fitted(t_s: Array, x: Array, frequency_hz: float, free: bool) -> Sine:
     if len(x) < 8:
-        raise DataError(f"{len(x)} samples are too few for a sine; it takes 8")
+        raise DataError(f"{len(x)} samples are too few for a sine fit; at least 8 are needed")
     middle, rate_hz = float(t_s.mean()), (len(t_s) - 1) / float(np.ptp(t_s))
     t, turn = t_s - middle, 2 * np.pi * frequency_hz
     for _ in range(ROUNDS):

@@ -54,7 +54,7 @@ def find_records(table: Table) -> tuple[Record, ...]:
         row = int(np.argmax(np.diff(t) < 0)) + 2
         raise DataError(f'{table.source}: row {row}, column "t_s" falls; samples must be in order of time')
     if table.n < 2 or not t[-1] > t[0]:
-        raise TooFewRows(f"{table.source}: {table.n} samples at one time are no record of a motion")
+        raise TooFewRows(f"{table.source}: {table.n} samples all have the same time; this not a record of a motion")
     step = float(np.median(np.diff(t))) or float(t[-1] - t[0]) / (table.n - 1)
     cut = np.diff(t) > LONGEST_STEP * step
     for name in SAME_RATE:

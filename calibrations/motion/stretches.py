@@ -159,7 +159,7 @@ def make_stretches(table: Table) -> Stretches:
     length_s = _length_s(found, made)
     cuts = list(_cuts(samples, length_s))
     if len(cuts) < FEWEST_MOTION_STRETCHES:
-        raise TooFewRows(f"{table.source}: the record holds only {len(cuts)} stretches of motion; record it longer")
+        raise TooFewRows(f"{table.source}: the record has only {len(cuts)} stretches of motion; record it longer")
     lines = _shown(samples, residual_lines(samples, made, expected, length_s), cuts, slope * expected)
     return _rows(table, samples, lines, cuts, slope)
 

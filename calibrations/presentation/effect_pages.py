@@ -20,12 +20,12 @@ from calibrations.presentation.charts.signature import noise_signature_chart, sh
 from calibrations.presentation.static import sparing, svg
 
 ACTS_ON = {
-    "pose": "the pose: where the stages and the vertical really are",
-    "force": "the specific force: what of it each sensing axis feels",
+    "pose": "the pose: the true position of the stages and of the vertical",
+    "force": "the specific force: its component along each sensing axis",
     "transduction": "the transduction: from specific force to output",
-    "output": "the output: what becomes of it before it is a number",
+    "output": "the output: filter, converter and other changes after the transduction",
     "spectrum": "the spectrum of a still record: noise",
-    "lines": "the spectrum of a still record: lines in it",
+    "lines": "the spectrum of a still record: tones",
 }
 
 SOURCES = """
@@ -113,8 +113,9 @@ def _caption_of_noise(effect: Effect) -> str:
     own = {p.name: p.unit.replace("{out}", "V") for p in effect.parameters}
     values = [f"{name.replace('_', ' ')} {value:g} {own[name]}" for name, value in shown_noise(effect).items()]
     return (
-        "Allan deviation, and one-sided density, of a still record at 10 Hz: broken of white noise alone (coefficient "
-        f"1 V/sqrt(Hz)), full with {', '.join(values)}{'' if effect.name == 'white-noise' else ' beside it'}."
+        "Allan deviation, and one-sided density, of a still record at 10 Hz: broken line: white noise alone "
+        "(coefficient "
+        f"1 V/sqrt(Hz)); full line: with {', '.join(values)}{'' if effect.name == 'white-noise' else ' beside it'}."
     )
 
 

@@ -16,11 +16,11 @@ class Motion(Kind):
     size_in = "samples"
     note = (
         "The model is fitted to this motion, and its error is that of the fit. The report of the run also compares the "
-        "models of the run's sweep with the displacement sensor: they are not fitted to the motion, so that their "
+        "models of the run's sweep with the displacement sensor. Those are not fitted to the motion, so their "
         "error also contains changes since the sweep and the error of the reference."
     )
     moving = True
-    measurement_caption = "Output over a few periods, less its mean: dots are measured, lines are the model {}."
+    measurement_caption = "Output over a few periods without its mean: measured (dots) and model (lines) {}."
     failure_caption = (
         "Mean residual of the model {} over one period of the motion's strongest line, with the noise of the mean."
     )

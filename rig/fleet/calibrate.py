@@ -186,4 +186,4 @@ def _rigs(path: Path) -> Mapping[str, StageErrors]:
             )
         return dict(said["rigs"])
     except (ValueError, KeyError, TypeError) as error:
-        raise ModelError(f"{path}: is no list of rigs' errors ({error}); write it by `rig fleet discover`") from None
+        raise ModelError(f"{path}: is not a list of rig errors ({error}); write it by `rig fleet discover`") from None

@@ -24,7 +24,7 @@ AHEAD = 3  # chunks on their way for each thread of a worker
 PATIENCE_S = 10  # for a scheduler to answer
 FEW = 10  # messages that Dask keeps of each connection: they hold the tables that were sent, and memory would grow
 
-LOST = "the scheduler is lost; what was done is in the record: give the same command again"
+LOST = "the connection to the scheduler is lost; finished work is in the record: run the same command again"
 
 T = TypeVar("T")
 
@@ -59,7 +59,7 @@ def crew(scheduler: str | None, workers: int | None) -> Iterator[Client]:
             try:
                 client = Client(scheduler, timeout=PATIENCE_S)
             except (OSError, ValueError) as error:
-                raise FleetError(f"{scheduler}: no scheduler answers there ({error}); look at its address") from None
+                raise FleetError(f"{scheduler}: no scheduler answers there ({error}); check its address") from None
             with client:
                 yield client
             return

@@ -62,7 +62,7 @@ def fleet_of(sources: Iterable[str]) -> list[Member]:
     for member in unique:
         if (other := seen.setdefault(member.sensor, member)) is not member:
             raise RigError(
-                f"the sensor {member.sensor} is there twice: {other.data} and {member.data}; "
+                f"the sensor {member.sensor} occurs twice: {other.data} and {member.data}; "
                 "give each its name in the column `sensor` of an index, or leave one out"
             )
     return unique
@@ -109,10 +109,12 @@ def _of_index(path: Path) -> Iterator[Member]:
             name.strip(): (cell or "").strip() for name, cell in row.items() if isinstance(cell, str | None) and name
         }
         if unknown := set(said) - set(COLUMNS):
-            raise RigError(f"{path}: an index has the columns {', '.join(COLUMNS)}, not {', '.join(sorted(unknown))}")
+            raise RigError(
+                f"{path}: an index can have the columns {', '.join(COLUMNS)}, but not {', '.join(sorted(unknown))}"
+            )
         named = said.get("file") or said.get("data")
         if not named:
-            raise RigError(f"{path}, line {number}: names no file and no run; fill in the column `file` or `data`")
+            raise RigError(f"{path}, line {number}: has no file and no run; fill in the column `file` or `data`")
         beside = path.parent / named
         known = {name: said[name] for name in ("sensor", "batch", "rig") if said.get(name)}
         if said.get("file") or beside.is_file():

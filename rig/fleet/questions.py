@@ -72,7 +72,7 @@ def kept(record: Record, keys: Sequence[str]) -> dict[str, Any]:
 
 CHUNK = {"look": 20, "diagnosis": 4}  # sensors of one task: about half a second's work
 SLICE = 100  # sensors that the record is asked for at a time
-KILLED = "its data kill the process that works on them; send them to a maintainer with `rig doctor`"
+KILLED = "its data ends the worker process; send the data to a maintainer with `rig doctor`"
 Tell = Callable[[int, int], None]
 
 

@@ -150,8 +150,8 @@ def _checked(table: Table, model: Model) -> Table:
         raise DataError(_instead(table.source, table.kind))
     if not model.for_table(table).terms:
         raise ModelError(
-            f"{table.source}: {model.name} is no model of {table.content}; make these sensors a fleet of their own, "
-            f"with --model {table.type.default_model}"
+            f"{table.source}: {model.name} is not a model of {table.content}; put these sensors into a separate "
+            f"fleet with --model {table.type.default_model}"
         )
     check_unit(model, table.unit, table.source)
     return table
@@ -160,8 +160,8 @@ def _checked(table: Table, model: Model) -> Table:
 def _instead(source: str, kind: str) -> str:
     command = "discover" if kind in FITTED else "noise"
     return (
-        f"{source}: is a table of {kind}, and fleets have {joined(list(MEANS))}; leave it out, and ask for it "
-        f"alone: rig {command} {source}"
+        f"{source}: is a table of {kind}, and a fleet can have {joined(list(MEANS))}; leave it out, and analyse "
+        f"it alone: rig {command} {source}"
     )
 
 

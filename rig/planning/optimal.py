@@ -150,7 +150,9 @@ def _dwell_s(over: Range, chosen: Sequence[Pose]) -> float:
     """All dwells together at equal worst standard error: in any order about the same. Raises PlanError."""
     unordered = over.judged(_listing(over.settings, chosen))
     if lost := [over.name(int(k)) for k in np.flatnonzero(over.standard.told & ~unordered.told)]:
-        raise PlanError(f"{len(chosen)} poses do not tell {', '.join(lost)}, as the sweep does; choose more of them")
+        raise PlanError(
+            f"{len(chosen)} poses do not determine {', '.join(lost)}, but the sweep does; choose more poses"
+        )
     return len(chosen) * _longer(unordered.dwell_s, relative(over.standard, unordered))
 
 

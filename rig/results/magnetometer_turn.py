@@ -66,7 +66,8 @@ def evaluate(measured: Measured) -> dict[str, Result | Missing]:
     table, poses = measured.table(), [kept.pose for kept in measured.kept()]
     if poses[0].up != "z":
         raise DataError(
-            f"run {measured.name} holds nothing of the turn about z any more; rig exclude --include takes it in again"
+            f"run {measured.name} has no pose of the turn about z: all are excluded; take them in again with rig "
+            "exclude --include"
         )
     names, std_v = [p.path for p in poses], _std_v(table)
     extremes = iron_by_extremes(table.outputs, [p.up for p in poses], names, std_v)
@@ -132,7 +133,7 @@ def _by_extremes(found: ExtremesEstimate, level: Elements, noise_v: float) -> di
         results[f"hard-iron-by-hand-{axis}"] = (
             Result(value, "V", std)
             if np.isfinite(value)
-            else Missing(f"{axis} was upright throughout; use more mounts")
+            else Missing(f"{axis} was vertical in every turn; use more mounts")
         )
     soft = found.soft_iron
     ratio, noise = soft.least / soft.greatest, noise_v * hypot(1 / soft.least, 1 / soft.greatest)

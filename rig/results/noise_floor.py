@@ -23,7 +23,7 @@ def evaluate(measured: Measured) -> dict[str, Result | Missing]:
     for kept in measured.kept():
         (still if kept.pose.path.startswith(STILL) else upright).append(kept)
     if not still:
-        raise DataError(f"run {measured.run.run} holds no still record yet; `rig resume` goes on with it")
+        raise DataError(f"run {measured.run.run} has no still record yet; `rig resume` continues it")
     first, results = still[0].samples, dict[str, Result | Missing]()
     for axis in UPRIGHT_DEG:
         if (channel := f"v{axis}") not in first.channels:

@@ -30,5 +30,5 @@ def _result(found: tuple[float, float | None], unit: str) -> Result | Missing:
     """A spread of zero without an uncertainty would pass any limit."""
     spread, std = found
     if std is None:
-        return Missing("all repetitions are equal and their noise is not known; repeat with more digits or samples")
+        return Missing("all repetitions are equal and their noise is unknown; record more digits or more samples")
     return Result(spread, unit, std)

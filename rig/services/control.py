@@ -50,7 +50,7 @@ def controlled(
     charted = {key: mine for key, mine in of.items() if len(mine) >= FEWEST_RUNS}
     if not charted:
         names = ", ".join(dict.fromkeys(sensor for sensor, _ in chosen))
-        raise RecordError(f"{names}: {FEWEST_RUNS} check-standard runs at least make a chart; there is one so far")
+        raise RecordError(f"{names}: {FEWEST_RUNS} check-standard runs are needed for a chart; there is one")
     return [_controlled(*key, mine, baseline) for key, mine in charted.items()]
 
 

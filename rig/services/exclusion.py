@@ -47,4 +47,4 @@ def _evaluate_again(record: Record, run: Run) -> None:
         record.set_results(run.run, results)
         record.note(run.run, RESULTS, why or "evaluated again")
     elif run.results:
-        record.note(run.run, RESULTS, "given by the procedure itself, which knew all poses; not evaluated again")
+        record.note(run.run, RESULTS, "computed by the procedure during the run from all poses; not evaluated again")

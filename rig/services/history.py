@@ -199,7 +199,7 @@ def _runs(record: Record, sensor: str) -> list[tuple[str, Run]]:
 
 
 def _none(record: Record, sensor: str, passed_over: Mapping[str, str]) -> RecordError:
-    reasons = f" Its runs are none by this model: {next(iter(passed_over.values()))}" if passed_over else ""
+    reasons = f" This model cannot use its runs: {next(iter(passed_over.values()))}" if passed_over else ""
     known = sensors(record.runs())
     nearest = "" if sensor in known else did_you_mean(sensor, known)
     return RecordError(f"no calibration of the sensor {sensor!r} in the record.{reasons}{nearest}")
@@ -280,7 +280,7 @@ def _change(text: str) -> tuple[str, float]:
     except ValueError:
         change = math.nan
     if not math.isfinite(change):
-        raise RigError(f"the limit {text!r} is none: write NAME=CHANGE, as in bias-x=0.005")
+        raise RigError(f"the limit {text!r} is not valid: write NAME=CHANGE, as in bias-x=0.005")
     return name, change
 
 

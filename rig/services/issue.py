@@ -177,13 +177,13 @@ def _simulated(run: Run | None) -> list[str]:
 
 def _remarks(run: Run | None, stated: bool) -> Iterator[str]:
     if roles := _simulated(run):
-        yield f"Simulated were: {', '.join(roles)}. This certifies nothing of any sensor."
+        yield f"These instruments were simulated: {', '.join(roles)}. This document certifies no sensor."
     if run is not None and EXPIRED in run.constants:
-        yield f"{run.constants[EXPIRED]}: what was measured with it is not traceable by it."
+        yield f"{run.constants[EXPIRED]}: measurements with it are not traceable."
     if run is not None and run.state != "complete":
-        yield f"The run is {run.state}, and the certificate is of what it holds."
+        yield f"The run is {run.state}; the certificate covers the data that it has."
     if not stated:
-        yield "The bench file does not say which laboratory this is (its key laboratory)."
+        yield "The bench file does not name the laboratory (key laboratory)."
 
 
 def _samples(table: Table, measured: Measured | None) -> Iterator[Sample]:

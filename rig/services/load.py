@@ -100,13 +100,15 @@ def rows_of(request: Request, effects: Mapping[str, Effect], tell: Tell) -> Tabl
     """The table of a request, with remarks on its noise."""
     if request.channel or request.rate_hz:
         raise DataError(
-            f"{request.data}: --channel and --rate are for still records, and this is none (or name --model still)"
+            f"{request.data}: --channel and --rate are for still records only; this is not one (for samples at "
+            "rest, give --model still)"
         )
     table = with_known_noise(load(request.data, tell=tell), request.noise, effects)
     if table.type.stage_angles and not correlation_known(table):
         tell(
-            f"{table.source}: how the samples of a mean correlate is not known, and they are taken as independent; "
-            "scatter of the poses beyond that counts as noise. Give the constants filter_corner_hz and sample_rate_hz."
+            f"{table.source}: the correlation of the samples in a mean is unknown. The fit assumes independent "
+            "samples, and adds any further scatter of the poses to the noise. Give the constants "
+            "filter_corner_hz and sample_rate_hz."
         )
     for why in filter(None, (earth_rate_warning(table), table_noise.scatter_remark(table), doubt(table))):
         tell(f"{table.source}: {why}.")
@@ -122,7 +124,7 @@ def _still(request: Request, chosen: Model | None, tell: Tell) -> Dataset[Any]:
     from calibrations.noise.fit import noise_terms
 
     if request.noise is not None:
-        raise ModelError("--noise is for poses and rates; the model of a still record is named with --model")
+        raise ModelError("--noise is for poses and rates; for a still record, give --model")
     if chosen is not None:
         noise_terms(chosen)
     return StillRecord(still_of(request, tell))
@@ -157,7 +159,7 @@ def still_of(
         tell(text)
     if np.isfinite(first.corner_hz):
         tell(
-            f"Coefficients are those before the {first.corner_hz:g} Hz low-pass of the output, "
+            f"The coefficients are those before the {first.corner_hz:g} Hz low-pass of the output, "
             f"fitted below {first.corner_hz / 2:.3g} Hz."
         )
     return replace(still, sensed=sensed)

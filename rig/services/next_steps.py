@@ -13,21 +13,23 @@ from rig.record import Run
 SPREADS = re.compile("tolerance|wander")  # uncertainties themselves: two digits
 # By the name of a result that is beyond its limit: what to look at. The first that fits counts.
 REMEDIES = {
-    r"level-offset": "the half turn takes the level's own offset out of the tilt; have the level adjusted",
+    r"level-offset": "the half turn removes the offset of the level from the tilt; have the level adjusted",
     r"level-": "level the base, set the zero of alpha, then: rig run level-check",
     r"noise-(rms|pp)|inclination": "look for vibration, loose cables and a noisy supply, then measure again",
-    r"theta-|alpha-|beta-|non-orthogonality|correction": "seat the sensor anew and search again; what stays is its "
-    "own, and the results named correction take it out",
+    r"theta-|alpha-|beta-|non-orthogonality|correction": "mount the sensor again and repeat the search; a part "
+    "that remains belongs to the sensor, and the results named correction remove it",
     r"(bias|scale)-temperature": "correct for temperature: rig discover {run} finds the effect and its size",
-    r"(bias|scale)-(as-is|power|mount)": "look at screws, connector and supply, and let it warm up: rig run soak",
+    r"(bias|scale)-(as-is|power|mount)": "check screws, connector and supply, and let the sensor warm up: rig run soak",
     r"rmse|improvement|amplitude|noise-limit": "see where the model fails: rig compare {run}; "
-    "then how sensor and displacement sensor sit on the carriage",
-    r"(hard|soft)-iron|left-by|field-": "move iron and magnets away from the sensor; what turns with it is in "
-    "the model of rig fit {run} --model magnetometer",
-    r"gyro-|rate-": "seat the sensor anew; what stays is its own, and rig discover {run} makes the model of it",
-    r"drift|steady|time-constant|wander": "let it warm up longer, away from drafts, before it is used or calibrated",
-    r"gap": "the run was interrupted: rig show {run} says when",
-    r"": "look for poses unlike the others: rig show {run} --poses; rig exclude leaves one out, with a reason",
+    "then check how sensor and displacement sensor are mounted on the carriage",
+    r"(hard|soft)-iron|left-by|field-": "move iron and magnets away from the sensor; iron that turns with it is "
+    "in the model: rig fit {run} --model magnetometer",
+    r"gyro-|rate-": "mount the sensor again; a part that remains belongs to the sensor: rig discover {run} finds "
+    "its model",
+    r"drift|steady|time-constant|wander": "let the sensor warm up longer, away from drafts, before use or calibration",
+    r"gap": "the run was interrupted: rig show {run} shows when",
+    r"": "look for poses that differ from the others: rig show {run} --poses; rig exclude leaves one out, with "
+    "a reason",
 }
 LENGTHS = ("duration_s", "times", "cycles", "most_rounds", "dwell_s")  # settings by which a procedure measures longer
 LONGER = 4  # times as long halves a statistical uncertainty
@@ -60,8 +62,8 @@ def _marginal(run: Run) -> Iterator[str]:
         longer = f" (--{setting.replace('_', '-')} {LONGER * run.settings[setting]:g})" if setting else ""
         verb = "reach" if len(names) > 1 else "reaches"
         yield (
-            f"Marginal: {joined(names)} {verb} across the limit with its uncertainty: measuring {LONGER} times as long"
-            f"{longer} halves that"
+            f"Marginal: {joined(names)} {verb} across the limit with its uncertainty; {LONGER} times the duration"
+            f"{longer} halves the uncertainty"
         )
 
 
@@ -73,7 +75,7 @@ def _unjudged(results: Mapping[str, Any]) -> Iterator[str]:
     """That a result without a limit has no verdict, and how it gets one."""
     free = [name.rpartition("/")[2] for name, result in results.items() if result["limit"] is None]
     if free:
-        yield f"No verdict without a limit: limits.results of the bench file takes them, such as `{free[0]}: ...`"
+        yield f"No verdict without a limit: add one to limits.results of the bench file, such as `{free[0]}: ...`"
 
 
 def _commands(run: Run) -> Iterator[str]:

@@ -64,7 +64,7 @@ class ModelSession(Generic[F]):
     def tried(self, effect: Effect) -> Step[F]:
         """The present model with one effect more, fitted. Raises ModelError where that says nothing new."""
         if self.end.model.holds(effect.name):
-            raise ModelError(f"{effect.name} is in the model already")
+            raise ModelError(f"{effect.name} is already in the model")
         plan = self._plan()
         if plan is not None and plan.names[:1] == (effect.name,):
             return plan.steps[0]

@@ -78,7 +78,7 @@ def repairs(samples: Stream, n: int) -> Iterable[str]:
         missing = sum(length for _, length in samples.closed)
         gaps = "a gap is" if len(samples.closed) == 1 else f"{len(samples.closed)} gaps are"
         yield (
-            f"{gaps} closed up, {missing:.3g} s in all: longer times are too short by up to "
+            f"{gaps} closed up, {missing:.3g} s in all: long averaging times are too short by up to "
             f"{100 * missing * samples.rate_hz / n:.2g} %."
         )
     if samples.uneven_s:
@@ -88,7 +88,7 @@ def repairs(samples: Stream, n: int) -> Iterable[str]:
         )
     for name, step in samples.coarse.items():
         yield (
-            f"{name} was read in steps of {1e3 * step:.3g} mV, larger than its noise: its means are wrong by part of a "
+            f"{name} was read in steps of {1e3 * step:.3g} mV, larger than its noise. Its means are wrong by part of a "
             "step, and the slope of an output that follows it is less certain than stated."
         )
 
@@ -101,7 +101,7 @@ def _number(constant: str | float | None) -> float:
 def channel_of(channels: tuple[str, ...], channel: str | None, source: str) -> str:
     """The channel asked for, or the first. Raises DataError."""
     if not channels:
-        raise DataError(f"{source}: has no channel beside the time; add a column with the sensor's output")
+        raise DataError(f"{source}: has no channel except the time; add a column with the sensor's output")
     wanted = channel or channels[0]
     found = next((name for name in (wanted, f"{wanted}_v") if name in channels), None)
     if found is None:
@@ -113,13 +113,13 @@ def agreed(measured: float | None, stated: float, source: str) -> float:
     """The rate, Hz. Raises DataError where two disagree, or there is none."""
     if measured is None and not stated > 0:
         raise DataError(
-            f"{source}: its rate is not known; give --rate HZ, or a line `# sample_rate_hz: 100` above the header"
+            f"{source}: its sample rate is unknown; give --rate HZ, or a line `# sample_rate_hz: 100` above the header"
         )
     if measured is None:
         return stated
     if stated > 0 and abs(measured / stated - 1) > DISAGREE:
         raise DataError(
-            f"{source}: {stated:g} samples a second are stated, the column t_s has {measured:g}; correct one of them"
+            f"{source}: the stated rate is {stated:g} samples a second, the column t_s gives {measured:g}; correct one"
         )
     return measured
 
@@ -130,7 +130,7 @@ def agreed(measured: float | None, stated: float, source: str) -> float:
 MOST_MISSING = 0.1  # of a record, in gaps that are closed up
 WHOLE = 0.1  # of a step, by which steps may be off whole numbers of them where single samples were lost
 FEW_GAPS = 0.01  # of all steps
-EVEN = "record anew, evenly and every sample (what is interpolated has less white noise than the sensor)"
+EVEN = "record again with every sample at an even rate (interpolated samples have less white noise than the sensor)"
 UNEVEN = 1e-3  # of a record, by which times may be off an even row: those of a computer that samples reach in bursts
 
 
@@ -139,7 +139,7 @@ def of_table(table: Table, channel: str | None, rate_hz: float | None) -> Stream
         kind = "poses" if table.kind == "still" else table.kind
         raise _no_record(f"{table.source}: a table of {kind}")
     if "n" in table and (many := float(np.median(table.column("n")))) > 1:
-        raise _no_record(f"{table.source}: a row is the mean of {many:.0f} samples by its column n, as of poses")
+        raise _no_record(f"{table.source}: a row is the mean of {many:.0f} samples (column n), as in poses")
     channels = tuple(name for name in table.columns if name not in BESIDE)
     chosen = channel_of(channels, channel, table.source)
     stated = rate_hz or table.number("sample_rate_hz", 0.0)
@@ -158,7 +158,8 @@ def of_table(table: Table, channel: str | None, rate_hz: float | None) -> Stream
 def _no_record(what: str) -> DataError:
     """What is no still record, and what to do."""
     return DataError(
-        f"{what}; noise needs single samples of a sensor at rest: take a table of still, or `rig run noise-floor`"
+        f"{what}; a noise analysis needs single samples of a sensor at rest: give a still record, or `rig run "
+        "noise-floor`"
     )
 
 
@@ -188,7 +189,7 @@ def _times(table: Table) -> _Times | None:
     typical = float(np.median(step_s))
     if step_s.min() <= 0:
         row = int(np.argmin(step_s > 0)) + 2
-        raise DataError(f"{table.source}: row {row}: the time does not go on; sort the rows and remove duplicates")
+        raise DataError(f"{table.source}: row {row}: the time does not increase; sort the rows and remove duplicates")
     far = np.flatnonzero(np.abs(step_s - typical) > LATE * typical)
     if len(far) <= FEW_GAPS * table.n and np.all(step_s[far] > typical):
         gaps = tuple((float(t_s[i]), float(step_s[i] - typical)) for i in far)
@@ -197,8 +198,8 @@ def _times(table: Table) -> _Times | None:
     lost = np.round(step_s / typical) - 1
     if 0 < lost.sum() < table.n and np.all(np.abs(step_s / typical - 1 - lost) < WHOLE):
         raise DataError(
-            f"{table.source}: {lost.sum():.0f} samples are missing, here and there, the first after row {far[0] + 2}; "
-            f"{EVEN}, or analyse {_longest(far, table.n)} by themselves"
+            f"{table.source}: {lost.sum():.0f} single samples are missing, the first after row {far[0] + 2}; "
+            f"{EVEN}, or analyse {_longest(far, table.n)} alone"
         )
     off_s = float(np.max(np.abs(t_s - np.linspace(t_s[0], t_s[-1], table.n))))
     if off_s > UNEVEN * length_s:
@@ -223,7 +224,7 @@ def _check_gaps(gaps: Sequence[tuple[float, float]], length_s: float, source: st
         longest = max(gaps, key=lambda gap: gap[1])
         raise DataError(
             f"{source}: {len(gaps)} gaps, {missing:g} s in all beside {length_s:g} s of samples; the longest, of "
-            f"{longest[1]:g} s, is at t = {longest[0]:g} s: analyse the parts between gaps each by itself"
+            f"{longest[1]:g} s, is at t = {longest[0]:g} s: analyse the parts between the gaps separately"
         )
 
 
@@ -236,9 +237,7 @@ UPRIGHT = 0.999  # g: a pose that is as good as along gravity
 def of_run(measured: Measured, channel: str | None, rate_hz: float | None) -> Stream:
     first = next((kept for kept in measured.kept() if _is_still(kept)), None)
     if first is None:
-        raise RecordError(
-            f"run {measured.name} holds no still record; `rig run noise-floor` or `rig run soak` makes one"
-        )
+        raise RecordError(f"run {measured.name} has no still record; `rig run noise-floor` or `rig run soak` makes one")
     names = first.samples.channels
     chosen = channel_of(tuple(names), (channel or "").removesuffix("_v") or None, f"run {measured.name}")
     rate = agreed(first.samples.rate_hz, rate_hz or 0.0, f"run {measured.name}")
@@ -345,7 +344,7 @@ def _source(record: Record | None, data: str, rate_hz: float | None) -> Callable
     path = Path(data)
     if path.suffix == ".npy":
         if not path.is_file():
-            raise DataError(f"{data}: there is no such file; a run is named as `rig runs` lists it")
+            raise DataError(f"{data}: there is no such file; `rig runs` lists the names of runs")
         return lambda _: _of_array(path, rate_hz)
     if path.exists() or record is None:
         table = load(data, "still" if path.suffix != "" else None)
@@ -359,14 +358,14 @@ def _source(record: Record | None, data: str, rate_hz: float | None) -> Callable
 
 def _of_array(path: Path, rate_hz: float | None) -> Stream:
     if rate_hz is None:
-        raise DataError(f"{path}: an array does not say how fast it was sampled; give --rate HZ")
+        raise DataError(f"{path}: an array does not contain the sample rate; give --rate HZ")
     try:
         with warnings.catch_warnings(action="ignore"):  # of a header as Python 2 wrote it
             array = np.load(path, mmap_mode="r", allow_pickle=False)
     except Exception as error:  # its header is parsed as Python, which fails in many ways
-        raise DataError(f"{path}: is no array that numpy.save wrote: {error}") from None
+        raise DataError(f"{path}: is not an array from numpy.save: {error}") from None
     if array.ndim == 2 and 1 in array.shape:
         array = array.reshape(-1)
     if array.ndim != 1:
-        raise DataError(f"{path}: holds an array of shape {array.shape}; save one channel, of shape (n,)")
+        raise DataError(f"{path}: has an array of shape {array.shape}; save one channel, of shape (n,)")
     return Stream(str(path), "values", rate_hz, "count", (array[i : i + BLOCK] for i in range(0, len(array), BLOCK)))

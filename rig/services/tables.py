@@ -51,11 +51,9 @@ def _included(table: Table, tell: Callable[[str], None]) -> Table:
     out = table.optional(EXCLUDED, 0.0) != 0
     if not out.any():
         return table
-    tell(f"{table.source}: {np.count_nonzero(out)} of {table.n} rows are left out, by its column `{EXCLUDED}`.")
+    tell(f"{table.source}: {np.count_nonzero(out)} of {table.n} rows are left out, as its column `{EXCLUDED}`.")
     if out.all():
-        raise DataError(
-            f"{table.source}: every row is left out, by its column `{EXCLUDED}`; put 0 where a row is to count"
-        )
+        raise DataError(f"{table.source}: its column `{EXCLUDED}` leaves out every row; write 0 for the rows to use")
     return table.rows(~out)
 
 
@@ -93,7 +91,7 @@ def load_all(names: Sequence[str], tell: Callable[[str], None] = lambda _: None)
     tables = [load(name, tell=tell) for name in names]
     sources = [table.source for table in tables]
     if twice := next((name for name, source in zip(names, sources, strict=True) if sources.count(source) > 1), None):
-        raise DataError(f"{twice} is named twice; the same data counts once")
+        raise DataError(f"{twice} is given twice; give the same data once")
     if len(tables) == 1:
         return tables[0]
     return joined_runs(tables, [_begun(name) for name in names], tell)
@@ -107,7 +105,7 @@ def joined_runs(
     if len(known) == len(tables):
         tables = [_later(t, (at - known[0]).total_seconds()) for t, at in zip(tables, known, strict=True)]
     if clock_began_anew(tables):
-        tell("The clocks of these began anew: they are taken as if one had followed the other at once.")
+        tell("The time starts again in each of these; the analysis assumes that one followed directly after the other.")
     return joined(tables)
 
 

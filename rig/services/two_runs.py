@@ -121,7 +121,7 @@ def both(first: Request, second: Request, tell: Callable[[str], None]) -> tuple[
     if one.data.content != other.data.content:
         raise RecordError(
             f"{first.data} is of {one.data.content}, {second.data} of {other.data.content}: no model describes both; "
-            "mark two of one kind in the record"
+            "choose two runs of one kind"
         )
     return one.data.fit(one.model), other.data.fit(one.model)
 

@@ -204,7 +204,7 @@ def test_what_cannot_be_looked_at_says_what_to_do_and_the_next_path_is_read(
     private, table = tmp_path / "private.txt", tmp_path / "table.csv"
     private.write_text("root:x:0\nme:y:1\n")
     table.write_text("alpha_deg,beta_deg,vx_v\n" + "".join(f"90,{b},{2.5 + b % 7}\n" for b in range(0, 360, 30)))
-    for path, shown in ((private, "holds no numbers"), (table, "on 12 poses")):
+    for path, shown in ((private, "has no numbers"), (table, "on 12 poses")):
         page.get_by_label("Data: a run").click()
         page.keyboard.press("ControlOrMeta+a")
         page.keyboard.type(str(path))

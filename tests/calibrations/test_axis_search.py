@@ -109,5 +109,5 @@ def test_a_search_without_a_complete_round_is_refused() -> None:
     half = {name: column[:15] for name, column in table.columns.items()}
     with pytest.raises(DataError, match="no round of the search is complete"):
         estimate_directions(Table.from_columns("poses", half, {}, "half", {"path": table.labels["path"][:15]}))
-    with pytest.raises(DataError, match="is no search for the axes"):
+    with pytest.raises(DataError, match="is not a misalignment run"):
         estimate_directions(Table.from_columns("poses", half, {}, "half"))

@@ -102,9 +102,9 @@ def entry(**content: object) -> str:
     [
         ({"effect": "own", "expression": "a*open('x')"}, 'm.yaml: own: column 3: there is no function "open"'),
         ({"effect": "own", "expression": "a.__class__"}, "is not allowed here"),
-        ({"effect": "hysteresis", "expression": "a*t"}, "hysteresis is known already"),
+        ({"effect": "hysteresis", "expression": "a*t"}, "hysteresis is already the name of an effect"),
         ({"effect": "Own One", "expression": "a*t"}, "cannot name an effect"),
-        ({"effect": "bias", "columns": ["humidity"]}, "bias has columns, and no expression"),
+        ({"effect": "bias", "columns": ["humidity"]}, "bias has columns but no expression"),
         ({"effect": "own", "expression": "sin(beta)"}, "nothing to be fitted"),
     ],
 )

@@ -53,7 +53,9 @@ def test_what_others_found_misaligned_is_found_by_name() -> None:
     found = discover(turned.ferraris(), GYROSCOPE)
     assert found.causes == ("gyro-misalignment",)
     assert found.start.pooled_excess > 50
-    assert "nothing checks all of the 12 parameters" in str(found.caution)  # one turn about each edge, and none back
+    assert "the fit cannot check all of the 12 parameters" in str(
+        found.caution
+    )  # one turn about each edge, and none back
 
 
 @pytest.mark.parametrize(
@@ -139,15 +141,15 @@ def test_the_axis_of_a_turn_is_given_or_seen() -> None:
 def test_what_cannot_be_known_of_the_turns_is_said() -> None:
     table = turned.gyroscope(seed=0)
     half = {name: table.column(name)[:27] for name in ("rate_deg_s", "gx", "gy", "gz")}
-    with pytest.raises(DataError, match=r"more than one output follows the rate.*add the columns axis_x"):
+    with pytest.raises(DataError, match=r"several outputs follow the rate.*add the columns axis_x"):
         fit(GYROSCOPE, Table.from_columns("rates", half))
     upright = {f"a{axis}": table.column(f"a{axis}")[:27] for axis in "xyz"}
     with pytest.raises(DataError, match='"rate_deg_s" never changes'):
         fit(GYROSCOPE, Table.from_columns("rates", half | upright | {"rate_deg_s": np.zeros(27)}))
-    with pytest.raises(DataError, match='"rate_deg_s" never changes; a gyroscope is turned at several rates'):
+    with pytest.raises(DataError, match='"rate_deg_s" never changes; turn the gyroscope at several rates'):
         fit(GYROSCOPE, about_z((30.0,)))
     oblique = {f"a{axis}": np.ones(27) for axis in "xyz"}
-    with pytest.raises(DataError, match="row 2 was turned while no edge of the sensor stood upright"):
+    with pytest.raises(DataError, match="row 2 is a turn without a vertical edge of the sensor"):
         fit(GYROSCOPE, Table.from_columns("rates", half | oblique))
     none = {f"axis_{axis}": np.zeros(27) for axis in "xyz"}
     with pytest.raises(DataError, match="row 1 has no axis"):

@@ -55,7 +55,7 @@ def test_bias_and_the_three_squares_are_one_too_many() -> None:
         e = found[name, "x"]
         assert not e.identified
         assert e.std is None
-        assert "on this data it cannot be told from" in str(e.why)
+        assert "on this data it cannot be separated from" in str(e.why)
         others = {"bias bias x", "quadratic-nonlinearity square x", "cross-axis-bias square x", "z-axis-bias square x"}
         assert sum(other in str(e.why) for other in others) == 3
         assert " y" not in str(e.why)
@@ -83,7 +83,7 @@ def test_an_estimate_no_better_than_what_a_sensor_may_show() -> None:
     e = found["z-axis-bias", "x"]
     assert not e.identified
     assert e.std is not None
-    assert "no smaller than what a sensor may show" in str(e.why)
+    assert "not smaller than a typical value" in str(e.why)
 
 
 def heated(model: Model, temperature_c: np.ndarray) -> dict[tuple[str, str], Estimate]:
@@ -93,7 +93,7 @@ def heated(model: Model, temperature_c: np.ndarray) -> dict[tuple[str, str], Est
 
 def test_without_a_span_of_temperature_its_coefficient_is_not_known() -> None:
     still, hardly = np.full(500, 22.0), 22 + 1e-3 * np.sin(np.arange(500.0))
-    for temperature_c, why in ((still, "it changes nothing"), (hardly, "no smaller than what a sensor may show")):
+    for temperature_c, why in ((still, "it changes nothing"), (hardly, "not smaller than a typical value")):
         found = heated(linear_with("temperature-bias"), temperature_c)
         assert why in str(found["temperature-bias", "x"].why)
         assert found["scale-factor", "x"].identified

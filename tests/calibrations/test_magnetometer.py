@@ -111,11 +111,11 @@ def turn(n: int = 24) -> Array:
 
 def test_how_badly_few_orientations_show_it_is_a_sentence() -> None:
     few = coverage_fault(turned.magnetometer(turned.in_iron(5, seed=1)), SOFT_IRON)
-    assert "something in it would be known not at all; turn the sensor about three axes" in str(few)
+    assert "a combination of parameters is unknown; turn the sensor about three axes" in str(few)
     cap = np.random.default_rng(3).normal([0.0, 0.0, 2.0], 0.5, (200, 3))
     cap /= np.linalg.norm(cap, axis=1, keepdims=True)
     some = coverage_fault(turned.magnetometer(turned.in_iron(200, 1, directions=cap)), SOFT_IRON)
-    assert " times worse than from as many on all sides, and 10 times is the limit; turn" in str(some)
+    assert " times less certain than with all directions covered (limit: 10 times); turn" in str(some)
 
 
 def test_what_a_single_turn_cannot_show_is_said_and_not_fitted() -> None:
@@ -124,8 +124,8 @@ def test_what_a_single_turn_cannot_show_is_said_and_not_fitted() -> None:
         fit(read_model("magnetometer"), table)
     found = discover(table, FIELD)
     assert found.verdict == "ambiguous"
-    assert "hard-iron and soft-iron cannot be asked" in str(found.caution)
-    assert str(found.caution).endswith("until then every value is that of a sensor without it")
+    assert "hard-iron and soft-iron cannot be tested" in str(found.caution)
+    assert str(found.caution).endswith("the values assume a sensor without this effect")
 
 
 @pytest.mark.parametrize(("degrees", "hard", "soft"), [(180.0, True, True), (75.0, True, False), (20.0, False, False)])

@@ -96,7 +96,7 @@ def test_shipped_models_have_no_values_yet(name: str) -> None:
         (f"{HEAD}effects: [{{effect: bias, parameters: [{{name: bias, value: 1}}]}}]", "needs `axis: x`, y or z"),
         (
             f"{HEAD}effects: [{{effect: bias, tied: true, parameters: [{{name: bias, axis: x, value: 1}}]}}]",
-            "has one value and no axis",
+            "is one value for all axes",
         ),
         (
             f"{HEAD}effects: [{{effect: bias, tied: true, parameters: [{TWICE}, {TWICE}]}}]",
@@ -105,7 +105,7 @@ def test_shipped_models_have_no_values_yet(name: str) -> None:
         (f"{HEAD}effects: [{{effect: hysteresis, constants: {{x: 1}}}}]", 'hysteresis has no constant "x"'),
         ("schema: [2001-99-99]", "bad.yaml: is not YAML: month must be in"),
         ("[" * 5000, "bad.yaml: is not YAML"),
-        (f"{HEAD}effects: [{{effect: bias}}, {{effect: bias}}]", 'the effect "bias" stands in the model twice'),
+        (f"{HEAD}effects: [{{effect: bias}}, {{effect: bias}}]", 'the effect "bias" occurs twice in the model'),
     ],
 )
 def test_names_the_key(text: str, says: str) -> None:
@@ -161,7 +161,7 @@ def with_units(unit: str = "V", bias: str = ", unit: V", scale: str = "V/g", deg
         ({"unit": "mV"}, 'bias: the unit of "bias" x is V, and must be mV in a model with `unit: mV`; values are not'),
         ({"scale": "mV/g"}, 'scale-factor: the unit of "scale" x is mV/g, and must be V/g in a model with `unit: V`'),
         ({"deg": "rad"}, f'stage-zero-offset: the unit of "{ANGLE}" is rad, and must be deg; values are not converted'),
-        ({"unit": '""'}, 'bias: the unit of "bias" x is V; give the unit of the outputs too, such as `unit: V`'),
+        ({"unit": '""'}, 'bias: the unit of "bias" x is V; also give the unit of the outputs, such as `unit: V`'),
     ],
 )
 def test_units_that_do_not_fit_are_refused(units: dict[str, str], says: str) -> None:

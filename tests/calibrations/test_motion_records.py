@@ -37,7 +37,7 @@ def test_rounded_times_are_even_again() -> None:
     ("t", "error", "says"),
     [
         (T[::-1], DataError, 'row 2, column "t_s" falls'),
-        (np.zeros(9000), TooFewRows, "9000 samples at one time are no record"),
+        (np.zeros(9000), TooFewRows, "9000 samples all have the same time"),
         (T[:1500], TooFewRows, "no record lasts 2 s"),
         (T + 3e-3 * np.sin(T), DataError, "of a step off; a motion is sampled evenly"),
     ],

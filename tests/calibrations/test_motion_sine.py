@@ -71,5 +71,5 @@ def test_noise_alone_holds_no_line() -> None:
 
 
 def test_too_few_samples_are_said() -> None:
-    with pytest.raises(DataError, match="5 samples are too few for a sine; it takes 8"):
+    with pytest.raises(DataError, match="5 samples are too few for a sine fit; at least 8 are needed"):
         fit_three_parameter(T[:5], T[:5], 10.0)

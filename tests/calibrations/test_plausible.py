@@ -126,7 +126,7 @@ def test_rows_that_are_there_twice() -> None:
     kept, said = drop_duplicate_rows(Table.from_columns("poses", columns, source="made"))
     assert kept.n == 3
     assert said is not None
-    assert said.startswith("made: rows 4 (as 1), 5 (as 2) copy earlier rows (same time, same digits)")
+    assert said.startswith("made: rows 4 (as 1), 5 (as 2) copy earlier rows (same time, same values)")
     for name, values in {"t_s": [0.0, 1, 2, 3, 4], "vx_v": [1.0, 1, 1, 1.1, 1.1]}.items():  # measured again
         again = Table.from_columns("poses", {**columns, name: values})
         assert drop_duplicate_rows(again) == (again, None)

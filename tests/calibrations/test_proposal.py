@@ -198,7 +198,7 @@ def test_a_session_in_named_sections_is_rates_and_its_counter_counts_nothing() -
 def test_sections_in_which_nothing_turns_are_positions() -> None:
     told = advised(session(turned=False))
     assert "--kind positions --column ax=acc_x:counts" in told
-    assert "this import is likely:\n" in told
+    assert "suggest this import:\n" in told
 
 
 @pytest.mark.parametrize(
@@ -214,7 +214,7 @@ def test_what_was_tried_in_vain_is_said_so() -> None:
     rows = "".join(f"{9.8 * (k == 0)},{9.8 * (k == 1)},{9.8 * (k == 2)}\n" for k in range(3))
     told = advised(f"accX,accY,accZ\n{rows}")
     assert "The most likely import fails: theirs.csv: 3 positions; no model has fewer than 4 parameters" in told
-    assert "this import is likely" not in told
+    assert "suggest this import" not in told
 
 
 def columns_of(values: Array) -> str:

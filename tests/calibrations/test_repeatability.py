@@ -47,7 +47,7 @@ def test_its_standard_errors_are_true() -> None:
 def test_an_incomplete_tumble_is_refused() -> None:
     with pytest.raises(DataError, match="no tumble is complete: 'as-is 1' lacks beta 180 deg"):
         estimate_tumbles(table(["as-is 1"], last=2), "x")
-    with pytest.raises(DataError, match="there is no tumble"):
+    with pytest.raises(DataError, match="no tumble is complete yet"):
         estimate_tumbles(table(["reference"]), "x")
 
 

@@ -92,7 +92,7 @@ def test_a_short_soak_has_courses_and_no_verdict_on_steady_state() -> None:
 
 def test_without_a_whole_reversal_there_is_nothing() -> None:
     table = soak_table()
-    with pytest.raises(TooFewRows, match="holds no reversal"):
+    with pytest.raises(TooFewRows, match="has no reversal"):
         analyse_soak(table.rows(np.char.startswith(np.array(table.labels["path"]), "hold")))
 
 

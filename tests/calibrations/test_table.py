@@ -59,7 +59,7 @@ def test_a_constant_that_cannot_be(name: str, value: str | float, says: str) -> 
         Table.from_columns("poses", POSES, {name: value}, "made.csv")
 
 
-EARTH = "not the gravity of a place on Earth"
+EARTH = "which is not gravity at any place on Earth"
 
 
 @pytest.mark.parametrize(
@@ -137,9 +137,9 @@ def test_guesses_the_kind() -> None:
     assert guess_kind(["t_s", "vx_v", "displacement_m", "vy_v"]) == "motion"
     assert guess_kind(["ax", "ay", "az", "gx", "gy", "gz"]) == "positions"
     assert guess_kind(["rate_deg_s", "gx", "gy", "gz"]) == "rates"
-    with pytest.raises(MissingColumn, match='has the column "bta_deg"; did you mean "beta_deg"'):
+    with pytest.raises(MissingColumn, match='the column name is unknown: "bta_deg"; did you mean "beta_deg"'):
         guess_kind(["alpha_deg", "bta_deg", "vx_v"])
-    with pytest.raises(MissingColumn, match="are of no known kind of table; poses need"):
+    with pytest.raises(MissingColumn, match="do not fit any kind of table; poses need"):
         guess_kind(["when", "humidity"])
 
 

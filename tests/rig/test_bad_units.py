@@ -75,7 +75,7 @@ def test_an_effect_of_ones_own_takes_no_shipped_name(
     (work / "bias.py").write_text(OWN.replace("class Sag", "class Bias").replace("sag: ", "bias: "))
     bench = str(bench_file({"folders": {"effects": str(work)}}))
     said = refused("diagnose", "good.csv", "--bench", bench)
-    assert f"{work}: bias is in the catalogue already; give your effect another name" in said
+    assert f"{work}: bias is already in the catalogue; give your effect another name" in said
 
 
 def test_an_unknown_procedure_names_the_nearest(refused: Refused) -> None:

@@ -46,7 +46,7 @@ def test_a_run_gives_all_three_forms(rig: Rig, bench_file: Callable[..., Path], 
     assert ended.status == 1, ended.err  # the scale factor is beyond its limit
     assert "pass (over 99.9 %)" in ended.out
     assert "hand level's certificate L-1 expired" in ended.out
-    assert "This certifies nothing of any sensor." in ended.out
+    assert "This document certifies no sensor." in ended.out
     assert "Simulated calibration, no certificate" in (tmp_path / "c.html").read_text(encoding="utf-8")
     for form, text in ((".html", "The Lab"), (".xml", "<dcc:city>Town</dcc:city>"), (".pdf", "")):
         path = tmp_path / f"c{form}"
@@ -84,7 +84,7 @@ def test_a_file_is_certified_without_a_rig(rig: Rig, work: Path) -> None:
         "Me",
         "measured elsewhere",
         "As found: by the model last-year.yaml",
-        "does not say which laboratory",
+        "does not name the laboratory",
     ):
         assert text in page
     assert "No values as found" in _page(rig, "linear", work)

@@ -108,7 +108,7 @@ def test_a_standard_that_was_measured_once_keeps_no_other_from_its_chart(rig: Ri
 def test_what_cannot_be_charted_is_said(rig: Rig) -> None:
     assert "no check-standard run is complete yet" in rig("control").err
     checks(QUIET[:1])
-    assert "CS-1: 2 check-standard runs at least make a chart; there is one so far" in rig("control").err
+    assert "CS-1: 2 check-standard runs are needed for a chart; there is one" in rig("control").err
     assert "no check-standard run of the sensor 'CS-3'. Did you mean 'CS-1'?" in rig("control", "CS-3").err
     ended = rig("control", "--since", "yesterday")
     assert (ended.status, "no complete check-standard run 'yesterday'" in ended.err) == (2, True)

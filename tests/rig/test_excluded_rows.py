@@ -21,13 +21,13 @@ def test_rows_that_the_file_excludes_are_left_out_and_that_is_said(tmp_path: Pat
     file.write_text("\n".join(ROWS))
     table = load(str(file), tell=said.append)
     assert list(table.column("vx_v")) == [3.5, 1.5]
-    assert said == [f"{file}: 1 of 3 rows are left out, by its column `excluded`."]
+    assert said == [f"{file}: 1 of 3 rows are left out, as its column `excluded`."]
 
 
 def test_a_file_cannot_exclude_all(tmp_path: Path) -> None:
     file = tmp_path / "nothing.csv"
     file.write_text("\n".join(row[:-1] + "1" if row[0] == "9" else row for row in ROWS))
-    with pytest.raises(DataError, match="every row is left out"):
+    with pytest.raises(DataError, match="leaves out every row"):
         load(str(file))
 
 
@@ -40,5 +40,5 @@ def test_a_fit_of_all_rows_names_those_that_stand_out(command: str, tmp_path: Pa
     write_csv(poses(columns, volts, 2.5 + y), tmp_path / "knocked.csv")
     said = rig(command, str(tmp_path / "knocked.csv"), "--model", "linear")
     assert said.status == 0
-    assert "1 pose stands out: #7 (counted from 0, excluded ones too), still in this fit" in said.out
+    assert "1 pose stands out: #7 (counted from 0, including excluded poses), still in this fit" in said.out
     assert "rig exclude" in said.out

@@ -178,7 +178,7 @@ def test_a_lost_scheduler_says_how_to_go_on() -> None:
         going_on = answered(client, numbered, iter([[k] for k in range(50)]))
         next(going_on)
         lost.close()
-        with pytest.raises(FleetError, match="give the same command again"):
+        with pytest.raises(FleetError, match="run the same command again"):
             list(going_on)
 
 
@@ -198,7 +198,7 @@ def test_members_of_files_folders_and_runs(tmp_path: Path, monkeypatch: pytest.M
     with pytest.raises(RigError, match="no such file or folder"):
         fleet_of(["nowhere"])
     (tmp_path / "index.csv").write_text("sensor,file\nS,one.csv\nS,two.csv\n")
-    with pytest.raises(RigError, match="the sensor S is there twice"):
+    with pytest.raises(RigError, match="the sensor S occurs twice"):
         fleet_of([str(tmp_path / "index.csv")])
     (tmp_path / "index.csv").write_text("sensor,file,lot\nS,one.csv,1\n")
     with pytest.raises(RigError, match="not lot"):

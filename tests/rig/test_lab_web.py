@@ -121,7 +121,7 @@ def test_a_life_is_that_in_the_lab(run: str, reader: str, tmp_path: Path, monkey
     monkeypatch.setenv("RIG_HOME", str(tmp_path / "elsewhere"))
 
     async def visit(user: User) -> None:
-        await user.should_see(f"Its runs are none by this model: {run}", retries=200)  # noise alone: but it was read
+        await user.should_see(f"This model cannot use its runs: {run}", retries=200)  # noise alone: but it was read
 
     visiting("/history?sensor=ADXL203", visit)
 

@@ -84,7 +84,7 @@ def test_what_is_not_computed_is_null() -> None:
     e = diagnosis_document(found, "linear")["next_experiment"]
     assert (e["procedure"], e["settings"], e["expected"]) == ("level-check", {"on": "base"}, None)
     assert e["command"] == "rig run level-check --on base --bench b.yaml"
-    assert "the base alone" in e["why"]
+    assert "the base only" in e["why"]
 
 
 def dispute(temperature: bool) -> Dispute:
@@ -160,7 +160,7 @@ def test_another_bench_than_that_of_the_run_is_named(bench: dict[str, str], told
 
 
 def test_the_same_data_counts_once(refused: Callable[..., str]) -> None:
-    assert "good.csv is named twice; the same data counts once" in refused("discover", "good.csv", "good.csv")
+    assert "good.csv is given twice; give the same data once" in refused("discover", "good.csv", "good.csv")
 
 
 def test_a_command_line_is_made_of_words_that_a_shell_takes() -> None:

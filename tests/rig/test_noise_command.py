@@ -209,23 +209,23 @@ def test_a_supply_is_coarse_where_noise_does_not_smooth_its_steps(noise_v: float
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        (("still.npy",), "does not say how fast it was sampled; give --rate HZ"),
+        (("still.npy",), "does not contain the sample rate; give --rate HZ"),
         (("nowhere.npy", "--rate", "5"), "nowhere.npy: there is no such file"),
-        (("square.npy", "--rate", "5"), "holds an array of shape (8, 8); save one channel"),
-        (("broken.npy", "--rate", "5"), "broken.npy: is no array that numpy.save wrote"),
+        (("square.npy", "--rate", "5"), "has an array of shape (8, 8); save one channel"),
+        (("broken.npy", "--rate", "5"), "broken.npy: is not an array from numpy.save"),
         (("hole.npy", "--rate", "5"), "sample 4001 is nan, not a number"),
         (("short.npy", "--rate", "5"), "needs 64 or more"),
         (("still.npy", "--rate", "0"), "0 is not in the range"),
         (("still.npy", "--rate", "50", "--tau", "100"), "an averaging time of 100 s needs a record of 200 s or more"),
         (("still.npy", "--rate", "50", "--tau", "0.001"), "is below that of one sample, 0.02 s"),
-        (("rate.csv",), "100 samples a second are stated, the column t_s has 50"),
-        (("uneven.csv",), "s; samples must be evenly spaced: record anew, evenly"),
-        (("means.csv",), "a row is the mean of 500 samples by its column n, as of poses"),
+        (("rate.csv",), "the stated rate is 100 samples a second, the column t_s gives 50"),
+        (("uneven.csv",), "s; samples must be evenly spaced: record again with every sample"),
+        (("means.csv",), "a row is the mean of 500 samples (column n), as in poses"),
         (("one-constant.csv",), "channel vx_v (--channel takes another: vy_v): every sample is the same"),
         (("torn.csv",), "1 gaps, 200 s in all beside 119.98 s of samples; the longest, of 200 s, is at t = 19.98 s"),
-        (("back.csv",), "row 501: the time does not go on"),
+        (("back.csv",), "row 501: the time does not increase"),
         (("constant.csv",), "every sample is the same"),
-        (("poses.csv",), "a table of poses; noise needs single samples"),
+        (("poses.csv",), "a table of poses; a noise analysis needs single samples"),
     ],
 )
 def test_bad_input_is_one_message(rig: Rig, folder: Path, words: tuple[str, ...], says: str) -> None:
@@ -312,7 +312,7 @@ def test_single_samples_that_were_lost_are_no_jitter(rig: Rig, folder: Path) -> 
     file = table(folder / "lost.csv", (np.arange(6000) / 50)[kept], vx_v=samples()[kept])
     ended = rig("noise", file)
     assert ended.status == 2
-    assert f"{np.sum(~kept[: np.flatnonzero(kept)[-1]])} samples are missing, here and there" in ended.err
+    assert f"{np.sum(~kept[: np.flatnonzero(kept)[-1]])} single samples are missing" in ended.err
     lost = np.flatnonzero(~kept)
     first = 3000 - np.count_nonzero(~kept[:3000]) - (2999 - lost[lost < 3000][-1])
     assert f"or analyse rows {first + 1} to {first + lost[lost >= 3500][0] - lost[lost < 3000][-1] - 1}, " in ended.err

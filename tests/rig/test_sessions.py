@@ -99,8 +99,8 @@ def test_json_is_arrays_or_rows_and_the_rest_is_constants() -> None:
         ('{"mag": [[1, 2, 3]', "is not valid JSON; give arrays"),
         ('{"a": [1, 2], "b": [1]}', "arrays of different length: {'a': 2, 'b': 1}"),
         ('{"mag": [[1, 2, 3], [1, 2]]}', 'row 2 of "mag" does not have 3 numbers'),
-        ('{"name": "x"}', "holds no arrays of measurements"),
-        ("[1, 2]", "holds no arrays of measurements"),
+        ('{"name": "x"}', "has no arrays of measurements"),
+        ("[1, 2]", "has no arrays of measurements"),
     ],
 )
 def test_json_that_is_no_table_is_refused(content: str, said: str) -> None:

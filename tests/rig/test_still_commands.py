@@ -187,8 +187,8 @@ def test_bad_input_is_one_message(rig: Rig, folder: Path, command: str) -> None:
     before = set(folder.iterdir())
     for data, says in {
         "nan.csv": "nan",
-        "gap.csv": "analyse the parts between gaps each by itself",
-        "late.csv": "samples must be evenly spaced: record anew, evenly",
+        "gap.csv": "analyse the parts between the gaps separately",
+        "late.csv": "samples must be evenly spaced: record again with every sample",
         "rate.csv": "100 samples a second are stated, the column t_s has 10; correct one of them",
         "constant.csv": "every sample is the same; is the sensor connected",
         "clipped.csv": "the channel is clipped; choose a wider range",

@@ -31,7 +31,7 @@ PAGE = "schema: rig.model/1\nname: mine\neffects:\n- effect: bias\n"
     [
         ("!!python/object/apply:os.system ['touch ran']", "could not determine a constructor"),
         ("!!python/name:os.system", "could not determine a constructor"),
-        (BOMB, "more than 100000 parts; do not let aliases"),
+        (BOMB, "more than 100000 parts; do not use aliases"),
         ("a: &a [*a]", "contains itself"),
         ("[" * 10_000, "nested too deeply"),
         ("x: " + "y" * LONGEST_YAML, f"the limit is {LONGEST_YAML}"),

@@ -45,7 +45,7 @@ def test_what_says_nothing_new_is_refused(turned: ModelSession) -> None:
         turned.tried(turned.effects["bias"])
     with pytest.raises(ModelError, match="hard-iron is not defined for poses"):
         turned.tried(turned.effects["hard-iron"])
-    with pytest.raises(ModelError, match="mine adds nothing that linear does not have"):
+    with pytest.raises(ModelError, match="mine changes nothing that linear cannot already describe"):
         turned.tried(turned.written("mine", "a + 0*beta"))
 
 

@@ -88,9 +88,9 @@ def test_one_horizontal_turn_says_what_it_cannot_show(rig: Rig, folder: Path) ->
     assert document["results"]["field-azimuth-by-hand"]["value"] == pytest.approx(-34.3, abs=5.0)
     told = rig("show", document["run"]).out  # and its exit status is 1
     assert "no hard-iron-x, hard-iron-y, " in told
-    assert "or left-by-ellipsoid: hard-iron and soft-iron cannot be asked: the orientations cover too little" in told
+    assert "or left-by-ellipsoid: hard-iron and soft-iron cannot be tested: the orientations cover too little" in told
     assert told.count("cover too little") == 1  # for all of them
-    assert "no hard-iron-by-hand-z: z was upright throughout; use more mounts" in told
+    assert "no hard-iron-by-hand-z: z was vertical in every turn; use more mounts" in told
 
 
 @pytest.mark.sockets

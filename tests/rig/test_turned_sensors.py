@@ -61,7 +61,7 @@ def test_a_single_turn_is_told_what_it_cannot_show(rig: Rig, tmp_path: Path) -> 
     outputs = np.column_stack([22 * np.cos(t) + 5, 18 * np.sin(t) - 3, np.full(36, 40.0) + 0.01 * np.sin(7 * t)])
     turn = written(turned.magnetometer(outputs), tmp_path / "turn.csv")
     said = rig("fit", turn)
-    assert "hard-iron and soft-iron cannot be asked" in said.out
+    assert "hard-iron and soft-iron cannot be tested" in said.out
     assert "hard iron 5, -3 uT; soft iron in the plane: radii 22 and 18 uT" in said.out
     assert "hard iron of z is unknown: also turn the sensor" in said.out
     refused = rig("fit", turn, "--model", "magnetometer")
