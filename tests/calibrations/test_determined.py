@@ -95,4 +95,4 @@ def test_a_report_on_ten_positions_says_so_too() -> None:
     found = discover(suarez(), nine())
     assert not found.steps
     assert found.judgement.headline.startswith("No effect is significant, but the ")
-    assert "not identifiable from these positions" in summary(found)
+    assert "not identifiable from 10 positions" in summary(found)
