@@ -228,6 +228,6 @@ class Dataset(ABC, Generic[F]):
     def add(self, effect: Effect, model: Model, effects: Mapping[str, Effect]) -> Discovery[F]:
         """The model with one effect more. Raises ModelError where it has the effect, or cannot have it."""
         if model.holds(effect.name):
-            raise ModelError(f"{model.name}: {effect.name} is in the model already; it has {', '.join(model.effects)}")
+            raise ModelError(f"{model.name}: {effect.name} is already in the model; it has {', '.join(model.effects)}")
         self.require_allowed(effect)
         return Discovery.of(self.addition(effect, model, effects))

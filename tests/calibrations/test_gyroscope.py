@@ -141,7 +141,7 @@ def test_the_axis_of_a_turn_is_given_or_seen() -> None:
 def test_what_cannot_be_known_of_the_turns_is_said() -> None:
     table = turned.gyroscope(seed=0)
     half = {name: table.column(name)[:27] for name in ("rate_deg_s", "gx", "gy", "gz")}
-    with pytest.raises(DataError, match=r"several outputs follow the rate.*add the columns axis_x"):
+    with pytest.raises(DataError, match=r"more than one output follows the rate.*add the columns axis_x"):
         fit(GYROSCOPE, Table.from_columns("rates", half))
     upright = {f"a{axis}": table.column(f"a{axis}")[:27] for axis in "xyz"}
     with pytest.raises(DataError, match='"rate_deg_s" never changes'):

@@ -104,7 +104,7 @@ def test_any_text_is_a_table_or_one_clear_error(text: str) -> None:
         ("alpha_deg,vx_v\n1,2\n", "poses need alpha_deg, beta_deg, vx_v"),
         (
             "alpha_deg,bta_deg,vx_v\n1,2,3\n",
-            'line 1: no kind of table the column name is unknown: "bta_deg"; did you mean "beta_',
+            'line 1: the column name is unknown: "bta_deg"; did you mean "beta_',
         ),
         (f"{HEADER}\n90,0,3.5\n90,10\n", "bad.csv, line 3: 2 values for 3 columns (alpha_deg, beta_deg, vx_v)"),
         (f"{HEADER},humidity\n90,0,3.5\n", "bad.csv, line 2: 3 values for 4 columns"),

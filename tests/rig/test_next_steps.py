@@ -37,7 +37,7 @@ def test_a_remedy_names_its_run_and_sensors_are_one_kind() -> None:
 
 
 def test_something_unheard_of_is_looked_for_among_the_poses() -> None:
-    assert "Fail: mass: look for poses unlike the others: rig show r1 --poses" in steps(mass=result("fail"))
+    assert "Fail: mass: look for poses that differ from the others: rig show r1 --poses" in steps(mass=result("fail"))
 
 
 @pytest.mark.parametrize(
@@ -52,13 +52,13 @@ def test_something_unheard_of_is_looked_for_among_the_poses() -> None:
 def test_what_is_marginal_is_measured_longer(settings: dict[str, Any], hint: str) -> None:
     text = steps(replace(RUN, settings=settings), noise_rms_x=result("marginal"))
     assert (
-        f"Marginal: noise-rms-x reaches across the limit with its uncertainty: measuring 4 times as long{hint} halves"
+        f"Marginal: noise-rms-x reaches across the limit with its uncertainty; 4 times the duration{hint} halves"
         in text
     )
 
 
 def test_results_without_a_limit_say_where_limits_are_set() -> None:
-    assert "limits.results of the bench file takes them, such as `amplitude: ...`" in steps(
+    assert "add one to limits.results of the bench file, such as `amplitude: ...`" in steps(
         amplitude=result(None, None)
     )
     assert "limits.results" not in steps(amplitude=result("pass"))

@@ -41,7 +41,7 @@ def test_where_no_column_tells_the_noise_the_error_falls_and_rises_again(tmp_pat
 
 
 def test_what_says_nothing_new_is_refused(turned: ModelSession) -> None:
-    with pytest.raises(ModelError, match="bias is in the model already"):
+    with pytest.raises(ModelError, match="bias is already in the model"):
         turned.tried(turned.effects["bias"])
     with pytest.raises(ModelError, match="hard-iron is not defined for poses"):
         turned.tried(turned.effects["hard-iron"])
@@ -70,5 +70,5 @@ def test_a_noise_model_grows_as_well(tmp_path: Path) -> None:
     assert not grown.compared().fails
     assert grown.diagnosed().verdict == "adequate"
     assert grown.undone() == found
-    with pytest.raises(ModelError, match="rate-random-walk is in the model already"):
+    with pytest.raises(ModelError, match="rate-random-walk is already in the model"):
         grown.tried(result.candidates[0].effect)
