@@ -1,8 +1,8 @@
-"""Which experiment to run next: every one of the menu is planned on the bench, and its data are foreseen.
+"""Choice of the next experiment: each candidate is planned on the bench, and its data are predicted.
 
-The shortest is taken that will tell the explanations apart with certainty (95 %): what it would tell beyond that is
-worth no time. Where none is certain to, the one that brings most information per minute. What cannot be foreseen,
-as it gives no table of poses, is proposed by its physics alone, and nothing is said of what it brings.
+The choice is the shortest experiment that separates the explanations with 95 % probability. If none does, it is the one
+with most information per minute. An experiment without a table of poses cannot be predicted; it is proposed for its
+physics, without an expected result.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ from rig.planning.plan import Plan, plan
 from rig.planning.sweep_range import columns
 
 ALONE, TOGETHER = "probability_alone", "probability"  # of Expected
-LEAST = 1.0  # of lambda, to be called information
+LEAST = 1.0  # smallest lambda that counts as information
 Answer = TypeVar("Answer", Diagnosis[Any], Discovery[Any])
 
 
 @dataclass(frozen=True)
 class Dispute:
-    """Explanations of the same data that it cannot tell apart: `best`, and the others by the effect that differs."""
+    """Explanations that the data cannot separate: `best`, and the others by the effect that differs."""
 
     best: Fit
     rivals: Mapping[tuple[str, str], Fit]  # by (effect of the best, effect of the rival)
@@ -47,7 +47,7 @@ class Dispute:
 
     @classmethod
     def of(cls, best: Fit, pairs: Iterable[tuple[str, str]], effects: Mapping[str, Effect]) -> Dispute:
-        """The best explanation, and it with each rival in its place. Raises what `refit` raises."""
+        """The best explanation, and the same with each rival effect. Raises the errors of `refit`."""
         rivals = {(a, b): refit(best, best.model.without(a).with_effect(effects[b])) for a, b in pairs}
         nothing = refit(best, best.model.without(next(iter(rivals))[0]))
         return cls(
@@ -56,19 +56,19 @@ class Dispute:
 
 
 def proposed(result: Answer, effects: Mapping[str, Effect], bench: Bench, bench_file: Path | None) -> Answer:
-    """The answer with the next experiment chosen for the bench; the same where nothing is in dispute."""
+    """The result with the next experiment for the bench; unchanged without a dispute."""
     e = result.next_experiment
     if e is None:
         return result
     found = result.findings
     frees = {a for a, _ in e.separates} & set(found.origin.model.effects)  # a value for each axis, and adds nothing
     if not found.data.foreseeable or frees or not e.separates:
-        return replace(result, next_experiment=as_told(e, bench, bench_file))
+        return replace(result, next_experiment=as_proposed(e, bench, bench_file))
     return replace(result, next_experiment=chosen(Dispute.of(found.end, e.separates, effects), e, bench, bench_file))
 
 
 def possible(experiments: Iterable[Experiment], bench: Bench, within_s: float) -> Iterator[Experiment]:
-    """Those that the bench can do within a time."""
+    """The experiments that the bench can do within a time."""
     for e in experiments:
         with suppress(LimitError, ProcedureError, BenchError):
             if (planned_experiment(e, bench, None)[0].duration_s or 0.0) <= within_s:
@@ -76,7 +76,7 @@ def possible(experiments: Iterable[Experiment], bench: Bench, within_s: float) -
 
 
 def planned_experiment(experiment: Experiment, bench: Bench, bench_file: Path | None) -> tuple[Experiment, Plan]:
-    """The experiment with its command line and its duration. Raises what `plan` raises where the bench cannot do it."""
+    """The experiment with command line and duration. Raises the errors of `plan` if the bench cannot do it."""
     procedure = find(experiment.procedure, bench.folders.procedures)
     planned = plan(bench, procedure, parse(procedure, experiment.settings))
     command = command_line(experiment, bench_file)
@@ -84,13 +84,13 @@ def planned_experiment(experiment: Experiment, bench: Bench, bench_file: Path | 
 
 
 def gives_poses(e: Experiment, bench: Bench) -> bool:
-    """Whether its data are poses, which are judged together with those of a sweep. Raises as `plan` does."""
+    """Whether its data are poses, which are analysed together with those of a sweep. Raises the errors of `plan`."""
     poses = planned_experiment(e, bench, None)[1].poses
     return bool(poses) and KINDS[find(e.procedure, bench.folders.procedures).kind].stage_angles
 
 
 def command_line(experiment: Experiment, bench_file: Path | None) -> str:
-    """What a person types to run it."""
+    """The command line that runs the experiment."""
     words = ["rig", "run", experiment.procedure]
     for name, value in experiment.settings.items():
         words += [f"--{name.replace('_', '-')}", _text(value)]
@@ -111,17 +111,17 @@ def chosen(
     menu: Sequence[Experiment] = MENU,
     judged: Sequence[str] = (ALONE, TOGETHER),
 ) -> Experiment:
-    """The next experiment for a dispute; one that the bench cannot do is not proposed, unless there is no other.
+    """The next experiment for a dispute; one that the bench cannot do only if there is no other.
 
-    `by_physics` is what to do where nothing of the menu can tell; it then says what the bench lacks. `judged`: whether
-    its data will be judged alone or with those at hand, in order of preference.
+    `by_physics` is the experiment if no candidate of the menu helps; its text then says what the bench lacks. `judged`:
+    whether the new data are analysed alone or with the present data, in order of preference.
     """
-    foreseeable = [_foreseen(dispute, each, bench, bench_file) for each in menu]
-    return best_of([e for e in foreseeable if e is not None], judged) or as_told(by_physics, bench, bench_file)
+    foreseeable = [_predicted(dispute, e, bench, bench_file) for e in menu]
+    return best_of([e for e in foreseeable if e is not None], judged) or as_proposed(by_physics, bench, bench_file)
 
 
 def best_of(experiments: Sequence[Experiment], judged: Sequence[str]) -> Experiment | None:
-    """The shortest that is certain to separate most pairs; else the one that tells most per minute."""
+    """The shortest experiment that certainly separates most pairs; else that with most information per minute."""
     for probability in judged:
         enough = [e for e in experiments if getattr(e.expected, probability) >= CERTAIN_PROBABILITY]
         if enough:
@@ -131,15 +131,15 @@ def best_of(experiments: Sequence[Experiment], judged: Sequence[str]) -> Experim
 
 
 def _per_minute(e: Experiment) -> float:
-    """Lambda that a minute on the rig brings; 0 where there is as good as none."""
+    """Lambda per minute on the rig; 0 below LEAST."""
     found = e.expected.together if e.expected else 0.0
     return 60 * found / max(e.duration_s or 0.0, 1.0) if found > LEAST else 0.0
 
 
-def _foreseen(dispute: Dispute, e: Experiment, bench: Bench, bench_file: Path | None) -> Experiment | None:
-    """The experiment with what it will tell; None where the bench cannot do it, or its data cannot be foreseen.
+def _predicted(dispute: Dispute, e: Experiment, bench: Bench, bench_file: Path | None) -> Experiment | None:
+    """The experiment with its expected result; None if the bench cannot do it or its data cannot be predicted.
 
-    Nobody knows the temperature of a room ahead: what depends on it is only foreseen in an oven.
+    The temperature of a room is not known in advance: effects that depend on it are only predicted in an oven.
     """
     try:
         e, planned = planned_experiment(e, bench, bench_file)
@@ -147,17 +147,19 @@ def _foreseen(dispute: Dispute, e: Experiment, bench: Bench, bench_file: Path | 
         if dispute.of_temperature and "temperature_c" not in planned_columns:
             return None
         table = predict_data(dispute.best, planned_columns)
-        each = {pair: expected_gain(dispute.best, rival, table) for pair, rival in dispute.rivals.items()}
+        gains = {pair: expected_gain(dispute.best, rival, table) for pair, rival in dispute.rivals.items()}
     except (LimitError, ProcedureError, BenchError, CalibrationError):
         return None
-    told = {pair: each[pair] for pair in each if pairs_separated(each[pair].together) >= CERTAIN_PROBABILITY} or each
+    separated = {
+        pair: gains[pair] for pair in gains if pairs_separated(gains[pair].together) >= CERTAIN_PROBABILITY
+    } or gains
     shown = [vary_one_way(found, dispute.nothing, table).alone for found in (dispute.best, *dispute.rivals.values())]
-    worst = Expected(min(x.alone for x in told.values()), min(x.together for x in told.values()), min(shown))
-    return replace(e, separates=tuple(told), expected=worst)
+    worst = Expected(min(x.alone for x in separated.values()), min(x.together for x in separated.values()), min(shown))
+    return replace(e, separates=tuple(separated), expected=worst)
 
 
-def as_told(e: Experiment, bench: Bench, bench_file: Path | None) -> Experiment:
-    """Proposed by its physics; where the bench cannot do it, that is said too."""
+def as_proposed(e: Experiment, bench: Bench, bench_file: Path | None) -> Experiment:
+    """The experiment for its physics; with a remark if the bench cannot do it."""
     try:
         return planned_experiment(e, bench, bench_file)[0]
     except (LimitError, ProcedureError, BenchError) as error:

@@ -1,7 +1,7 @@
-"""Poses chosen for a model, beside the sweep that they take the place of: `rig plan sweep --optimal`.
+"""Poses chosen for a model, compared with the standard sweep: `rig plan sweep --optimal`.
 
-Both plans are counted by the procedure itself on the bench. The chosen poses are fewer and held for longer: as long as
-it takes for the worst standard error to be that of the sweep.
+The durations of both come from plans on the bench. The chosen poses are fewer with longer dwells, so that the worst
+standard error equals that of the sweep.
 """
 
 from __future__ import annotations
@@ -33,21 +33,21 @@ from rig.planning.planned import from_home_s, moves_s
 from rig.planning.sweep_range import Judged, Range
 
 MOST_POSES = 60
-ONE_IN = 10  # poses is measured again, and as many are kept out of the fit
-FEWEST = 4  # of either
-APART_S = 5.0  # of moves are worth it that no repeat follows at once: it would not show what changes between visits
-NEARLY = 0.99  # as good
+ONE_IN = 10  # share of poses that are repeated, and of check poses that the fit does not use
+FEWEST = 4  # repeated poses, and check poses
+APART_S = 5.0  # cost of an immediate repeat, which does not show changes between visits
+NEARLY = 0.99  # ratio of errors that counts as equal
 DESIGN, AGAIN, CHECK = "design", "again", MARK  # paths of poses
 CRITERIA: Mapping[str, Callable[[Array], Criterion]] = {"D": lambda _: DOptimal(), "I": IOptimal.over}
 
 
 @dataclass(frozen=True)
 class Optimal:
-    """The poses of `criterion` for the model of a range, beside its standard sweep.
+    """The poses of `criterion` for a model, compared with the standard sweep of a range.
 
-    `short` has the standard sweep's dwell, `equal` the dwell at which the worst standard errors are equal, `all_equal`
-    that at which no parameter is less certain than after the sweep. `drift_loss`: by how much the variance of the
-    parameter that suffers most grows where a drift is fitted beside all.
+    `short` has the dwell of the standard sweep, `equal` that for equal worst standard errors, `all_equal` that
+    at which no parameter is less certain. `drift_loss`: the largest relative increase of the variance of a parameter if
+    a drift is fitted as well.
     """
 
     over: Range
@@ -64,34 +64,34 @@ class Optimal:
 
     @property
     def times_less(self) -> float:
-        """Rig time of the standard sweep over that at equal worst standard error."""
+        """Ratio of the rig times, standard sweep to chosen poses, for equal worst standard error."""
         return self.standard.plan.duration_s / self.equal.plan.duration_s
 
     @property
     def times_less_for_all(self) -> float:
-        """The same with no parameter less certain than after the standard sweep."""
+        """The same ratio if no parameter may be less certain."""
         return self.standard.plan.duration_s / self.all_equal.plan.duration_s
 
     @property
     def height_correlation(self) -> float:
-        """Of height (the part of gravity across the table) with time, over the poses in order."""
+        """Correlation of height (gravity across the table) with time over the poses."""
         heights = np.cos(np.radians([pose.alpha_deg for pose in self.equal.poses]))
         times_s = [held.start_s for held in self.equal.plan.held]
         return float(np.corrcoef(heights, times_s)[0, 1]) if np.ptp(heights) else 0.0
 
     def worst(self, judged: Judged) -> int:
-        """Number of the parameter with the greatest error at full scale, of those that the standard sweep tells."""
+        """Index of the parameter with the largest error at full scale, of those that the standard sweep determines."""
         return int(np.argmax(np.where(self.standard.told, judged.errors, -1.0)))
 
 
 def relative(standard: Judged, judged: Judged) -> float:
-    """Worst standard error over that of the standard sweep, of the parameters that the standard sweep tells."""
+    """Ratio of the worst standard errors to the standard sweep, for the parameters that it determines."""
     known = standard.told
     return float(np.max(judged.errors[known]) / np.max(standard.errors[known]))
 
 
 def most_relative(standard: Judged, judged: Judged) -> float:
-    """The greatest ratio of any parameter's standard error to its own in the standard sweep."""
+    """The largest ratio of a standard error to that of the same parameter in the standard sweep."""
     known = standard.told
     return float(np.max(judged.errors[known] / standard.errors[known]))
 

@@ -1,7 +1,7 @@
-"""A dry run: the procedure itself on instruments that only count what they are told. Nothing is touched.
+"""The plan of a procedure: the procedure runs on planned instruments, and nothing moves.
 
-Each move, the limits that it stays within, how long all of it takes, the room that it needs on the disk. A procedure
-that goes by what it measures is rehearsed on twins: its plan is that of one simulated run.
+A plan has every move, the limits, the duration, and the size on the disk. A procedure that depends on its measurements
+runs on simulated instruments: its plan is that of one simulated run.
 """
 
 from __future__ import annotations
@@ -39,13 +39,12 @@ from rig.planning.planned import (
 from rig.record.measured import of_sensor
 from rig.record.values import Kept
 
-# A dry run of a procedure that goes by what it measures: on a simulated copy of the bench, every step counted.
-#
-# Nothing real is touched and nothing is kept: all instruments are twins, in the world that the bench file describes.
+# The plan of a procedure that depends on its measurements: a run on a simulated copy of the bench, which records
+# every step. Nothing real moves and nothing is stored; all instruments are simulated, in the world of the bench file.
 
 
-class Counted:
-    """Does what it is told with `twin`, after `planned` has counted it, or refused it."""
+class RecordedTwin:
+    """Calls `planned`, which records or refuses a command, and then the simulated instrument `twin`."""
 
     def __init__(self, planned: Any, twin: Any) -> None:
         self._planned, self._twin = planned, twin
@@ -56,7 +55,7 @@ class Counted:
         def both(*arguments: Any, **named: Any) -> Any:
             counted = count(*arguments, **named)
             if isgenerator(counted):
-                deque(counted, maxlen=0)  # to its end
+                deque(counted, maxlen=0)  # run it to its end
             return act(*arguments, **named)
 
         return both
@@ -64,7 +63,7 @@ class Counted:
 
 @dataclass
 class RehearsalHost(PlanHost):
-    """A plan's host that remembers what the twins of `rig` measure, for as long as the rehearsal lasts."""
+    """A planned host that stores the simulated measurements of `rig` during the rehearsal."""
 
     rig: Rig
     dwells: list[Dwell] = field(default_factory=list)
@@ -76,13 +75,13 @@ class RehearsalHost(PlanHost):
         return self.dwells
 
     def keep(self, pose: Pose, samples: Samples, temperature_c: float | None) -> None:
-        self.ledger.held.append(Held(self.ledger.now_s, pose))  # the twins' clock shows another time
+        self.ledger.held.append(Held(self.ledger.now_s, pose))  # the clock of the twins differs
         kept = Kept(pose, samples, samples.start_s, temperature_c)
         self.dwells.append(of_sensor(kept, self.rig.bench.first_sensor).dwell)
 
     def ask(self, question: Question) -> str:
         done = answer(question, self.rig)
-        if isinstance(question, Dial) and done is not None:  # the planned stage has counted the move
+        if isinstance(question, Dial) and done is not None:  # the planned stage has recorded the move
             return done
         planned = super().ask(question)
         return done or planned
@@ -90,22 +89,22 @@ class RehearsalHost(PlanHost):
 
 @contextmanager
 def rehearsing(bench: Bench, planned: Mapping[str, Any], ledger: Ledger) -> Iterator[Session]:
-    """A session on the twins of `bench`, in which `planned` instruments count along.
+    """A session on simulated instruments of `bench`; `planned` instruments record every step.
 
-    The limits of the world are not the bench's: the simulated table may stand worse than the real one.
+    The limits of temperature and tilt do not apply: the simulated table may be less level than the real one.
     """
     with connected(_simulated(bench)) as rig:
         parts: dict[str, Any] = {role: absent(role) for role in planned}
-        parts |= {role: Counted(planned[role], driver) for role, driver in rig.drivers.items()}
+        parts |= {role: RecordedTwin(planned[role], driver) for role, driver in rig.drivers.items()}
         level_deg = None if bench.limits.level_deg is None else math.inf
         limits = replace(bench.limits, temperature_c=(-math.inf, math.inf), level_deg=level_deg)
-        clock: Any = Counted(ledger, rig.clock)
+        clock: Any = RecordedTwin(ledger, rig.clock)
         host = RehearsalHost(ledger, rig)
         yield replace(rig.session(host), **parts, clock=clock, limits=limits)
 
 
 def _simulated(bench: Bench) -> Bench:
-    """The same bench with a sound twin in every role."""
+    """The same bench with a simulated instrument without faults in every role."""
     twins = {
         role: part.model_copy(update={"url": SIMULATED, "stream_url": None, "faults": ()})
         for role, part in bench.instruments.items()
@@ -127,7 +126,7 @@ PLANNED = {
 
 @dataclass(frozen=True)
 class Plan:
-    """All that a procedure would do: `steps`, and the poses that it keeps, both in order.
+    """The steps and the recorded poses of a procedure, both in order.
 
     `reach`: for each stage (lowest, highest) angle and its limits, in deg.
     """
@@ -143,19 +142,19 @@ class Plan:
 
     @property
     def poses(self) -> int:
-        """How many are kept."""
+        """Number of recorded poses."""
         return len(self.held)
 
     @property
     def questions(self) -> tuple[str, ...]:
-        """What a person is asked, each with its name."""
+        """The questions to a person with their names."""
         return tuple(f"{question.name}: {question.text}" for question in self.asked)
 
 
 def plan(bench: Bench, procedure: Procedure, settings: Mapping[str, Any]) -> Plan:
-    """What `procedure` would do on `bench`. Raises what the run would: LimitError, SettingError, ProcedureError.
+    """The plan of `procedure` on `bench`. Raises LimitError, SettingError and ProcedureError, as the run does.
 
-    Raises BenchError for a pose at which a stage's error table has nothing.
+    Raises BenchError for a pose outside the error table of a stage.
     """
     ledger = Ledger()
     parts = _parts(bench, ledger)
@@ -179,13 +178,13 @@ def plan(bench: Bench, procedure: Procedure, settings: Mapping[str, Any]) -> Pla
 
 @contextmanager
 def _counting(bench: Bench, parts: Mapping[str, Any], ledger: Ledger) -> Iterator[Session]:
-    """A session on instruments that only count."""
-    limits = replace(bench.limits, temperature_c=(-math.inf, math.inf))  # nobody knows it yet
+    """A session on planned instruments."""
+    limits = replace(bench.limits, temperature_c=(-math.inf, math.inf))  # the temperature is not known yet
     yield Session(**parts, clock=ledger, host=PlanHost(ledger), limits=limits)
 
 
 def _require_known_angles(bench: Bench, poses: Sequence[Pose]) -> None:
-    """Better told now than when the run is evaluated."""
+    """Raises BenchError for poses outside an error table, before the run."""
     for role in TURNING:
         part = bench.instruments.get(role)
         if part is None or not isinstance(part.error_table, tuple):
@@ -204,18 +203,18 @@ def _parts(bench: Bench, ledger: Ledger) -> dict[str, Any]:
     return made
 
 
-# A plan in a few lines: poses of one path are a stretch, and what is done besides moving and recording is named.
+# A plan in a few lines: the poses of one path are a stretch; other steps than moves and recordings are listed.
 
 PLAIN = re.compile(
     r"(alpha|beta) (from|seeks|turns|brakes)|adc records|wait |level is read"
-)  # steps that go without saying
-COUNTER = re.compile(r"\s*(\d+)$")  # of a path: "still 3" is the third of one stretch
+)  # steps that are not listed
+COUNTER = re.compile(r"\s*(\d+)$")  # of a path: "still 3" is the third pose of a stretch
 LONG_WAIT_S = 30.0
 
 
 @dataclass(frozen=True)
 class Stretch:
-    """Poses in a row, the first dwell of which begins at `start_s`; `also` is what else is done on the way there."""
+    """Consecutive poses, the first dwell of which begins at `start_s`; `also` lists other steps before them."""
 
     start_s: float
     poses: tuple[Pose, ...]
@@ -223,14 +222,14 @@ class Stretch:
 
     @property
     def words(self) -> str:
-        """In one line."""
+        """The stretch in one line."""
         number = f"{len(self.poses)} pose{'s' * (len(self.poses) > 1)}"
         alpha, beta = _range([p.alpha_deg for p in self.poses]), _range([p.beta_deg for p in self.poses])
         return "  ".join([f"alpha {alpha}, beta {beta} deg: {number}", *_named(self.poses)])
 
 
 def stretches(plan: Plan) -> list[Stretch]:
-    """All poses of a plan, in order."""
+    """The stretches of a plan, in order."""
     found, before_s = [], 0.0
     for _, group in groupby(plan.held, lambda held: _kind(held.pose)):
         held = list(group)
@@ -245,7 +244,7 @@ def _kind(pose: Pose) -> tuple[str, float, int]:
 
 
 def _besides(plan: Plan, from_s: float, to_s: float) -> Iterator[str]:
-    """What is done between two moments that is no plain step, each once, and how long is waited where it is long."""
+    """Other steps between two times, each once, and long waits."""
     mine = [step for step in plan.steps if from_s <= step.start_s < to_s]
     yield from dict.fromkeys(step.what for step in mine if not PLAIN.match(step.what))
     waited_s = sum(step.duration_s for step in mine if step.what.startswith("wait ") and step.duration_s >= LONG_WAIT_S)
@@ -262,13 +261,13 @@ def _range(angles_deg: Sequence[float]) -> str:
 
 
 def _named(poses: Sequence[Pose]) -> Iterator[str]:
-    """The path, and how the sensor is mounted where that is not as usual."""
+    """The path, the rates, and an unusual mounting of the sensor."""
     numbers = [match[1] for pose in (poses[0], poses[-1]) if (match := COUNTER.search(pose.path))]
     path = COUNTER.sub("", poses[0].path)
     counted = [*dict.fromkeys(numbers)]
     if path:
         yield f"{path} {' to '.join(counted)}".rstrip()
     if rates := sorted({abs(pose.rate_deg_s) for pose in poses} - {0.0}):
-        yield f"at {', '.join(f'{rate:g}' for rate in rates)} deg/s both ways"
+        yield f"at {', '.join(f'{rate:g}' for rate in rates)} deg/s in both directions"
     if poses[0].mount_deg or poses[0].flip:
-        yield f"mounted face {'down' if poses[0].flip else 'up'}, turned by {poses[0].mount_deg:g} deg"
+        yield f"mounted face {'down' if poses[0].flip else 'up'}, rotated by {poses[0].mount_deg:g} deg"

@@ -1,4 +1,4 @@
-"""Instruments that only count what they are told: a plan's stages, converter, oven and the others, on its clock."""
+"""Planned instruments: stages, converter, oven and others that record their steps and durations without moving."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from rig.record.values import Block
 
 LEVEL_S = 1.0  # a reading of the level
 ROOM_C = 25.0
-EXCHANGE_S = 0.05  # what commands and polls add to a move or a record
+EXCHANGE_S = 0.05  # time of commands and polls for each move or recording
 
 
 @dataclass(frozen=True)
 class Step:
-    """One thing that is done: from `start_s` for `duration_s`."""
+    """One step of a plan: from `start_s` for `duration_s`."""
 
     start_s: float
     duration_s: float
@@ -36,7 +36,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Held:
-    """A pose that is kept: its dwell begins at `start_s`."""
+    """A recorded pose: its dwell begins at `start_s`."""
 
     start_s: float
     pose: Pose
@@ -44,7 +44,7 @@ class Held:
 
 @dataclass
 class Ledger:
-    """The planned clock, and the steps so far."""
+    """The clock of the plan, and its steps so far."""
 
     now_s: float = 0.0
     steps: list[Step] = field(default_factory=list)
@@ -64,7 +64,7 @@ class Ledger:
 
 
 class StageSettings(Protocol):
-    """What a plan needs to know of a stage, whatever turns it."""
+    """The settings of a stage that a plan needs, for any driver."""
 
     @property
     def limits_deg(self) -> tuple[float, float]: ...
@@ -78,17 +78,17 @@ class StageSettings(Protocol):
 
 @dataclass(frozen=True)
 class PlannedTurn:
-    """A turn that goes on for as long as a plan wants it to."""
+    """A rotation of any length."""
 
     rate_deg_s: float
     beat_s: float = math.inf
 
     def require(self) -> None:
-        """It turns."""
+        """The rotation never fails."""
 
 
 class PlannedStage:
-    """A stage that counts: it stands where it was told, and refuses what its driver would refuse."""
+    """A planned stage: it is at the last target, and refuses the same targets as its driver."""
 
     def __init__(self, name: str, settings: StageSettings, ledger: Ledger) -> None:
         self._name, self._settings, self._ledger = name, settings, ledger
@@ -134,7 +134,7 @@ class PlannedStage:
         return self._homed
 
     def stop(self) -> None:
-        """It never moves."""
+        """Nothing to stop."""
 
     @property
     def limits(self) -> tuple[float, float]:
@@ -142,7 +142,7 @@ class PlannedStage:
 
 
 class PlannedAdc:
-    """A converter that counts samples. The sensor is on, until it is switched."""
+    """A planned converter that counts samples. The sensor is on until it is switched off."""
 
     def __init__(self, name: str, settings: AdcSettings, ledger: Ledger) -> None:
         self._name, self._settings, self._ledger = name, settings, ledger
@@ -177,7 +177,7 @@ class PlannedAdc:
 
 
 class PlannedOven:
-    """An oven that is at the temperature it was set to. It is off, until it is switched."""
+    """A planned oven at its set point. It is off until it is switched on."""
 
     def __init__(self, name: str, settings: OvenSettings, ledger: Ledger) -> None:
         self._name, self._settings, self._ledger = name, settings, ledger
@@ -204,7 +204,7 @@ class PlannedOven:
 
 @dataclass(frozen=True)
 class PlannedTilt:
-    """The reading of a level on a table that is level."""
+    """The reading of a level on a horizontal table."""
 
     x_deg: float = 0.0
     y_deg: float = 0.0
@@ -212,7 +212,7 @@ class PlannedTilt:
 
 
 class PlannedLevel:
-    """A level that shows 0."""
+    """A planned level that reads 0."""
 
     def __init__(self, name: str, settings: Any, ledger: Ledger) -> None:  # noqa: ARG002
         self._name, self._ledger = name, ledger
@@ -223,7 +223,7 @@ class PlannedLevel:
 
 
 class PlannedPositioner:
-    """A positioner that stands where it was told, and refuses what its driver would refuse."""
+    """A planned positioner: it is at the last target, and refuses the same targets as its driver."""
 
     def __init__(self, name: str, settings: Any, ledger: Ledger) -> None:
         self._name, self._settings, self._ledger = name, settings, ledger
@@ -258,7 +258,7 @@ class PlannedPositioner:
 
 
 def planned_answer(question: Question) -> str:
-    """An answer that lets the plan go on."""
+    """A valid answer to a question."""
     if isinstance(question, Number):
         return repr(min(max(0.0, question.low), question.high))
     return question.choices[0] if isinstance(question, Choice) else "yes"
@@ -266,7 +266,7 @@ def planned_answer(question: Question) -> str:
 
 @dataclass
 class PlanHost:
-    """The session's host that keeps nothing but what was read: how the sensor is mounted is among it."""
+    """The host of a planned session: it stores readings, such as the mounting of the sensor, and no samples."""
 
     ledger: Ledger
     read: dict[str, Reading] = field(default_factory=dict, kw_only=True)
@@ -294,30 +294,30 @@ class PlanHost:
         return planned_answer(question)
 
     def doing(self, text: str) -> None:
-        """Its steps say what it does."""
+        """The steps of the plan are enough."""
 
 
-# How long the stages take from one pose to another, as a session moves them: alpha first, then beta from its side.
+# Duration of moves between poses, in the order of a session: alpha first, then beta from its side.
 
-REMOUNT_S = 900.0  # a person turns the sensor over, and it takes its temperature again: as seldom as possible
+REMOUNT_S = 900.0  # a person turns the sensor over, and its temperature settles again
 HOME = Pose(0.0, 0.0)
 
 
 def moves_s(bench: Bench, poses: Sequence[Pose]) -> Array:
-    """From each of `poses` to each, shape (n, n)."""
+    """Duration from each of `poses` to each, s, shape (n, n)."""
     moves = _Moves.of(bench)
     return np.array([[moves.seconds(a, b) for b in poses] for a in poses])
 
 
 def from_home_s(bench: Bench, poses: Sequence[Pose]) -> Array:
-    """From where both stages stand at 0 with the sensor face up, shape (n,)."""
+    """Duration from both stages at 0 with the sensor face up, s, shape (n,)."""
     moves = _Moves.of(bench)
     return np.array([moves.seconds(HOME, pose) for pose in poses])
 
 
 @dataclass(frozen=True)
 class _Moves:
-    """Seconds that each stage needs for a distance, and how far an approach begins beyond a pose."""
+    """Duration of a move of each stage by its distance, and the overrun of an approach."""
 
     alpha_s: Callable[[float], float]
     beta_s: Callable[[float], float]
@@ -329,11 +329,11 @@ class _Moves:
         return _Moves(cache(alpha), cache(beta), bench.limits.overrun_deg)
 
     def seconds(self, start: Pose, end: Pose) -> float:
-        """Of all moves from one pose to another, and of a remount."""
-        way_deg = end.beta_deg - start.beta_deg
-        beta_deg = [abs(way_deg)]
-        if end.direction and way_deg * end.direction < SHORTEST_APPROACH_DEG:
-            beta_deg = [abs(way_deg - end.direction * self.overrun_deg), self.overrun_deg]
+        """Duration of all moves from one pose to another, with a remount, s."""
+        distance_deg = end.beta_deg - start.beta_deg
+        beta_deg = [abs(distance_deg)]
+        if end.direction and distance_deg * end.direction < SHORTEST_APPROACH_DEG:
+            beta_deg = [abs(distance_deg - end.direction * self.overrun_deg), self.overrun_deg]
         moves = [(self.alpha_s, abs(end.alpha_deg - start.alpha_deg)), *((self.beta_s, deg) for deg in beta_deg)]
         remount_s = REMOUNT_S * ((end.mount_deg, end.flip) != (start.mount_deg, start.flip))
         return remount_s + sum(move_s(deg) + EXCHANGE_S for move_s, deg in moves if deg)

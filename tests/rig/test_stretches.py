@@ -62,7 +62,7 @@ def test_poses_that_are_counted_are_one_stretch() -> None:
 
 def test_how_the_sensor_is_mounted_is_said_where_it_is_not_as_usual() -> None:
     (other,) = stretches(of((Held(0.0, Pose(0, 0, mount_deg=90.0, flip=1)),)))
-    assert other.words == "alpha 0, beta 0 deg: 1 pose  mounted face down, turned by 90 deg"
+    assert other.words == "alpha 0, beta 0 deg: 1 pose  mounted face down, rotated by 90 deg"
 
 
 def of(held: tuple[Held, ...]) -> Plan:

@@ -179,7 +179,7 @@ def test_a_run_that_is_stopped_in_a_turn_stands_and_goes_on_sample_for_sample(
 
 def test_a_plan_knows_ways_limits_and_mounts(rig: Rig) -> None:
     told = rig("plan", "rate-turn", "--rates-deg-s", "20,80").out
-    assert "alpha 180, beta -180 to 180 deg: 4 poses  y turning  at 20, 80 deg/s both ways" in told
+    assert "alpha 180, beta -180 to 180 deg: 4 poses  y turning  at 20, 80 deg/s in both directions" in told
     assert "mount-0-x-up: Does the sensor stand on edge, its x axis up and its y axis along the table's x?" in told
     assert "beta from -273.333 to 273.333 deg, within its limits -400 to 400 deg" in told
     refused = rig("plan", "rate-turn", "--rates-deg-s", "200")
