@@ -86,7 +86,7 @@ LEAST_GAINS = {  # gain, by process
 }
 TWO_LEVELS_BETTER = 14.0  # gain beyond the price of the path: chance in one of 1000 records
 FEWEST_JUMPS = 4  # between two levels: each is reached again, which a step does not do
-MOST_PATTERNS = 3  # of a channel: more steps are noise that jumps
+MOST_PATTERNS = 4  # of a channel: a line, a curvature and a branch over temperature, and a step; more are noise
 FALSE_LINE = 1e-3  # chance of a line over all frequencies of a record
 FALSE_MINIMUM = 0.05  # chance of a minimum over all pairs of averaging times of a level Allan deviation
 MOST_FAST_LINES = 8  # of a channel: a disturbance and its first harmonics

@@ -256,6 +256,18 @@ def matched_sums(forms: Array, weighted: Array, weight: Array) -> tuple[Array, A
 
 
 @njit(cache=True, nogil=True)
+def play(values: Array, width: float) -> Array:
+    """The branch (n,) of a hysteresis: 1/2 where values (n,) have risen by `width`, -1/2 where they have fallen."""
+    branch, state = np.empty_like(values), 0.0
+    for i in range(len(values)):
+        if i:
+            state += (values[i] - values[i - 1]) / width
+        state = min(max(state, -0.5), 0.5)
+        branch[i] = state
+    return branch
+
+
+@njit(cache=True, nogil=True)
 def first_order_lag(values: Array, steps: float) -> Array:
     """Values (n,) through a first-order lag with a time constant of so many steps, settled at the first value."""
     share = 1.0 - np.exp(-1.0 / steps)

@@ -20,17 +20,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache, partial
-from itertools import product
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 from scipy.fft import dct, dst
+from scipy.optimize import minimize_scalar
 from scipy.special import xlogy
 
 from calibrations.criteria import FEWEST_JUMPS, INSEPARABLE, PATTERN_AMPLITUDE, PATTERN_CERTAIN, TWO_LEVELS_BETTER
 from calibrations.noise.fit import fit_effects, without_effects
-from calibrations.noise.kernels import first_order_lag, matched_sums
+from calibrations.noise.kernels import first_order_lag, matched_sums, play
 from calibrations.noise.likelihood import ChannelFit
 from calibrations.noise.lines import means_without
 from calibrations.noise.record import Channel
@@ -39,9 +39,12 @@ from calibrations.table import Array
 
 STEP, DRIFT, SETTLING, FOLLOWS = "step", "drift", "settling", "follows"
 TIMES = np.geomspace(1 / 50, 1 / 2, 16)  # time constants of a settling that are tried, of the record
-LAGS = (0.0, *np.geomspace(1 / 400, 1 / 5, 10))  # of an output behind a column, of the record
+LAGS = (0.0, *np.geomspace(1 / 400, 1 / 5, 10).tolist())  # of an output behind a column, of the record
 EDGE = 8  # means from either end within which a step would be one odd value
+LAG_PRECISION = 0.02  # of a lag
 PER = {"temperature_c": "K", "supply_v": "V"}  # units of columns
+POWERS = {2: "square", 3: "cube"}  # of a column, about its mean: a polynomial beside a straight line
+PLAYS = (0.03, 0.1, 0.3)  # widths of a hysteresis that are tried, of the range of a column
 
 
 @dataclass(frozen=True)
@@ -65,6 +68,7 @@ class Pattern:
     cause: str = ""
     doubt: float = 0.0
     rivals: tuple[Pattern, ...] = ()
+    further: bool = False  # a curvature or a branch beside a straight line over the same column
 
     @cached_property
     def form(self) -> Array:
@@ -88,6 +92,11 @@ class Pattern:
         return self.worth > (0.0 if self.kind == FOLLOWS else PATTERN_CERTAIN)
 
     @property
+    def needless(self) -> bool:
+        """Whether a curvature or a branch is chance, once all amounts are fitted together."""
+        return self.further and (self.size / self.std) ** 2 < PATTERN_AMPLITUDE
+
+    @property
     def text(self) -> str:
         """In words, with the patterns that the record cannot separate from it."""
         others = " or ".join(each.plain for each in self.rivals)
@@ -98,14 +107,14 @@ class Pattern:
         return replace(channel, means=channel.means - self.size * self.form) if channel.axis == self.axis else channel
 
 
-def pattern_of(found: ChannelFit) -> Pattern | None:
-    """The pattern with the greatest gain in one channel; None where chance explains it."""
+def pattern_of(found: ChannelFit, removed: Iterable[Pattern] = ()) -> Pattern | None:
+    """The pattern with the greatest gain in one channel; None where chance explains it. `removed`: those before it."""
     if hidden_in(found.channel.oddities) is not None:
         return None  # rounding makes steps and slopes
     spectrum, unit = _Ordinates.of(found), found.channel.unit
     every = [
         _step(found.channel, spectrum, unit), *_courses(found.channel, spectrum, unit),
-        *_followed(found.channel, spectrum, unit),
+        *_followed(found.channel, spectrum, unit, removed), *_further(found.channel, spectrum, unit, removed),
     ]  # fmt: skip
     kinds = {(each.kind, each.cause) for each in every}
     best, *others = sorted((_best(every, *kind) for kind in kinds), key=lambda each: -each.worth)
@@ -223,22 +232,55 @@ def _course_coefficients(n: int, k: int) -> Array:
     return np.asarray(found / np.sqrt(2 * n))
 
 
-def _followed(channel: Channel, by: _Ordinates, unit: str) -> Iterator[Pattern]:
-    """Outputs that follow a column, as read or without its scatter, at once or with a lag."""
+def _followed(channel: Channel, by: _Ordinates, unit: str, removed: Iterable[Pattern]) -> Iterator[Pattern]:
+    """Outputs that follow a column, as read or without its scatter, at once or with a lag; each column once."""
     price = PATTERN_AMPLITUDE + 2 * float(np.log(len(LAGS) * max(1, len(channel.logged))))
+    known = {each.cause for each in removed if each.axis == channel.axis}
     for name, column in channel.logged.items():
-        readings = ((column.read, 0.0), (column.level, column.doubt))
-        for (values, doubt), (share, behind) in product(readings, _lags(channel.length_s)):
-            form = values if share == 0 else first_order_lag(values, share * len(values))
+        if name in known:
+            continue
+        for values, doubt in ((column.read, 0.0), (column.level, column.doubt)):
+            share = _best_lag(values, by)
+            behind = f", with a lag of {share * channel.length_s:.2g} s" if share else ""
             text = f"{channel.axis} follows {name} by {{}} {unit}/{PER.get(name, name)}{behind}"
-            make = partial(np.asarray, form)
-            yield Pattern(FOLLOWS, channel.axis, text, make, *by.matched(form), price, name, doubt)
+            make = partial(_lagged, values, share)
+            yield Pattern(FOLLOWS, channel.axis, text, make, *by.matched(make()), price, name, doubt)
 
 
-def _lags(length_s: float) -> Iterator[tuple[float, str]]:
-    """Time constants as shares of the record, and the same in words."""
-    for share in LAGS:
-        yield share, f", with a lag of {share * length_s:.2g} s" if share else ""
+def _lagged(values: Array, share: float) -> Array:
+    """Values (n,) behind a first-order lag, its time constant a share of the record."""
+    return values if share == 0 else np.asarray(first_order_lag(values, share * len(values)))
+
+
+def _best_lag(values: Array, by: _Ordinates) -> float:
+    """The lag with the greatest gain: the best of LAGS, refined; 0 where the data cannot separate it from none."""
+
+    def loss(share: float) -> float:
+        return -by.matched(_lagged(values, share))[2]
+
+    losses = [loss(share) for share in LAGS]
+    best = int(np.argmin(losses))
+    if losses[0] - losses[best] < INSEPARABLE or -losses[best] < PATTERN_AMPLITUDE:
+        return 0.0
+    ends = LAGS[max(1, best - 1)], LAGS[min(len(LAGS) - 1, best + 1)]
+    found = minimize_scalar(loss, bounds=ends, method="bounded", options={"xatol": LAG_PRECISION * LAGS[best]})
+    return float(found.x if found.fun < losses[best] else LAGS[best])
+
+
+def _further(channel: Channel, by: _Ordinates, unit: str, removed: Iterable[Pattern]) -> Iterator[Pattern]:
+    """Curvature and branches of an output that follows a column, with the lag that was found: its square and cube, and
+    a hysteresis, which depends on the direction in which the column changes."""
+    price = PATTERN_AMPLITUDE + 2 * float(np.log(len(POWERS) + len(PLAYS)))
+    for line in removed:
+        if line.kind != FOLLOWS or line.further or line.axis != channel.axis:
+            continue
+        per, span = PER.get(line.cause, line.cause), float(np.ptp(line.form))
+        forms = [(f"the {name} of {line.cause} by {{}} {unit}/{per}^{k}", line.form**k) for k, name in POWERS.items()]
+        branch = f"the direction in which {line.cause} changes by {{}} {unit} (hysteresis)"
+        forms += [(branch, play(line.form, share * span)) for share in PLAYS]
+        for words, form in forms:
+            make, text = partial(np.asarray, form), f"{channel.axis} follows {words}"
+            yield Pattern(FOLLOWS, channel.axis, text, make, *by.matched(form), price, line.cause, further=True)
 
 
 def refitted(patterns: tuple[Pattern, ...], found: ChannelFit, whole: Channel) -> tuple[Pattern, ...]:

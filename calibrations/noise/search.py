@@ -149,7 +149,7 @@ def search(still: Still, model: Model, effects: Mapping[str, Effect]) -> Search:
         found = replace(found, telegraphs=tuple(filter(None, map(telegraph_of, found.mixture.channels))))
     first = found
     while len(found.patterns) < MOST_PATTERNS * len(still.channels):
-        more = _remove_next_pattern(found, given)
+        more = _remove_next_pattern(still, found, given)
         if more is found:
             break
         found = more
@@ -158,23 +158,31 @@ def search(still: Still, model: Model, effects: Mapping[str, Effect]) -> Search:
 
 def _with_common_amounts(whole: Still, found: Search, given: tuple[Effect, ...]) -> Search:
     """With the amounts of all patterns fitted at once, beside the processes that are left."""
-    patterns: list[Pattern] = []
-    for channel, beside in zip(whole.channels, found.mixture.channels, strict=True):
-        own = tuple(pattern for pattern in found.patterns if pattern.axis == channel.axis)
-        patterns += refitted(own, beside, channel) if own else ()
-    cleaned = with_cleaned_curves(without_patterns(whole, tuple(patterns)), tuple(patterns))
+    beside = found.mixture.channels
+    patterns = _with_amounts(whole, found.patterns, beside)
+    patterns = _with_amounts(whole, tuple(each for each in patterns if not each.needless), beside)
+    cleaned = with_cleaned_curves(without_patterns(whole, patterns), patterns)
     left = _search_once(cleaned, found.model, found.effects, given)
-    return replace(left, patterns=tuple(patterns), telegraphs=found.telegraphs)
+    return replace(left, patterns=patterns, telegraphs=found.telegraphs)
 
 
-def _remove_next_pattern(found: Search, given: tuple[Effect, ...]) -> Search:
+def _with_amounts(whole: Still, patterns: tuple[Pattern, ...], beside: tuple[ChannelFit, ...]) -> tuple[Pattern, ...]:
+    """The patterns with their amounts fitted together, channel by channel, to the record that holds them all."""
+    fitted: list[Pattern] = []
+    for channel, present in zip(whole.channels, beside, strict=True):
+        own = tuple(pattern for pattern in patterns if pattern.axis == channel.axis)
+        fitted += refitted(own, present, channel) if own else ()
+    return tuple(fitted)
+
+
+def _remove_next_pattern(whole: Still, found: Search, given: tuple[Effect, ...]) -> Search:
     """The search without the patterns that stand out, if that explains the record better; otherwise `found`.
 
     A form that is searched for in the record itself must also make a process unnecessary, or be no chance beside the
     best mixture: noise that jumps has steps and slopes of its own. A logged column is independent of the noise.
     """
     sure, likely = (_patterns(found, channels) for channels in (found.mixture.channels, found.mixtures.base))
-    tried = [_search_without(found, each, given) for each in (sure, likely) if each]
+    tried = [_search_without(whole, found, each, given) for each in (sure, likely) if each]
     best = max(tried, key=_worth, default=found)
     logged = any(pattern.kind == FOLLOWS for pattern in best.patterns[len(found.patterns) :])
     least = _worth(found) + (0.0 if logged else INSEPARABLE)
@@ -184,16 +192,19 @@ def _remove_next_pattern(found: Search, given: tuple[Effect, ...]) -> Search:
     return best if fewer or logged or any(pattern.certain for pattern in sure) else found
 
 
-def _search_without(found: Search, patterns: tuple[Pattern, ...], given: tuple[Effect, ...]) -> Search:
-    """The search without further patterns."""
-    rest = _search_once(without_patterns(found.still, patterns), found.model, found.effects, given)
-    return replace(rest, patterns=found.patterns + patterns, telegraphs=found.telegraphs)
+def _search_without(whole: Still, found: Search, patterns: tuple[Pattern, ...], given: tuple[Effect, ...]) -> Search:
+    """The search without further patterns. A curvature changes the slope beside it, so that amounts are fitted anew."""
+    together = found.patterns + patterns
+    together = _with_amounts(whole, together, found.mixture.channels) if found.patterns else together
+    rest = _search_once(without_patterns(whole, together), found.model, found.effects, given)
+    return replace(rest, patterns=together, telegraphs=found.telegraphs)
 
 
 def _patterns(found: Search, channels: tuple[ChannelFit, ...]) -> tuple[Pattern, ...]:
     """The pattern of each channel that has one. A channel that jumps between two levels has steps anyway."""
     jumping = {telegraph.axis for telegraph in found.telegraphs}
-    return tuple(filter(None, (pattern_of(each) for each in channels if each.channel.axis not in jumping)))
+    free = (each for each in channels if each.channel.axis not in jumping)
+    return tuple(filter(None, (pattern_of(each, found.patterns) for each in free)))
 
 
 def without_patterns(still: Still, patterns: tuple[Pattern, ...]) -> Still:
