@@ -149,8 +149,8 @@ def require_reference(source: str, kind: str) -> None:
     """Raises ModelError for a kind of data whose parameters could be traced to nothing: no reference is known."""
     if kind not in MEANS:
         raise ModelError(
-            f"{source}: a certificate is drawn up of poses, positions or rates, whose reference is known, and not "
-            f"of {kind}. Certify a sweep of the sensor (`rig run sweep`); `rig report` has what this one shows"
+            f"{source}: a certificate needs poses, positions or rates, whose reference is known; this is {kind}. "
+            "Certify a sweep of the sensor (`rig run sweep`); `rig report` shows the results of this data"
         )
 
 
