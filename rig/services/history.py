@@ -256,7 +256,7 @@ def _quantity(name: str, of: Sequence[Calibration], limit: Limit | None, baselin
     return Quantity(name, values[0].unit, mine, chart, line, allowed, when)
 
 
-# What results may come to before a sensor has to be calibrated again: of the bench file, and as a person says it.
+# Limits that set the next calibration: from the bench file and from options.
 
 
 def limits_of(bench_file: Path | None) -> dict[str, Limit]:
@@ -284,7 +284,7 @@ def _change(text: str) -> tuple[str, float]:
     return name, change
 
 
-# Two calibrations beside each other: of two days, of two sensors, of two rigs.
+# Comparison of two calibrations: of two days, two sensors, or two rigs.
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ def shaken_of(data: str) -> MotionResult | None:
         return beside_displacement(measured) if measured.run.procedure == "motion" else None
 
 
-# The page on a soak, for `rig report RUN`: asked for by the run's procedure, unless a model is named.
+# The page on a soak, for `rig report RUN` without --model.
 
 
 Page = tuple[list["Picture"], Callable[[], str]]
@@ -77,7 +77,7 @@ def _facts(measured: Measured, date: str, program: str) -> Mapping[str, str]:
     }
 
 
-# The report on data, as `rig report` writes it and the workbench hands it over: pictures, and the page's maker.
+# The page on data and a model.
 
 
 def reported(request: Request, tell: Callable[[str], None]) -> Page:

@@ -1,4 +1,4 @@
-"""What an analysis is asked: which data, beside which model, with what is known beside them."""
+"""The request of an analysis: data, model, and options."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from pathlib import Path
 
 @dataclass(frozen=True)
 class Request:
-    """A question of the command line or the workbench, in the words it was put in.
+    """A request of the command line or the workbench, as texts.
 
-    `data` is a file or a run; `model` a shipped model's name or a file, None for that of the kind of data. `noise` is a
-    model of the sensor's noise, which then is not guessed. `channel` and `rate_hz` are of a still record alone.
+    `data` is a file or a run; `model` the name of a shipped model or a file, None for the default of the kind of data.
+    `noise` is a noise model of the sensor. `channel` and `rate_hz` are for still records.
     """
 
     data: str
@@ -23,5 +23,5 @@ class Request:
 
     @property
     def bench_words(self) -> str:
-        """What names the bench in a command that is proposed, with a space before it; nothing for the simulated rig."""
+        """The option --bench for a proposed command, with a space before it; empty for the simulated rig."""
         return f" --bench {self.bench_file}" if self.bench_file else ""

@@ -124,7 +124,7 @@ def agreed(measured: float | None, stated: float, source: str) -> float:
     return measured
 
 
-# A still table as a stream: a channel, what may be followed, and times that must go on evenly.
+# A still table as a stream; its times must be evenly spaced.
 
 
 MOST_MISSING = 0.1  # of a record, in gaps that are closed up
@@ -228,7 +228,7 @@ def _check_gaps(gaps: Sequence[tuple[float, float]], length_s: float, source: st
         )
 
 
-# A run's still record as a stream, straight from the samples that were kept: no block is read twice.
+# The still record of a run as a stream from its samples; each block is read once.
 
 
 UPRIGHT = 0.999  # g: a pose that is as good as along gravity
@@ -305,7 +305,7 @@ def _note_upright(kept: Kept, volts: Array, into: Stream) -> None:
         into.upright_v.setdefault(round(g), float(volts.mean()))
 
 
-# DATA of a still sensor as a stream of samples: a table, an array in a file, or a run straight from its record.
+# The stream of DATA: a table, an array in a file, or a run.
 
 
 BLOCK = 1 << 17

@@ -29,13 +29,13 @@ BESIDE = ("t_s", *FOLLOWED, "n", "direction", "path")  # columns that are not ch
 
 
 def averaged(log: Table, tell: Callable[[str], None]) -> Table:
-    """The table itself, or the means of what a raw log holds still, which `tell` is then told.
+    """The table; a raw log is averaged over its still intervals, with a remark to `tell`.
 
-    Rows that are there twice count once. Raises DataError where nothing holds still.
+    Duplicate rows count once. Raises DataError without any still interval.
     """
     table = average_raw_log(log)
     if table is not log:
-        tell(f"{log.source} is a log of raw samples: {_taken(table)}, out of {log.n} samples, are taken.")
+        tell(f"{log.source} is a log of raw samples: the table has {_taken(table)}, from {log.n} samples.")
     table, copies = drop_duplicate_rows(table)
     if copies is not None:
         tell(copies)
@@ -47,7 +47,7 @@ def _taken(table: Table) -> str:
 
 
 def _included(table: Table, tell: Callable[[str], None]) -> Table:
-    """The table without the rows that its column `excluded` leaves out; a run has `rig exclude` for that."""
+    """The table without the rows that its column `excluded` marks; a run has `rig exclude` instead."""
     out = table.optional(EXCLUDED, 0.0) != 0
     if not out.any():
         return table
@@ -58,12 +58,12 @@ def _included(table: Table, tell: Callable[[str], None]) -> Table:
 
 
 def load(data: str, kind: str | None = None, tell: Callable[[str], None] = lambda _: None) -> Table:
-    """The table that `data` names. A file of that name is preferred to a run. `tell` hears what is done to a raw log.
+    """The table of `data`: a file, else a run. `tell` receives remarks.
 
     Raises DataError naming file, line and column; UnknownRun naming the nearest run.
     """
     if Path(data).is_dir():
-        raise DataError(f"{data}: is a folder; name a file in it, or a run (`rig runs` lists them)")
+        raise DataError(f"{data}: this is a folder; give a file in it, or a run (`rig runs` lists them)")
     if Path(data).is_file():
         return averaged(read_csv(Path(data), kind), tell)
     table = _of_run(data)
@@ -110,7 +110,7 @@ def joined_runs(
 
 
 def _begun(name: str) -> datetime | None:
-    """When a run began whose times count from then: one on real instruments."""
+    """The start of a run on real instruments, whose times count from it."""
     if Path(name).is_file():
         return None
     from rig.record.store import Record
@@ -121,7 +121,7 @@ def _begun(name: str) -> datetime | None:
 
 
 def begun(record: Record, run: str) -> datetime | None:
-    """When a run of the record began; None on a simulated bench, whose times count from when its sensor was powered."""
+    """The start of a run; None on a simulated bench, whose times count from power-on."""
     from rig.bench import Bench
 
     found = record.run(run)

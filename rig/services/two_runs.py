@@ -91,7 +91,7 @@ def _estimates(fit: FittedModel) -> Iterator[tuple[str, Estimate]]:
             yield " ".join(dict.fromkeys(filter(None, (term.name, each.name, each.axis)))), each
 
 
-# Two runs, or two sensors, by one model: the fits of both, and their measurements at the poses that both have.
+# One model fitted to both, and the measurements at common poses.
 
 
 POSE = ("alpha_deg", "beta_deg", "direction", "mount_deg", "flip")  # what a pose is, as far as it is known

@@ -80,7 +80,7 @@ def test_foreign_names_are_answered_with_the_import_that_takes_them(rig: Rig, fo
 
 def test_raw_samples_become_poses_and_it_is_said(rig: Rig, folder: Path) -> None:
     write(folder / "raw.csv", "alpha_deg;beta_deg;vx_v", samples=60)
-    said = "raw.csv is a log of raw samples: the means of 100 poses, out of 6240 samples, are taken."
+    said = "raw.csv is a log of raw samples: the table has the means of 100 poses, from 6240 samples."
     ended = rig("compare", "raw.csv", "--json")
     assert (ended.status, ended.err.strip()) == (0, said)
     assert json.loads(ended.out)["n"] == 100  # 104 but for four that are the same pose again, without a pause
