@@ -260,7 +260,7 @@ class _Reader:
         operation = FUNCTIONS[name]
         if not operation.least <= len(arguments) <= operation.most:
             wanted = f"{operation.least}" if operation.least == operation.most else f"{operation.least} or more"
-            raise self._fault(read, f"{name} takes {wanted} in its brackets, not {len(arguments)}")
+            raise self._fault(read, f"{name} takes {wanted} between its brackets, not {len(arguments)}")
         applied = self._apply(read, operation, arguments, depth)
         if name in OF_ANGLES and (degrees := _degrees(applied)):
             right = f"write {degrees.removesuffix('_deg')}, the same in rad, or {degrees}*pi/180"

@@ -314,7 +314,7 @@ class StillRecord(Dataset[NoiseFit]):
     def remarks(self, found: NoiseFit) -> list[str]:
         """Lines that the log-likelihood does not include."""
         if any(line.frequency_hz > each.channel.highest_hz for each in found.channels for line in each.lines):
-            return ["Lines above half the corner of the low-pass are not fitted, and gain no likelihood."]
+            return ["Lines above half the corner of the low-pass are not part of the fit."]
         return []
 
 

@@ -52,7 +52,7 @@ class Settings:
         fastest_hz = 1 / (FEWEST_POINTS * cycle_s)
         if not 0 < frequency_hz <= fastest_hz:
             raise LimitError(
-                f"{name}: no wave table plays {frequency_hz:g} Hz; nothing was moved",
+                f"{name}: the wave tables cannot play {frequency_hz:g} Hz; nothing was moved",
                 f"Ask for a positive frequency of at most {fastest_hz:g} Hz",
             )
         if frequency_hz > self.limit_hz:

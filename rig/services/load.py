@@ -203,8 +203,8 @@ def is_noise(model: Model | None) -> bool:
     noise = [term.name for term in model.terms if term.effect.is_noise]
     if noise and len(noise) < len(model.terms):
         raise ModelError(
-            f"{model.name}: {', '.join(noise)} is noise of a still record, and the other effects act on samples; "
-            "keep them in models of their own"
+            f"{model.name}: {', '.join(noise)} is a noise effect, and the model has other effects too; "
+            "put noise effects and other effects into separate models"
         )
     return bool(noise)
 

@@ -35,7 +35,7 @@ def test_six_faces_and_three_turns_give_the_published_calibration(rig: Rig, tmp_
     assert [values[f"gyro-scale-factor {a}"] for a in "xyz"] == pytest.approx([16.6777, 16.1879, 16.2534], abs=2e-4)
     assert [values[f"gyro-bias {a}"] for a in "xyz"] == pytest.approx([1.96, -4.47, -3.65], abs=0.02)
     assert found["accelerometer"]["bias"] == pytest.approx([-6.01887, -48.28787, -28.96637], abs=5e-6)
-    assert "by its six faces: bias -6.018868, -48.28787, -28.96637" in rig("fit", run, "--model", models[0]).out
+    assert "from its six faces: bias -6.018868, -48.28787, -28.96637" in rig("fit", run, "--model", models[0]).out
     page = tmp_path / "page.html"
     assert rig("report", run, "--model", models[0], "--out", str(page)).status == 0
     assert "fails" in json.loads(rig("compare", run, "--model", models[0], "--json").out)
