@@ -26,7 +26,7 @@ pytestmark = pytest.mark.slow
 
 DOTS = "[aria-label='Residuals'] .points path"
 ALIVE_MS = 5000  # on a busy machine; else a tenth of that
-BARS = "[aria-label^='Error by model'] .bars .point"
+BARS = "[aria-label*=' by model'] .bars .point"
 
 
 def looked_at(workbench: Workbench, data: str, verdict: str) -> Page:
@@ -125,7 +125,7 @@ def test_of_a_motion_its_samples_are_drawn(workbench: Workbench) -> None:
         run = start(record, read_bench(), find("motion"), {}, Quiet({})).run.run
     page = workbench.visit(f"/?data={run}")
     expect(page.locator("[aria-label='Measurement and model'] .ytitle")).to_have_text("x − mean (mV)")
-    expect(page.locator("[aria-label='Where it fails'] .xtitle")).to_have_text("phase of the motion at 10 Hz (deg)")
+    expect(page.locator("[aria-label='Residual pattern'] .xtitle")).to_have_text("phase of the motion at 10 Hz (deg)")
     page.keyboard.press("x")
     expect(page.locator("[aria-label='Residuals'] .ytitle")).to_contain_text("residual of x in phase")
     workbench.shot(page, "motion")
@@ -166,8 +166,8 @@ def test_selection_units_axes_and_poses(workbench: Workbench, tmp_path: Path) ->
     page.get_by_label("against").click()
     page.get_by_role("option", name="temperature (°C)").click()
     expect(page.locator("[aria-label='Residuals'] .xtitle")).to_have_text("temperature (°C)")
-    page.locator("[aria-label='Where it fails'] .points path").nth(9).hover(force=True)
-    expect(page.locator("[aria-label='Where it fails'] .hovertext")).to_contain_text("α 90°, β 90°")
+    page.locator("[aria-label='Residual pattern'] .points path").nth(9).hover(force=True)
+    expect(page.locator("[aria-label='Residual pattern'] .hovertext")).to_contain_text("α 90°, β 90°")
 
 
 def test_selected_poses_are_left_out_with_a_reason_and_taken_in_again(workbench: Workbench) -> None:
