@@ -13,11 +13,11 @@ from drivers.transport.server import Connection, Port, Server
 
 LISTEN = "pty:?baud=9600"
 FAULTS = {
-    "lies": Kind("shows this much more along x", 1.0, "deg"),
-    "stale": Kind("shows again and again what it showed"),
-    "out-of-range": Kind("shows that it is beyond its range"),
-    "deaf": Kind("talks on when it is told to stop"),
-    "restart": Kind("is without power for a moment: talks unasked, once"),
+    "lies": Kind("reports this much more along x", 1.0, "deg"),
+    "stale": Kind("repeats its last reading"),
+    "out-of-range": Kind("reports that it is out of range"),
+    "deaf": Kind("continues to send after the command to stop"),
+    "restart": Kind("loses power for a moment: sends without a request, once"),
 }
 INTERVAL_S = 0.1  # from one pair of lines to the next [M]
 THINKING_S = 0.002  # [M]

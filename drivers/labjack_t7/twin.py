@@ -32,17 +32,17 @@ from drivers.world.kernel import kernel
 
 FAULTS = {
     **MODBUS_FAULTS,
-    "overflow": Kind("skips so many scans and says so, once", 50, "scan", least=1),
-    "buffer-full": Kind("says that its buffer ran over, and streams no more, once"),
-    "stall": Kind("streams nothing, though it was started"),
+    "overflow": Kind("skips this number of scans and reports it, once", 50, "scan", least=1),
+    "buffer-full": Kind("reports a full buffer and stops the stream, once"),
+    "stall": Kind("sends no data after the start of a stream"),
     "lost-packet": Kind("leaves out the second packet of a stream"),
     "duplicated-packet": Kind("sends the second packet of a stream twice"),
     "swapped-packets": Kind("sends the second packet of a stream after the third"),
-    "clock-step": Kind("its clock stands still for so long in the middle of a stream, once", 0.5, "s", least=0.001),
-    "over-range": Kind("has the first input beyond its range now and then"),
-    "endless": Kind("streams on when it is told to stop"),
+    "clock-step": Kind("its clock stops for this time during a stream, once", 0.5, "s", least=0.001),
+    "over-range": Kind("the first input is sometimes out of range"),
+    "endless": Kind("ignores the command to stop the stream"),
     "open-interlock": Kind("the contact at this digital line opens", 4, least=0),
-    "restart": Kind("is without power for a moment: forgets all, and drops its connections, once"),
+    "restart": Kind("loses power for a moment: loses its settings and connections, once"),
 }
 
 

@@ -15,11 +15,11 @@ from drivers.transport.server import Server
 LISTEN = "pty:?baud=9600"
 FAULTS = {
     **MODBUS_FAULTS,
-    "lies": Kind("shows this much more", 100.0, "K"),
-    "stale": Kind("shows and goes by the temperature that it had"),
-    "no-temperature": Kind("shows the code of a fault", 0x8003),
-    "runaway": Kind("heats as much as it can, as long as it runs"),
-    "restart": Kind("is without power for a moment: stands still with its first set point, once"),
+    "lies": Kind("reports this much more", 100.0, "K"),
+    "stale": Kind("reports and controls with an old temperature"),
+    "no-temperature": Kind("reports a fault code instead of a temperature", 0x8003),
+    "runaway": Kind("heats with full power while it is on"),
+    "restart": Kind("loses power for a moment: off, with its first set point, once"),
 }
 AT_POWER_ON = (25.0, False)
 FULL_C = 1000.0  # a set point that takes all power

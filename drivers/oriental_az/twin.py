@@ -25,11 +25,11 @@ THINKING_S = 0.003  # transmission waiting time of the drive
 FAULTS = {
     **MODBUS_FAULTS,
     "alarm": Kind("stops with the alarm of this code, once", 0x30),
-    "restart": Kind("is without power for a moment: stops, and does not know where it is any more, once"),
-    "stuck": Kind("does not turn, and finds itself in position"),
-    "e-stop": Kind("its stop input is on: it brakes, and does not start"),
-    "busy": Kind("says that it moves, whatever it does"),
-    "lies": Kind("shows a position that is off by this", 1.0, "deg"),
+    "restart": Kind("loses power for a moment: stops and loses its position, once"),
+    "stuck": Kind("does not turn, and reports that it is in position"),
+    "e-stop": Kind("its stop input is on: it brakes and does not start"),
+    "busy": Kind("always reports that it is moving"),
+    "lies": Kind("reports a position with this error", 1.0, "deg"),
 }
 TRIGGERS = dict(zip(range(-7, 0), (r.address for r in az.DIRECT[:-1]), strict=True))  # trigger -> starting item
 

@@ -17,11 +17,11 @@ from drivers.transport.server import Server
 
 LISTEN = "tcp://127.0.0.1:0"
 FAULTS = {
-    "restart": Kind("is without power for a moment: servo off, waves and record forgotten, once"),
-    "stuck": Kind("does not go where it is sent, and finds itself on target"),
-    "busy": Kind("says that it moves, whatever it does"),
-    "lies": Kind("shows a position that is off by this", 1.0, "um"),
-    "refuses": Kind("declines every command with this error", 17),
+    "restart": Kind("loses power for a moment: servo off, waves and recording lost, once"),
+    "stuck": Kind("does not move, and reports that it is on target"),
+    "busy": Kind("always reports that it is moving"),
+    "lies": Kind("reports a position with this error", 1.0, "um"),
+    "refuses": Kind("refuses every command with this error", 17),
 }
 IDENTITY = "(c)2015 Physik Instrumente (PI) GmbH & Co. KG, E-727, 0117055412, 13.21.00.09"
 PARAMETERS = {  # identifier: (value, type, name), the same for every axis

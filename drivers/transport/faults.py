@@ -243,25 +243,25 @@ def other_unit(said: Said, size: float, wire: Wire) -> list[Said]:
 
 
 EFFECTS: dict[str, tuple[Kind, Effect]] = {
-    "silence": (Kind("hears nothing and says nothing, as with a cable that is out"), nothing),
+    "silence": (Kind("receives and sends nothing, as with an unplugged cable"), nothing),
     "disconnect": (
-        Kind("the connection is closed as soon as it is asked or would say something; it can be opened again"),
+        Kind("closes the connection at the next message; it can be opened again"),
         the_end,
     ),
-    "lost-answers": (Kind("hears and obeys, but nothing that it says arrives"), nothing),
-    "delay": (Kind("all that it says comes later", 0.7, "s", least=0), later),
-    "garbage": (Kind("says noise in place of what it should", 8, "byte", least=1), noise),
-    "garbage-before": (Kind("so much noise comes before what it says", 3, "byte", least=1), after_noise),
-    "garbage-after": (Kind("so much noise comes after what it says", 3, "byte", least=1), before_noise),
+    "lost-answers": (Kind("executes commands, but its answers are lost"), nothing),
+    "delay": (Kind("its answers come late", 0.7, "s", least=0), later),
+    "garbage": (Kind("sends random bytes instead of an answer", 8, "byte", least=1), noise),
+    "garbage-before": (Kind("random bytes come before its answer", 3, "byte", least=1), after_noise),
+    "garbage-after": (Kind("random bytes come after its answer", 3, "byte", least=1), before_noise),
     "babble": (
-        Kind("for each thing that it should say, a minute of noise, a byte each interval", 0.01, "s", least=0.001),
+        Kind("sends random bytes for a minute instead of an answer, one each interval", 0.01, "s", least=0.001),
         babble,
     ),
-    "truncated": (Kind("only the first bytes of what it says arrive", 4, "byte", least=1), truncated),
-    "merged": (Kind("what it says comes together with a copy of it"), merged),
-    "trickle": (Kind("what it says comes byte by byte, at this interval", 0.002, "s", least=0), trickled),
-    "flipped-bit": (Kind("this bit is turned over in all that it says; TCP mends it", 13, "bit", least=0), flipped),
-    "wrong-unit": (Kind("another unit answers, whose number is larger by this", 1), other_unit),
+    "truncated": (Kind("only the first bytes of its answer arrive", 4, "byte", least=1), truncated),
+    "merged": (Kind("its answer arrives twice in one piece"), merged),
+    "trickle": (Kind("its answer arrives byte by byte, at this interval", 0.002, "s", least=0), trickled),
+    "flipped-bit": (Kind("this bit of every answer is inverted; TCP corrects it", 13, "bit", least=0), flipped),
+    "wrong-unit": (Kind("another unit answers; its number is larger by this", 1), other_unit),
 }
 
 

@@ -18,7 +18,7 @@ from drivers.transport.address import Url
 from drivers.transport.faults import Faults, Kind, Wire
 from drivers.transport.server import Connection, Port
 
-MODBUS_FAULTS = {"exception": Kind("declines whatever it is asked with this exception", 4, least=1)}
+MODBUS_FAULTS = {"exception": Kind("answers every request with this exception", 4, least=1)}
 ILLEGAL_FUNCTION, ILLEGAL_ADDRESS, ILLEGAL_VALUE, DEVICE_FAILURE = 1, 2, 3, 4
 
 
