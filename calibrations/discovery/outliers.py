@@ -104,4 +104,4 @@ def caution(rows: tuple[int, ...]) -> str | None:
     """What was done about them, and what a person can do; None where there are none."""
     if not rows:
         return None
-    return f"{told(rows)} {COUNTED}; set aside here, as accidents: {LEAVE_OUT}"
+    return f"{told(rows)} {COUNTED}; left out of this fit as outliers: {LEAVE_OUT}"
