@@ -94,7 +94,7 @@ def test_an_effect_of_ones_own_with_a_mistake_and_then_right(workbench: Workbenc
     workbench.shot(page, "own-effect-mistake")
     page.get_by_label("Name").fill("my-worm")
     text.fill("beta_deg += a*sin(5*beta) + b*cos(5*beta)")
-    expect(page.locator(".fall").last).to_contain_text("× the noise floor; unseen rows")
+    expect(page.locator(".fall").last).to_contain_text("× the noise floor; held-out error")
     expect(add).to_be_enabled()
     workbench.shot(page, "own-effect")
     add.click()
