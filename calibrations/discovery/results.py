@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from calibrations.discovery.dataset import Dataset
     from calibrations.discovery.patterns import Pattern
     from calibrations.discovery.plausibility import Finding
+    from calibrations.free_forms.naming import ActingPlace
     from calibrations.presentation.chart import Chart
 
 
@@ -186,6 +187,7 @@ class Findings(Generic[F]):
     candidates    every effect alone on top of the baseline; the effect of the first step comes first
     causes        effects of the steps named as causes; the others refine the form of a cause
     alternatives  by effect, those that the data cannot separate from it
+    places        places of the signal chain that act, the largest first, where the search has found them
     left          what no effect explains, in words; `pattern` is the same as an expression
     spoilt        whether that makes every effect doubtful; `unresponsive`, whether an output does not follow the poses
     searched      whether further effects were searched for after the last step
@@ -208,6 +210,7 @@ class Findings(Generic[F]):
     candidates: tuple[Candidate, ...] = ()
     causes: tuple[str, ...] = ()
     alternatives: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    places: tuple[ActingPlace, ...] = ()
     left: str | None = None
     pattern: Pattern | None = None
     spoilt: bool = False
@@ -258,6 +261,7 @@ class Findings(Generic[F]):
     def _common(self) -> dict[str, Any]:
         return {
             "alternatives": self.alternatives,
+            "unknown": tuple(place.name for place in self.places if place.unknown),
             "left": self.left,
             "share_left": self.end.share_left(self.origin),
             "spoilt": self.spoilt,

@@ -22,6 +22,7 @@ from calibrations.discovery.places import places
 from calibrations.discovery.plausibility import Finding, refusal, rejection
 from calibrations.discovery.results import Candidate, Diagnosis, Discovery, Findings, Place, Step
 from calibrations.discovery.search import Path, Settled, cost, find_path, first_order, recounted, settled
+from calibrations.discovery.structural import StructuralSearch, has_structure, search_structure
 from calibrations.discovery.structure import plainer, structure_of
 from calibrations.discovery.verdict import Verdict
 from calibrations.effects import Effect
@@ -115,11 +116,16 @@ class Rows(Dataset[Fit]):
         if (reason := refusal(self.table)) is not None:
             return self._rejected(self.fit(model), reason)
         start, outliers = fit_without(model, self.table)
+        if has_structure(start.table):
+            return self._with_structure(search_structure(start, effects), outliers)
         return self._found(find_path(start, outliers, effects), effects)
 
     def search_on(self, start: Fit, origin: Fit, effects: Mapping[str, Effect]) -> Findings[Fit]:
         """The same from a fitted model."""
-        return self._found(find_path(start, self._left_out(start), effects), effects, origin)
+        outliers = self._left_out(start)
+        if has_structure(start.table):
+            return self._with_structure(search_structure(start, effects), outliers, origin)
+        return self._found(find_path(start, outliers, effects), effects, origin)
 
     def candidates(self, before: Fit, plan: Findings[Fit], effects: Mapping[str, Effect]) -> tuple[Candidate, ...]:  # noqa: ARG002
         """One round of the search."""
@@ -213,6 +219,45 @@ class Rows(Dataset[Fit]):
             return found.without_steps()
         if path.outliers and not steps and left is None:
             return replace(found, left=told(path.outliers), spoilt=True)
+        return found
+
+    def _with_structure(
+        self, searched: StructuralSearch, outliers: tuple[int, ...], origin: Fit | None = None
+    ) -> Findings[Fit]:
+        start, end = searched.start, searched.end
+        if (reason := rejection(end)) is not None:
+            return self._rejected(start, reason)
+        left = structure_of(end) if end.pooled_excess > MATERIAL else None
+        rivals = searched.alternatives
+        known = {c.name for c in searched.candidates}
+        separations = {
+            name: separating_experiment(name, tuple(o for o in others if o in known), self.table)
+            for name, others in rivals.items()
+            if known & set(others)
+        }
+        names = [step.name for step in searched.steps]
+        found = Findings(
+            data=self,
+            start=start,
+            origin=origin or start,
+            baseline=start,
+            steps=searched.steps,
+            candidates=tuple(sorted(searched.candidates, key=lambda c: c.name not in names[:1])),
+            causes=searched.causes,
+            alternatives=rivals,
+            places=searched.structure.places,
+            left=left.text if left else None,
+            pattern=left,
+            undetermined=(undetermined(start), undetermined(end)),
+            set_aside=caution(outliers),
+            outliers=outliers,
+            separations=separations,
+            remarks=searched.remarks,
+        )
+        if searched.steps and found.final.verdict is Verdict.UNEXPLAINED and not found.final.unknown:
+            return found.without_steps()
+        if outliers and not searched.steps and left is None:
+            return replace(found, left=told(outliers), spoilt=True)
         return found
 
     def _rejected(self, start: Fit, reason: Finding) -> Findings[Fit]:

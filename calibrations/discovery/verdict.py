@@ -52,6 +52,7 @@ class Judgement:
     missing       effects that it lacks, in the order in which a search adds them
     added         effects that the search added to it, named as causes
     refinements   effects that the search added for the form of a cause
+    unknown       places of the signal chain where something acts that no effect of the catalogue describes
     alternatives  effects that the data cannot separate from a missing or added one
     left          what no effect explains, in words
     share_left    part of the excess variance at the start of the search that stays
@@ -69,6 +70,7 @@ class Judgement:
     missing: tuple[str, ...] = ()
     added: tuple[str, ...] = ()
     refinements: tuple[str, ...] = ()
+    unknown: tuple[str, ...] = ()
     alternatives: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     left: str | None = None
     share_left: float = 0.0
@@ -132,6 +134,8 @@ def decide(j: Judgement) -> Verdict:
         return Verdict.NO_RESPONSE
     if residual is Residual.DOUBT or (residual is Residual.CAUSE and not j.missing):
         return Verdict.UNEXPLAINED
+    if j.unknown:
+        return Verdict.UNEXPLAINED
     inseparable = any(j.alternatives.get(name) for name in (*j.missing, *j.added))
     if j.missing:
         return Verdict.AMBIGUOUS if inseparable else Verdict.EFFECT_MISSING
@@ -149,6 +153,8 @@ def headline(j: Judgement) -> str:
     """The first sentence."""
     if j.verdict is Verdict.NO_RESPONSE:
         return f"No response: {j.left}."
+    if j.verdict is Verdict.UNEXPLAINED and j.unknown and not j.spoilt:
+        return f"An effect that is not in the catalogue acts at {joined(j.unknown)}."
     if j.verdict is Verdict.UNEXPLAINED:
         return f"No effect of the catalogue explains the residual: {j.left}."
     if j.missing:
@@ -174,6 +180,8 @@ def _details(j: Judgement) -> Iterator[str]:
             yield f"The model {j.model} also misses {joined(j.missing)}."
         elif j.added:
             yield f"The model {j.model} also misses {joined(j.added)}."
+        if j.unknown and not j.spoilt:
+            yield _remaining(j)
     elif not j.missing and j.closest is None and j.undetermined is None:
         yield _remaining(j)
     elif j.left is not None and not j.spoilt:

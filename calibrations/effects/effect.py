@@ -214,6 +214,13 @@ class Effect:
         """
         raise NotImplementedError
 
+    def columns(self, a: Array, table: Table) -> Mapping[str, Array] | None:
+        """What a unit of each parameter adds to the output, by name, shape (n, 3), where `transduction` is linear.
+
+        Derivatives are then exact and fast. None where an effect does not say.
+        """
+        return None
+
     def lacks(self, table: Table) -> str | None:
         """Why the rows of `table` cannot show the effect whatever their number, or None."""
         return None
@@ -223,7 +230,7 @@ class Effect:
         return 1.0
 
 
-METHODS = (*HOOKS, "follow", "lacks", "searched")
+METHODS = (*HOOKS, "follow", "columns", "lacks", "searched")
 TUPLES = ("needs", "kinds", "after", "contains")
 TYPES: Mapping[str, type] = {"exact": bool, "rounds": bool, "left_out": str, "memory": int}
 MEMBERS = (*METHODS, *TUPLES, *TYPES)

@@ -37,12 +37,12 @@ def unseen_variance(found: Fit) -> float:
 
 def leverages(found: Fit) -> Array:
     """The diagonal of the hat matrix, shape (channels, n): 1 where the fit goes through a value, whatever it is."""
-    jacobian = found.whitened[:, 1:]
+    jacobian = np.vstack([found.whitened[:, 1:], found.problem.layout.prior_rows])
     size = np.linalg.norm(jacobian, axis=0)
     columns = jacobian[:, size > 0] / size[size > 0]
     basis, singular, _ = np.linalg.svd(columns, full_matrices=False)
     kept = basis[:, singular > 1e-8 * singular[0]] if singular.size else basis[:, :0]
-    return np.asarray(np.sum(kept**2, axis=1)).reshape(found.residual.shape)
+    return np.asarray(np.sum(kept**2, axis=1))[: found.residual.size].reshape(found.residual.shape)
 
 
 def _mean_variance(leverage: Array) -> float:

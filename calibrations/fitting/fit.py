@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 ROUNDS = 2
 NEWTON_STEPS = 20
+DAMPINGS = (0.0, 1e-3, 1e-2, 0.1, 1.0, 10.0)  # of each column's squares
+BOUND_ROUNDS = 3
 STRAIGHT = 1e-6  # of what is left: a step that foretells it better is a linear model's
 SMALL_GAIN = 1e-6  # of a sum of squares whose unit is the noise
 
@@ -128,7 +130,12 @@ class Fit(Result):
         return held_out(self.residual, jacobian, self.noise, folds(self.table), theta, prior)
 
     def share_left(self, start: Fit) -> float:
-        """Part of the excess variance of `start` that this fit does not explain."""
+        """Part of the excess variance of `start` that this fit does not explain: on unseen rows where it has priors.
+
+        A free form follows the rows of its fit, so that only unseen rows show what it explains.
+        """
+        if len(self.problem.layout.prior_rows):
+            return max(self.held_out_excess**2 - 1, 0.0) / max(start.held_out_excess**2 - 1, 1e-9)
         return max(self.pooled_excess**2 - 1, 0.0) / max(start.pooled_excess**2 - 1, 1e-9)
 
     @property
@@ -179,7 +186,7 @@ def _alternate(problem: Problem, noise: Noise, starts: list[Array]) -> Fit:
     theta = min((_minimise(problem, noise, start) for start in starts), key=lambda t: t[1])[0]
     # with smooth columns set aside the noise hardly depends on the parameters, and one round is enough
     for _ in range(1 if problem.smooth.size else ROUNDS):
-        found = estimate(noise, problem.residual(theta), problem.jacobian(theta), problem.smooth)
+        found = estimate(noise, problem.residual(theta), _free(problem, problem.jacobian(theta)), problem.smooth)
         if found.is_like(noise):
             break
         noise = found
@@ -195,15 +202,20 @@ def evaluate(model: Model, table: Table) -> Fit | None:
         return None
     residual, jacobian = problem.residual(theta), problem.jacobian(theta)
     noise = white_only(problem.white, problem.gap_s, len(problem.channels), problem.given)
-    noise = estimate(noise, residual, jacobian, problem.smooth)
+    noise = estimate(noise, residual, _free(problem, jacobian), problem.smooth)
     return Fit(replace(model, unit=table.unit), problem, theta, noise, residual, jacobian)
+
+
+def _free(problem: Problem, jacobian: Array) -> Array:
+    """Columns of the parameters without a prior: a prior already keeps the others from following noise."""
+    return jacobian[:, :, ~np.isfinite(problem.layout.prior)]
 
 
 def _minimise(problem: Problem, noise: Noise, start: Array) -> tuple[Array, float]:
     """(parameters, cost) of least squares under `noise`."""
     if not len(start):
         return start, 0.0
-    if problem.keeps_starts:
+    if problem.keeps_starts or len(problem.layout.prior_rows):
         return _determined(problem, noise, start)
     at_once = _at_once(problem, noise, start) if problem.adds else None
     if at_once is not None:
@@ -253,10 +265,11 @@ def _at_once(problem: Problem, noise: Noise, start: Array) -> tuple[Array, float
 
 
 def _determined(problem: Problem, noise: Noise, start: Array) -> tuple[Array, float]:
-    """As `_minimise`, by Gauss and Newton's shortest steps: what the data do not determine stays as it began."""
-    typical, (low, high) = problem.layout.typical, problem.layout.bounds
+    """As `_minimise`, by the shortest steps of Gauss and Newton, damped where they fail (Levenberg and Marquardt).
 
-    rows = problem.layout.prior_rows
+    What the data do not determine stays as it began.
+    """
+    typical, rows = problem.layout.typical, problem.layout.prior_rows
 
     def white(theta: Array) -> Array:
         return np.append(noise.whiten(problem.residual(theta)[:, :, None])[:, 0], rows @ theta)
@@ -264,17 +277,38 @@ def _determined(problem: Problem, noise: Noise, start: Array) -> tuple[Array, fl
     theta, left = start, white(start)
     for _ in range(NEWTON_STEPS):
         J = np.vstack([noise.whiten(problem.jacobian(theta)), rows]) * typical
-        size = np.linalg.norm(J, axis=0).max() or 1.0
-        step = typical * np.linalg.lstsq(J / size, -left / size, rcond=RELATIVE_RANK)[0]
-        tried = [(t, white(t)) for t in (np.clip(theta + share * step, low, high) for share in (1.0, 0.25))]
-        after, least = min(tried, key=lambda t: float(t[1] @ t[1]))
-        gain = float(left @ left - least @ least)
-        if not gain > 0:
+        low, high = ((bound - theta) / typical for bound in problem.layout.bounds)
+        for damping in DAMPINGS:
+            after = theta + typical * _step(J, left, damping, low, high)
+            least = white(after)
+            gain = float(left @ left - least @ least)
+            if gain > 0:
+                break
+        else:
             break
         theta, left = after, least
-        if gain < SMALL_GAIN:
+        if gain < SMALL_GAIN * max(1.0, 1e-3 * float(left @ left)):
             break
     return theta, float(left @ left) / 2
+
+
+def _step(J: Array, left: Array, damping: float, low: Array, high: Array) -> Array:
+    """The damped step within bounds: an entry that a step takes beyond its bound goes there, and no farther."""
+    step = np.zeros(J.shape[1])
+    free = np.ones(len(step), dtype=bool)
+    for _ in range(BOUND_ROUNDS):
+        columns, side = J[:, free], left + J[:, ~free] @ step[~free]
+        size = np.linalg.norm(columns, axis=0)
+        most = size.max(initial=0.0) or 1.0
+        damped = np.vstack([columns / most, np.diag(np.sqrt(damping) * size / most)]) if damping else columns / most
+        step[free] = np.linalg.lstsq(damped, np.append(-side / most, np.zeros(len(damped) - len(side))),
+                                     rcond=RELATIVE_RANK)[0]  # fmt: skip
+        beyond = free & ((step < low) | (step > high))
+        if not beyond.any():
+            break
+        step = np.clip(step, low, high)
+        free &= ~beyond
+    return np.asarray(np.clip(step, low, high))
 
 
 def _result(problem: Problem, theta: Array, noise: Noise) -> Fit:
@@ -291,8 +325,10 @@ def _wider(cautious: Fit) -> Array:
     if not cautious.problem.widens:
         return np.ones(len(cautious.theta))
     layout = cautious.problem.layout
-    wider = widening(cautious.noise, cautious.residual, cautious.jacobian, layout.typical)
-    return np.where(np.isfinite(layout.prior), 1.0, wider)
+    wider, free = np.ones(len(cautious.theta)), ~np.isfinite(layout.prior)
+    jacobian = _free(cautious.problem, cautious.jacobian)
+    wider[free] = widening(cautious.noise, cautious.residual, jacobian, layout.typical[free])
+    return wider
 
 
 def cautiously(found: Fit) -> Fit:
@@ -303,5 +339,6 @@ def cautiously(found: Fit) -> Fit:
     """
     if found.all_noise is not None:
         return replace(found, noise=found.all_noise)
-    noise = estimate(found.noise, found.residual, found.jacobian, np.zeros((found.table.n, 0)))
+    jacobian = _free(found.problem, found.jacobian)
+    noise = estimate(found.noise, found.residual, jacobian, np.zeros((found.table.n, 0)))
     return replace(found, noise=noise.prolonged())

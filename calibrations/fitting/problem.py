@@ -133,13 +133,33 @@ class Problem:
         low, high = self.layout.bounds
         steps = 1e-3 * self.layout.typical
         chosen = np.flatnonzero(np.ones(len(theta), dtype=bool) if of is None else of)
-        error = self._errors_near(theta, stairs)
+        error, known = self._errors_near(theta, stairs), self._known_columns(theta)
         columns = []
         for k in map(int, chosen):
+            if k in known:
+                columns.append(known[k])
+                continue
             ahead, behind = theta.copy(), theta.copy()
             ahead[k], behind[k] = min(theta[k] + steps[k], high[k]), max(theta[k] - steps[k], low[k])
             columns.append((error(k, ahead) - error(k, behind)) / (ahead[k] - behind[k]))
         return np.stack(columns, axis=2) if columns else np.zeros((len(self.channels), self.table.n, 0))
+
+    def _known_columns(self, theta: Array) -> dict[int, Array]:
+        """d residual / d the entries of effects that say how they enter linearly, (channels, n) each."""
+        layout = self.layout
+        even = [i for i, term in enumerate(layout.model.terms) if not term.effect.rounds]
+        if not np.isfinite(layout.prior).any():
+            return {}
+        steps = layout.steps(theta)
+        columns = Near(self._samples, [steps[i] for i in even]).columns
+        known: dict[int, Array] = {}
+        for k, slot in enumerate(layout.slots):
+            if slot.term in even and (of := columns.get(even.index(slot.term))) is not None:
+                chosen = [self.table.axes.index(slot.axis)] if slot.axis else slice(None)
+                column = np.zeros_like(of[slot.parameter.name])
+                column[:, chosen] = of[slot.parameter.name][:, chosen]
+                known[k] = self._reduced(-column)
+        return known
 
     def _errors_near(self, theta: Array, stairs: bool) -> Callable[[int, Array], Array]:
         """The residual, up to a constant, as a function of (entry changed, vector).

@@ -6,6 +6,7 @@ comes from the other side, it passes through the approach, `approach_deg` before
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -13,6 +14,14 @@ import numpy as np
 from calibrations.criteria import SHORTEST_APPROACH_DEG
 from calibrations.geometry.orientation import Pose, specific_force
 from calibrations.table import Array, Table
+
+AS_STATED = -1.0  # an approach as the table states it
+
+
+@lru_cache(maxsize=64)
+def approached(table: Table, by_deg: float) -> Table:
+    """The table with an approach that begins so many degrees before each pose; the table itself for `AS_STATED`."""
+    return table if by_deg < 0 else replace(table, constants={**table.constants, "approach_deg": by_deg})
 
 
 @lru_cache(maxsize=8)

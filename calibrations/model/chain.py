@@ -11,7 +11,7 @@ field as a share of its strength.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -132,6 +132,23 @@ class Near:
     @cached_property
     def _added(self) -> list[Array]:
         return added(self._sensed, self.table, self.steps)
+
+    @cached_property
+    def _slope(self) -> Array:
+        """d output / d the sum of all parts, where the output stage has no memory, shape (n, axes)."""
+        total, axes = sum(self._added, np.zeros((self.table.n, 3))), len(self.table.axes)
+        if not any("output" in effect.places for effect, _ in self.steps):
+            return np.ones((self.table.n, axes))
+        h = 1e-6 * (float(np.ptp(total)) or 1.0)
+        more, less = (converted([total + s * h], self.table.n, self.table, self.steps) for s in (1.0, -1.0))
+        return np.asarray((more - less)[:, :axes] / (2 * h))
+
+    @cached_property
+    def columns(self) -> Mapping[int, Mapping[str, Array]]:
+        """d output / d each parameter of effects that are linear in them, by term and name, shape (n, axes) each."""
+        axes = len(self.table.axes)
+        by_term = {i: effect.columns(self._sensed, self.table) for i, (effect, _) in enumerate(self.steps)}
+        return {i: {k: v[:, :axes] * self._slope for k, v in c.items()} for i, c in by_term.items() if c is not None}
 
     def output(self, term: int, values: Values) -> Array:
         """Output of the measured axes with other `values` of one effect, up to a constant, shape (n, axes).

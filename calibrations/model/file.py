@@ -7,13 +7,15 @@ from pathlib import Path
 from typing import Any, Literal
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from calibrations.effects import Effect
 from calibrations.effects.catalogue import catalogue, find
 from calibrations.effects.expression_effect import own_effect
 from calibrations.errors import ModelError, UnknownName, nearest
 from calibrations.files import load_yaml
+from calibrations.free_forms.effect import FreeForm, check_forms, free_form, place_of
+from calibrations.free_forms.form import Form
 from calibrations.model import Estimate, Model, Term
 from calibrations.table import NUMBERS
 
@@ -38,6 +40,7 @@ class _Parameter(_Strict):
 class _Effect(_Strict):
     effect: str
     expression: str | None = None
+    forms: tuple[Form, ...] | None = None
     columns: list[str] = []
     tied: bool = False
     constants: dict[str, float] = {}
@@ -112,7 +115,7 @@ def _fault(error: Any) -> str:
 
 def _term(entry: _Effect, source: str, known: Mapping[str, Effect], unit: str) -> Term:
     """`unit` is that of the model's outputs, "" where the file gives none."""
-    effect = _written(entry, source, known) if entry.expression is not None else _known(entry, source, known)
+    effect = _effect(entry, source, known)
     _check_parameters(entry, effect, f"{source}: {entry.effect}")
     units = {p.name: _unit(p, effect, unit, f"{source}: {entry.effect}") for p in entry.parameters}
     for name in entry.constants:
@@ -122,6 +125,21 @@ def _term(entry: _Effect, source: str, known: Mapping[str, Effect], unit: str) -
         Estimate(p.name, p.axis or "", p.value, p.std, units[p.name], p.identified, p.why) for p in entry.parameters
     )
     return Term(effect, entry.tied, given, entry.constants)
+
+
+def _effect(entry: _Effect, source: str, known: Mapping[str, Effect]) -> Effect:
+    if entry.forms is not None:
+        return _free(entry, source)
+    return _written(entry, source, known) if entry.expression is not None else _known(entry, source, known)
+
+
+def _free(entry: _Effect, source: str) -> Effect:
+    """The free forms of a place: all of them is in the file."""
+    try:
+        place = place_of(entry.effect)
+        return free_form(check_forms(entry.forms or (), place))
+    except ModelError as error:
+        raise ModelError(f"{source}: {entry.effect}: {error}") from None
 
 
 def _known(entry: _Effect, source: str, known: Mapping[str, Effect]) -> Effect:
@@ -200,6 +218,8 @@ def _dump_term(term: Term) -> dict[str, Any]:
         entry["expression"] = term.effect.expression
         if columns := [name for name in term.effect.needs if name not in NUMBERS]:
             entry["columns"] = columns
+    if isinstance(term.effect, FreeForm):
+        entry["forms"] = TypeAdapter(tuple[Form, ...]).dump_python(term.effect.forms, mode="json")
     if term.tied:
         entry["tied"] = True
     if term.constants:

@@ -5,6 +5,7 @@ A model is a frozen value. Fitting or adding an effect makes a new one; the old 
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -52,6 +53,18 @@ class Term:
     def name(self) -> str:
         """The effect's name."""
         return self.effect.name
+
+    @property
+    def quantities(self) -> tuple[Estimate, ...]:
+        """The estimates that have a meaning each: not the coefficients of a free form."""
+        coefficients = {p.name for p in self.effect.parameters if p.prior is not None}
+        return tuple(e for e in self.estimates if e.name not in coefficients)
+
+    @property
+    def coefficients(self) -> dict[str, int]:
+        """Number of coefficients of a free form, by axis; "" where all axes share them."""
+        named = {e.name for e in self.quantities}
+        return dict(Counter(e.axis for e in self.estimates if e.name not in named))
 
 
 class Parameters(Mapping[str, Estimate]):

@@ -25,4 +25,4 @@ class AdcNonlinearity(Effect):
 
     def output(self, v: Array, table: Table, p: Values) -> Array:
         u = (v - p.middle) / p.half_span
-        return v + p.bow * u**2 + p.bend * u**3
+        return v + (p.bow + p.bend * u) * u * u

@@ -2,10 +2,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from calibrations.effects import Effect, Parameter, Values
+from calibrations.effects import Constant, Effect, Parameter, Values
 from calibrations.effects.kernels import slip
 from calibrations.geometry.orientation import other_in_plane
-from calibrations.geometry.stage_path import turning_points
+from calibrations.geometry.stage_path import AS_STATED, approached, turning_points
 from calibrations.table import Array, Table
 
 ELEMENTS = (np.arange(6) + 0.5) / 3 - 1  # midpoints of six equal parts of -1 .. 1
@@ -41,8 +41,11 @@ class Hysteresis(Effect):
         "1/g", typical=0.5, per_axis=False, low=-0.9, high=5.0, doc="growth of the limits with the other axis's load"
     )
 
+    approach_deg = Constant(lambda _: AS_STATED)  # from where beta comes; a search may find it
+
     def transduction(self, a: Array, table: Table, p: Values) -> Array:
-        return slip(a, turning_points(table), _pressed(a, p), _limits(p)) * p.height
+        path = turning_points(approached(table, float(p.approach_deg)))
+        return slip(a, path, _pressed(a, p), _limits(p)) * p.height
 
     def follow(self, a: Array, table: Table, p: Values, before: Sequence[Array]) -> tuple[Array, list[Array]]:
         """`before` and after: the specific force at which each element would be at rest, g."""

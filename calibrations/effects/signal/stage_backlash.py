@@ -2,9 +2,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from calibrations.effects import Effect, Parameter, Values
+from calibrations.effects import Constant, Effect, Parameter, Values
 from calibrations.geometry.orientation import Pose
-from calibrations.geometry.stage_path import last_turn
+from calibrations.geometry.stage_path import AS_STATED, approached, last_turn
 from calibrations.table import Table
 
 
@@ -24,6 +24,8 @@ class StageBacklash(Effect):
     needs = ("direction",)
 
     half_play = Parameter("deg", typical=0.2, per_axis=False, doc="lag of beta behind its motor")
+    approach_deg = Constant(lambda _: AS_STATED)  # from where beta comes; a search may find it
 
     def pose(self, pose: Pose, table: Table, p: Values) -> Pose:
-        return replace(pose, beta=pose.beta - np.radians(p.half_play) * last_turn(table))
+        side = last_turn(approached(table, float(p.approach_deg)))
+        return replace(pose, beta=pose.beta - np.radians(p.half_play) * side)

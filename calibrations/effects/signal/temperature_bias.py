@@ -1,6 +1,7 @@
 import numpy as np
 
 from calibrations.effects import Constant, Effect, Parameter, Values
+from calibrations.effects.thermometer import sensor_temperature_c
 from calibrations.table import Array, Table
 
 
@@ -20,8 +21,9 @@ class TemperatureBias(Effect):
     needs = ("temperature_c",)
 
     slope = Parameter("{out}/K", typical=0.005, doc="output per kelvin")
+    lead_s = Constant(lambda _: 0.0)  # by which the sensor is ahead of the thermometer; a search finds it
     reference_c = Constant(lambda table: float(np.mean(table.column("temperature_c"))))
 
     def transduction(self, a: Array, table: Table, p: Values) -> Array:
-        warmer = table.column("temperature_c") - p.reference_c
+        warmer = sensor_temperature_c(table, float(p.lead_s)) - p.reference_c
         return warmer[:, None] * p.slope

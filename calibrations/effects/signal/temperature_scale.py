@@ -1,6 +1,7 @@
 import numpy as np
 
 from calibrations.effects import Constant, Effect, Parameter, Values
+from calibrations.effects.thermometer import sensor_temperature_c
 from calibrations.table import Array, Table
 
 
@@ -19,8 +20,9 @@ class TemperatureScale(Effect):
     needs = ("temperature_c",)
 
     slope = Parameter("{out}/g/K", typical=0.001, doc="scale factor per kelvin")
+    lead_s = Constant(lambda _: 0.0)  # by which the sensor is ahead of the thermometer; a search finds it
     reference_c = Constant(lambda table: float(np.mean(table.column("temperature_c"))))
 
     def transduction(self, a: Array, table: Table, p: Values) -> Array:
-        warmer = table.column("temperature_c") - p.reference_c
+        warmer = sensor_temperature_c(table, float(p.lead_s)) - p.reference_c
         return warmer[:, None] * a * p.slope

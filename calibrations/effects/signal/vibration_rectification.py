@@ -1,31 +1,60 @@
+from __future__ import annotations
+
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from calibrations.effects import Effect, Parameter, Values
+from calibrations.effects import Constant, Effect, Parameter, Values
 from calibrations.motion.spectrum import find_records
 from calibrations.table import Array, Table
 
 SECOND = 1.0
 
 
+def _output_per_g(table: Table) -> float:
+    return table.number("output_per_g", float(np.median(np.ptp(table.outputs, axis=0))) / 2 or 1.0)
+
+
 class VibrationRectification(Effect):
-    """vibration-rectification: motion shifts the zero-g output in proportion to its mean square.
+    """vibration-rectification: vibration shifts the zero-g output in proportion to its mean square.
 
-        V += k_i m      m: mean square of the motion's acceleration over a second, g^2; k in {out}/g^2, one per axis
+        V += k_i m      m: mean square of the acceleration, g^2; k in {out}/g^2, one per axis. In a motion over a second
+                        of the reference; in poses of the samples of a mean, from their standard deviation
 
-    Symptom   the mean of the output changes when the motion starts, stops or changes its amplitude.
-    Excited by  motion with different amplitudes, or with rests.
+    Symptom   the mean of the output changes when the motion starts, stops or changes its amplitude; in poses it follows
+              the square of the standard deviation of the samples.
+    Excited by  motion with different amplitudes, or with rests; poses with different vibration.
     Confused with  bias, if the amplitude is constant. To separate them, include a rest.
     Source    IEEE Std 1293, vibration rectification error.
     """
 
-    kinds = ("motion",)
+    kinds = ("motion", "poses")
     left_out = "it follows the mean square of a motion over a second"
 
     coefficient = Parameter("{out}/g^2", typical=1.0, doc="shift per mean square of the acceleration")
+    output_per_g = Constant(_output_per_g)
+
+    def lacks(self, table: Table) -> str | None:
+        if table.kind != "poses":
+            return None
+        columns = [f"v{axis}_std_v" for axis in table.axes]
+        if any(name not in table for name in columns):
+            return f"needs the columns {', '.join(columns)}"
+        same = all(np.ptp(table.column(name)) == 0 for name in columns)
+        return "needs standard deviations that differ" if same else None
 
     def transduction(self, a: Array, table: Table, p: Values) -> Array:
+        if table.kind == "poses":
+            return np.asarray(_mean_squares_g2(table, float(p.output_per_g)) * p.coefficient)
         return np.outer(mean_square_g2(table), p.coefficient)
+
+
+def _mean_squares_g2(table: Table, output_per_g: float) -> Array:
+    """Mean square of the samples of each axis about their mean, less the least of all rows, g^2, shape (n, 3)."""
+    out = np.zeros((table.n, 3))
+    for k, axis in enumerate(table.axes):
+        squares = (table.column(f"v{axis}_std_v") / output_per_g) ** 2
+        out[:, k] = squares - squares.min()
+    return out
 
 
 def mean_square_g2(table: Table) -> Array:

@@ -24,7 +24,7 @@ def budget(found: Fit) -> dict[str, Any] | None:
     drawn = make_budget(found, input_contributions(found.table))
     if not drawn.given:
         return None
-    known = [(k, name, e) for k, (name, e) in enumerate(_estimates(found)) if e.identified and e.std is not None]
+    known = [(k, name, e) for k, name, e in _estimates(found) if e.identified and e.std is not None]
     groups = dict.fromkeys(name for _, name, _ in known)
     return {
         "parameters": [_parameter(drawn, *each) for each in known],
@@ -33,8 +33,10 @@ def budget(found: Fit) -> dict[str, Any] | None:
     }
 
 
-def _estimates(found: Fit) -> list[tuple[str, Estimate]]:
-    return [(term.name, e) for term in found.model.terms for e in term.estimates]
+def _estimates(found: Fit) -> list[tuple[int, str, Estimate]]:
+    """Position, effect and estimate of each quantity; coefficients of free forms have no budget of their own."""
+    every = [(term, e) for term in found.model.terms for e in term.estimates]
+    return [(k, term.name, e) for k, (term, e) in enumerate(every) if e in term.quantities]
 
 
 def _label(e: Estimate) -> str:
@@ -81,7 +83,7 @@ def budget_document(found: Fit) -> dict[str, Any] | None:
     if not found.table.type.budget or not len(found.theta):
         return None
     drawn = make_budget(found, input_contributions(found.table))
-    known = [(k, name, e) for k, (name, e) in enumerate(_estimates(found)) if e.identified and e.std is not None]
+    known = [(k, name, e) for k, name, e in _estimates(found) if e.identified and e.std is not None]
     return {
         "parameters": [
             {

@@ -19,7 +19,7 @@ from calibrations.design.experiment import Experiment
 from calibrations.discovery.results import Candidate, Comparison, Discovery, Step
 from calibrations.fitting.fit import Fit
 from calibrations.fitting.sensed import in_milli, milli_unit, pooled_milli
-from calibrations.model import Estimate, Model
+from calibrations.model import Estimate, Model, Term
 from calibrations.motion.reference import Bias
 from calibrations.presentation.chart import Picture
 from calibrations.presentation.charts.discovery import album
@@ -229,10 +229,18 @@ def _parameters(model: Model, added: set[str]) -> list[dict[str, Any]]:
             "effect": term.name,
             "added": term.name in added,
             "tied": term.tied,
-            "rows": [_estimate(e) for e in term.estimates],
+            "rows": [*map(_estimate, term.quantities), *_curves(term)],
             "constants": {name: rounded(value, 6) for name, value in term.constants.items()},
         }
         for term in model.terms
+    ]
+
+
+def _curves(term: Term) -> list[dict[str, str]]:
+    """A free form: its coefficients have no meaning each."""
+    return [
+        {"name": "curve", "axis": axis or "–", "remark": "", "value": f"{n} coefficients", "unit": ""}
+        for axis, n in term.coefficients.items()
     ]
 
 

@@ -31,7 +31,10 @@ if TYPE_CHECKING:
 
 def parameters(model: Model) -> str:
     """The model's parameters as a table."""
-    rows = [(term.name, e.name, e.axis or "-", _value(e)) for term in model.terms for e in term.estimates]
+    rows = []
+    for term in model.terms:
+        rows += [(term.name, e.name, e.axis or "-", _value(e)) for e in term.quantities]
+        rows += [(term.name, "curve", axis or "-", f"{n} coefficients") for axis, n in term.coefficients.items()]
     return columns(("effect", "parameter", "axis", "value"), rows)
 
 

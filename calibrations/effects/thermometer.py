@@ -1,0 +1,38 @@
+"""The temperature of the sensor from that of the thermometer, which follows it late or early."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from calibrations.table import Array, Table
+
+SMOOTHED_ROWS, FEWEST_SMOOTHED = 11, 5  # of a thermometer, whose noise would hide its lag
+
+
+def sensor_temperature_c(table: Table, lead_s: float) -> Array:
+    """The temperature that the thermometer shows `lead_s` later, deg C, shape (n,).
+
+    As logged where that is 0, and in a single row, which has no later reading.
+    """
+    return leading_temperature(table, lead_s) if lead_s and table.n > 1 else table.column("temperature_c")
+
+
+@lru_cache(maxsize=64)
+def leading_temperature(table: Table, lead_s: float) -> Array:
+    """The same without the thermometer's noise: a local line over some rows."""
+    shown = table.column("temperature_c")
+    if "t_s" not in table:
+        return shown
+    return np.interp(table.time_s + lead_s, table.time_s, _smooth(shown, min(SMOOTHED_ROWS, 2 * (table.n // 4) + 1)))
+
+
+def _smooth(x: Array, width: int) -> Array:
+    """A straight line fitted to `width` rows about each row, an odd number; at the ends to the first and the last."""
+    if width < FEWEST_SMOOTHED:
+        return x
+    half, rows = width // 2, np.arange(width)
+    first, last = np.polyfit(rows, x[:width], 1), np.polyfit(rows, x[-width:], 1)
+    inside = np.convolve(x, np.full(width, 1 / width), "valid")
+    return np.concatenate([np.polyval(first, rows[:half]), inside, np.polyval(last, rows[half + 1 :])])

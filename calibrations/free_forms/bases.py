@@ -1,0 +1,164 @@
+"""Smooth functions whose coefficients have independent priors of one variance.
+
+A function f = B b with the roughness penalty b' S b is a Gaussian prior of precision S / tau^2. The null space of S
+(the constant, or constant and line) is removed, and the rest is turned so that S becomes the identity:
+f = Z u, u ~ N(0, tau^2 I). Columns are ordered from smooth to rough.
+
+Source  Wood, Generalized Additive Models (2nd ed., 2017), 5.8 and 6.6.1; Eilers and Marx, Stat. Sci. 11 (1996) 89.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Literal
+
+import numpy as np
+from scipy.interpolate import BSpline
+
+from calibrations.table import Array
+
+DEGREE = 3
+NULL = 1e-7  # of the largest eigenvalue: an eigenvector below it is in the null space
+
+
+@dataclass(frozen=True)
+class Spline:
+    """A cubic spline over `low` .. `high`, constant beyond. Its roughness is the mean square derivative of `order`."""
+
+    low: float
+    high: float
+    intervals: int
+    order: int = 2
+    kind: Literal["spline"] = "spline"
+
+    @property
+    def count(self) -> int:
+        """Number of columns."""
+        return self.intervals + DEGREE - self.order
+
+    def __call__(self, x: Array) -> Array:
+        """Columns at x (n,), shape (n, count)."""
+        inside = np.clip(x, self.low, self.high - 1e-12 * (self.high - self.low))
+        knots, turn = _turned(self.low, self.high, self.intervals, self.order)
+        return np.asarray(BSpline.design_matrix(inside, knots, DEGREE).toarray() @ turn)
+
+
+@lru_cache(maxsize=256)
+def _turned(low: float, high: float, intervals: int, order: int) -> tuple[Array, Array]:
+    """Knots, and the matrix (B-splines, count) that turns the penalty into the identity."""
+    step = (high - low) / intervals
+    knots = low + step * np.arange(-DEGREE, intervals + DEGREE + 1)
+    splines = len(knots) - DEGREE - 1
+    nodes, weights = np.polynomial.legendre.leggauss(4)
+    at = (low + step * (np.arange(intervals)[:, None] + (nodes + 1) / 2)).ravel()
+    derivative = BSpline(knots, np.eye(splines), DEGREE).derivative(order)(at) * step**order
+    penalty = derivative.T @ (np.tile(weights, intervals)[:, None] * derivative)
+    values, vectors = np.linalg.eigh(penalty)
+    kept = values > NULL * values[-1]
+    return np.asarray(knots), np.asarray(vectors[:, kept] / np.sqrt(values[kept]), dtype=np.float64)
+
+
+def spline(x: Array, most: int = 14, order: int = 2, margin: float = 0.03) -> Spline:
+    """A spline over the range of x with as many intervals as its distinct values bear, at most `most`."""
+    span = float(np.ptp(x)) or 1.0
+    distinct = len(np.unique(np.round((x - x.min()) / span, 4)))
+    intervals = max(2, min(most, distinct - order))
+    return Spline(float(x.min()) - margin * span, float(x.max()) + margin * span, intervals, order)
+
+
+@dataclass(frozen=True)
+class Harmonics:
+    """cos and sin of k x, k = least .. most, over (k / least)^power: a function with that many derivatives."""
+
+    least: int
+    most: int
+    power: float = 2.0
+    kind: Literal["harmonics"] = "harmonics"
+
+    @property
+    def count(self) -> int:
+        """Number of columns."""
+        return 2 * (self.most - self.least + 1)
+
+    def __call__(self, x: Array) -> Array:
+        """Columns at x (n,), in rad, shape (n, count)."""
+        k = np.arange(self.least, self.most + 1)
+        turned = np.outer(x, k)
+        pairs = np.stack([np.cos(turned), np.sin(turned)], axis=2) / ((k / self.least) ** self.power)[:, None]
+        return np.asarray(pairs.reshape(len(x), -1))
+
+
+@dataclass(frozen=True)
+class Waves:
+    """Cosines of k half waves over begin .. begin + span with variances k^-power: 1 is flicker, 2 a random walk."""
+
+    begin: float
+    span: float
+    count: int
+    power: float
+    kind: Literal["waves"] = "waves"
+
+    def __call__(self, x: Array) -> Array:
+        """Columns at x (n,), shape (n, count)."""
+        k = np.arange(1, self.count + 1)
+        return np.asarray(np.cos(np.pi * np.outer((x - self.begin) / self.span, k)) * k ** (-self.power / 2))
+
+
+@dataclass(frozen=True)
+class Line:
+    """A straight line, 0 in the middle of low .. high and +-1 at the ends."""
+
+    low: float
+    high: float
+    kind: Literal["line"] = "line"
+
+    @property
+    def count(self) -> int:
+        """One column."""
+        return 1
+
+    def __call__(self, x: Array) -> Array:
+        """The column at x (n,), shape (n, 1)."""
+        return np.asarray((x - (self.low + self.high) / 2)[:, None] / ((self.high - self.low) / 2 or 1.0))
+
+
+@dataclass(frozen=True)
+class Play:
+    """Slip elements that follow x and slip at their widths, over the widths: hysteresis of any shape."""
+
+    widths: tuple[float, ...]
+    kind: Literal["play"] = "play"
+
+    @property
+    def count(self) -> int:
+        """Number of elements."""
+        return len(self.widths)
+
+
+@dataclass(frozen=True)
+class Products:
+    """Products of powers of two or three components of a vector on the sphere, up to a degree."""
+
+    degree: int
+    kind: Literal["products"] = "products"
+
+    @property
+    def powers(self) -> tuple[tuple[int, int, int], ...]:
+        """Exponents of x, y, z; z at most once, as x^2 + y^2 + z^2 = 1."""
+        top = range(self.degree + 1)
+        return tuple(
+            (i, j, m)
+            for i in top
+            for j in top
+            for m in (0, 1)
+            if 2 <= i + j + m <= self.degree and i + j <= self.degree and (i > 0) + (j > 0) + (m > 0) > 1
+        )
+
+    @property
+    def count(self) -> int:
+        """Number of products."""
+        return len(self.powers)
+
+
+Basis = Spline | Harmonics | Waves | Line | Play | Products

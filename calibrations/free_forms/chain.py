@@ -1,0 +1,148 @@
+"""Signals along the chain at given coefficients, and their derivatives (Gauss-Newton).
+
+    stage angles -> specific force -> response of the sensor -> output
+
+The base has bias and three components of sensitivity per axis (scale factor, misalignment and non-orthogonality
+together), an offset of alpha, a tilt of the base, and columns of effects that the given model has besides. Components
+add to an angle, to the response or to the output. Derivatives are those of the linear part of the chain: the iteration
+still ends where the exact residual is balanced by the priors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from calibrations.free_forms.poses import PoseData
+from calibrations.geometry.orientation import Pose, specific_force
+from calibrations.table import Array
+
+if TYPE_CHECKING:
+    from calibrations.free_forms.components import Component
+
+SMALL = 1e-6  # rad, of a numerical derivative
+UP = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Signals along the chain. Arrays (n, 3) of forces, else (channels, n)."""
+
+    data: PoseData
+    force: Array  # along the sensing axes, g
+    reference: Array  # along the reference axes, g
+    by_alpha: Array  # d output / d alpha, per rad
+    by_beta: Array
+    by_tilt: Array  # d output / d tilt about the base's x axis, per rad
+    response: Array  # before the output stage
+    predicted: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Given:
+    """Effects of the given model beyond the base: their contribution, and their columns (channels, n, m)."""
+
+    contribution: Array
+    columns: Array
+
+    @staticmethod
+    def nothing(data: PoseData) -> Given:
+        """No effect."""
+        shape = data.channels, data.n
+        return Given(np.zeros(shape), np.zeros((*shape, 0)))
+
+
+@dataclass(frozen=True, eq=False)
+class Coefficients:
+    """Coefficients of the base, and of each component by name; those that are zero are left out."""
+
+    base: Array
+    of: Mapping[str, Array]
+
+
+def base_size(data: PoseData, given: Given) -> int:
+    """Number of base columns: bias, three sensitivities per axis, alpha, tilt, beta if remounted, given columns."""
+    return own_base_size(data) + int(given.columns.shape[2])
+
+
+def own_base_size(data: PoseData) -> int:
+    """The same without the given model's columns."""
+    return 4 * data.channels + 2 + int(data.remounted)
+
+
+def start(data: PoseData, given: Given) -> Coefficients:
+    """The base fitted to the nominal poses by ordinary least squares."""
+    a = specific_force(Pose(data.alpha, data.beta, data.mount, data.flip, UP))
+    X = np.column_stack([np.ones(data.n), a])
+    answer = np.linalg.lstsq(X, (data.outputs - given.contribution).T, rcond=1e-9)[0]  # (4, channels)
+    rest = np.zeros(2 + int(data.remounted) + given.columns.shape[2])
+    return Coefficients(np.concatenate([answer[0], answer[1:].T.ravel(), rest]), {})
+
+
+def state_at(data: PoseData, given: Given, values: Coefficients, components: Sequence[Component]) -> State:
+    """All signals; `components` must hold every component that has a coefficient."""
+    c = data.channels
+    bias, rows = values.base[:c], values.base[c : 4 * c].reshape(c, 3)
+    alpha0, tilt = values.base[4 * c : 4 * c + 2]
+    beta0 = values.base[4 * c + 2] if data.remounted else 0.0
+    active = [comp for comp in components if comp.name in values.of and not comp.noise]
+    alpha, beta = data.alpha + alpha0, data.beta + beta0
+    for comp in active:
+        if comp.angle is not None:
+            error = comp.angle @ values.of[comp.name]
+            alpha, beta = (alpha + error, beta) if comp.stage == "alpha" else (alpha, beta + error)
+
+    def at(alpha: Array, beta: Array, tilt: float) -> Array:
+        up = np.array([0.0, -np.sin(tilt), np.cos(tilt)])
+        return specific_force(Pose(alpha, beta, data.mount, data.flip, up))
+
+    a = at(alpha, beta, tilt)
+    extra = given.columns @ values.base[own_base_size(data) :]
+    linear = rows @ a.T + bias[:, None] + given.contribution + extra
+    by_alpha = rows @ (at(alpha + SMALL, beta, tilt) - at(alpha - SMALL, beta, tilt)).T / (2 * SMALL)
+    by_beta = rows @ (at(alpha, beta + SMALL, tilt) - at(alpha, beta - SMALL, tilt)).T / (2 * SMALL)
+    by_tilt = rows @ (at(alpha, beta, tilt + SMALL) - at(alpha, beta, tilt - SMALL)).T / (2 * SMALL)
+    force = a @ _sensing(rows).T
+    bare = State(data, force, a, by_alpha, by_beta, by_tilt, linear, linear)
+    response = linear.copy()
+    for comp in active:
+        if comp.stage == "response":
+            response += comp.jacobian(bare) @ values.of[comp.name]
+    before = State(data, force, a, by_alpha, by_beta, by_tilt, response, response)
+    predicted = response.copy()
+    for comp in active:
+        if comp.stage == "output":
+            predicted += comp.jacobian(before) @ values.of[comp.name]
+    return State(data, force, a, by_alpha, by_beta, by_tilt, response, predicted)
+
+
+def base_jacobian(state: State, given: Given) -> Array:
+    """d output / d base coefficients, (channels, n, p)."""
+    data = state.data
+    c, n = data.channels, data.n
+    out = np.zeros((c, n, base_size(data, given)))
+    for k in range(c):
+        out[k, :, k] = 1.0
+        out[k, :, c + 3 * k : c + 3 * k + 3] = state.reference
+    out[:, :, 4 * c] = state.by_alpha
+    out[:, :, 4 * c + 1] = state.by_tilt
+    if data.remounted:
+        out[:, :, 4 * c + 2] = state.by_beta
+    out[:, :, own_base_size(data) :] = given.columns
+    return out
+
+
+def _sensing(rows: Array) -> Array:
+    """Unit vectors of the three sensing axes in the reference frame, (3, 3); unmeasured ones complete the frame."""
+    units = rows / np.linalg.norm(rows, axis=1, keepdims=True)
+    if len(units) == 3:
+        return np.asarray(units)
+    if len(units) == 2:
+        z = np.cross(units[0], units[1])
+        return np.vstack([units, z / np.linalg.norm(z)])
+    y = np.cross(UP, units[0])
+    y = y / np.linalg.norm(y)
+    return np.vstack([units[0], y, np.cross(units[0], y)])

@@ -1,0 +1,91 @@
+"""A component of the search: a group of columns with one variance, either a free form or the form of an effect."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibrations.free_forms.chain import State
+from calibrations.free_forms.form import ANGLES, Form
+from calibrations.table import Array
+
+Columns = Callable[[State], Array]  # (channels, n, m)
+Basis = Callable[[State, int], Array]  # (n, m) of one channel
+
+
+@dataclass(frozen=True, eq=False)
+class Component:
+    """One group of columns with one variance.
+
+    stage     "alpha", "beta" (an angle's error, `angle` (n, m)), "response" or "output" (`columns`)
+    cause     the catalogue effect that it is a form of; "" for a free form
+    family    components of which one at most acts: one form at several values of its shape
+    price     of twice the log-likelihood, above that of the search: products and general forms cost more
+    general   whether it can follow almost anything: it is tried once no other component gains
+    form      the free form that it is, or that takes the place of the effect's own form
+    shape     values in which the columns are not linear; `step` by which they are first changed
+    constants by which the catalogue effect is the same function, such as the thermometer's lead
+    starts    values of the effect's parameters that belong to the shape: (parameter, axis or "", value)
+    """
+
+    name: str
+    place: str
+    stage: str
+    cause: str = ""
+    family: str = ""
+    price: float = 0.0
+    columns: Columns | None = None
+    angle: Array | None = None
+    noise: bool = False
+    general: bool = False
+    form: Form | None = None
+    shape: tuple[float, ...] = ()
+    step: tuple[float, ...] = ()
+    reshaped: Callable[[tuple[float, ...]], Component] | None = None
+    constants: tuple[tuple[str, float], ...] = ()
+    starts: tuple[tuple[str, str, float], ...] = ()
+
+    def jacobian(self, state: State) -> Array:
+        """d output / d coefficients, (channels, n, m)."""
+        if self.angle is not None:
+            by = state.by_alpha if self.stage == "alpha" else state.by_beta
+            return np.asarray(by[:, :, None] * self.angle[None])
+        assert self.columns is not None  # noqa: S101 every other component has columns
+        return self.columns(state)
+
+
+def per_axis(basis: Basis) -> Columns:
+    """Columns of each channel's own function: zero in the other channels."""
+
+    def columns(state: State) -> Array:
+        blocks = [basis(state, k) for k in range(state.data.channels)]
+        out = np.zeros((len(blocks), state.data.n, sum(b.shape[1] for b in blocks)))
+        at = 0
+        for k, block in enumerate(blocks):
+            out[k, :, at : at + block.shape[1]] = block
+            at += block.shape[1]
+        return out
+
+    return columns
+
+
+def free(form: Form, data_state: State, cause: str = "", price: float = 0.0, **more: object) -> Component:
+    """The component of a free form."""
+    table = data_state.data.table
+    name = f"{form.place}/{form.name}"
+    if form.driver in ANGLES:
+        nothing = np.zeros((table.n, 3))
+        angle = form.columns(table, nothing, nothing[:, 0], 0)
+        return Component(name, form.place, form.driver, cause, price=price, angle=angle, form=form, **more)  # type: ignore[arg-type]
+
+    def basis(state: State, k: int) -> Array:
+        return form.columns(table, state.force, state.response[k], k)
+
+    if form.shared:
+        columns: Columns = lambda state: np.stack([basis(state, k) for k in range(state.data.channels)])  # noqa: E731
+    else:
+        columns = per_axis(basis)
+    stage = "output" if form.driver == "output" else "response"
+    return Component(name, form.place, stage, cause, price=price, columns=columns, form=form, **more)  # type: ignore[arg-type]

@@ -1,0 +1,197 @@
+"""Free forms of one place as an effect of a model, named `free:PLACE`.
+
+The forms are kept with the model, so that the effect is the same function on every table.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+
+from calibrations.effects import Effect, Parameter, Values
+from calibrations.errors import ModelError, nearest
+from calibrations.free_forms.form import ANGLES, Form
+from calibrations.geometry.orientation import Pose, nominal_pose, specific_force
+from calibrations.table import AXES, Array, Table
+
+PREFIX = "free:"
+PLACES = {
+    "stage-angle-alpha": "error of the angle alpha over alpha",
+    "stage-angle-beta": "error of the angle beta over beta, and over the side from which it came",
+    "own-response": "output over the specific force along the own axis",
+    "cross-response": "output over the specific force along the other axis in the plane",
+    "z-response": "output over the specific force along the axis out of the plane",
+    "scale-over-cross": "scale factor over the specific force along the other axis in the plane",
+    "scale-over-z": "scale factor over the specific force along the axis out of the plane",
+    "force": "output over products of forces along several axes",
+    "history": "output over the forces passed on the way: slip elements and branches",
+    "temperature-bias": "output over the temperature",
+    "temperature-scale": "scale factor over the temperature",
+    "time-bias": "output over the time",
+    "time-scale": "scale factor over the time",
+    "output": "output of all axes over the output itself: the converter",
+}  # and column:NAME, a logged column
+
+
+def place_of(name: str) -> str:
+    """The place of `free:PLACE`. Raises ModelError with the nearest place."""
+    place = name.removeprefix(PREFIX)
+    if place not in PLACES and not place.startswith("column:"):
+        raise ModelError(
+            f'no free form acts at "{place}"{nearest(place, PLACES)} A logged column is written {PREFIX}column:NAME. '
+            f"The places are {', '.join(PLACES)}"
+        )
+    return place
+
+
+def check_forms(forms: tuple[Form, ...], place: str) -> tuple[Form, ...]:
+    """The forms, if they are those of one place, with sizes. Raises ModelError."""
+    if not forms:
+        raise ModelError("the list of forms is empty; `rig add` and `rig discover` write it")
+    for form in forms:
+        where = f"the form {form.name}"
+        if form.place != place:
+            raise ModelError(f"{where} acts at {form.place}, and the effect at {place}; each place has one effect")
+        if not form.sizes or min(form.sizes) < 0 or max(form.sizes) == 0:
+            raise ModelError(f"{where} has no size; the size is the standard deviation of its coefficients")
+        counts = {"bases": len(form.bases), "kept": len(form.kept)}
+        if any(n not in (1, len(form.sizes)) for n in counts.values()):
+            raise ModelError(f"{where} has {counts} for {len(form.sizes)} axes; give one for each axis, or one for all")
+        if any(
+            not (size == 0) <= form.count(k) <= form.basis(k).count * (size > 0) for k, size in enumerate(form.sizes)
+        ):
+            raise ModelError(f"{where} keeps more columns than its basis has, or none, or some of size 0")
+    return forms
+
+
+@lru_cache(maxsize=128)
+def free_form(forms: tuple[Form, ...]) -> Effect:
+    """The effect of these forms, which act at one place and have sizes."""
+    if forms[0].driver in ANGLES:
+        return _OnAngle(forms)
+    return _AtOutput(forms) if forms[0].driver == "output" else _OnResponse(forms)
+
+
+class FreeForm(Effect):
+    """free-form: a smooth function of unknown form acts at one place of the signal chain.
+
+        V += f_i(x)          x: what drives the place; f: a penalised spline, of a size that the data show
+
+    Symptom   the residual is a smooth curve over what drives the place.
+    Excited by  data in which x changes.
+    Confused with  catalogue effects that act at the same place; their forms are drawn through the curve.
+    Source    Wood (2017), 5.8; Patterson and Thompson (1971).
+    """
+
+    kinds = ("poses",)
+
+    def __init__(self, forms: tuple[Form, ...]) -> None:
+        """Parameters are the coefficients of each form's columns, with the form's size as their prior."""
+        self.forms = forms
+        self.name = f"{PREFIX}{forms[0].place}"
+        self.summary = f"{PLACES.get(forms[0].place, 'output over the logged column')}, of unknown form"
+        self.needs = tuple(dict.fromkeys(column for form in forms for column in form.needs()))
+        self.left_out = _left_out(forms)
+        self.parameters = tuple(p for form in forms for p in _parameters(form))
+
+        self._last: tuple[Table, Array, list[Array]] | None = None
+
+    def _coefficients(self, p: Values, k: int) -> Array:
+        """Coefficients of all forms for axis k."""
+        values = [(p[_name(form, j)], form.shared) for form in self.forms for j in range(form.count(k))]
+        return np.array([float(v if shared else v[k]) for v, shared in values])
+
+    def _columns(self, table: Table, force: Array, response: Array, k: int) -> Array:
+        """Columns of all forms for axis k, shape (n, count)."""
+        return np.hstack([form.columns(table, force, response, k) for form in self.forms])
+
+    def _kept_columns(self, table: Table, force: Array) -> list[Array]:
+        """Columns of each axis. Those of the last force are kept: a jacobian asks for them once a parameter."""
+        if self._last is None or self._last[0] is not table or self._last[1] is not force:
+            nothing = np.zeros(len(force))
+            columns = [self._columns(table, force, nothing, k) for k in range(len(table.axes))]
+            self._last = (table, force, columns)
+        return self._last[2]
+
+
+class _OnResponse(FreeForm):
+    """Adds to the output of each axis, (n, 3)."""
+
+    def transduction(self, a: Array, table: Table, p: Values) -> Array:
+        out = np.zeros(a.shape)
+        for k, columns in enumerate(self._kept_columns(table, a)):
+            out[:, k] = columns @ self._coefficients(p, k)
+        return out
+
+    def columns(self, a: Array, table: Table) -> dict[str, Array]:
+        by_name = {p.name: np.zeros(a.shape) for p in self.parameters}
+        for k, columns in enumerate(self._kept_columns(table, a)):
+            names = [_name(form, j) for form in self.forms for j in range(form.count(k))]
+            for name, column in zip(names, columns.T, strict=True):
+                by_name[name][:, k] = column
+        return by_name
+
+
+class _AtOutput(FreeForm):
+    """Adds to the output, over the output."""
+
+    def output(self, v: Array, table: Table, p: Values) -> Array:
+        out = v.copy()
+        for k in range(len(table.axes)):
+            out[:, k] += self._columns(table, v, v[:, k], k) @ self._coefficients(p, k)
+        return out
+
+
+class _OnAngle(FreeForm):
+    """Adds to a stage angle; coefficients are in rad."""
+
+    def pose(self, pose: Pose, table: Table, p: Values) -> Pose:
+        error = self._kept_columns(table, linear_force(table))[0] @ self._coefficients(p, 0)
+        if self.forms[0].driver == "alpha":
+            return replace(pose, alpha=pose.alpha + error)
+        return replace(pose, beta=pose.beta + error)
+
+
+def _name(form: Form, j: int) -> str:
+    return f"{form.name.replace('-', '_')}_{j + 1:02d}"
+
+
+def _parameters(form: Form) -> list[Parameter]:
+    """A parameter for each column that an axis uses."""
+    unit = "rad" if form.driver in ANGLES else "{out}"
+    if not form.sizes:
+        raise ModelError(f"the free form {form.place}/{form.name} has no sizes yet; a search of `rig add` finds them")
+    axes = ("",) if form.shared else AXES[: len(form.sizes)]
+    most = max(form.count(k) for k in range(len(form.sizes)))
+    return [
+        Parameter(
+            unit,
+            typical=max(form.sizes),
+            per_axis=not form.shared,
+            prior={axis: form.sizes[k] for k, axis in enumerate(axes) if j < form.count(k)},
+            name=_name(form, j),
+            doc=f"coefficient {j + 1} of the {form.name} over {form.driver}",
+        )
+        for j in range(most)
+    ]
+
+
+def _left_out(forms: tuple[Form, ...]) -> str:
+    """Why the sensor's product cannot undo the effect; "" where it can."""
+    if forms[0].driver in ANGLES:
+        return "it is an error of the stage"
+    if forms[0].driver == "time":
+        return "the drift of one record says nothing of the next"
+    if any(form.driver == "variance" for form in forms):
+        return "it follows the standard deviation of the samples of a mean"
+    if any(form.factor == "side" or form.bases[0].kind == "play" for form in forms):
+        return "it follows the way of the stage to each pose"
+    return ""
+
+
+@lru_cache(maxsize=4)
+def linear_force(table: Table) -> Array:
+    """Specific force at the reported poses, g, shape (n, 3)."""
+    return specific_force(nominal_pose(table))

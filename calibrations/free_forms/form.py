@@ -1,0 +1,135 @@
+"""A free form: a basis, what drives it, and how it enters the signal chain.
+
+driver        x of the function f                      unit
+own           specific force along the own axis         g
+cross         along the other axis in the plane         g
+out-of-plane  along the axis out of the plane           g
+force         all three components                      g
+alpha, beta   stage angle                               rad
+temperature   temperature, led by `lead_s`              deg C
+time          time of the record                        s
+output        output before the form                    the output's
+variance      square of the samples' standard deviation the output's, squared
+column:NAME   a logged column                           its own
+
+factor        what f is multiplied by
+force         specific force along the own axis, g
+side          side of beta's last move, +-1
+load          magnitude of the force along the other axis, g
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from calibrations.effects.thermometer import leading_temperature
+from calibrations.free_forms.bases import Basis, Play, Products
+from calibrations.free_forms.poses import side, way
+from calibrations.geometry.orientation import nominal_pose, out_of_plane, specific_force
+from calibrations.table import Array, Table
+
+Factor = Literal["", "force", "side", "load"]
+CROSS = (1, 0, 0)  # of x, y, z: the other axis in the plane
+ANGLES = ("alpha", "beta")
+
+
+@dataclass(frozen=True)
+class Form:
+    """One function f of unknown form. `bases` holds one basis an axis, or one for all.
+
+    place       place of the signal chain, such as own-response
+    name        the form within the place, such as curve
+    sizes       standard deviation of the coefficients, an axis or one for all axes; () before a fit
+    kept        number of columns that are used, from the smoothest on
+    shared      whether all axes have one function (stage angles, output)
+    approach_deg, lead_s  of the factor `side` and of slip elements; of the temperature
+    """
+
+    place: str
+    name: str
+    driver: str
+    bases: tuple[Annotated[Basis, Field(discriminator="kind")], ...]
+    factor: Factor = ""
+    sizes: tuple[float, ...] = ()
+    kept: tuple[int, ...] = ()
+    shared: bool = False
+    approach_deg: float = 0.0
+    lead_s: float = 0.0
+
+    def basis(self, k: int) -> Basis:
+        """The basis of axis k."""
+        return self.bases[k if len(self.bases) > 1 else 0]
+
+    def count(self, k: int) -> int:
+        """Number of columns of axis k."""
+        return self.kept[k if len(self.kept) > 1 else 0] if self.kept else self.basis(k).count
+
+    def needs(self) -> tuple[str, ...]:
+        """Columns without which the form cannot be computed."""
+        named = self.driver.removeprefix("column:")
+        by_driver = {"temperature": ("temperature_c",), "time": ("t_s",)}
+        own = by_driver.get(self.driver, (named,) if named != self.driver else ())
+        return (*own, *(("direction",) if self.factor == "side" and self.approach_deg else ()))
+
+    def columns(self, table: Table, force: Array, response: Array, k: int) -> Array:
+        """Columns of axis k, shape (n, count).
+
+        From the force along the sensing axes (n, 3), g, and the output of the axis before the form (n,).
+        """
+        basis, kept = self.basis(k), self.count(k)
+        if isinstance(basis, Products):
+            x, y, z = force.T
+            out = np.column_stack([x**i * y**j * z**m for i, j, m in basis.powers])
+        elif isinstance(basis, Play):
+            out = np.asarray(_slipping(table, basis, self.approach_deg)[k])
+        else:
+            out = basis(self.drive(table, force, response, k))[:, :kept]
+        return np.asarray(out * self._factor(table, force, k)[:, None]) if self.factor else out
+
+    def drive(self, table: Table, force: Array, response: Array, k: int) -> Array:
+        """What drives the function of axis k, shape (n,)."""
+        if self.driver == "own":
+            return force[:, k]
+        if self.driver == "cross":
+            return force[:, CROSS[k]]
+        if self.driver == "out-of-plane":
+            return out_of_plane(force)[:, k]
+        if self.driver in ANGLES:
+            return np.radians(table.column(f"{self.driver}_deg"))
+        if self.driver == "temperature":
+            return leading_temperature(table, self.lead_s)
+        if self.driver == "time":
+            return table.time_s
+        if self.driver == "output":
+            return response
+        if self.driver == "variance":
+            return table.column(f"v{table.axes[k]}_std_v") ** 2
+        return table.column(self.driver.removeprefix("column:"))
+
+    def _factor(self, table: Table, force: Array, k: int) -> Array:
+        if self.factor == "force":
+            return force[:, k]
+        if self.factor == "load":
+            return np.abs(force[:, CROSS[k]])
+        return side(table, self.approach_deg)
+
+
+@lru_cache(maxsize=32)
+def _slipping(table: Table, basis: Play, approach_deg: float) -> Array:
+    """Forces of the slip elements over their widths, shape (3, n, widths)."""
+    widths = np.array(basis.widths)
+    driver = specific_force(nominal_pose(table))
+    held, last = np.zeros((3, len(widths))), np.zeros(3)
+    out = np.empty((3, table.n, len(widths)))
+    path = np.concatenate([way(table, approach_deg), driver[:, None]], axis=1)
+    for i, points in enumerate(path):
+        for here in points:
+            held = np.minimum(np.maximum(held + (here - last)[:, None], -widths), widths)
+            last = here
+        out[:, i] = held
+    return np.asarray(out / widths)

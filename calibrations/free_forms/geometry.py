@@ -1,0 +1,122 @@
+"""Geometry: which of misalignment, non-orthogonality, stage zeros and base tilt the linear parts need.
+
+The linear parts of the fit are a vector q of small angles with a covariance. Each effect of the geometry is a linear
+map into it, from its own derivatives. A place that acts over another axis may have a linear part of its own, as large
+as its curve: so much is added to the covariance before anything is asked, so that no mechanism's linear part names a
+second cause.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from itertools import combinations
+
+import numpy as np
+
+from calibrations.free_forms.chain import own_base_size
+from calibrations.free_forms.form import CROSS
+from calibrations.free_forms.search import SearchResult
+from calibrations.table import Array
+
+GEOMETRY = ("axis-nonorthogonality", "axis-misalignment", "stage-zero-offset", "base-tilt")
+CAUSE_PRICE, PARAMETER_PRICE = 12.0, 2.0  # of chi-square
+CLOSE = 8.0  # of chi-square: explanations that this data does not tell apart
+LINEAR_PART = 1.0  # of a curve's size: the standard deviation of a mechanism's own linear part
+LEAST_LINE = 0.3  # noise floors: a smaller linear part is left out
+IMMATERIAL = 0.15  # noise floors: a smaller angle is no matter
+OVER_CROSS = ("cross-response", "scale-over-cross", "force")
+OVER_Z = ("z-response", "scale-over-z", "force", "stage-angle-alpha")
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """Which effects of the geometry are causes.
+
+    alternatives  what else would do for each
+    lines         linear parts that no cause bears, by place: output at 1 g, in its unit
+    """
+
+    causes: tuple[str, ...] = ()
+    alternatives: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    lines: Mapping[str, float] = field(default_factory=dict)
+
+
+def geometry(result: SearchResult, sizes: Mapping[str, float], effects: Mapping[str, Array], has: set[str]) -> Geometry:
+    """The geometry that the linear parts show.
+
+    sizes    rms of each acting place, in the output's unit
+    effects  d output / d parameters of each effect of the geometry, (channels, n, m)
+    has      effects of the geometry that the given model has: they cost nothing
+    """
+    data, c, g = result.data, result.data.channels, result.gram
+    gain = np.array([result.values.base[c + 3 * k + k] for k in range(c)])
+    floor, mean_gain = float(np.sqrt(np.mean(result.white**2))), float(np.mean(np.abs(gain)))
+    if not mean_gain > 0:
+        return Geometry()
+    pick, over = _angles(result, gain)
+    b = own_base_size(data)
+    active = g.indices(result.sizes.variances)
+    cross = g.base_inverse @ g.base_products[:, active]
+    covariance = (g.base_inverse + cross @ result.sizes.inverse @ cross.T)[:b, :b]
+    q = pick @ result.values.base[:b]
+    C = pick @ covariance @ pick.T
+    for i, places in enumerate(over):
+        size = max((sizes.get(place, 0.0) for place in places), default=0.0)
+        C[i, i] += (LINEAR_PART * size / mean_gain / 0.5) ** 2
+    C += np.diag(np.full(len(q), (IMMATERIAL * floor / mean_gain) ** 2))
+    root = np.linalg.cholesky(C)
+    inverse = np.linalg.inv(root)
+    whole = g.base_inverse.shape[0]
+    base = result.columns[:, :whole]
+    maps = {
+        name: inverse @ pick @ (g.base_inverse @ (base.T @ (J / result.white[:, :, None]).reshape(len(base), -1)))[:b]
+        for name, J in effects.items()
+    }
+    causes, alternatives, left = _chosen(inverse @ q, maps, has)
+    lines: dict[str, float] = {}
+    for places, angle in zip(over, root @ left, strict=True):
+        if places and abs(angle) * mean_gain > LEAST_LINE * floor:
+            lines[places[0]] = max(lines.get(places[0], 0.0), float(abs(angle)) * mean_gain)
+    return Geometry(causes, alternatives, lines)
+
+
+def _angles(result: SearchResult, gain: Array) -> tuple[Array, list[tuple[str, ...]]]:
+    """The matrix that picks the angles q of the base coefficients, rad, and the places that hide each."""
+    data, c = result.data, result.data.channels
+    rows: list[Array] = []
+    over: list[tuple[str, ...]] = []
+    for k in range(c):
+        for j in range(3):
+            if j != k:
+                row = np.zeros(own_base_size(data))
+                row[c + 3 * k + j] = 1 / gain[k]
+                rows.append(row)
+                over.append(OVER_CROSS if j == CROSS[k] else OVER_Z)
+    for i in range(4 * c, own_base_size(data)):
+        row = np.zeros(own_base_size(data))
+        row[i] = 1.0
+        rows.append(row)
+        over.append(())
+    return np.array(rows), over
+
+
+def _chosen(
+    q: Array, maps: Mapping[str, Array], has: set[str]
+) -> tuple[tuple[str, ...], dict[str, tuple[str, ...]], Array]:
+    """The cheapest set of effects that explains the whitened angles q, what else would do, and what q keeps."""
+    free = [maps[name] for name in maps if name in has]
+    others = [name for name in maps if name not in has]
+    scored: list[tuple[float, tuple[str, ...], Array]] = []
+    for count in range(len(others) + 1):
+        for names in combinations(others, count):
+            parts = [*free, *(maps[name] for name in names)]
+            A = np.hstack([np.zeros((len(q), 0)), *parts])
+            answer, _, rank, _ = np.linalg.lstsq(A, q, rcond=1e-7)
+            left = q - A @ answer
+            scored.append((float(left @ left) + CAUSE_PRICE * count + PARAMETER_PRICE * int(rank), names, left))
+    scored.sort(key=lambda s: s[0])
+    best, chosen, left = scored[0]
+    close = [names for score, names, _ in scored[1:] if score < best + CLOSE and len(names) <= len(chosen)]
+    rivals = {name for names in close for name in names} - set(chosen)
+    return chosen, {name: tuple(sorted(rivals)) for name in chosen if rivals}, left

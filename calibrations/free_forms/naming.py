@@ -1,0 +1,151 @@
+"""Names within a place: the fewest catalogue forms that take up its curve; else the cause is unknown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import kurtosis
+
+from calibrations.free_forms.chain import base_size
+from calibrations.free_forms.components import Component
+from calibrations.free_forms.reml import gains, without
+from calibrations.free_forms.search import SearchResult
+from calibrations.table import Array
+
+NEXT_FORM = 0.05  # of a place's variance that a second form must take up: less is the form of the first
+NAMED = 0.5  # of it that all forms must take up: else the cause is unknown
+WHOLE = 0.98  # of it: the curve is no longer needed
+LEAST_SIZE = 0.6  # noise floors: a smaller place is a refinement
+LEAST_SHARE = 0.01  # of the largest place's size
+JUMPS = 4.0  # excess kurtosis of a walk's increments: 500 of a Gaussian process keep within +-1
+CLOSE = 10.0  # of -2 log likelihood: not told apart
+
+
+@dataclass(frozen=True)
+class ActingPlace:
+    """A place that acts: its size (rms over the poses, in floors), and its causes with the share that they take up."""
+
+    name: str
+    size: float
+    components: tuple[str, ...]
+    causes: tuple[str, ...]
+    share: float
+    material: bool
+    gain: float
+    inseparable_from: tuple[str, ...]
+    curve: Array  # (channels, n), in the output's unit, freed of what the base takes up
+
+    @property
+    def unknown(self) -> bool:
+        """Whether no effect of the catalogue is its cause."""
+        return self.material and not self.causes
+
+
+def places(result: SearchResult) -> list[ActingPlace]:
+    """Every place that acts, largest first."""
+    b = base_size(result.data, result.given)
+    by_place: dict[str, list[str]] = {}
+    for name in result.active:
+        by_place.setdefault(result.component(name).place, []).append(name)
+    base = result.columns[:, :b]
+    Q = np.linalg.qr(base / np.maximum(np.linalg.norm(base, axis=0), 1e-300))[0]
+    curves = {
+        place: _freed(Q, np.sum([_part(result, n, b) for n in names], axis=0)) for place, names in by_place.items()
+    }
+    sizes = {place: float(np.sqrt(np.mean(curve**2))) for place, curve in curves.items()}
+    largest = max(sizes.values(), default=0.0)
+    out = []
+    for place, names in by_place.items():
+        causes, share = _named(result, place, names, curves[place], Q, b)
+        material = sizes[place] >= max(LEAST_SIZE, LEAST_SHARE * largest)
+        gain, others = _rivals(result, names)
+        curve = curves[place].reshape(result.white.shape) * result.white
+        out.append(ActingPlace(place, sizes[place], tuple(names), causes, share, material, gain, others, curve))
+    return sorted(out, key=lambda p: -p.size)
+
+
+def _part(result: SearchResult, name: str, b: int) -> Array:
+    """What one component adds to the output over the noise, (channels * n,)."""
+    block = result.gram.blocks[name]
+    return np.asarray(result.columns[:, b + block.start : b + block.stop] @ result.sizes.of(result.gram, name))
+
+
+def _freed(Q: Array, x: Array) -> Array:
+    return np.asarray(x - Q @ (Q.T @ x))
+
+
+def _named(
+    result: SearchResult, place: str, names: Sequence[str], curve: Array, Q: Array, b: int
+) -> tuple[tuple[str, ...], float]:
+    """The fewest catalogue effects that take up the curve, and their share of its variance."""
+    forms: dict[str, list[Component]] = {}
+    jumps = any(_jumps(result, name) for name in names if "/walk-" in name)
+    for comp in result.components:
+        if comp.place == place and comp.cause and (comp.name in names or not _shaped_out(comp, result, names)):
+            if comp.cause == "bias-drift" and jumps:
+                continue
+            forms.setdefault(comp.cause, []).append(comp)
+    columns = {cause: _columns(result, comps, names, Q, b) for cause, comps in forms.items()}
+    total = float(curve @ curve) or 1.0
+    chosen: list[str] = []
+    share = 0.0
+    while len(chosen) < len(columns):
+        tried = {}
+        for cause in columns:
+            if cause in chosen:
+                continue
+            tried[cause] = max(1 - _left([*(columns[c][0] for c in chosen), X], curve) / total for X in columns[cause])
+        best = max(tried, key=lambda c: tried[c])
+        if tried[best] - share < (NEXT_FORM if chosen else 0.2):
+            break
+        chosen.append(best)
+        share = tried[best]
+    return (tuple(chosen), share) if share >= NAMED else ((), share)
+
+
+def _jumps(result: SearchResult, name: str) -> bool:
+    """Whether the increments of a random walk have tails that a Gaussian process does not have."""
+    walk = result.component(name).jacobian(result.state) @ result.values.of[name]
+    increments = np.diff(walk[np.argmax(np.ptp(walk, axis=1))])
+    return bool(kurtosis(increments) > JUMPS)
+
+
+def _shaped_out(comp: Component, result: SearchResult, names: Sequence[str]) -> bool:
+    """Whether another member of its family acts, at a better shape."""
+    return bool(comp.family) and any(result.component(n).family == comp.family for n in names)
+
+
+def _columns(result: SearchResult, comps: Sequence[Component], names: Sequence[str], Q: Array, b: int) -> list[Array]:
+    """Candidates of one cause: of all its components together where they act, else each by itself."""
+    parts = []
+    for comp in comps:
+        block = result.gram.blocks[comp.name]
+        X = result.columns[:, b + block.start : b + block.stop]
+        parts.append(X - Q @ (Q.T @ X))
+    acting = [X for comp, X in zip(comps, parts, strict=True) if comp.name in names]
+    return [np.hstack(acting)] if acting else parts
+
+
+def _left(columns: Sequence[Array], y: Array) -> float:
+    X = np.hstack(columns)
+    scale = np.maximum(np.linalg.norm(X, axis=0), 1e-300)
+    rest = y - X @ (np.linalg.lstsq(X / scale, y, rcond=1e-8)[0] / scale)
+    return float(rest @ rest)
+
+
+def _rivals(result: SearchResult, names: Sequence[str]) -> tuple[float, tuple[str, ...]]:
+    """What the place gains, and causes at other places that would gain nearly as much in its stead."""
+    others = result.sizes
+    for name in names:
+        others = without(result.gram, others, name)
+    lost = others.deviance - result.sizes.deviance
+    if len(names) > 1:
+        return lost, ()
+    place, own = result.component(names[0]).place, result.component(names[0])
+    rest = [c.name for c in result.components if c.name not in result.sizes.variances and c.place != place]
+    gained = gains(result.gram, others, rest)
+    close = {result.component(n).cause or result.component(n).place for n, (g, _) in gained.items()
+             if g - result.component(n).price > lost - own.price - CLOSE}  # fmt: skip
+    return lost, tuple(sorted(close - {own.cause}))

@@ -1,0 +1,279 @@
+"""Sizes by restricted maximum likelihood, on a matrix of products that is made once for all components.
+
+With the base (flat prior) eliminated, data y = Z u + e, e ~ N(0, phi I) whitened, u_k ~ N(0, tau_k^2 I):
+
+    -2 l = y'y - y'Z H^-1 Z'y + log |H| + sum m_k log tau_k^2,      H = Z'Z + diag(1 / tau_k^2)
+
+Sizes follow from tau_k^2 <- u_k'u_k / (m_k - tr(H^-1)_kk / tau_k^2), the update of Fellner and Schall.
+
+Source  Patterson and Thompson, Biometrika 58 (1971) 545; Wood and Fasiolo, Biometrics 73 (2017) 1071.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg.lapack import dpotri
+
+from calibrations.free_forms.chain import Coefficients, Given, State, base_jacobian
+from calibrations.free_forms.components import Component
+from calibrations.table import Array
+
+RANK = 1e-11  # of the largest eigenvalue of the base's products
+LEAST_BESIDE = 1e-3  # of a component's squares: less beside the base is not magnified
+ROUNDS = 40
+SETTLED = 0.02  # of a variance
+
+
+@dataclass(frozen=True, eq=False)
+class Gram:
+    """Products of all whitened columns with each other and with the data, the base eliminated.
+
+    products  (p, p), with (p,) and squares ()
+    blocks    columns of each component
+    """
+
+    products: Array
+    with_data: Array
+    squares: float
+    blocks: Mapping[str, slice]
+    scales: Mapping[str, float]
+    base_inverse: Array  # (b, b)
+    base_products: Array  # (b, p)
+    base_with_data: Array  # (b,)
+    rows: int
+    base_rank: int
+
+    def indices(self, names: Iterable[str]) -> Array:
+        """Column numbers of these components in order."""
+        parts = [np.arange(self.blocks[name].start, self.blocks[name].stop) for name in names]
+        return np.concatenate(parts) if parts else np.zeros(0, dtype=int)
+
+
+def whitened(
+    state: State,
+    given: Given,
+    values: Coefficients,
+    components: Sequence[Component],
+    scales: Mapping[str, float],
+    white: Array,
+) -> tuple[Array, dict[str, slice], dict[str, float]]:
+    """[base, components, data] over the white noise, (channels * n, b + p + 1), blocks, scales."""
+    data = state.data
+    base = base_jacobian(state, given)
+    target = data.outputs - state.predicted + base @ values.base
+    blocks, at, parts, used = {}, 0, [base], dict(scales)
+    for comp in components:
+        J = comp.jacobian(state)
+        if comp.name not in used:
+            used[comp.name] = float(np.sqrt(np.mean(np.sum(J * J, axis=2)))) or 1.0
+        J = J / used[comp.name]
+        if comp.name in values.of and not comp.noise:
+            target = target + J @ (values.of[comp.name] * used[comp.name])
+        parts.append(J)
+        blocks[comp.name] = slice(at, at + J.shape[2])
+        at += J.shape[2]
+    X = np.concatenate([*parts, target[:, :, None]], axis=2) / white[:, :, None]
+    return X.reshape(-1, X.shape[2]), blocks, used
+
+
+def gram(X: Array, blocks: Mapping[str, slice], scales: Mapping[str, float], b: int) -> Gram:
+    """Products of whitened columns [base (b), components, data], the base eliminated."""
+    return eliminated(X.T @ X, blocks, scales, b, len(X))
+
+
+def eliminated(G: Array, blocks: Mapping[str, slice], scales: Mapping[str, float], b: int, rows: int) -> Gram:
+    """The same from the products of all columns."""
+    size = np.sqrt(np.maximum(np.diag(G)[:b], 1e-300))
+    values, vectors = np.linalg.eigh(G[:b, :b] / np.outer(size, size))
+    kept = values > RANK * values[-1]
+    inverse = (vectors[:, kept] / values[kept]) @ vectors[:, kept].T / np.outer(size, size)
+    cross = G[:b, b:]
+    rest = G[b:, b:] - cross.T @ inverse @ cross
+    return Gram(rest[:-1, :-1], rest[:-1, -1], float(rest[-1, -1]), blocks, scales, inverse, cross[:, :-1],
+                cross[:, -1], rows, int(kept.sum()))  # fmt: skip
+
+
+def beside_base(X: Array, g: Gram, b: int) -> tuple[Array, dict[str, float]]:
+    """Columns and scales such that what the base leaves of each component has unit rms."""
+    X, scales = X.copy(), dict(g.scales)
+    for name, block in g.blocks.items():
+        columns = X[:, b + block.start : b + block.stop]
+        raw = float(np.sum(columns * columns)) or 1.0
+        factor = max(float(np.trace(g.products[block, block])) / raw, LEAST_BESIDE) ** 0.5
+        scales[name] = g.scales[name] * factor
+        X[:, b + block.start : b + block.stop] = columns / factor
+    return X, scales
+
+
+@dataclass(frozen=True, eq=False)
+class Sizes:
+    """Variances of the active components, coefficients and -2 log restricted likelihood."""
+
+    variances: Mapping[str, float]
+    coefficients: Array
+    inverse: Array  # H^-1
+    deviance: float
+
+    def of(self, g: Gram, name: str) -> Array:
+        """Coefficients of one active component (of normalised columns)."""
+        at = 0
+        for other in self.variances:
+            m = g.blocks[other].stop - g.blocks[other].start
+            if other == name:
+                return self.coefficients[at : at + m]
+            at += m
+        raise KeyError(name)
+
+    def shrinkage(self, g: Gram, name: str) -> float:
+        """Coefficients of one active component that its prior determines, in place of the data."""
+        part = _part(g, self, name)
+        return float(np.trace(self.inverse[part, part])) / self.variances[name]
+
+
+def solve(g: Gram, variances: Mapping[str, float]) -> Sizes:
+    """Coefficients and deviance at these variances."""
+    rows = g.indices(variances)
+    widths = [g.blocks[name].stop - g.blocks[name].start for name in variances]
+    std = np.sqrt(np.repeat(list(variances.values()), widths))
+    K = g.products[np.ix_(rows, rows)] * np.outer(std, std)
+    K[np.diag_indices_from(K)] += 1.0  # H = D^-1 K D^-1 with D the standard deviations: well conditioned
+    root = _root(K)
+    side = g.with_data[rows]
+    inverse, _ = dpotri(root[0], lower=1)
+    inverse = (np.tril(inverse) + np.tril(inverse, -1).T) * np.outer(std, std)
+    answer = inverse @ side
+    logdet = 2 * float(np.sum(np.log(np.diag(root[0]))))
+    return Sizes(dict(variances), answer, inverse, g.squares - float(side @ answer) + logdet)
+
+
+def _root(K: Array) -> tuple[Array, bool]:
+    """Cholesky factor; where rounding made K indefinite, of K with a little more on its diagonal."""
+    more = 0.0
+    if not np.isfinite(K).all():
+        raise ArithmeticError("the products of the columns are not finite")
+    while True:
+        try:
+            factor: tuple[Array, bool] = cho_factor(K + more * np.eye(len(K)), lower=True, check_finite=False)
+            return factor
+        except np.linalg.LinAlgError:
+            more = max(100 * more, 1e-12 * float(np.max(np.diag(K))))
+
+
+def estimate(g: Gram, variances: Mapping[str, float], most: Mapping[str, float], rounds: int = ROUNDS) -> Sizes:
+    """Variances of greatest restricted likelihood, none above `most`, by Fellner-Schall steps with extrapolation."""
+    present = dict(variances)
+    fit = solve(g, present)
+    for _ in range(rounds):
+        changed, at, moved = {}, 0, 0.0
+        for name, v in present.items():
+            m = g.blocks[name].stop - g.blocks[name].start
+            part = slice(at, at + m)
+            at += m
+            free = m - float(np.trace(fit.inverse[part, part])) / v
+            size = float(fit.coefficients[part] @ fit.coefficients[part])
+            factor = np.clip(size / max(v * free, 1e-300), 0.05, 20.0) ** 1.4
+            changed[name] = float(np.clip(v * factor, 1e-16, most.get(name, 1e8)))
+            moved = max(moved, abs(np.log(changed[name] / v)) * min(1.0, free / 0.01))
+        after = solve(g, changed)
+        if after.deviance > fit.deviance + 1e-6:  # too far: halfway back
+            changed = {k: float(np.sqrt(v * present[k])) for k, v in changed.items()}
+            after = solve(g, changed)
+        gained = fit.deviance - after.deviance
+        if gained < -0.5:
+            break
+        present, fit = changed, after
+        if moved < SETTLED or abs(gained) < 0.01:
+            break
+    return fit
+
+
+GRID = np.exp(np.linspace(-12.0, 6.0, 19))
+
+
+def gains(g: Gram, fit: Sizes, names: Sequence[str]) -> dict[str, tuple[float, float]]:
+    """By inactive component: gain in -2 log likelihood at its best variance, the others held, and this variance."""
+    if not names:
+        return {}
+    active, rest = g.indices(fit.variances), g.indices(names)
+    cross = g.products[np.ix_(active, rest)]
+    solved = fit.inverse @ cross
+    side = g.with_data[rest] - cross.T @ fit.coefficients
+    answer, at = {}, 0
+    for name in names:
+        block = g.blocks[name]
+        m = block.stop - block.start
+        part = slice(at, at + m)
+        at += m
+        M = g.products[block, block] - cross[:, part].T @ solved[:, part]
+        answer[name] = gain(M, side[part])
+    return answer
+
+
+def gain(M: Array, side: Array) -> tuple[float, float]:
+    """Greatest gain and its variance of a component with products M (m, m) and `side` (m,) given the others."""
+    d, V = np.linalg.eigh((M + M.T) / 2) if len(M) > 1 else (M[0], np.ones((1, 1)))
+    d = np.maximum(d, 0.0)
+    q = (V.T @ side) ** 2
+    top = float(d[-1])
+    if top <= 1e-9:
+        return 0.0, 1e-12
+    grid = GRID * max(float(q.sum() / top / max(top, 1e-300)), 1.0 / top) / max(len(d), 1)
+    value = np.sum(q * grid[:, None] / (1 + grid[:, None] * d) - np.log1p(grid[:, None] * d), axis=1)
+    k = int(np.argmax(value))
+    fine = grid[k] * np.exp(np.linspace(-0.8, 0.8, 9))
+    value = np.sum(q * fine[:, None] / (1 + fine[:, None] * d) - np.log1p(fine[:, None] * d), axis=1)
+    k = int(np.argmax(value))
+    return max(float(value[k]), 0.0), float(fine[k])
+
+
+def gain_of_columns(g: Gram, fit: Sizes, X: Array, b: int, N: Array) -> tuple[float, float]:
+    """The gain of whitened columns N (rows, m) that are not in g; X are the columns that g was made of."""
+    active = g.indices(fit.variances)
+    with_base = X[:, :b].T @ N
+    by_base = g.base_inverse @ with_base
+    M = N.T @ N - with_base.T @ by_base
+    side = N.T @ X[:, -1] - by_base.T @ g.base_with_data
+    cross = X[:, b + active].T @ N - g.base_products[:, active].T @ by_base
+    return gain(M - cross.T @ fit.inverse @ cross, side - cross.T @ fit.coefficients)
+
+
+def _part(g: Gram, fit: Sizes, name: str) -> slice:
+    at = 0
+    for other in fit.variances:
+        m = g.blocks[other].stop - g.blocks[other].start
+        if other == name:
+            return slice(at, at + m)
+        at += m
+    raise KeyError(name)
+
+
+def loss(g: Gram, fit: Sizes, name: str) -> float:
+    """Rise of -2 log likelihood without one active component, the other variances held."""
+    part = _part(g, fit, name)
+    C, u = fit.inverse[part, part], fit.coefficients[part]
+    root = _root(C)
+    logdet = 2 * float(np.sum(np.log(np.diag(root[0]))))
+    quadratic = float(u @ cho_solve(root, u, check_finite=False))
+    return quadratic + logdet - len(u) * float(np.log(fit.variances[name]))
+
+
+def without(g: Gram, fit: Sizes, name: str) -> Sizes:
+    """The fit without one active component, the other variances held."""
+    part = _part(g, fit, name)
+    rest = np.r_[0 : part.start, part.stop : len(fit.coefficients)]
+    solved = cho_solve(_root(fit.inverse[part, part]), fit.inverse[part][:, rest], check_finite=False)
+    inverse = fit.inverse[np.ix_(rest, rest)] - fit.inverse[part][:, rest].T @ solved
+    answer = fit.coefficients[rest] - solved.T @ fit.coefficients[part]
+    variances = {k: v for k, v in fit.variances.items() if k != name}
+    return Sizes(variances, answer, inverse, fit.deviance + loss(g, fit, name))
+
+
+def coefficients(g: Gram, fit: Sizes) -> Coefficients:
+    """Coefficients of base and components in the units of their own columns."""
+    rows = g.indices(fit.variances)
+    base = g.base_inverse @ (g.base_with_data - g.base_products[:, rows] @ fit.coefficients)
+    return Coefficients(base, {name: fit.of(g, name) / g.scales[name] for name in fit.variances})

@@ -1,0 +1,296 @@
+"""Forward selection with backward elimination and exchange on the restricted likelihood, around Gauss-Newton steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibrations.free_forms.chain import Coefficients, Given, State, base_size, start, state_at
+from calibrations.free_forms.components import Component
+from calibrations.free_forms.places import components as all_components
+from calibrations.free_forms.poses import PoseData
+from calibrations.free_forms.quantisation import find_saw
+from calibrations.free_forms.reml import (
+    Gram,
+    Sizes,
+    beside_base,
+    coefficients,
+    estimate,
+    gain_of_columns,
+    gains,
+    gram,
+    loss,
+    whitened,
+    without,
+)
+from calibrations.table import Array
+
+ENTER = 16.0  # gain in -2 log restricted likelihood for one component more: 1 % of clean sensors (`chance`)
+LEAVE = 12.0
+COARSE = (1e-3, 2e-5)  # of the misfit, at each linearisation: less may be a second-order remainder
+ROUNDS = 7
+MOST_COMPONENTS = 24
+SPILL = 0.03  # of the misfit that is left: a place that gains less takes up part of what acts elsewhere
+LARGEST = 4.0  # of the mean square of the first misfit: more is two components against each other
+SLOW_MOST = 0.5  # slow noise, in noise floors, at most (rms)
+
+
+@dataclass(frozen=True, eq=False)
+class SearchResult:
+    """The end of the search."""
+
+    data: PoseData
+    given: Given
+    white: Array
+    components: Sequence[Component]
+    gram: Gram
+    columns: Array  # whitened [base, components, data]
+    sizes: Sizes
+    values: Coefficients
+    state: State
+    path: Sequence[str]
+
+    def component(self, name: str) -> Component:
+        return next(c for c in self.components if c.name == name)
+
+    @property
+    def residual(self) -> Array:
+        """Whitened residual, (channels * n,)."""
+        b, g = self.columns.shape[1] - 1 - len(self.gram.with_data), self.gram
+        rows = g.indices(self.sizes.variances)
+        base = g.base_inverse @ (g.base_with_data - g.base_products[:, rows] @ self.sizes.coefficients)
+        fitted = self.columns[:, :b] @ base + self.columns[:, b + rows] @ self.sizes.coefficients
+        return np.asarray(self.columns[:, -1] - fitted)
+
+    @property
+    def freedom(self) -> float:
+        """Degrees of freedom that the residual keeps: rows less those that base and components take."""
+        taken = sum(
+            self.gram.blocks[name].stop - self.gram.blocks[name].start - self.sizes.shrinkage(self.gram, name)
+            for name in self.sizes.variances
+        )
+        return float(max(len(self.columns) - self.gram.base_rank - taken, 1.0))
+
+    @property
+    def active(self) -> list[str]:
+        return [name for name in self.sizes.variances if not self.component(name).noise]
+
+
+def search(data: PoseData, white: Array, given: Given) -> SearchResult:
+    """Places that act, with their sizes. `white` (channels, n): standard deviation of each mean."""
+    values = start(data, given)
+    state = state_at(data, given, values, ())
+    components = all_components(data, state)
+    scales: dict[str, float] = {}
+    noise = {c.name for c in components if c.noise}
+    floor = float(np.sqrt(np.mean(white**2)))
+    variances = dict.fromkeys(noise, (0.1 * floor) ** 2)
+    most: dict[str, float] = dict.fromkeys(noise, (SLOW_MOST * floor) ** 2)
+    path: list[str] = []
+    b = base_size(data, given)
+    rejected: list[float] = []
+    first = find_saw(data, state, white, data.outputs - state.predicted, rejected, ENTER)
+    components += [first] if first is not None else []
+    caution = 1.0
+    for number in range(ROUNDS):
+        X, blocks, scales = whitened(state, given, values, components, scales, white)
+        g = gram(X, blocks, scales, b)
+        if number == 0:
+            X, scales = beside_base(X, g, b)
+            g = gram(X, blocks, scales, b)
+            largest = LARGEST * g.squares / g.rows * floor**2
+            most |= {c.name: largest for c in components if not c.noise}
+        limit = caution * (max(ENTER, COARSE[number] * g.squares) if number < len(COARSE) else ENTER)
+        before = set(variances)
+        kept = values, dict(variances), state
+        sizes = estimate(g, variances, most)
+        sizes, steps = _select(g, sizes, components, most, limit, number >= len(COARSE))
+        path += steps
+        values = coefficients(g, sizes)
+        variances = dict(sizes.variances)
+        reshaped = _refined(components, g, sizes, X, b, state, scales, white)
+        if reshaped is not None:
+            components, values = reshaped, kept[0]
+            X, blocks, scales = whitened(state, given, values, components, scales, white)
+            g = gram(X, blocks, scales, b)
+            sizes = estimate(g, variances, most)
+            values, variances = coefficients(g, sizes), dict(sizes.variances)
+        moved = state_at(data, given, values, components)
+        change = float(np.sqrt(np.mean(((moved.predicted - state.predicted) / white) ** 2)))
+        state = moved
+        worse = float(np.sqrt(np.mean(((data.outputs - moved.predicted) / white) ** 2)))
+        if worse > 1.2 * np.sqrt(g.squares / g.rows) + 3.0:  # components against each other: the step is not taken
+            values, variances, state = kept
+            saws = {c.name for c in components if c.cause == "quantisation"} & set(sizes.variances)
+            rejected += [c.shape[0] for c in components if c.name in saws]
+            components = [c for c in components if c.name not in saws]
+            variances = {k: v for k, v in variances.items() if k not in saws}
+            values = Coefficients(values.base, {k: v for k, v in values.of.items() if k not in saws})
+            caution *= 1.0 if saws else 30.0
+            continue
+        if not any(c.cause == "quantisation" for c in components):
+            extra = find_saw(data, state, white, data.outputs - state.predicted, rejected, ENTER)
+            if extra is not None:
+                components = [*components, extra]
+                continue
+        if number >= len(COARSE) and set(variances) == before and change < 0.03:
+            break
+    X, blocks, scales = whitened(state, given, values, components, scales, white)
+    g = gram(X, blocks, scales, b)
+    sizes = estimate(g, variances, most)
+    values = coefficients(g, sizes)
+    state = state_at(data, given, values, components)
+    return SearchResult(data, given, white, components, g, X, sizes, values, state, path)
+
+
+def _select(
+    g: Gram, sizes: Sizes, components: Sequence[Component], most: Mapping[str, float], limit: float, last: bool
+) -> tuple[Sizes, list[str]]:
+    """Components added, exchanged and removed until nothing gains more than `limit`."""
+    by_name = {c.name: c for c in components}
+    simple = {c.name: c for c in components if not c.general}
+    steps: list[str] = []
+    seen: set[frozenset[str]] = set()
+    sizes = _pruned(g, sizes, by_name, most, steps)
+    stale: dict[str, float] = {}
+    while len(sizes.variances) < MOST_COMPONENTS:
+        enough = max(limit, SPILL * (sizes.deviance - g.rows))
+        best = _best(g, sizes, simple, stale)
+        if (best is None or best[1] <= enough) and stale:
+            stale = {}
+            best = _best(g, sizes, simple, stale)
+        if best is None or best[1] <= enough:
+            best = _best(g, sizes, by_name)
+        if best is not None and best[1] > enough:
+            sizes = estimate(g, {**sizes.variances, best[0]: best[2]}, most, 12)
+            steps.append(f"+{best[0]}")
+            if by_name[best[0]].reshaped is not None:
+                break  # its shape is found first: its misfit looks like other places
+            sizes = _pruned(g, sizes, by_name, most, steps)
+            if frozenset(sizes.variances) not in seen:
+                seen.add(frozenset(sizes.variances))
+                continue
+        if not last:
+            break
+        after = _exchanged(g, sizes, by_name, most, steps)
+        if set(after.variances) == set(sizes.variances) or frozenset(after.variances) in seen:
+            break
+        seen.add(frozenset(after.variances))
+        sizes = _pruned(g, after, by_name, most, steps)
+    return estimate(g, sizes.variances, most), steps
+
+
+def _best(
+    g: Gram, sizes: Sizes, by_name: Mapping[str, Component], stale: dict[str, float] | None = None
+) -> tuple[str, float, float] | None:
+    """The component that gains most, price taken off, and its variance.
+
+    Gains mostly fall when components are added: with `stale` gains of an earlier call the most promising are computed
+    first, until none of the others promises more.
+    """
+    taken = {by_name[name].family for name in sizes.variances if name in by_name} - {""}
+    names = [n for n, c in by_name.items() if n not in sizes.variances and c.family not in taken and n in g.blocks]
+    known = {} if stale is None else stale
+    names.sort(key=lambda n: -known.get(n, np.inf))
+    best: tuple[str, float, float] | None = None
+    for part in [names[k : k + 6] for k in range(0, len(names), 6)] if known else [names]:
+        if not part or (best is not None and best[1] > known.get(part[0], np.inf)):
+            break
+        for n, (gained, variance) in gains(g, sizes, part).items():
+            known[n] = gained - by_name[n].price
+            if best is None or known[n] > best[1]:
+                best = n, known[n], variance
+    return best
+
+
+def _pruned(
+    g: Gram, sizes: Sizes, by_name: Mapping[str, Component], most: Mapping[str, float], steps: list[str]
+) -> Sizes:
+    """Without components whose loss costs less than they must gain, the least first."""
+    while True:
+        costs = {n: loss(g, sizes, n) - by_name[n].price for n in sizes.variances if not by_name[n].noise}
+        if not costs:
+            return sizes
+        name = min(costs, key=lambda n: costs[n])
+        if costs[name] > LEAVE:
+            return sizes
+        rest = {k: v for k, v in sizes.variances.items() if k != name}
+        after = estimate(g, rest, most, 12)
+        if after.deviance - sizes.deviance - by_name[name].price > LEAVE:
+            return sizes
+        steps.append(f"-{name}")
+        sizes = after
+
+
+def _exchanged(
+    g: Gram, sizes: Sizes, by_name: Mapping[str, Component], most: Mapping[str, float], steps: list[str]
+) -> Sizes:
+    """With each component replaced where another one in its stead is likelier."""
+    for name in [n for n in sizes.variances if not by_name[n].noise]:
+        if name not in sizes.variances:
+            continue
+        others = without(g, sizes, name)
+        lost = others.deviance - sizes.deviance - by_name[name].price
+        best = _best(g, others, by_name)
+        if best is None or best[0] == name or best[1] < lost + 1.0:
+            continue
+        tried = estimate(g, {**others.variances, best[0]: best[2]}, most, 12)
+        better = sizes.deviance + by_name[name].price - tried.deviance - by_name[best[0]].price
+        if better > 1.0:
+            steps.append(f"{name}>{best[0]}")
+            sizes = tried
+    return sizes
+
+
+def _refined(
+    components: list[Component],
+    g: Gram,
+    sizes: Sizes,
+    X: Array,
+    b: int,
+    state: State,
+    scales: Mapping[str, float],
+    white: Array,
+) -> list[Component] | None:
+    """The active components at their likeliest shapes, the others held; None: no change."""
+    changed = list(components)
+    moved = False
+    for i, comp in enumerate(components):
+        if comp.name not in sizes.variances or comp.reshaped is None:
+            continue
+        rest = without(g, sizes, comp.name)
+
+        def gained(shape: tuple[float, ...], comp: Component = comp, rest: Sizes = rest) -> float:
+            assert comp.reshaped is not None  # noqa: S101 checked above
+            J = comp.reshaped(shape).jacobian(state) / scales[comp.name] / white[:, :, None]
+            return gain_of_columns(g, rest, X, b, J.reshape(-1, J.shape[2]))[0]
+
+        best = _climbed(gained, comp.shape, comp.step)
+        if best != comp.shape:
+            changed[i] = comp.reshaped(best)
+            moved = True
+    return changed if moved else None
+
+
+def _climbed(
+    gained: Callable[[tuple[float, ...]], float], shape: tuple[float, ...], step: tuple[float, ...]
+) -> tuple[float, ...]:
+    """The shape of greatest gain nearby: each value in turn, by a parabola through three points, steps halved."""
+    best, top = list(shape), gained(shape)
+    for _ in range(3):
+        for k in range(len(best)):
+            size = step[k]
+            for _ in range(5):
+                sides = []
+                for sign in (-1.0, 1.0):
+                    tried = tuple(v + sign * size if j == k else v for j, v in enumerate(best))
+                    sides.append((gained(tried), tried))
+                value, tried = max(sides)
+                if value > top:
+                    top, best = value, list(tried)
+                else:
+                    size *= 0.4
+        step = tuple(0.2 * s for s in step)
+    return tuple(best)

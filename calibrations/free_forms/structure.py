@@ -1,0 +1,179 @@
+"""The structure of a sensor's error: places that act, catalogue effects that are their causes, and the noise floor."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+from scipy.optimize import nnls
+
+from calibrations.free_forms.bases import Line
+from calibrations.free_forms.chain import Given
+from calibrations.free_forms.form import CROSS, Form
+from calibrations.free_forms.geometry import Geometry, geometry
+from calibrations.free_forms.naming import ActingPlace, places
+from calibrations.free_forms.poses import PoseData
+from calibrations.free_forms.search import SearchResult, search
+from calibrations.geometry.orientation import out_of_plane
+from calibrations.table import Array, Table
+
+TOO_SMALL = 0.93  # of a stated noise: a residual below contradicts it
+FLOOR_ROUNDS = 2  # in which the noise floor is found from the residual
+OUTLYING = 4.0  # times the usual residual: more counts as so much
+KEPT = 0.1  # noise floors: rough columns that together add less are left out of a form
+LINEAR = {"cross-response": "cross", "z-response": "out-of-plane"}  # places with a linear part, and their drivers
+
+
+class FloorSource(StrEnum):
+    """Where the noise of a mean is known from."""
+
+    SAMPLES = "the standard deviation and the number of samples of each mean"
+    NEIGHBOURS = "neighbouring poses differ by so much, and the noise of a mean is not stated"
+    CONTRADICTED = "the standard deviations of the samples contain more than noise"
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """What a search found. `white` (channels, n): the noise of each mean that it used; `floor_source` says why."""
+
+    result: SearchResult
+    places: tuple[ActingPlace, ...]
+    geometry: Geometry
+    white: Array
+    floor_source: FloorSource
+
+    @property
+    def causes(self) -> tuple[str, ...]:
+        """Catalogue effects that are named, the largest place first."""
+        named = [cause for place in self.places if place.material for cause in place.causes]
+        return tuple(dict.fromkeys([*named, *self.geometry.causes]))
+
+    @property
+    def unknown(self) -> tuple[ActingPlace, ...]:
+        """Places that act without a catalogue effect as their cause."""
+        return tuple(place for place in self.places if place.unknown)
+
+    @property
+    def alternatives(self) -> dict[str, tuple[str, ...]]:
+        """By cause, what the data cannot separate from it."""
+        found = {c: p.inseparable_from for p in self.places if p.material for c in p.causes if p.inseparable_from}
+        return found | dict(self.geometry.alternatives or {})
+
+    def constants(self, cause: str) -> dict[str, float]:
+        """Constants by which a catalogue effect is the function that was found."""
+        for place in self.places:
+            for name in place.components:
+                component = self.result.component(name)
+                if component.cause == cause and component.constants:
+                    return dict(component.constants)
+        return {}
+
+    def starts(self, cause: str) -> tuple[tuple[str, str, float], ...]:
+        """Values of a cause's parameters from which its fit starts: (parameter, axis or "", value)."""
+        acting = [self.result.component(name) for place in self.places for name in place.components]
+        return next((c.starts for c in acting if c.cause == cause and c.starts), ())
+
+    def forms(self, place: ActingPlace) -> tuple[Form, ...]:
+        """The free forms that act at a place, with their sizes."""
+        forms = tuple(self._sized(name) for name in place.components if self.result.component(name).form is not None)
+        return (*forms, *self._line(place.name))
+
+    @property
+    def free_forms(self) -> tuple[tuple[Form, ...], ...]:
+        """The free forms of each place, the largest place first; last linear parts of places without a curve."""
+        acting = {place.name for place in self.places}
+        curves = [self.forms(place) for place in self.places]
+        return tuple(filter(None, [*curves, *(self._line(name) for name in LINEAR if name not in acting)]))
+
+    def _line(self, place: str) -> tuple[Form, ...]:
+        """The linear part of what acts over another axis, where geometry alone does not bear it."""
+        if place not in self.geometry.lines:
+            return ()
+        state, c = self.result.state, self.result.data.channels
+        forces = state.force[:, list(CROSS)] if place == "cross-response" else out_of_plane(state.force)
+        lines = tuple(Line(float(forces[:, k].min()), float(forces[:, k].max())) for k in range(c))
+        size = 2 * self.geometry.lines[place]
+        return (Form(place, "line", LINEAR[place], lines, sizes=(size,) * c, kept=(1,)),)
+
+    def _sized(self, name: str) -> Form:
+        form, block = self.result.component(name).form, self.result.gram.blocks[name]
+        assert form is not None  # noqa: S101 the caller asks for forms only
+        variance, scale = self.result.sizes.variances[name], self.result.gram.scales[name]
+        channels = 1 if form.shared else self.result.data.channels
+        b = self.result.columns.shape[1] - 1 - len(self.result.gram.with_data)
+        columns = self.result.columns[:, b + block.start : b + block.stop]
+        added = self.result.sizes.of(self.result.gram, name) ** 2 * np.sum(columns**2, axis=0)
+        size, at = float(np.sqrt(variance) / scale), 0
+        sizes, kept = [], []
+        for k in range(channels):
+            count = form.count(k)
+            rest = np.cumsum(added[at : at + count][::-1])[::-1] / self.result.data.n  # from each column on
+            whole = form.basis(k).kind in ("play", "products")
+            sizes.append(size if count else 0.0)
+            kept.append(count if whole else max(min(count, 1), int(np.sum(rest > KEPT**2))))
+            at += count
+        return replace(form, sizes=tuple(sizes), kept=tuple(kept))
+
+
+def find_structure(
+    table: Table, white: Array | None, given: Given, geometries: Mapping[str, Array], has: set[str]
+) -> Structure:
+    """Places that act in poses, rows in order of time.
+
+    white       standard deviation of each mean, (channels, n); None where it is not known
+    given       effects of the given model beyond bias, scale factor and geometry
+    geometries  derivatives of the effects of the geometry, (channels, n, m); `has`: those in the given model
+    """
+    data = PoseData.of(table)
+    source = FloorSource.SAMPLES
+    if white is None:
+        white, source = _neighbours(data), FloorSource.NEIGHBOURS
+    result = search(data, white, given)
+    for _ in range(FLOOR_ROUNDS):
+        again = _scatter(result, source)
+        if again is None:
+            break
+        white, source = again, FloorSource.NEIGHBOURS if source is FloorSource.NEIGHBOURS else FloorSource.CONTRADICTED
+        result = search(data, white, given)
+    acting = places(result)
+    floor = float(np.sqrt(np.mean(white**2)))
+    shape = geometry(result, {p.name: p.size * floor for p in acting}, geometries, has)
+    return Structure(result, tuple(acting), shape, white, source)
+
+
+def _neighbours(data: PoseData) -> Array:
+    """White noise from second differences of neighbouring poses, the same for all rows of an axis."""
+    y = data.outputs
+    if data.n < 5:
+        return np.full(y.shape, float(np.std(y)) or 1.0)
+    second = y[:, 2:] - 2 * y[:, 1:-1] + y[:, :-2]
+    std = np.median(np.abs(second), axis=1) / 0.6745 / np.sqrt(6)
+    return np.tile(np.maximum(std, 1e-9 * np.ptp(y, axis=1))[:, None], (1, data.n))
+
+
+def _scatter(result: SearchResult, source: FloorSource) -> Array | None:
+    """White noise of equal rows as the residual has it; None where the noise that was used agrees.
+
+    Noise from the samples is only replaced where the residual is clearly smaller: a larger one may hold more effects.
+    """
+    left = result.residual
+    ratio = float(np.sqrt(left @ left / result.freedom))
+    if ratio > TOO_SMALL and (source is FloorSource.SAMPLES or ratio < 1 / TOO_SMALL):
+        return None
+    r = left.reshape(result.white.shape) * result.white
+    white = np.stack([_rows_noise(result, k, row) for k, row in enumerate(r)])
+    return white * np.sqrt(left.size / result.freedom) if np.all(white > 0) else None
+
+
+def _rows_noise(result: SearchResult, k: int, residual: Array) -> Array:
+    """Noise of each row of one channel, (n,): a constant part, and a part that follows the samples' variance."""
+    usual = np.median(np.abs(residual - np.median(residual))) / 0.6745
+    squares = np.minimum(residual**2, (OUTLYING * usual) ** 2)
+    spread = result.data.spread
+    if spread is None or np.ptp(spread[k]) == 0:
+        return np.full(len(residual), usual)
+    shares = np.column_stack([np.ones(len(residual)), spread[k] ** 2 / np.mean(spread[k] ** 2)])
+    parts, _ = nnls(shares / usual**2, squares / usual**2)
+    return np.asarray(np.sqrt(shares @ parts))
