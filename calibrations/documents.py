@@ -114,10 +114,32 @@ def _in_doubt(result: Diagnosis[F] | Discovery[F]) -> Document:
         "alternatives": {name: list(names) for name, names in result.alternatives.items()},
         "reason": result.reason,
         "disturbances": [dict(each) for each in result.findings.disturbances],
+        "places": places_document(result),
         "residual_structure": result.residual_structure,
         "outliers": list(result.outliers),
         "next_experiment": experiment_document(result.next_experiment),
     }
+
+
+def places_document(result: Diagnosis[F] | Discovery[F]) -> list[Document]:
+    """The places of the signal chain that act, the largest first; none where the search does not tell."""
+    acting, data = result.findings.places, result.findings.data
+    total = sum(place.rms**2 for place in acting) or 1.0
+    return [
+        {
+            "place": place.name,
+            "axes": list(data.axes),
+            "size": place.rms,
+            "unit": data.unit,
+            "size_over_floor": place.size,
+            "share": place.rms**2 / total,
+            "p_value": place.p_value,
+            "explained_by": list(place.causes),
+            "explained_share": place.share if place.causes else 0.0,
+            "inseparable_from": list(place.inseparable_from),
+        }
+        for place in acting
+    ]
 
 
 def step_document(step: Step[F], data: Dataset[F]) -> Document:

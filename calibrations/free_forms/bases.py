@@ -53,7 +53,7 @@ def _turned(low: float, high: float, intervals: int, order: int) -> tuple[Array,
     nodes, weights = np.polynomial.legendre.leggauss(4)
     at = (low + step * (np.arange(intervals)[:, None] + (nodes + 1) / 2)).ravel()
     derivative = BSpline(knots, np.eye(splines), DEGREE).derivative(order)(at) * step**order
-    penalty = derivative.T @ (np.tile(weights, intervals)[:, None] * derivative)
+    penalty = derivative.T @ (np.tile(weights / 2, intervals)[:, None] * derivative)
     values, vectors = np.linalg.eigh(penalty)
     kept = values > NULL * values[-1]
     return np.asarray(knots), np.asarray(vectors[:, kept] / np.sqrt(values[kept]), dtype=np.float64)

@@ -56,9 +56,11 @@ def check_forms(forms: tuple[Form, ...], place: str) -> tuple[Form, ...]:
             raise ModelError(f"{where} acts at {form.place}, and the effect at {place}; each place has one effect")
         if not form.sizes or min(form.sizes) < 0 or max(form.sizes) == 0:
             raise ModelError(f"{where} has no size; the size is the standard deviation of its coefficients")
-        counts = {"bases": len(form.bases), "kept": len(form.kept)}
-        if any(n not in (1, len(form.sizes)) for n in counts.values()):
-            raise ModelError(f"{where} has {counts} for {len(form.sizes)} axes; give one for each axis, or one for all")
+        counts = {"bases": len(form.bases), "kept": len(form.kept) or 1}
+        if wrong := next((key for key, n in counts.items() if n not in (1, len(form.sizes))), None):
+            raise ModelError(
+                f"{where}: {wrong} has {counts[wrong]} entries for {len(form.sizes)} axes; give 1, or 1 an axis"
+            )
         if any(
             not (size == 0) <= form.count(k) <= form.basis(k).count * (size > 0) for k, size in enumerate(form.sizes)
         ):

@@ -24,6 +24,7 @@ CAUSE_PRICE, PARAMETER_PRICE = 12.0, 2.0  # of chi-square
 CLOSE = 8.0  # of chi-square: explanations that this data does not tell apart
 LINEAR_PART = 1.0  # of a curve's size: the standard deviation of a mechanism's own linear part
 LEAST_LINE = 0.3  # noise floors: a smaller linear part is left out
+SEEN = 3.5  # standard uncertainties: a smaller linear part may be noise
 IMMATERIAL = 0.15  # noise floors: a smaller angle is no matter
 OVER_CROSS = ("cross-response", "scale-over-cross", "force")
 OVER_Z = ("z-response", "scale-over-z", "force", "stage-angle-alpha")
@@ -61,6 +62,7 @@ def geometry(result: SearchResult, sizes: Mapping[str, float], effects: Mapping[
     covariance = (g.base_inverse + cross @ result.sizes.inverse @ cross.T)[:b, :b]
     q = pick @ result.values.base[:b]
     C = pick @ covariance @ pick.T
+    std = np.sqrt(np.maximum(np.diag(C), 0.0))
     for i, places in enumerate(over):
         size = max((sizes.get(place, 0.0) for place in places), default=0.0)
         C[i, i] += (LINEAR_PART * size / mean_gain / 0.5) ** 2
@@ -75,8 +77,8 @@ def geometry(result: SearchResult, sizes: Mapping[str, float], effects: Mapping[
     }
     causes, alternatives, left = _chosen(inverse @ q, maps, has)
     lines: dict[str, float] = {}
-    for places, angle in zip(over, root @ left, strict=True):
-        if places and abs(angle) * mean_gain > LEAST_LINE * floor:
+    for places, angle, uncertainty in zip(over, root @ left, std, strict=True):
+        if places and abs(angle) > max(LEAST_LINE * floor / mean_gain, SEEN * uncertainty):
             lines[places[0]] = max(lines.get(places[0], 0.0), float(abs(angle)) * mean_gain)
     return Geometry(causes, alternatives, lines)
 

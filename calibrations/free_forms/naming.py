@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import kurtosis
+from scipy.stats import chi2, kurtosis
 
 from calibrations.free_forms.chain import base_size
 from calibrations.free_forms.components import Component
@@ -36,6 +36,16 @@ class ActingPlace:
     gain: float
     inseparable_from: tuple[str, ...]
     curve: Array  # (channels, n), in the output's unit, freed of what the base takes up
+
+    @property
+    def rms(self) -> float:
+        """Size over the poses, in the output's unit."""
+        return float(np.sqrt(np.mean(self.curve**2)))
+
+    @property
+    def p_value(self) -> float:
+        """Chance of such a gain of one variance at its boundary: half of chi-square (Self and Liang, 1987)."""
+        return float(chi2.sf(max(self.gain, 0.0), 1) / 2)
 
     @property
     def unknown(self) -> bool:

@@ -14,6 +14,7 @@ from calibrations.table import Array
 
 SAW_POINTS = 3.0  # frequencies in a resolved interval
 SAW_REJECTIONS = 1  # of one saw: its phase may belong to an output that is not right yet
+LEAST_OF_SAW = 0.3  # of the first harmonic that a step of this height has
 SAW_VISIBLE = 2.0  # steps' frequency times the noise of a sample: beyond, nothing is left of a saw in a mean
 
 
@@ -35,6 +36,8 @@ def find_saw(
     values = (left / white**2).ravel()
     weights = (1 / white**2).ravel()
     power = _spectrum(at, values, step, int(highest / step))[-len(frequencies) :] * 2 / np.sum(weights)
+    amplitude = np.sqrt(2 * power / np.sum(weights))
+    power[amplitude < LEAST_OF_SAW * _fundamental(frequencies, noise)] = 0.0  # no saw: a step has a height
     for f in rejected:
         close = np.abs(frequencies - f) * span < 1.0
         if sum(abs(other - f) * span < 1.0 for other in rejected) > SAW_REJECTIONS:
@@ -46,6 +49,12 @@ def find_saw(
     fine = frequencies[best] + np.linspace(-1, 1, 41) / (SAW_POINTS * span)
     power = np.abs(np.exp(-2j * np.pi * np.outer(fine, at)) @ values) ** 2
     return saw(float(fine[int(np.argmax(power))]), 3, price)
+
+
+def _fundamental(frequencies: Array, noise: float) -> Array:
+    """Amplitude of the first harmonic that a saw of 1 / frequency has in a mean of samples with such noise."""
+    step = 1 / frequencies
+    return np.asarray(step / np.pi * np.exp(-2 * (np.pi * noise / step) ** 2))
 
 
 def _spectrum(at: Array, values: Array, step: float, count: int) -> Array:

@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from typing import Any
 
 from calibrations.discovery.results import Comparison, Diagnosis, Discovery
-from calibrations.documents import why
-from calibrations.text import columns
+from calibrations.documents import places_document, why
+from calibrations.text import columns, quantity
 
 MOST_CANDIDATES = 6
 SELF_JUDGED = "The noise is known from this residual only, so that the error alone shows no failure."
@@ -47,4 +47,23 @@ def discovery_text(result: Discovery[Any], experiment: Iterable[str] = ()) -> st
     data = result.findings.data
     lines = [result.judgement.text, *data.remarks(result.end), *experiment]
     lines += [f"But {result.caution}."] if result.caution else []
-    return "\n\n".join([columns(*data.step_table(result)), "\n".join(lines)])
+    parts = [columns(*data.step_table(result)), "\n".join(lines)]
+    if result.findings.places:
+        parts.insert(1, _places(result))
+    return "\n\n".join(parts)
+
+
+def _places(result: Discovery[Any]) -> str:
+    """Where something acts, how much, and why."""
+    rows = [
+        (
+            place["place"],
+            ", ".join(place["explained_by"]) or "unknown form",
+            quantity(place["size"], place["unit"]),
+            f"{place['size_over_floor']:.3g}",
+            f"{100 * place['share']:.2g} %",
+            ", ".join(place["inseparable_from"]) or "-",
+        )
+        for place in places_document(result)
+    ]
+    return columns(("place", "effect", "size", "size / floor", "share", "cannot be separated from"), rows)

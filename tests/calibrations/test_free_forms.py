@@ -1,0 +1,188 @@
+"""Free forms: bases, effects of a model, and the search for places."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.interpolate import BSpline
+
+from calibrations.discovery.verdict import Verdict
+from calibrations.effects.catalogue import catalogue
+from calibrations.errors import ModelError
+from calibrations.fitting.fit import Fit, evaluate, fit, refit
+from calibrations.free_forms import bases
+from calibrations.free_forms.bases import DEGREE, Harmonics, Line, Play, Products, Spline, Waves, spline
+from calibrations.free_forms.effect import FreeForm, free_form, place_of
+from calibrations.free_forms.form import Form
+from calibrations.geometry.orientation import nominal_pose, specific_force
+from calibrations.loop import discover
+from calibrations.model.file import dump_model, parse_model, read_model
+from calibrations.table import Array, Table
+from tests.calibrations import synthetic
+
+
+def poses(added: Array, seed: int = 0) -> Table:
+    """A sweep of five inclinations; `added` (n, 2) is what the sensor adds, V."""
+    columns, forces = columns_of_sweep(), forces_of_sweep()
+    outputs = np.array([2.5, 2.52]) + forces[:, :2] * [1.0, 0.97] + added
+    return synthetic.poses(columns, outputs[:, 0], outputs[:, 1], seed=seed)
+
+
+def columns_of_sweep() -> dict[str, Array]:
+    return synthetic.turns((90, 30, 150, 60, 120), step_deg=10)
+
+
+def forces_of_sweep() -> Array:
+    return np.column_stack(synthetic.components(columns_of_sweep()))
+
+
+def with_curve(size: float, table: Table) -> Fit:
+    """The linear model with a free form of the own response."""
+    over = spline(np.linspace(-1.0, 1.0, 50), 12)
+    form = Form("own-response", "curve", "own", (over, over), sizes=(size, size))
+    start = fit(read_model("linear"), table)
+    return refit(start, start.model.with_effect(free_form((form,))))
+
+
+def test_columns_of_a_spline_have_unit_roughness_and_are_independent() -> None:
+    basis = Spline(-1.0, 1.0, 8)
+    knots, turn = bases._turned(basis.low, basis.high, basis.intervals, basis.order)
+    x = np.linspace(-1.0, 1.0, 20001)[:-1]
+    step = 2.0 / basis.intervals
+    second = BSpline(knots, np.eye(len(turn)), DEGREE).derivative(2)(x) @ turn * step**2
+    roughness = second.T @ second / len(x) * basis.intervals
+    assert roughness == pytest.approx(np.eye(basis.count), abs=2e-3)
+
+
+@pytest.mark.parametrize("basis", [Spline(0.0, 1.0, 5), Harmonics(2, 4), Waves(0.0, 1.0, 6, 2.0), Line(0.0, 1.0)])
+def test_a_basis_has_as_many_columns_as_it_counts(basis: Spline | Harmonics | Waves | Line) -> None:
+    assert basis(np.linspace(0.0, 1.0, 30)).shape == (30, basis.count)
+
+
+def test_products_and_slip_elements_count_their_columns() -> None:
+    assert Products(4).count == len(Products(4).powers)
+    assert all((i > 0) + (j > 0) + (m > 0) > 1 for i, j, m in Products(4).powers)
+    assert Play((0.1, 0.3)).count == 2
+
+
+def test_a_free_form_of_size_zero_changes_nothing() -> None:
+    table = poses(np.zeros((len(forces_of_sweep()), 2)))
+    without, with_it = fit(read_model("linear"), table), with_curve(1e-12, table)
+    assert with_it.residual == pytest.approx(without.residual, abs=1e-9)
+    assert with_it.params["bias.x"].value == pytest.approx(without.params["bias.x"].value, abs=1e-9)
+    assert with_it.held_out_excess == pytest.approx(without.held_out_excess, rel=1e-6)
+
+
+def test_a_free_form_follows_a_curve_and_predicts_unseen_poses() -> None:
+    forces = forces_of_sweep()
+    table = poses(1e-3 * np.sin(4 * forces[:, :2]))
+    found = with_curve(1e-3, table)
+    assert fit(read_model("linear"), table).held_out_excess > 5
+    assert found.held_out_excess < 1.15
+    assert found.pooled_excess < 1.1
+
+
+def test_a_prior_pulls_coefficients_towards_zero() -> None:
+    table = poses(1e-3 * np.sin(4 * forces_of_sweep()[:, :2]))
+    free, pulled = with_curve(1e-2, table), with_curve(1e-6, table)
+    own = free.problem.layout.of_effect("free:own-response")
+    assert np.linalg.norm(pulled.theta[own]) < 0.1 * np.linalg.norm(free.theta[own])
+
+
+def test_a_model_file_keeps_a_free_form_to_the_last_bit() -> None:
+    table = poses(1e-3 * np.sin(4 * forces_of_sweep()[:, :2]))
+    found = with_curve(1e-3, table)
+    again = parse_model(dump_model(found.model), "again")
+    effect = again.terms[-1].effect
+    assert isinstance(effect, FreeForm)
+    assert effect.forms == found.model.terms[-1].effect.forms  # type: ignore[attr-defined]
+    evaluated = evaluate(again, table)
+    assert evaluated is not None
+    assert np.array_equal(evaluated.residual, found.residual)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"sizes": ()}, "has no size"),
+        ({"place": "time-bias"}, "acts at time-bias, and the effect at own-response"),
+        ({"kept": (40, 40)}, "keeps more columns than its basis has"),
+        ({"kept": (1, 1, 1)}, "for 2 axes"),
+    ],
+)
+def test_a_model_file_with_an_impossible_form_is_refused(change: dict[str, object], message: str) -> None:
+    found = with_curve(1e-3, poses(np.zeros((len(forces_of_sweep()), 2))))
+    text = dump_model(found.model)
+    effect = found.model.terms[-1].effect
+    assert isinstance(effect, FreeForm)
+    broken = replace(effect.forms[0], **change)  # type: ignore[arg-type]
+    import yaml
+    from pydantic import TypeAdapter
+
+    document = yaml.safe_load(text)
+    document["effects"][-1]["forms"] = TypeAdapter(tuple[Form, ...]).dump_python((broken,), mode="json")
+    with pytest.raises(ModelError, match=message):
+        parse_model(yaml.safe_dump(document), "broken")
+
+
+def test_an_unknown_place_is_refused_with_the_nearest() -> None:
+    with pytest.raises(ModelError, match='no free form acts at "own-respons"; did you mean "own-response"'):
+        place_of("free:own-respons")
+
+
+def test_an_exact_form_of_the_catalogue_leaves_no_free_form() -> None:
+    result = discover(poses(1e-3 * forces_of_sweep()[:, :2] ** 3), read_model("linear"))
+    assert result.causes == ("cubic-nonlinearity",)
+    assert [step.name for step in result.steps] == ["cubic-nonlinearity"]
+    assert result.verdict is Verdict.ADEQUATE
+    assert [place.name for place in result.findings.places] == ["own-response"]
+
+
+def test_a_form_that_the_catalogue_lacks_is_an_unknown_effect_at_its_place() -> None:
+    result = discover(poses(1e-3 * np.sin(9 * forces_of_sweep()[:, :2])), read_model("linear"))
+    assert result.verdict is Verdict.UNEXPLAINED
+    assert not result.causes
+    assert [place.name for place in result.findings.places if place.unknown] == ["own-response"]
+    assert "not in the catalogue acts at own-response" in result.judgement.text
+    assert result.end.held_out_excess < 1.3
+
+
+def test_a_cause_in_another_form_keeps_its_curve() -> None:
+    cross = forces_of_sweep()[:, [1, 0]]
+    result = discover(poses(1e-3 * cross**2 + 4e-4 * np.cos(6 * cross) + 5e-4 * cross), read_model("linear"))
+    assert result.causes == ("cross-axis-bias",)
+    assert "free:cross-response" in [step.name for step in result.steps]
+    assert result.end.held_out_excess < 1.15
+
+
+def test_a_linear_sensor_gets_neither_a_name_nor_a_form() -> None:
+    for seed in range(5):
+        result = discover(poses(np.zeros((len(forces_of_sweep()), 2)), seed), read_model("linear"))
+        assert not result.steps
+        assert not result.findings.places
+
+
+def test_the_order_of_rows_changes_nothing() -> None:
+    table = poses(1e-3 * forces_of_sweep()[:, [1, 0]] ** 2)
+    shuffled = table.rows(np.random.default_rng(1).permutation(table.n))
+    first, second = (discover(each, read_model("linear")) for each in (table, shuffled))
+    assert first.causes == second.causes == ("cross-axis-bias",)
+    assert [p.name for p in first.findings.places] == [p.name for p in second.findings.places]
+
+
+def test_uncertainties_beside_a_free_form_are_wider() -> None:
+    table = poses(1e-3 * np.sin(4 * forces_of_sweep()[:, :2]))
+    alone = refit(fit(read_model("linear"), table), read_model("linear").with_effect(catalogue()["cubic-nonlinearity"]))
+    form = with_curve(1e-3, table).model.terms[-1].effect
+    beside = refit(alone, alone.model.with_effect(form))
+    narrow, wide = (f.params["cubic-nonlinearity.x"].std for f in (alone, beside))
+    assert narrow is not None
+    assert wide is not None
+    assert wide * beside.birge > narrow / alone.birge
+
+
+def test_forces_of_the_chain_drive_the_form() -> None:
+    table = poses(np.zeros((len(forces_of_sweep()), 2)))
+    forces = specific_force(nominal_pose(table))
+    form = Form("z-response", "line", "out-of-plane", (Line(-1.0, 1.0),), sizes=(1.0, 1.0))
+    assert form.columns(table, forces, forces[:, 0], 0)[:, 0] == pytest.approx(forces[:, 2])
