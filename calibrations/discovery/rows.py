@@ -22,7 +22,7 @@ from calibrations.discovery.places import places
 from calibrations.discovery.plausibility import Finding, refusal, rejection
 from calibrations.discovery.results import Candidate, Diagnosis, Discovery, Findings, Place, Step
 from calibrations.discovery.search import Path, Settled, cost, find_path, first_order, recounted, settled
-from calibrations.discovery.structural import StructuralSearch, has_structure, search_structure
+from calibrations.discovery.structural import StructuralSearch, check_structure, search_structure
 from calibrations.discovery.structure import plainer, structure_of
 from calibrations.discovery.verdict import Verdict
 from calibrations.effects import Effect
@@ -116,16 +116,19 @@ class Rows(Dataset[Fit]):
         if (reason := refusal(self.table)) is not None:
             return self._rejected(self.fit(model), reason)
         start, outliers = fit_without(model, self.table)
-        if has_structure(start.table):
-            return self._with_structure(search_structure(start, effects), outliers)
         return self._found(find_path(start, outliers, effects), effects)
+
+    def search_places(self, model: Model, effects: Mapping[str, Effect]) -> Findings[Fit]:
+        """Places that act, then effects that are their causes, then free forms for the rest."""
+        check_structure(self.table)
+        if (reason := refusal(self.table)) is not None:
+            return self._rejected(self.fit(model), reason)
+        start, outliers = fit_without(model, self.table)
+        return self._with_structure(search_structure(start, effects), outliers)
 
     def search_on(self, start: Fit, origin: Fit, effects: Mapping[str, Effect]) -> Findings[Fit]:
         """The same from a fitted model."""
-        outliers = self._left_out(start)
-        if has_structure(start.table):
-            return self._with_structure(search_structure(start, effects), outliers, origin)
-        return self._found(find_path(start, outliers, effects), effects, origin)
+        return self._found(find_path(start, self._left_out(start), effects), effects, origin)
 
     def candidates(self, before: Fit, plan: Findings[Fit], effects: Mapping[str, Effect]) -> tuple[Candidate, ...]:  # noqa: ARG002
         """One round of the search."""
@@ -221,9 +224,7 @@ class Rows(Dataset[Fit]):
             return replace(found, left=told(path.outliers), spoilt=True)
         return found
 
-    def _with_structure(
-        self, searched: StructuralSearch, outliers: tuple[int, ...], origin: Fit | None = None
-    ) -> Findings[Fit]:
+    def _with_structure(self, searched: StructuralSearch, outliers: tuple[int, ...]) -> Findings[Fit]:
         start, end = searched.start, searched.end
         if (reason := rejection(end)) is not None:
             return self._rejected(start, reason)
@@ -239,7 +240,7 @@ class Rows(Dataset[Fit]):
         found = Findings(
             data=self,
             start=start,
-            origin=origin or start,
+            origin=start,
             baseline=start,
             steps=searched.steps,
             candidates=tuple(sorted(searched.candidates, key=lambda c: c.name not in names[:1])),

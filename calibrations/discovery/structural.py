@@ -17,6 +17,7 @@ from calibrations.discovery.candidates import RowCandidate, candidates
 from calibrations.discovery.results import Step
 from calibrations.discovery.search import find_path
 from calibrations.effects import Effect
+from calibrations.errors import ModelError, TooFewRows
 from calibrations.fitting.fit import Fit, fit, refit
 from calibrations.fitting.problem import Problem
 from calibrations.free_forms.chain import Given
@@ -64,9 +65,18 @@ class StructuralSearch:
         return {name: self.structure.alternatives[name] for name in self.causes if name in self.structure.alternatives}
 
 
-def has_structure(table: Table) -> bool:
-    """Whether a table can show the places that act: enough poses at known angles."""
-    return table.type.stage_angles and table.n >= FEWEST_ROWS
+def check_structure(table: Table) -> None:
+    """Raises ModelError for a table that is not poses, TooFewRows for poses that are too few to show a place."""
+    if not table.type.stage_angles:
+        raise ModelError(
+            f"{table.source}: places of the signal chain are found in poses at known stage angles, "
+            f"and this is a table of {table.kind}"
+        )
+    if table.n < FEWEST_ROWS:
+        raise TooFewRows(
+            f"{table.source}: {table.n} poses cannot show where something acts; measure at least {FEWEST_ROWS}, "
+            "at several inclinations and from both sides of beta"
+        )
 
 
 def search_structure(start: Fit, effects: Mapping[str, Effect]) -> StructuralSearch:

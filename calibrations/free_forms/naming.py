@@ -15,8 +15,8 @@ from calibrations.free_forms.search import SearchResult
 from calibrations.table import Array
 
 NEXT_FORM = 0.05  # of a place's variance that a second form must take up: less is the form of the first
-NAMED = 0.5  # of it that all forms must take up: else the cause is unknown
-WHOLE = 0.98  # of it: the curve is no longer needed
+NAMED = 0.5  # of it that one form must take up: else the cause is unknown
+MOST_FORMS, NAMED_TOGETHER = 2, 0.8  # forms that only approximate a curve, and what two of them must take up
 LEAST_SIZE = 0.6  # noise floors: a smaller place is a refinement
 LEAST_SHARE = 0.01  # of the largest place's size
 JUMPS = 4.0  # excess kurtosis of a walk's increments: 500 of a Gaussian process keep within +-1
@@ -94,25 +94,28 @@ def _named(
     jumps = any(_jumps(result, name) for name in names if "/walk-" in name)
     for comp in result.components:
         if comp.place == place and comp.cause and (comp.name in names or not _shaped_out(comp, result, names)):
-            if comp.cause == "bias-drift" and jumps:
+            if (comp.cause == "bias-drift" and jumps) or (comp.cause == "quantisation" and comp.name not in names):
                 continue
             forms.setdefault(comp.cause, []).append(comp)
     columns = {cause: _columns(result, comps, names, Q, b) for cause, comps in forms.items()}
     total = float(curve @ curve) or 1.0
+    acting = {result.component(name).cause for name in names}
     chosen: list[str] = []
     share = 0.0
-    while len(chosen) < len(columns):
+    while True:
+        full = len(set(chosen) - acting) >= MOST_FORMS
         tried = {}
         for cause in columns:
-            if cause in chosen:
+            if cause in chosen or (full and cause not in acting):
                 continue
             tried[cause] = max(1 - _left([*(columns[c][0] for c in chosen), X], curve) / total for X in columns[cause])
-        best = max(tried, key=lambda c: tried[c])
-        if tried[best] - share < (NEXT_FORM if chosen else 0.2):
+        best = max(tried, key=lambda c: tried[c], default="")
+        if not best or tried[best] - share < (NEXT_FORM if chosen else 0.2):
             break
         chosen.append(best)
         share = tried[best]
-    return (tuple(chosen), share) if share >= NAMED else ((), share)
+    enough = NAMED if len(set(chosen) - acting) < MOST_FORMS else NAMED_TOGETHER
+    return (tuple(chosen), share) if share >= enough else ((), share)
 
 
 def _jumps(result: SearchResult, name: str) -> bool:

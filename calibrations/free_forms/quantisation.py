@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from calibrations.free_forms.chain import State
 from calibrations.free_forms.components import Component
@@ -51,7 +52,7 @@ def find_saw(
     return saw(float(fine[int(np.argmax(power))]), 3, price)
 
 
-def _fundamental(frequencies: Array, noise: float) -> Array:
+def _fundamental(frequencies: NDArray[np.floating], noise: float) -> Array:
     """Amplitude of the first harmonic that a saw of 1 / frequency has in a mean of samples with such noise."""
     step = 1 / frequencies
     return np.asarray(step / np.pi * np.exp(-2 * (np.pi * noise / step) ** 2))

@@ -28,10 +28,10 @@ def table_for(effect: Effect, kind: str) -> Table:
     columns = synthetic.turns((90, 30, 150), step_deg=30)
     a = np.column_stack(synthetic.components(columns))
     needed = {name: np.linspace(4.9, 5.1, len(a)) for name in effect.needs if name not in columns}
-    if kind == "poses" and effect.name == "vibration-rectification":
-        needed |= {name: np.linspace(1e-3, 5e-3, len(a)) for name in ("vx_std_v", "vy_std_v")}
     if kind == "poses":
-        return synthetic.poses(columns | needed, a[:, 0] + 2.5, a[:, 1] + 2.5)
+        made = synthetic.poses(columns | needed, a[:, 0] + 2.5, a[:, 1] + 2.5)
+        spread = np.linspace(1e-3, 5e-3, len(a))  # with vibration that changes
+        return Table.from_columns("poses", {**made.columns, "vx_std_v": spread, "vy_std_v": spread}, made.constants)
     if kind == "motion":
         moved = shaken.record(duration_s=4.0, attitudes=((45.0, 60.0),))
         needed = {name: np.linspace(4.9, 5.1, moved.n) for name in effect.needs if name not in moved}

@@ -6,16 +6,17 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
+from calibrations.discovery.results import Discovery
 from calibrations.discovery.verdict import Verdict
 from calibrations.effects.catalogue import catalogue
-from calibrations.errors import ModelError
+from calibrations.errors import ModelError, TooFewRows
 from calibrations.fitting.fit import Fit, evaluate, fit, refit
 from calibrations.free_forms import bases
 from calibrations.free_forms.bases import DEGREE, Harmonics, Line, Play, Products, Spline, Waves, spline
 from calibrations.free_forms.effect import FreeForm, free_form, place_of
 from calibrations.free_forms.form import Form
 from calibrations.geometry.orientation import nominal_pose, specific_force
-from calibrations.loop import discover
+from calibrations.loop import dataset
 from calibrations.model.file import dump_model, parse_model, read_model
 from calibrations.table import Array, Table
 from tests.calibrations import synthetic
@@ -26,6 +27,10 @@ def poses(added: Array, seed: int = 0) -> Table:
     columns, forces = columns_of_sweep(), forces_of_sweep()
     outputs = np.array([2.5, 2.52]) + forces[:, :2] * [1.0, 0.97] + added
     return synthetic.poses(columns, outputs[:, 0], outputs[:, 1], seed=seed)
+
+
+def discover(table: Table) -> Discovery[Fit]:
+    return dataset(table).discover_places(read_model("linear"), catalogue())
 
 
 def columns_of_sweep() -> dict[str, Array]:
@@ -131,7 +136,7 @@ def test_an_unknown_place_is_refused_with_the_nearest() -> None:
 
 
 def test_an_exact_form_of_the_catalogue_leaves_no_free_form() -> None:
-    result = discover(poses(1e-3 * forces_of_sweep()[:, :2] ** 3), read_model("linear"))
+    result = discover(poses(1e-3 * forces_of_sweep()[:, :2] ** 3))
     assert result.causes == ("cubic-nonlinearity",)
     assert [step.name for step in result.steps] == ["cubic-nonlinearity"]
     assert result.verdict is Verdict.ADEQUATE
@@ -139,7 +144,8 @@ def test_an_exact_form_of_the_catalogue_leaves_no_free_form() -> None:
 
 
 def test_a_form_that_the_catalogue_lacks_is_an_unknown_effect_at_its_place() -> None:
-    result = discover(poses(1e-3 * np.sin(9 * forces_of_sweep()[:, :2])), read_model("linear"))
+    forces = forces_of_sweep()[:, :2]
+    result = discover(poses(1e-3 * np.exp(-((forces - 0.35) ** 2) / 0.02) * [1.0, -0.6]))
     assert result.verdict is Verdict.UNEXPLAINED
     assert not result.causes
     assert [place.name for place in result.findings.places if place.unknown] == ["own-response"]
@@ -149,7 +155,7 @@ def test_a_form_that_the_catalogue_lacks_is_an_unknown_effect_at_its_place() -> 
 
 def test_a_cause_in_another_form_keeps_its_curve() -> None:
     cross = forces_of_sweep()[:, [1, 0]]
-    result = discover(poses(1e-3 * cross**2 + 4e-4 * np.cos(6 * cross) + 5e-4 * cross), read_model("linear"))
+    result = discover(poses(1e-3 * cross**2 + 4e-4 * np.cos(6 * cross) + 5e-4 * cross))
     assert result.causes == ("cross-axis-bias",)
     assert "free:cross-response" in [step.name for step in result.steps]
     assert result.end.held_out_excess < 1.15
@@ -157,7 +163,7 @@ def test_a_cause_in_another_form_keeps_its_curve() -> None:
 
 def test_a_linear_sensor_gets_neither_a_name_nor_a_form() -> None:
     for seed in range(5):
-        result = discover(poses(np.zeros((len(forces_of_sweep()), 2)), seed), read_model("linear"))
+        result = discover(poses(np.zeros((len(forces_of_sweep()), 2)), seed))
         assert not result.steps
         assert not result.findings.places
 
@@ -165,7 +171,7 @@ def test_a_linear_sensor_gets_neither_a_name_nor_a_form() -> None:
 def test_the_order_of_rows_changes_nothing() -> None:
     table = poses(1e-3 * forces_of_sweep()[:, [1, 0]] ** 2)
     shuffled = table.rows(np.random.default_rng(1).permutation(table.n))
-    first, second = (discover(each, read_model("linear")) for each in (table, shuffled))
+    first, second = (discover(each) for each in (table, shuffled))
     assert first.causes == second.causes == ("cross-axis-bias",)
     assert [p.name for p in first.findings.places] == [p.name for p in second.findings.places]
 
@@ -186,3 +192,12 @@ def test_forces_of_the_chain_drive_the_form() -> None:
     forces = specific_force(nominal_pose(table))
     form = Form("z-response", "line", "out-of-plane", (Line(-1.0, 1.0),), sizes=(1.0, 1.0))
     assert form.columns(table, forces, forces[:, 0], 0)[:, 0] == pytest.approx(forces[:, 2])
+
+
+def test_places_need_poses_and_enough_of_them() -> None:
+    table = poses(np.zeros((len(forces_of_sweep()), 2)))
+    with pytest.raises(TooFewRows, match="8 poses cannot show where something acts; measure at least 24"):
+        discover(table.rows(np.arange(8)))
+    turned = Table.from_columns("positions", dict(zip(("ax", "ay", "az"), np.eye(3), strict=True)), source="turned.csv")
+    with pytest.raises(ModelError, match=r"turned.csv: places .* this is a table of positions"):
+        discover(turned)

@@ -1,10 +1,10 @@
-"""The scores of answers on sets with hidden causes, and the prototype of free forms on two of these sets."""
+"""The scores of answers on sets with hidden causes, and the search for places on some of these sets."""
 
 import json
 
 import pytest
 
-from tests.benchmark.free_forms.__main__ import free_forms
+from tests.benchmark.places import by_places
 from tests.benchmark.hidden import FOLDER, Answer, score, summary, timed
 
 
@@ -38,10 +38,10 @@ def test_an_exception_of_the_search_is_an_error_and_no_answer() -> None:
     assert "errors: 1" in summary("single", [score("set", ["hysteresis"], answer, 0.0)])
 
 
-@pytest.mark.parametrize("name", ["single-010", "null-154"])
-def test_free_forms_find_one_cause_and_name_none_on_a_clean_sensor(name: str) -> None:
+@pytest.mark.parametrize("name", ["single-010", "null-154", "pair-270"])
+def test_the_search_for_places_names_one_cause_and_none_on_a_clean_sensor(name: str) -> None:
     truth = json.loads((FOLDER / "truth.json").read_text())[name]["causes"]
-    answer = free_forms(FOLDER / "sets" / f"{name}.csv.gz")
+    answer = by_places(FOLDER / "sets" / f"{name}.csv.gz")
     assert list(answer.causes) == truth
     assert answer.held_out is not None
     assert answer.held_out < 1.15
