@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from tests.benchmark.places import by_places
 from tests.benchmark.hidden import FOLDER, Answer, score, summary, timed
+from tests.benchmark.places import by_places
 
 
 def test_a_named_cause_replaces_a_hidden_one_only_if_the_answer_lists_it() -> None:
