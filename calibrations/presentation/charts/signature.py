@@ -73,7 +73,7 @@ def signature(effect: Effect) -> list[Part]:
         (known["bias"], Values(bias=np.full(3, 2.5))),
         (known["scale-factor"], Values(scale=np.ones(3))),
     ]
-    table = sweep() if "poses" in effect.kinds else motion()
+    table = sweep() if effect.excluded(sweep()) is None else motion()
     v, a = forward(table, linear), force(table, linear)
     table = replace(table, columns={**table.columns, "vx_v": v[:, 0], "vy_v": v[:, 1]})
     change = forward(table, [*linear, (effect, shown(effect, table))]) - v
