@@ -22,7 +22,6 @@ from calibrations.discovery.places import places
 from calibrations.discovery.plausibility import Finding, refusal, rejection
 from calibrations.discovery.results import Candidate, Diagnosis, Discovery, Findings, Place, Step
 from calibrations.discovery.search import Path, Settled, cost, find_path, first_order, recounted, settled
-from calibrations.discovery.structural import StructuralSearch, check_structure, search_structure
 from calibrations.discovery.structure import plainer, structure_of
 from calibrations.discovery.verdict import Verdict
 from calibrations.effects import Effect
@@ -37,6 +36,7 @@ from calibrations.table import Array, Table
 from calibrations.text import quantity, rounded
 
 if TYPE_CHECKING:
+    from calibrations.discovery.structural import StructuralSearch
     from calibrations.presentation.chart import Chart
 
 
@@ -120,6 +120,8 @@ class Rows(Dataset[Fit]):
 
     def search_places(self, model: Model, effects: Mapping[str, Effect]) -> Findings[Fit]:
         """Places that act, then effects that are their causes, then free forms for the rest."""
+        from calibrations.discovery.structural import check_structure, search_structure  # only this search needs them
+
         check_structure(self.table)
         if (reason := refusal(self.table)) is not None:
             return self._rejected(self.fit(model), reason)

@@ -113,6 +113,7 @@ class Effect:
     exact      its form follows from geometry alone: no other effect refines it
     rounds     its output is a staircase, whose slope says nothing
     left_out   why a compensation in the sensor's product cannot undo it; "" where it can
+    incidental  nobody plans what excites it: a table that cannot show it is no reason for a remark
     memory     how many arrays (n, 3) `follow` keeps from one sample to the next
     """
 
@@ -136,6 +137,7 @@ class Effect:
     exact: bool = False
     rounds: bool = False
     left_out: str = ""
+    incidental: bool = False
     memory: int = 0
 
     def __init_subclass__(cls) -> None:
@@ -232,7 +234,7 @@ class Effect:
 
 METHODS = (*HOOKS, "follow", "columns", "lacks", "searched")
 TUPLES = ("needs", "kinds", "after", "contains")
-TYPES: Mapping[str, type] = {"exact": bool, "rounds": bool, "left_out": str, "memory": int}
+TYPES: Mapping[str, type] = {"exact": bool, "rounds": bool, "left_out": str, "incidental": bool, "memory": int}
 MEMBERS = (*METHODS, *TUPLES, *TYPES)
 
 

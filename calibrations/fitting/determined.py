@@ -96,6 +96,8 @@ def blind_to(found: Fit, effects: Mapping[str, Effect]) -> tuple[str, ...]:
 
 
 def _hidden(found: Fit, effect: Effect) -> bool:
+    if effect.incidental:
+        return False
     if found.table.content in effect.kinds and effect.lacks(found.table) is not None:
         return True
     return _can_be_asked(found, effect) and not _shows(found, effect)

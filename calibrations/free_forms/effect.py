@@ -7,8 +7,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from calibrations.effects import Effect, Parameter, Values
 from calibrations.errors import ModelError, nearest
@@ -66,6 +68,20 @@ def check_forms(forms: tuple[Form, ...], place: str) -> tuple[Form, ...]:
         ):
             raise ModelError(f"{where} keeps more columns than its basis has, or none, or some of size 0")
     return forms
+
+
+def read_forms(name: str, document: list[dict[str, Any]]) -> Effect:
+    """The effect `free:PLACE` of a model file. Raises ModelError, and ValidationError of pydantic with the key."""
+    place = place_of(name)
+    return free_form(check_forms(TypeAdapter(tuple[Form, ...]).validate_python(document), place))
+
+
+def dump_forms(effect: Effect) -> list[dict[str, Any]]:
+    """The forms of an effect as a model file keeps them; none of an effect of another kind."""
+    if not isinstance(effect, FreeForm):
+        return []
+    made: list[dict[str, Any]] = TypeAdapter(list[Form]).dump_python(list(effect.forms), mode="json")
+    return made
 
 
 @lru_cache(maxsize=128)

@@ -7,15 +7,13 @@ from pathlib import Path
 from typing import Any, Literal
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from calibrations.effects import Effect
 from calibrations.effects.catalogue import catalogue, find
 from calibrations.effects.expression_effect import own_effect
 from calibrations.errors import ModelError, UnknownName, nearest
 from calibrations.files import load_yaml
-from calibrations.free_forms.effect import FreeForm, check_forms, free_form, place_of
-from calibrations.free_forms.form import Form
 from calibrations.model import Estimate, Model, Term
 from calibrations.table import NUMBERS
 
@@ -40,7 +38,7 @@ class _Parameter(_Strict):
 class _Effect(_Strict):
     effect: str
     expression: str | None = None
-    forms: tuple[Form, ...] | None = None
+    forms: list[dict[str, Any]] | None = None  # of a free form, read by `calibrations.free_forms`
     columns: list[str] = []
     tied: bool = False
     constants: dict[str, float] = {}
@@ -135,9 +133,15 @@ def _effect(entry: _Effect, source: str, known: Mapping[str, Effect]) -> Effect:
 
 def _free(entry: _Effect, source: str) -> Effect:
     """The free forms of a place: all of them is in the file."""
+    from calibrations.free_forms.effect import read_forms  # few models have one
+
     try:
-        place = place_of(entry.effect)
-        return free_form(check_forms(entry.forms or (), place))
+        return read_forms(entry.effect, entry.forms or [])
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise ModelError(
+            f"{source}: {entry.effect}, key forms.{'.'.join(map(str, first['loc']))}: {first['msg']}"
+        ) from None
     except ModelError as error:
         raise ModelError(f"{source}: {entry.effect}: {error}") from None
 
@@ -218,8 +222,10 @@ def _dump_term(term: Term) -> dict[str, Any]:
         entry["expression"] = term.effect.expression
         if columns := [name for name in term.effect.needs if name not in NUMBERS]:
             entry["columns"] = columns
-    if isinstance(term.effect, FreeForm):
-        entry["forms"] = TypeAdapter(tuple[Form, ...]).dump_python(term.effect.forms, mode="json")
+    if term.coefficients:
+        from calibrations.free_forms.effect import dump_forms
+
+        entry["forms"] = dump_forms(term.effect)
     if term.tied:
         entry["tied"] = True
     if term.constants:

@@ -178,5 +178,5 @@ def test_what_cannot_be_certified_is_refused() -> None:
         in_si("furlong", 9.81)
     shaken = fit(read_model("linear"), table())
     object.__setattr__(shaken.problem.table, "kind", "motion")
-    with pytest.raises(ModelError, match=r"of poses, positions or rates.*and not of motion"):
+    with pytest.raises(ModelError, match=r"needs poses, positions or rates.*this is motion"):
         figures(shaken, None, {})

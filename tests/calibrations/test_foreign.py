@@ -122,7 +122,7 @@ GOOD = "ax,ay,az\n1,2,3\n4,5,6\n"
         ("ax,ay,az\n1,2,3\n4,nan,6\n", (), 'theirs.txt, line 3, column "ay": "nan" is not a finite number'),
         ("1 2 3\n4 5 6\n1 - 2\n", ("ax=1", "ay=2", "az=3"), 'theirs.txt, line 3, column "2": "-" where a number'),
         ('ax,ay,az\n1,2,"' + "x" * 200_000, (), "theirs.txt: cannot be split into columns"),
-        ("axx,ay,az\n1,2,3\n", (), 'theirs.txt, line 1: no kind of table has the column "axx"; did you mean "ax"?'),
+        ("axx,ay,az\n1,2,3\n", (), 'theirs.txt, line 1: the column name is unknown: "axx"; did you mean "ax"?'),
         (GOOD, ("ax=acx",), 'theirs.txt: there is no column "acx"; did you mean "ax"?'),
         (GOOD, ("ax=ax:mgg",), 'theirs.txt: unknown unit "mgg" of the column "ax"; did you mean "mg"?'),
         (GOOD, ("ax=ax:g", "ay=ay:mg", "az=az:V"), "the three axes must have the same unit: ax in g, ay in g, az in V"),

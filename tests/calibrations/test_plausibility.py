@@ -64,7 +64,7 @@ DEAD: dict[str, tuple[Callable[[Data], Data], str]] = {
     "constant": (lambda d: replace(d, vx=0 * d.vx + 2.5), "vx_v is constant"),
     "noise": (
         lambda d: replace(d, vy=2.5 + NOISE_V * np.random.default_rng(7).standard_normal(len(d.vy))),
-        "vy_v holds noise only",
+        "vy_v is only noise",
     ),
     "noise of unknown level": (
         lambda d: replace(d, vy=2.5 + np.random.default_rng(7).standard_normal(len(d.vy)), samples=False),

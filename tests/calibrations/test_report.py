@@ -172,7 +172,7 @@ def test_it_holds_every_parameter_with_its_uncertainty() -> None:
     for term in warm().end.model.terms:
         for e in term.estimates:
             assert f"{e.name} {e.axis} {estimate_text(e.value, e.std)} {unit(e.unit)}" in text
-    (reference,) = warm().end.model.terms[-1].constants.values()
+    reference = warm().end.model.terms[-1].constants["reference_c"]
     assert f"{rounded(reference, 6)} (a reference value, not fitted)" in text
 
 

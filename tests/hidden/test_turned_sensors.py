@@ -21,7 +21,7 @@ from procedures.magnetometer_turn import magnetometer_turn
 from procedures.rate_turn import rate_turn
 from rig.record.measured import positions_table, rates_table
 from rig.record.values import Run
-from rig.results.result import estimates, fitted
+from rig.results.result import fitted
 from tests.procedures.bench import session
 
 SQUARE = {"turn_x_deg": 0.5, "turn_y_deg": -0.8, "turn_z_deg": 0.3}
@@ -80,15 +80,15 @@ def test_what_is_fitted_is_what_the_mechanism_has() -> None:
     The pick-up gives 0.11 V for the Coriolis displacement of 1 deg/s, 0.055 nm.
     """
     found = fitted(turned(**SQUARE), "gyroscope", "gyro-misalignment", "gyro-g-sensitivity")
-    lean = {e.name: e for e in estimates(found, "gyro-misalignment")}
+    lean = {e.name: e for e in found.model.estimates("gyro-misalignment")}
     expected = {"xy": -0.3, "yx": 0.3, "xz": -0.8, "zx": 0.8, "yz": -0.5, "zy": 0.5}
     for pair, deg in expected.items():
         assert lean[pair].value == pytest.approx(deg, abs=0.01)
         assert 0 < (lean[pair].std or 0.0) < 0.005
     coriolis_nm = 2 * np.radians(1) * 15e3 * 6e3 / (2 * np.pi * (15300.0**2 - 15e3**2))
-    for e in estimates(found, "gyro-scale-factor"):
+    for e in found.model.estimates("gyro-scale-factor"):
         assert e.value == pytest.approx(0.11 * coriolis_nm, rel=2e-4)
-    for e in estimates(found, "gyro-g-sensitivity"):
+    for e in found.model.estimates("gyro-g-sensitivity"):
         assert abs(e.value) < 5 * (e.std or 0.0)
 
 
@@ -97,10 +97,10 @@ def test_the_earths_rotation_is_in_the_bias_unless_the_latitude_is_known() -> No
     at_the_pole = {"laboratory": {"latitude_deg": 90.0}}
     unknown = fitted(turned(latitude_deg=None, world=at_the_pole, noise_v=1e-4), "gyroscope", "gyro-g-sensitivity")
     known = fitted(turned(latitude_deg=90.0, world=at_the_pole, noise_v=1e-4), "gyroscope", "gyro-g-sensitivity")
-    along = {e.axis: e for e in estimates(unknown, "gyro-g-sensitivity") if e.axis == e.name}
+    along = {e.axis: e for e in unknown.model.estimates("gyro-g-sensitivity") if e.axis == e.name}
     for axis, e in along.items():
         assert e.value / 6.05e-3 == pytest.approx(0.00418, abs=0.0008), axis
-    for e in estimates(known, "gyro-g-sensitivity"):
+    for e in known.model.estimates("gyro-g-sensitivity"):
         assert abs(e.value) / 6.05e-3 < 0.0008
 
 
@@ -132,7 +132,7 @@ def test_a_ball_of_iron_comes_back_as_its_dipole() -> None:
     r = np.array([9.0, 17.0, -4.0])
     k = (7.0 / np.linalg.norm(r)) ** 3 * 999 / 1002
     expected = k * (3 * np.outer(r, r) / (r @ r) - np.eye(3))
-    soft = {e.name: e.value for e in estimates(found, "soft-iron")}
+    soft = {e.name: e.value for e in found.model.estimates("soft-iron")}
     assert soft == pytest.approx(
         {"xx": expected[0, 0], "yy": expected[1, 1], "xy": expected[0, 1], "xz": expected[0, 2], "yz": expected[1, 2]},
         abs=2e-4,

@@ -118,8 +118,10 @@ def test_compare(rig: Rig, clean: str, bent: str) -> None:
     found = document(rig("compare", bent, "--model", "linear", "--json"), "rig.comparison/1")
     place = {"where": str, "from": NUMBER, "to": NUMBER, "axis": str, "excess": float, "text": str}
     both = dict.fromkeys(("rmse", "noise_floor", "slow_noise", "excess"), BOTH)
-    none = dict.fromkeys(("verdict", "residual_structure"), type(None))
-    check(found, {"schema": str, "data": str, "model": str, "n": int, **both, "fails": [place], **none})
+    none = dict.fromkeys(("verdict", "residual_structure", "missing"), type(None))
+    check(
+        found, {"schema": str, "data": str, "model": str, "n": int, **both, "fails": [place], "missing": [str], **none}
+    )
     assert (found["data"], found["model"], found["n"]) == (bent, "linear", 130)
     excesses = [place["excess"] for place in found["fails"]]
     assert excesses
@@ -145,6 +147,7 @@ def test_diagnose(rig: Rig, clean: str, bent: str) -> None:
     kinds |= dict.fromkeys(("next_experiment", "own_effect"), (dict, type(None))) | {
         "residual_structure": (str, type(None)),
         "outliers": [int],
+        "places": [dict],
         "text": str,
         "missing": [str],
         "provisional": bool,

@@ -97,7 +97,7 @@ def test_every_driver_is_found_by_its_file() -> None:
         ({"instruments": {"alpha": ALPHA | {"error_table": "a.csv"}}}, "a.csv: cannot be read: No such file"),
         (
             {"instruments": {"alpha": ALPHA | {"error_table": [[0, 0, 0.1], [10, -11, 0.1]]}}},
-            "key instruments.alpha.error_table: an error table makes the stage turn back after 0 deg",
+            "key instruments.alpha.error_table: with this error table the stage turns backwards after 0 deg",
         ),
         (
             {"instruments": {"oven": {"driver": "omega_cn7500", "url": "simulated", "error_table": [[0, 0, 0.1]]}}},
@@ -108,8 +108,14 @@ def test_every_driver_is_found_by_its_file() -> None:
             "key instruments.alpha.certificate.nummer: no such key. Did you mean 'number'?",
         ),
         ({"certificates": {"d63": {"number": 1, "due": "soon"}}}, "key certificates.d63.due: Input should be a valid"),
-        ({"sensor": {"gravity_m_s2": 98}}, "key sensor.gravity_m_s2: is 98, not the gravity of a place on Earth; give"),
-        ({"sensor": {"gravity_m_s2": 1}}, "key sensor.gravity_m_s2: is 1, not the gravity of a place on Earth; it loo"),
+        (
+            {"sensor": {"gravity_m_s2": 98}},
+            "key sensor.gravity_m_s2: is 98, which is not gravity at any place on Earth",
+        ),
+        (
+            {"sensor": {"gravity_m_s2": 1}},
+            "key sensor.gravity_m_s2: is 1, which is not gravity at any place on Earth",
+        ),
         ({"sensor": {"gravity_m_s2": "9,80131"}}, "is '9,80131'; write 9.80131, with a decimal point"),
         ({"sensor": {"filter_corner_hz": 0}}, "key sensor.filter_corner_hz: the corner is 0 Hz; give one above 0"),
         ({"limits": {"temperature_c": [60, 20]}}, "key limits.temperature_c: [60, 20] is not a range; give the lowest"),

@@ -64,7 +64,7 @@ def test_a_run_with_an_expired_one_is_marked_everywhere(rig: Rig, file: Callable
     shown = json.loads(rig("show", document["run"], "--json").out)
     assert shown["expired"] == shown["constants"]["expired"] == MARK
     assert [event["text"] for event in shown["events"] if event["what"] == "expired"] == [MARK]
-    assert f"But {MARK}." in rig("show", document["run"]).out
+    assert f"Remark: {MARK}." in rig("show", document["run"]).out
     out = tmp_path / "data.csv"
     rig("export", document["run"], "--out", str(out))
     assert f"# expired: {MARK}\n" in out.read_text()
@@ -81,4 +81,4 @@ def test_a_run_with_good_ones_says_nothing(rig: Rig, file: Callable[..., str]) -
     assert document["expired"] is None
     assert json.loads(rig("show", document["run"], "--json").out)["expired"] is None
     assert "expired" not in rig(*SWEEP, "--bench", file(GOOD, GOOD)).out
-    assert f"But {MARK}." in rig(*SWEEP, "--bench", file(OLD, GOOD)).out
+    assert f"Remark: {MARK}." in rig(*SWEEP, "--bench", file(OLD, GOOD)).out

@@ -128,11 +128,11 @@ def test_of_positions_and_rates_no_columns_are_shared(tmp_path: Path) -> None:
 def test_what_a_fleet_cannot_judge_is_said_with_the_way_to_judge_it(tmp_path: Path) -> None:
     still = Table.from_columns("still", {"t_s": np.arange(9.0), "vx_v": np.arange(9.0)}, source="S.csv")
     assert asked(still, "linear", tmp_path)["fault"].endswith(
-        "is a table of still, and fleets have poses, positions and rates; leave it out, and ask for it alone: "
+        "is a table of still, and a fleet can have poses, positions and rates; leave it out, and analyse it alone: "
         "rig noise S.csv"
     )
     fault = asked(turned.ferraris(), "linear", tmp_path)["fault"]
-    assert fault.startswith("S.csv: linear is no model of rates")
+    assert fault.startswith("S.csv: linear is not a model of rates")
     assert fault.endswith("with --model gyroscope")
 
 

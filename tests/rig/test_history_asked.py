@@ -34,7 +34,7 @@ def test_what_is_as_by_default_is_not_in_the_address() -> None:
     ("query", "told"),
     [
         ("baseline=1", "baseline=1: give the number of calibrations for the limits, at least 2"),
-        ("baseline=%C2%B2", "baseline=²: write how many"),
+        ("baseline=%C2%B2", "baseline=²: give the number of calibrations"),
         ("limit=bias-x", "write NAME=CHANGE, as in bias-x=0.005"),
         ("at=monday", "'monday' is not a date: write it like 2"),
     ],

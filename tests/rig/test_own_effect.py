@@ -87,7 +87,7 @@ def test_the_model_file_holds_the_effect(rig: Rig, data: str, here: Path) -> Non
 
 REFUSED = [
     (["a*sn(beta)", "--name", "own"], r'column 3: there is no function "sn"; did you mean "sin"\?\n .*\n +\^'),
-    (["a*ax", "--name", "own-scale"], "adds nothing that linear does not have"),
+    (["a*ax", "--name", "own-scale"], "own-scale changes nothing that linear cannot already describe"),
     (["a*sin(5*beta)", "--name", "hysteresis"], "hysteresis is already in the catalogue"),
     (["a*sin(5*beta)", "--name", "My Effect"], "cannot name an effect"),
     (["a*sin(5*beta)"], "if this is an expression, give it a name"),

@@ -102,7 +102,8 @@ def test_what_the_technician_does_by_hand_is_in_the_budget(rig: Rig, tmp_path: P
     ended = rig("run", "repeat", "--times", "6", "--off-s", "30", "--warm-s", "5", "--bench", str(path), *FAST)
     ended = json.loads(ended.out)
     found, moved_v = ended["results"], 0.020 / 8.2  # 20 pm of the 8.2 nm that 1 g displaces
-    assert found["bias-as-is-x"]["value"] < 1e-5
+    as_is = found.get("bias-as-is-x", {"value": 0.0})  # not determined where the converter shows no noise
+    assert as_is["value"] < 1e-5
     assert 0.4 * moved_v < found["bias-mount-x"]["value"] < 1.7 * moved_v  # of six mountings
     with Record() as record:
         state: Any = record.state(ended["run"])

@@ -91,7 +91,7 @@ LIMITS = [  # a fault of an instrument, the exit status, and what is said
     ("motion", "positioner", Fault("restart", at_s=259.5), 3, "positioner: the oscillation of x has stopped."),
     ("motion", "positioner", Fault("refuses", at_s=9.0), 3, "positioner: SVO 1 1 2 1 3 1: error 17, a value is out of"),
     ("motion", "positioner", Fault("stuck", at_s=9.0), 3, "positioner: x is at"),
-    ("temperature-cycle", "oven", Fault("stale", at_s=30.0), 3, "C for 300 s while approaching 40 C. Check that the"),
+    ("temperature-cycle", "oven", Fault("stale", at_s=30.0), 3, "C for 300 s while approaching 40 C. Check the"),
     ("temperature-cycle", "oven", Fault("runaway", at_s=700.0), 4, "oven: the sensor is at "),
 ]
 

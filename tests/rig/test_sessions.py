@@ -25,7 +25,7 @@ RATE, TURN = ("--constant", "sample_rate_hz=204.8"), ("--constant", "turn_deg=36
 def test_six_faces_and_three_turns_give_the_published_calibration(rig: Rig, tmp_path: Path) -> None:
     file = str(DATA / "imucal_ferraris_gyro" / "annotated_session.csv.gz")
     taken = rig("import", file, *SESSION, *RATE, *TURN, "--json")
-    assert "the means of 9 rests and turns, out of 9414 samples, are taken" in taken.err
+    assert "the means of 9 rests and turns, from 9414 samples" in taken.err
     run, models = json.loads(taken.out)["run"], [str(tmp_path / name) for name in ("leaning.yaml", "whole.yaml")]
     assert json.loads(rig("diagnose", run, "--json").out)["candidates"][0]["effect"] == "gyro-misalignment"
     assert rig("add", "gyro-misalignment", "--model", "gyroscope", "--data", run, "--out", models[0]).status == 0

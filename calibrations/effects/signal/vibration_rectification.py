@@ -29,6 +29,7 @@ class VibrationRectification(Effect):
 
     kinds = ("motion", "poses")
     left_out = "it follows the mean square of a motion over a second"
+    incidental = True
 
     coefficient = Parameter("{out}/g^2", typical=1.0, doc="shift per mean square of the acceleration")
     output_per_g = Constant(_output_per_g)
