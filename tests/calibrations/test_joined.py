@@ -43,7 +43,5 @@ def test_constants_that_differ_are_not_kept_but_noise_that_each_measured_is_aver
 
 def test_tables_that_are_not_alike_are_refused() -> None:
     one_axis = Table.from_columns("poses", {"alpha_deg": [90.0], "beta_deg": [0.0], "vx_v": [1.0]}, source="one axis")
-    with pytest.raises(
-        DataError, match="one axis: is a table of poses along x, a one of poses along x, y; only"
-    ):
+    with pytest.raises(DataError, match="one axis: is a table of poses along x, a one of poses along x, y; only"):
         joined([table([0.0]), one_axis])
