@@ -64,7 +64,9 @@ def crew(scheduler: str | None, workers: int | None) -> Iterator[Client]:
                 yield client
             return
         with (
-            LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None, host="127.0.0.1") as cluster,
+            LocalCluster(
+                n_workers=workers, threads_per_worker=1, dashboard_address="127.0.0.1:0", host="127.0.0.1"
+            ) as cluster,
             Client(cluster) as client,
         ):
             client.register_plugin(Deaf())

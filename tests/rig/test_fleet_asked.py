@@ -57,7 +57,12 @@ class Ripple(Effect):
 def cluster() -> Iterator[LocalCluster]:
     """A scheduler that listens, with one worker in this process."""
     with LocalCluster(
-        n_workers=1, threads_per_worker=1, processes=False, protocol="tcp://", host="127.0.0.1", dashboard_address=None
+        n_workers=1,
+        threads_per_worker=1,
+        processes=False,
+        protocol="tcp://",
+        host="127.0.0.1",
+        dashboard_address="127.0.0.1:0",
     ) as made:
         yield made
 
