@@ -155,7 +155,7 @@ def test_what_cannot_be_shown_and_what_to_do(workbench: Workbench, runs: list[st
     expect(page.get_by_text("A control chart needs two calibrations, a drift three")).to_be_visible()
     for asked, told in (
         ("sensor=170", "no calibration of the sensor '170' in the record. Did you mean '17'?"),
-        ("sensor=18&model=gyroscope", "Its runs are none by this model"),
+        ("sensor=18&model=gyroscope", "This model cannot use its runs"),
         ("sensor=17&baseline=one", "baseline=one: give the number of calibrations for the limits, at least 2"),
     ):
         page.goto(f"{workbench.origin}/history?{asked}")

@@ -32,7 +32,7 @@ def test_a_port_that_is_taken_is_refused() -> None:
         words = [*WEB, "--port", str(port)]
         ended = subprocess.run(words, check=False, capture_output=True, text=True, timeout=60)
     assert ended.returncode == 2
-    assert f"cannot listen at 127.0.0.1:{port}: Address already in use; name another --port" in ended.stderr
+    assert f"cannot listen at 127.0.0.1:{port}: Address already in use; give another --port" in ended.stderr
 
 
 def test_another_host_is_warned_of_and_has_a_token_as_well() -> None:

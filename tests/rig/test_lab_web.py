@@ -79,7 +79,7 @@ def test_pages_read_the_lab_and_show_no_password(run: str, reader: str, tmp_path
         answers = [page(path) for path in pages]
         assert all(run in answer for answer in answers[:2])
         assert "/history?sensor=ADXL203" in answers[2]
-        assert "reads postgresql://anna:***@127.0.0.1" in answers[0]
+        assert "record: postgresql://anna:***@127.0.0.1" in answers[0]
         line = Path(f"/proc/{process.pid}/cmdline").read_bytes()
         process.send_signal(signal.SIGTERM)
         said = "".join(process.communicate(timeout=20))

@@ -32,7 +32,7 @@ TITLES = {
     "allan": "Allan deviation and model",
     "spectrum": "Spectrum and model",
     "ratio": "Residual pattern",
-    "waterfall": "Mismatch of each model; ◆: on the half of the record that the fit did not use",
+    "waterfall": "Mismatch by model; ◆: on the half of the record that the fit did not use",
     "record": "The record",
 }
 
