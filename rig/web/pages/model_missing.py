@@ -256,7 +256,7 @@ class Own:
             self.fall = words("", "fall small")
             with ui.element("div").classes("row-of"):
                 self.add = ui.button("Add effect", icon="add", on_click=self._add).props("dense unelevated")
-                with ui.button(icon="help_outline").props("flat round dense aria-label='Names in an expression'"):
+                with ui.button(icon="help_outline").props("flat round dense aria-label='Columns and functions'"):
                     ui.tooltip(HELP).props("max-width=360px")
         self.add.disable()
 
