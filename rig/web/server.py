@@ -79,17 +79,25 @@ class _Server(uvicorn.Server):
 
 
 def _listen(host: str, port: int | None) -> socket.socket:
-    """A socket at the address. Raises RigError."""
+    """A socket that listens at the address. Raises RigError."""
+    try:
+        return _listening(host, PORT if port is None else port)
+    except OSError as error:
+        if port is None:
+            return _listening(host, 0)
+        raise RigError(f"cannot listen at {host}:{port}: {error.strerror}; give another --port or --host") from None
+
+
+def _listening(host: str, port: int) -> socket.socket:
+    """A socket that listens from the start: until then another server may take the same port. Raises OSError."""
     listener = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
-        listener.bind((host, PORT if port is None else port))
-    except OSError as error:
-        if port is None:
-            listener.bind((host, 0))
-            return listener
+        listener.bind((host, port))
+        listener.listen()
+    except OSError:
         listener.close()
-        raise RigError(f"cannot listen at {host}:{port}: {error.strerror}; give another --port or --host") from None
+        raise
     return listener
 
 
