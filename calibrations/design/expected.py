@@ -173,7 +173,7 @@ PLANNED = ("t_s", "direction")  # a plan's own: the mean of other data does not 
 def predict_data(like: Fit, columns: Mapping[str, Array]) -> Table:
     """The table of poses that planned `columns` would give a sensor such as that of `like`.
 
-    `columns`, each of shape (n,): alpha_deg and beta_deg, and what else is planned of direction, flip, mount_deg, t_s,
+    `columns`, each of shape (n,): alpha_deg and beta_deg; optionally direction, flip, mount_deg, t_s,
     temperature_c, ...; `n` samples a mean, or `dwell_s` at the data's sample rate, else as many as the data's. Columns
     that the model's effects need and a plan does not set, such as temperature_c, are held at their mean in the data.
     Constants (filter corner, gravity, approach) are the data's.

@@ -353,7 +353,7 @@ def _assignment(table: Table, found: Response, a: Array) -> Finding | None:
 
 
 def _astray(table: Table, found: Response, rows: list[int]) -> str:
-    """Which outputs follow which axis, and what to check."""
+    """The axis that each output follows, and a hint on the wiring to check."""
     follow = []
     for k in rows:
         slope = found.slope[k]

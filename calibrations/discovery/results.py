@@ -188,7 +188,7 @@ class Findings(Generic[F]):
     causes        effects of the steps named as causes; the others refine the form of a cause
     alternatives  by effect, those that the data cannot separate from it
     places        places of the signal chain that act, the largest first, where the search has found them
-    left          what no effect explains, in words; `pattern` is the same as an expression
+    left          unexplained part of the residual, in words; `pattern` holds it as an expression
     spoilt        whether that makes every effect doubtful; `unresponsive`, whether an output does not follow the poses
     searched      whether further effects were searched for after the last step
     undetermined  why the data do not determine the given model, and the final model
@@ -310,12 +310,12 @@ class _Answer(Result, Generic[F]):
 
     @property
     def residual_structure(self) -> str | None:
-        """What no effect explains, in words."""
+        """Unexplained part of the residual, in words."""
         return self.findings.left
 
     @property
     def pattern(self) -> Pattern | None:
-        """What no effect explains, as an expression."""
+        """Unexplained part of the residual, as an expression."""
         return self.findings.pattern
 
     @property

@@ -54,7 +54,7 @@ class Judgement:
     refinements   effects that the search added for the form of a cause
     unknown       places of the signal chain where something acts that no effect of the catalogue describes
     alternatives  effects that the data cannot separate from a missing or added one
-    left          what no effect explains, in words
+    left          unexplained part of the residual, in words
     share_left    part of the excess variance at the start of the search that stays
     spoilt        whether that part makes every effect of the search doubtful
     unresponsive  whether that part is an output that does not follow the poses

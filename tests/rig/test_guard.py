@@ -16,6 +16,7 @@ from rig.cli.terminal.failure import status_of
 from rig.instruments.guard import AT_ONCE_S, GuardedClock, Look
 from rig.record import Record
 from rig.runs.runner import resume
+from rig.web.server import _listen
 from tests.rig.misbehaving import afflicted, digest, guarded_bench, looking_on, short, watched_bench
 from tests.rig.rigging import Onlooker
 
@@ -174,3 +175,9 @@ def test_an_oven_that_runs_away_is_noticed_while_the_run_waits() -> None:
         assert not isinstance(outcome.error, OverTemperature), "the sensor's limit comes before the oven's"
         assert "the sensor is at 85." in str(outcome.error)
         assert not aftermath.heating
+
+
+def test_two_servers_that_start_at_once_listen_on_different_ports() -> None:
+    """Neither has accepted a connection yet when the other binds."""
+    with _listen("127.0.0.1", None) as first, _listen("127.0.0.1", None) as second:
+        assert first.getsockname()[1] != second.getsockname()[1]
