@@ -5,8 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from calibrations.fitting.fit import fit
+from calibrations.fitting.fit import fit, refit
 from calibrations.fitting.held_out import folds, held_out
+from calibrations.free_forms.bases import spline
+from calibrations.free_forms.effect import free_form
+from calibrations.free_forms.form import Form
 from calibrations.geometry.orientation import nominal_pose, specific_force
 from calibrations.means.noise import white_only
 from calibrations.model.file import read_model
@@ -66,3 +69,27 @@ def test_rows_of_one_pose_share_a_fold() -> None:
 def test_positions_are_left_out_one_by_one() -> None:
     few = Table.from_columns("positions", dict.fromkeys(("ax", "ay", "az"), np.arange(12.0)))
     assert sorted(folds(few)) == list(range(12))
+
+
+def test_equals_a_refit_without_the_fold_where_parameters_have_priors() -> None:
+    """The fit without a fold is solved here with the priors as further rows."""
+    data, size = table(0.003), 2e-4
+    over = spline(np.linspace(-1.0, 1.0, 50), 8)
+    form = Form("own-response", "curve", "own", (over, over), sizes=(size, size))
+    start = fit(read_model("linear"), data)
+    found = refit(start, start.model.with_effect(free_form((form,))))
+    prior = found.problem.layout.prior
+    own = np.isfinite(prior)
+    rows = np.diag(1 / prior[own])
+    J, r, floor = found.jacobian, found.residual, found.noise.floor
+    number, error = folds(found.table), np.empty_like(found.residual)
+    white = white_only(found.problem.white, found.noise.gap_s, 2)
+    for k in np.unique(number):
+        kept = number != k
+        X = np.vstack([*(J[c, kept] / floor[c] for c in range(2)), np.zeros((own.sum(), len(own)))])
+        X[-own.sum() :, own] = rows
+        y = np.concatenate([*(r[c, kept] / floor[c] for c in range(2)), found.theta[own] / prior[own]])
+        step = np.linalg.lstsq(X, -y, rcond=None)[0]
+        error[:, ~kept] = r[:, ~kept] + J[:, ~kept] @ step
+    explicit = np.sqrt(np.mean(np.mean(error**2, axis=1) / floor**2))
+    assert held_out(r, J, white, number, found.theta, prior) == pytest.approx(explicit, rel=1e-6)
