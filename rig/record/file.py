@@ -2,15 +2,22 @@
 
 With the write-ahead log and synchronous=FULL a committed transaction is on the disk. A failure of the disk, the folder
 or the file is a RecordError, now or later.
+
+If another program removes the write-ahead log or its index, SQLite continues to write into the removed file, and its
+rows would be lost without an error. So the identities of both files are compared before and after each transaction.
+The connection still has the removed file: it copies all rows from there into the record, and a new connection goes on.
 """
 
 from __future__ import annotations
 
 import os
 import sqlite3
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from sqlalchemy import Connection, Engine, ExceptionContext, create_engine, event, text
+from sqlalchemy.exc import InvalidatePoolError
 
 from rig.errors import RecordError
 from rig.record.schema import MIGRATIONS, SCHEMA, give_sha256, metadata
@@ -29,14 +36,23 @@ FAILURES = {  # primary code of SQLite: fault and remedy
 }
 
 
-def open_file(path: Path) -> Engine:
+SIDES = ("-wal", "-shm")  # of the record's file: write-ahead log, and its index
+REMOVED = "another program removed the write-ahead log of the record during this command"
+
+
+def open_file(path: Path, tell: Callable[[str], None] = lambda _: None) -> Engine:
     """The engine of the file. Missing tables are made, old tables are migrated.
 
     In a folder without write permission the file is opened read-only. Raises RecordError if the file cannot be opened,
-    is damaged, or belongs to a newer program. Later use of the engine raises it as well.
+    is damaged, or belongs to a newer program. Later use of the engine raises it as well. `tell` gets a message if the
+    write-ahead log was removed.
     """
     engine = create_engine(f"sqlite:///{path}", creator=lambda: _connected(path))
     event.listen(engine, "connect", lambda connection, _: give_sha256(connection))
+    event.listen(engine, "connect", lambda _, info: info.info.update(sides=_sides(path), inode=_inode(path)))
+    event.listen(engine, "checkout", lambda connection, info, _: _require_sides(connection, info.info, path, tell))
+    event.listen(engine, "checkin", lambda connection, info: _save_rows(connection, info.info, path, tell))
+    event.listen(engine, "close", lambda connection, info: _save_rows(connection, info.info, path, tell))
     event.listen(engine, "handle_error", lambda context: _tell(context, path))
     event.listen(engine, "begin", lambda connection: _require_there(connection, path))
     try:
@@ -64,6 +80,46 @@ def _connected(path: Path) -> sqlite3.Connection:
 def _prepare(connection: sqlite3.Connection) -> None:
     for pragma in ("busy_timeout = 10000", "journal_mode = WAL", "synchronous = FULL", "foreign_keys = ON"):
         connection.execute(f"PRAGMA {pragma}")
+    connection.execute("SELECT count(*) FROM sqlite_master").fetchone()  # opens the write-ahead log
+
+
+def _inode(path: Path) -> int | None:
+    try:
+        return path.stat().st_ino
+    except OSError:
+        return None
+
+
+def _sides(path: Path) -> tuple[int | None, ...]:
+    """The identities of the write-ahead log and its index; None for a missing file."""
+    return tuple(_inode(path.with_name(path.name + side)) for side in SIDES)
+
+
+def _require_sides(connection: Any, info: dict[str, Any], path: Path, tell: Callable[[str], None]) -> None:
+    """Go on with a new connection if the write-ahead log was removed. Raises RecordError if rows cannot be saved."""
+    if not _save_rows(connection, info, path, tell):
+        raise RecordError(f"{path}: {REMOVED}, and its rows cannot be saved; {RECOVER}")
+    if info.get("replaced"):
+        raise InvalidatePoolError  # the pool makes a new connection
+
+
+def _save_rows(connection: Any, info: dict[str, Any], path: Path, tell: Callable[[str], None]) -> bool:
+    """Copy the rows of a removed write-ahead log into the record. Returns False if that fails.
+
+    A record that was removed or exchanged itself is found at the begin of the next transaction.
+    """
+    if connection is None or info.get("replaced") or _sides(path) == info["sides"] or _inode(path) != info["inode"]:
+        return True
+    if info["sides"][0] is None:  # read-only, or a file system without a write-ahead log
+        return True
+    try:
+        (busy, *_) = connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()
+    except sqlite3.Error:
+        busy = True
+    info["replaced"] = not busy
+    remedy = "check the poses of this run" if busy else "all rows were saved"
+    tell(f"{path}: {REMOVED}; {remedy}; do not let a program remove files from this folder")
+    return not busy
 
 
 def _require_there(connection: Connection, path: Path) -> None:
@@ -72,7 +128,7 @@ def _require_there(connection: Connection, path: Path) -> None:
         inode = path.stat().st_ino
     except OSError as error:
         raise RecordError(f"{path}: the record has disappeared ({error.strerror}); put its folder back") from None
-    if connection.info.setdefault("inode", inode) != inode:
+    if connection.info["inode"] != inode:
         raise RecordError(f"{path}: the record was exchanged during this command; run the command again")
 
 

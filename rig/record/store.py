@@ -65,7 +65,11 @@ class Record:
     def __init__(self, place: Path | URL | None = None) -> None:
         self.folder = home() if isinstance(place, URL) else place or home()  # also of the locks
         self.path = self.folder / FILE
-        self.where, self._engine = _opened(place) if isinstance(place, URL) else (str(self.path), open_file(self.path))
+        self.remarks: list[str] = []  # on the file: it was repaired during this command
+        if isinstance(place, URL):
+            self.where, self._engine = _opened(place)
+        else:
+            self.where, self._engine = str(self.path), open_file(self.path, self.remarks.append)
         self._lines: list[dict[str, Any]] = []  # of the log, not written yet
 
     @classmethod

@@ -174,8 +174,16 @@ def _carry_out(record: Record, rig: Rig, run: Run, procedure: Procedure, observe
             raise  # a defect of the program
         return _interrupted(record, run, error, complaints)
     log("complete", why or f"{len(results)} results")
-    record.set_state(run.run, "complete", why and f"results: {why}", results)
+    _complete(record, run.run, why and f"results: {why}", results)
     return Outcome(record.run(run.run))
+
+
+def _complete(record: Record, run: str, why: str | None, results: Mapping[str, Any]) -> None:
+    """End a complete run. Its message has the remarks on the record, also on the last transaction."""
+    remarks = None
+    while remarks != record.remarks:
+        remarks = list(record.remarks)
+        record.set_state(run, "complete", "; ".join([*([why] if why else []), *remarks]) or None, results)
 
 
 def _interrupted(record: Record, run: Run, error: Exception, complaints: Sequence[str]) -> Outcome:

@@ -82,6 +82,34 @@ def test_a_record_that_is_exchanged_is_not_written_into(tmp_path: Path) -> None:
         assert "the record was exchanged during this command" in str(outcome.error)
 
 
+@pytest.mark.parametrize("removed", [("-wal",), ("-wal", "-shm")])
+def test_a_removed_write_ahead_log_costs_no_pose_and_is_said(tmp_path: Path, removed: tuple[str, ...]) -> None:
+    def remove() -> None:
+        for side in removed:
+            (tmp_path / f"record.db{side}").unlink()
+        subprocess.run(
+            [sys.executable, "-c", "import sqlite3, sys; sqlite3.connect(sys.argv[1]).execute('SELECT * FROM runs')",
+             str(tmp_path / "record.db")], capture_output=True, check=False)  # fmt: skip
+
+    with Record(tmp_path) as record:
+        outcome = swept(record, remove)
+        assert outcome.run.state == "complete"
+        assert "removed the write-ahead log of the record during this command; all rows were saved" in str(
+            outcome.run.message
+        )
+    with Record(tmp_path) as record:
+        assert [kept.number for kept in record.kept(outcome.run.run)] == list(range(POSES))
+
+
+def test_a_write_ahead_log_that_is_removed_after_the_last_pose_costs_none(tmp_path: Path) -> None:
+    with Record(tmp_path) as record:
+        run = swept(record, lambda: None).run.run
+        (tmp_path / "record.db-wal").unlink()
+    assert len(record.remarks) == 1
+    with Record(tmp_path) as record:
+        assert len(list(record.kept(run))) == POSES
+
+
 READS = """
 import contextlib, io, os, sys, tempfile
 from rig.cli import main
