@@ -19,6 +19,7 @@ from typing import Any
 from drivers.errors import DriverError, Interlocked
 from procedures.catalogue import Procedure, find
 from procedures.errors import Declined, NoAnswer, ProcedureError, SafetyLimit
+from procedures.questions import Confirm
 from procedures.settings import parse
 from rig.bench import Bench
 from rig.bench.certificates import EXPIRED, expired
@@ -26,6 +27,7 @@ from rig.errors import RecordError, RigError, RunMismatch, Stopped
 from rig.instruments.instruments import Rig, connected
 from rig.lease import lease
 from rig.planning.plan import plan
+from rig.planning.preparation import first_question
 from rig.record import Record, Run
 from rig.results import Result, documents, judged, returned
 from rig.runs.host import RunHost, leave_as
@@ -57,9 +59,9 @@ def start(
     with stoppable():
         observer.planned(planned)
         trail = Trace(record) if trace else None
-        return _after_decision(
-            record, _begun(record, bench, procedure, settings, observer, after, trail), observer, trace
-        )
+        asked = first_question(planned)
+        begun = _begun(record, bench, procedure, settings, observer, after, trail, asked)
+        return _after_decision(record, begun, observer, trace)
 
 
 def _begun(
@@ -70,6 +72,7 @@ def _begun(
     observer: Observer,
     after: str | None,
     trace: Trace | None,
+    asked: Confirm | None,
 ) -> Outcome:
     with stoppable(), connected(bench, trace) as rig:
         identities = {role: asdict(identity) for role, identity in rig.identities().items()}
@@ -91,7 +94,7 @@ def _begun(
         if after is not None:
             leave_as(rig, record, after)
         with _held(record, run):
-            return _carry_out(record, rig, record.run(run), procedure, observer)
+            return _carry_out(record, rig, record.run(run), procedure, observer, asked)
 
 
 def resume(record: Record, run_id: str, observer: Observer, bench: Bench | None = None, trace: bool = False) -> Outcome:
@@ -118,7 +121,14 @@ def _resumed(
         if trail is not None:
             trail.begin(run_id)
         _same_instruments(run, rig)
-        return _carry_out(record, rig, run, procedure, observer)
+        return _carry_out(record, rig, run, procedure, observer, _unanswered(record, run, own, procedure))
+
+
+def _unanswered(record: Record, run: Run, bench: Bench, procedure: Procedure) -> Confirm | None:
+    """The first question of a run that ended before its answer; None if the record has an answer."""
+    if any(event.what.startswith("answer ") for event in record.events(run.run)):
+        return None
+    return first_question(plan(bench, procedure, parse(procedure, run.settings)))
 
 
 def _after_decision(record: Record, outcome: Outcome, observer: Observer, trace: bool) -> Outcome:
@@ -149,7 +159,9 @@ def _held(record: Record, run: str) -> AbstractContextManager[None]:
     return lease(record.folder, run, f"run {run}")
 
 
-def _carry_out(record: Record, rig: Rig, run: Run, procedure: Procedure, observer: Observer) -> Outcome:
+def _carry_out(
+    record: Record, rig: Rig, run: Run, procedure: Procedure, observer: Observer, asked: Confirm | None
+) -> Outcome:
     """The run itself. At its end the stages are at rest, and the record has its state, whatever happens."""
 
     def log(what: str, text: str) -> None:
@@ -159,7 +171,7 @@ def _carry_out(record: Record, rig: Rig, run: Run, procedure: Procedure, observe
     record.set_state(run.run, "running")
     try:
         observer.begun(run.run)  # a person may end it from now on
-        own = _perform(record, rig, run, procedure, observer)
+        own = _perform(record, rig, run, procedure, observer, asked)
         results, why = (documents(own, rig.bench.result_limits), None) if own else judged(record, run)
     except BaseException as failure:
         error = _error_of(failure, run)
@@ -204,8 +216,13 @@ def _error_of(failure: BaseException, run: Run) -> Exception:
     return RuntimeError(f"{type(failure).__name__}: {failure}")
 
 
-def _perform(record: Record, rig: Rig, run: Run, procedure: Procedure, observer: Observer) -> Mapping[str, Result]:
-    """Execute the procedure in the last recorded state of the bench. Returns the results of the procedure."""
+def _perform(
+    record: Record, rig: Rig, run: Run, procedure: Procedure, observer: Observer, asked: Confirm | None
+) -> Mapping[str, Result]:
+    """Execute the procedure in the last recorded state of the bench. Returns the results of the procedure.
+
+    A person answers `asked` before the stages move, also to their home.
+    """
     state = record.state(run.run)
     host = RunHost(record, rig, run, observer, state)
     session = rig.session(host)
@@ -215,6 +232,8 @@ def _perform(record: Record, rig: Rig, run: Run, procedure: Procedure, observer:
         rig.restore(state["rig"])
     with rig.guarded(session):
         if state is None:
+            if asked is not None:
+                session.request(asked)
             session.reference()
             host.keep_state()
         results = procedure.function(session, **settings) or {}

@@ -21,6 +21,7 @@ from rig.web.parts import message
 # The present run in the head of every page: progress, pause and stop.
 
 LOOK_S = 0.5
+STOP_KEY = "F8"  # the one key that acts on the rig from every page, also while a person types
 PHASES = {"starting": "starts", "running": "runs", "asking": "asks you", "paused": "is paused"}
 
 
@@ -35,6 +36,8 @@ class Strip:
             )
             self.stop = ui.button("Stop", icon="stop", color="negative", on_click=lambda: control_run(control.stop))
             self.stop.props("unelevated dense")
+            with self.stop:
+                ui.tooltip(f"Key {STOP_KEY}")
         ui.timer(LOOK_S, self.look)
         self.look()
 
@@ -58,6 +61,14 @@ def control_run(how: Callable[[Status], None]) -> None:
         how(status)
     except RigError as error:
         ui.notify(message(error), type="warning")
+
+
+def stop_run() -> None:
+    """Stop the present run."""
+    status = control.latest()
+    if status is not None and status.phase != "ended":
+        control_run(control.stop)
+        ui.notify(f"{status.procedure}: stop", type="warning")
 
 
 STATIC = Path(__file__).parent / "static"
@@ -97,6 +108,7 @@ def frame(desk: Desk, here: str) -> Iterator[dict[str, Key]]:
             ui.label(f"record: {lab}").classes("quiet small")
         ui.element("div").classes("space")
         Strip()
+        keys[STOP_KEY] = Key("stop the run, also while a field has the focus", stop_run)
         _keys(keys)
         _theme(desk)
     with ui.element("div").classes("stack sheet"):
@@ -135,7 +147,13 @@ def _keys(keys: Mapping[str, Key]) -> None:
                     ui.label(key.does)
         dialog.open()
 
+    def anywhere(event: KeyEventArguments) -> None:
+        if event.action.keydown and event.key.name == STOP_KEY:
+            stop_run()
+
     async def pressed(event: KeyEventArguments) -> None:
+        if event.key.name == STOP_KEY:
+            return
         if not event.action.keydown or event.modifiers.ctrl or event.modifiers.alt or event.modifiers.meta:
             return
         if event.key.name == "?":
@@ -146,5 +164,6 @@ def _keys(keys: Mapping[str, Key]) -> None:
                 await done
 
     ui.keyboard(on_key=pressed, ignore=["input", "select", "textarea"])
+    ui.keyboard(on_key=anywhere, ignore=[])
     with ui.button(icon="keyboard", on_click=listed).props("flat round dense aria-label='Keys'"):
         ui.tooltip("Keys (?)")

@@ -10,11 +10,13 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from rig.record import Record
+from rig.runs.background import control
 from tests.browser.conftest import Workbench
 from tests.browser.test_model_page import BARS
 
 pytestmark = pytest.mark.slow
 
+ANSWER_MS = 2000  # on a busy machine; 300 on a free one
 NIGHT = "/run?procedure=soak&duration_s=43200"
 
 
@@ -26,8 +28,25 @@ def phase(page: Page, word: str) -> None:
 def started(workbench: Workbench, path: str) -> Page:
     page = workbench.visit(path)
     expect(page.get_by_text("Takes", exact=True)).to_be_visible()
-    page.get_by_role("button", name="Start").click()
+    begin(page)
     return page
+
+
+def begin(page: Page) -> None:
+    """Start, tick every check, Begin."""
+    page.get_by_role("button", name="Start").click()
+    tick(page)
+    page.get_by_role("dialog").get_by_role("button", name="Begin").click()
+    expect(page.get_by_role("dialog")).to_have_count(0)
+
+
+def tick(page: Page) -> None:
+    """Tick every check of the dialog."""
+    dialog = page.get_by_role("dialog")
+    expect(dialog.get_by_role("button", name="Begin")).to_be_visible()
+    for check in dialog.get_by_role("checkbox").all():
+        check.click()
+    expect(dialog.get_by_role("button", name="Begin")).to_be_enabled()
 
 
 def test_a_newcomer_gets_from_the_empty_record_to_the_falling_error(workbench: Workbench) -> None:
@@ -39,7 +58,7 @@ def test_a_newcomer_gets_from_the_empty_record_to_the_falling_error(workbench: W
     page.get_by_label("inclinations (deg)").fill("90,30,150,60")
     expect(page.get_by_text("104 poses")).to_be_visible()
     workbench.shot(page, "plan")
-    page.get_by_role("button", name="Start").click()
+    begin(page)
     phase(page, "running")
     expect(page.locator(".values").get_by_text("as usual").first).to_be_visible()
     expect(page.get_by_role("cell", name="−20 to 85 °C")).to_be_visible()
@@ -92,12 +111,12 @@ def test_a_run_of_a_terminal_is_watched_and_stopped(workbench: Workbench) -> Non
 
 
 def test_questions_are_asked_and_a_wrong_answer_is_refused(workbench: Workbench) -> None:
-    page = workbench.visit("/run?procedure=sweep&step_deg=180&inclinations_deg=90")
+    page = workbench.visit("/run?procedure=sweep&step_deg=180&inclinations_deg=90&face=both")
     expect(page.get_by_text("Takes", exact=True)).to_be_visible()
     page.get_by_text("Ask me").click()
-    page.get_by_role("button", name="Start").click()
+    begin(page)
     phase(page, "asks you")
-    expect(page.locator(".question")).to_be_visible()
+    expect(page.locator(".question")).to_contain_text("face down")  # the first mounting was one of the checks
     workbench.shot(page, "question")
     page.locator(".question").get_by_role("button", name="yes").click()
     phase(page, "complete")
@@ -122,3 +141,58 @@ def test_the_bench_is_checked(workbench: Workbench) -> None:
     page = workbench.visit("/run")
     page.get_by_role("button", name="Check the instruments").click()
     expect(page.get_by_text("✓ alarm").first).to_be_visible()
+
+
+def test_a_run_begins_after_the_checks_and_no_single_key_moves_anything(workbench: Workbench) -> None:
+    page = workbench.visit(NIGHT)
+    expect(page.get_by_text("Takes", exact=True)).to_be_visible()
+    before = control.latest()
+    for key in ("s", "Enter", "p", " "):
+        page.keyboard.press(key)
+    expect(page.get_by_role("dialog")).to_have_count(0)
+    page.get_by_role("button", name="Start").click()
+    dialog = page.get_by_role("dialog")
+    expect(dialog.get_by_label("Sensor")).to_have_value("ADXL203")
+    dialog.get_by_label("Serial number").fill("17")
+    for text in ("Takes", "Turns alpha", "Stops", "Can its cable turn freely?", "to do"):
+        expect(dialog.get_by_text(text).first).to_be_visible()
+    drawing = dialog.locator(".attitude svg").bounding_box()
+    assert drawing is not None
+    assert drawing["width"] > 400
+    workbench.shot(page, "begin")
+    expect(dialog.get_by_role("button", name="Begin")).to_be_disabled()
+    tick(page)
+    assert control.latest() == before  # nothing has begun
+    dialog.get_by_role("button", name="Begin").click()
+    expect(page.locator(".live .chip").first).to_have_text(re.compile("starting|running"), timeout=ANSWER_MS)
+    phase(page, "running")
+    page.get_by_label("dwell (s)").first.click()  # the key stops also while a person types
+    page.keyboard.press("F8")
+    phase(page, "stopped")
+    with Record() as record:
+        run = record.runs()[0]
+        assert run.constants["serial"] == "17"
+        assert next(event.what for event in record.events(run.run)) == "answer mounting"
+    page.get_by_role("button", name="Resume").click()
+    expect(page.get_by_role("dialog").get_by_role("button", name="Begin")).to_be_disabled()
+    workbench.shot(page, "resume")
+    page.get_by_role("button", name="Cancel").click()
+
+
+def test_two_pages_that_begin_at_once_start_one_run(workbench: Workbench) -> None:
+    pages = [workbench.visit(NIGHT) for _ in range(2)]
+    for page in pages:
+        expect(page.get_by_text("Takes", exact=True)).to_be_visible()
+        page.get_by_role("button", name="Start").click()
+        tick(page)
+    with Record() as record:
+        before = len(record.runs())
+    for page in pages:
+        page.get_by_role("dialog").get_by_role("button", name="Begin").click(no_wait_after=True)
+    expect(pages[1].get_by_role("dialog").get_by_role("alert")).to_contain_text("soak is in progress since")
+    expect(pages[0].get_by_role("dialog")).to_have_count(0)
+    phase(pages[0], "running")
+    pages[0].keyboard.press("F8")
+    phase(pages[0], "stopped")
+    with Record() as record:
+        assert len(record.runs()) == before + 1

@@ -15,7 +15,7 @@ from procedures.errors import SettingError
 from procedures.settings import parse
 from rig.bench import read_bench
 from rig.cli.terminal.watch import Quiet
-from rig.errors import RigError
+from rig.errors import Busy, RigError
 from rig.files import home
 from rig.lease import lease
 from rig.record import Kept, Record
@@ -227,3 +227,25 @@ def test_nobody_is_answered_who_does_not_ask() -> None:
     os.mkfifo(file(KEY, "answers"))
     with pytest.raises(RigError, match="does not wait for an answer"):
         control.answer(status_of_one_who_asked, "yes")
+
+
+def test_a_second_start_is_refused_while_a_run_is_in_progress() -> None:
+    file(KEY, "json").parent.mkdir(parents=True)
+    Status("20261121-093012-000000-ab12", 4711, "sweep", "a bench", phase="running").write()
+    with (
+        lease(home(), lock("20261121-093012-000000-ab12"), "a test"),
+        pytest.raises(Busy, match="sweep is in progress since"),
+    ):
+        control.begin("sweep", SMALL, None, attended=False)
+
+
+def test_a_process_that_ended_before_its_run_began_has_no_run_to_resume() -> None:
+    file(KEY, "json").parent.mkdir(parents=True)
+    Status(KEY, os.getpid(), "sweep", "a bench").write()
+    alive = read(KEY)
+    assert alive is not None
+    assert alive.phase == "starting"
+    Status(KEY, 2**22 + 1, "sweep", "a bench").write()  # no process has this number
+    ended = read(KEY)
+    assert ended is not None
+    assert ended.error.endswith("it was stopped before the run began")

@@ -20,12 +20,13 @@ from procedures.questions import Choice, Confirm, Mounting, Number
 from procedures.session import Limits, Pose, Reading
 from rig.bench import Bench, read_bench
 from rig.cli.terminal.guide import Guide
-from rig.cli.terminal.screen import WIDTH, before, checks, gauge, mounting, screen
+from rig.cli.terminal.screen import WIDTH, before, gauge, screen
 from rig.cli.terminal.watch import watching
 from rig.drawings import Attitude, page
 from rig.errors import Stopped
 from rig.files import free_bytes
 from rig.planning.plan import Plan, plan
+from rig.planning.preparation import checks, mounting
 from rig.record import Block, Kept, Record
 from rig.runs.observer import RunView, nearness
 from rig.runs.progress import Progress

@@ -12,6 +12,7 @@ import pytest
 
 from drivers.errors import LimitError, StageAlarm
 from procedures.errors import SettingError
+from procedures.level_check import FACE_UP
 from procedures.session import Limits
 from procedures.sweep import grid
 from rig.bench import Bench, read_bench
@@ -67,7 +68,7 @@ def test_a_sweep_keeps_every_pose_once_in_order() -> None:
     assert outcome.error is None
     assert (outcome.run.state, outcome.run.rows, watch.expected) == ("complete", POSES, [(POSES, 0)])
     assert poses == list(grid((90.0, 45.0), 90.0)) == [kept.pose for kept in watch.seen]
-    assert watch.said[:2] == ["homing alpha", "homing beta"]
+    assert watch.said[:3] == [f"mounting: {FACE_UP}", "homing alpha", "homing beta"]
     assert set(table.column("n")) == {200}
     assert np.all(np.diff(table.column("t_s")) > 0)
 

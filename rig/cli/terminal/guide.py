@@ -19,10 +19,11 @@ from procedures.errors import BadAnswer, Declined, NoAnswer
 from procedures.questions import Choice, Question
 from procedures.session import Reading
 from rig.bench import Bench
-from rig.cli.terminal.screen import before, drawn, mounting, screen
+from rig.cli.terminal.screen import before, drawn, screen
 from rig.drawings import Attitude, drawing_of, page
 from rig.files import free_bytes, home, write_whole
 from rig.planning.plan import Plan
+from rig.planning.preparation import mounting
 from rig.record import Kept
 from rig.runs.observer import RunViewer
 from rig.runs.runner import Decision, Outcome

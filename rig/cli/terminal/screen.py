@@ -19,8 +19,9 @@ from calibrations.text import duration, size
 from procedures.catalogue import Procedure
 from rig.bench import Bench
 from rig.bench.certificates import expired
-from rig.drawings import Attitude, drawing_of, sketch
+from rig.drawings import Attitude, sketch
 from rig.planning.plan import Plan, stretches
+from rig.planning.preparation import checks, stops
 from rig.runs.observer import RunView, Value, nearness, values
 
 WIDTH = 15  # characters, the ends included
@@ -105,7 +106,7 @@ def _facts(plan: Plan, procedure: Procedure, bench: Bench, free_bytes: int) -> I
     yield "Does", "\n".join(_does(plan))
     for role, ((low, high), (least, most)) in plan.reach.items():
         yield f"Turns {role}", f"from {low:g} to {high:g} deg; the limits are {least:g} to {most:g} deg"
-    yield "Stops", "; ".join(_stops(bench))
+    yield "Stops", "; ".join(stops(bench))
     if asked := Counter(re.sub(r"-\d+$", "", question.name) for question in plan.asked):
         yield "Asks you", ", ".join(f"{name} ({n} times)" if n > 1 else name for name, n in asked.items())
     space = "" if free_bytes > plan.bytes else ": not enough space"
@@ -117,39 +118,6 @@ def _does(plan: Plan) -> list[str]:
     if len(lines) > MOST_STRETCHES:
         lines[MOST_STRETCHES - 1 :] = [f"and {len(lines) - MOST_STRETCHES + 1} more: rig plan {plan.procedure}"]
     return lines or ["records readings and no pose"]
-
-
-def _stops(bench: Bench) -> list[str]:
-    low, high = bench.limits.temperature_c
-    level_deg = bench.limits.level_deg
-    tilt = [] if level_deg is None else [f"if the tilt of the table exceeds {level_deg:g} deg"]
-    return [f"if the sensor is not at {low:g} to {high:g} C", *tilt]
-
-
-def checks(plan: Plan) -> list[str]:
-    """Checks that only a person can do, before anything moves."""
-    actions = [step.what for step in plan.steps]
-    level = any("level" in question.name for question in plan.asked)
-    lines = [
-        "the cables can follow the stages over the whole range, and nothing and nobody is in the progress",
-        "the sensor is fastened as in the drawing, with pin 1 at the drawn place",
-    ]
-    if any("level is read" in action for action in actions):
-        lines.append("the level lies on the table and is switched on")
-    if level:
-        lines.append("a level lies on the table; you will read it")
-    if "oven on" in actions:
-        lines.append("the oven is closed, and everything in it withstands the temperatures")
-    if any("positioner swings" in action for action in actions):
-        lines.append("the nano-positioner's carriage is free to move")
-    return lines
-
-
-def mounting(plan: Plan) -> Attitude:
-    """The first mounting of the sensor: from the first question with a drawing, else from the first pose."""
-    drawn = [attitude for question in plan.asked if (attitude := drawing_of(question)) is not None]
-    posed = [Attitude(mount_deg=held.pose.mount_deg, flip=held.pose.flip) for held in plan.held]
-    return next(iter([*drawn, *posed]), Attitude())
 
 
 def drawn(attitude: Attitude, file: Path) -> RenderableType:

@@ -10,6 +10,8 @@ import subprocess
 import sys
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack, suppress
+from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
 from typing import ParamSpec, Self
@@ -17,12 +19,13 @@ from typing import ParamSpec, Self
 from procedures.questions import Question
 from procedures.session import Reading
 from rig.bench import Bench
-from rig.errors import RigError
+from rig.errors import Busy, RigError
 from rig.files import home
 from rig.lease import lease
 from rig.planning.plan import Plan
 from rig.record import Kept, Record
 from rig.runs.background.status import (
+    KEY_TIME,
     Order,
     Seat,
     Status,
@@ -122,25 +125,51 @@ IN_ITS_TERMINAL = "the run began in a terminal; answer there"
 _children: list[subprocess.Popen[bytes]] = []  # to collect the processes that have ended
 
 
-def begin(procedure: str, settings: Mapping[str, str], bench_file: Path | None, attended: bool) -> str:
-    """Start `procedure` in the background. Returns its key. Its status has the error, if there is one."""
-    return _begin(Order(new_key(), procedure, dict(settings), str(bench_file or ""), attended=attended))
+STARTING = "starting"  # the lock of a start: two pages that start at once start one run
+
+
+def begin(
+    procedure: str,
+    settings: Mapping[str, str],
+    bench_file: Path | None,
+    attended: bool,
+    sensor: Mapping[str, str] | None = None,
+    answers: Mapping[str, str] | None = None,
+) -> str:
+    """Start `procedure` in the background. Returns its key. Its status has the error, if there is one.
+
+    `sensor` and `answers` are those of `Order`. Raises Busy while another run is in progress.
+    """
+    order = Order(new_key(), procedure, dict(settings), str(bench_file or ""), attended=attended)
+    return _begin(replace(order, sensor=dict(sensor or {}), answers=dict(answers or {})))
 
 
 def go_on(run: str, procedure: str, bench_file: Path | None, attended: bool) -> str:
-    """Resume a run in the background. Returns its key."""
+    """Resume a run in the background. Returns its key. Raises Busy while another run is in progress."""
     return _begin(Order(new_key(), procedure, {}, str(bench_file or ""), run, attended))
 
 
 def _begin(order: Order) -> str:
     file(order.key, "log").parent.mkdir(parents=True, exist_ok=True)
-    tidy()
-    os.mkfifo(file(order.key, "answers"))
-    with file(order.key, "log").open("wb") as log:
-        words = [sys.executable, "-m", "rig.runs.background.process", order.text()]
-        child = subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True)  # noqa: S603
+    with lease(home(), STARTING, "the start of a run"):
+        if (other := latest()) is not None and other.phase != "ended":
+            raise Busy(f"{other.procedure} is in progress since {begun(other)}; stop it, or wait until it ends")
+        bench = order.bench().name
+        tidy()
+        os.mkfifo(file(order.key, "answers"))
+        with file(order.key, "log").open("wb") as log:
+            words = [sys.executable, "-m", "rig.runs.background.process", order.text()]
+            child = subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True)  # noqa: S603
+        if not file(order.key, "json").exists():  # the process needs a second until its own first status
+            Status(order.key, child.pid, order.procedure, bench, run=order.resume).write()
     _children.append(child)
     return order.key
+
+
+def begun(status: Status) -> str:
+    """The time of day, local, at which a background run began."""
+    at = datetime.strptime(status.key.rpartition("-")[0], KEY_TIME).replace(tzinfo=UTC)
+    return f"{at.astimezone():%H:%M:%S}"
 
 
 def latest() -> Status | None:

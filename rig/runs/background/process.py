@@ -15,7 +15,7 @@ from procedures.catalogue import find
 from procedures.errors import BadAnswer
 from procedures.questions import Choice, Question
 from procedures.settings import parse
-from rig.bench import Bench, read_bench
+from rig.bench import Bench
 from rig.errors import Stopped
 from rig.files import home
 from rig.lease import lease
@@ -38,6 +38,8 @@ class Attendant(StatusWriter):
 
     def ask(self, question: Question, instead: str | None) -> str:
         """The answer of a person, or of the simulated technician if nobody attends the run."""
+        if question.name in self._order.answers:
+            return self._order.answers[question.name]
         if instead is not None and not self._order.attended:
             return instead
         return self._answer(question, instead or "", "asking")
@@ -88,7 +90,7 @@ def main(text: str) -> None:
     """Execute an order. The status has its end in any case."""
     order = Order.read(text)
     with lease(home(), lock(order.key), f"an order, {order.procedure}"), Record() as record:
-        writer = Attendant(order, read_bench(order.bench_path))
+        writer = Attendant(order, order.bench())
         try:
             outcome = _carried_out(order, record, writer)
         except KeyboardInterrupt as signal:  # before the run began, or between its parts
@@ -110,7 +112,7 @@ def main(text: str) -> None:
 def _carried_out(order: Order, record: Record, writer: Attendant) -> Outcome:
     if order.resume:
         return resume(record, order.resume, writer)
-    bench = read_bench(order.bench_path)
+    bench = order.bench()
     procedure = find(order.procedure, bench.folders.procedures)
     return start(record, bench, procedure, parse(procedure, order.settings), writer)
 

@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 from procedures.questions import Choice, Confirm, Question
 from procedures.session import Reading
-from rig.bench import Bench
+from rig.bench import Bench, read_bench
 from rig.drawings import drawing_of
 from rig.files import home, write_whole
 from rig.lease import is_held
@@ -23,13 +23,15 @@ from rig.record import Kept
 from rig.runs.observer import RunViewer, values
 
 FOLDER = "apart"
+KEY_TIME = "%Y%m%d-%H%M%S-%f"  # of the begin of a process, UTC
 
 
 @dataclass(frozen=True)
 class Order:
     """`settings` are texts, as on a command line. `resume` is the id of a run, or "" for a new run of `procedure`.
 
-    `attended`: questions go to a person, even if the simulated technician can answer them.
+    `attended`: questions go to a person, even if the simulated technician can answer them. `sensor`: name and serial
+    number of the mounted sensor, instead of those of the bench file. `answers`: what a person has confirmed already.
     """
 
     key: str
@@ -38,6 +40,13 @@ class Order:
     bench_file: str = ""
     resume: str = ""
     attended: bool = False
+    sensor: Mapping[str, str] = field(default_factory=dict)
+    answers: Mapping[str, str] = field(default_factory=dict)
+
+    def bench(self) -> Bench:
+        """The bench with the sensor of the order. Raises BenchError."""
+        bench = read_bench(self.bench_path)
+        return bench.model_copy(update={"sensor": bench.sensor.model_copy(update=dict(self.sensor))})
 
     @property
     def bench_path(self) -> Path | None:
@@ -56,7 +65,7 @@ class Order:
 
 def new_key() -> str:
     """A name for a process; names sort by time."""
-    return f"{datetime.now(UTC):%Y%m%d-%H%M%S-%f}-{secrets.token_hex(2)}"
+    return f"{datetime.now(UTC):{KEY_TIME}}-{secrets.token_hex(2)}"
 
 
 def file(key: str, ending: str) -> Path:
@@ -126,10 +135,21 @@ def read(key: str) -> Status | None:
         return None
     asked = document.pop("asked")
     status = Status(**document, asked=Asked(**asked) if asked else None)
-    if status.phase == "ended" or is_held(home(), lock(key)):
+    if status.phase == "ended" or is_held(home(), lock(key)) or _is_starting(status):
         return status
-    error = f"its process ended: {_last_words(key)}"
+    error = f"its process ended: {_last_words(key, status.run)}"
     return replace(status, phase="ended", state="stopped", asked=None, error=error)
+
+
+def _is_starting(status: Status) -> bool:
+    """Whether the process exists and has not taken its lock yet."""
+    if status.phase != "starting":
+        return False
+    try:
+        os.kill(status.pid, 0)
+    except ProcessLookupError:
+        return False
+    return True
 
 
 def lock(key: str) -> str:
@@ -155,11 +175,13 @@ def tidy() -> None:
                 file(key, ending).unlink(missing_ok=True)
 
 
-def _last_words(key: str) -> str:
+def _last_words(key: str, run: str) -> str:
     """The last line of its standard error."""
     path = file(key, "log")
     log = path.read_text(encoding="utf-8", errors="replace").strip() if path.exists() else ""
-    return log.splitlines()[-1] if log else "it was killed; `rig resume` continues its run"
+    if log:
+        return log.splitlines()[-1]
+    return "it was killed; `rig resume` continues its run" if run else "it was stopped before the run began"
 
 
 class StatusWriter:

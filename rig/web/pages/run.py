@@ -5,22 +5,23 @@ from __future__ import annotations
 import inspect
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from datetime import UTC, datetime
+from functools import partial
 from typing import Any
 
 from fastapi import Request
 from nicegui import ui
 
-from calibrations.text import duration, size
+from calibrations.text import duration
 from procedures.catalogue import Procedure, find, paths, summary
 from procedures.settings import choices, parse
 from rig.bench import Bench, read_bench
 from rig.bench.certificates import expired
-from rig.files import free_bytes, home
 from rig.instruments.instruments import checked
 from rig.planning.plan import Plan, plan, stretches
 from rig.runs.background import control
 from rig.web.desk import Desk, lab_read
 from rig.web.frame import Key, frame
+from rig.web.pages.run_begin import BeginDialog, before_start, plan_facts
 from rig.web.pages.run_live import Live
 from rig.web.parts import box, div, facts, failed, message, off_loop, setting_label, setting_text, table, waiting, words
 
@@ -47,8 +48,7 @@ def register(desk: Desk) -> None:
                     live = Live()
                     planning.lay_out_plan()
             planning.started = live.look
-            keys["s"] = Key("start the planned run", planning.start)
-            keys["p"] = Key("pause or resume the run", live.pause_or_go_on)
+            keys["p"] = Key("pause the run", live.pause_run)
 
 
 class Instruments:
@@ -101,7 +101,8 @@ class Planning:
         self.desk, self.bench = desk, bench
         self.given = {name: value for name, value in given.items() if name != "procedure"}
         self.started: Callable[[], Awaitable[None]] | None = None
-        self.asked, self.good = 0, False
+        self.asked = 0
+        self.found: Plan | None = None
         names = {name: f"{name}: {summary(path)}" for name, path in paths(bench.folders.procedures).items()}
         chosen = given.get("procedure", DEFAULT_PROCEDURE)
         with box():
@@ -153,7 +154,7 @@ class Planning:
     async def replan(self) -> None:
         """Plan the run with the present settings."""
         self.asked += 1
-        asked, self.good = self.asked, False
+        asked, self.found = self.asked, None
         self.button.disable()
         self.plan.clear()
         with self.plan:
@@ -168,14 +169,14 @@ class Planning:
                     failed("This procedure cannot run", message(error))
             return
         if asked == self.asked:
-            self.good = True
+            self.found = found
             self.button.enable()
             self.plan.clear()
             with self.plan:
                 _show(found, self.bench)
 
-    async def start(self) -> None:
-        """Start the run in a background process."""
+    def start(self) -> None:
+        """Open the checks before the run; their Begin starts it."""
         if lab_read() is not None:
             ui.notify(
                 "This workbench reads the lab's record; start `rig web` without --record to make runs", type="warning"
@@ -185,32 +186,31 @@ class Planning:
         if under_way is not None and under_way.phase != "ended":
             ui.notify(f"{under_way.procedure} is running; stop it first", type="warning")
             return
-        if self.good:
-            self.button.disable()
+        if self.found is not None:
             name, settings = str(self.name.value), self.settings()
-            await off_loop(control.begin, name, settings, self.desk.bench_file, bool(self.attended.value))
-            if self.started is not None:
-                await self.started()
-            self.button.enable()
+            BeginDialog(before_start(self.found, self.bench), partial(self._begin, name, settings))
+
+    async def _begin(
+        self, name: str, settings: Mapping[str, str], sensor: Mapping[str, str], answers: Mapping[str, str]
+    ) -> None:
+        """Start the run in a background process. Raises Busy while another run is in progress."""
+        attended = bool(self.attended.value)
+        await off_loop(control.begin, name, settings, self.desk.bench_file, attended, sensor, answers)
+        if self.started is not None:
+            await self.started()
 
 
 def _show(found: Plan, bench: Bench) -> None:
     """Show a plan."""
-    faster = ", which is simulated and faster" if bench.simulated else ""
-    free = free_bytes(home())
-    rows = {
-        "Takes": f"{duration(found.duration_s)}{faster}",
-        "Stores": f"{found.poses} poses, {size(found.bytes)}; {size(free)} are free on the disk",
-    }
-    for role, ((low, high), (least, most)) in found.reach.items():
-        rows[f"Turns {role}"] = f"from {low:g} to {high:g} deg; the limits are {least:g} to {most:g} deg"
+    rows = plan_facts(found, bench)
     if found.questions:
         rows["Asks you"] = "; ".join(dict.fromkeys(found.questions))
     facts(rows)
     lines = [(duration(stretch.start_s), stretch.words) for stretch in stretches(found)]
     table(("at", "what"), lines[:MOST_STRETCHES])
     if len(lines) > MOST_STRETCHES:
-        words(f"and {len(lines) - MOST_STRETCHES} more: rig plan {found.procedure}", "quiet small")
+        with ui.expansion(f"{len(lines) - MOST_STRETCHES} more").props("dense"):
+            table(("at", "what"), lines[MOST_STRETCHES:])
 
 
 def _field(name: str, value: str, few: Sequence[str]) -> ui.select | ui.input:

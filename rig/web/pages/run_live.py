@@ -16,6 +16,7 @@ from rig.drawings import Attitude, page
 from rig.runs.background import control
 from rig.runs.background.status import Asked, Status
 from rig.web.frame import control_run
+from rig.web.pages.run_begin import BeginDialog, before_resume
 from rig.web.pages.run_record import OverTime
 from rig.web.parts import box, div, failed, for_page, off_loop, words
 
@@ -74,11 +75,9 @@ class Live:
         """Send a decision to a paused run."""
         control_run(lambda status: control.answer(status, what))
 
-    def pause_or_go_on(self) -> None:
-        """Pause a running run, or continue a paused one."""
-        if self.status is not None and self.status.phase == "paused":
-            self.decide("resume")
-        elif self.status is not None and self.status.phase == "running":
+    def pause_run(self) -> None:
+        """Pause a running run. No key continues it: a key must not move anything."""
+        if self.status is not None and self.status.phase == "running":
             control_run(control.pause)
 
     def _enlarge(self) -> None:
@@ -93,10 +92,17 @@ class Live:
         if self.status is not None:
             ui.navigate.to(f"/?{urlencode({'data': self.status.run})}")
 
-    async def go_on(self) -> None:
-        """Resume an incomplete run."""
-        if (status := self.status) is not None and status.run:
+    def go_on(self) -> None:
+        """Open the checks before an incomplete run resumes."""
+        if (status := self.status) is None or not status.run:
+            return
+
+        async def begin(_sensor: Mapping[str, str], _answers: Mapping[str, str]) -> None:
             await off_loop(control.go_on, status.run, status.procedure, None, False)
+            await self.look()
+
+        attitude = Attitude(**status.attitude) if status.attitude else Attitude()
+        BeginDialog(before_resume(status.run, status.procedure, attitude), begin)
 
     async def look(self) -> None:
         """Show the present status; only changes are sent."""

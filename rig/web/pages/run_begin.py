@@ -1,0 +1,137 @@
+"""The last step before a run: sensor, drawing, checks by hand, duration and limits; then Begin."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from nicegui import ui
+
+from calibrations.text import capital, duration, size
+from rig.bench import Bench
+from rig.drawings import Attitude, page
+from rig.files import free_bytes, home
+from rig.planning.plan import Plan
+from rig.planning.preparation import checks, first_question, mounting, stops
+from rig.web.parts import div, facts, for_page, message, words
+
+
+@dataclass(frozen=True)
+class Preparation:
+    """The content of the dialog. `answers`: the questions that the checks answer with yes, by name."""
+
+    title: str
+    facts: Mapping[str, str]
+    checks: Sequence[str]
+    attitude: Attitude
+    sensor: Mapping[str, str] | None = None  # name and serial number; None: they cannot be changed
+    answers: Mapping[str, str] = field(default_factory=dict)
+
+
+def before_start(plan: Plan, bench: Bench) -> Preparation:
+    """The preparation of a new run. The sensors of a batch keep the names of the bench file."""
+    question = first_question(plan)
+    by_hand = [for_page(capital(line)) for line in checks(plan)]
+    sensor = None if bench.sensors else {"name": bench.sensor.name, "serial": bench.sensor.serial}
+    batch = {"Sensors": ", ".join(bench.sensors)} if bench.sensors else {}
+    return Preparation(
+        f"{plan.procedure} on {bench.name}",
+        batch | plan_facts(plan, bench),
+        [*by_hand, *([question.text] if question is not None else [])],
+        mounting(plan),
+        sensor,
+        {question.name: "yes"} if question is not None else {},
+    )
+
+
+def before_resume(run: str, procedure: str, attitude: Attitude) -> Preparation:
+    """The preparation of a stopped run that continues."""
+    by_hand = (
+        "The cables can follow the stages over the whole range, and nothing and nobody is within their reach",
+        "The sensor is fastened as before, as in the drawing",
+    )
+    return Preparation(f"Resume {procedure} {run}", {}, by_hand, attitude)
+
+
+def plan_facts(plan: Plan, bench: Bench) -> dict[str, str]:
+    """Duration, storage, reach and limits of a plan."""
+    faster = ", simulated: it passes faster" if bench.simulated else ""
+    rows = {
+        "Takes": f"{duration(plan.duration_s)}{faster}",
+        "Stores": f"{plan.poses} poses, {size(plan.bytes)}; {size(free_bytes(home()))} are free on the disk",
+    }
+    for role, ((low, high), (least, most)) in plan.reach.items():
+        rows[f"Turns {role}"] = f"from {low:g} to {high:g} deg; the limits are {least:g} to {most:g} deg"
+    rows["Stops"] = for_page("; ".join(stops(bench)))
+    return rows
+
+
+Begin = Callable[[Mapping[str, str], Mapping[str, str]], Awaitable[None]]
+
+
+class BeginDialog:
+    """The dialog; `begin` receives sensor and answers. *Begin* is enabled when every check is ticked.
+
+    An error of `begin` keeps the dialog open and is shown in it.
+    """
+
+    def __init__(self, content: Preparation, begin: Begin) -> None:
+        self.content, self.begin = content, begin
+        with ui.dialog().props("persistent") as self.dialog, ui.card().classes("begin"):
+            words(content.title, "title")
+            with div("two"):
+                with div("stack"):
+                    self._sensor()
+                    facts(content.facts)
+                    words("Check by hand", "title")
+                    self.boxes = [ui.checkbox(line, on_change=self._look) for line in content.checks]
+                with div("attitude"):
+                    ui.html(page(content.attitude), sanitize=False)
+            self.fault = words("", "fault").props("role=alert")
+            with div("row-of"):
+                self.button = ui.button("Begin", icon="play_arrow", on_click=self._begin)
+                ui.button("Cancel", on_click=self.close).props("flat")
+                self.hint = words("", "quiet small")
+        self._look()
+        self.dialog.open()
+
+    def _sensor(self) -> None:
+        self.inputs: dict[str, ui.input] = {}
+        if self.content.sensor is None:
+            return
+        with div("row-of"):
+            for name, label in (("name", "Sensor"), ("serial", "Serial number")):
+                field = ui.input(label, value=self.content.sensor[name], on_change=self._look).props("dense")
+                self.inputs[name] = field.classes("grow")
+
+    @property
+    def sensor(self) -> dict[str, str]:
+        """Name and serial number as typed."""
+        return {name: str(field.value or "").strip() for name, field in self.inputs.items()}
+
+    def _look(self) -> None:
+        """Enable Begin if every check is ticked and the sensor has a name or a serial number."""
+        if not hasattr(self, "button"):
+            return
+        left = sum(not box.value for box in self.boxes)
+        unnamed = bool(self.inputs) and not any(self.sensor.values())
+        self.button.set_enabled(not left and not unnamed)
+        text = f"{left} of {len(self.boxes)} checks to do" if left else "Nothing has moved yet."
+        self.hint.set_text("Give the name or the serial number of the sensor." if unnamed else text)
+
+    async def _begin(self) -> None:
+        self.button.disable()
+        self.fault.set_text("")
+        given = {name: text for name, text in self.sensor.items() if text or name == "serial"}
+        try:
+            await self.begin(given, self.content.answers)
+        except Exception as error:
+            self.fault.set_text(message(error))
+            self._look()
+            return
+        self.close()
+
+    def close(self) -> None:
+        """Close the dialog and forget its ticks."""
+        self.dialog.close()
+        self.dialog.delete()
