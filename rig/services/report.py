@@ -12,7 +12,7 @@ from calibrations.errors import UnusableData
 from rig.record import Record
 from rig.record.measured import Measured
 from rig.results.motion import beside_displacement
-from rig.services.load import loaded
+from rig.services.load import Loaded, loaded
 from rig.services.next_experiment import planned
 from rig.services.provenance import program, today
 from rig.services.request import Request
@@ -80,14 +80,16 @@ def _facts(measured: Measured, date: str, program: str) -> Mapping[str, str]:
 # The page on data and a model.
 
 
-def reported(request: Request, tell: Callable[[str], None]) -> Page:
-    """On a model, or on the night of a soak where none is named. Raises what `loaded` and `fit` raise, UnusableData."""
+def reported(request: Request, tell: Callable[[str], None], held: Loaded | None = None) -> Page:
+    """On a model, or on the night of a soak where none is named. Raises what `loaded` and `fit` raise, UnusableData.
+
+    `held`: data and model that are in memory already, so that the page and its report show the same rows.
+    """
     night = night_of(request.data, today(), program()) if request.model is None and request.channel is None else None
-    return night or _on_a_model(request, tell)
+    return night or _on_a_model(request, held or loaded(request, tell), tell)
 
 
-def _on_a_model(request: Request, tell: Callable[[str], None]) -> Page:
-    asked = loaded(request, tell)
+def _on_a_model(request: Request, asked: Loaded, tell: Callable[[str], None]) -> Page:
     beside = asked.data.compare(asked.model)
     if (reason := beside.rejection) is not None and reason.verdict == Verdict.NO_RESPONSE:
         raise UnusableData(f"{asked.data.source}: no report is written: {reason.verdict}: {reason.text}")

@@ -14,8 +14,9 @@ from typing import Any, Generic
 from calibrations.discovery.dataset import Dataset
 from calibrations.discovery.results import Comparison, Diagnosis, F, Findings, Step
 from calibrations.effects import Effect
-from calibrations.errors import ModelError
+from calibrations.errors import CalibrationError, ModelError
 from calibrations.model import Model
+from rig.services.content import Content, content_of
 from rig.services.load import loaded
 from rig.services.next_experiment import planned
 from rig.services.provenance import with_provenance
@@ -30,6 +31,7 @@ class ModelSession(Generic[F]):
 
     `kept` are the data without gross outliers, `start` the fit to them. `effects` are those that may be added, `notes`
     is what a person should know of the data, `plans` are the searches so far by the effects added before them.
+    `content` is that of data and model when they were read.
     """
 
     request: Request
@@ -41,6 +43,7 @@ class ModelSession(Generic[F]):
     start: F
     steps: tuple[Step[F], ...] = ()
     plans: dict[Names, Findings[F]] = field(default_factory=dict, compare=False)
+    content: Content = field(default_factory=lambda: Content(""))
 
     @property
     def end(self) -> F:
@@ -125,6 +128,27 @@ class ModelSession(Generic[F]):
 def model_session(request: Request) -> ModelSession[Any]:
     """The beginning: data (a file or a run) and a model by name or file. Raises what `loaded` and `fit` raise."""
     notes: list[str] = []
+    content = content_of(request.data, request.model)  # before the data: a row between both makes the session old
     found = loaded(request, notes.append)
     kept, start = found.data.beginning(found.model)
-    return ModelSession(request, found.model, found.data, kept, found.effects, tuple(notes), start)
+    return ModelSession(request, found.model, found.data, kept, found.effects, tuple(notes), start, content=content)
+
+
+def brought_up_to_date(old: ModelSession[Any]) -> ModelSession[Any]:
+    """The same request and the same added effects on the present data; a note says what changed.
+
+    Raises what `model_session` raises. An effect that the present data cannot have is left out, with a note.
+    """
+    new = model_session(old.request)
+    was, now = old.content.extent, new.content.extent
+    notes = [
+        f"The data or the model have changed since this page was last open: {was or 'a file'}, now {now or 'new'}."
+    ]
+    for step in old.steps:
+        effect = step.after.model.terms[-1].effect
+        try:
+            new = new.among({**new.effects, effect.name: effect})
+            new = new.with_step(new.tried(effect))
+        except CalibrationError as error:
+            notes.append(f"{effect.name} is not in the model any more: {error}")
+    return replace(new, notes=(*notes, *new.notes))

@@ -28,12 +28,19 @@ class Desk:
     sessions: OrderedDict[tuple[str, str], ModelSession[Any]] = field(default_factory=OrderedDict)
 
     def open(self, data: str, model: str) -> ModelSession[Any]:
-        """The open session, or a new one; `model` "" is the default model. Raises the errors of `model_session`."""
-        from rig.services.request import Request
-        from rig.services.session import model_session
+        """The open session if its data and model are still the same, else a new one with the same added effects.
 
-        request = Request(data, model or None, self.bench_file)
-        found = self.sessions.get((data, model)) or model_session(request)
+        `model` "" is the default model. Raises the errors of `model_session`.
+        """
+        from rig.services.content import content_of
+        from rig.services.request import Request
+        from rig.services.session import brought_up_to_date, model_session
+
+        found = self.sessions.get((data, model))
+        if found is None:
+            found = model_session(Request(data, model or None, self.bench_file))
+        elif found.content.key != content_of(data, model or None).key:
+            found = brought_up_to_date(found)
         self.keep(data, model, found)
         return found
 

@@ -16,8 +16,8 @@ from procedures.catalogue import find
 from procedures.settings import parse
 from rig.bench import read_bench
 from rig.cli.terminal.watch import Quiet
-from rig.record import Record
-from rig.runs.runner import start
+from rig.record import Kept, Record
+from rig.runs.runner import resume, start
 from tests.browser.conftest import Workbench
 from tests.browser.held import held_up
 from tests.browser.measured import hidden, hundred_thousand, thousand, unexplained, wandering
@@ -228,3 +228,39 @@ def test_large_data_leave_the_page_alive(workbench: Workbench, tmp_path: Path, m
     expect(page.get_by_text(re.compile("of [0-9]+ selected"))).to_be_visible(timeout=ALIVE_MS)
     workbench.shot(page, f"dark-{rows.split()[1]}")
     dark.click()
+
+
+class Stopping(Quiet):
+    """Stops the run after a number of poses."""
+
+    left = 20
+
+    def kept(self, kept: Kept) -> None:
+        super().kept(kept)
+        self.left -= 1
+        if not self.left:
+            raise KeyboardInterrupt
+
+
+def test_an_analysis_of_a_part_of_a_run_says_so_and_is_updated(workbench: Workbench) -> None:
+    settings = parse(find("sweep"), {"step_deg": "45", "inclinations_deg": "90,30,60"})
+    with Record() as record:
+        run = start(record, read_bench(), find("sweep"), settings, Stopping({})).run
+    assert (run.state, run.rows) == ("stopped", 20)
+    page = looked_at(workbench, run.run, "")
+    expect(page.locator(".verdict .detail")).to_contain_text("on 20 poses")
+    with Record() as record:
+        complete = resume(record, run.run, Quiet({})).run
+    assert complete.state == "complete"
+    expect(page.get_by_text(f"has changed: {complete.rows} poses by now")).to_be_visible()
+    expect(page.locator(".verdict .detail")).to_contain_text("on 20 poses")
+    workbench.shot(page, "changed")
+    page.get_by_role("button", name="Update").click()
+    expect(page.locator(".verdict .detail")).to_contain_text(f"on {complete.rows} poses")
+    expect(page.get_by_text("now 54 poses")).to_be_visible()
+    expect(page.locator(DOTS)).to_have_count(complete.rows)
+    page.get_by_role("button", name="Save model").click()
+    expect(page.get_by_role("dialog")).to_contain_text(f"{complete.rows} poses")
+    page.get_by_role("button", name="Save", exact=True).click()
+    expect(page.get_by_text("written:")).to_be_visible()
+    assert read_model(workbench.home / "models" / "complete.yaml").provenance["rows"] == complete.rows

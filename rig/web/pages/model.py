@@ -11,6 +11,7 @@ from nicegui import ui
 
 from calibrations.discovery.verdict import Verdict
 from rig.errors import RecordError
+from rig.services.content import Content, content_of
 from rig.services.exclusion import numbered_run
 from rig.web.desk import Desk, runs
 from rig.web.frame import Key, frame
@@ -24,6 +25,9 @@ from rig.web.parts import Cancelled, Counted, box, div, failed, for_page, messag
 if TYPE_CHECKING:
     from calibrations.discovery.results import Comparison, Diagnosis, Step
     from rig.services.session import ModelSession
+
+
+LOOK_S = 2.0
 
 
 def register(desk: Desk) -> None:
@@ -43,6 +47,7 @@ class Workbench:
         self.search = Counted({})
         self.turn = 0  # results of older requests are ignored
         self.diagnoses: dict[tuple[str, ...], Diagnosis[Any]] = {}
+        self.seen: tuple[bool, Content] | None = None
 
     def build(self) -> None:
         """Build the page; long computations start when the browser shows it."""
@@ -59,6 +64,7 @@ class Workbench:
             if not self.data:
                 _nothing()
                 return
+            self.newer = div("")
             self.notes = div("stack")
             self.verdict = VerdictBox()
             self.analysis = div("analysis")
@@ -112,7 +118,31 @@ class Workbench:
         if found := run_record.left_out(self.data):
             with self.notes, ui.expansion(f"{len(found)} excluded from every analysis").props("dense").classes("box"):
                 run_record.listed(self.data, self.afresh)
+        ui.timer(LOOK_S, self._look_for_changes)
         await self.show(session)
+
+    async def _look_for_changes(self) -> None:
+        """Say that the run grows, or that data or model have changed, with a button that updates the analysis."""
+        if self.session is None:
+            return
+        held = self.session.content
+        try:
+            present = await off_loop(content_of, self.data, self.model or None)
+        except Exception:  # the record is busy, or the file is being written: look again later
+            return
+        changed = present.key != held.key
+        if (state := (changed, present)) == self.seen:
+            return
+        self.seen = state
+        self.newer.clear()
+        if not changed and not present.growing:
+            return
+        have = f"{present.extent} by now; " if changed and present.extent else ""
+        what = f"{self.data} is still running" if present.growing else f"{self.data} or the model has changed"
+        with self.newer, box("note row-of").props("role=status"):
+            words(f"{what}: {have}this page analyses {held.extent or 'the earlier content'}.", "grow")
+            if changed:
+                ui.button("Update", icon="refresh", on_click=lambda: self.go(self.data, self.model)).props("dense")
 
     async def show(self, session: ModelSession[Any]) -> None:
         """Show pictures and error of the present model, then its missing effects."""

@@ -88,6 +88,8 @@ class Choice:
         with ui.dialog() as dialog, ui.card().style("min-width: 420px"):
             words("Save the present model", "title")
             name = ui.input("Name", value="complete").props("autofocus").classes("grow")
+            if self.page.session is not None:
+                words(f"Fitted to {self.page.session.data.description}.", "small")
             where = words(f"Folder: {home() / MODELS}", "quiet small")
 
             def save() -> None:
@@ -126,15 +128,17 @@ class Choice:
 
     async def _report(self) -> None:
         """Download the report, as from `rig report`."""
+        from rig.services.load import Loaded
         from rig.services.report import reported
         from rig.services.request import Request
 
         page, session = self.page, self.page.session
+        held = Loaded(session.data, session.model, session.effects) if session is not None else None
         hint = ui.notification("Making the report", spinner=True, timeout=None)
         try:
             notes: list[str] = []
             _, made = await off_loop(
-                reported, Request(page.data, page.model or None, page.desk.bench_file), notes.append
+                reported, Request(page.data, page.model or None, page.desk.bench_file), notes.append, held
             )
             text = await off_loop(made)
             ui.download.content(text, f"{Path(page.data).stem}-{session.model.name if session else 'model'}.html")

@@ -1,0 +1,49 @@
+"""The content of data and model: what an analysis was computed from, and whether it is still the same."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+from rig.record import Record
+
+
+@dataclass(frozen=True)
+class Content:
+    """`key` changes with every row, exclusion, constant, and with the model's file.
+
+    `extent`: number of rows as text, "" for a file. `growing`: a run in progress adds rows.
+    """
+
+    key: str
+    extent: str = ""
+    growing: bool = False
+
+
+def content_of(data: str, model: str | None) -> Content:
+    """The present content of `data` (a file, a run, a sensor of a run) and `model`.
+
+    Reads no samples. Raises UnknownRun, RecordError, OSError.
+    """
+    of_model = _of_file(Path(model)) if model and Path(model).is_file() else model or ""
+    if Path(data).is_file():
+        return Content(_key("file", _of_file(Path(data)), of_model))
+    name, _, sensor = data.partition("/")
+    with Record.to_find(name) as record:
+        run = record.run(name)
+        excluded = sorted(record.excluded(run.run).items())
+        read = [(reading.name, reading.value) for reading in record.readings(run.run)]
+        count = record.next_number(run.run)
+    parts = (run.run, run.uid, run.rows, count, excluded, read, dict(run.constants), sensor, of_model)
+    return Content(_key(*parts), run.extent, run.state == "running")
+
+
+def _key(*parts: object) -> str:
+    return hashlib.sha256(json.dumps(parts, default=str).encode()).hexdigest()
+
+
+def _of_file(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

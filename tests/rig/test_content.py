@@ -1,0 +1,50 @@
+"""The content of data and model: an open session never shows an analysis of other rows than the record has."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from rig.record import Record
+from rig.services.content import content_of
+from rig.services.exclusion import exclude
+from rig.web.desk import Desk
+from tests import recorded
+
+
+@pytest.fixture
+def run(rig_home: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
+    shutil.copytree(recorded.record(tmp_path_factory, "sweep"), rig_home)
+    with Record() as record:
+        return record.runs()[0].run
+
+
+def test_the_key_follows_rows_exclusions_and_the_model(run: str, tmp_path: Path) -> None:
+    key = content_of(run, "linear").key
+    assert content_of("last", "linear").key == key
+    with Record() as record:
+        exclude(record, run, [3], "a bump")
+    assert content_of(run, "linear").key != key
+    with Record() as record:
+        exclude(record, run, [3], None)
+    assert content_of(run, "linear").key == key
+    assert content_of(run, "physical").key != key
+    (model := tmp_path / "model.yaml").write_text("one")
+    before = content_of(run, str(model))
+    model.write_text("two")
+    assert content_of(run, str(model)).key != before.key
+
+
+def test_a_session_of_changed_data_is_made_anew_with_its_effects(run: str) -> None:
+    desk = Desk(None)
+    session = desk.open(run, "linear")
+    desk.keep(run, "linear", session.with_step(session.tried(session.effects["axis-misalignment"])))
+    assert desk.open(run, "linear").names == ("axis-misalignment",)
+    with Record() as record:
+        exclude(record, run, [3, 4], "a bump")
+    again = desk.open(run, "linear")
+    assert again.names == ("axis-misalignment",)
+    assert again.data.table.n == again.end.table.n == session.data.table.n - 2
+    assert "have changed" in again.notes[0]
