@@ -52,8 +52,8 @@ def head(at: Connection, run: str) -> str:
 
 
 def run_row(at: Connection, run: str) -> Row[Any]:
-    """The row of the run, without its names. Raises UnknownRun."""
-    chosen = [column for column in runs.c if column not in (runs.c.run, runs.c.uid)]
+    """The row of the run, without its names and its checksum. Raises UnknownRun."""
+    chosen = [column for column in runs.c if column not in (runs.c.run, runs.c.uid, runs.c.checksum)]
     row = at.execute(select(*chosen).where(runs.c.run == run)).one_or_none()
     if row is None:
         raise UnknownRun(f"no run {run!r}")
@@ -69,11 +69,15 @@ def uid_of(at: Connection, run: str) -> str:
 def rows_of(table: Table, run: str, counted: bool = False) -> Select[Any]:
     """The rows of a run in order, without the columns that belong to one record only.
 
-    With `counted`, bytes are replaced by their SHA-256.
+    With `counted`, bytes are replaced by their SHA-256, and checksums are omitted: older records have none.
     """
     kept: Iterable[ColumnElement[Any]] = (column for column in table.c if column not in (*GIVEN, table.c.run))
     if counted:
-        kept = (func.sha256(column) if isinstance(column.type, LargeBinary) else column for column in kept)
+        kept = (
+            func.sha256(column) if isinstance(column.type, LargeBinary) else column
+            for column in kept
+            if column.name != "checksum"
+        )
     query = select(*kept).where(table.c.run == run).order_by(ORDER[table])
     return query.execution_options(yield_per=32)
 

@@ -20,7 +20,7 @@ from sqlalchemy import Connection, Engine, ExceptionContext, create_engine, even
 from sqlalchemy.exc import InvalidatePoolError
 
 from rig.errors import RecordError
-from rig.record.schema import MIGRATIONS, SCHEMA, give_sha256, metadata
+from rig.record.schema import SCHEMA, give_sha256, upgrade
 
 RECOVER = "move it to another folder, or copy its readable rows with `rig doctor --recover FOLDER`"
 FAILURES = {  # primary code of SQLite: fault and remedy
@@ -66,8 +66,13 @@ def open_file(path: Path, tell: Callable[[str], None] = lambda _: None) -> Engin
 def _connected(path: Path) -> sqlite3.Connection:
     """A new connection. It waits for a busy file, and a commit reaches the disk."""
     if path.exists() and not os.access(path.parent, os.W_OK):
-        return sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro&immutable=1", uri=True, check_same_thread=False)
+        connection = sqlite3.connect(
+            f"{path.resolve().as_uri()}?mode=ro&immutable=1", uri=True, check_same_thread=False
+        )
+        connection.text_factory = decoded
+        return connection
     connection = sqlite3.connect(path, check_same_thread=False)
+    connection.text_factory = decoded
     try:
         _prepare(connection)
     except (UnicodeDecodeError, sqlite3.OperationalError) as error:  # SQLite quotes unreadable bytes
@@ -75,6 +80,11 @@ def _connected(path: Path) -> sqlite3.Connection:
             raise RecordError(f"{path}: {FAILURES[sqlite3.SQLITE_CORRUPT]} ({error})") from None
         raise
     return connection
+
+
+def decoded(data: bytes) -> str:
+    """The text; unreadable bytes become surrogates, so that the other rows of a query stay readable."""
+    return data.decode("utf-8", "surrogateescape")
 
 
 def _prepare(connection: sqlite3.Connection) -> None:
@@ -148,9 +158,7 @@ def _make_tables(engine: Engine, path: Path) -> None:
         if _version(to, path) < SCHEMA:
             to.exec_driver_sql("BEGIN IMMEDIATE")  # of two processes at a new file only one makes the tables
             version = _version(to, path)
-            metadata.create_all(to)
-            for statement in (each for old in range(version or SCHEMA, SCHEMA) for each in MIGRATIONS[old]):
-                to.execute(text(statement))
+            upgrade(to, version)
             to.execute(text(f"PRAGMA user_version = {SCHEMA:d}"))
 
 

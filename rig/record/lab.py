@@ -12,7 +12,7 @@ from sqlalchemy import URL, Connection, Engine, ExceptionContext, create_engine,
 from sqlalchemy.exc import ArgumentError, InterfaceError, OperationalError
 
 from rig.errors import LabAway, RecordError
-from rig.record.schema import MIGRATIONS, SCHEMA, metadata
+from rig.record.schema import SCHEMA, metadata, upgrade
 
 SECRET = ("password", "sslpassword")  # query keys of libpq
 # The message does not quote a refused URL, because it may contain a password.
@@ -148,9 +148,7 @@ def prepare(url: URL) -> int:
             before = version(to)
             if before > SCHEMA:
                 require_current(before, shown(url))
-            metadata.create_all(to)
-            for statement in (each for old in range(before or SCHEMA, SCHEMA) for each in MIGRATIONS[old]):
-                to.execute(text(statement))
+            upgrade(to, before)
             to.execute(text(f"COMMENT ON TABLE runs IS 'schema {SCHEMA:d}'"))
             _grant(to)
     finally:

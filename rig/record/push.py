@@ -89,7 +89,8 @@ def push(own: Record, lab: Record, run: str) -> Pushed:
     """
     _require_finished(own, run)
     with own.engine.connect() as at:
-        parcel = _Parcel(run, uid_of(at, run), dict(run_row(at, run)._mapping), head(at, run), digest(at, run))
+        row = {**run_row(at, run)._mapping, "checksum": at.scalar(select(runs.c.checksum).where(runs.c.run == run))}
+        parcel = _Parcel(run, uid_of(at, run), row, head(at, run), digest(at, run))
         done = None
         while done is None:
             with lab.engine.begin() as to:

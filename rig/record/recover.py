@@ -1,21 +1,30 @@
 """Recovery of a damaged record: copies every readable row into a new record, and reports the losses.
 
 SQLite stores rows in pages, so damage at one place loses some rows of one table. Each table is read from both ends up
-to the damage. A pose without its samples is not copied.
+to the damage. A row with another checksum than at its insertion is not copied, and a pose without its samples neither.
+A run with a damaged or lost entry gets a new one, with the parts that are readable, so that its poses are in reach.
+
+A file that lost its end is read from a copy that is filled up with zeros.
 """
 
 from __future__ import annotations
 
+import shutil
 import sqlite3
+import struct
 from collections.abc import Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+
+from sqlalchemy import Connection, delete, insert, select, union, update
 
 from rig.errors import RecordError
 from rig.record import codec
-from rig.record.file import open_file
-from rig.record.schema import metadata
+from rig.record.checksum import COVERED, is_damaged
+from rig.record.file import decoded, open_file
+from rig.record.schema import DAMAGED, blocks, metadata, poses, readings, runs
 
 FILE = "record.db"
 UNREADABLE = (sqlite3.Error, UnicodeDecodeError)  # the second: SQLite quotes unreadable bytes in its messages
@@ -23,11 +32,14 @@ UNREADABLE = (sqlite3.Error, UnicodeDecodeError)  # the second: SQLite quotes un
 
 @dataclass(frozen=True)
 class Recovered:
-    """The number of copied rows by table, the tables with unreadable rows, and the poses with damaged samples."""
+    """The number of copied rows by table, the tables with unreadable rows, the poses with damaged samples, and a phrase
+    for each other loss.
+    """
 
     rows: Mapping[str, int]
     damaged: tuple[str, ...]
     spoilt: tuple[str, ...]
+    changed: tuple[str, ...] = ()
 
 
 def recover(source: Path, folder: Path) -> Recovered:
@@ -38,25 +50,111 @@ def recover(source: Path, folder: Path) -> Recovered:
     target = folder / FILE
     if target.exists():
         raise RecordError(f"{target}: this record exists already; give a folder without a record")
-    open_file(target).dispose()
-    with closing(_opened(source)) as old, closing(sqlite3.connect(target)) as new:
+    folder.mkdir(parents=True, exist_ok=True)
+    begun, padded = folder / "recovery.db", folder / "padded.db"
+    for file in (begun, padded):
+        for each in folder.glob(f"{file.name}*"):
+            each.unlink()  # of an attempt that failed
+    try:
+        found = _recovered(_whole(source, padded), begun)
+        begun.rename(target)
+    finally:
+        for each in (*folder.glob(f"{begun.name}*"), *folder.glob(f"{padded.name}*")):
+            each.unlink()
+    return found
+
+
+def _recovered(source: Path, target: Path) -> Recovered:
+    """Copy the readable rows of the file `source` into the new file `target`."""
+    with closing(_opened(source)) as old:
+        open_file(target).dispose()
+        new = sqlite3.connect(target)
         rows, damaged = {}, []
         for table in metadata.sorted_tables:
             copied, whole = _copied(old, new, table.name)
             rows[table.name] = copied
             if not whole:
                 damaged.append(table.name)
+        new.commit()
+        changed = tuple(_checked(target))
         spoilt = tuple(_spoilt(new))
         new.execute("DELETE FROM poses WHERE NOT EXISTS (SELECT 1 FROM blocks WHERE blocks.run = poses.run "
                     "AND blocks.number = poses.number)")  # fmt: skip
         new.commit()
-    return Recovered(rows, tuple(damaged), spoilt)
+        new.execute("PRAGMA journal_mode = DELETE")  # all is in one file, which gets its name now
+        new.close()
+    return Recovered(rows, tuple(damaged), spoilt, changed)
+
+
+_HEADER = struct.Struct(">16x H 10x I")  # of SQLite's file: bytes of a page, number of pages
+
+
+def _whole(source: Path, padded: Path) -> Path:
+    """The file, or a copy that is filled up with zeros if the end is missing."""
+    with source.open("rb") as file:
+        head = file.read(_HEADER.size)
+    if len(head) < _HEADER.size or not head.startswith(b"SQLite format 3"):
+        return source  # is refused when it is opened
+    page, pages = _HEADER.unpack(head)
+    size = (65536 if page == 1 else page) * pages
+    if source.stat().st_size >= size:
+        return source
+    shutil.copyfile(source, padded)
+    if (log := source.with_name(f"{source.name}-wal")).exists():
+        shutil.copyfile(log, padded.with_name(f"{padded.name}-wal"))
+    with padded.open("r+b") as file:
+        file.truncate(size)
+    return padded
+
+
+def _checked(target: Path) -> Iterator[str]:
+    """Remove rows that changed on the disk, and make a new entry for runs without a sound one. Yields the losses."""
+    engine = open_file(target)
+    try:
+        with engine.begin() as to:
+            for table in (table for table in COVERED if table is not runs):
+                place = "name" if "name" in table.c else "number"
+                key = (table.c.run, table.c[place])
+                rows = to.execute(select(table))
+                bad = [(row.run, getattr(row, place)) for row in rows if is_damaged(table, row._mapping)]
+                for run, which in bad:
+                    to.execute(delete(table).where(key[0] == run, key[1] == which))
+                    yield f"run {run}, {table.name}: {which}"
+            yield from _mend_runs(to)
+    finally:
+        engine.dispose()
+
+
+def _mend_runs(to: Connection) -> Iterator[str]:
+    for row in to.execute(select(runs)).all():
+        if is_damaged(runs, row._mapping):
+            values: dict[str, Any] = {name: value for name, value in row._mapping.items() if value is DAMAGED}
+            lost = ", ".join(values) or "one value; check its settings, constants and bench"
+            message = f"recovered from a damaged record; unreadable: {lost}"
+            mended: dict[str, Any] = {
+                **{name: {} for name in values},
+                "state": "failed",
+                "message": message,
+                "checksum": None,
+            }
+            to.execute(update(runs).where(runs.c.run == row.run).values(mended))
+            yield f"run {row.run}: {lost}"
+    there = union(*[select(table.c.run) for table in (poses, blocks, readings)]).subquery()
+    for run in to.execute(select(there.c.run).where(there.c.run.not_in(select(runs.c.run)))).scalars().all():
+        documents: dict[str, Any] = {name: {} for name in ("settings", "bench", "identities", "constants", "results")}
+        procedure = (*run.split("-"), "", "", "unknown")[2] or "unknown"
+        to.execute(insert(runs), {
+            "run": run, "kind": "poses", "procedure": procedure, "state": "failed", "configuration": "", "created": "",
+            "source": "a damaged record", "message": "recovered from a damaged record without the entry of this run",
+            **documents})  # fmt: skip
+        yield f"run {run}: its entry; settings, bench and constants are empty now"
 
 
 def _opened(source: Path) -> sqlite3.Connection:
     """The damaged file with its log, read-only."""
     try:
         old = sqlite3.connect(f"{source.resolve().as_uri()}?mode=ro", uri=True)
+        old.text_factory = decoded
         old.execute("SELECT count(*) FROM sqlite_master").fetchone()
     except UNREADABLE as error:
         raise RecordError(f"{source}: no row is readable ({error}); restore a copy of the record") from None
@@ -81,10 +179,19 @@ def _copied(old: sqlite3.Connection, new: sqlite3.Connection, table: str) -> tup
             if row is None:
                 whole = False
             else:
-                copied += new.execute(insert, row).rowcount
+                copied += new.execute(insert, [_writable(value) for value in row]).rowcount
         if whole:
             break
     return copied, whole
+
+
+def _writable(value: object) -> object:
+    """The value. A text with unreadable bytes gets replacement characters, one of them first: it is no JSON then."""
+    if isinstance(value, str) and not value.isascii():
+        data = value.encode("utf-8", "surrogateescape")
+        whole = data.decode("utf-8", "replace")
+        return whole if whole == value else f"\ufffd{whole}"
+    return value
 
 
 def _readable(old: sqlite3.Connection, select: str) -> Iterator[tuple[object, ...] | None]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import sqlite3
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from sqlalchemy import (
@@ -24,6 +24,7 @@ from sqlalchemy import (
     Table,
     Text,
     TypeDecorator,
+    inspect,
     text,
 )
 from sqlalchemy.dialects import postgresql, sqlite
@@ -36,8 +37,18 @@ SERVER = "postgresql"
 Counter = BigInteger().with_variant(Integer, "sqlite")
 
 
+class Damaged:
+    """A document that cannot be read."""
+
+
+DAMAGED = Damaged()
+
+
 class Document(TypeDecorator[Any]):
-    """JSON as Python writes it, with Infinity. It is text in PostgreSQL, because its JSON type refuses Infinity."""
+    """JSON as Python writes it, with Infinity. It is text in PostgreSQL, because its JSON type refuses Infinity.
+
+    An unreadable document is DAMAGED, so that the other rows of a query stay readable.
+    """
 
     impl = JSON
     cache_ok = True
@@ -50,6 +61,17 @@ class Document(TypeDecorator[Any]):
 
     def process_result_value(self, value: Any, dialect: Dialect) -> Any:
         return json.loads(value) if dialect.name == SERVER and value is not None else value
+
+    def result_processor(self, dialect: Dialect, coltype: object) -> Callable[[Any], Any] | None:
+        decode = super().result_processor(dialect, coltype)
+
+        def decoded(value: Any) -> Any:
+            try:
+                return value if decode is None else decode(value)
+            except (ValueError, TypeError):
+                return DAMAGED
+
+        return decoded
 
 
 def is_new(to: Connection, table: Table, values: Mapping[str, Any]) -> bool:
@@ -80,7 +102,7 @@ def _sha256(data: bytes | None) -> bytes | None:
 # `SCHEMA` is the version of the tables. It is stored in `user_version` of a file, and on a server in the comment on the
 # table `runs`.
 
-SCHEMA = 8
+SCHEMA = 9
 metadata = MetaData()
 
 runs = Table(
@@ -101,6 +123,7 @@ runs = Table(
     Column("message", String),  # why it stopped or failed
     Column("results", Document, nullable=False),
     Column("uid", String, nullable=False, server_default=""),  # the same in every record that the run is copied to
+    Column("checksum", BigInteger),  # of the values that do not change; NULL in rows of older programs
 )
 
 poses = Table(
@@ -121,6 +144,7 @@ poses = Table(
     Column("beta_read_deg", Float),
     Column("up", String, nullable=False, server_default="z"),  # the edge that stands along the table's normal
     Column("rate_deg_s", Float, nullable=False, server_default="0"),  # of beta, in a turn that was kept
+    Column("checksum", BigInteger),
 )
 
 readings = Table(  # numbers that belong to a run and to none of its poses
@@ -132,6 +156,7 @@ readings = Table(  # numbers that belong to a run and to none of its poses
     Column("value", Float, nullable=False),
     Column("std", Float),
     Column("unit", String, nullable=False),
+    Column("checksum", BigInteger),
 )
 
 blocks = Table(
@@ -144,6 +169,7 @@ blocks = Table(
     Column("channels", Document, nullable=False),
     Column("codec", String, nullable=False),
     Column("samples", LargeBinary, nullable=False),
+    Column("checksum", BigInteger),
 )
 
 dwells = Table(  # what a page draws of a night without reading its samples
@@ -154,6 +180,7 @@ dwells = Table(  # what a page draws of a night without reading its samples
     Column("n", Integer, nullable=False),  # samples
     Column("means", Document, nullable=False),  # V, by channel
     Column("stds", Document, nullable=False),
+    Column("checksum", BigInteger),
 )
 
 columns = Table(  # of imported tables
@@ -164,6 +191,7 @@ columns = Table(  # of imported tables
     Column("position", Integer, nullable=False),
     Column("numbers", LargeBinary),  # float64, little-endian
     Column("texts", Document),
+    Column("checksum", BigInteger),
 )
 
 states = Table(  # of a simulated bench after the last kept pose: clock, world, twins
@@ -217,7 +245,17 @@ answers = Table(  # about one sensor of a fleet, so that the same question is no
     Column("answer", Document, nullable=False),
 )
 
-# Statements from each version to the next. New tables are made before.
+
+def upgrade(to: Connection, version: int) -> None:
+    """Make missing tables, and change those of the older `version`; 0 is a database without tables."""
+    older = set(inspect(to).get_table_names())
+    metadata.create_all(to)
+    for statement in (each for old in range(version or SCHEMA, SCHEMA) for each in MIGRATIONS[old]):
+        if statement.split()[2] in older:  # ALTER TABLE name; a new table has every column
+            to.execute(text(statement))
+
+
+# Statements from each version to the next, see `upgrade`.
 MIGRATIONS = {
     1: ("ALTER TABLE poses ADD COLUMN excluded VARCHAR",),
     2: tuple(f"ALTER TABLE poses ADD COLUMN {role}_read_deg FLOAT" for role in ("alpha", "beta")),
@@ -229,4 +267,8 @@ MIGRATIONS = {
     5: (),  # a new table
     6: ("ALTER TABLE runs ADD COLUMN uid VARCHAR NOT NULL DEFAULT ''",),  # and a new table
     7: (),  # a new table
+    8: tuple(
+        f"ALTER TABLE {table} ADD COLUMN checksum BIGINT"
+        for table in ("runs", "poses", "readings", "blocks", "dwells", "columns")
+    ),
 }

@@ -29,6 +29,7 @@ from rig.errors import RecordError, UnknownRun
 from rig.files import RECORD, home
 from rig.lease import is_held
 from rig.record import codec
+from rig.record.checksum import is_damaged, with_checksum
 from rig.record.file import RECOVER, open_file
 from rig.record.schema import (
     arrivals,
@@ -139,9 +140,9 @@ class Record:
         measured = kept.dwell
         dwell = {"n": measured.n, "means": dict(measured.means), "stds": dict(measured.stds)}
         with self._engine.begin() as to:
-            to.execute(insert(poses), key | pose | {name: getattr(kept, name) for name in _BESIDE})
-            to.execute(insert(blocks), key | samples)
-            to.execute(insert(dwells), key | dwell)
+            pose |= {name: getattr(kept, name) for name in _BESIDE}
+            for table, values in ((poses, pose), (blocks, samples), (dwells, dwell)):
+                to.execute(insert(table), with_checksum(table, key | values))
             if state is not None:
                 _put_state(to, run, state)
             self._put_lines(to)
@@ -150,7 +151,8 @@ class Record:
         """Add readings and the `state` of the simulated bench, in one transaction. An existing name is replaced."""
         with self._engine.begin() as to:
             for reading in read:
-                _put(to, readings, {"run": run, "at": now(), **vars(reading)}, ("run", "name"))
+                row = with_checksum(readings, {"run": run, "at": now(), **vars(reading)})
+                _put(to, readings, row, ("run", "name"))
             if state is not None:
                 _put_state(to, run, state)
             self._put_lines(to)
@@ -212,27 +214,45 @@ class Record:
         with self._engine.begin() as to:
             run = _new_run(to, values | {"ended": now()})
             for position, cell in enumerate(cells):
-                to.execute(insert(columns), {**cell, "run": run, "position": position})
+                row = with_checksum(columns, {**cell, "position": position})
+                to.execute(insert(columns), {**row, "run": run})
         return run
 
     # reading
 
     def runs(self) -> list[Run]:
-        """Every run, newest first."""
+        """Every readable run, newest first; `damaged_runs` has the others."""
         with self._reading() as at:
-            rows = at.execute(_select_runs().order_by(newest_first(at)))
-            return [self._seen(Run(**row._mapping)) for row in rows]
+            rows = at.execute(_select_runs().order_by(newest_first(at))).all()
+        return [self._seen(_run(row)) for row in rows if not is_damaged(runs, row._mapping)]
+
+    def damaged_runs(self) -> list[str]:
+        """A sentence for each run with a damaged entry, newest first."""
+        with self._reading() as at:
+            rows = at.execute(_select_runs().order_by(newest_first(at))).all()
+        return [_damage(row.run) for row in rows if is_damaged(runs, row._mapping)]
+
+    def damaged_rows(self) -> list[str]:
+        """A phrase for each row of a run, except its entry, that changed on the disk."""
+        found = []
+        with self._reading() as at:
+            for table in (poses, blocks, dwells, readings, columns):
+                rows = at.execution_options(yield_per=32).execute(select(table))
+                found += [_place(row, table) for row in rows if is_damaged(table, row._mapping)]
+        return found
 
     def run(self, name: str) -> Run:
         """The run with this id, or whose id alone begins so; `last` and `last PROCEDURE` are the newest ones.
 
-        Raises UnknownRun with a suggestion.
+        Raises UnknownRun with a suggestion; RecordError if the entry of the run is damaged.
         """
         with self._reading() as at:
             rows = at.execute(_named(at, name)).all() or at.execute(_beginning(name)).all()
             known = at.execute(select(runs.c.procedure if name.startswith(f"{LAST} ") else runs.c.run)).scalars().all()
         if len(rows) == 1:
-            return self._seen(Run(**rows[0]._mapping))
+            if is_damaged(runs, rows[0]._mapping):
+                raise RecordError(f"{self.where}: {_damage(rows[0].run)}")
+            return self._seen(_run(rows[0]))
         if rows:
             listed = ", ".join(sorted(row.run for row in rows)[:MOST_LISTED])
             raise UnknownRun(f"{len(rows)} runs in {self.where} begin with {name!r}: {listed}; write more of the id")
@@ -242,9 +262,9 @@ class Record:
     def poses(self, run: str) -> list[Pose]:
         """The poses in order, without the excluded ones."""
         chosen = (poses.c.run == run) & poses.c.excluded.is_(None)
-        query = select(*[poses.c[name] for name in _POSE]).where(chosen).order_by(poses.c.number)
+        query = select(poses).where(chosen).order_by(poses.c.number)
         with self._reading() as at:
-            return [Pose(**row._mapping) for row in at.execute(query)]
+            return [_pose(_sound(row, poses)) for row in at.execute(query)]
 
     def excluded(self, run: str) -> dict[int, str]:
         """The reason of each excluded pose, by its number."""
@@ -267,10 +287,10 @@ class Record:
 
     def readings(self, run: str) -> list[Reading]:
         """The run's readings, in the order of their names."""
-        names = ("name", "value", "unit", "std")
-        query = select(*[readings.c[name] for name in names]).where(readings.c.run == run).order_by(readings.c.name)
+        query = select(readings).where(readings.c.run == run).order_by(readings.c.name)
         with self._reading() as at:
-            return [Reading(*row) for row in at.execute(query)]
+            rows = [_sound(row, readings) for row in at.execute(query)]
+        return [Reading(row.name, row.value, row.unit, row.std) for row in rows]
 
     def kept(self, run: str) -> Iterator[Kept]:
         """Every pose with its samples, in order, with the excluded ones. Only a few are in memory at a time."""
@@ -279,7 +299,8 @@ class Record:
         with self._reading() as at:
             options = at.execution_options(yield_per=32)
             for row in options.execute(query.order_by(poses.c.number)):
-                yield _kept(row)
+                if row.excluded is None or not any(is_damaged(table, row._mapping) for table in (poses, blocks)):
+                    yield _kept(_sound(row, poses, blocks))
 
     def dwells(self, run: str, after: int = -1) -> list[tuple[int, Dwell]]:
         """Means and scatter of every pose with a number above `after`, without the excluded ones.
@@ -287,10 +308,10 @@ class Record:
         For runs of an older program they are computed from the samples, which is slower.
         """
         same = (poses.c.run == dwells.c.run) & (poses.c.number == dwells.c.number)
-        query = select(poses, dwells.c.n, dwells.c.means, dwells.c.stds).join_from(poses, dwells, same, isouter=True)
+        query = select(poses, dwells).join_from(poses, dwells, same, isouter=True)
         chosen = (poses.c.run == run) & (poses.c.number > after) & poses.c.excluded.is_(None)
         with self._reading() as at:
-            rows = at.execute(query.where(chosen).order_by(poses.c.number)).all()
+            rows = [_sound(row, poses, dwells) for row in at.execute(query.where(chosen).order_by(poses.c.number))]
         older = {kept.number: kept.dwell for kept in self.kept(run)} if any(row.n is None for row in rows) else {}
         return [(row.number, older.get(row.number) or _dwell(row)) for row in rows]
 
@@ -316,7 +337,7 @@ class Record:
         """The columns of an imported table: numbers, and texts, by name."""
         query = select(columns).where(columns.c.run == run).order_by(columns.c.position)
         with self._reading() as at:
-            rows = at.execute(query).all()
+            rows = [_sound(row, columns) for row in at.execute(query)]
         numbers = {row.name: np.frombuffer(row.numbers, "<f8") for row in rows if row.numbers is not None}
         return numbers, {row.name: tuple(row.texts) for row in rows if row.numbers is None}
 
@@ -359,7 +380,7 @@ def _new_run(to: Connection, values: Mapping[str, Any]) -> str:
     while True:
         run = f"{datetime.now(UTC):%Y%m%d-%H%M%S}-{values['procedure']}-{secrets.token_hex(2)[:3]}"
         row = {"results": {}, "identities": {}, **values, "run": run, "created": now(), "uid": uuid.uuid4().hex}
-        if is_new(to, runs, row):
+        if is_new(to, runs, with_checksum(runs, row)):
             return run  # else a run of the same second has this id
 
 
@@ -393,9 +414,40 @@ def _beginning(name: str) -> Select[Any]:
     return _select_runs().where(runs.c.run.startswith(name, autoescape=True) if name else false())
 
 
+def _run(row: Row[Any]) -> Run:
+    return Run(**{name: value for name, value in row._mapping.items() if name != "checksum"})
+
+
+def _pose(row: Row[Any]) -> Pose:
+    return Pose(**{name: row._mapping[poses.c[name]] for name in _POSE})
+
+
+def _sound(row: Row[Any], *tables: SqlTable) -> Row[Any]:
+    """The row of `tables`. Raises RecordError if it changed on the disk."""
+    damaged = next((table for table in tables if is_damaged(table, row._mapping)), None)
+    if damaged is None:
+        return row
+    if damaged in (readings, columns):
+        raise RecordError(f"{_place(row, damaged)}; {RECOVER}")
+    raise RecordError(
+        f"{_place(row, damaged)}; exclude it with `rig exclude "
+        f"{row.run} {row.number} --reason damaged`, or restore a copy of the record"
+    )
+
+
+def _place(row: Row[Any], table: SqlTable) -> str:
+    """The phrase about a row that changed on the disk."""
+    which = f" {table.name[:-1]} {row.name!r}" if "name" in table.c else f" pose {row.number}"
+    return f"run {row.run},{which}: its values changed on the disk ({table.name})"
+
+
+def _damage(run: str) -> str:
+    """The sentence about a run with a damaged entry."""
+    return f"run {run}: its entry is damaged; `rig doctor --recover FOLDER` copies its poses and the other runs"
+
+
 def _dwell(row: Row[Any]) -> Dwell:
-    pose = Pose(**{name: row._mapping[name] for name in _POSE})
-    return Dwell(pose, row.t_s, row.means, row.stds, row.n, row.temperature_c)
+    return Dwell(_pose(row), row.t_s, row.means, row.stds, row.n, row.temperature_c)
 
 
 def _kept(row: Row[Any]) -> Kept:
@@ -406,6 +458,6 @@ def _kept(row: Row[Any]) -> Kept:
         volts = codec.decode(row.samples)
     except ValueError as error:
         raise RecordError(f"{where}: {error}; restore a copy of the record") from None
-    pose = Pose(**{name: row._mapping[name] for name in _POSE})
+    pose = _pose(row)
     block = Block(volts, tuple(row.channels), row.rate_hz, row.start_s)
     return Kept(pose, block, excluded=row.excluded, number=row.number, **{name: row._mapping[name] for name in _BESIDE})

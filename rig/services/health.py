@@ -69,7 +69,10 @@ def _record_finding(file: Path) -> Finding:
     try:
         with closing(sqlite3.connect(f"{file.resolve().as_uri()}?mode=ro", uri=True)) as connection:
             problems = [row[0] for row in connection.execute("PRAGMA integrity_check(10)")]
-    except sqlite3.Error as error:
+        if problems == ["ok"]:
+            with Record(file.parent) as record:
+                problems = [*record.damaged_runs(), *record.damaged_rows()] or ["ok"]
+    except (sqlite3.Error, RecordError) as error:
         problems = [str(error)]
     sound = problems == ["ok"]
     size = f"{file.stat().st_size / 1e6:.1f} MB"

@@ -195,6 +195,8 @@ def test_a_database_is_prepared_once_and_brought_up_to_date(server: Server, rig:
     with Record() as own, Record(lab_url(url)) as lab:
         run = a_run(own)
         push(own, lab, run)
+    for table in ("runs", "poses", "readings", "blocks", "dwells", "columns"):
+        server.sql(f"ALTER TABLE {table} DROP COLUMN checksum", name)
     server.sql("ALTER TABLE runs DROP COLUMN uid; DROP TABLE arrivals; COMMENT ON TABLE runs IS 'schema 6'", name)
     assert f"this record has an older schema (6 of {SCHEMA}); `rig push --prepare" in rig("runs", "--record", url).err
     assert prepare(lab_url(url)) == 6

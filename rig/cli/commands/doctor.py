@@ -83,6 +83,7 @@ def _recovered(folder: Path, as_json: bool) -> int:
     """Recover the record; print the copied and the lost rows."""
     done = recover(home() / "record.db", folder)
     lost = [*(f"some rows of {table}" for table in done.damaged), *(f"the samples of {pose}" for pose in done.spoilt)]
+    lost += done.changed
     if as_json:
         emit({"schema": "rig.recovered/1", "folder": str(folder), "rows": dict(done.rows), "lost": lost})
     else:

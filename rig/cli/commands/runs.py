@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from calibrations.text import columns
-from rig.cli.terminal.output import emit, json_option
+from rig.cli.terminal.output import emit, json_option, notes
 from rig.record import Record, Run
 
 
@@ -14,10 +14,11 @@ from rig.record import Record, Run
 def command(as_json: bool) -> None:
     """List the runs of the record, newest first."""
     with Record.to_read() as record:
-        runs = record.runs()
+        runs, damaged = record.runs(), record.damaged_runs()
+    notes(damaged)
     if as_json:
         emit({"schema": "rig.runs/1", "runs": [_document(run) for run in runs]})
-    elif runs:
+    elif runs or damaged:
         rows = [(run.run, run.state, run.kind, run.extent, run.source) for run in runs]
         click.echo(columns(("run", "state", "kind", "holds", "source"), rows))
     else:

@@ -1,0 +1,143 @@
+"""Rows that changed on the disk: each is named and refused, the others stay readable, and recovery reaches them."""
+
+from __future__ import annotations
+
+import shutil
+import sqlite3
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from procedures.session import Pose, Reading
+from rig.errors import RecordError
+from rig.record import Kept, Record
+from rig.record.measured import table_of
+from rig.record.recover import recover
+from tests.rig.test_doctor import PAGE, recorded
+from tests.rig.test_store import begin, block
+
+
+def change(record: Path, statement: str, *values: object) -> None:
+    with closing(sqlite3.connect(record / "record.db")) as connection, connection:
+        assert connection.execute(statement, values).rowcount == 1
+
+
+def flip(folder: Path, column: str, run: str, at: int = 4) -> None:
+    """One bit of a run's document: the text is no JSON, or no text, any more."""
+    with closing(sqlite3.connect(folder / "record.db")) as connection, connection:
+        (text,) = connection.execute(f"SELECT {column} FROM runs WHERE run = ?", (run,)).fetchone()  # noqa: S608
+        data = bytearray(text.encode())
+        data[at] ^= 0x80
+        connection.execute(f"UPDATE runs SET {column} = CAST(? AS TEXT) WHERE run = ?", (bytes(data), run))  # noqa: S608
+
+
+def two_runs(folder: Path) -> tuple[str, str]:
+    return recorded(folder, 3), recorded(folder, 3)
+
+
+def test_one_damaged_run_is_named_and_hides_no_other(rig: Callable[..., Any], rig_home: Path, tmp_path: Path) -> None:
+    bad, good = two_runs(rig_home)
+    flip(rig_home, "constants", bad)
+    listed = rig("runs")
+    assert (listed.status, good in listed.out, bad in listed.out) == (0, True, False)
+    assert f"run {bad}: its entry is damaged" in listed.err
+    with Record() as record, pytest.raises(RecordError, match=f"run {bad}: its entry is damaged"):
+        record.run(bad)
+    checked = rig("doctor", "--out", str(tmp_path / "doctor.zip"))
+    assert (checked.status, f"WRONG  damaged: run {bad}" in checked.out) == (1, True)
+    ended = rig("doctor", "--recover", str(tmp_path / "new"))
+    assert (ended.status, f"run {bad}: constants" in ended.out) == (1, True)
+    with Record(tmp_path / "new") as record:
+        assert [run.run for run in record.runs()] == [good, bad]
+        assert record.run(bad).constants == {}
+        assert table_of(record, bad).n == table_of(record, good).n == 3
+
+
+def test_a_number_that_changed_in_a_document_is_noticed(tmp_path: Path) -> None:
+    run = recorded(tmp_path, 1)
+    change(tmp_path, "UPDATE runs SET settings = '{\"step_deg\": 18.0}'")
+    with Record(tmp_path) as record:
+        assert (record.runs(), len(record.damaged_runs())) == ([], 1)
+        with pytest.raises(RecordError, match="entry is damaged"):
+            record.run(run)
+
+
+@pytest.mark.parametrize(
+    "statement",
+    [
+        "UPDATE poses SET beta_deg = 65.0 WHERE number = 1",
+        "UPDATE blocks SET rate_hz = 1001.0 WHERE number = 1",
+        "UPDATE blocks SET start_s = 2.0 WHERE number = 1",
+    ],
+)
+def test_a_changed_pose_is_named_until_it_is_excluded(tmp_path: Path, statement: str) -> None:
+    run = recorded(tmp_path, 3)
+    change(tmp_path, statement)
+    with Record(tmp_path) as record:
+        with pytest.raises(RecordError, match="pose 1: its values changed on the disk"):
+            table_of(record, run)
+        assert len(record.damaged_rows()) == 1
+        record.exclude(run, 1, "damaged")
+        assert list(table_of(record, run).column("beta_deg")) == [0, 2]
+    done = recover(tmp_path / "record.db", tmp_path / "new")
+    assert "1" in done.changed[0]
+    with Record(tmp_path / "new") as record:
+        assert record.poses(run) == [Pose(90, 0), Pose(90, 2)]
+
+
+def test_changed_means_readings_and_columns_are_noticed(tmp_path: Path) -> None:
+    run = recorded(tmp_path, 1)
+    change(tmp_path, "UPDATE dwells SET n = 399")
+    change(tmp_path, "UPDATE readings SET value = 0.03")
+    with Record(tmp_path) as record:
+        for read in (record.dwells, record.readings):
+            with pytest.raises(RecordError, match="changed on the disk"):
+                read(run)
+
+
+def test_rows_of_an_older_program_have_no_checksum_and_are_read(tmp_path: Path) -> None:
+    run = recorded(tmp_path, 2)
+    with closing(sqlite3.connect(tmp_path / "record.db")) as connection, connection:
+        for table in ("runs", "poses", "blocks", "dwells", "readings"):
+            connection.execute(f"UPDATE {table} SET checksum = NULL")  # noqa: S608
+    with Record(tmp_path) as record:
+        assert (record.run(run).rows, len(record.dwells(run)), len(record.readings(run))) == (2, 2, 1)
+        assert (record.damaged_runs(), record.damaged_rows(), table_of(record, run).n) == ([], [], 2)
+
+
+def test_odd_numbers_keep_their_checksum(tmp_path: Path) -> None:
+    with Record(tmp_path) as record:
+        run = begin(record)
+        record.keep(run, 0, Kept(Pose(90, -0.0, 1, "\u00e9\x00", 1, 1), block([[2.0, 1.0]]), 3, float("nan")), None)
+        record.keep_readings(run, [Reading("a", 1, "m", None)], None)
+        assert (len(list(record.kept(run))), len(record.readings(run)), record.damaged_rows()) == (1, 1, [])
+
+
+def test_a_record_that_lost_its_end_is_recovered(tmp_path: Path) -> None:
+    run = recorded(tmp_path / "old", 54)
+    path = tmp_path / "old" / "record.db"
+    path.write_bytes(path.read_bytes()[:-PAGE])
+    assert recover(path, tmp_path / "new").rows["poses"] > 50
+    with Record(tmp_path / "new") as record:
+        assert len(list(record.kept(run))) > 50
+    assert sorted(file.name for file in (tmp_path / "new").iterdir()) == ["record.db"]
+
+
+def test_a_failed_recovery_does_not_block_the_next(tmp_path: Path) -> None:
+    recorded(tmp_path / "old", 1)
+    (tmp_path / "letters").write_text("no database" * 1000)
+    with pytest.raises(RecordError, match="no row is readable"):
+        recover(tmp_path / "letters", tmp_path / "new")
+    assert recover(tmp_path / "old" / "record.db", tmp_path / "new").rows["poses"] == 1
+
+
+def test_poses_without_the_entry_of_their_run_are_in_reach(tmp_path: Path) -> None:
+    run = recorded(tmp_path / "old", 2)
+    change(tmp_path / "old", "DELETE FROM runs")
+    shutil.rmtree(tmp_path / "new", ignore_errors=True)
+    assert recover(tmp_path / "old" / "record.db", tmp_path / "new").changed
+    with Record(tmp_path / "new") as record:
+        assert (record.run(run).state, table_of(record, run).n) == ("failed", 2)
