@@ -61,7 +61,10 @@ class Points:
 
 @dataclass(frozen=True)
 class Line:
-    """Points joined by a line; NaN is a gap. A `halo` keeps it visible over dots."""
+    """Points joined by a line; NaN is a gap. A `halo` keeps it visible over dots.
+
+    `texts` are for `hover`, one a point.
+    """
 
     x: Array
     y: Array
@@ -72,6 +75,7 @@ class Line:
     halo: bool = False
     hover: str = ""
     markers: bool = False
+    texts: Sequence[str] = ()
 
 
 @dataclass(frozen=True)

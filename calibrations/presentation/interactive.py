@@ -238,6 +238,7 @@ def _line(s: c.Line, panel: c.Panel) -> Parts:
     look = {"color": _visible(s.colour), "width": s.width, "dash": s.dash}
     trace = _trace(s, panel, "lines+markers" if s.markers else "lines") | {"line": look}
     trace |= {"hovertemplate": f"{s.hover}<extra></extra>"} if s.hover else {"hoverinfo": "skip"}
+    trace |= {"text": list(s.texts)} if s.texts else {}
     halo = {**trace, "line": {"color": "rgba(255,255,255,0.85)", "width": 2 * s.width}, "hoverinfo": "skip",
             "showlegend": False}  # fmt: skip
     return ([halo, trace] if s.halo else [trace]), [], []

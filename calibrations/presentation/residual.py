@@ -21,6 +21,7 @@ from calibrations.text import minus, rounded
 LENGTHS = ((7200.0, 3600.0, "h"), (180.0, 60.0, "min"), (-1.0, 1.0, "s"))  # longer than, unit, its name
 RESOLUTION_C = 0.01  # a smaller range of temperatures is that of a constant one
 LABELS = {"temperature_c": "temperature (°C)", "supply_v": "supply voltage (V)"}
+HOLD = "hold "  # the paths of a soak, which switches the sensor on
 SHOWN_OTHERWISE = ("direction", "alpha_deg", "beta_deg")
 NAMES = {
     "alpha_deg": "α (deg)",
@@ -111,7 +112,20 @@ def _time(table: Table, n: int) -> Column:
     if "t_s" not in table:
         return _same("row", "row (number)", np.arange(1.0, table.n + 1), n)
     size, unit = in_time(float(np.ptp(table.time_s)))
-    return _same("time", f"time ({unit})", table.time_s / size, n)
+    zero_s, since = time_origin(table)
+    return _same("time", f"time{since} ({unit})", (table.time_s - zero_s) / size, n)
+
+
+def time_origin(table: Table) -> tuple[float, str]:
+    """(zero of a time axis on the clock of the table in s, its name): power-on of a soak, else the run's first row.
+
+    The times of a file are taken as they are.
+    """
+    if table.numbers is None:
+        return 0.0, ""
+    if any(path.startswith(HOLD) for path in table.labels.get("path", ())):
+        return 0.0, " since power-on"
+    return float(table.time_s[0]), " since the first pose"
 
 
 def in_time(length_s: float) -> tuple[float, str]:
@@ -263,7 +277,8 @@ def _place(table: Table, row: int) -> Iterator[str]:
         yield f"row {number}: {at['rate_deg_s']:g} deg/s"
     else:
         yield f"row {number}"
-    details = [f"t = {at['t_s']:.0f} s"] if "t_s" in at else []
+    zero_s, since = time_origin(table) if "t_s" in at else (0.0, "")
+    details = [f"t = {at['t_s'] - zero_s:.0f} s{since}"] if "t_s" in at else []
     details += [f"{at['temperature_c']:.2f} °C"] if "temperature_c" in at else []
     if details:
         yield ", ".join(details)

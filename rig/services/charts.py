@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from datetime import date
+from datetime import date, datetime, timedelta
 
 import numpy as np
 
@@ -29,6 +29,8 @@ from calibrations.presentation.charts.noise import TIME, Scaled, measured_points
 from calibrations.presentation.residual import Column, Shown, in_time
 from calibrations.text import estimate_text, labelled, minus, prefixed, unit
 from procedures.session import Dwell
+from rig.record import Record, Run
+from rig.record.measured import Measured
 from rig.services.history import Calibration, Quantity
 from rig.services.two_runs import DIFFERENT, Again, Pair
 
@@ -112,16 +114,40 @@ FEW = 400  # parts: as many can be told apart as dots
 ROW, AXIS = 0.27, 0.6  # inches of a difference, and of the axis of a group
 
 
-def course_chart(course: Course, name: str) -> Chart:
+@dataclass(frozen=True)
+class RunTime:
+    """The time axis of a run: `zero_s` on the run's clock, its name, and the time of day at 0 s of that clock."""
+
+    zero_s: float = 0.0
+    since: str = " since the start of the run"
+    begun: datetime | None = None
+
+    @classmethod
+    def of(cls, record: Record, run: Run) -> RunTime:
+        """Power-on of a run that switches the sensor, else the start of the run."""
+        begun = datetime.fromisoformat(run.created)
+        on_s = Measured(record, run, next(iter(run.bench.get("sensors", {})), None)).power_on_s() if run.rows else 0.0
+        return cls(on_s, " since power-on", begun) if on_s or run.procedure == "soak" else cls(begun=begun)
+
+    def clock(self, t_s: float) -> str:
+        """The time of day, UTC, for the pointer."""
+        if self.begun is None:
+            return ""
+        return f"{self.begun + timedelta(seconds=t_s):%Y-%m-%d %H:%M:%S} UTC"
+
+
+def course_chart(course: Course, name: str, time: RunTime = RunTime()) -> Chart:
     """One quantity, V or °C, over the time of the run: means of several dwells, with the range of the dwells."""
-    t_s, mean, low, high = course.line(name)
+    run_s, mean, low, high = course.line(name)
+    t_s = [each - time.zero_s for each in run_s]
     size, unit_s = in_time(t_s[-1] - t_s[0] if t_s else 0.0)
     at, colour = np.array(t_s) / size, CANDIDATE if name == "temperature" else MEASURED
     band = (Band(at, np.array(low), np.array(high), colour=colour, opacity=0.2),) if course.each > 1 else ()
-    hover = f"%{{y:.6g}} at %{{x:.4g}} {unit_s}"
-    line = Line(at, np.array(mean), colour=colour, hover=hover, markers=len(at) < FEW)
+    hover = f"%{{y:.6g}} at %{{x:.4g}} {unit_s}<br>%{{text}}"
+    clock = [time.clock(each) for each in run_s]
+    line = Line(at, np.array(mean), colour=colour, hover=hover, markers=len(at) < FEW, texts=clock)
     label = "temperature (°C)" if name == "temperature" else f"{name} (V)"
-    return one(Panel((*band, line), Axis(f"time ({unit_s})"), Axis(label)))
+    return one(Panel((*band, line), Axis(f"time{time.since} ({unit_s})"), Axis(label)))
 
 
 # A sensor's life

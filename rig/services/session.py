@@ -8,6 +8,7 @@ again from there; shares of the error stay those of the model that the session b
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any, Generic
 
@@ -16,6 +17,7 @@ from calibrations.discovery.results import Comparison, Diagnosis, F, Findings, S
 from calibrations.effects import Effect
 from calibrations.errors import CalibrationError, ModelError
 from calibrations.model import Model
+from rig.errors import RecordError
 from rig.services.content import Content, content_of
 from rig.services.load import loaded
 from rig.services.next_experiment import planned
@@ -128,7 +130,9 @@ class ModelSession(Generic[F]):
 def model_session(request: Request) -> ModelSession[Any]:
     """The beginning: data (a file or a run) and a model by name or file. Raises what `loaded` and `fit` raise."""
     notes: list[str] = []
-    content = content_of(request.data, request.model)  # before the data: a row between both makes the session old
+    content = Content("")
+    with suppress(RecordError, OSError):  # `loaded` says better what is wrong
+        content = content_of(request.data, request.model)  # before the data: a later row makes the session old
     found = loaded(request, notes.append)
     kept, start = found.data.beginning(found.model)
     return ModelSession(request, found.model, found.data, kept, found.effects, tuple(notes), start, content=content)

@@ -264,3 +264,22 @@ def test_an_analysis_of_a_part_of_a_run_says_so_and_is_updated(workbench: Workbe
     page.get_by_role("button", name="Save", exact=True).click()
     expect(page.get_by_text("written:")).to_be_visible()
     assert read_model(workbench.home / "models" / "complete.yaml").provenance["rows"] == complete.rows
+
+
+def test_pictures_have_true_angles_and_opening_a_card_leaves_them(workbench: Workbench, tmp_path: Path) -> None:
+    page = looked_at(workbench, hidden(tmp_path, "package turned"), "misses axis-misalignment")
+    ticks = page.locator("[aria-label='Residual pattern'] .yaxislayer-above text")
+    expect(ticks.last).to_have_text("150")
+    assert ticks.all_text_contents() == ["30", "45", "60", "90", "120", "135", "150"]
+    label = page.locator("[aria-label='Residuals'] .xtitle")
+    expect(label).to_have_text("β (deg)")  # also with the first card open and its effect drawn
+    expect(page.get_by_text("explained by axis-misalignment")).to_be_visible()
+    second = page.locator(".card .head").nth(1)
+    second.click()
+    expect(second).to_have_attribute("aria-expanded", "true")
+    expect(page.get_by_text("explained by axis-misalignment")).to_be_visible()
+    expect(label).to_have_text("β (deg)")
+    workbench.shot(page, "card")
+    page.locator(".card.first").get_by_role("button", name="Show the curve").click()
+    expect(label).to_have_text("change made by axis-misalignment (mV)")
+    workbench.shot(page, "curve")

@@ -169,8 +169,21 @@ def test_the_map_holds_the_residual_over_the_floor_at_each_pose() -> None:
         np.testing.assert_allclose(shown.values, found.residual[c] / found.noise.floor[c])  # type: ignore[arg-type]
         np.testing.assert_array_equal(shown.x, found.table.column("beta_deg"))
         side = found.table.column("direction")
-        np.testing.assert_array_equal(np.sign(shown.y - found.table.column("alpha_deg")), side)
+        inclination = [float(panel.y.names[k]) for k in np.rint(shown.y).astype(int)]  # the name of its row is true
+        np.testing.assert_array_equal(inclination, found.table.column("alpha_deg"))
+        np.testing.assert_array_equal(np.sign(shown.y - np.rint(shown.y)), side)
         assert [symbol == "triangle-up" for symbol in shown.symbol] == (side > 0).tolist()
+
+
+def test_an_effect_is_a_line_only_over_a_column_that_it_is_a_function_of() -> None:
+    step, table = warm().steps[0], warm().start.table
+    found = charts.choices(warm().start)
+    for name, wanted in (("temperature_c", Line), ("beta", Points)):
+        series = charts.residual(charts.Shown(warm().start, 0, False), found[name], found["alpha_deg"], step).series
+        assert isinstance(series[-1], wanted)
+    change = charts.change_of(step)[0]
+    np.testing.assert_allclose(series[-1].y, 1e3 * change)  # type: ignore[union-attr] # a cross at the change of each row
+    assert len(change) == table.n
 
 
 def test_the_map_of_positions_is_of_equal_area() -> None:

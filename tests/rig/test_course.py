@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from datetime import UTC, datetime
+
 import numpy as np
 import pytest
 
+from calibrations.presentation.chart import Line
 from procedures.session import Dwell, Pose
-from rig.services.charts import MOST, Course, kind_of
+from rig.services.charts import MOST, Course, RunTime, course_chart, kind_of
 
 
 def dwell(number: int, path: str = "hold 1") -> Dwell:
@@ -38,3 +41,16 @@ def test_what_was_measured_has_names() -> None:
 @pytest.mark.parametrize(("path", "kind"), [("hold 17", "hold"), ("A+ to B-", ""), ("", ""), ("17", "")])
 def test_dwells_of_numbered_paths_belong_together(path: str, kind: str) -> None:
     assert kind_of(dwell(1, path)) == kind
+
+
+def test_times_are_those_since_the_start_with_the_time_of_day_under_the_pointer() -> None:
+    course = Course()
+    for number in range(3):
+        course.add(dwell(number))
+    time = RunTime(10.0, " since power-on", datetime(2026, 5, 1, 12, 0, 0, tzinfo=UTC))
+    panel = course_chart(course, "vx", time).panels[0][0]
+    (line,) = panel.series
+    assert panel.x.label == "time since power-on (s)"
+    assert isinstance(line, Line)
+    assert line.x.tolist() == [-10.0, 0.0, 10.0]
+    assert line.texts[1] == "2026-05-01 12:00:10 UTC"

@@ -48,7 +48,9 @@ from calibrations.presentation.residual import (
 from calibrations.table import MILLI, Array
 
 PALE = 3.0  # times the noise floor: below, noise alone stays pale
-APART = 0.22  # of the step between inclinations, by which both directions of turning are set apart
+APART = 0.22  # of the step between rows of inclinations, by which both directions of turning are set apart
+MOST_INCLINATIONS = 16  # with a row each; more are drawn at their true angles, both directions at one place
+MISSED = 0.1  # part of the change's rms by which a curve may miss the change of single rows
 SIDES: dict[int, Symbol] = {1: "circle", -1: "circle-open", 0: "circle"}
 PLACES: dict[int, Symbol] = {1: "triangle-up", -1: "triangle-down", 0: "circle"}
 TOWARDS = "towards x; left: z upwards, right: z downwards (equal-area map)"
@@ -225,7 +227,14 @@ def _stretches(shown: Shown, x: Array, model: Array) -> tuple[Array, Array]:
     return np.array(at), np.array(values)
 
 
-def _explained(step: Step[Fit], x: Column, shown: Shown) -> Iterator[Line]:
+def _explained(step: Step[Fit], x: Column, shown: Shown) -> Iterator[Line | Points]:
+    """A line where the change is a function of `x`, else a cross for each row."""
+    if not is_function(step, x, shown.c):
+        change, rows = change_of(step)[shown.c], shown.rows
+        hover = [f"explained by {step.name}<br>{shown.place(int(row))}" for row in rows]
+        yield Points(x.values[shown.c, rows], shown.factor * change[rows], colour=CANDIDATE, symbol="cross", size=5,
+                     hover=hover)  # fmt: skip
+        return
     for side, at, values in curves(step, x, shown.c):
         turning = {1: " clockwise", -1: " anticlockwise"}.get(int(side), "")
         yield Line(at, shown.factor * values, colour=CANDIDATE, width=3, dash="solid" if side >= 0 else "dash",
@@ -237,10 +246,12 @@ def _map(shown: Shown) -> tuple[Array, Array, tuple[Axis, Axis]]:
     fit = shown.fit
     if fit.table.type.stage_angles:
         alpha, side = fit.table.column("alpha_deg"), np.sign(fit.table.optional("direction", 0.0))
-        steps = np.diff(np.unique(alpha))
-        apart = APART * float(np.median(steps)) if len(steps) else 1.0
-        label = "β (deg); ▲ turning clockwise, ▼ anticlockwise"
-        return fit.table.column("beta_deg"), alpha + apart * side, (Axis(label, ticks="quarters"), Axis("α (deg)"))
+        label = Axis("β (deg); ▲ turning clockwise, ▼ anticlockwise", ticks="quarters")
+        inclinations, row = np.unique(alpha, return_inverse=True)
+        if len(inclinations) > MOST_INCLINATIONS:
+            return fit.table.column("beta_deg"), alpha, (label, Axis("α (deg)"))
+        names = tuple(f"{each:g}" for each in inclinations)
+        return fit.table.column("beta_deg"), row.ravel() + APART * side, (label, Axis("α (deg)", names=names))
     if fit.table.type.magnitude:
         a = specific_force(fit)
         flat = a[:, :2] / np.sqrt(np.linalg.norm(a, axis=1, keepdims=True) + np.abs(a[:, 2:]))
@@ -305,6 +316,22 @@ def curves(step: Step[Fit], column: Column, c: int) -> Iterator[tuple[float, Arr
         at = np.flatnonzero(side == s)
         at = at[np.argsort(x[at], kind="stable")]
         yield float(s), x[at], y[at]
+
+
+def is_function(step: Step[Fit], column: Column, c: int) -> bool:
+    """Whether the curves of the change over `column` pass through the change of the single rows.
+
+    They may miss them by MISSED of the change's rms, or by the noise floor of one row.
+    """
+    if column.name == "change" or step.before.table.type.moving:
+        return True
+    change, sides, x = change_of(step)[c], _sides(step), column.values[c]
+    missed = np.zeros(len(change))
+    for side, at, values in curves(step, column, c):
+        rows = sides == side
+        missed[rows] = change[rows] - np.interp(x[rows], at, values)
+    limit = max(MISSED * float(rms(change)), float(step.before.noise.floor[c]))
+    return float(rms(missed)) <= limit
 
 
 def _sides(step: Step[Fit]) -> Array:

@@ -89,7 +89,8 @@ class Missing:
                 self._others(result)
             below = div("stack")
         if missing and cards:
-            await cards[0].open()
+            cards[0].open()
+            await self.look_at(cards[0].c)
         if result.next_experiment is not None:
             with below:
                 await self._next(result)
@@ -127,12 +128,12 @@ class Missing:
         except Exception as error:
             hint.set_text(message(error))
 
-    async def look_at(self, c: Candidate) -> None:
-        """Draw the candidate's curve through the residual."""
+    async def look_at(self, c: Candidate, look: bool = False) -> None:
+        """Draw the candidate in the residual; with `look`, against the column that it follows."""
         self.looked_at = c
         step = await self.step_of(c)
         if step is not None and self.looked_at is c:
-            self.page.pictures.consider(step)
+            self.page.pictures.consider(step, look)
 
     async def step_of(self, c: Candidate) -> Step[Any] | None:
         """The complete fit of a candidate; None if it fails, with a message."""
@@ -173,7 +174,7 @@ class Card:
                 self._describe(result)
                 with div("row-of"):
                     ui.button(f"Add {c.name}", icon="add", on_click=lambda: side.add(c)).props("dense unelevated")
-                    ui.button("Show the curve", on_click=lambda: side.look_at(c)).props("dense flat")
+                    ui.button("Show the curve", on_click=lambda: side.look_at(c, look=True)).props("dense flat")
 
     def _describe(self, result: Diagnosis[Any]) -> None:
         c = self.c
@@ -192,19 +193,18 @@ class Card:
             }
         )
 
-    async def open(self) -> None:
-        """Unfold the card and draw the curve."""
+    def open(self) -> None:
+        """Unfold the card; the pictures stay as they are."""
         self.body.set_visibility(True)
         self.head.props("aria-expanded=true")
-        await self.side.look_at(self.c)
 
-    async def toggle(self) -> None:
+    def toggle(self) -> None:
         """Unfold or fold the card."""
         if self.body.visible:
             self.body.set_visibility(False)
             self.head.props("aria-expanded=false")
         else:
-            await self.open()
+            self.open()
 
 
 def _written(value: object) -> str:

@@ -69,7 +69,7 @@ class NoisePictures:
         self.considered.set_visibility(False)
         self.draw()
 
-    def consider(self, step: Step[NoiseFit] | None) -> None:
+    def consider(self, step: Step[NoiseFit] | None, look: bool = False) -> None:  # noqa: ARG002 one axis
         """Also draw the model with one more effect; None removes it."""
         self.step = step
         self.considered.set_visibility(step is not None)

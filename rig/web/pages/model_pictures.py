@@ -6,12 +6,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from nicegui import events, ui
 
 from calibrations.presentation.chart import one
 from calibrations.presentation.charts import motion
 from calibrations.presentation.charts.discovery import levels, waterfall
-from calibrations.presentation.charts.fit import failure, measurement, most_telling, residual
+from calibrations.presentation.charts.fit import failure, is_function, measurement, most_telling, residual
 from calibrations.presentation.interactive import figure
 from calibrations.presentation.residual import Column, Shown, choices, first_choices, residual_units
 from rig.web.parts import box, div, redraw, words
@@ -47,6 +48,7 @@ class Pictures:
         self.columns: dict[str, Column] = {}
         self.selected: list[int] = []
         self.plots: dict[str, ui.plotly] = {}
+        self.legends: dict[str, ui.label] = {}
         with div("pictures"):
             self._controls()
             for name in TITLES:
@@ -72,13 +74,12 @@ class Pictures:
     def _picture(self, name: str) -> None:
         with box("picture"):
             with div("title"):
-                title = words(TITLES[name])
-                if name == "waterfall":
-                    self.falling = title
+                words(TITLES[name])
                 if name == "residual":
                     self.considered = ui.button(icon="close", on_click=lambda: self.consider(None))
                     self.considered.props("flat dense size=sm icon-right=close").props(remove="icon")
                     self.considered.set_visibility(False)
+            self.legends[name] = words("", "legend quiet")
             plot = ui.plotly({"data": [], "layout": {}}).classes("plot").props(f'aria-label="{TITLES[name]}"')
             self.plots[name] = plot
         if name in LINKED:
@@ -92,7 +93,6 @@ class Pictures:
             self.selected = []
         self.fit, self.session, self.step = fit, session, None
         self.columns = choices(fit)
-        self.falling.set_text(f"{TITLES['waterfall']}; ◆ on {fit.table.type.rows} not used in the fit")
         x, colour = first_choices(list(self.columns))
         self._offer(fit.channels)
         self.unit.set_options(residual_units(fit), value=fit.table.type.magnitude or bool(self.unit.value))
@@ -115,19 +115,23 @@ class Pictures:
         self.axis.set_options(dict(enumerate(channels)), value=value)
         self.axis.set_visibility(len(channels) > 1)
 
-    def consider(self, step: Step[Fit] | None) -> None:
-        """Draw the curve of an effect in the residual against its column; None removes it."""
+    def consider(self, step: Step[Fit] | None, look: bool = False) -> None:
+        """Draw an effect in the residual; None removes it. With `look`, against the column that it follows."""
+        if self.fit is None:
+            return
         self.step = step
         self.columns.pop(FOLLOWED, None)
-        if step is not None:
+        same: str | None = None
+        if step is not None and look:
             column = most_telling(step)
             same = next((name for name in self.columns if name == column.name), None)
             if same is None:
                 self.columns[FOLLOWED] = column
+        if step is not None:
             self.considered.set_text(step.name)
         self.considered.set_visibility(step is not None)
         value = self.x.value if self.x.value in self.columns else next(iter(self.columns))
-        if step is not None:
+        if step is not None and look:
             value = same or FOLLOWED
         self.x.set_options({name: column.labels[self.c] for name, column in self.columns.items()}, value=value)
         self.draw()
@@ -159,6 +163,7 @@ class Pictures:
             "residual": residual(shown, self.columns[self.x.value], colour, self.step),
             "failure": motion.failure(shown) if moving else failure(shown),
         }
+        self._legends(shown, plain)
         for name, panel in panels.items():
             linked = not moving or name == "residual"
             keep = f"{panel.x.label} {panel.y.label}"
@@ -168,6 +173,20 @@ class Pictures:
             redraw(self.plots[name], drawn)
         redraw(self.plots["waterfall"], figure(waterfall(levels(session)), "waterfall", False))
         self._tell(shown)
+
+    def _legends(self, shown: Shown, plain: Column) -> None:
+        """Say what marks, lines and bands mean."""
+        kind = shown.fit.table.type
+        sides = "; filled clockwise, open anticlockwise" if np.any(shown.side) else ""
+        model = "line" if plain.name == "beta" or kind.magnitude or kind.moving else "+"
+        effect = ""
+        if self.step is not None:
+            line = is_function(self.step, self.columns[self.x.value], shown.c)
+            effect = f"; orange {'line' if line else '+'}: explained by {self.step.name}"
+        self.legends["measurement"].set_text(f"●: measured; {model}: model{sides}")
+        self.legends["residual"].set_text(f"grey band: ± noise floor{sides}{effect}")
+        self.legends["failure"].set_text("orange: measured above the model; blue: below it")
+        self.legends["waterfall"].set_text(f"bar: fit; ◆ {kind.rows} not used in the fit; grey: the noise floor")
 
     def next_axis(self) -> None:
         """Select the next channel."""

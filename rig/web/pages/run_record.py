@@ -15,7 +15,7 @@ from calibrations.presentation.interactive import figure
 from calibrations.text import bound, estimate_text, joined, unit
 from rig.errors import RecordError
 from rig.record import Event, Record, Run
-from rig.services.charts import Course, course_chart, kind_of
+from rig.services.charts import Course, RunTime, course_chart, kind_of
 from rig.services.exclusion import exclude, numbered_run
 from rig.services.export import export
 from rig.services.history import lives
@@ -107,6 +107,7 @@ class OverTime:
         for select in (self.kind, self.name):
             select.style("min-width: 150px").set_visibility(False)
         self.place = div("")
+        self.time = RunTime()
         self.plot: ui.plotly | None = None
 
     async def follow(self, run: str) -> None:
@@ -118,9 +119,10 @@ class OverTime:
             self.name.set_visibility(False)
         if not run:
             return
-        new = await off_loop(_new, run, self.last)
+        new, time = await off_loop(_new, run, self.last)
         if not new or run != self.run:
             return
+        self.time = time
         for number, dwell in new:
             self.courses.setdefault(kind_of(dwell), Course()).add(dwell)
             self.last = number
@@ -149,7 +151,7 @@ class OverTime:
         if course is None or self.name.value not in course.names:
             return
         name = str(self.name.value)
-        self.lay_out().update_figure(figure(course_chart(course, name), name))
+        self.lay_out().update_figure(figure(course_chart(course, name, self.time), name))
 
     def lay_out(self) -> ui.plotly:
         """The plot; made at the first call, so that the browser loads Plotly early."""
@@ -160,9 +162,10 @@ class OverTime:
         return self.plot
 
 
-def _new(run: str, after: int) -> list[tuple[int, Any]]:
+def _new(run: str, after: int) -> tuple[list[tuple[int, Any]], RunTime]:
     with Record.to_read() as record:
-        return record.dwells(run, after)
+        found = record.dwells(run, after)
+        return found, RunTime.of(record, record.run(run)) if found else RunTime()
 
 
 # The page of one run: settings, results, notes, export and report.
