@@ -1,10 +1,12 @@
-"""Output files, the folder of the record, and free disk space."""
+"""Output files, the folders of the record and of locks, free disk space, and the version of the program."""
 
 from __future__ import annotations
 
 import os
 import shutil
+import tempfile
 from contextlib import suppress
+from importlib.metadata import version
 from pathlib import Path
 
 from rig.errors import OutputError
@@ -31,10 +33,24 @@ def write_whole(out: Path, content: str | bytes) -> None:
         raise OutputError(f"{out}: cannot write the file: {error.strerror}; give another file") from None
 
 
+def program() -> str:
+    """Name and version of this program, as runs and results carry it."""
+    return f"inertial-rig {version('inertial-rig')}"
+
+
 # The folder of the record is `RIG_HOME`, else the user's data folder.
 
 RECORD = "RIG_RECORD"  # URL of a lab's record, to read it instead of the rig's own
 LAB = "RIG_LAB"  # URL of the lab's record for `rig push`
+
+
+def machine() -> Path:
+    """The folder of locks that all users and all folders of records on this machine share."""
+    folder = Path(tempfile.gettempdir()) / "inertial-rig"
+    folder.mkdir(parents=True, exist_ok=True)
+    with suppress(OSError):  # another user made it
+        folder.chmod(0o777)
+    return folder
 
 
 def home() -> Path:

@@ -1,6 +1,7 @@
 """Locks of runs and wires: a lock on a file. The kernel releases it when the process ends.
 
-The file names the process that holds the lock: {"pid": 4711, "what": "run 20240502-...", "since": "14:03:22"}.
+The file names the process that holds the lock: {"pid": 4711, "what": "run 20240502-...", "since": "14:03:22", "runs":
+"/home/..."}. The lock of a wire belongs to the machine, and `runs` is the folder with the locks of its holder's runs.
 """
 
 from __future__ import annotations
@@ -22,16 +23,24 @@ ATTEMPTS, PAUSE_S = 20, 0.01  # `is_held` in another process holds the lock for 
 
 
 @contextmanager
-def lease(folder: Path, name: str, what: str) -> Iterator[None]:
-    """Hold the lock `name` in `folder`; `what` names it for people. Raises Busy if another process holds it."""
+def lease(folder: Path, name: str, what: str, runs: Path | None = None) -> Iterator[None]:
+    """Hold the lock `name` in `folder`; `what` names it for people. `runs`: the folder with the locks of runs, if it is
+    another one; then all users share this lock. Raises Busy if another process holds it.
+    """
     path = _path(folder, name)
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("a+", encoding="utf-8") as file:
+        if runs is not None:
+            with suppress(OSError):  # another user made them
+                path.parent.chmod(0o777)
+                path.chmod(0o666)
         if not _lock(file.fileno()):
             raise Busy(f"{_describe_holder(path)} uses {what}; wait until it ends, or stop it with Ctrl-C")
         since = datetime.now().astimezone()
         file.truncate(0)
-        json.dump({"pid": os.getpid(), "what": what, "since": f"{since:%Y-%m-%d %H:%M:%S}"}, file)
+        json.dump(
+            {"pid": os.getpid(), "what": what, "since": f"{since:%Y-%m-%d %H:%M:%S}", "runs": str(runs or folder)}, file
+        )
         file.flush()
         yield  # the file stays: without it two processes could hold locks with the same name
 
@@ -64,7 +73,8 @@ def _describe_holder(path: Path) -> str:
     holder = _holder(path)
     if not holder:
         return "another process"
-    others = [_holder(other) for other in sorted(path.parent.glob("*.lock")) if other != path]
+    locks = Path(str(holder.get("runs", path.parent.parent))) / FOLDER
+    others = [_holder(other) for other in sorted(locks.glob("*.lock")) if other != path]
     runs = [str(o["what"]) for o in others if o.get("pid") == holder["pid"] and str(o["what"]).startswith("run ")]
     at = f", with {runs[-1]}" if runs else ""
     return f"another process ({holder['pid']}, since {holder['since']}{at})"

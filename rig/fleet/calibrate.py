@@ -19,12 +19,11 @@ from calibrations.fleet.siblings import Pooled, pool_siblings
 from calibrations.model import Estimate, Model
 from calibrations.model.file import dump_model, read_model
 from rig.errors import OutputError
-from rig.files import write_whole
+from rig.files import program, write_whole
 from rig.fleet.discover import errors_of, stands_out
 from rig.fleet.members import Member
 from rig.fleet.questions import Fleet
 from rig.fleet.worker import Own, Question, effects_of, model_of, read_look
-from rig.services.provenance import program
 
 Names = tuple[tuple[str, str, str, str], ...]
 

@@ -12,9 +12,10 @@ from calibrations.presentation.certificate.terms import name as result_name
 from calibrations.presentation.charts.fleet import Spread
 from calibrations.presentation.report.fleet import calibration_report, population_report
 from calibrations.text import estimate_text, rounded
+from rig.files import program
 from rig.fleet.calibrate import Calibrated, Calibration
 from rig.fleet.worker import effects_of
-from rig.services.provenance import program, today
+from rig.services.provenance import today
 
 SCHEMA = "rig.fleet/1"
 Document = dict[str, Any]

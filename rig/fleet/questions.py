@@ -19,14 +19,13 @@ from sqlalchemy import select
 
 import calibrations
 from calibrations.errors import DataError
-from rig.files import RECORD
+from rig.files import RECORD, program
 from rig.fleet.crew import answered
 from rig.fleet.members import Member, content
 from rig.fleet.worker import Question, Task, answer
 from rig.record import Record
 from rig.record.schema import answers, insert_or
 from rig.record.store import now
-from rig.services.provenance import program
 
 if TYPE_CHECKING:
     from distributed import Client

@@ -30,7 +30,7 @@ from drivers.world.world import World
 from rig.bench import Bench
 from rig.bench.check import check_lines
 from rig.errors import InstrumentFailed
-from rig.files import home
+from rig.files import home, machine
 from rig.instruments.guard import GuardedClock
 from rig.lease import lease
 
@@ -71,7 +71,7 @@ def wired(bench: Bench, tap: Tap | None = None) -> Iterator[Wiring]:
     with ExitStack() as stack:
         urls = {i.url for i in bench.instruments.values() if not i.simulated} - {PERSON}
         for line, url in sorted({Url.parse(url).line: url for url in sorted(urls)}.items()):
-            stack.enter_context(lease(home(), f"wire-{hashlib.sha256(line.encode()).hexdigest()[:16]}", url))
+            stack.enter_context(lease(machine(), f"wire-{hashlib.sha256(line.encode()).hexdigest()[:16]}", url, home()))
         world = world_of(bench)
         servers = serve(bench, world)
         for server in servers.values():

@@ -7,6 +7,11 @@ from __future__ import annotations
 
 import logging
 import os
+import socket
+import threading
+from contextlib import suppress
+from functools import cache
+from typing import Any
 
 from sqlalchemy import URL, Connection, Engine, ExceptionContext, create_engine, event, make_url, text
 from sqlalchemy.exc import ArgumentError, InterfaceError, OperationalError
@@ -56,6 +61,10 @@ ENCRYPTED = {"sslmode": "require"}  # by default; the default of libpq would fal
 HERE = ("/", "@", "127.", "localhost", "::1")  # prefixes of this machine; the first two are sockets
 TLS = ("SSL", "certificate")  # words in libpq's messages on encryption
 FORBIDDEN, READ_ONLY = "42501", "25006"  # SQLSTATE: insufficient privilege, read-only transaction
+LOCKED = "55P03"  # SQLSTATE: lock not available
+SILENCE_S = 60.0  # longest wait for one answer of the server; the server may be stopped, and its network alive
+LOCK_S = 15  # longest wait for another push of the same run
+IDLE_S = 60  # after which the server ends the transaction of a client that is stopped, and releases its locks
 
 for _name in ("psycopg", "sqlalchemy"):  # our own message reports a lost connection
     logging.getLogger(_name).addHandler(logging.NullHandler())
@@ -64,8 +73,42 @@ for _name in ("psycopg", "sqlalchemy"):  # our own message reports a lost connec
 def connected(url: URL) -> Engine:
     """The engine of the server. It does not connect yet."""
     engine = create_engine(url, connect_args=options(url))
+    event.listen(engine, "do_connect", lambda _dialect, _record, args, named: patient().connect(*args, **named))
+    event.listen(engine, "connect", lambda connection, _: _bound_locks(connection))
     event.listen(engine, "handle_error", lambda context: _tell(context, url))
     return engine
+
+
+@cache
+def patient() -> Any:
+    """A class of connections that end after SILENCE_S without an answer of the server; libpq would wait forever."""
+    import psycopg  # only a rig with a lab needs the database driver
+
+    class PatientConnection(psycopg.Connection[Any]):
+        def wait(self, *args: Any, **named: Any) -> Any:
+            timer = threading.Timer(SILENCE_S, hang_up, (self.pgconn.socket,))
+            timer.daemon = True
+            timer.start()
+            try:
+                return super().wait(*args, **named)
+            finally:
+                timer.cancel()
+
+    return PatientConnection
+
+
+def hang_up(fileno: int) -> None:
+    """Shut a socket down: the thread that waits for it gets an error."""
+    with suppress(OSError), socket.socket(fileno=os.dup(fileno)) as wire:
+        wire.shutdown(socket.SHUT_RDWR)
+
+
+def _bound_locks(connection: Any) -> None:
+    connection.autocommit = True
+    with connection.cursor() as cursor:
+        cursor.execute(f"SET lock_timeout = '{LOCK_S}s'")
+        cursor.execute(f"SET idle_in_transaction_session_timeout = '{IDLE_S}s'")
+    connection.autocommit = False
 
 
 def options(url: URL) -> dict[str, str]:
@@ -113,6 +156,11 @@ def _tell(context: ExceptionContext, url: URL) -> None:
         role = url.username or "this role"
         raise RecordError(f"{shown(url)}: {role} has no permission for this ({_first_line(error)}); the owner can "
                           "grant it rig_writer, or rig_reader for reading") from None  # fmt: skip
+    if getattr(error, "sqlstate", None) == LOCKED:
+        raise RecordError(
+            f"{shown(url)}: another push has locked this run for more than {LOCK_S} s; push it again later (the server "
+            f"releases the lock of a stopped program after {IDLE_S} s)"
+        ) from None
     if context.connection is None and any(word in (reason := _first_line(error)) for word in TLS):
         raise RecordError(f"{shown(url)}: there is no encrypted connection to a trusted server ({reason}); nothing was "
                           "sent. Give the certificate of the server's signer in sslrootcert, and set `ssl = on` in the "

@@ -22,7 +22,7 @@ from rig.errors import RecordError, UnknownRun
 from rig.record import tables
 from rig.record.store import Record
 from rig.record.tables import MOST_BLOCKS, inflations, poses_table, samples_table
-from rig.record.values import Block, Kept, Run
+from rig.record.values import CHANGED, Block, Kept, Run
 
 # The table of a magnetometer or a gyroscope.
 #
@@ -132,6 +132,8 @@ class Measured:
     def constants(self) -> Mapping[str, str | float]:
         """The constants of the bench and of the sensor."""
         motion = tables.constants(self.run, self.sensor) if KINDS[self.run.kind].moving else {}
+        if changes := [event.text for event in self.record.events(self.run.run) if event.what == CHANGED]:
+            motion["program_changed"] = "; ".join(changes)  # also in every export
         if self.sensor is None:
             return {**self.run.constants, **motion}
         sensor = Sensor.model_validate(self.run.bench["sensors"][self.sensor])

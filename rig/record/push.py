@@ -8,14 +8,14 @@ computes the digest of all rows in the lab. The run becomes visible if it is equ
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 from sqlalchemy import Connection, Table, insert, select, update
 
 from rig.bench import Lab
-from rig.errors import RecordError
+from rig.errors import LabAway, RecordError
 from rig.record.content import count, digest, head, rows_of, run_row, uid_of
 from rig.record.schema import arrivals, is_new, poses, runs
 from rig.record.store import Record, now
@@ -33,9 +33,8 @@ def push_after(record: Record, run: Run, lab: Lab | None, tell: Callable[[str], 
 
     try:
         with Record(lab_url(lab.url)) as there:
-            for each in unsent(record, there):
-                push(record, there, each)
-                tell(f"{each}: pushed to {there.where}")
+            for each in push_all(record, there, unsent(record, there)):
+                tell(str(each) if isinstance(each, RecordError) else f"{each.run}: pushed to {there.where}")
     except RecordError as error:
         tell(f"not pushed: {error}")
 
@@ -80,6 +79,17 @@ def unsent(own: Record, lab: Record, named: Sequence[str] = ()) -> list[str]:
     with lab.engine.connect() as at:
         there = {row.uid: row.head for row in at.execute(select(arrivals.c.uid, arrivals.c.head))}
     return [run for run, (uid, here) in heads.items() if there.get(uid) != here]
+
+
+def push_all(own: Record, lab: Record, named: Sequence[str]) -> Iterator[Pushed | RecordError]:
+    """Push each run. A run that the lab refuses does not hinder the others. Raises LabAway."""
+    for run in named:
+        try:
+            yield push(own, lab, run)
+        except LabAway:
+            raise
+        except RecordError as error:
+            yield RecordError(f"run {run} is not pushed: {error}")
 
 
 def push(own: Record, lab: Record, run: str) -> Pushed:

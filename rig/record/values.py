@@ -94,6 +94,9 @@ class Line:
     text: str
 
 
+CHANGED = "program changed"  # event: the poses from here on were measured by another program or procedure
+
+
 @dataclass(frozen=True)
 class Event:
     """An event of a run."""

@@ -10,7 +10,8 @@ again.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import hashlib
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, suppress
 from dataclasses import asdict, replace
 from datetime import UTC, datetime
@@ -24,11 +25,13 @@ from procedures.settings import parse
 from rig.bench import Bench
 from rig.bench.certificates import EXPIRED, expired
 from rig.errors import RecordError, RigError, RunMismatch, Stopped
+from rig.files import program
 from rig.instruments.instruments import Rig, connected
 from rig.lease import lease
 from rig.planning.plan import plan
 from rig.planning.preparation import first_question
 from rig.record import Record, Run
+from rig.record.values import CHANGED
 from rig.results import Result, documents, judged, returned
 from rig.runs.host import RunHost, leave_as
 from rig.runs.observer import Decision, Observer, Outcome
@@ -37,6 +40,7 @@ from rig.runs.signals import Trace, stoppable
 __all__ = ["REPEATED", "Decision", "Observer", "Outcome", "RunHost", "resume", "start"]
 
 REPEATED = "repeated by hand"
+PROGRAM = "program"  # kind of the log's lines with the version of the program and the digest of the procedure
 
 
 def start(
@@ -168,6 +172,7 @@ def _carry_out(
         record.log(run.run, rig.clock.now(), "run", what, text)
 
     log("begun", f"{procedure.name} at pose {run.rows}")
+    _note_program(record, run, procedure, log)
     record.set_state(run.run, "running")
     try:
         observer.begun(run.run)  # a person may end it from now on
@@ -188,6 +193,16 @@ def _carry_out(
     log("complete", why or f"{len(results)} results")
     _complete(record, run.run, why and f"results: {why}", results)
     return Outcome(record.run(run.run))
+
+
+def _note_program(record: Record, run: Run, procedure: Procedure, log: Callable[[str, str], None]) -> None:
+    """Log the version of the program and the digest of the procedure. An event marks the begin of another one."""
+    digest = hashlib.sha256(procedure.path.read_bytes()).hexdigest()[:16]
+    present = f"{program()}, procedure {procedure.name} {digest}"
+    before = next((line.text for line in reversed(record.lines(run.run, (PROGRAM,)))), present)
+    log(PROGRAM, present)
+    if present != before and run.rows:
+        record.note(run.run, CHANGED, f"from pose {run.rows}: {present}; before: {before}")
 
 
 def _complete(record: Record, run: str, why: str | None, results: Mapping[str, Any]) -> None:

@@ -29,10 +29,11 @@ from calibrations.text import as_written
 from rig.bench import Bench
 from rig.bench.certificates import EXPIRED, certificates
 from rig.errors import UnknownRun
+from rig.files import program
 from rig.record import Record, Run
 from rig.record.codec import digest_of
 from rig.record.measured import Measured
-from rig.services.provenance import program, today
+from rig.services.provenance import today
 
 # condition's column -> name and unit
 CONDITIONS = {"temperature_c": ("temperature", "C"), "supply_v": ("supply voltage", "V")}

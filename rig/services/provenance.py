@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
-from importlib.metadata import version
 from pathlib import Path
 
 from calibrations.discovery.plausibility import NO_RESPONSE, refusal
@@ -14,16 +13,11 @@ from calibrations.errors import UnusableData
 from calibrations.model import Model
 from calibrations.model.file import dump_model
 from calibrations.table import NUMBERS, Table
-from rig.files import write_whole
+from rig.files import program, write_whole
 
 OF_THE_SENSOR = ("sensor", "serial", "gravity_m_s2")  # constants of the data that a model file keeps
 
 INFLUENCES = ("temperature_c", "supply_v", "t_s")  # that a product may know
-
-
-def program() -> str:
-    """Name and version of this program, as results carry it."""
-    return f"inertial-rig {version('inertial-rig')}"
 
 
 def today() -> str:

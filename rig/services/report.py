@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING
 from calibrations.analyses.motion import MotionResult
 from calibrations.discovery.verdict import Verdict
 from calibrations.errors import UnusableData
+from rig.files import program
 from rig.record import Record
 from rig.record.measured import Measured
 from rig.results.motion import beside_displacement
 from rig.services.load import Loaded, loaded
 from rig.services.next_experiment import planned
-from rig.services.provenance import program, today
+from rig.services.provenance import today
 from rig.services.request import Request
 
 if TYPE_CHECKING:

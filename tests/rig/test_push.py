@@ -8,12 +8,16 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from sqlalchemy import insert
 
 from rig.errors import LabAway, RecordError, UnknownRun
 from rig.record import Record
+from rig.record import lab as laboratory
 from rig.record import push as pushing
+from rig.record.content import run_row, uid_of
 from rig.record.lab import lab_url
-from rig.record.push import Pushed, push, unsent, verify
+from rig.record.push import Pushed, push, push_all, unsent, verify
+from rig.record.schema import arrivals, runs
 from tests.rig.cutting import Enough, Judge, after_bytes, at_random, whole, wire
 from tests.rig.postgres import Server
 from tests.rig.pushing import POSES, a_run, a_table, held, pushed, until_there
@@ -209,6 +213,43 @@ def test_a_byte_that_is_lost_in_the_lab_is_noticed(own: Record, lab: Record, ser
     spoil = f"UPDATE blocks SET samples = samples || '\\x00' WHERE run = '{other}' AND number = 5"  # noqa: S608
     server.sql(spoil, database)
     assert set(verify(lab).changed) == {run, other}
+
+
+def test_a_lab_that_falls_silent_is_away(lab: Record, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(laboratory, "SILENCE_S", 0.1)
+    with pytest.raises(LabAway, match="no connection to the lab's record"), lab.engine.connect() as at:
+        at.exec_driver_sql("SELECT pg_sleep(20)")
+    with lab.engine.connect() as at:
+        assert at.exec_driver_sql("SHOW idle_in_transaction_session_timeout").scalar() == "1min"
+
+
+def test_a_locked_run_is_said_and_not_waited_for(own: Record, lab: Record, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(laboratory, "LOCK_S", 0.1)
+    run = a_run(own)
+    with lab.engine.begin() as stopped:
+        with own.engine.connect() as at:  # the transaction of a stopped program stays open
+            stopped.execute(insert(runs), {**run_row(at, run)._mapping, "run": run})
+            stopped.execute(insert(arrivals), {"uid": uid_of(at, run), "run": run, "at": ""})
+        with (
+            Record(lab_url(lab.where)) as another,
+            pytest.raises(RecordError, match="another push has locked this run"),
+        ):
+            push(own, another, run)
+        stopped.rollback()
+    assert push(own, lab, run).how == "pushed"
+
+
+def test_a_refused_run_does_not_hinder_the_newer_ones(own: Record, lab: Record) -> None:
+    run = a_run(own, 1)
+    pushed(own, lab.where)
+    lab.exclude(run, 3, "by the lab")
+    own.exclude(run, 4, "by the rig")
+    newer = a_run(own, 2)
+    refused, sent = push_all(own, lab, unsent(own, lab))
+    assert isinstance(refused, RecordError)
+    assert run in str(refused)
+    assert isinstance(sent, Pushed)
+    assert (sent.run, sent.how) == (newer, "pushed")
 
 
 def test_a_run_of_an_older_program_has_one_identity_in_every_copy_of_its_record(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 from collections.abc import Callable
 from pathlib import Path
@@ -11,12 +12,14 @@ import numpy as np
 import pytest
 
 from drivers.errors import LimitError, StageAlarm
+from procedures.catalogue import SHIPPED, find
 from procedures.errors import SettingError
 from procedures.level_check import FACE_UP
 from procedures.session import Limits
 from procedures.sweep import grid
 from rig.bench import Bench, read_bench
 from rig.errors import Busy, InstrumentFailed, RunMismatch
+from rig.instruments.wiring import wired
 from rig.lease import lease
 from rig.record import Kept, Record
 from rig.record.measured import table_of
@@ -232,3 +235,34 @@ def test_results_of_a_procedure_are_kept(tmp_path: Path) -> None:
     with Record() as record:
         outcome = start(record, read_bench(), find("weigh", tmp_path), {"grams": 2.0}, Onlooker())
     assert outcome.run.results["mass"] == {"value": 2.0, "std": 0.1, "unit": "g", "limit": None, "verdict": None}
+
+
+def test_a_part_that_another_procedure_measured_is_marked(tmp_path: Path) -> None:
+    own = tmp_path / "procedures"
+    own.mkdir()
+    (own / "sweep.py").write_text((SHIPPED / "sweep.py").read_text())
+    bench = read_bench()
+    bench = bench.model_copy(update={"folders": bench.folders.model_copy(update={"procedures": own})})
+    procedure, settings = find("sweep", own), small_sweep()[1]
+    with Record() as record:
+        run = start(record, bench, procedure, settings, Interrupting(5, raising(KeyboardInterrupt()))).run.run
+        (line,) = record.lines(run, ("program",))
+        assert re.fullmatch(r"inertial-rig \S+, procedure sweep [0-9a-f]{16}", line.text)
+        with (own / "sweep.py").open("a") as file:
+            file.write("# edited\n")
+        assert resume(record, run, Onlooker(), bench).run.state == "complete"
+        (event,) = (event for event in record.events(run) if event.what == "program changed")
+        assert event.text.startswith("from pose 5: ")
+        assert str(table_of(record, run).constants["program_changed"]).startswith("from pose 5: ")
+
+
+def test_two_folders_of_records_do_not_share_a_wire(
+    tmp_path: Path, bench_file: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "tty").touch()
+    parts = {"alpha": {"driver": "oriental_az", "url": f"serial:{tmp_path}/tty", "unit": 1}}
+    bench = read_bench(bench_file({"instruments": parts}))
+    with wired(bench):
+        monkeypatch.setenv("RIG_HOME", str(tmp_path / "another"))
+        with pytest.raises(Busy, match="uses serial:"), wired(bench):
+            pass

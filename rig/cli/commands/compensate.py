@@ -61,9 +61,9 @@ def command(
     from calibrations.compensation.document import make_vectors, summary
     from calibrations.compensation.inverse import compensated_residual, invert_model
     from calibrations.model.file import dump_model, read_model
-    from rig.files import write_whole
+    from rig.files import program, write_whole
     from rig.services.load import check_unit, effects_of
-    from rig.services.provenance import program, today
+    from rig.services.provenance import today
 
     if picture is not None and data is None:
         raise click.UsageError("--picture shows the test of --data: also give --data DATA")

@@ -31,10 +31,10 @@ def command(folder: Path, as_json: bool) -> None:
     from rig.cli.terminal.watch import watching
     from rig.cli.terminal.words import discovery
     from rig.cli.terminal.words import table as shown
-    from rig.files import write_whole
+    from rig.files import program, write_whole
     from rig.record import Record
     from rig.runs.runner import start
-    from rig.services.provenance import program, today, write_model
+    from rig.services.provenance import today, write_model
     from rig.services.tables import load
 
     try:

@@ -11,10 +11,11 @@ from sqlalchemy import URL
 from rig.bench import read_bench
 from rig.cli.terminal.options import require_no_password
 from rig.cli.terminal.output import bench_option, emit, json_option, note
+from rig.errors import RecordError
 from rig.files import LAB
 from rig.record import Record
 from rig.record.lab import READER, WRITER, lab_url, prepare, shown
-from rig.record.push import Pushed, push, unsent, verify
+from rig.record.push import Pushed, push_all, unsent, verify
 
 
 def _given(context: click.Context, _: click.Parameter, url: str | None) -> str | None:
@@ -42,7 +43,8 @@ def command(
     """Push RUNS, or all finished runs that the lab does not have or has in another version.
 
     The lab's record is named by --to, by RIG_LAB, or in the bench file (lab: {url: ...}). After an interruption the
-    command continues; it sends nothing twice. Exit status 1: --verify found a run that has changed since it arrived.
+    command continues; it sends nothing twice. Exit status 1: the lab refused a run, and the others were pushed; or
+    --verify found a run that has changed since it arrived.
     """
     if (prepares or verifies) and named:
         raise click.UsageError("--prepare and --verify apply to the whole record; remove the runs")
@@ -66,16 +68,25 @@ def _lab(given: str | None, bench_file: Path | None) -> URL:
 
 def _push(url: URL, named: tuple[str, ...], as_json: bool) -> int:
     done: list[Pushed] = []
+    refused: list[RecordError] = []
     with Record() as own, Record(url) as lab:
         waiting = unsent(own, lab, named)
-        for number, run in enumerate(waiting, 1):
-            done.append(push(own, lab, run))
-            note(f"{number} of {len(waiting)}: {_description(done[-1])}")
+        for number, each in enumerate(push_all(own, lab, waiting), 1):
+            if isinstance(each, RecordError):
+                refused.append(each)
+            else:
+                done.append(each)
+            note(f"{number} of {len(waiting)}: {each if isinstance(each, RecordError) else _description(each)}")
+    if refused and len(waiting) == 1:
+        raise refused[0]
     if as_json:
         emit({"schema": "rig.push/1", "to": shown(url), "runs": [vars(each) for each in done]})
     else:
-        click.echo(f"{len(done)} runs pushed to {shown(url)}" if done else f"{shown(url)} has all finished runs")
-    return 0
+        count = f", {len(refused)} refused" if refused else ""
+        click.echo(
+            f"{len(done)} runs pushed to {shown(url)}{count}" if waiting else f"{shown(url)} has all finished runs"
+        )
+    return int(bool(refused))
 
 
 def _description(pushed: Pushed) -> str:

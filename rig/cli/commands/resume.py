@@ -8,10 +8,11 @@ import click
 
 from procedures.catalogue import find
 from rig.bench import Bench, read_bench
-from rig.cli.terminal.output import bench_option, json_option, note, watch_options
+from rig.cli.terminal.output import bench_option, json_option, note, notes, watch_options
 from rig.cli.terminal.watch import print_end, trace_option, watching
 from rig.record import Record
 from rig.record.push import push_after
+from rig.record.values import CHANGED
 from rig.runs.runner import Outcome, resume
 
 
@@ -36,5 +37,6 @@ def command(
         own = Bench.model_validate(found.bench)
         with watching(find(found.procedure, own.folders.procedures), own, unattended, answers) as observer:
             outcome = resume(record, found.run, observer, bench, trace)
+        notes(f"program changed {event.text}" for event in record.events(found.run) if event.what == CHANGED)
         push_after(record, outcome.run, (bench or own).lab, note)
         return print_end(record, outcome, as_json)
