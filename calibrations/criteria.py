@@ -34,7 +34,6 @@ NEGLIGIBLE = 0.02  # of a deviation or density: a noise model this near is as go
 MOST_EFFECTS = 14  # added in one search: data of one sensor determine no more
 MOST_EXCHANGED = 6  # added effects that are tested against each other: more take longer than a person waits
 EXCHANGE_ROUNDS = 6  # of exchanges: each raises the likelihood, so that few suffice
-CANDIDATES_FOR_A_STEP = 3  # best candidates that are refitted for the next step
 CANDIDATES_FOR_A_PLACE = 2  # best candidates that are tried in the place of an effect
 NEARLY_AS_GOOD = 0.9  # of the best gain: a candidate with less is not tried in the place of an effect
 LIKELY = 0.5  # probability of a candidate: from here on it is worth a sentence, though it is not significant

@@ -143,6 +143,22 @@ def load_yaml(text: str) -> Any:
     return document
 
 
+def read_mapping(path: Path, what: str, error: Callable[[str], Exception], example: str) -> dict[str, Any]:
+    """The mapping in the YAML file `path`; `what` names the file's kind and `example` says how to get or write one.
+
+    Raises `error` with the path, the kind and the reason.
+    """
+    try:
+        document = load_yaml(path.read_text(encoding="utf-8"))
+    except OSError as fault:
+        raise error(f"{path}: cannot read the {what}: {fault.strerror}; give another file") from None
+    except ValueError as fault:
+        raise error(f"{path}: the {what} is not YAML: {fault}") from None
+    if not isinstance(document, dict):
+        raise error(f"{path}: the {what} is not a mapping; {example}")
+    return document
+
+
 def _require_bounded(document: Any) -> None:
     """Raises ValueError for a document with too many parts; a part that an alias repeats counts each time."""
     sizes: dict[int, int | None] = {}  # of parts that are done; None while they are being counted

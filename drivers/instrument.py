@@ -8,7 +8,10 @@ from typing import Protocol
 
 from drivers.errors import LimitError
 
+# What to do after a value was refused; drivers and plans give the same advice.
 OUTSIDE_ANGLE = "Ask for an angle within the limits, or change them in the bench file after checking the cables"
+OUTSIDE_TEMPERATURE = "Ask for a temperature within the limits, or change them in the bench file"
+OUTSIDE_POSITION = "Ask for positions within the limits; an oscillation goes half its width to each side of its centre"
 
 
 @dataclass(frozen=True)

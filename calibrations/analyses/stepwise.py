@@ -116,10 +116,6 @@ class AxisEstimate:
     q: Array  # V/g^2, V/g, V
     r: Array  # V/g^3, V/g^2, V/g
 
-    def linear(self, v: Array) -> Array:
-        """Acceleration by the manufacturer's method, g. Ang (3)."""
-        return (v - self.bias) / self.scale
-
     def line(self, a: Array) -> Array:
         """Output by the manufacturer's method, V. Ang (8)."""
         return a * self.scale + self.bias
@@ -199,26 +195,8 @@ class Stepwise:
     @cached_property
     def acceleration(self) -> Array:
         """Acceleration from the measured outputs, g, a_z taken from the stage angle. Ang (14), (16)."""
-        return self._accelerations(self.force[:, 2])
-
-    @cached_property
-    def acceleration_by_outputs(self) -> Array:
-        """The same, a_z taken from the outputs themselves: what a tilt sensor without stages could do. Ang (5)-(7)."""
-        return self._accelerations(self.a_z_by_outputs)
-
-    @cached_property
-    def a_z_by_outputs(self) -> Array:
-        """a_z from the other two, g, shape (n,); its sign, which a root cannot know, is the stage's. Ang (5)-(7).
-
-        The paper's normalised voltages forget the zero-g output, with which the radicand would be negative.
-        """
-        left = 1 - np.sum(self.linear_acceleration**2, axis=1)
-        return np.asarray(np.sqrt(np.maximum(left, 0.0)) * np.sign(self.force[:, 2]))
-
-    @cached_property
-    def linear_acceleration(self) -> Array:
-        """Acceleration by the manufacturer's method, g. Ang (3)."""
-        return np.column_stack([self.x.linear(self.table.column("vx_v")), self.y.linear(self.table.column("vy_v"))])
+        v_x, v_y, a_z = self.table.column("vx_v"), self.table.column("vy_v"), self.force[:, 2]
+        return np.column_stack([self.x.acceleration(v_x, v_y, a_z), self.y.acceleration(v_y, v_x, a_z)])
 
     @cached_property
     def linear_predicted(self) -> Array:
@@ -231,19 +209,9 @@ class Stepwise:
         return _rmse(self.predicted, self.table.outputs[:, :2])
 
     @property
-    def rmse_mg(self) -> Array:
-        """Root mean square error of the acceleration, mg, shape (2,)."""
-        return 1e3 * _rmse(self.acceleration, self.force[:, :2])
-
-    @property
     def linear_rmse_v(self) -> Array:
         """The linear model's, V, shape (2,)."""
         return _rmse(self.linear_predicted, self.table.outputs[:, :2])
-
-    @property
-    def linear_rmse_mg(self) -> Array:
-        """The linear model's, mg, shape (2,)."""
-        return 1e3 * _rmse(self.linear_acceleration, self.force[:, :2])
 
     @cached_property
     def tilts(self) -> tuple[Tilt, Tilt]:
@@ -255,10 +223,6 @@ class Stepwise:
         out_of_plane = own.q[1] / own.scale
         twice = in_plane * self.force[:, across] + out_of_plane * self.force[:, 2]
         return Tilt(float(in_plane), float(out_of_plane), 1e3 * float(rms(twice)))
-
-    def _accelerations(self, a_z: Array) -> Array:
-        v_x, v_y = self.table.column("vx_v"), self.table.column("vy_v")
-        return np.column_stack([self.x.acceleration(v_x, v_y, a_z), self.y.acceleration(v_y, v_x, a_z)])
 
 
 def estimate_stepwise(table: Table) -> Stepwise:

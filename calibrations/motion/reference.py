@@ -61,14 +61,26 @@ class Sine:
         return np.asarray(self.amplitude * np.cos(2 * np.pi * self.frequency_hz * t_s + self.phase_rad))
 
 
-def fit_three_parameter(t_s: Array, x: Array, frequency_hz: float) -> Sine:
-    """The best sine of a given frequency. Raises DataError for fewer than 8 samples."""
-    return _fitted(t_s, x, frequency_hz, free=False)
-
-
 def fit_four_parameter(t_s: Array, x: Array, frequency_hz: float | None = None) -> Sine:
-    """The best sine, its frequency fitted from `frequency_hz` or the strongest line on. Raises DataError."""
-    return _fitted(t_s, x, strongest_line(t_s, x)[0] if frequency_hz is None else frequency_hz, free=True)
+    """The best sine. Its frequency is fitted too, from `frequency_hz` or the strongest line. Raises DataError."""
+    if len(x) < 8:
+        raise DataError(f"{len(x)} samples are too few for a sine fit; at least 8 are needed")
+    start_hz = strongest_line(t_s, x)[0] if frequency_hz is None else frequency_hz
+    middle, rate_hz = float(t_s.mean()), (len(t_s) - 1) / float(np.ptp(t_s))
+    t, turn = t_s - middle, 2 * np.pi * start_hz
+    for _ in range(ROUNDS):
+        columns = np.column_stack([np.cos(turn * t), np.sin(turn * t), np.ones(len(t))])
+        a, b, offset = np.linalg.lstsq(columns, x, rcond=None)[0]
+        slope = t * (b * columns[:, 0] - a * columns[:, 1])  # d x / d turn
+        residual = x - columns @ (a, b, offset)
+        columns = np.column_stack([columns, slope])
+        step = float(np.linalg.lstsq(columns, residual, rcond=None)[0][3])
+        turn += float(np.clip(step, -1 / np.ptp(t), 1 / np.ptp(t)))
+        if abs(step) * np.ptp(t) < 1e-10:
+            break
+    density = _density_beside(residual, rate_hz, turn / (2 * np.pi))
+    cov = np.linalg.inv(columns.T @ columns) * density * rate_hz / 2
+    return _as_sine(a, b, offset, turn, cov, middle, density)
 
 
 def find_sines(t_s: Array, x: Array) -> tuple[Sine, ...]:
@@ -109,42 +121,17 @@ def _refit_each(t_s: Array, x: Array, found: list[Sine]) -> list[Sine]:
     return found
 
 
-def _fitted(t_s: Array, x: Array, frequency_hz: float, free: bool) -> Sine:
-    if len(x) < 8:
-        raise DataError(f"{len(x)} samples are too few for a sine fit; at least 8 are needed")
-    middle, rate_hz = float(t_s.mean()), (len(t_s) - 1) / float(np.ptp(t_s))
-    t, turn = t_s - middle, 2 * np.pi * frequency_hz
-    for _ in range(ROUNDS):
-        columns = np.column_stack([np.cos(turn * t), np.sin(turn * t), np.ones(len(t))])
-        a, b, offset = np.linalg.lstsq(columns, x, rcond=None)[0]
-        slope = t * (b * columns[:, 0] - a * columns[:, 1])  # d x / d turn
-        residual = x - columns @ (a, b, offset)
-        if not free:
-            break
-        columns = np.column_stack([columns, slope])
-        step = float(np.linalg.lstsq(columns, residual, rcond=None)[0][3])
-        turn += float(np.clip(step, -1 / np.ptp(t), 1 / np.ptp(t)))
-        if abs(step) * np.ptp(t) < 1e-10:
-            break
-    density = _density_beside(residual, rate_hz, turn / (2 * np.pi))
-    cov = np.linalg.inv(columns.T @ columns) * density * rate_hz / 2
-    return _as_sine(a, b, offset, turn, cov, middle, density)
-
-
 def _as_sine(a: float, b: float, offset: float, turn: float, cov: Array, middle: float, density: float) -> Sine:
     """From x = offset + a cos(turn (t - middle)) + b sin(turn (t - middle)) to amplitude and phase at t = 0."""
     amplitude = float(np.hypot(a, b))
     along, across = np.array([a, b]) / amplitude, np.array([b, -a]) / amplitude**2
-    late = np.zeros(len(cov))
-    late[:2] = across
-    if len(cov) == 4:
-        late[3] = -middle
+    late = np.array([*across, 0.0, -middle])
     return Sine(
         frequency_hz=turn / (2 * np.pi),
         amplitude=amplitude,
         phase_rad=float((np.arctan2(-b, a) - turn * middle + np.pi) % (2 * np.pi) - np.pi),
         offset=float(offset),
-        frequency_std_hz=float(np.sqrt(cov[3, 3])) / (2 * np.pi) if len(cov) == 4 else 0.0,
+        frequency_std_hz=float(np.sqrt(cov[3, 3])) / (2 * np.pi),
         amplitude_std=float(np.sqrt(along @ cov[:2, :2] @ along)),
         phase_std_rad=float(np.sqrt(late @ cov @ late)),
         offset_std=float(np.sqrt(cov[2, 2])),

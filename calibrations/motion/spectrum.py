@@ -144,11 +144,6 @@ def periodogram(x: Array, rate_hz: float) -> tuple[Array, Array]:
     return rfftfreq(len(x), 1 / rate_hz), 2 * power / (rate_hz * np.sum(window**2))
 
 
-def band_rms(density: Array, f: Array, response: Response) -> float:
-    """Rms of noise of this one-sided density behind a filter."""
-    return float(np.sqrt(np.trapezoid(density * np.abs(response(f)) ** 2, f)))
-
-
 NOMINAL_CORNER_HZ = 15.07  # 32 kOhm and 0.33 uF, Ang V, if the table gives none
 
 

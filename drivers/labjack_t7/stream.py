@@ -24,7 +24,6 @@ from drivers.transport.link import Link
 #         backlog in bytes, status, additional information; then the samples as U16.
 # Source  T-series datasheet, stream mode and analog input calibration.
 
-HEADER_BYTES = 16
 UNIT, FUNCTION, KIND = 1, 76, 16
 RECOVERING, RECOVERED, OVERLAP, SKIP_OVERFLOW, BURST_COMPLETE, BUFFER_FULL = range(2940, 2946)
 STATUS = {
@@ -97,11 +96,6 @@ class Packets:
             wrong = "are missing" if 1 < step < 32768 else "are repeated or out of order"
             raise StreamError(f"{self._name}: packets {wrong} after packet {before} of the record", REMEDY)
         self._last = numbers[-1:]
-
-
-def codes_of(data: bytes | bytearray, samples: int, name: str) -> NDArray[np.uint16]:
-    """The samples of all whole packets in `data`; raises StreamError as `Packets.codes`."""
-    return Packets(samples, name).codes(data)
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from drivers.clock import Clock
 from drivers.errors import OverTemperature, SensorFault
-from drivers.instrument import Check, Identity, require_range, require_within
+from drivers.instrument import OUTSIDE_TEMPERATURE, Check, Identity, require_range, require_within
 from drivers.transport import Address, Links
 from drivers.transport.modbus import Register, Unit
 
@@ -95,8 +95,7 @@ class Oven:
 
     def set_temperature(self, temperature_c: float) -> None:
         """Give a new set point; raises LimitError before anything is sent."""
-        remedy = "Ask for a temperature within the limits, or change them in the bench file"
-        require_within(f"{self.name}: ", temperature_c, self.settings.limits_c, "C", remedy)
+        require_within(f"{self.name}: ", temperature_c, self.settings.limits_c, "C", OUTSIDE_TEMPERATURE)
         self._unit.write(SET_POINT, temperature_c)
         self._told_c = temperature_c
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.errors import LimitError, NotSettled, StreamError
-from drivers.instrument import Check, Identity, require_positive, require_range, require_within
+from drivers.instrument import OUTSIDE_POSITION, Check, Identity, require_positive, require_range, require_within
 from drivers.pi_e727 import parameters as e727
 from drivers.transport import Address, Links
 from drivers.transport.gcs import Gcs
@@ -23,8 +23,6 @@ POLL_S = 0.01
 PATIENCE_S = 5.0  # for an arrival: a full travel at any sensible speed
 STOPPING_S = 1.0
 FEWEST_POINTS = 20  # of a period: coarser is no sine
-
-OUTSIDE = "Ask for positions within the limits; an oscillation extends half its width to each side of its centre"
 
 
 @dataclass(frozen=True)
@@ -226,7 +224,7 @@ class Positioner:
         return max(low.values()), min(high.values())
 
     def _require_within_limits(self, axis: str, um: float) -> None:
-        require_within(f"{self.name}: {axis} = ", um, self.settings.limits_um, "um", OUTSIDE)
+        require_within(f"{self.name}: {axis} = ", um, self.settings.limits_um, "um", OUTSIDE_POSITION)
 
     def _require_swing(self, peak_to_peak_um: float) -> None:
         if not peak_to_peak_um > 0:

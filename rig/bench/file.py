@@ -10,7 +10,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from calibrations.errors import DataError
-from calibrations.files import load_yaml
+from calibrations.files import read_mapping
 from calibrations.geometry.error_table import ErrorTable, Point, read_error_table
 from drivers.philtec_d63 import Curve
 from rig.bench.bench import Bench
@@ -18,6 +18,7 @@ from rig.bench.check import check, check_values, describe_error
 from rig.bench.parts import SIMULATED, TURNING, Folders, Instrument
 from rig.errors import BenchError
 
+CURVE = "its keys are serial, date, near and far"
 DEFAULT = Path(__file__).with_name("default.yaml")
 
 
@@ -27,15 +28,7 @@ def read_bench(path: Path | None = None) -> Bench:
     Raises BenchError with file, key and suggestion.
     """
     path = path or DEFAULT
-    try:
-        document = load_yaml(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise BenchError(f"{path}: cannot read the bench file: {error.strerror}; give another file") from None
-    except ValueError as error:
-        raise BenchError(f"{path}: the bench file is not YAML: {error}") from None
-    if not isinstance(document, dict):
-        raise BenchError(f"{path}: the bench file is not a mapping; `rig check --example` prints one")
-    return _checked(document, path)
+    return _checked(read_mapping(path, "bench file", BenchError, "`rig check --example` prints one"), path)
 
 
 def _checked(document: dict[str, Any], path: Path) -> Bench:
@@ -72,12 +65,10 @@ def _with_curve(given: Any, path: Path) -> dict[str, Any]:
     if not isinstance(given, dict) or not isinstance(name := given.get("curve"), str) or name == SIMULATED:
         return {}
     file = own_file(path, Path(name), f"{path}, key d63.curve")
+    document = read_mapping(file, "curve", lambda text: BenchError(f"{path}, key d63.curve: {text}"), CURVE)
     try:
-        document = load_yaml(file.read_text(encoding="utf-8"))
-        if not isinstance(document, dict):
-            raise ValueError("the file is not a mapping")
         curve = Curve.from_mapping(document)
-    except (OSError, ValueError) as error:
+    except ValueError as error:
         raise BenchError(f"{path}, key d63.curve: {file}: {error}") from None
     return {"d63": {**given, "curve": dataclasses.asdict(curve)}}
 

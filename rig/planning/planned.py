@@ -13,6 +13,7 @@ import numpy as np
 
 from calibrations.table import Array
 from drivers.errors import LimitError
+from drivers.instrument import OUTSIDE_ANGLE, OUTSIDE_POSITION, OUTSIDE_TEMPERATURE, require_within
 from drivers.labjack_t7.driver import Settings as AdcSettings
 from drivers.omega_cn7500.driver import Settings as OvenSettings
 from procedures.questions import Choice, Number, Question
@@ -97,12 +98,7 @@ class PlannedStage:
         self.reach = (0.0, 0.0)
 
     def move_to(self, deg: float) -> None:
-        low, high = self._settings.limits_deg
-        if not low <= deg <= high:
-            raise LimitError(
-                f"{self._name}: {deg:g} deg is outside its limits {low:g} .. {high:g} deg; nothing was moved",
-                "Choose other settings, or change limits_deg in the bench file after checking the cables",
-            )
+        require_within(f"{self._name}: ", deg, self._settings.limits_deg, "deg", OUTSIDE_ANGLE, "nothing was moved")
         if deg != self._at_deg:
             move_s = self._settings.move_s(abs(deg - self._at_deg))
             self._ledger.add(f"{self._name} from {self._at_deg:g} to {deg:g} deg", move_s + EXCHANGE_S)
@@ -188,10 +184,7 @@ class PlannedOven:
         return ROOM_C if self._set_c is None else self._set_c
 
     def set_temperature(self, c: float) -> None:
-        low, high = self._settings.limits_c
-        if not low <= c <= high:
-            outside = f"{self._name}: {c:g} C is outside its limits {low:g} .. {high:g} C"
-            raise LimitError(outside, "Choose another temperature, or change limits_c in the bench file")
+        require_within(f"{self._name}: ", c, self._settings.limits_c, "C", OUTSIDE_TEMPERATURE)
         if c != self._set_c:
             self._ledger.add(f"{self._name} to {c:g} C", EXCHANGE_S)
         self._set_c = c
@@ -233,7 +226,7 @@ class PlannedPositioner:
         self._ledger.add(f"{self._name} servo {'on' if on else 'off'}", EXCHANGE_S)
 
     def move_to(self, axis: str, um: float) -> None:
-        self._within(um, um)
+        self._require_within(axis, um)
         self._ledger.add(f"{self._name} moves {axis} to {um:g} um", EXCHANGE_S)
         self._at_um[axis] = um
 
@@ -241,7 +234,7 @@ class PlannedPositioner:
         return self._at_um.get(axis, 0.0)
 
     def oscillate(self, axis: str, *, peak_to_peak_um: float, frequency_hz: float, centre_um: float) -> float:
-        self._within(centre_um - peak_to_peak_um / 2, centre_um + peak_to_peak_um / 2)
+        self._require_within(axis, centre_um - peak_to_peak_um / 2, centre_um + peak_to_peak_um / 2)
         really_hz: float = self._settings.wave(self._name, frequency_hz).frequency_hz
         what = f"{self._name} swings {axis} by {peak_to_peak_um:g} um peak to peak at {really_hz:g} Hz"
         self._ledger.add(what, EXCHANGE_S)
@@ -250,11 +243,9 @@ class PlannedPositioner:
     def stop(self) -> None:
         self._ledger.add(f"{self._name} stops", EXCHANGE_S)
 
-    def _within(self, lowest_um: float, highest_um: float) -> None:
-        low, high = self._settings.limits_um
-        if not low <= lowest_um <= highest_um <= high:
-            outside = f"{self._name}: {lowest_um:g} .. {highest_um:g} um is outside its limits {low:g} .. {high:g} um"
-            raise LimitError(outside, "Choose a smaller motion, or change limits_um in the bench file")
+    def _require_within(self, axis: str, *positions_um: float) -> None:
+        for um in positions_um:
+            require_within(f"{self._name}: {axis} = ", um, self._settings.limits_um, "um", OUTSIDE_POSITION)
 
 
 def planned_answer(question: Question) -> str:

@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from calibrations.errors import DataError
-from calibrations.motion.reference import Sine, find_sines, fit_four_parameter, fit_three_parameter, strongest_line
+from calibrations.motion.reference import Sine, find_sines, fit_four_parameter, strongest_line
 
 RATE = 1000.0
 T = 50.0 + np.arange(4000) / RATE
@@ -25,9 +25,8 @@ def of_many(fit: object) -> list[Sine]:
     return [fit(made(seed)) for seed in range(SEEDS)]  # type: ignore[operator]
 
 
-@pytest.mark.parametrize("free", [False, True], ids=["three parameters", "four parameters"])
-def test_amplitude_reaches_the_cramer_rao_bound(free: bool) -> None:
-    found = of_many(lambda x: fit_four_parameter(T, x) if free else fit_three_parameter(T, x, TRUE["frequency"]))
+def test_amplitude_reaches_the_cramer_rao_bound() -> None:
+    found = of_many(lambda x: fit_four_parameter(T, x))
     bound = NOISE * np.sqrt(2 / len(T))
     amplitudes = np.array([s.amplitude for s in found])
     assert abs(amplitudes.mean() / TRUE["amplitude"] - 1) < 1e-4
@@ -52,7 +51,7 @@ def test_uncertainty_holds_for_noise_behind_a_low_pass() -> None:
     found = []
     for seed in range(100):
         noise = lfilter([1 - rho], [1, -rho], np.random.default_rng(seed).standard_normal(len(T)))
-        found.append(fit_three_parameter(T, 10 * np.cos(2 * np.pi * 10 * T) + noise, 10.0))
+        found.append(fit_four_parameter(T, 10 * np.cos(2 * np.pi * 10 * T) + noise, 10.0))
     scatter, told = np.std([s.amplitude for s in found]), np.mean([s.amplitude_std for s in found])
     assert told == pytest.approx(scatter, rel=0.2)
 
@@ -72,4 +71,4 @@ def test_noise_alone_holds_no_line() -> None:
 
 def test_too_few_samples_are_said() -> None:
     with pytest.raises(DataError, match="5 samples are too few for a sine fit; at least 8 are needed"):
-        fit_three_parameter(T[:5], T[:5], 10.0)
+        fit_four_parameter(T[:5], T[:5], 10.0)

@@ -43,7 +43,6 @@ def test_all_coefficients_of_an_axis_beside_a_linear_one(own: str) -> None:
     np.testing.assert_allclose(axis.q, Q, atol=1e-10)
     np.testing.assert_allclose(axis.r, r, atol=1e-10)
     np.testing.assert_allclose(found.rmse_v, 0, atol=1e-10)
-    np.testing.assert_allclose(found.rmse_mg, 0, atol=1e-9)
     np.testing.assert_allclose(found.acceleration[:, "xy".index(own)], a, atol=1e-11)
 
 
@@ -74,19 +73,9 @@ def test_both_axes_crossed_at_once() -> None:
 
 def test_linear_sensor() -> None:
     columns = synthetic.turns()
-    a_x, a_y, a_z = synthetic.components(columns)
+    a_x, a_y, _ = synthetic.components(columns)
     found = estimate_stepwise(table(SF["x"] * a_x + B["x"], SF["y"] * a_y + B["y"], columns))
     np.testing.assert_allclose(found.linear_rmse_v, 0, atol=1e-12)
-    np.testing.assert_allclose(found.linear_rmse_mg, 0, atol=1e-9)
-    np.testing.assert_allclose(found.a_z_by_outputs, a_z, atol=1e-7)  # the root loses half the digits near 90 deg
-    np.testing.assert_allclose(found.acceleration_by_outputs, np.column_stack([a_x, a_y]), atol=1e-8)
-
-
-def test_radicand_is_clipped() -> None:
-    columns = synthetic.turns()
-    a_x, a_y, _ = synthetic.components(columns)
-    found = estimate_stepwise(table(SF["x"] * a_x + B["x"], SF["y"] * a_y + B["y"] + 0.01 * a_x**2, columns))
-    assert np.all(np.isfinite(found.acceleration_by_outputs))
 
 
 def test_repeats_are_averaged_and_the_linear_error_stands_beside() -> None:
@@ -97,7 +86,6 @@ def test_repeats_are_averaged_and_the_linear_error_stands_beside() -> None:
     found = estimate_stepwise(table(vx, vy, columns))
     assert found.x.bias == pytest.approx(B["x"], abs=1e-12)  # both directions: the loop's middle
     assert found.linear_rmse_v[0] == pytest.approx(0.01, rel=1e-9)
-    assert found.linear_rmse_mg[0] == pytest.approx(1e3 * 0.01 / SF["x"], rel=1e-9)
 
 
 def test_negative_inclinations_and_turned_mounts_find_their_places() -> None:
@@ -120,7 +108,7 @@ def test_a_tilt_ends_up_in_p1_and_q1() -> None:
     assert tilt.in_plane == pytest.approx(theta_xy, abs=1e-10)
     assert tilt.out_of_plane == pytest.approx(theta_xz, abs=1e-10)
     assert tilt.twice_mg == pytest.approx(1e3 * np.sqrt(np.mean((theta_xy * a_y + theta_xz * a_z) ** 2)))
-    assert found.rmse_mg[0] == pytest.approx(0, abs=1e-9)
+    np.testing.assert_allclose(found.acceleration[:, 0], a_x, atol=1e-11)
     assert none.twice_mg == pytest.approx(0, abs=1e-9)
 
 

@@ -63,7 +63,7 @@ def test_a_plan_beyond_a_limit_is_bad_input_and_a_run_of_it_is_stopped(rig: Rig)
     for command, status in (("plan", 2), ("run", 4)):
         ended = rig(command, "sweep", "--inclinations-deg", "500")
         assert (ended.status, ended.out) == (status, "")
-        assert "alpha: 500 deg is outside its limits -400 .. 400 deg; nothing was moved. Choose" in ended.err
+        assert "alpha: 500 deg is outside its limits -400 .. 400 deg; nothing was moved. Ask" in ended.err
 
 
 def test_plan_prints_moves_limits_and_time(rig: Rig, rig_home: Path) -> None:

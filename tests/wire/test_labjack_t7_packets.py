@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivers.errors import StreamError
-from drivers.labjack_t7.stream import Calibration, codes_of, packet_type
+from drivers.labjack_t7.stream import Calibration, Packets, packet_type
 from drivers.labjack_t7.twin import codes_of_volts
 
 FIRST = bytes.fromhex("FF FF 00 00 00 0E 01 4C 10 00 00 00 00 00 00 00 00 01 80 00")
@@ -24,11 +24,11 @@ def packet(number: int, samples: list[int], status: int = 0, additional: int = 0
 
 
 def test_two_packets_and_the_number_turning_over() -> None:
-    assert codes_of(FIRST + SECOND, 2, "adc").tolist() == [1, 0x8000, 0xFFFF, 2]
+    assert Packets(2, "adc").codes(FIRST + SECOND).tolist() == [1, 0x8000, 0xFFFF, 2]
 
 
 def test_half_a_packet_is_left() -> None:
-    assert codes_of(FIRST + SECOND[:7], 2, "adc").tolist() == [1, 0x8000]
+    assert Packets(2, "adc").codes(FIRST + SECOND[:7]).tolist() == [1, 0x8000]
 
 
 def test_a_header_is_16_bytes() -> None:
@@ -37,7 +37,7 @@ def test_a_header_is_16_bytes() -> None:
 
 def test_a_missing_packet_is_noticed() -> None:
     with pytest.raises(StreamError, match="adc: packets are missing after packet 0"):
-        codes_of(packet(1, [1, 2]) + packet(3, [3, 4]), 2, "adc")
+        Packets(2, "adc").codes(packet(1, [1, 2]) + packet(3, [3, 4]))
 
 
 @pytest.mark.parametrize(
@@ -48,7 +48,7 @@ def test_a_foreign_packet_is_noticed(offset: int, value: int, field: str) -> Non
     foreign = bytearray(FIRST + SECOND)
     foreign[20 + offset] = value
     with pytest.raises(StreamError, match=f"adc: packet 1 has {field} {value} instead of"):
-        codes_of(foreign, 2, "adc")
+        Packets(2, "adc").codes(foreign)
 
 
 @pytest.mark.parametrize(
@@ -64,18 +64,18 @@ def test_a_foreign_packet_is_noticed(offset: int, value: int, field: str) -> Non
 )
 def test_every_status_of_loss_is_put_into_words(status: int, words: str) -> None:
     with pytest.raises(StreamError, match=words):
-        codes_of(packet(0, [1]) + packet(1, [2], status, 7), 1, "adc")
+        Packets(1, "adc").codes(packet(0, [1]) + packet(1, [2], status, 7))
 
 
 def test_the_end_of_a_burst_is_no_loss() -> None:
-    assert codes_of(packet(0, [1], 2944), 1, "adc").tolist() == [1]
+    assert Packets(1, "adc").codes(packet(0, [1], 2944)).tolist() == [1]
 
 
 @settings(derandomize=True, deadline=None)
 @given(st.lists(st.lists(st.integers(0, 65535), min_size=3, max_size=3), max_size=20), st.integers(0, 65535))
 def test_every_record_survives(blocks: list[list[int]], first: int) -> None:
     data = b"".join(packet((first + k) % 65536, block) for k, block in enumerate(blocks))
-    assert codes_of(data, 3, "adc").tolist() == [code for block in blocks for code in block]
+    assert Packets(3, "adc").codes(data).tolist() == [code for block in blocks for code in block]
 
 
 def test_volts_of_known_codes() -> None:

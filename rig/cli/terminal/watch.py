@@ -9,7 +9,7 @@ from pathlib import Path
 
 import click
 
-from calibrations.files import load_yaml
+from calibrations.files import read_mapping
 from procedures.catalogue import Procedure
 from procedures.errors import BadAnswer, NoAnswer
 from procedures.questions import Question
@@ -96,14 +96,7 @@ def watching(procedure: Procedure, bench: Bench, unattended: bool, answers: Path
 def _answers(path: Path | None) -> dict[str, str]:
     if path is None:
         return {}
-    try:
-        document = load_yaml(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise BadAnswer(f"{path}: cannot read the file of answers: {error.strerror}") from None
-    except ValueError as error:
-        raise BadAnswer(f"{path}: this is not a YAML file: {error}") from None
-    if not isinstance(document, dict):
-        raise BadAnswer(f"{path}: a file of answers is a mapping, such as `mounting: yes`")
+    document = read_mapping(path, "file of answers", BadAnswer, "write an answer in each line, such as `mounting: yes`")
     return {str(name): str(answer) for name, answer in document.items()}
 
 
