@@ -17,7 +17,7 @@ from itertools import chain
 
 from procedures.errors import ProcedureError, SettingError
 from procedures.level_check import prepare
-from procedures.session import Pose, Session, Stage
+from procedures.session import Pose, Session, Stage, bounded
 from procedures.sweep import turn
 
 KIND = "motion"
@@ -84,7 +84,7 @@ def sweep() -> Iterator[Pose]:
 
 def blocks(path: str, duration_s: float, block_s: float) -> list[Pose]:
     """The blocks of a record at the attitude of the motion."""
-    return [Pose(ALPHA_DEG, BETA_DEG, 0, f"{path} {k}") for k in range(max(1, round(duration_s / block_s)))]
+    return bounded(Pose(ALPHA_DEG, BETA_DEG, 0, f"{path} {k}") for k in range(max(1, round(duration_s / block_s))))
 
 
 def _only(missing: Sequence[Pose], part: Sequence[Pose]) -> list[Pose]:

@@ -38,7 +38,7 @@ def repeat(
         )
     prepare(rig)
     kinds = [AS_IS, *[POWER] * power, *[MOUNT] * mount]
-    paths = [f"{kind} {k}" for kind in kinds for k in range(1, times + 1)]
+    paths = (f"{kind} {k}" for kind in kinds for k in range(1, times + 1))
     for pose in rig.missing(pose for path in paths for pose in tumble(path)):
         kind, _, number = pose.path.partition(" ")
         if is_first(pose) and kind == POWER:

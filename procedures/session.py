@@ -10,16 +10,31 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
+from itertools import islice
 from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from procedures.errors import Declined, SafetyLimit
+from procedures.errors import Declined, SafetyLimit, SettingError
 from procedures.questions import EDGES, Confirm, Mounting, Number, Question
 
 Read = TypeVar("Read")
 SHORTEST_APPROACH_DEG = 0.5  # a shorter move does not take up the gear play
+
+
+MOST_POSES = 50_000  # of a plan: about a week on a rig; more is a mistyped setting
+
+
+def bounded(poses: Iterable[Read]) -> list[Read]:
+    """All `poses`, or their paths. Raises SettingError above MOST_POSES, before the others are made."""
+    found = list(islice(poses, MOST_POSES + 1))
+    if len(found) > MOST_POSES:
+        raise SettingError(
+            f"the plan has more than {MOST_POSES} poses; give a larger step, a shorter duration, or fewer angles and "
+            "repetitions"
+        )
+    return found
 
 
 @dataclass(frozen=True)
@@ -234,10 +249,13 @@ class Session:
     steady: Callable[[Sequence[Dwell], float], bool] = never
 
     def missing(self, poses: Iterable[Pose]) -> Iterator[Pose]:
-        """The `poses` that are not in the record yet, in order. A pose that occurs twice is measured twice."""
+        """The `poses` that are not in the record yet, in order. A pose that occurs twice is measured twice.
+
+        Raises SettingError for more than MOST_POSES.
+        """
         kept = Counter(self.host.kept())
         missing = []
-        for pose in poses:
+        for pose in bounded(poses):
             if kept[pose] > 0:
                 kept[pose] -= 1
             else:

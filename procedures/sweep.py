@@ -14,7 +14,7 @@ from typing import Literal
 from procedures.errors import SettingError
 from procedures.level_check import check_level, prepare
 from procedures.pose_list import parse_poses
-from procedures.session import Pose, Session
+from procedures.session import Pose, Session, bounded
 
 INCLINATIONS_DEG = (90.0, 30.0, 150.0, 60.0, 120.0, 45.0, 135.0)
 REFERENCE = Pose(90.0, 45.0, 1, "reference")  # both axes feel gravity; beta always rises to it
@@ -48,7 +48,7 @@ def sweep(
         raise SettingError(f"sweep: reference_every is {reference_every}; give a number of poses, or 0 for none")
     if pose_list and (reference_every or face != "up"):
         raise SettingError("sweep: pose_list has all poses; use reference_every and face without pose_list only")
-    one_face = with_references(list(grid(inclinations_deg, step_deg, paths)), reference_every)
+    one_face = with_references(bounded(grid(inclinations_deg, step_deg, paths)), reference_every)
     both_faces = [replace(pose, flip=flip) for flip in FLIPS[face] for pose in one_face]
     poses = parse_poses(pose_list) if pose_list else both_faces
     if poses[0].flip:

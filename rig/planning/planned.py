@@ -17,12 +17,14 @@ from drivers.instrument import OUTSIDE_ANGLE, OUTSIDE_POSITION, OUTSIDE_TEMPERAT
 from drivers.labjack_t7.driver import Settings as AdcSettings
 from drivers.omega_cn7500.driver import Settings as OvenSettings
 from procedures.questions import Choice, Number, Question
-from procedures.session import SHORTEST_APPROACH_DEG, Dwell, Pose, Reading, Samples
+from procedures.session import MOST_POSES, SHORTEST_APPROACH_DEG, Dwell, Pose, Reading, Samples
 from rig.bench import Bench
+from rig.errors import PlanError
 from rig.record.values import Block
 
 LEVEL_S = 1.0  # a reading of the level
 ROOM_C = 25.0
+MOST_STEPS = 10 * MOST_POSES
 EXCHANGE_S = 0.05  # time of commands and polls for each move or recording
 
 
@@ -60,6 +62,10 @@ class Ledger:
         self.add(f"wait {seconds:g} s", seconds)
 
     def add(self, what: str, duration_s: float) -> None:
+        if len(self.steps) >= MOST_STEPS:
+            raise PlanError(
+                f"the plan has more than {MOST_STEPS} steps; give larger steps, a shorter time, or fewer repetitions"
+            )
         self.steps.append(Step(self.now_s, duration_s, what))
         self.now_s += duration_s
 

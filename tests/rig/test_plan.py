@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -87,3 +88,20 @@ def test_an_oven_is_planned_too(tmp_path: Path) -> None:
     assert whats[-3:] == ["oven to 40 C", "oven on", "wait 60 s"]
     with pytest.raises(LimitError, match=r"oven: 90 C is outside its limits 0 \.\. 85 C"):
         plan(read_bench(), bake, {"to_c": 90.0})
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("sweep", "--step-deg", "0.0001"),
+        ("sweep", "--step-deg", "1e-300"),
+        ("noise-floor", "--duration-s", "1e9", "--block-s", "1"),
+        ("motion", "--still-s", "1e9", "--block-s", "1"),
+        ("soak", "--duration-s", "1e9"),
+        ("repeat", "--times", "1000000000"),
+        ("temperature-cycle", "--cycles", "1000000000"),
+    ],
+)
+def test_a_plan_without_bound_is_refused_before_it_is_built(rig: Callable[..., Any], words: tuple[str, ...]) -> None:
+    ended = rig("plan", *words)
+    assert (ended.status, "the plan has more than" in ended.err) == (2, True), ended.err
