@@ -147,6 +147,15 @@ def write_guide(found: Population, start: Question, folder: Path) -> list[Path]:
     return [folder / name for name in texts]
 
 
+def write_models(result: Calibration, folder: Path) -> list[Path]:
+    """A model file for each sensor. Raises OutputError."""
+    made_folder(folder)
+    texts = {safe(sensor): dump_model(model) for batch in result.batches for sensor, model in models(batch).items()}
+    for sensor, text in texts.items():
+        write_whole(folder / f"{sensor}.yaml", text)
+    return [folder / f"{sensor}.yaml" for sensor in texts]
+
+
 def read_guide(given: str, batches: set[str], own: Own = ()) -> Guide:
     """The guide in a folder, or one model for all by its name or file. Raises ModelError, UnknownName."""
     folder, effects = Path(given), effects_of(own)
