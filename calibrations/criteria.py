@@ -124,6 +124,7 @@ REACHED_K = 1.0  # from the set point: an oven that is further away is still hea
 
 # Stability and control
 FEWEST_FOR_DRIFT = 3  # values: fewer cannot separate a drift from scatter
+SHORTEST_FOR_DRIFT_DAYS = 30.0  # between the first and the last value: no rate a year from a shorter time
 HORIZON_DAYS = 3653  # ten years: no forecast of a drift beyond
 FEWEST_TURNS = 2  # of a magnetometer: one turn does not show how well turns agree
 LIMIT_SIGMAS = 3.0  # of an individual value: a false alarm in 370 runs (Shewhart)

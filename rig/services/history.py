@@ -16,7 +16,7 @@ import numpy as np
 
 from calibrations.analyses.control_chart import Chart, control_chart
 from calibrations.analyses.stability import Agreement, Stability, compare_values, fit_stability
-from calibrations.criteria import BASELINE_RUNS, FEWEST_FOR_DRIFT, FEWEST_RUNS
+from calibrations.criteria import BASELINE_RUNS, FEWEST_FOR_DRIFT, FEWEST_RUNS, MATERIAL, SHORTEST_FOR_DRIFT_DAYS
 from calibrations.errors import CalibrationError, DataError
 from calibrations.fitting.fit import fit
 from calibrations.fitting.problem import check_kind
@@ -81,13 +81,23 @@ class Value:
 
 @dataclass(frozen=True)
 class Calibration:
-    """One run's parameters by the names of certificates. `at` is its date and time."""
+    """One run's parameters by the names of certificates. `at` is its date and time, `kind` its procedure.
+
+    `excess` is the remaining error, in noise floors.
+    """
 
     data: str
     at: datetime
     rig: str
     values: Mapping[str, Value]
     expired: str | None
+    kind: str = ""
+    excess: float = 1.0
+
+    @property
+    def complete(self) -> bool:
+        """Whether the remaining error is that of noise; else the values depend on the measured poses."""
+        return self.excess <= MATERIAL
 
     @property
     def day(self) -> str:
@@ -96,7 +106,10 @@ class Calibration:
 
 @dataclass(frozen=True)
 class Quantity:
-    """One parameter over all calibrations that have it; `chart` and `line` None where they are too few."""
+    """One parameter over all calibrations that have it; `chart` None where they are too few.
+
+    `line` is None for a reason, `no_drift`: too few, too short a time, or a model that is not complete.
+    """
 
     name: str
     unit: str
@@ -105,6 +118,7 @@ class Quantity:
     line: Stability | None
     allowed: tuple[float, float] | None
     due: date | None
+    no_drift: str = ""
 
     @property
     def last(self) -> Value:
@@ -120,6 +134,20 @@ class History:
     calibrations: tuple[Calibration, ...]
     quantities: tuple[Quantity, ...]
     passed_over: Mapping[str, str]
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Why values of these calibrations are not comparable."""
+        open_ = [each for each in self.calibrations if not each.complete]
+        if not open_:
+            return ()
+        worst = max(each.excess for each in open_)
+        text = (
+            f"The model {self.model} is not complete for {len(open_)} of {len(self.calibrations)} calibrations: the "
+            f"remaining error is up to {worst:.2g} times the noise floor. The values depend on the measured poses, so "
+            "no drift is computed. Choose a complete model."
+        )
+        return (text,)
 
     @property
     def due(self) -> date | None:
@@ -150,7 +178,18 @@ def history(
             passed_over[data] = str(error)
     if not found:
         raise _none(record, sensor, passed_over)
+    found, others = _of_one_kind(found)
+    passed_over |= others
     return judged(History(sensor, model.name, tuple(found), (), passed_over), limits, baseline)
+
+
+def _of_one_kind(found: list[Calibration]) -> tuple[list[Calibration], dict[str, str]]:
+    """The calibrations by the most frequent procedure, of equal ones the last; the others with the reason."""
+    kinds = [each.kind for each in found]
+    kind = max(reversed(kinds), key=kinds.count)
+    why = "a calibration by {}, and those of {} are shown: another choice of poses is not comparable"
+    others = {each.data: why.format(each.kind, kind) for each in found if each.kind != kind}
+    return [each for each in found if each.kind == kind], others
 
 
 def latest(record: Record, sensor: str, model: Model) -> Calibration:
@@ -220,7 +259,8 @@ def _calibration(record: Record, data: str, run: Run, model: Model) -> Calibrati
     if len(values) < len(found.theta):
         raise DataError(f"{table.source}: does not determine every parameter of {model.name}")
     expired = str(run.constants[EXPIRED]) if EXPIRED in run.constants else None
-    return Calibration(data, at, str(run.bench.get("name", "")) or "elsewhere", values, expired)
+    rig = str(run.bench.get("name", "")) or "elsewhere"
+    return Calibration(data, at, rig, values, expired, run.procedure, found.pooled_excess)
 
 
 def date_of(run: Run) -> datetime:
@@ -247,13 +287,25 @@ def _quantity(name: str, of: Sequence[Calibration], limit: Limit | None, baselin
     numbers, stds = [each.value for each in values], [each.std for each in values]
     days = [each.at.timestamp() / 86400 for each in mine]
     chart = control_chart(numbers, baseline, float(rms(np.array(stds)))) if len(mine) >= FEWEST_RUNS else None
-    line = fit_stability(days, numbers, stds) if len(mine) >= FEWEST_FOR_DRIFT and np.ptp(days) > 0 else None
+    no_drift = _no_drift(mine, float(np.ptp(days)))
+    line = None if no_drift else fit_stability(days, numbers, stds)
     allowed = None
     if limit is not None:
         allowed = limit if isinstance(limit, tuple) else (numbers[-1] - limit, numbers[-1] + limit)
     due = line.due_days(*allowed) if line is not None and allowed is not None else None
     when = None if due is None else datetime.fromtimestamp(due * 86400, tz=mine[-1].at.tzinfo).date()
-    return Quantity(name, values[0].unit, mine, chart, line, allowed, when)
+    return Quantity(name, values[0].unit, mine, chart, line, allowed, when, no_drift)
+
+
+def _no_drift(of: Sequence[Calibration], days: float) -> str:
+    """Why these calibrations have no drift; "" where they have one."""
+    if len(of) < FEWEST_FOR_DRIFT:
+        return f"A drift needs {FEWEST_FOR_DRIFT} calibrations at different times."
+    if days < SHORTEST_FOR_DRIFT_DAYS:
+        return f"A drift needs calibrations over {SHORTEST_FOR_DRIFT_DAYS:.0f} days; these are of {days:.2g} days."
+    if not all(each.complete for each in of):
+        return "A drift needs a complete model."
+    return ""
 
 
 # Limits that set the next calibration: from the bench file and from options.

@@ -27,7 +27,7 @@ def next_due(life: History, limit_is_given: str) -> str:
     if all(q.allowed is None for q in life.quantities):
         return f"A due date needs a limit: {limit_is_given}, or limits.results in the bench file."
     if all(q.line is None for q in life.quantities):
-        return "A due date needs three calibrations at different times."
+        return next(q.no_drift for q in life.quantities if q.allowed is not None).replace("drift", "due date", 1)
     return "With this drift no calibration is due within ten years."
 
 

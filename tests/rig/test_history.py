@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from datetime import UTC, date, datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,16 @@ from calibrations.model.file import read_model
 from calibrations.table import Table
 from rig.errors import RecordError
 from rig.record import Record
-from rig.services.history import Calibration, Value, compare_rigs, history, latest
+from rig.services.history import (
+    Calibration,
+    History,
+    Value,
+    _of_one_kind,
+    compare_rigs,
+    history,
+    judged,
+    latest,
+)
 from tests.rig.lives import COLUMNS, calibrated
 
 Rig = Callable[..., Any]
@@ -161,3 +171,36 @@ def test_what_is_not_there_is_refused(refused: Callable[..., str], years: None) 
     assert "the model linear has no quantity 'bias-w'" in refused("history", "17", "--limit", "bias-w=0.1")
     calibrated("19", "last week", 2.5)
     assert "its constant date is 'last week'; write it as 2025-03-01" in refused("history", "19")
+
+
+def test_runs_of_one_day_have_no_drift_a_year(rig: Rig) -> None:
+    for hour in (8, 12, 16):
+        calibrated("17", f"2020-03-01T{hour:02}:00", 2.5 + 0.001 * hour, seed=hour)
+    ended = rig("history", "17", "--limit", "bias-x=0.005", "--json")
+    said = json.loads(ended.out)
+    assert len(said["calibrations"]) == 3
+    assert {q["drift_per_year"] for q in said["quantities"]} == {None}
+    assert (
+        "A due date needs calibrations over 30 days; these are of 0.33 days."
+        in rig("history", "17", "--limit", "bias-x=0.005").out
+    )
+
+
+def test_calibrations_of_another_kind_or_by_an_incomplete_model_are_not_compared() -> None:
+    start = datetime(2020, 3, 1, tzinfo=UTC)
+    values = {"bias-x": Value(2.5, 1e-4, "V")}
+    kinds = ("sweep", "misalignment", "sweep", "sweep")
+    of = [
+        Calibration(f"r{k}", start + timedelta(days=100 * k), "A", values, None, kind, 1.0)
+        for k, kind in enumerate(kinds)
+    ]
+    found, others = _of_one_kind(of)
+    assert [each.data for each in found] == ["r0", "r2", "r3"]
+    assert list(others) == ["r1"]
+    life = judged(History("17", "linear", tuple(found), (), others), {})
+    assert life.quantities[0].line is not None
+    assert life.warnings == ()
+    found[1] = replace(found[1], excess=6.6)
+    life = judged(History("17", "linear", tuple(found), (), others), {})
+    assert life.quantities[0].line is None
+    assert "not complete for 1 of 3" in life.warnings[0]

@@ -154,6 +154,7 @@ def lines(found: History) -> Iterator[str]:
     yield ""
     yield next_due(found, "--limit bias-x=0.005")
     yield from (f"{each.data}: {each.expired}." for each in of if each.expired)
+    yield from found.warnings
     for data, why in found.passed_over.items():
         note(f"Not used: {data}: {why}")
 
@@ -202,6 +203,7 @@ def document(found: History, closest: Near, why: str | None, compared: Sequence[
         ],
         "quantities": [_of_quantity(q) for q in found.quantities],
         "passed_over": dict(found.passed_over),
+        "warnings": list(found.warnings),
         "closest": None if closest is None else {"data": closest[0].data, "age_days": closest[1], "stale": why},
         "compared": [
             {"one": each.one, "other": each.other, "quantities": _agreements(each.rows)} for each in compared

@@ -243,7 +243,7 @@ def _legend(q: Quantity) -> str:
     if q.chart is not None and q.chart.signals:
         signs.append("◆ outside the limits of a control chart")
     if q.line is None:
-        signs.append("a drift needs three calibrations at different times")
+        signs.append(q.no_drift.rstrip("."))
     else:
         signs.append("line and band: drift, with 95 % interval of the value")
     if q.allowed is not None:
@@ -269,6 +269,8 @@ def summary_of(found: History, q: Quantity) -> None:
                 if overdue:
                     words("overdue", "chip bad")
             words(for_page(f"{summary(found)}."), "quiet small")
+            for warning in found.warnings:
+                words(for_page(warning), "fault")
             if out:
                 words(f"{OUT.capitalize()}: {', '.join(out)}.", "small")
         with div("row-of numbers"):
