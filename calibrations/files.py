@@ -20,6 +20,7 @@ import yaml
 from calibrations.errors import DataError
 
 LARGEST_BYTES = 1 << 30
+LONGEST_LINE_BYTES = 1 << 24
 HEAD_BYTES = 1 << 16
 MARKS = {codecs.BOM_UTF8: "utf-8-sig", codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"}
 CONTROLS = frozenset(range(32)) - set(b"\t\n\r\f") - {0x1A}  # 0x1A ends a text file in old Windows programs
@@ -76,16 +77,21 @@ def _bytes(path: Path) -> BinaryIO:
 
 
 class _Unpacked(gzip.GzipFile):
-    """A gzip file with a limit on its unpacked size."""
+    """A gzip file with a limit on its unpacked size, and on the length of a line, which is held in memory."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(path, "rb")
-        self._taken = 0
+        self._taken = self._of_line = 0
 
     def read1(self, size: int = -1) -> bytes:
-        """Read for the text decoder. Raises DataError beyond LARGEST_BYTES in total."""
+        """Read for the text decoder. Raises DataError beyond LARGEST_BYTES, and in a line beyond LONGEST_LINE_BYTES."""
         data = super().read1(size)
         self._taken += len(data)
+        _, end, rest = data.rpartition(b"\n")
+        self._of_line = len(rest) if end else self._of_line + len(data)
+        if self._of_line > LONGEST_LINE_BYTES:
+            most = LONGEST_LINE_BYTES >> 20
+            raise DataError(f"{self.name}: a line has more than {most} MiB; is it really a CSV file?")
         if self._taken > LARGEST_BYTES:
             raise DataError(
                 f"{self.name}: holds more than {LARGEST_BYTES >> 30} GiB; unpack it and import a part of it"

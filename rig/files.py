@@ -13,9 +13,11 @@ from rig.errors import OutputError
 
 
 def require_out(out: Path, *inputs: str | Path | None) -> None:
-    """Raises OutputError if the folder of `out` is missing, or if `out` is one of the input files."""
+    """Raises OutputError if the folder of `out` is missing, or if `out` is a device or one of the input files."""
     if not out.parent.is_dir():
         raise OutputError(f"{out}: there is no folder {out.parent}; make it, or give another file")
+    if out.exists() and not out.is_file():
+        raise OutputError(f"{out}: is not a regular file, so it is not overwritten; give another file")
     for file in inputs:
         if file is not None and Path(file).exists() and out.exists() and out.samefile(file):
             raise OutputError(f"{out}: this would overwrite the input file {file}; give another file")

@@ -7,6 +7,7 @@ import numpy as np
 from calibrations.effects import Parameter, Values
 from calibrations.table import Array, Table
 
+SHORTEST_S = 1e-3  # a time constant
 PARTS = (0.05, 0.2, 0.6)  # of the record's length: time constants from which a fit starts
 
 
@@ -16,8 +17,9 @@ def begin_s(table: Table) -> float:
 
 
 def time_constants_s(table: Table) -> Array:
-    """(starts, axes) time constants from which a fit starts, s."""
-    return np.outer(PARTS, np.full(len(table.axes), np.ptp(table.time_s)))
+    """(starts, axes) time constants from which a fit starts, s; SHORTEST_S for a record at one time."""
+    starts = np.outer(PARTS, np.full(len(table.axes), np.ptp(table.time_s)))
+    return np.asarray(np.maximum(starts, SHORTEST_S))
 
 
 def left(table: Table, p: Values) -> Array:
@@ -31,7 +33,7 @@ TIME_CONSTANT = Parameter(
     typical=600.0,
     per_axis=False,
     starts=(600.0,),
-    low=1e-3,
+    low=SHORTEST_S,
     guess=time_constants_s,
     doc="of the exponential",
 )

@@ -255,7 +255,8 @@ def write_csv(table: Table, path: Path | str) -> None:
     """Write `table` so that `read_csv` restores it to the last bit."""
     names = [*table.columns, *table.labels]
     with Path(path).open("w", encoding="utf-8", newline="") as file:
-        file.writelines(f"# {key}: {value}\n" for key, value in table.constants.items())
+        # A constant is one line; a line break in a sensor's name would begin a constant of its own.
+        file.writelines(f"# {' '.join(f'{key}: {value}'.splitlines())}\n" for key, value in table.constants.items())
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(names)
         cells = [[repr(float(v)) for v in values] for values in table.columns.values()]

@@ -176,6 +176,8 @@ def _check_parameters(entry: _Effect, effect: Effect, where: str) -> None:
             raise ModelError(f'{where}: "{p.name}" has one value for each axis; it needs `axis: x`, y or z')
         if not declared[p.name] and p.axis is not None:
             raise ModelError(f'{where}: "{p.name}" is one value for all axes; remove the key axis, which is {p.axis}')
+        if (entry.effect, p.name, p.value) == ("scale-factor", "scale", 0.0):
+            raise ModelError(f"{where}: the scale is 0, so the sensor would have no response; give another value")
     given = [(p.name, p.axis) for p in entry.parameters]
     if twice := next((key for key in given if given.count(key) > 1), None):
         raise ModelError(f"{where}: {' '.join(filter(None, twice))} is given twice")

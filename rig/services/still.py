@@ -364,6 +364,8 @@ def _of_array(path: Path, rate_hz: float | None) -> Stream:
             array = np.load(path, mmap_mode="r", allow_pickle=False)
     except Exception as error:  # its header is parsed as Python, which fails in many ways
         raise DataError(f"{path}: is not an array from numpy.save: {error}") from None
+    if not isinstance(array, np.ndarray):
+        raise DataError(f"{path}: is an archive of several arrays (.npz); save one array with numpy.save")
     if array.ndim == 2 and 1 in array.shape:
         array = array.reshape(-1)
     if array.ndim != 1:

@@ -247,3 +247,29 @@ def test_two_runs_of_one_second_do_not_share_a_name(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr("rig.record.store.secrets.token_hex", lambda _: next(drawn))
     with Record() as record:
         assert begin(record) != begin(record)
+
+
+def test_a_part_of_an_id_names_its_run_if_it_is_the_only_one() -> None:
+    with Record() as record:
+        first = begin(record)
+        assert record.run(first[:-1]).run == first
+        begin(record)
+        with pytest.raises(UnknownRun, match=r"2 runs in .* begin with '20'.*write more of the id"):
+            record.run("20")
+        for odd in ("", "%", "_" * len(first)):
+            with pytest.raises(UnknownRun, match="no run"):
+                record.run(odd)
+
+
+def test_means_of_an_older_record_come_from_its_samples() -> None:
+    with Record() as record:
+        run = begin(record)
+        for number in range(3):
+            samples = block([[number, 1.0], [number + 1.0, 3.0]])
+            record.keep(run, number, Kept(Pose(90, number), samples, 3.5, 21.5), None)
+        present = record.dwells(run)
+        with record.engine.begin() as to:
+            to.exec_driver_sql("DELETE FROM dwells WHERE number > 0")  # an older program wrote none
+        assert record.dwells(run) == present
+        assert [number for number, _ in record.dwells(run, after=1)] == [2]
+        assert present[1][1].means == {"vx": 1.5, "vy": 2.0}

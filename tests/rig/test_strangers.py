@@ -4,16 +4,22 @@ from __future__ import annotations
 
 import gzip
 import logging
+import math
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
+import calibrations as cal
 from calibrations import files
 from calibrations.errors import DataError, ModelError
 from calibrations.files import LONGEST_YAML, load_yaml
+from calibrations.importing.foreign import write_csv
 from calibrations.model.file import parse_model
+from calibrations.table import Table
 from drivers.errors import LinkRefused
 from drivers.transport.address import Url
 from procedures.catalogue import find
@@ -139,6 +145,50 @@ def test_a_compressed_file_is_no_bomb(tmp_path: Path, monkeypatch: pytest.Monkey
     assert path.stat().st_size < 1 << 14
     with pytest.raises(DataError, match="holds more than"), files.open_text_file(path).lines() as lines:
         assert sum(1 for _ in lines) < 0
+
+
+def test_a_compressed_line_without_an_end_is_refused_early(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(files, "LONGEST_LINE_BYTES", 1 << 20)
+    path = tmp_path / "bomb.csv.gz"
+    path.write_bytes(gzip.compress(b"t_s,vx_v\n" * 1_000_000 + b"1" * (1 << 22)))
+    with pytest.raises(DataError, match="a line has more than 1 MiB"), files.open_text_file(path).lines() as lines:
+        assert sum(1 for _ in lines) < 0
+
+
+def test_a_line_break_in_a_name_makes_no_constant_in_an_export(tmp_path: Path) -> None:
+    columns = {"alpha_deg": [90.0, 90.0], "beta_deg": [0.0, 90.0], "vx_v": [2.5, 3.5]}
+    name = "ADXL203\n# gravity_m_s2: 1.6\rbeta\u2028gamma"
+    write_csv(Table.from_columns("poses", columns, {"sensor": name, "gravity_m_s2": 9.8}, "x"), tmp_path / "out.csv")
+    constants = cal.read(tmp_path / "out.csv").constants
+    assert (constants["gravity_m_s2"], sorted(constants)) == (9.8, ["gravity_m_s2", "sensor"])
+
+
+def test_a_device_is_not_overwritten(rig: Callable[..., Any], tmp_path: Path) -> None:
+    (tmp_path / "data.csv").write_text("alpha_deg,beta_deg,vx_v\n90,0,2.5\n90,90,3.5\n")
+    os.mkfifo(tmp_path / "device")
+    ended = rig("export", str(tmp_path / "data.csv"), "--format", "csv", "--out", str(tmp_path / "device"))
+    assert (ended.status, "is not a regular file" in ended.err) == (2, True)
+    assert (tmp_path / "device").is_fifo()
+
+
+def test_one_time_for_all_poses_is_no_fault_of_the_program(rig: Callable[..., Any], tmp_path: Path) -> None:
+    rows = (f"{a},{b},{2.5 + math.sin(a) * math.cos(b):.4f},100" for a in (90, 45) for b in range(0, 360, 15))
+    (tmp_path / "data.csv").write_text("\n".join(["alpha_deg,beta_deg,vx_v,t_s", *rows]))
+    ended = rig("fit", str(tmp_path / "data.csv"), "--out", str(tmp_path / "out.yaml"))
+    assert ended.status in (0, 1), ended.err
+
+
+def test_an_archive_named_as_an_array_is_refused(rig: Callable[..., Any], tmp_path: Path) -> None:
+    np.savez(tmp_path / "two.npz", a=np.zeros(9))
+    (tmp_path / "two.npz").rename(tmp_path / "two.npy")
+    ended = rig("noise", str(tmp_path / "two.npy"), "--rate", "100")
+    assert (ended.status, "is an archive of several arrays" in ended.err) == (2, True)
+
+
+def test_a_model_with_a_scale_of_zero_is_refused() -> None:
+    scale = "- effect: scale-factor\n  parameters:\n  - {name: scale, axis: x, value: 0.0, unit: V/g}\n"
+    with pytest.raises(ModelError, match="the scale is 0, so the sensor would have no response"):
+        parse_model(PAGE + scale, "zero.yaml")
 
 
 ADDRESS = "tcp://me:hush@192.168.1.40:502"
