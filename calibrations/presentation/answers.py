@@ -38,7 +38,10 @@ def diagnosis_text(result: Diagnosis[Any], model: str = "") -> str:
         parts.append(columns(*data.candidate_table(result, shown)))
     if result.missing:
         best = result.candidates[0]
-        parts += [f"{best.name}: {why(best, result)}", f"    {best.effect.formula.splitlines()[0]}"]
+        parts += [
+            f"{best.name}: {why(best, result)}",
+            f"    {best.effect.formula.splitlines()[0].replace('{out}', result.findings.data.unit)}",
+        ]
     return "\n\n".join(parts)
 
 

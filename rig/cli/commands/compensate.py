@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+import shlex
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -92,8 +93,25 @@ def command(
         emit(summary(made, origin) | {"files": paths, "residual": beside.document() if beside else None})
     else:
         click.echo(
-            "\n".join([*_lines(made), *(beside.lines() if beside else []), *(f"written: {path}" for path in paths)])
+            "\n".join(
+                [
+                    *_lines(made),
+                    *(beside.lines() if beside else []),
+                    *(f"written: {path}" for path in paths),
+                    *_how_to_test(language, out, origin.name),
+                ]
+            )
         )
+
+
+def _how_to_test(language: str, out: Path, name: str) -> list[str]:
+    """The command that compiles and tests the written files; nothing for JSON, which has the reference vectors."""
+    if language == "python":
+        return [f"To test: python {shlex.quote(str(out / name))}.py"]
+    if language == "c":
+        program = f"cc -std=c99 -O2 -D{name.upper()}_MAIN {name}.c {name}_self_test.c -lm -o {name}_self_test"
+        return [f"To compile and test: cd {shlex.quote(str(out))} && {program} && ./{name}_self_test && echo passed"]
+    return []
 
 
 def _writer(language: str) -> Callable[..., dict[str, str]]:

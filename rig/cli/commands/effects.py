@@ -45,7 +45,8 @@ def command(effect: str | None, bench_file: Path | None, as_json: bool) -> None:
         emit({"schema": "rig.effects/1", "effects": [document(e) for e in shown]})
     elif effect:
         e = shown[0]
-        click.echo(f"{e.name}: {e.summary}\n\n    " + e.formula.replace("\n", "\n    ") + "\n")
+        formula = e.formula.replace("{out}", "V").replace("\n", "\n    ")  # as docs/effects does for an output in V
+        click.echo(f"{e.name}: {e.summary}\n\n    {formula}\n")
         parts = (("Symptom", e.symptom), ("Excited by", e.excited_by), ("Confused with", e.confused_with))
         more = (("At run time", known_at_run_time(e)), ("Source", e.source))
         click.echo("\n".join(f"{title}: {text}" for title, text in (*parts, *more) if text))

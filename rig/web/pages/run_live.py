@@ -32,6 +32,7 @@ SEATS = {
     "terminal": "This run was started in a terminal. Pause stops the motion; the terminal then asks how to continue.",
     "nobody": "This run is unattended and cannot pause. Stop ends it; you can resume it later.",
 }
+STOPPED = "Stopped by a person. Resume continues at the same pose."
 ENDS = {"complete": "good", "stopped": "doubt", "failed": "bad"}
 
 
@@ -150,8 +151,10 @@ class Live:
         with self.alarm:
             if status.moving:
                 failed("Not at rest", "\n".join(status.moving))
-            if status.error:
-                failed("Reason for the pause" if status.phase == "paused" else "Reason for the end", _ended(status))
+            if _stopped_by_a_person(status):
+                words(STOPPED, "quiet")
+            elif status.error:
+                failed("Reason for the pause" if status.phase == "paused" else "Reason for the end", status.error)
 
     def _ask(self, asked: Asked | None, here: bool) -> None:
         self.question.clear()
@@ -200,11 +203,9 @@ class Live:
                 ui.html(_drawn(status.attitude), sanitize=False)
 
 
-def _ended(status: Status) -> str:
-    """The error; for a run stopped on a page, the next step."""
-    if status.state == "stopped" and status.error.startswith("stopped by SIGTERM"):
-        return "Stopped by a person. Resume continues at the same pose."
-    return status.error
+def _stopped_by_a_person(status: Status) -> bool:
+    """Whether the run has ended because a person stopped it, which is no error."""
+    return status.state == "stopped" and status.error.startswith("stopped by SIG")
 
 
 def _limits(value: Mapping[str, Any]) -> str:
