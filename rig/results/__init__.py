@@ -1,7 +1,7 @@
-"""What a run's measurements come to: one file for each procedure that has results, found by its name.
+"""Results of runs: one file for each procedure that has results, with the name of the procedure.
 
-`noise_floor.py` holds `evaluate(measured) -> {name: Result | Missing}` for the procedure "noise-floor", and the NAMES
-that its results can have. A procedure of the user's own may return its results instead, as such a mapping.
+`noise_floor.py` has `evaluate(measured) -> {name: Result | Missing}` for the procedure "noise-floor", and NAMES, the
+names that its results can have. A user's procedure can return such a mapping itself instead.
 """
 
 from rig.results.evaluate import judged

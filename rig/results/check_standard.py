@@ -1,4 +1,4 @@
-"""check-standard: bias and scale factor of the check standard, the points of its control chart."""
+"""check-standard: bias and scale factor of the check standard, for its control chart."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ NAMES = ("bias-{axis}", "scale-{axis}")
 
 
 def evaluate(measured: Measured) -> dict[str, Result]:
-    """bias-x in V, scale-x in V/g, and so on; the standard errors are those of white noise. Raises DataError."""
+    """bias-x in V and scale-x in V/g, the same of y; uncertainties by white noise alone. Raises DataError."""
     table, results = measured.table(), {}
     for axis in (axis for axis in table.axes if axis in AXES):
-        (done,) = estimate_tumbles(table, axis)
-        results[f"bias-{axis}"] = Result(done.bias_v, "V", done.bias_std_v)
-        results[f"scale-{axis}"] = Result(done.scale_v_per_g, "V/g", done.scale_std * abs(done.scale_v_per_g))
+        (tumble,) = estimate_tumbles(table, axis)
+        results[f"bias-{axis}"] = Result(tumble.bias_v, "V", tumble.bias_std_v)
+        results[f"scale-{axis}"] = Result(tumble.scale_v_per_g, "V/g", tumble.scale_std * abs(tumble.scale_v_per_g))
     return results

@@ -1,4 +1,4 @@
-"""The results of a run by the name of its procedure; the record is all that they are made of."""
+"""The results of a run, computed from the record by the file of its procedure."""
 
 from __future__ import annotations
 
@@ -17,32 +17,32 @@ from rig.results.result import Missing, Result, documents
 
 
 def judged(record: Record, run: Run) -> tuple[dict[str, Any], str | None]:
-    """The run's results as documents, judged by the limits of its bench; and which of them are missing, and why.
+    """The run's results as documents with the verdicts by the limits of its bench, and a text on the missing results.
 
-    An instrument's fault that shows only now is raised: SensorFault.
+    Raises SensorFault if the samples show a fault of an instrument.
     """
     try:
-        found = evaluated(record, record.run(run.run))  # as it is now: the number of its rows bounds the memory
+        results = evaluated(record, record.run(run.run))  # read again: the number of its rows bounds the memory
     except (CalibrationError, RecordError) as error:
         return {}, f"none: {error}"
-    given = {name: result for name, result in found.items() if isinstance(result, Result)}
-    return documents(given, Bench.model_validate(run.bench).result_limits), _missing(found)
+    given = {name: result for name, result in results.items() if isinstance(result, Result)}
+    return documents(given, Bench.model_validate(run.bench).result_limits), _missing(results)
 
 
-def _missing(found: Mapping[str, Result | Missing]) -> str | None:
-    """What is missing, each reason once; None where nothing is."""
+def _missing(results: Mapping[str, Result | Missing]) -> str | None:
+    """The missing results, each reason once; None if no result is missing."""
     by_reason: dict[str, list[str]] = {}
-    for name, result in found.items():
+    for name, result in results.items():
         if isinstance(result, Missing):
             by_reason.setdefault(result.why, []).append(name)
     return "; ".join(f"no {joined(names, 'or')}: {why}" for why, names in by_reason.items()) or None
 
 
 def evaluated(record: Record, run: Run) -> dict[str, Result | Missing]:
-    """What the run's measurements come to, by name; nothing for a procedure without results.
+    """The run's results by name; empty for a procedure without results.
 
-    Those of a batch begin with the sensor's name: `a1/bias-drift-x`. What belongs to the bench (OF_THE_BENCH of the
-    file) is given once. Raises DataError where the record does not hold enough.
+    In a batch the names begin with that of the sensor: `a1/bias-drift-x`. Results of the bench (OF_THE_BENCH in the
+    file) are given once. Raises DataError if the record has too few measurements.
     """
     name = run.procedure.replace("-", "_")
     if not Path(__file__).with_name(f"{name}.py").is_file():
@@ -50,10 +50,10 @@ def evaluated(record: Record, run: Run) -> dict[str, Result | Missing]:
     module = importlib.import_module(f"rig.results.{name}")
     sensors = [] if getattr(module, "OF_THE_BENCH", False) else sensors_of(run)
     if not sensors:
-        found: dict[str, Result | Missing] = module.evaluate(Measured(record, run))
-        return found
-    each = {sensor: module.evaluate(Measured(record, run, sensor)) for sensor in sensors}
-    return {f"{sensor}/{name}": result for sensor, results in each.items() for name, result in results.items()}
+        results: dict[str, Result | Missing] = module.evaluate(Measured(record, run))
+        return results
+    by_sensor = {sensor: module.evaluate(Measured(record, run, sensor)) for sensor in sensors}
+    return {f"{sensor}/{name}": result for sensor, of_one in by_sensor.items() for name, result in of_one.items()}
 
 
 # The names that results can have: NAMES of each procedure's file, in which `{axis}` stands for any axis.
@@ -62,7 +62,8 @@ AXES = "xyz"
 
 
 def names() -> list[str]:
-    """Those of all shipped procedures, in alphabetical order."""
+    """The names of results of all shipped procedures, in alphabetical order."""
     files = (path.stem for path in Path(__file__).parent.glob("[a-z]*.py"))
-    patterns = [each for file in files for each in getattr(importlib.import_module(f"rig.results.{file}"), "NAMES", ())]
+    modules = [importlib.import_module(f"rig.results.{file}") for file in files]
+    patterns = [pattern for module in modules for pattern in getattr(module, "NAMES", ())]
     return sorted({pattern.format(axis=axis) for pattern in patterns for axis in AXES})

@@ -1,4 +1,4 @@
-"""level-check: the table's tilt, and the level's own offset, from two readings half a turn apart."""
+"""level-check: the tilt of the table and the offset of the level, from two readings half a turn apart."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ NAMES = ("level-{axis}", "level-offset-{axis}", "base-{axis}", "base-offset-{axi
 
 
 def evaluate(measured: Measured) -> dict[str, Result]:
-    """Tilt along x and y of the level, or of the base, and the offset that the half turn takes out, deg."""
-    read = {reading.name: reading for reading in measured.readings()}
+    """Tilt of the table or of the base along x and y of the level, and the offset of the level, deg."""
+    readings = {reading.name: reading for reading in measured.readings()}
     what = "base" if measured.run.settings.get("on") == "base" else "level"
     results = {}
     for axis in "xy":
-        front, back = read[f"{what}-front-{axis}"], read[f"{what}-back-{axis}"]
+        front, back = readings[f"{what}-front-{axis}"], readings[f"{what}-back-{axis}"]
         std = hypot(front.std, back.std) / 2 if front.std is not None and back.std is not None else None
         tilt_deg, offset_deg = reversal(front.value, back.value)
         results[f"{what}-{axis}"] = Result(tilt_deg, "deg", std)

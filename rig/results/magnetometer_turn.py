@@ -1,4 +1,4 @@
-"""magnetometer-turn: hard and soft iron, by the ellipsoid and by hand; the elements of the field."""
+"""magnetometer-turn: hard and soft iron by an ellipsoid fit and by hand, and the elements of the field."""
 
 from __future__ import annotations
 
@@ -38,30 +38,30 @@ NAMES = (
 
 
 def evaluate(measured: Measured) -> dict[str, Result | Missing]:
-    """By the ellipsoid of all directions:
+    """By an ellipsoid fit to all directions (equations of Book 17):
 
     hard-iron                V, of each axis
     soft-iron                relative, as in the effect soft-iron
-    left-by-ellipsoid        rms of what is left of the magnitude, per mille of the field
+    left-by-ellipsoid        rms residual of the magnitude, per mille of the field
     field-total, -horizontal F and H, V                 (17.6)
-    field-azimuth            deg from the base's x axis, clockwise seen from above
-    field-declination        D, deg from true north, where the bench knows the base's `heading_deg`    (17.9)
+    field-azimuth            deg from the x axis of the base, clockwise from above
+    field-declination        D, deg from true north, if the bench has the `heading_deg` of the base    (17.9)
     field-inclination        I, deg below the horizontal    (17.10)
 
     and by hand, from the extremes of each turn, (17.11)-(17.15):
 
     hard-iron-by-hand        V
-    soft-iron-by-hand        least over greatest radius of the turn about z
+    soft-iron-by-hand        smallest over largest radius of the turn about z
     soft-iron-angle-by-hand  deg from x to its major axis, from -90 to 90
-    left-by-hand             what the magnitude then varies by, per mille
-    field-horizontal-by-hand, field-azimuth-by-hand    of the turn about z alone
+    left-by-hand             variation of the corrected magnitude, per mille
+    field-horizontal-by-hand, field-azimuth-by-hand    from the turn about z
 
-    In the uncertainties by hand stands what the extremes cannot see (`horizontal_turn.py`): what iron lets of the
-    upright field into the level axes, unless the sensor was turned over; what it makes of H; the steps.
-    How the sensor sits in its mount shows in several turns: of one, the azimuth has no uncertainty.
+    The uncertainties by hand include the errors of this method: the vertical field that iron turns into the horizontal
+    axes (unless the sensor was turned over), the effect of iron on H, and the steps between positions. The azimuth has
+    an uncertainty only with several turns, because one turn does not show how the sensor sits in its mount.
 
-    Where the directions cover too little of the sphere, what the ellipsoid gives is missing and says so. Raises
-    DataError where the turn about z was left out.
+    The results of the ellipsoid are Missing if the directions cover too little of the sphere. Raises DataError without
+    the turn about z.
     """
     table, poses = measured.table(), [kept.pose for kept in measured.kept()]
     if poses[0].up != "z":
@@ -84,7 +84,7 @@ def evaluate(measured: Measured) -> dict[str, Result | Missing]:
 
 
 def _std_v(table: Table) -> float:
-    """Of one position's mean, V; 0 where a single sample was all of it."""
+    """Standard deviation of the mean at one position, V; 0 for single samples."""
     white = white_std(table)
     return 0.0 if white is None else float(np.sqrt(np.mean(white**2)))
 
@@ -96,27 +96,25 @@ def _all_missing(why: str) -> dict[str, Result | Missing]:
 
 
 def _by_ellipsoid(table: Table, poses: list[Pose]) -> dict[str, Result | Missing]:
-    found = fitted(table, "magnetometer")
-    results = {f"hard-iron-{e.axis}": result(e) for e in found.model.estimates("hard-iron")}
-    results |= {f"soft-iron-{e.name}": result(e) for e in found.model.estimates("soft-iron")}
-    results["left-by-ellipsoid"] = Result(float(1e3 * rms(found.residual)[0]), "per mille")
-    return results | _elements(found, table, poses)
+    fit = fitted(table, "magnetometer")
+    results = {f"hard-iron-{e.axis}": result(e) for e in fit.model.estimates("hard-iron")}
+    results |= {f"soft-iron-{e.name}": result(e) for e in fit.model.estimates("soft-iron")}
+    results["left-by-ellipsoid"] = Result(float(1e3 * rms(fit.residual)[0]), "per mille")
+    return results | _elements(fit, table, poses)
 
 
-def _elements(found: Fit, table: Table, poses: list[Pose]) -> dict[str, Result | Missing]:
-    made = calibration_matrices(found)
-    if made is None:
+def _elements(fit: Fit, table: Table, poses: list[Pose]) -> dict[str, Result | Missing]:
+    calibration = calibration_matrices(fit)
+    if calibration is None:
         return {name: Missing("the ellipsoid gives no calibration") for name in ELEMENTS.values()}
-    (strength,) = found.model.estimates("field-strength")
+    (strength,) = fit.model.estimates("field-strength")
     attitudes: Array = np.array([sensor_from_base(pose) for pose in poses])
-    turned = field_elements(strength.value * made(table.outputs), attitudes, [p.path for p in poses])
+    turned = field_elements(strength.value * calibration(table.outputs), attitudes, [p.path for p in poses])
     units = {"F": "V", "H": "V", "D": "deg", "I": "deg"}
     results: dict[str, Result | Missing] = {}
     for name, value in turned.value.items():
-        std, of_strength = (
-            turned.std[name],
-            (strength.std or 0.0) * value / strength.value if units[name] == "V" else 0.0,
-        )
+        std = turned.std[name]
+        of_strength = (strength.std or 0.0) * value / strength.value if units[name] == "V" else 0.0
         results[ELEMENTS[name]] = Result(value, units[name], None if std is None else hypot(std, of_strength))
         if name == "D" and HEADING in table.constants:
             from_north = (value + table.number(HEADING, 0.0) + 180) % 360 - 180
@@ -124,20 +122,20 @@ def _elements(found: Fit, table: Table, poses: list[Pose]) -> dict[str, Result |
     return results
 
 
-def _by_extremes(found: ExtremesEstimate, level: Elements, noise_v: float) -> dict[str, Result | Missing]:
+def _by_extremes(extremes: ExtremesEstimate, level: Elements, noise_v: float) -> dict[str, Result | Missing]:
     results: dict[str, Result | Missing] = {}
     for name, unit in (("H", "V"), ("D", "deg")):
         results[f"{ELEMENTS[name]}-by-hand"] = Result(level.value[name], unit, level.std[name])
     for k, axis in enumerate(AXES):
-        value, std = float(found.hard_iron[k]), float(found.hard_iron_std[k])
+        value, std = float(extremes.hard_iron[k]), float(extremes.hard_iron_std[k])
         results[f"hard-iron-by-hand-{axis}"] = (
             Result(value, "V", std)
             if np.isfinite(value)
             else Missing(f"{axis} was vertical in every turn; use more mounts")
         )
-    soft = found.soft_iron
+    soft = extremes.soft_iron
     ratio, noise = soft.least / soft.greatest, noise_v * hypot(1 / soft.least, 1 / soft.greatest)
     results["soft-iron-by-hand"] = Result(ratio, "", hypot(soft.ratio_std, ratio * noise))
     angle_deg = (np.degrees(soft.angle_rad) + 90) % 180 - 90  # an axis has no direction
     results["soft-iron-angle-by-hand"] = Result(float(angle_deg), "deg", soft.angle_std_deg(noise_v))
-    return results | {"left-by-hand": Result(found.left_per_mille, "per mille")}
+    return results | {"left-by-hand": Result(extremes.left_per_mille, "per mille")}

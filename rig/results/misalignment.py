@@ -17,20 +17,20 @@ NAMES = (
 
 
 def evaluate(measured: Measured) -> dict[str, Result]:
-    """theta-xx .. theta-yz, alpha-x .. beta-y in deg, and the correction of Ang (20)-(21) for accelerations in order.
+    """theta-xx .. theta-yz, alpha-x .. beta-y in deg, and the matrix of Ang (20)-(21) that corrects accelerations.
 
-    Raises DataError where no round of the search is complete.
+    Raises DataError if no round of the search is complete.
     """
-    found = estimate_directions(measured.table())
+    directions = estimate_directions(measured.table())
     results: dict[str, Result] = {}
-    for direction in found.values():
+    for direction in directions.values():
         results |= _of_axis(direction)
-    value, std = non_orthogonality_deg(found["x"], found["y"])
+    value, std = non_orthogonality_deg(directions["x"], directions["y"])
     results["non-orthogonality"] = Result(value, "deg", std)
-    matrix = correction_matrix(found["x"].theta, found["y"].theta)
+    matrix = correction_matrix(directions["x"].theta, directions["y"].theta)
     for (row, column), factor in np.ndenumerate(matrix):
         results[f"correction-{REFERENCE[row]}{REFERENCE[column]}"] = Result(float(factor), "")
-    return results | {"rounds": Result(float(found["x"].rounds), "")}
+    return results | {"rounds": Result(float(directions["x"].rounds), "")}
 
 
 def _of_axis(direction: Direction) -> dict[str, Result]:

@@ -1,4 +1,4 @@
-"""noise-floor: rms and peak-to-peak noise of each axis, and the inclination that it hides."""
+"""noise-floor: rms and peak-to-peak noise of each axis, and the smallest inclination above the noise."""
 
 from __future__ import annotations
 
@@ -17,7 +17,10 @@ NAMES = ("noise-rms-{axis}", "noise-pp-{axis}", "inclination-{axis}")
 
 
 def evaluate(measured: Measured) -> dict[str, Result | Missing]:
-    """V, and deg for the inclination, which needs both poses at +-1 g. Raises DataError without a still record."""
+    """Noise in V, inclination in deg. The inclination needs the poses at +1 g and -1 g.
+
+    Raises DataError without a still record.
+    """
     upright: list[Kept] = []
     still: list[Kept] = []
     for kept in measured.kept():
@@ -39,10 +42,10 @@ def evaluate(measured: Measured) -> dict[str, Result | Missing]:
 def _inclination(upright: list[Kept], axis: str, rms_v: float, std_v: float) -> Result | Missing:
     outputs_v = []
     for beta_deg in UPRIGHT_DEG[axis]:
-        found = [kept.dwell.means[f"v{axis}"] for kept in upright if kept.pose.beta_deg == beta_deg]
-        if not found:
+        at_pose_v = [kept.dwell.means[f"v{axis}"] for kept in upright if kept.pose.beta_deg == beta_deg]
+        if not at_pose_v:
             return Missing(f"there is no pose at alpha 90, beta {beta_deg:g} deg; `rig show RUN --poses` lists all")
-        outputs_v.append(float(np.mean(found)))
+        outputs_v.append(float(np.mean(at_pose_v)))
     plus, minus = outputs_v
     inclination = hidden_inclination_deg(PEAK_TO_PEAK * rms_v, (plus - minus) / 2)
     return Result(inclination, "deg", inclination * std_v / rms_v if rms_v else None)

@@ -19,28 +19,28 @@ NAMES = (
 
 
 def evaluate(measured: Measured) -> dict[str, Result | Missing]:
-    """Of each axis:
+    """For each axis:
 
-    gyro-bias                V, the output at rest under no specific force
+    gyro-bias                V, output at rest without specific force
     gyro-scale               V/(deg/s)
-    gyro-misalignment-xy     deg, what x feels of a turn about y, as a sine
-    gyro-g-sensitivity-xy    (deg/s)/g, what x shows of a specific force along y
-    rate-residual            deg/s, rms of what the four leave over all turns and rests
+    gyro-misalignment-xy     deg, response of x to a turn about y, as an arc sine
+    gyro-g-sensitivity-xy    (deg/s)/g, sensitivity of x to a specific force along y
+    rate-residual            deg/s, rms residual of the four over all turns and rests
 
-    The earth's rotation is taken off where the bench knows its latitude. Of an axis that was not asked to be turned
-    about there is no scale factor, and no misalignment of the others towards it.
+    The rotation of the earth is subtracted if the bench has its latitude. An axis without a turn about it has no scale
+    factor, and the other axes have no misalignment towards it.
     """
     table = measured.table()
-    found = fitted(table, "gyroscope", "gyro-misalignment", "gyro-g-sensitivity")
-    results = {f"gyro-bias-{e.axis}": result(e) for e in found.model.estimates("gyro-bias")}
-    scales = {e.axis: e for e in found.model.estimates("gyro-scale-factor")}
+    fit = fitted(table, "gyroscope", "gyro-misalignment", "gyro-g-sensitivity")
+    results = {f"gyro-bias-{e.axis}": result(e) for e in fit.model.estimates("gyro-bias")}
+    scales = {e.axis: e for e in fit.model.estimates("gyro-scale-factor")}
     results |= {f"gyro-scale-{axis}": result(scale) for axis, scale in scales.items()}
-    results |= {f"gyro-misalignment-{e.name}": result(e) for e in found.model.estimates("gyro-misalignment")}
-    left = dict(zip(found.channels, rms(found.residual), strict=True))
+    results |= {f"gyro-misalignment-{e.name}": result(e) for e in fit.model.estimates("gyro-misalignment")}
+    left = dict(zip(fit.channels, rms(fit.residual), strict=True))
     for axis, scale in scales.items():
         if scale.identified and scale.value:
-            for e in (e for e in found.model.estimates("gyro-g-sensitivity") if e.axis == axis):
+            for e in (e for e in fit.model.estimates("gyro-g-sensitivity") if e.axis == axis):
                 results[f"gyro-g-sensitivity-{axis}{e.name}"] = result(e, "(deg/s)/g", scale.value)
             results[f"rate-residual-{axis}"] = Result(abs(float(left[axis]) / scale.value), "deg/s")
     whole = measured.run.settings["mounts"] == len(EDGES)
-    return {name: each for name, each in results.items() if whole or isinstance(each, Result)}
+    return {name: value for name, value in results.items() if whole or isinstance(value, Result)}

@@ -1,8 +1,8 @@
-"""One measured quantity, and its verdict against a limit: the uncertainty has its say.
+"""One measured quantity, and its verdict by a limit and the uncertainty.
 
 pass      within the limit by more than the expanded uncertainty (k = 2)
 fail      beyond it by more than that
-marginal  neither can be said
+marginal  neither
 Source    ISO 14253-1, JCGM 106: a guard band on both sides of the limit.
 """
 
@@ -25,7 +25,7 @@ Limit = float | tuple[float, float]
 
 @dataclass(frozen=True)
 class Result:
-    """A value with its standard uncertainty, in `unit`; no `std` where it is not known."""
+    """A value with its standard uncertainty, in `unit`; `std` is None if it is not known."""
 
     value: float
     unit: str
@@ -41,7 +41,7 @@ class Result:
 
 @dataclass(frozen=True)
 class Missing:
-    """A result that the poses which are left do not determine, and why."""
+    """A result that the poses do not determine, and the reason."""
 
     why: str
 
@@ -57,7 +57,7 @@ def returned(name: str, given: Any) -> Result:
 
 
 def documents(results: Mapping[str, Result], limits: Mapping[str, Limit]) -> dict[str, dict[str, Any]]:
-    """The results as JSON, each beside its limit and verdict where the bench has one."""
+    """The results as JSON, each with its limit and verdict if the bench has a limit."""
     return {
         name: {
             "value": result.value,
@@ -70,11 +70,11 @@ def documents(results: Mapping[str, Result], limits: Mapping[str, Limit]) -> dic
     }
 
 
-# What the results of turned sensors have in common: a fitted model's parameters as results.
+# Parameters of a fitted model as results, for magnetometers and gyroscopes.
 
 
 def fitted(table: Table, model: str, *more: str) -> Fit:
-    """A shipped model, with the effects `more` that the table can have. Raises what `fit` raises."""
+    """The fit of a shipped model with those of the effects `more` that suit the table. Raises as `fit`."""
     effects, start = catalogue(), read_model(model)
     for name in more:
         if effects[name].excluded(table) is None:
@@ -83,7 +83,7 @@ def fitted(table: Table, model: str, *more: str) -> Fit:
 
 
 def result(estimate: Estimate, unit: str | None = None, per: float = 1.0) -> Result | Missing:
-    """An estimate as a result, over `per`; Missing where the data do not determine it."""
+    """An estimate divided by `per` as a result; Missing if the data do not determine it."""
     if not estimate.identified:
         return Missing(estimate.why or "it is not identified")
     std = None if estimate.std is None else abs(estimate.std / per)

@@ -1,4 +1,4 @@
-"""soak: when bias and scale factor come to rest, how far they drift until then, and how fast."""
+"""soak: steady-state time, drift and time constants of bias and scale factor."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from procedures.soak import REVERSAL
 from rig.record.measured import Measured
 from rig.results.result import Result
 
-SEEN = 3  # reversals after the steady state before a soak is ended by it
+FEWEST_STEADY = 3  # reversals after the steady state before it ends a soak
 NAMES = (
     *("steady-state", "steady-state-time", "steady-state-{axis}", "steady-state-time-{axis}"),
     *("steady-state-earliest", "steady-state-expected", "steady-state-latest"),
@@ -29,53 +29,55 @@ NAMES = (
 
 
 def evaluate(measured: Measured) -> dict[str, Result]:
-    """Of each axis, and of all:
+    """Results of each axis and of all axes. Times in h are since power-on.
 
-    steady-state           1 where it is reached within the soak, 0 where it is not
-    steady-state-time      h since power-on, where it is reached: the later one of bias and scale factor
-    steady-state-earliest  h since power-on, where it is not reached: it is later than that, by 97.5 %, as foreseen
-    steady-state-latest    the same: it is sooner than that, by 97.5 %; where that is within two days
-    steady-state-expected  the median, where there is a latest
-    bias-drift             V, the fitted bias at the last reversal less that at the first
-    scale-drift            the same of the scale factor, over its final value
-    time-constant          h, of the slowest exponential of the bias, where there is one
+    steady-state           1 if it is reached within the soak, else 0
+    steady-state-time      h, if it is reached: the later time of bias and scale factor
+    steady-state-earliest  h, if it is not reached: lower bound (97.5 %) of the forecast
+    steady-state-latest    h, upper bound (97.5 %) of the forecast, if it is within two days
+    steady-state-expected  h, median of the forecast, if there is an upper bound
+    bias-drift             V, fitted bias at the last reversal minus that at the first
+    scale-drift            the same of the scale factor, relative to its final value
+    time-constant          h, slowest exponential of the bias, if there is one
     scale-time-constant    the same of the scale factor
-    bias-tolerance         V, within which a bias is called steady; so for the scale factor, over its final value
-    temperature-wander     K, peak to peak, of the temperature about the sensor's own warming
-    gap                    s, of which nothing was kept
-    bias-final             V, what the bias comes to, as followed by the filter: where that is known
+    bias-tolerance         V, half-width of the band in which a bias is steady
+    scale-tolerance        the same of the scale factor, relative to its final value
+    temperature-wander     K, peak to peak, after removing the warm-up of the sensor
+    gap                    s, total time without samples
+    bias-final             V, final value of the bias by the Kalman filter, if it is known
     scale-final            V/g, the same of the scale factor
-    bias-foreseen          h since power-on, from which on the filter knew it; so for the scale factor
+    bias-foreseen          h, time from which the filter knew the final bias
+    scale-foreseen         the same of the scale factor
 
-    A soak with too few reversals to tell drift from noise has its gaps only.
+    A soak with too few reversals to separate drift from noise has only the gap.
     """
-    found, ahead = night(measured), foreseen_of(measured)
+    soak, forecasts = night(measured), foreseen_of(measured)
     results: dict[str, Result] = {}
-    for axis in ("", *found.axes) if all(course.state for course in found.courses.values()) else ():
-        results |= _steady(found, ahead, axis)
-    for course in found.courses.values():
+    for axis in ("", *soak.axes) if all(course.state for course in soak.courses.values()) else ():
+        results |= _steady(soak, forecasts, axis)
+    for course in soak.courses.values():
         if course.state is not None:
             results |= _drift(course, course.state)
-    if (wander_k := found.temperature_wander_k) is not None:
+    if (wander_k := soak.temperature_wander_k) is not None:
         results["temperature-wander"] = Result(wander_k, "K")
-    results |= _foreseen(ahead)
-    return results | {"gap": Result(sum(gap.length_s for gap in found.gaps), "s")}
+    results |= _foreseen(forecasts)
+    return results | {"gap": Result(sum(gap.length_s for gap in soak.gaps), "s")}
 
 
 def night(measured: Measured) -> Soak:
-    """The run as a soak; its times are counted from power-on, or from its beginning where that is not known."""
+    """The soak of the run. Times are since power-on, or since the beginning if that is not known."""
     return soak_of(measured.table(), measured.run.settings["oven_c"])
 
 
 def foreseen_of(measured: Measured) -> dict[str, ForecastHistory]:
-    """What was known of each quantity in the course of the run."""
+    """The forecasts of each quantity in the course of the run."""
     return forecast_history(measured.table(), measured.run.settings["oven_c"])
 
 
 def steady(dwells: Sequence[Dwell], oven_c: float) -> bool:
-    """Whether every axis of every sensor has come to rest, seen for a while: what ends a soak early.
+    """Whether every axis of every sensor has been steady for several reversals, so that the soak can end early.
 
-    `oven_c` is the temperature of the oven that it is in (0: none).
+    `oven_c` is the temperature of the oven, C (0: no oven).
     """
     reversals = [dwell for dwell in dwells if dwell.pose.path.startswith(REVERSAL)]
     if len(list(groupby(reversals, lambda dwell: dwell.pose.path))) < FEWEST_APPROACH_VALUES:
@@ -84,15 +86,15 @@ def steady(dwells: Sequence[Dwell], oven_c: float) -> bool:
     return all(_at_rest(soak_of(table_of(reversals, sensor), oven_c)) for sensor in sensors)
 
 
-def _at_rest(found: Soak) -> bool:
-    for course in found.courses.values():
+def _at_rest(soak: Soak) -> bool:
+    for course in soak.courses.values():
         state, last_s = course.state, course.t_s[-1]
         time = course.time_s
         if (
             state is None
             or time is None
             or time[0] + COVERAGE_FACTOR * time[1] > last_s
-            or np.sum(course.t_s > time[0]) < SEEN
+            or np.sum(course.t_s > time[0]) < FEWEST_STEADY
         ):
             return False
     return True
@@ -101,7 +103,7 @@ def _at_rest(found: Soak) -> bool:
 def table_of(
     dwells: Sequence[Dwell], sensor: str = "", constants: Mapping[str, str | float] | None = None, on_s: float = 0.0
 ) -> Table:
-    """The dwells of one sensor, "" where there is only one, as a table with what is known of it; on since `on_s`."""
+    """The dwells of one sensor ("" without a batch) as a table of poses; `on_s` is the time of power-on, s."""
     prefix = f"{sensor}." if sensor else ""
     columns: dict[str, list[float]] = {
         "alpha_deg": [dwell.pose.alpha_deg for dwell in dwells],
@@ -121,23 +123,23 @@ def table_of(
     return Table.from_columns("poses", columns, constants or {}, "the run", labels)
 
 
-def _steady(found: Soak, ahead: Mapping[str, ForecastHistory], axis: str) -> dict[str, Result]:
-    """When it was reached; else when it will be."""
-    time, end = found.time_s(axis), f"-{axis}" if axis else ""
+def _steady(soak: Soak, forecasts: Mapping[str, ForecastHistory], axis: str) -> dict[str, Result]:
+    """The time of the steady state, or its forecast."""
+    time, end = soak.time_s(axis), f"-{axis}" if axis else ""
     results = {f"steady-state{end}": Result(float(time is not None), "")}
     if time is not None:
         return results | {f"steady-state-time{end}": Result(time[0] / HOUR_S, "h", time[1] / HOUR_S)}
-    bounds = steady_time(ahead, axis)
+    bounds = steady_time(forecasts, axis)
     shown = {} if bounds is None else {"earliest": bounds.low}
     if bounds is not None and np.isfinite(bounds.high):
         shown |= {"expected": bounds.value, "latest": bounds.high}
     return results | {f"steady-state-{name}{end}": Result(s / HOUR_S, "h") for name, s in shown.items()}
 
 
-def _foreseen(found: Mapping[str, ForecastHistory]) -> dict[str, Result]:
-    """What was known at the end, and since when."""
+def _foreseen(forecasts: Mapping[str, ForecastHistory]) -> dict[str, Result]:
+    """The final values at the end of the soak, and the times from which they were known."""
     results: dict[str, Result] = {}
-    for name, course in found.items():
+    for name, course in forecasts.items():
         quantity, _, axis = name.partition("-")
         if course.known_s is not None:
             final = course.last.final
@@ -151,9 +153,9 @@ def _drift(course: Course, state: SteadyState) -> dict[str, Result]:
     unit, whole = ("V", 1.0) if course.quantity == "bias" else ("", abs(state.final[0]))
     value, std = state.drift
     results = {"drift": Result(value / whole, unit, std / whole), "tolerance": Result(state.tolerance / whole, unit)}
-    found = {f"{course.quantity}-{name}-{course.axis}": result for name, result in results.items()}
+    named = {f"{course.quantity}-{name}-{course.axis}": result for name, result in results.items()}
     if state.terms:
         tau_s, tau_std = state.terms[0].tau_s
         name = "time-constant" if course.quantity == "bias" else "scale-time-constant"
-        found[f"{name}-{course.axis}"] = Result(tau_s / HOUR_S, "h", tau_std / HOUR_S)
-    return found
+        named[f"{name}-{course.axis}"] = Result(tau_s / HOUR_S, "h", tau_std / HOUR_S)
+    return named

@@ -1,4 +1,4 @@
-"""temperature-cycle: what temperature does to bias and scale factor, and what it leaves behind."""
+"""temperature-cycle: temperature coefficients of bias and scale factor, and their hysteresis."""
 
 from __future__ import annotations
 
@@ -18,11 +18,12 @@ def evaluate(measured: Measured) -> dict[str, Result]:
     table, results = measured.table(), {}
     for axis in (axis for axis in table.axes if axis in AXES):
         steps = estimate_tumbles(table, axis)
-        for name, unit, found in (
+        for name, unit, coefficients in (
             ("bias", "V", bias_coefficients(steps)),
             ("scale", "", scale_coefficients(steps)),
         ):
-            results[f"{name}-temperature-{axis}"] = Result(found.slope[0], f"{unit or '1'}/K", found.slope[1])
-            hysteresis, std = found.hysteresis
+            slope, slope_std = coefficients.slope
+            results[f"{name}-temperature-{axis}"] = Result(slope, f"{unit or '1'}/K", slope_std)
+            hysteresis, std = coefficients.hysteresis
             results[f"{name}-temperature-hysteresis-{axis}"] = Result(hysteresis, unit, std)
     return results
