@@ -92,6 +92,17 @@ def test_paused_and_gone_on_and_stopped() -> None:
     assert "stopped by SIG" in status.error
 
 
+def test_a_second_pause_changes_nothing() -> None:
+    def person() -> None:
+        control.pause(when("running"))
+        control.pause(when("paused"))
+        control.answer(when("paused"), "resume")
+        control.stop(when("running"))
+
+    status = carried_out("soak", {"duration_s": "43200"}, person)
+    assert "stopped by SIGTERM" in status.error
+
+
 def test_stopped_while_it_is_paused() -> None:
     def person() -> None:
         control.pause(when("running"))

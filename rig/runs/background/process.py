@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import select
+import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -24,6 +25,7 @@ from rig.record.push import push_after
 from rig.runs.background.status import Order, StatusWriter, file, lock, open_question
 from rig.runs.runner import Decision, Outcome, resume, start
 
+PAUSE = signal.SIGINT  # by which a page pauses a run
 LONGEST = 4096  # bytes of an answer, which a pipe hands over in one piece
 WISHES = Choice("interrupted", "What now?", choices=("resume", "repeat", "end"))
 
@@ -45,10 +47,13 @@ class Attendant(StatusWriter):
         return self._answer(question, instead or "", "asking")
 
     def interrupted(self, outcome: Outcome) -> Decision:
-        """Wait at rest for the decision of a person."""
+        """Wait at rest for the decision of a person. A second wish for a pause changes nothing."""
         by_a_person = isinstance(outcome.error, Stopped)
         self.publish(error="" if by_a_person else str(outcome.error), moving=outcome.moving)
-        return cast(Decision, self._answer(WISHES, "resume", "paused"))
+        before = signal.signal(PAUSE, signal.SIG_IGN)
+        decision = cast(Decision, self._answer(WISHES, "resume", "paused"))
+        signal.signal(PAUSE, before)  # after another signal the caller restores all of them
+        return decision
 
     def _answer(self, question: Question, proposed: str, phase: str) -> str:
         """Ask until the question accepts the answer."""
@@ -93,8 +98,8 @@ def main(text: str) -> None:
         writer = Attendant(order, order.bench())
         try:
             outcome = _carried_out(order, record, writer)
-        except KeyboardInterrupt as signal:  # before the run began, or between its parts
-            writer.publish(phase="ended", state="stopped", asked=None, error=f"stopped by {signal}")
+        except KeyboardInterrupt as stop:  # before the run began, or between its parts
+            writer.publish(phase="ended", state="stopped", asked=None, error=f"stopped by {stop}")
             return
         except Exception as error:
             writer.publish(phase="ended", state="failed", asked=None, error=str(error))
