@@ -16,6 +16,7 @@ from rig.bench import Bench, read_bench
 from rig.planning.plan import plan
 from rig.record import Record
 from rig.runs.runner import start
+from tests.recorded import command
 from tests.rig.rigging import Onlooker, small_sweep
 
 
@@ -105,3 +106,13 @@ def test_an_oven_is_planned_too(tmp_path: Path) -> None:
 def test_a_plan_without_bound_is_refused_before_it_is_built(rig: Callable[..., Any], words: tuple[str, ...]) -> None:
     ended = rig("plan", *words)
     assert (ended.status, "the plan has more than" in ended.err) == (2, True), ended.err
+
+
+def test_the_help_of_a_procedure_shows_its_settings_with_units_and_meaning() -> None:
+    status, out, _ = command("run", "sweep", "--help")
+    assert status == 0
+    assert "--step-deg 10\n        In deg." in out
+    assert "One of: up, down, both." in out
+    assert "number of poses between two reference poses" in out
+    assert command("procedures", "soak")[1].startswith("soak: ")
+    assert "PROCEDURE" in command("run", "--help")[1]

@@ -10,33 +10,23 @@ import click
 from procedures.catalogue import Procedure, find, paths
 from rig.bench import read_bench
 from rig.cli.terminal.output import bench_option, emit, json_option
+from rig.cli.terminal.settings_help import procedure_text
 
 
 @click.command("procedures")
+@click.argument("procedure", required=False)
 @bench_option
 @json_option
-def command(bench_file: Path | None, as_json: bool) -> None:
-    """List the shipped procedures and your own, with their purposes and the defaults of their settings."""
+def command(procedure: str | None, bench_file: Path | None, as_json: bool) -> None:
+    """List the shipped procedures and your own, with their purposes and settings; or one PROCEDURE."""
     folder = read_bench(bench_file).folders.procedures
-    found = [find(name, folder) for name in paths(folder)]
+    found = [find(name, folder) for name in ([procedure] if procedure else paths(folder))]
     if as_json:
-        emit({"schema": "rig.procedures/1", "procedures": [_document(procedure) for procedure in found]})
+        emit({"schema": "rig.procedures/1", "procedures": [_document(each) for each in found]})
     else:
-        click.echo("\n\n".join(_text(procedure) for procedure in found))
+        click.echo("\n\n".join(procedure_text(each) for each in found))
 
 
 def _document(procedure: Procedure) -> dict[str, Any]:
     head = {"name": procedure.name, "summary": procedure.summary, "doc": procedure.doc}
     return {**head, "settings": procedure.defaults}
-
-
-def _text(procedure: Procedure) -> str:
-    settings = [f"  --{name.replace('_', '-')} {_written(value)}" for name, value in procedure.defaults.items()]
-    return "\n".join([procedure.doc, "", *settings])
-
-
-def _written(value: Any) -> str:
-    """The text of a default on the command line."""
-    if isinstance(value, tuple):
-        return ",".join(f"{part:g}" for part in value)
-    return f"{value:g}" if isinstance(value, float) else str(value)

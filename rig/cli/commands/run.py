@@ -11,13 +11,14 @@ from procedures.settings import parse
 from rig.bench import read_bench
 from rig.cli.terminal.options import PASS_ON, read_settings, settings_arguments
 from rig.cli.terminal.output import bench_option, json_option, note, watch_options
+from rig.cli.terminal.settings_help import ProcedureCommand
 from rig.cli.terminal.watch import print_end, trace_option, watching
 from rig.record import Record
 from rig.record.push import push_after
 from rig.runs.runner import start
 
 
-@click.command("run", context_settings=PASS_ON)
+@click.command("run", cls=ProcedureCommand, context_settings=PASS_ON)
 @click.argument("procedure")
 @settings_arguments
 @watch_options
