@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from procedures.noise_floor import STILL
 from procedures.session import Pose
 from rig.record import Block, Kept, Record
 from rig.services.still import coarse, stream
+from tests import recorded
 from tests.rig.conftest import Ended
 
 Rig = Callable[..., Ended]
@@ -156,18 +158,10 @@ def test_words_and_pictures(rig: Rig, folder: Path) -> None:
         assert "mathdefault" not in path.read_text()
 
 
-@pytest.fixture(scope="module")
-def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("home")
-
-
 @pytest.fixture
-def run(rig: Rig, home: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    """A noise-floor run, made once."""
-    monkeypatch.setenv("RIG_HOME", str(home))
-    if not (home / "record.db").exists():
-        made = rig("run", "noise-floor", "--duration-s", "30", "--unattended", "--json")
-        assert made.status == 0, made.err
+def run(rig_home: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
+    """The shared noise-floor run of 60 s."""
+    shutil.copytree(recorded.record(tmp_path_factory, "noise-floor"), rig_home)
     with Record() as record:
         return record.runs()[0].run
 
@@ -175,7 +169,7 @@ def run(rig: Rig, home: Path, monkeypatch: pytest.MonkeyPatch) -> str:
 def test_a_run_straight_from_its_record(rig: Rig, run: str) -> None:
     ended = rig("noise", run)
     assert ended.status == 0, ended.err
-    assert f"{run}: 30000 samples at 1000 Hz, 0:30" in ended.out
+    assert f"{run}: 60000 samples at 1000 Hz, 1:00" in ended.out
     assert "uV/sqrt(Hz)" in ended.out
     assert "ug/sqrt(Hz)" in ended.out
     assert "15.07 Hz low-pass" in ended.err
@@ -189,9 +183,9 @@ def test_no_block_of_a_run_is_read_twice(run: str) -> None:
     with Record() as record:
         still = stream(record, run, "vy", None)
         lengths = [len(block) for block in still.blocks]
-    assert lengths == [10_000] * 3
+    assert lengths == [10_000] * 6
     assert {name: sum(map(len, blocks)) for name, blocks in still.logged.items()} == dict.fromkeys(
-        ("temperature_c", "supply_v"), 30_000
+        ("temperature_c", "supply_v"), 60_000
     )
     assert {len(block) for block in still.logged["supply_v"]} == {1000}
     assert still.scale_v_per_g == pytest.approx(1.0, rel=0.05)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ import pytest
 import yaml
 
 from calibrations.table import Array
+from tests import recorded
 from tests.calibrations.hidden_noise import RATE_HZ, fractional, traps, white
 from tests.rig.conftest import Ended
 
@@ -125,9 +127,9 @@ def test_the_report_is_one_page_with_both_pictures(rig: Rig, folder: Path) -> No
     assert {path.name for path in Path("pictures").iterdir()} == {"allan.svg", "spectrum.svg"}
 
 
-def test_a_run_straight_from_its_record(rig: Rig, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("RIG_HOME", str(folder / "home"))
-    run = document(rig("run", "noise-floor", "--duration-s", "60", "--unattended", "--json"))["run"]
+def test_a_run_straight_from_its_record(rig: Rig, rig_home: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
+    shutil.copytree(recorded.record(tmp_path_factory, "noise-floor"), rig_home)
+    run = document(rig("runs", "--json"))["runs"][0]["run"]
     said = document(rig("diagnose", run, "--json"))
     assert (said["data"], said["verdict"]) == (run, "adequate")
     fit = document(rig("fit", run, "--json"))
