@@ -23,6 +23,14 @@ def require_out(out: Path, *inputs: str | Path | None) -> None:
             raise OutputError(f"{out}: this would overwrite the input file {file}; give another file")
 
 
+def make_folder(folder: Path) -> None:
+    """Make the folder and those above it. Raises OutputError."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot make the folder: {error.strerror}; give another folder") from None
+
+
 def write_whole(out: Path, content: str | bytes) -> None:
     """Write a file completely or not at all. Raises OutputError."""
     draft = out.with_name(f".{out.name}.{os.getpid()}")

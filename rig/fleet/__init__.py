@@ -1,1 +1,1 @@
-"""Fleets: thousands of sensors brought to workers on Dask, and what they find brought into the record."""
+"""Fleets: analyse thousands of sensors on Dask workers, and store the answers in the record."""

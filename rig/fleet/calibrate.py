@@ -1,4 +1,4 @@
-"""A fleet calibrated: every sensor fitted by its batch's model, and pooled with its siblings."""
+"""Calibration of a fleet: fit each sensor with the model of its batch, then pool it with the batch."""
 
 from __future__ import annotations
 
@@ -18,8 +18,7 @@ from calibrations.fleet.rigs import StageErrors
 from calibrations.fleet.siblings import Pooled, pool_siblings
 from calibrations.model import Estimate, Model
 from calibrations.model.file import dump_model, read_model
-from rig.errors import OutputError
-from rig.files import program, write_whole
+from rig.files import make_folder, program, write_whole
 from rig.fleet.discover import errors_of, stands_out
 from rig.fleet.members import Member
 from rig.fleet.questions import Fleet
@@ -30,9 +29,9 @@ Names = tuple[tuple[str, str, str, str], ...]
 
 @dataclass(frozen=True)
 class Guide:
-    """What sensors are fitted by: the text of a model file for each batch, `otherwise` for the rest; errors by rig.
+    """Input of a calibration: text of a model file by batch, and `otherwise` for other batches; stage errors by rig.
 
-    `own`: the files of the user's own effects.
+    `own` has the files of the user's effects.
     """
 
     models: Mapping[str, str]
@@ -41,14 +40,14 @@ class Guide:
     own: Own = ()
 
     def question(self, member: Member) -> Question:
-        """What is asked of a sensor."""
+        """The question for a sensor."""
         model, errors = self.models.get(member.batch, self.otherwise), self.errors.get(member.rig, {})
         return Question("look", model, (), errors, self.own)
 
 
 @dataclass(frozen=True)
 class Calibrated:
-    """The sensors of a batch that have the same parameters; `members`, `looks` and `pooled` in one order."""
+    """Sensors of a batch with the same parameters. `members`, `looks` and `pooled` have the same order."""
 
     batch: str
     names: Names
@@ -59,28 +58,28 @@ class Calibrated:
 
     @cached_property
     def unlike(self) -> tuple[bool, ...]:
-        """Of each sensor, whether the model leaves more than noise, and so does not describe it."""
+        """For each sensor, whether its residual is more than noise, so that the model does not describe it."""
         usual = [look.excess for look in self.looks]
         return tuple(stands_out(look, usual) for look in self.looks)
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """All batches, and why sensors are in none."""
+    """All batches, and the faults of the sensors that are in no batch."""
 
     batches: tuple[Calibrated, ...]
     faults: Mapping[Member, str]
 
 
 def calibrate_fleet(fleet: Fleet, members: Sequence[Member], guide: Guide) -> Calibration:
-    """Fit and pool."""
+    """Fit all sensors, and pool those of a batch that have the same parameters."""
     faults = {member: member.fault for member in members if member.fault}
     looks: dict[Member, Screening] = {}
     for member, said in fleet.ask([(m, guide.question(m)) for m in members if m not in faults]):
         if "fault" in said:
             faults[member] = said["fault"]
         else:
-            looks[member] = replace(read_look(said), scores=(), stage=NOWHERE)  # what is pooled, and no more
+            looks[member] = replace(read_look(said), scores=(), stage=NOWHERE)  # pooling needs no scores
     groups: dict[tuple[str, Names], list[Member]] = defaultdict(list)
     for member in members:
         if member in looks:
@@ -100,7 +99,7 @@ def _batch(batch: str, names: Names, of: list[Member], looks: Mapping[Member, Sc
 
 
 def models(found: Calibrated) -> dict[str, Model]:
-    """Each sensor's model, by its name, with its pooled values and standard uncertainties."""
+    """The models by sensor, with pooled values and standard uncertainties."""
     base = _base(found)
     values, stds = found.pooled.values, found.pooled.stds
     return {m.sensor: _model(base, found, m, values[k], stds[k]) for k, m in enumerate(found.members)}
@@ -129,16 +128,16 @@ def _with(base: Model, names: Names, values: object, stds: object, said: Mapping
     return replace(base, terms=terms, provenance={**said, "program": program()})
 
 
-# What a discovery hands to a calibration: a folder with a model for each batch, and the errors of the rigs.
+# The output of a discovery for a calibration: a folder with a model for each batch, and the errors of the rigs.
 
 RIGS = "rigs.json"
 SCHEMA = "rig.fleet-rigs/1"
-OTHERWISE = "other.yaml"  # for sensors of no batch
+OTHERWISE = "other.yaml"  # for sensors without a batch
 
 
 def write_guide(found: Population, start: Question, folder: Path) -> list[Path]:
-    """A model file for each batch, and the rigs' errors. Raises OutputError."""
-    made_folder(folder)
+    """Write a model file for each batch, and the errors of the rigs; return the paths. Raises OutputError."""
+    make_folder(folder)
     texts = {f"{safe(each.batch)}.yaml": _guide_model(start, each) for each in found.batches}
     rigs = {error.rig: errors_of(found.rigs, error.rig) for error in found.rigs}
     texts[RIGS] = json.dumps({"schema": SCHEMA, "rigs": {rig: of for rig, of in rigs.items() if of}}, indent=1) + "\n"
@@ -148,8 +147,8 @@ def write_guide(found: Population, start: Question, folder: Path) -> list[Path]:
 
 
 def write_models(result: Calibration, folder: Path) -> list[Path]:
-    """A model file for each sensor. Raises OutputError."""
-    made_folder(folder)
+    """Write a model file for each sensor; return the paths. Raises OutputError."""
+    make_folder(folder)
     texts = {safe(sensor): dump_model(model) for batch in result.batches for sensor, model in models(batch).items()}
     for sensor, text in texts.items():
         write_whole(folder / f"{sensor}.yaml", text)
@@ -157,7 +156,7 @@ def write_models(result: Calibration, folder: Path) -> list[Path]:
 
 
 def read_guide(given: str, batches: set[str], own: Own = ()) -> Guide:
-    """The guide in a folder, or one model for all by its name or file. Raises ModelError, UnknownName."""
+    """The guide from a folder, or from the name or file of one model. Raises ModelError, UnknownName."""
     folder, effects = Path(given), effects_of(own)
     if not folder.is_dir():
         return Guide({}, dump_model(read_model(given, effects)), {}, own)
@@ -165,17 +164,8 @@ def read_guide(given: str, batches: set[str], own: Own = ()) -> Guide:
     return Guide(texts, "", _rigs(folder / RIGS), own)
 
 
-def made_folder(folder: Path) -> Path:
-    """The folder, made where it is not there. Raises OutputError."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"{folder}: cannot be made: {error.strerror}; name another folder") from None
-    return folder
-
-
 def safe(name: str) -> str:
-    """A name as that of a file."""
+    """A name with the characters of a file name only."""
     return "".join(c if c.isalnum() or c in "-_." else "_" for c in name).lstrip(".") or Path(OTHERWISE).stem
 
 

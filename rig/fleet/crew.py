@@ -1,8 +1,7 @@
 """The workers: a local Dask cluster, or the scheduler of the lab.
 
-Chunks of tasks are handed out a few ahead of what the workers do, so that memory does not grow with the fleet. What was
-under way on a worker that died is done again at the end, one task at a time and alone: so a task that kills its worker
-is found, and no other is blamed for it.
+Only a few chunks of tasks are submitted ahead, so memory does not grow with the fleet. The tasks of a worker that died
+are repeated at the end, one at a time. This shows which task kills its worker.
 """
 
 from __future__ import annotations
@@ -30,16 +29,16 @@ T = TypeVar("T")
 
 
 class FleetError(RigError):
-    """The workers cannot be reached, or were lost; what was answered is in the record."""
+    """The workers cannot be reached, or the connection is lost. The record has the answers so far."""
 
     exit_status = 3
 
 
 @contextmanager
 def crew(scheduler: str | None, workers: int | None) -> Iterator[Client]:
-    """The client of a scheduler at an address, or of a local cluster with so many worker processes.
+    """The client of the scheduler at an address, or of a local cluster with `workers` processes.
 
-    Raises FleetError where Dask is not installed, or no scheduler answers.
+    Raises FleetError if Dask is not installed or no scheduler answers.
     """
     try:
         import dask
@@ -76,9 +75,9 @@ def crew(scheduler: str | None, workers: int | None) -> Iterator[Client]:
 def answered(
     client: Client, work: Callable[[list[T]], Any], chunks: Iterator[list[T]]
 ) -> Iterator[tuple[list[T], Any]]:
-    """Chunks of tasks with what `work` makes of them, as they are done; None for a task that kills its worker.
+    """Chunks of tasks with the results of `work`, in the order of completion; None for a task that kills its worker.
 
-    An empty chunk is given back at once. Raises FleetError where the scheduler is lost.
+    An empty chunk is returned at once. Raises FleetError if the scheduler is lost.
     """
     from concurrent.futures import CancelledError
 
@@ -116,17 +115,17 @@ def answered(
         raise FleetError(LOST) from None
 
 
-# Local workers do not hear Ctrl-C, which a terminal sends to them too, and say nothing: the command does both.
+# A terminal sends Ctrl-C to local workers too. They ignore it and print nothing, because the command handles both.
 
 
 def hush() -> None:
-    """No line of Dask's own: what a person should know is said by us, once."""
+    """Suppress the messages of Dask, because the command reports each fault once."""
     for name in [name for name in logging.root.manager.loggerDict if name.startswith("distributed")]:
         logging.getLogger(name).setLevel(logging.CRITICAL)
 
 
 class Deaf(WorkerPlugin):
-    """Every worker process of a local cluster has this, also one that takes a dead one's place."""
+    """Plugin of every worker process of a local cluster, also of one that replaces a dead one."""
 
     def setup(self, worker: Worker) -> None:  # noqa: ARG002 Dask calls it so
         hush()

@@ -1,8 +1,11 @@
-"""What a fleet's sensors miss, in rounds: every sensor is looked at, rigs and batches are judged, and what they explain
-is taken into the model of those sensors, which are looked at again. At the end each effect of a batch is taken out of
-the whole, and dropped where the batch does as well without. Who then still stands out is diagnosed in full.
+"""Missing effects of a fleet, found in rounds.
 
-Looks pass through: the scores of a batch are let go as soon as it is judged.
+1. Screen every sensor. Find the errors of rigs and the missing effects of batches.
+2. Add these to the models of the sensors concerned, and repeat for them.
+3. Test each added effect of a batch again without it, and remove an effect that is not needed.
+4. Diagnose the sensors that still differ from their batch in full.
+
+The scores of a batch are deleted from memory after its verdict.
 """
 
 from __future__ import annotations
@@ -33,15 +36,15 @@ from rig.fleet.worker import Question, effects_of, read_look
 
 STANDS_OUT = 0.05  # chance, over the whole search, below which a sensor is diagnosed in full
 MOST_ROUNDS = 6
-JUDGED = ("left", "share_left", "spoilt", "unresponsive", "undetermined")  # facts of a diagnosis behind its verdict
-FEWEST = 4  # sensors that tell how noisy their batch is
+JUDGED = ("left", "share_left", "spoilt", "unresponsive", "undetermined")  # facts of a diagnosis for the verdict
+FEWEST = 4  # sensors of a batch for an estimate of its noise
 
 Batches = Mapping[str, Sequence[Member]]
 
 
 @dataclass(frozen=True)
 class Seen:
-    """What is kept of a look at a sensor, as there; `on_stages`: whether it was measured on any."""
+    """The part of a screening that is kept, see Screening. `on_stages`: whether stages turned the sensor."""
 
     excess: float
     free: int
@@ -52,7 +55,7 @@ class Seen:
 
 @dataclass(frozen=True)
 class Stand:
-    """What is known between two rounds; `start` is what was asked first of every sensor."""
+    """The state between two rounds; `start` is the first question for every sensor."""
 
     start: Question
     faults: Mapping[Member, str]
@@ -61,17 +64,17 @@ class Stand:
     errors: tuple[RigError, ...] = ()
 
     def question(self, what: Any, member: Member) -> Question:
-        """What is now asked of a sensor."""
+        """The present question for a sensor."""
         effects = tuple(each.effect for each in self.effects.get(member.batch, ()))
         return replace(self.start, what=what, effects=effects, errors=errors_of(self.errors, member.rig))
 
     def judged_beside(self, batch: str, effects: tuple[BatchEffect, ...]) -> Stand:
-        """The same with other effects of a batch."""
+        """This state with other effects of a batch."""
         return replace(self, effects={**self.effects, batch: effects})
 
 
 def discover_fleet(fleet: Fleet, members: Sequence[Member], start: Question) -> Population:
-    """The population; `start` holds the text of the model file that every sensor is held against at first."""
+    """The population; `start` has the text of the model file that is tested first."""
     batches: dict[str, list[Member]] = defaultdict(list)
     for member in members:
         batches[member.batch].append(member)
@@ -81,7 +84,7 @@ def discover_fleet(fleet: Fleet, members: Sequence[Member], start: Question) -> 
 
 
 def errors_of(errors: Iterable[RigError], rig: str) -> StageErrors:
-    """What a rig's stages are off by: effect -> parameter -> value."""
+    """Errors of the stages of a rig: effect -> parameter -> value."""
     values: dict[str, dict[str, float]] = defaultdict(dict)
     for error in errors:
         if error.rig == rig and error.beyond:
@@ -90,7 +93,7 @@ def errors_of(errors: Iterable[RigError], rig: str) -> StageErrors:
 
 
 def _rigs(fleet: Fleet, stand: Stand, batches: Batches) -> Stand:
-    """With the errors of the rigs, where there are several."""
+    """The state with the errors of the rigs, if there are several rigs."""
     if len({member.rig for of in batches.values() for member in of}) < 2:
         return stand
     faults = dict(stand.faults)
@@ -102,7 +105,7 @@ def _rigs(fleet: Fleet, stand: Stand, batches: Batches) -> Stand:
 def _looks(
     fleet: Fleet, stand: Stand, batches: Batches, faults: dict[Member, str]
 ) -> Iterator[tuple[Member, Screening | None]]:
-    """Every sensor with its look, batch by batch; where there is none, why is added to `faults`."""
+    """Every sensor with its screening, batch by batch; without one, the reason is added to `faults`."""
     asked = [(m, stand.question("look", m)) for of in batches.values() for m in of if m not in faults]
     for member, said in fleet.ask(asked):
         if "fault" in said:
@@ -111,7 +114,7 @@ def _looks(
 
 
 def _grown(fleet: Fleet, stand: Stand, batches: Batches) -> Stand:
-    """Every batch with the effects that it misses, added one after another."""
+    """The state with the missing effects of every batch, added one after another."""
     open_ = batches
     for left in reversed(range(MOST_ROUNDS + 1)):
         stand, found = _judged(fleet, stand, open_)
@@ -122,7 +125,7 @@ def _grown(fleet: Fleet, stand: Stand, batches: Batches) -> Stand:
 
 
 def _judged(fleet: Fleet, stand: Stand, batches: Batches) -> tuple[Stand, dict[str, list[BatchEffect]]]:
-    """The sensors of the batches seen, and what each batch misses; a batch is judged when its last sensor is in."""
+    """The state with the screened sensors, and the missing effects of each batch, found after its last sensor."""
     stage = {name for name, effect in effects_of(stand.start.own).items() if "pose" in effect.places}
     faults, seen = dict(stand.faults), dict(stand.seen)
     waiting = {batch: sum(m not in faults for m in of) for batch, of in batches.items()}
@@ -141,14 +144,14 @@ def _judged(fleet: Fleet, stand: Stand, batches: Batches) -> tuple[Stand, dict[s
 
 
 def _settled(fleet: Fleet, stand: Stand, batches: Batches) -> Stand:
-    """Without those effects that a batch does as well without beside the others."""
+    """The state without the effects of a batch that are not needed with the others."""
     for batch in [batch for batch, effects in stand.effects.items() if len(effects) > 1]:
         stand = _needed(fleet, stand, batch, batches[batch])
     return stand
 
 
 def _needed(fleet: Fleet, stand: Stand, batch: str, members: Sequence[Member]) -> Stand:
-    """With the effects of a batch as they show beside each other; the first found of the needless is dropped first."""
+    """The state with the needed effects of a batch; the unneeded effect that was found first is removed first."""
     beside = _beside(fleet, stand, batch, members)
     needed = tuple(each for each in beside if each is not None)
     if len(needed) == len(beside):
@@ -159,7 +162,7 @@ def _needed(fleet: Fleet, stand: Stand, batch: str, members: Sequence[Member]) -
 
 
 def _beside(fleet: Fleet, stand: Stand, batch: str, members: Sequence[Member]) -> list[BatchEffect | None]:
-    """Each effect of a batch as its sensors show it beside all others; None where it is then no more than chance."""
+    """Each effect of a batch, tested with all others in the model; None if it is not significant."""
     effects = stand.effects[batch]
     found = []
     for k, effect in enumerate(effects):
@@ -170,14 +173,14 @@ def _beside(fleet: Fleet, stand: Stand, batch: str, members: Sequence[Member]) -
 
 
 def _diagnosed(fleet: Fleet, stand: Stand, batches: Batches) -> dict[Member, Any]:
-    """The diagnoses of those that stand out from their batch."""
+    """The diagnoses of the sensors that differ from their batch."""
     usual = {batch: [stand.seen[m].excess for m in of if m in stand.seen] for batch, of in batches.items()}
     out = [m for m, seen in stand.seen.items() if m not in stand.faults and stands_out(seen, usual[m.batch])]
     return dict(fleet.ask([(m, stand.question("diagnosis", m)) for m in out]))
 
 
 def stands_out(look: Screening | Seen, batch: Sequence[float]) -> bool:
-    """Whether noise alone would hardly leave so much: a pattern, a pose, or more than its batch leaves (`excess`)."""
+    """Whether the residual is more than noise: by a pattern, an outlier, or an excess above that of the batch."""
     usual = max(1.0, float(np.median(batch))) if len(batch) >= FEWEST else 1.0
     noisy = chdtrc(look.free, look.free * (look.excess / usual) ** 2) < STANDS_OUT
     return look.chance < STANDS_OUT or bool(look.outliers) or bool(noisy)

@@ -1,4 +1,4 @@
-"""What fleets come to as JSON documents, `rig.fleet/1`."""
+"""Results of fleets as JSON documents, `rig.fleet/1`, and as pages."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Document = dict[str, Any]
 
 
 def population_document(found: Population, model: str) -> Document:
-    """Of `rig fleet discover`."""
+    """The document of `rig fleet discover`."""
     return {
         "schema": SCHEMA,
         "what": "discovery",
@@ -53,7 +53,7 @@ def population_document(found: Population, model: str) -> Document:
 
 
 def calibration_document(found: Calibration, model: str) -> Document:
-    """Of `rig fleet calibrate`."""
+    """The document of `rig fleet calibrate`."""
     return {
         "schema": SCHEMA,
         "what": "calibration",
@@ -117,12 +117,12 @@ HOLDS_95 = 1.96
 
 
 def population_page(found: Population, model: str) -> str:
-    """Of `rig fleet discover`."""
+    """The HTML page of `rig fleet discover`."""
     return population_report(found, model, _facts(model))
 
 
 def calibration_page(found: Calibration, model: str) -> str:
-    """Of `rig fleet calibrate`."""
+    """The HTML page of `rig fleet calibrate`."""
     quantities: dict[str, list[Spread]] = {}
     for batch in found.batches:
         for k, name in enumerate(batch.names):

@@ -1,12 +1,12 @@
-"""Which sensors a fleet has: of which batch each is, which rig measured it, and where its table is.
+"""The sensors of a fleet: batch, rig and table of each.
 
 A source is one of
-    an index   a CSV file with a column `file` or `data` (a file beside it, or a run), and if known sensor, batch, rig
+    an index   a CSV file with the column `file` or `data` (a file in its folder, or a run); also sensor, batch, rig
     a folder   all its CSV files; an index in it named `fleet.csv` is preferred
     a table    one CSV file
-    a run      RUN or RUN/SENSOR of the record, RUN alone for all its sensors
-Where an index does not say, batch, rig and sensor are the constants of the table (`# batch: L7`), the name of the run's
-bench, and the file's name.
+    a run      RUN (all its sensors) or RUN/SENSOR of the record
+Without these columns, batch, rig and sensor are constants of the table (`# batch: L7`), the name of the bench of the
+run, and the name of the file.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ COLUMNS = ("sensor", "batch", "rig", "file", "data")
 
 @dataclass(frozen=True)
 class Member:
-    """One sensor's table. `text` is that of a file, None for what the record holds under `data`.
+    """One sensor. `data` is the path of its table or, with `run`, the name of a run in the record.
 
-    `digest` is the same for the same data; `fault` says why there is none.
+    `digest` is a digest of the data. `fault` is the reason why the data cannot be read, else None.
     """
 
     sensor: str
@@ -48,10 +48,10 @@ class Member:
 
 
 def fleet_of(sources: Iterable[str]) -> list[Member]:
-    """Every sensor that the sources name, once each; without a source, of all complete runs of the record.
+    """All sensors of the sources, without repetition; without a source, those of all complete runs of the record.
 
-    What cannot be read is a member with a fault. Raises RigError where there is no such source, or two members are
-    called alike.
+    A table that cannot be read gives a member with a fault. Raises RigError for a missing source, and for two members
+    with the same name.
     """
     named = list(sources)
     found = [member for source in named for member in _of(source)] if named else list(_of_record())
@@ -101,7 +101,7 @@ def _head(path: Path) -> list[str]:
 
 
 def _of_index(path: Path) -> Iterator[Member]:
-    """Raises RigError for a column that an index has not, and for a row that names no data."""
+    """The members of an index. Raises RigError for an unknown column and for a row without data."""
     with open_text_file(path).lines() as lines:
         rows = list(csv.DictReader(io.StringIO("".join(line for line in lines if not line.startswith("#")))))
     for number, row in enumerate(rows, 2):
@@ -146,7 +146,7 @@ def _constant(line: str) -> tuple[str, str, str]:
 
 
 def _of_run(name: str, said: dict[str, str]) -> Iterator[Member]:
-    """The sensors of a run, or the one that is named. Raises UnknownRun."""
+    """The sensors of a run, or the named sensor. Raises UnknownRun."""
     run_id, slash, chosen = name.partition("/")
     if not run_id:
         raise UnknownRun(f"{name}: there is no such file or folder")

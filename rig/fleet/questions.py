@@ -1,6 +1,6 @@
-"""Questions to a fleet: what the record knows is not asked again, and what comes is kept before it is used.
+"""Questions to a fleet. Answers in the record are not computed again; a new answer is stored before it is used.
 
-Answers pass through: no more of them are held than a few chunks, whatever the fleet's size.
+Only a few chunks of answers are in memory at a time, for a fleet of any size.
 """
 
 from __future__ import annotations
@@ -30,20 +30,20 @@ from rig.record.store import now
 if TYPE_CHECKING:
     from distributed import Client
 
-# Answers about sensors in the rig's own record: kept as they come, and found again by what was asked of which data.
+# Answers about sensors in the rig's own record. Their key is made from the question and the data.
 
 MOST = 500  # keys of one query
 
 
 def key_of(digest: str, question: Question) -> str:
-    """The same for the same data, question and program."""
+    """Key of an answer: a digest of data, question and program."""
     asked = json.dumps([_program(), digest, asdict(question)], sort_keys=True)
     return hashlib.sha256(asked.encode()).hexdigest()
 
 
 @cache
 def _program() -> str:
-    """Digest of the library's and the fleet's code: a version's number stays while a program is being changed."""
+    """Digest of the library's and the fleet's code: the number of the version stays the same during development."""
     sha = hashlib.sha256(program().encode())
     for folder in (Path(calibrations.__file__).parent, Path(__file__).parent):
         for path in sorted(folder.rglob("*.py")):
@@ -52,7 +52,7 @@ def _program() -> str:
 
 
 def keep(record: Record, found: Iterable[tuple[str, str, str, Mapping[str, Any]]]) -> None:
-    """(key, sensor, data, answer) each, in one transaction; one that is there stays."""
+    """Store rows (key, sensor, data, answer) in one transaction; rows that exist do not change."""
     rows = [{"key": k, "sensor": s, "data": d, "at": now(), "answer": dict(a)} for k, s, d, a in found]
     with record.engine.begin() as to:
         if rows:
@@ -60,7 +60,7 @@ def keep(record: Record, found: Iterable[tuple[str, str, str, Mapping[str, Any]]
 
 
 def kept(record: Record, keys: Sequence[str]) -> dict[str, Any]:
-    """The answers that are there, by key."""
+    """The stored answers, by key."""
     found: dict[str, Any] = {}
     with record.engine.connect() as at:
         for first in range(0, len(keys), MOST):
@@ -70,21 +70,21 @@ def kept(record: Record, keys: Sequence[str]) -> dict[str, Any]:
 
 
 CHUNK = {"look": 20, "diagnosis": 4}  # sensors of one task: about half a second's work
-SLICE = 100  # sensors that the record is asked for at a time
+SLICE = 100  # sensors in one query of the record
 KILLED = "its data ends the worker process; send the data to a maintainer with `rig doctor`"
 Tell = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
 class Fleet:
-    """Workers, the record, and who hears how many of how many sensors are done."""
+    """The workers, the record, and the function that gets the numbers of finished and of all sensors."""
 
     client: Client
     record: Record
     tell: Tell
 
     def ask(self, asked: Sequence[tuple[Member, Question]]) -> Iterator[tuple[Member, Any]]:
-        """Every member with its answer, about in the order asked; a `fault` in place of what could not be found."""
+        """Every member with its answer or a `fault`, roughly in the order of `asked`."""
         known: list[tuple[Member, Any]] = []
         open_: dict[str, list[tuple[Member, Question]]] = {}
         chunks, done = self._chunks(asked, known, open_), 0
@@ -102,9 +102,9 @@ class Fleet:
         known: list[tuple[Member, Any]],
         open_: dict[str, list[tuple[Member, Question]]],
     ) -> Iterator[list[Task]]:
-        """Tasks of what is not in the record, which is added to `open_`, by chunks; what is there is added to `known`.
+        """Tasks for the questions without a stored answer, in chunks; these questions are added to `open_`.
 
-        A chunk is empty where so much is known that it had better be taken first.
+        Stored answers are added to `known`. An empty chunk means: use the answers in `known` first, to save memory.
         """
         tasks: list[Task] = []
         size = min((CHUNK[question.what] for _, question in asked), default=1)
@@ -120,7 +120,7 @@ class Fleet:
                     continue
                 if key not in open_:
                     tasks.append(self._task(key, *each))
-                open_.setdefault(key, []).append(each)  # copies of a table are one question
+                open_.setdefault(key, []).append(each)  # equal tables are one question
                 if len(tasks) == size:
                     yield tasks
                     tasks = []
@@ -129,7 +129,7 @@ class Fleet:
     def _answers(
         self, chunks: Iterator[list[Task]], open_: dict[str, list[tuple[Member, Question]]]
     ) -> Iterator[list[tuple[Member, Any]]]:
-        """What the workers find, as it comes; nothing for an empty chunk."""
+        """The answers of the workers, in the order of completion; an empty list for an empty chunk."""
         for chunk in chunks:
             if chunk:
                 break
@@ -143,11 +143,11 @@ class Fleet:
             yield [(member, said) for _, member, _, said in rows]
 
     def _task(self, key: str, member: Member, question: Question) -> Task:
-        """With the text of its file, which the worker's machine need not have."""
+        """The task with the text of the file, because the worker may be on another machine."""
         if member.run:
             of_lab = os.environ.get(RECORD)  # its URL, which may hold a password, is not sent: workers have their own
             return Task(key, member.data, question, home=None if of_lab else str(self.record.folder))
         try:
             return Task(key, member.data, question, text=content(member))
-        except DataError:  # gone since it was listed: the worker's reading says so
+        except DataError:  # the file was removed after the listing: the worker reports it
             return Task(key, member.data, question, text="")

@@ -1,7 +1,6 @@
-"""What a worker does with a handful of sensors: read, look or diagnose, answer.
+"""The work of a worker on a few sensors: read the table, screen or diagnose it, answer.
 
-A sensor that cannot be read is answered with the reason. Answers are plain values, as they go through the network and
-into the record.
+The answer for a sensor that cannot be read is the reason. Answers are plain values, for the network and the record.
 """
 
 from __future__ import annotations
@@ -36,11 +35,11 @@ from rig.services.load import LONGEST_BEGINNING, channels_alone, check_unit
 from rig.services.load import effects_of as checked
 from rig.services.tables import averaged
 
-# A look as a document of plain values, and back.
+# A screening as a document of plain values, and back.
 
 
 def write_look(look: Screening) -> dict[str, Any]:
-    """Numbers to their last bit."""
+    """The screening as plain values, without rounding."""
     return {
         **_plain(look),
         "scores": [_plain(score) for score in look.scores],
@@ -49,7 +48,7 @@ def write_look(look: Screening) -> dict[str, Any]:
 
 
 def read_look(document: dict[str, Any]) -> Screening:
-    """The look that was written."""
+    """The screening from the document of `write_look`."""
     said = dict(document)
     stage = said.pop("stage")
     scores = tuple(Score(**_arrays(score) | {"effect": intern(score["effect"])}) for score in said.pop("scores"))
@@ -87,12 +86,12 @@ Answer = dict[str, Any]
 
 @dataclass(frozen=True)
 class Question:
-    """What is asked of every sensor of a batch on a rig. `model` is the text of a model file."""
+    """The question for every sensor of a batch on a rig. `model` is the text of a model file."""
 
     what: Literal["look", "diagnosis"]
     model: str
-    effects: tuple[str, ...] = ()  # of its batch, beside the model
-    errors: StageErrors = field(default_factory=dict)  # of its rig
+    effects: tuple[str, ...] = ()  # of the batch, in addition to the model
+    errors: StageErrors = field(default_factory=dict)  # of the rig
     own: Own = ()  # the user's effects
 
 
@@ -100,7 +99,8 @@ class Question:
 class Task:
     """One sensor and its question.
 
-    `text` is that of a file; else `data` is a run of the record in `home`, or of the lab's where there is none.
+    `text` is the content of a file. Without it, `data` is a run of the record in the folder `home`; without `home`, of
+    the lab's record.
     """
 
     key: str
@@ -111,7 +111,7 @@ class Task:
 
 
 def answer(tasks: Sequence[Task]) -> list[tuple[str, Answer]]:
-    """Every task's key and answer; where there is none, its `fault`."""
+    """Key and answer of each task; an answer can be a `fault`."""
     return [(task.key, _answered(task)) for task in tasks]
 
 
@@ -125,18 +125,18 @@ def _answered(task: Task) -> Answer:
         return _diagnosis_answer(diagnose(table, model, columns.effects))
     except (CalibrationError, RigError) as error:
         return {"fault": str(error)}
-    except Exception as error:  # one sensor never stops a fleet
+    except Exception as error:  # one sensor must not stop a fleet
         return {"fault": f"a fault of this program: {type(error).__name__}: {error}"}
 
 
 @lru_cache(maxsize=8)
 def _beside(model: str, effects: tuple[str, ...], own: Own) -> tuple[Model, SharedDesigns]:
-    """The model, and the columns that the sensors of this worker share beside it."""
+    """The model, and the designs that the sensors of this worker share."""
     return model_of(Question("look", model, effects, own=own)), SharedDesigns(effects_of(own))
 
 
 def model_of(asked: Question) -> Model:
-    """The model with the effects of the batch, in which nothing is known yet."""
+    """The model with the effects of the batch, without estimates of these."""
     effects = effects_of(asked.own)
     model = parse_model(asked.model, "the model", effects)
     for name in asked.effects:
@@ -145,7 +145,7 @@ def model_of(asked: Question) -> Model:
 
 
 def _checked(table: Table, model: Model) -> Table:
-    """The table, where a fleet may hold it against the model. Raises DataError, ModelError."""
+    """The table, if a fleet can test it with the model. Raises DataError, ModelError."""
     if not table.type.means:
         raise DataError(_instead(table.source, table.kind))
     if not model.for_table(table).terms:
@@ -179,7 +179,7 @@ def _read(task: Task) -> Table:
 
 
 def _nobody(_: str) -> None:
-    """What would be said to a person of one sensor is not said of thousands."""
+    """Suppress a remark on a single sensor."""
 
 
 def _diagnosis_answer(found: Diagnosis[Fit]) -> Answer:
@@ -198,14 +198,14 @@ def _diagnosis_answer(found: Diagnosis[Fit]) -> Answer:
     }
 
 
-# A user's own effects, brought to workers as texts: these need not see the folder that the bench file names.
+# The user's effects as texts, because workers may have no access to the folder that the bench file names.
 
 
 Own = tuple[tuple[str, str], ...]  # names and texts of Python files
 
 
 def own_files(bench_file: Path | None) -> Own:
-    """The files in the folder of effects that a bench file names. Raises ModelError for one that is no effect."""
+    """The files of the effects folder of a bench file. Raises ModelError for a file that is not an effect."""
     if bench_file is None:
         return ()
     from rig.bench import read_bench
@@ -218,7 +218,7 @@ def own_files(bench_file: Path | None) -> Own:
 
 @lru_cache(maxsize=8)
 def effects_of(own: Own) -> Mapping[str, Effect]:
-    """The shipped effects and those of a user's files. Raises ModelError."""
+    """The shipped effects and those of the user's files. Raises ModelError."""
     if not own:
         return catalogue()
     with TemporaryDirectory(prefix="effects-") as folder:
@@ -232,5 +232,5 @@ def effects_of(own: Own) -> Mapping[str, Effect]:
 
 
 def _silent(_: logging.LogRecord) -> bool:
-    """That files of one's own are run is said once, of the folder that one named."""
+    """Suppress the warning about the user's files; the command has given it once."""
     return False

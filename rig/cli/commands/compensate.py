@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from rig.cli.terminal.output import bench_option, emit, json_option, note
-from rig.errors import OutputError
 
 if TYPE_CHECKING:
     from calibrations.compensation.inverse import Compensation, Range
@@ -62,7 +61,7 @@ def command(
     from calibrations.compensation.document import make_vectors, summary
     from calibrations.compensation.inverse import compensated_residual, invert_model
     from calibrations.model.file import dump_model, read_model
-    from rig.files import program, write_whole
+    from rig.files import make_folder, program, write_whole
     from rig.services.load import check_unit, effects_of
     from rig.services.provenance import today
 
@@ -80,7 +79,7 @@ def command(
         table = load(data, tell=note)
         check_unit(found, table.unit, table.source)
         beside = compensated_residual(made, table)
-    _folder(out)
+    make_folder(out)
     for file, text in files.items():
         write_whole(out / file, text)
     if picture is not None and beside is not None:
@@ -152,13 +151,6 @@ def _identifier(name: str) -> str:
     """A valid name in C and Python."""
     made = re.sub(r"\W+", "_", name, flags=re.ASCII).strip("_").lower()
     return made if made[:1].isalpha() else f"sensor_{made}".rstrip("_")
-
-
-def _folder(out: Path) -> None:
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"{out}: cannot make the folder: {error.strerror}; give another folder") from None
 
 
 def _lines(made: Compensation) -> list[str]:

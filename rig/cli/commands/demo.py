@@ -31,17 +31,13 @@ def command(folder: Path, as_json: bool) -> None:
     from rig.cli.terminal.watch import watching
     from rig.cli.terminal.words import discovery
     from rig.cli.terminal.words import table as shown
-    from rig.files import program, write_whole
+    from rig.files import make_folder, program, write_whole
     from rig.record import Record
     from rig.runs.runner import start
     from rig.services.provenance import today, write_model
     from rig.services.tables import load
 
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise click.UsageError(f"{folder}: cannot make the folder: {error.strerror}") from None
-
+    make_folder(folder)
     note("1  Sweep: both stages move a simulated ADXL203 through 518 poses, over the protocols of the instruments.")
     sweep, bench = find("sweep"), read_bench()
     with watching(sweep, bench, False, None) as observer, Record() as record:
