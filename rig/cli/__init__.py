@@ -84,6 +84,9 @@ def _short_help(path: Path) -> str:
     return first.removeprefix(f"{_name(path)}: ")
 
 
+COMPLETE = "_RIG_COMPLETE"  # set by the completion script of a shell
+
+
 @click.command(cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(package_name="inertial-rig", prog_name="rig")
 def rig() -> None:
@@ -98,6 +101,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run one command and exit with its status; an error is one message."""
     # Before numpy is imported: the matrices are small, and threads that wait for each other slow a busy machine.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+    if instruction := os.environ.get(COMPLETE):  # the shell asks what may follow
+        from click.shell_completion import shell_complete
+
+        raise SystemExit(shell_complete(rig, {}, "rig", COMPLETE, instruction))
 
     def call() -> Any:
         words = list(sys.argv[1:] if arguments is None else arguments)

@@ -13,7 +13,7 @@ import pytest
 from calibrations.errors import DataError
 from drivers.errors import LimitError, LinkTimeout
 from procedures.errors import SafetyLimit, UnknownProcedure
-from rig.cli import GROUPS, Commands
+from rig.cli import GROUPS, Commands, main
 from rig.cli import rig as group
 from rig.cli.terminal.failure import BROKEN_PIPE, PROGRAM_FAULT, exit_status, status_of
 from rig.errors import BenchError, InstrumentFailed, Stopped
@@ -116,3 +116,30 @@ def test_a_reader_that_goes_away_is_no_fault() -> None:
     with child.stderr as err:
         assert err.read() == b""
     assert child.wait(timeout=30) == BROKEN_PIPE
+
+
+def completed(capture: pytest.CaptureFixture[bytes]) -> str:
+    """What the program answers to a shell."""
+    with pytest.raises(SystemExit) as ended:
+        main(())
+    assert ended.value.code == 0
+    return capture.readouterr().out.decode()
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_a_shell_gets_its_completion_script(
+    shell: str, monkeypatch: pytest.MonkeyPatch, capsysbinary: pytest.CaptureFixture[bytes]
+) -> None:
+    monkeypatch.setattr("click.shell_completion.BashComplete._check_version", lambda: None)
+    monkeypatch.setenv("_RIG_COMPLETE", f"{shell}_source")
+    assert f"_RIG_COMPLETE={shell}_complete" in completed(capsysbinary)
+
+
+def test_commands_and_procedures_are_completed(
+    monkeypatch: pytest.MonkeyPatch, capsysbinary: pytest.CaptureFixture[bytes]
+) -> None:
+    monkeypatch.setenv("_RIG_COMPLETE", "bash_complete")
+    for line, number, wanted in (("rig disc", 1, "plain,discover"), ("rig run swe", 2, "plain,sweep")):
+        monkeypatch.setenv("COMP_WORDS", line)
+        monkeypatch.setenv("COMP_CWORD", str(number))
+        assert completed(capsysbinary).split() == [wanted]

@@ -24,7 +24,7 @@ from procedures.settings import parse
 from rig.bench import Bench, read_bench
 from rig.cli.terminal.options import PASS_ON, read_settings, settings_arguments
 from rig.cli.terminal.output import bench_option, emit, json_option, model_option
-from rig.cli.terminal.settings_help import ProcedureCommand
+from rig.cli.terminal.settings_help import ProcedureCommand, complete_procedure
 from rig.errors import BeyondLimits
 from rig.planning.optimal import AGAIN, CHECK, DESIGN, Optimal, most_relative, relative
 from rig.planning.plan import Plan, Stretch, plan, stretches
@@ -47,7 +47,7 @@ def _limits_as_bad_input() -> Iterator[None]:
 
 
 @click.command("plan", cls=ProcedureCommand, context_settings=PASS_ON)
-@click.argument("procedure")
+@click.argument("procedure", shell_complete=complete_procedure)
 @settings_arguments
 @click.option("--moves", is_flag=True, help="List every move and every recording.")
 @click.option(

@@ -11,7 +11,7 @@ from procedures.settings import parse
 from rig.bench import read_bench
 from rig.cli.terminal.options import PASS_ON, read_settings, settings_arguments
 from rig.cli.terminal.output import bench_option, json_option, note, watch_options
-from rig.cli.terminal.settings_help import ProcedureCommand
+from rig.cli.terminal.settings_help import ProcedureCommand, complete_procedure
 from rig.cli.terminal.watch import print_end, trace_option, watching
 from rig.record import Record
 from rig.record.push import push_after
@@ -19,7 +19,7 @@ from rig.runs.runner import start
 
 
 @click.command("run", cls=ProcedureCommand, context_settings=PASS_ON)
-@click.argument("procedure")
+@click.argument("procedure", shell_complete=complete_procedure)
 @settings_arguments
 @watch_options
 @trace_option
