@@ -130,7 +130,7 @@ def completed(capture: pytest.CaptureFixture[bytes]) -> str:
 def test_a_shell_gets_its_completion_script(
     shell: str, monkeypatch: pytest.MonkeyPatch, capsysbinary: pytest.CaptureFixture[bytes]
 ) -> None:
-    monkeypatch.setattr("click.shell_completion.BashComplete._check_version", lambda: None)
+    monkeypatch.setattr("click.shell_completion.BashComplete._check_version", lambda *_: None)
     monkeypatch.setenv("_RIG_COMPLETE", f"{shell}_source")
     assert f"_RIG_COMPLETE={shell}_complete" in completed(capsysbinary)
 
