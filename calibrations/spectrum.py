@@ -99,20 +99,13 @@ def gauss_markov(f: Array, by: Sampling, time_constant_s: float) -> Array:
     return np.asarray(by.interval_s * (variance + lagged))
 
 
-@dataclass(frozen=True)
-class Process:
-    """Spectrum for a coefficient of 1, and what to multiply a value's unit with."""
-
-    spectrum: Callable[[Array, Sampling], Array]
-    per: str
-
-
-LINEAR: Mapping[str, Process] = MappingProxyType(
+# Spectra of processes for a coefficient of 1.
+LINEAR: Mapping[str, Callable[[Array, Sampling], Array]] = MappingProxyType(
     {
-        "white-noise": Process(white, "/sqrt(Hz)"),
-        "flicker-noise": Process(flicker, ""),
-        "rate-random-walk": Process(random_walk, "/sqrt(s)"),
-        "quantisation-noise": Process(quantisation, "*s"),
+        "white-noise": white,
+        "flicker-noise": flicker,
+        "rate-random-walk": random_walk,
+        "quantisation-noise": quantisation,
     }
 )
 GAUSS_MARKOV, SINUSOIDAL = "gauss-markov-noise", "sinusoidal-noise"
@@ -152,7 +145,7 @@ class Bands:
     def _column(self, process: str, time_constant_s: float = 0.0) -> Array:
         f = self.frequency_hz
         if process == "quantisation-noise":
-            return np.asarray(LINEAR[process].spectrum(f, self.sampling) + self._of_the_ends())
+            return np.asarray(LINEAR[process](f, self.sampling) + self._of_the_ends())
         if process == "flicker-noise":
             return np.asarray(flicker(f, self.sampling, self.corner_hz) * flickering(self.number))
         if process == "white-noise" and np.isfinite(self.corner_hz):
@@ -161,7 +154,7 @@ class Bands:
         kept = 1 / (1 + (f / self.corner_hz) ** 2)
         if process not in LINEAR:
             return np.asarray(kept * gauss_markov(f, self.sampling, time_constant_s))
-        return np.asarray(kept * LINEAR[process].spectrum(f, self.sampling))
+        return np.asarray(kept * LINEAR[process](f, self.sampling))
 
     def _of_the_ends(self) -> Array:
         """What the first and the last error of quantisation add to every cosine coefficient."""
