@@ -20,5 +20,7 @@ def calibrated(serial: str, day: str, bias: float, seed: int = 0, rig: str = "")
         run = record.add_table(Table.from_columns("poses", made.columns, constants, "made"))
         if rig:
             with record.engine.begin() as to:
-                to.exec_driver_sql("UPDATE runs SET bench = ? WHERE run = ?", (json.dumps({"name": rig}), run))
+                to.exec_driver_sql(
+                    "UPDATE runs SET bench = ?, checksum = NULL WHERE run = ?", (json.dumps({"name": rig}), run)
+                )
     return run
