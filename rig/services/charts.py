@@ -116,24 +116,32 @@ ROW, AXIS = 0.27, 0.6  # inches of a difference, and of the axis of a group
 
 @dataclass(frozen=True)
 class RunTime:
-    """The time axis of a run: `zero_s` on the run's clock, its name, and the time of day at 0 s of that clock."""
+    """The time axis of a run: `zero_s` on the run's clock, its name, and the time of day at `first_s` of that clock.
+
+    The clock of a run counts from power-on where that is known, maybe long before the run.
+    """
 
     zero_s: float = 0.0
-    since: str = " since the start of the run"
+    since: str = " since the first pose"
     begun: datetime | None = None
+    first_s: float = 0.0
 
     @classmethod
     def of(cls, record: Record, run: Run) -> RunTime:
-        """Power-on of a run that switches the sensor, else the start of the run."""
+        """Power-on of a run that switches the sensor, else the first pose."""
         begun = datetime.fromisoformat(run.created)
         on_s = Measured(record, run, next(iter(run.bench.get("sensors", {})), None)).power_on_s() if run.rows else 0.0
-        return cls(on_s, " since power-on", begun) if on_s or run.procedure == "soak" else cls(begun=begun)
+        first = next(record.kept(run.run), None)
+        first_s = first.t_s if first is not None else 0.0
+        if on_s or run.procedure == "soak":
+            return cls(on_s, " since power-on", begun, first_s)
+        return cls(first_s, begun=begun, first_s=first_s)
 
     def clock(self, t_s: float) -> str:
         """The time of day, UTC, for the pointer."""
         if self.begun is None:
             return ""
-        return f"{self.begun + timedelta(seconds=t_s):%Y-%m-%d %H:%M:%S} UTC"
+        return f"{self.begun + timedelta(seconds=t_s - self.first_s):%Y-%m-%d %H:%M:%S} UTC"
 
 
 def course_chart(course: Course, name: str, time: RunTime = RunTime()) -> Chart:
