@@ -225,14 +225,6 @@ class Dataset(ABC, Generic[F]):
         """The model with all effects that it misses."""
         return Discovery.of(self.search(model, effects))
 
-    def discover_places(self, model: Model, effects: Mapping[str, Effect]) -> Discovery[F]:
-        """The model with what acts at each place of the signal chain. Raises ModelError where the data tell none."""
-        return Discovery.of(self.search_places(model, effects))
-
-    def search_places(self, model: Model, effects: Mapping[str, Effect]) -> Findings[F]:  # noqa: ARG002
-        """The places that act, their causes and free forms. Raises ModelError, TooFewRows."""
-        raise ModelError(f"{self.source}: places of the signal chain are found in poses at known stage angles")
-
     def add(self, effect: Effect, model: Model, effects: Mapping[str, Effect]) -> Discovery[F]:
         """The model with one effect more. Raises ModelError where it has the effect, or cannot have it."""
         if model.holds(effect.name):

@@ -13,7 +13,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from calibrations.criteria import FEWEST_FOR_FLOOR, MATERIAL, REFINEMENT, WRONG_FLOOR
+from calibrations.criteria import (
+    FEWEST_FOR_FLOOR,
+    FEWEST_FOR_PLACES,
+    LEAST_NOISE,
+    MATERIAL,
+    MOST_EFFECTS,
+    MOST_UNEXPLAINED,
+    NO_MORE_THAN_NOISE,
+    REFINEMENT,
+    WRONG_FLOOR,
+)
 from calibrations.design.experiment import separating_experiment
 from calibrations.discovery.candidates import candidates, with_rivals
 from calibrations.discovery.dataset import Cells, Dataset
@@ -21,7 +31,7 @@ from calibrations.discovery.outliers import caution, fit_without, kept, told
 from calibrations.discovery.places import places
 from calibrations.discovery.plausibility import Finding, refusal, rejection
 from calibrations.discovery.results import Candidate, Diagnosis, Discovery, Findings, Place, Step
-from calibrations.discovery.search import Path, Settled, cost, find_path, first_order, recounted, settled
+from calibrations.discovery.search import Path, Settled, cost, find_path, first_order, is_complete, recounted, settled
 from calibrations.discovery.structure import plainer, structure_of
 from calibrations.discovery.verdict import Verdict
 from calibrations.effects import Effect
@@ -112,25 +122,33 @@ class Rows(Dataset[Fit]):
         return places(found)
 
     def search(self, model: Model, effects: Mapping[str, Effect]) -> Findings[Fit]:
-        """Forward steps, then exchanges."""
+        """One effect if it explains all, else places that act and their causes; of other kinds forward steps."""
         if (reason := refusal(self.table)) is not None:
             return self._rejected(self.fit(model), reason)
         start, outliers = fit_without(model, self.table)
-        return self._found(find_path(start, outliers, effects), effects)
-
-    def search_places(self, model: Model, effects: Mapping[str, Effect]) -> Findings[Fit]:
-        """Places that act, then effects that are their causes, then free forms for the rest."""
-        from calibrations.discovery.structural import check_structure, search_structure  # only this search needs them
-
-        check_structure(self.table)
-        if (reason := refusal(self.table)) is not None:
-            return self._rejected(self.fit(model), reason)
-        start, outliers = fit_without(model, self.table)
-        return self._with_structure(search_structure(start, effects), outliers)
+        return self._searched(start, outliers, start, effects)
 
     def search_on(self, start: Fit, origin: Fit, effects: Mapping[str, Effect]) -> Findings[Fit]:
         """The same from a fitted model."""
-        return self._found(find_path(start, self._left_out(start), effects), effects, origin)
+        return self._searched(start, self._left_out(start), origin, effects)
+
+    def _searched(
+        self, start: Fit, outliers: tuple[int, ...], origin: Fit, effects: Mapping[str, Effect]
+    ) -> Findings[Fit]:
+        path = find_path(start, outliers, effects, most=1 if self.shows_places else MOST_EFFECTS)
+        if not self.shows_places or _explained(path):
+            return self._found(path, effects, origin)
+        from calibrations.discovery.structural import search_structure  # only this search needs it
+
+        return self._with_structure(search_structure(start, effects), outliers, origin)
+
+    @property
+    def shows_places(self) -> bool:
+        """Whether the rows can show where in the signal chain something acts: enough poses at known angles.
+
+        Slow noise that is known from a still record is not yet among what that search can take for given.
+        """
+        return self.table.type.stage_angles and self.table.n >= FEWEST_FOR_PLACES and not self.table.noise
 
     def candidates(self, before: Fit, plan: Findings[Fit], effects: Mapping[str, Effect]) -> tuple[Candidate, ...]:  # noqa: ARG002
         """One round of the search."""
@@ -226,11 +244,14 @@ class Rows(Dataset[Fit]):
             return replace(found, left=told(path.outliers), spoilt=True)
         return found
 
-    def _with_structure(self, searched: StructuralSearch, outliers: tuple[int, ...]) -> Findings[Fit]:
+    def _with_structure(self, searched: StructuralSearch, outliers: tuple[int, ...], origin: Fit) -> Findings[Fit]:
         start, end = searched.start, searched.end
         if (reason := rejection(end)) is not None:
             return self._rejected(start, reason)
-        left = structure_of(end) if end.pooled_excess > MATERIAL else None
+        better = plainer(start, searched.causes_alone)
+        left = better or (structure_of(end) if end.pooled_excess > MATERIAL else None)
+        if left is None and any(place.unknown for place in searched.structure.places):
+            left = structure_of(searched.causes_alone)
         rivals = searched.alternatives
         known = {c.name for c in searched.candidates}
         separations = {
@@ -238,26 +259,27 @@ class Rows(Dataset[Fit]):
             for name, others in rivals.items()
             if known & set(others)
         }
-        names = [step.name for step in searched.steps]
         found = Findings(
             data=self,
             start=start,
-            origin=start,
+            origin=origin,
             baseline=start,
             steps=searched.steps,
-            candidates=tuple(sorted(searched.candidates, key=lambda c: c.name not in names[:1])),
+            candidates=searched.candidates,
             causes=searched.causes,
             alternatives=rivals,
             places=searched.structure.places,
             left=left.text if left else None,
             pattern=left,
+            spoilt=better is not None,
             undetermined=(undetermined(start), undetermined(end)),
             set_aside=caution(outliers),
             outliers=outliers,
             separations=separations,
             remarks=searched.remarks,
         )
-        if searched.steps and found.final.verdict is Verdict.UNEXPLAINED and not found.final.unknown:
+        spoilt = better is not None or (found.final.share_left > MOST_UNEXPLAINED and not found.final.unknown)
+        if searched.steps and spoilt:
             return found.without_steps()
         if outliers and not searched.steps and left is None:
             return replace(found, left=told(outliers), spoilt=True)
@@ -393,6 +415,13 @@ class Rows(Dataset[Fit]):
     def cautions(self, found: Fit) -> list[str]:
         """Why a fit of all rows may mislead: a model that the data do not determine, rows that stand out."""
         return list(filter(None, (undetermined(found), kept(found))))
+
+
+def _explained(path: Path) -> bool:
+    """Whether the effects of a path leave no more and no less than the noise of the samples, and no pattern."""
+    end = path.end
+    as_noise = end.noise.known and LEAST_NOISE < end.pooled_excess < NO_MORE_THAN_NOISE
+    return as_noise and structure_of(end) is None and is_complete(path)
 
 
 def _fall(before: float, after: float) -> str:

@@ -78,17 +78,23 @@ class Path:
         return best, *(c for c in step.candidates if c is not step.taken)
 
 
-def find_path(start: Fit, outliers: tuple[int, ...], effects: Mapping[str, Effect]) -> Path:
-    """Add the best effect to a fit until none is significant."""
-    path = grown(Path(start.in_floor(start.noise.floor), (), (), outliers), effects)
+def find_path(start: Fit, outliers: tuple[int, ...], effects: Mapping[str, Effect], most: int = MOST_EFFECTS) -> Path:
+    """Add the best effect to a fit until none is significant, `most` effects at most."""
+    path = grown(Path(start.in_floor(start.noise.floor), (), (), outliers), effects, most)
     return recounted(path, path.end)
 
 
-def grown(path: Path, effects: Mapping[str, Effect]) -> Path:
+def is_complete(path: Path) -> bool:
+    """Whether no candidate on top of the last model is significant and helps."""
+    explained = bool(path.steps) and path.end.share_left(path.start) <= 0  # no further candidates were asked for
+    return explained or _next(path.end, list(path.left)) is None
+
+
+def grown(path: Path, effects: Mapping[str, Effect], most: int = MOST_EFFECTS) -> Path:
     """Continue the forward search from the last model."""
     present, steps = path.end, list(path.steps)
     found = candidates(present, effects)
-    while len(steps) < MOST_EFFECTS:
+    while len(steps) < most:
         step = _next(present, found)
         if step is None:
             break

@@ -12,18 +12,19 @@ from itertools import pairwise
 
 import numpy as np
 
-from calibrations.criteria import MATERIAL
-from calibrations.discovery.candidates import RowCandidate, candidates
+from calibrations.criteria import MATERIAL, SIGNIFICANT
+from calibrations.discovery.candidates import RowCandidate, added, candidates, with_rivals
 from calibrations.discovery.results import Step
-from calibrations.discovery.search import find_path
+from calibrations.discovery.search import first_order
+from calibrations.discovery.significance import chance
 from calibrations.effects import Effect
-from calibrations.errors import ModelError, TooFewRows
-from calibrations.fitting.fit import Fit, fit, refit
+from calibrations.fitting.fit import Fit, evaluate, fit, refit
 from calibrations.fitting.problem import Problem
 from calibrations.free_forms.chain import Given
-from calibrations.free_forms.effect import free_form
+from calibrations.free_forms.effect import PREFIX, free_form
 from calibrations.free_forms.geometry import GEOMETRY
 from calibrations.free_forms.structure import FloorSource, Structure, find_structure
+from calibrations.means.noise import with_white
 from calibrations.model import Estimate, Model, Term
 from calibrations.model.chain import forward
 from calibrations.table import Array, Table
@@ -32,20 +33,19 @@ BASIC = ("bias", "scale-factor")
 BASE = (*BASIC, *GEOMETRY)
 
 
-FEWEST_ROWS = 24  # poses that can show where something acts
-
-
 @dataclass(frozen=True)
 class StructuralSearch:
     """The end of a search: the given model, the steps beyond it, and the places that act.
 
     `candidates`: every effect of the catalogue alone on top of the given model.
+    `causes_alone`: the last model without its free forms.
     """
 
     start: Fit
     steps: tuple[Step[Fit], ...]
     structure: Structure
     candidates: tuple[RowCandidate, ...]
+    causes_alone: Fit
     remarks: tuple[str, ...]
 
     @property
@@ -62,43 +62,73 @@ class StructuralSearch:
     @property
     def alternatives(self) -> dict[str, tuple[str, ...]]:
         """By cause, what the data cannot separate from it."""
-        return {name: self.structure.alternatives[name] for name in self.causes if name in self.structure.alternatives}
-
-
-def check_structure(table: Table) -> None:
-    """Raises ModelError for a table that is not poses, TooFewRows for poses that are too few to show a place."""
-    if not table.type.stage_angles:
-        raise ModelError(
-            f"{table.source}: places of the signal chain are found in poses at known stage angles, "
-            f"and this is a table of {table.kind}"
-        )
-    if table.n < FEWEST_ROWS:
-        raise TooFewRows(
-            f"{table.source}: {table.n} poses cannot show where something acts; measure at least {FEWEST_ROWS}, "
-            "at several inclinations and from both sides of beta"
-        )
+        found = {name: self.structure.alternatives.get(name, ()) for name in self.causes}
+        if self.candidates and self.causes == (self.candidates[0].name,):
+            name, rivals = self.candidates[0].name, self.candidates[0].indistinguishable_from
+            found[name] = tuple(dict.fromkeys([*found[name], *rivals]))
+        return {name: others for name, others in found.items() if others}
 
 
 def search_structure(start: Fit, effects: Mapping[str, Effect]) -> StructuralSearch:
     """The effects and free forms that the model of `start` misses."""
-    basic = {name: effects[name] for name in BASIC if name in effects and not start.model.holds(name)}
-    first = find_path(start, (), basic) if basic else None
-    base = first.end if first is not None else start
+    basic = [name for name in BASIC if name in effects and not start.model.holds(name)]
+    base = _freed(start, basic, effects)
     found = structure(base, effects)
     remarks: tuple[str, ...] = ()
-    if found.floor_source is FloorSource.CONTRADICTED and start.noise.known:
-        start, base = (fit(f.model, without_counts(f.table)) for f in (start, base))
-        remarks = (f"The noise floor is that of the residual: {FloorSource.CONTRADICTED}.",)
-    chosen = additions(found, base.model, effects)
-    fits = [base, *fitted(base, chosen)]
-    steps = [Step(s.taken.name, s.before, s.after) for s in first.steps] if first is not None else []
+    if found.floor_source is not FloorSource.SAMPLES and start.noise.known:
+        start, base = (fit(f.model, with_white(f.table, found.white)) for f in (start, base))
+        remarks = (f"The noise floor is that of the residual: {found.floor_source}.",)
+    causes = separately(base, found, additions(found, base.model, effects))
+    forms = free_additions(found, base.model)
+    end = together(base, [*causes, *forms])
+    if end.held_out_excess > MATERIAL and not end.problem.rounds:
+        # forms are found again beside the causes as the catalogue has them, so that they hold what these leave
+        beside = structure(causes_alone(end, forms), effects)
+        refined = separately(base, beside, additions(beside, end.model, effects))
+        others = [*refined, *free_additions(beside, base.model)]
+        other = together(base, [*_at(end, causes), *others])
+        if other.held_out_excess < end.held_out_excess:
+            end, forms = other, others
+    needed = [name for name in basic if chance(*first_order(end, name, shared=True)) < SIGNIFICANT]
+    chosen = _at(end, [*causes, *forms])
+    if needed != basic:
+        base = _freed(start, needed, effects)
+        end = together(base, chosen)
+    fits = [base, *fitted(base, end, chosen)]
+    steps = _steps(start, needed, base, effects)
     steps += [Step(a.effect.name, *pair) for a, pair in zip(chosen, pairwise(fits), strict=True)]
-    return StructuralSearch(start, tuple(steps), found, tuple(candidates(start, effects)), remarks)
+    tried = _first(start, steps, candidates(start, effects))
+    return StructuralSearch(start, tuple(steps), found, tried, causes_alone(end, forms), remarks)
 
 
-def without_counts(table: Table) -> Table:
-    """The table without the number of samples of each mean: its noise is then what the residual shows."""
-    return replace(table, columns={name: column for name, column in table.columns.items() if name != "n"})
+def _freed(start: Fit, names: list[str], effects: Mapping[str, Effect]) -> Fit:
+    """The fit in which each axis has a value of its own of these effects."""
+    model = start.model
+    for name in names:
+        model = model.with_effect(effects[name])
+    return refit(start, model) if names else start
+
+
+def _steps(start: Fit, names: list[str], base: Fit, effects: Mapping[str, Effect]) -> list[Step[Fit]]:
+    """A step for each effect that was freed; the last ends at `base`."""
+    fits = [start, *(_freed(start, names[: k + 1], effects) for k in range(len(names) - 1)), base]
+    return [Step(name, *pair) for name, pair in zip(names, pairwise(fits[: len(names) + 1]), strict=True)]
+
+
+def _first(start: Fit, steps: list[Step[Fit]], found: list[RowCandidate]) -> tuple[RowCandidate, ...]:
+    """The candidates on top of the given model; the effect of the first step first, as its full fit shows it.
+
+    The rivals of an effect are those of the search that adds effects; beside others they are not asked.
+    """
+    own = next((c for c in found if steps and c.name == steps[0].name), None)
+    if own is None:
+        return tuple(found)
+    after = added(start, own)
+    alone = sum(not step.name.startswith(PREFIX) for step in steps) == 1
+    rivals = with_rivals(own, found, start).indistinguishable_from if alone else own.indistinguishable_from
+    full = replace(own, excess_after=after.pooled_excess, held_out_after=after.held_out_excess,
+                   indistinguishable_from=rivals)  # fmt: skip
+    return full, *(c for c in found if c is not own)
 
 
 @dataclass(frozen=True)
@@ -107,21 +137,16 @@ class Addition:
 
     effect: Effect
     constants: Mapping[str, float] = field(default_factory=dict)
-    starts: tuple[tuple[str, str, float], ...] = ()
+    estimates: tuple[Estimate, ...] = ()
 
     def to(self, model: Model) -> Model:
-        """The model with the effect."""
+        """The model with the effect, its parameters at the values to start from."""
         larger = model.with_effect(self.effect)
-        return self.restarted(larger)
-
-    def restarted(self, model: Model) -> Model:
-        """The model with the effect's parameters at the values to start from."""
-        return replace(model, terms=tuple(self._begun(t) if t.name == self.effect.name else t for t in model.terms))
+        return replace(larger, terms=tuple(self._begun(t) if t.name == self.effect.name else t for t in larger.terms))
 
     def _begun(self, term: Term) -> Term:
         known = {name: value for name, value in self.constants.items() if name in term.effect.constants}
-        starts = tuple(Estimate(name, axis, value, None, "") for name, axis, value in self.starts)
-        return replace(term, constants={**term.constants, **known}, estimates=starts)
+        return replace(term, constants={**term.constants, **known}, estimates=self.estimates)
 
 
 def structure(start: Fit, effects: Mapping[str, Effect]) -> Structure:
@@ -133,36 +158,77 @@ def structure(start: Fit, effects: Mapping[str, Effect]) -> Structure:
 
 
 def additions(found: Structure, model: Model, effects: Mapping[str, Effect]) -> list[Addition]:
-    """The effects that the structure adds: causes, the largest place first, then geometry, then free forms."""
-    causes = [cause for place in found.places for cause in place.causes]
-    named = [
-        Addition(effects[c], found.constants(c), found.starts(c))
-        for c in (*causes, *found.geometry.causes)
-        if c in effects
-    ]
+    """The catalogue effects that the structure adds to a model: the largest place first, then geometry."""
+    causes = [cause for place in found.places for cause in (*place.causes, *found.refinements(place))]
+    names = dict.fromkeys([*causes, *found.geometry.causes])
+    starts = {c: tuple(Estimate(name, axis, value, None, "") for name, axis, value in found.starts(c)) for c in names}
+    return [Addition(effects[c], found.constants(c), starts[c]) for c in names if c in effects and not model.holds(c)]
+
+
+def free_additions(found: Structure, model: Model) -> list[Addition]:
+    """The free forms that the structure adds to a model, the largest place first."""
     free = [Addition(free_form(forms)) for forms in found.free_forms]
-    return [a for a in {a.effect.name: a for a in (*named, *free)}.values() if not model.holds(a.effect.name)]
+    return [a for a in free if not model.holds(a.effect.name)]
 
 
-def fitted(start: Fit, added: list[Addition]) -> list[Fit]:
-    """The fits with the first, the first two ... additions."""
+def separately(base: Fit, found: Structure, added: list[Addition]) -> list[Addition]:
+    """The additions with values to start from: each place's causes fitted to what the other places leave.
+
+    Beside other effects that are missing, the search for a nonlinear parameter goes astray.
+    """
+    names = {a.effect.name: a for a in added}
+    everything = np.sum([place.curve for place in found.places], axis=0) if found.places else 0.0
+    model = _with(base.model, [a for name, a in names.items() if name in GEOMETRY])
+    linear = fit(model, _less(base.table, everything)) if model is not base.model else base
+    known: dict[str, tuple[Estimate, ...]] = {term.name: term.estimates for term in linear.model.terms}
+    for place in found.places:
+        own = [names[cause] for cause in (*place.causes, *found.refinements(place)) if cause in names]
+        if own:
+            alone = fit(_with(linear.model, own), _less(base.table, everything - place.curve))
+            known |= {a.effect.name: alone.model.estimates(a.effect.name) for a in own}
+    return [replace(a, estimates=known.get(name, a.estimates)) for name, a in names.items()]
+
+
+def together(base: Fit, added: list[Addition]) -> Fit:
+    """All additions fitted at once."""
+    return refit(base, _with(base.model, added)) if added else base
+
+
+def fitted(base: Fit, end: Fit, added: list[Addition]) -> list[Fit]:
+    """The fits with the first, the first two ... additions; the last is `end`."""
     fits: list[Fit] = []
-    present = start
-    for addition in added:
+    present = base
+    for addition in added[:-1]:
         present = refit(present, addition.to(present.model))
         fits.append(present)
-    if len(added) > 1 and present.pooled_excess > MATERIAL:
-        fits[-1] = min(present, _restarted(present, added), key=lambda f: f.pooled_excess)
-    return fits
+    return [*fits, end] if added else []
 
 
-def _restarted(end: Fit, added: list[Addition]) -> Fit:
-    """The last fit from where the search saw its effects: a fit goes astray while others are still missing."""
+def causes_alone(end: Fit, forms: list[Addition]) -> Fit:
+    """The model without the free forms, at the values that it has beside them."""
     model = end.model
+    for form in forms:
+        model = model.without(form.effect.name)
+    alone = evaluate(model, end.table)
+    assert alone is not None  # noqa: S101 every parameter has been fitted
+    return alone
+
+
+def _at(end: Fit, added: list[Addition]) -> list[Addition]:
+    """The additions, starting from the values of `end`."""
+    return [replace(a, estimates=end.model.estimates(a.effect.name) or a.estimates) for a in added]
+
+
+def _with(model: Model, added: list[Addition]) -> Model:
     for addition in added:
-        if addition.starts:
-            model = addition.restarted(model)
-    return refit(end, model) if model is not end.model else end
+        model = addition.to(model)
+    return model
+
+
+def _less(table: Table, part: Array | float) -> Table:
+    """The table with a part (channels, n) taken off its outputs."""
+    outputs = table.outputs - np.broadcast_to(part, (len(table.axes), table.n)).T
+    return replace(table, columns={**table.columns, **dict(zip(table.output_names, outputs.T, strict=True))})
 
 
 def _derivatives(start: Fit, effect: Effect) -> Array:

@@ -275,8 +275,9 @@ def _determined(problem: Problem, noise: Noise, start: Array) -> tuple[Array, fl
         return np.append(noise.whiten(problem.residual(theta)[:, :, None])[:, 0], rows @ theta)
 
     theta, left = start, white(start)
+    stairs = False
     for _ in range(NEWTON_STEPS):
-        J = np.vstack([noise.whiten(problem.jacobian(theta)), rows]) * typical
+        J = np.vstack([noise.whiten(problem.jacobian(theta, stairs=stairs)), rows]) * typical
         low, high = ((bound - theta) / typical for bound in problem.layout.bounds)
         for damping in DAMPINGS:
             after = theta + typical * _step(J, left, damping, low, high)
@@ -284,11 +285,12 @@ def _determined(problem: Problem, noise: Noise, start: Array) -> tuple[Array, fl
             gain = float(left @ left - least @ least)
             if gain > 0:
                 break
-        else:
-            break
-        theta, left = after, least
+        if gain > 0:
+            theta, left = after, least
         if gain < SMALL_GAIN * max(1.0, 1e-3 * float(left @ left)):
-            break
+            if stairs or not problem.rounds:
+                break
+            stairs = True
     return theta, float(left @ left) / 2
 
 

@@ -161,4 +161,20 @@ class Products:
         return len(self.powers)
 
 
-Basis = Spline | Harmonics | Waves | Line | Play | Products
+@dataclass(frozen=True)
+class Ramp:
+    """A constant, the magnitude of x, and x: friction that grows with a load."""
+
+    kind: Literal["ramp"] = "ramp"
+
+    @property
+    def count(self) -> int:
+        """Three columns."""
+        return 3
+
+    def __call__(self, x: Array) -> Array:
+        """Columns at x (n,), shape (n, 3)."""
+        return np.column_stack([np.ones(len(x)), np.abs(x), x])
+
+
+Basis = Spline | Harmonics | Waves | Line | Play | Products | Ramp

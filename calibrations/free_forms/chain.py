@@ -4,8 +4,8 @@
 
 The base has bias and three components of sensitivity per axis (scale factor, misalignment and non-orthogonality
 together), an offset of alpha, a tilt of the base, and columns of effects that the given model has besides. Components
-add to an angle, to the response or to the output. Derivatives are those of the linear part of the chain: the iteration
-still ends where the exact residual is balanced by the priors.
+add to an angle, to the response or to the output. Derivatives are those of the linear part of the chain times the
+gain of the output stage: the iteration still ends where the exact residual is balanced by the priors.
 """
 
 from __future__ import annotations
@@ -39,6 +39,7 @@ class State:
     by_tilt: Array  # d output / d tilt about the base's x axis, per rad
     response: Array  # before the output stage
     predicted: Array
+    gain: Array  # d predicted / d response: that of a quantiser is far from 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,17 +107,21 @@ def state_at(data: PoseData, given: Given, values: Coefficients, components: Seq
     by_beta = rows @ (at(alpha, beta + SMALL, tilt) - at(alpha, beta - SMALL, tilt)).T / (2 * SMALL)
     by_tilt = rows @ (at(alpha, beta, tilt + SMALL) - at(alpha, beta, tilt - SMALL)).T / (2 * SMALL)
     force = a @ _sensing(rows).T
-    bare = State(data, force, a, by_alpha, by_beta, by_tilt, linear, linear)
+    ones = np.ones_like(linear)
+    bare = State(data, force, a, by_alpha, by_beta, by_tilt, linear, linear, ones)
     response = linear.copy()
     for comp in active:
         if comp.stage == "response":
             response += comp.jacobian(bare) @ values.of[comp.name]
-    before = State(data, force, a, by_alpha, by_beta, by_tilt, response, response)
-    predicted = response.copy()
-    for comp in active:
-        if comp.stage == "output":
-            predicted += comp.jacobian(before) @ values.of[comp.name]
-    return State(data, force, a, by_alpha, by_beta, by_tilt, response, predicted)
+
+    def output(response: Array) -> Array:
+        before = State(data, force, a, by_alpha, by_beta, by_tilt, response, response, ones)
+        added = (comp.jacobian(before) @ values.of[comp.name] for comp in active if comp.stage == "output")
+        return sum(added, response)
+
+    little = SMALL * float(np.ptp(response))
+    gain = (output(response + little) - output(response - little)) / (2 * little) if little > 0 else ones
+    return State(data, force, a, by_alpha, by_beta, by_tilt, response, output(response), gain)
 
 
 def base_jacobian(state: State, given: Given) -> Array:
@@ -131,6 +136,7 @@ def base_jacobian(state: State, given: Given) -> Array:
     out[:, :, 4 * c + 1] = state.by_tilt
     if data.remounted:
         out[:, :, 4 * c + 2] = state.by_beta
+    out *= state.gain[:, :, None]
     out[:, :, own_base_size(data) :] = given.columns
     return out
 

@@ -51,9 +51,9 @@ class Component:
         """d output / d coefficients, (channels, n, m)."""
         if self.angle is not None:
             by = state.by_alpha if self.stage == "alpha" else state.by_beta
-            return np.asarray(by[:, :, None] * self.angle[None])
+            return np.asarray((by * state.gain)[:, :, None] * self.angle[None])
         assert self.columns is not None  # noqa: S101 every other component has columns
-        return self.columns(state)
+        return self.columns(state) if self.stage == "output" else self.columns(state) * state.gain[:, :, None]
 
 
 def per_axis(basis: Basis) -> Columns:

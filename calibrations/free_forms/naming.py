@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,20 +15,26 @@ from calibrations.free_forms.search import SearchResult
 from calibrations.table import Array
 
 NEXT_FORM = 0.05  # of a place's variance that a second form must take up: less is the form of the first
+LEAST_NEEDED = 0.02  # the same of a form without which the others, as the catalogue has them, do less
 NAMED = 0.5  # of it that one form must take up: else the cause is unknown
 MOST_FORMS, NAMED_TOGETHER = 2, 0.8  # forms that only approximate a curve, and what two of them must take up
 LEAST_SIZE = 0.6  # noise floors: a smaller place is a refinement
-LEAST_SHARE = 0.01  # of the largest place's size
+LEAST_UNKNOWN, LEAST_UNKNOWN_SHARE = 1.0, 0.05  # the same two of a place without a cause
+LEAST_SHARE = 0.015  # of the largest place's size
 JUMPS = 4.0  # excess kurtosis of a walk's increments: 500 of a Gaussian process keep within +-1
 CLOSE = 10.0  # of -2 log likelihood: not told apart
 
 
 @dataclass(frozen=True)
 class ActingPlace:
-    """A place that acts: its size (rms over the poses, in floors), and its causes with the share that they take up."""
+    """A place that acts: its size (rms over the poses, in floors), and its causes with the share that they take up.
+
+    `largest`: size of the largest place.
+    """
 
     name: str
     size: float
+    largest: float
     components: tuple[str, ...]
     causes: tuple[str, ...]
     share: float
@@ -49,8 +55,8 @@ class ActingPlace:
 
     @property
     def unknown(self) -> bool:
-        """Whether no effect of the catalogue is its cause."""
-        return self.material and not self.causes
+        """Whether no effect of the catalogue is its cause, and it is no remainder of the form of a larger one."""
+        return self.material and not self.causes and self.size >= max(LEAST_UNKNOWN, LEAST_UNKNOWN_SHARE * self.largest)
 
 
 def places(result: SearchResult) -> list[ActingPlace]:
@@ -72,7 +78,9 @@ def places(result: SearchResult) -> list[ActingPlace]:
         material = sizes[place] >= max(LEAST_SIZE, LEAST_SHARE * largest)
         gain, others = _rivals(result, names)
         curve = curves[place].reshape(result.white.shape) * result.white
-        out.append(ActingPlace(place, sizes[place], tuple(names), causes, share, material, gain, others, curve))
+        out.append(
+            ActingPlace(place, sizes[place], largest, tuple(names), causes, share, material, gain, others, curve)
+        )
     return sorted(out, key=lambda p: -p.size)
 
 
@@ -100,6 +108,8 @@ def _named(
     columns = {cause: _columns(result, comps, names, Q, b) for cause, comps in forms.items()}
     total = float(curve @ curve) or 1.0
     acting = {result.component(name).cause for name in names}
+    if all(result.component(name).form is None for name in names):
+        return _needed({cause: columns[cause][0] for cause in acting}, curve, total)
     chosen: list[str] = []
     share = 0.0
     while True:
@@ -116,6 +126,19 @@ def _named(
         share = tried[best]
     enough = NAMED if len(set(chosen) - acting) < MOST_FORMS else NAMED_TOGETHER
     return (tuple(chosen), share) if share >= enough else ((), share)
+
+
+def _needed(columns: Mapping[str, Array], curve: Array, total: float) -> tuple[tuple[str, ...], float]:
+    """Of the catalogue forms that act without a free form beside them, those that the curve needs, and their share."""
+    share = 1 - _left(list(columns.values()), curve) / total
+
+    def lost(cause: str) -> float:
+        rest = [X for other, X in columns.items() if other != cause]
+        return share - (1 - _left(rest, curve) / total if rest else 0.0)
+
+    needs = {cause: lost(cause) for cause in columns}
+    least = min(LEAST_NEEDED, max(needs.values()))
+    return tuple(c for c in sorted(needs, key=lambda c: -needs[c]) if needs[c] >= least), share
 
 
 def _jumps(result: SearchResult, name: str) -> bool:

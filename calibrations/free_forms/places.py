@@ -14,7 +14,7 @@ import numpy as np
 
 from calibrations.effects.kernels import play
 from calibrations.effects.thermometer import leading_temperature
-from calibrations.free_forms.bases import Harmonics, Line, Play, Products, Waves, spline
+from calibrations.free_forms.bases import Harmonics, Line, Play, Products, Ramp, Waves, spline
 from calibrations.free_forms.chain import State
 from calibrations.free_forms.components import Basis, Columns, Component, free, per_axis
 from calibrations.free_forms.form import CROSS, Factor, Form
@@ -134,7 +134,7 @@ def _own(data: PoseData, first: State) -> list[Component]:
         return lambda shape: Component(
             name, place, "response", "dead-zone", f"{place}/dead-zone", price, per_axis(_dead(shape)),
             shape=shape, step=tuple(0.3 * w for w in shape), reshaped=dead(name),
-            starts=tuple(("width", axis, max(w, 0.0)) for axis, w in zip(data.axes, shape, strict=True)),
+            starts=tuple(("width", axis, abs(w)) for axis, w in zip(data.axes, shape, strict=True)),
         )  # fmt: skip
 
     found += [dead(f"{place}/dead-zone@{width:.4f}")((width,) * data.channels) for width in DEAD_G]
@@ -143,7 +143,7 @@ def _own(data: PoseData, first: State) -> list[Component]:
 
 def _dead(widths: tuple[float, ...]) -> Basis:
     """Specific force clipped at a width of each channel's own, g."""
-    return lambda s, k: np.clip(s.force[:, k, None], -widths[k], widths[k])
+    return lambda s, k: np.clip(s.force[:, k, None], -abs(widths[k]), abs(widths[k]))
 
 
 def _saturations(data: PoseData, first: State) -> list[Component]:
@@ -245,20 +245,9 @@ def _history(data: PoseData, first: State) -> list[Component]:
             splines = _over(forces, data.channels, 10)
             form = Form("history", f"{name}-{SIDES[approach]}", driver, splines, "side", approach_deg=approach)
             found.append(free(form, first, "hysteresis", PRODUCT))
-        found.append(_friction(turn, approach))
+        friction = Form("history", f"friction-{SIDES[approach]}", "cross", (Ramp(),), "side", approach_deg=approach)
+        found.append(free(friction, first, "hysteresis", constants=(("approach_deg", approach),)))
     return found
-
-
-def _friction(turn: Array, approach: float) -> Component:
-    """The side of the last move times a constant and the other axis's load."""
-
-    def basis(s: State, k: int) -> Array:
-        a = s.force[:, CROSS[k]]
-        return np.asarray(turn[:, None] * np.column_stack([np.ones_like(a), np.abs(a), a]))
-
-    name = f"history/friction@{SIDES[approach]}"
-    return Component(name, "history", "response", "hysteresis", columns=per_axis(basis),
-                     constants=(("approach_deg", approach),))  # fmt: skip
 
 
 def _slipping(first: State, name: str, factor: Factor, stated: bool) -> Make:
@@ -297,7 +286,7 @@ def _temperature(data: PoseData, first: State) -> list[Component]:
             found.append(
                 Component(
                     f"temperature-bias/temperature-hysteresis@{part}", "temperature-bias", "response",
-                    "temperature-hysteresis", "temperature-bias/play", 2 * np.log(len(PLAYS_K)), _timed(held),
+                    "temperature-hysteresis", "temperature-bias/play", GENERAL, _timed(held),
                 )
             )  # fmt: skip
     return found
@@ -393,18 +382,22 @@ def _output(data: PoseData, first: State) -> list[Component]:
     ]
 
 
-def saw(frequency: float, harmonics: int, price: float) -> Component:
-    """Quantisation: harmonics of a saw over the output, codes per unit of output."""
-
-    def columns(s: State) -> Array:
-        turned = 2 * np.pi * frequency * s.response[:, :, None] * np.arange(1, harmonics + 1)
-        scale = 1.0 / np.arange(1, harmonics + 1)
-        return np.concatenate([np.sin(turned) * scale, np.cos(turned) * scale], axis=2)
-
+def saw(frequency: float, harmonics: int, price: float, step: float) -> Component:
+    """Quantisation: harmonics of a saw over the output, codes per unit of output; `step` of the frequency to try."""
     name = f"output/quantisation@{frequency:.6g}"
-    return Component(
-        name, "output", "output", "quantisation", "output/quantisation", price, columns, shape=(frequency,)
-    )
+
+    def at(shape: tuple[float, ...]) -> Component:
+        def columns(s: State) -> Array:
+            turned = 2 * np.pi * shape[0] * s.response[:, :, None] * np.arange(1, harmonics + 1)
+            scale = 1.0 / np.arange(1, harmonics + 1)
+            return np.concatenate([np.sin(turned) * scale, np.cos(turned) * scale], axis=2)
+
+        return Component(
+            name, "output", "output", "quantisation", "output/quantisation", price, columns,
+            shape=shape, step=(step,), reshaped=at,
+        )  # fmt: skip
+
+    return at((frequency,))
 
 
 def _columns(data: PoseData, first: State) -> list[Component]:

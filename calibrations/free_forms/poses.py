@@ -40,7 +40,8 @@ class PoseData:
     def of(table: Table) -> PoseData:
         """The data of a table in order of time."""
         spreads = [name.replace("_v", "_std_v") for name in table.output_names]
-        other = set(table.columns) - USED - set(table.output_names) - set(spreads)
+        known = {f"{name}_of_mean" for name in spreads}
+        other = set(table.columns) - USED - set(table.output_names) - set(spreads) - known
         return PoseData(
             table=table,
             alpha=np.radians(table.column("alpha_deg")),

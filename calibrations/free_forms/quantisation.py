@@ -49,7 +49,7 @@ def find_saw(
         return None
     fine = frequencies[best] + np.linspace(-1, 1, 41) / (SAW_POINTS * span)
     power = np.abs(np.exp(-2j * np.pi * np.outer(fine, at)) @ values) ** 2
-    return saw(float(fine[int(np.argmax(power))]), 3, price)
+    return saw(float(fine[int(np.argmax(power))]), 3, price, 0.05 / span)
 
 
 def _fundamental(frequencies: NDArray[np.floating], noise: float) -> Array:

@@ -93,7 +93,7 @@ def eliminated(G: Array, blocks: Mapping[str, slice], scales: Mapping[str, float
     inverse = (vectors[:, kept] / values[kept]) @ vectors[:, kept].T / np.outer(size, size)
     cross = G[:b, b:]
     rest = G[b:, b:] - cross.T @ inverse @ cross
-    return Gram(rest[:-1, :-1], rest[:-1, -1], float(rest[-1, -1]), blocks, scales, inverse, cross[:, :-1],
+    return Gram(rest[:-1, :-1], rest[:-1, -1], max(float(rest[-1, -1]), 1e-300), blocks, scales, inverse, cross[:, :-1],
                 cross[:, -1], rows, int(kept.sum()))  # fmt: skip
 
 
@@ -165,7 +165,7 @@ def _root(K: Array) -> tuple[Array, bool]:
 
 def estimate(g: Gram, variances: Mapping[str, float], most: Mapping[str, float], rounds: int = ROUNDS) -> Sizes:
     """Variances of greatest restricted likelihood, none above `most`, by Fellner-Schall steps with extrapolation."""
-    present = dict(variances)
+    present = {name: min(v, most.get(name, np.inf)) for name, v in variances.items()}
     fit = solve(g, present)
     for _ in range(rounds):
         changed, at, moved = {}, 0, 0.0

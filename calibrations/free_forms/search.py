@@ -34,6 +34,9 @@ ROUNDS = 7
 MOST_COMPONENTS = 24
 SPILL = 0.03  # of the misfit that is left: a place that gains less takes up part of what acts elsewhere
 LARGEST = 4.0  # of the mean square of the first misfit: more is two components against each other
+HALVINGS = 6  # of a step that overshoots
+NOISE_ALONE, FEW = 1.04, 3  # residual over noise and components of a search that needs no second beginning
+CANCELS = 6.0  # of the squares of the first misfit: more in one component is taken off by others
 SLOW_MOST = 0.5  # slow noise, in noise floors, at most (rms)
 
 
@@ -77,12 +80,37 @@ class SearchResult:
     def active(self) -> list[str]:
         return [name for name in self.sizes.variances if not self.component(name).noise]
 
+    @property
+    def ratio(self) -> float:
+        """The residual over the noise."""
+        return float(np.sqrt(self.residual @ self.residual / self.freedom))
 
-def search(data: PoseData, white: Array, given: Given) -> SearchResult:
-    """Places that act, with their sizes. `white` (channels, n): standard deviation of each mean."""
+    @property
+    def criterion(self) -> float:
+        """-2 log restricted likelihood, and what each component must gain."""
+        return self.sizes.deviance + sum(ENTER + self.component(name).price for name in self.active)
+
+
+def search(data: PoseData, white: Array, given: Given, general: bool = True) -> SearchResult:
+    """Places that act, with their sizes, from two beginnings: the likelier end counts.
+
+    First forms of the catalogue begin, and free forms follow; where that leaves more than noise, or many components,
+    all begin together. What is not smooth is found by the one, what has another form by the other.
+
+    white    standard deviation of each mean, (channels, n)
+    general  whether components that can follow almost anything are tried
+    """
+    by_name = _descent(data, white, given, general, catalogue_first=True)
+    if by_name.ratio < NOISE_ALONE and len(by_name.active) <= FEW:
+        return by_name
+    return min(by_name, _descent(data, white, given, general, catalogue_first=False), key=lambda end: end.criterion)
+
+
+def _descent(data: PoseData, white: Array, given: Given, general: bool, catalogue_first: bool) -> SearchResult:
+    """Rounds of selection and Gauss-Newton steps from the base."""
     values = start(data, given)
     state = state_at(data, given, values, ())
-    components = all_components(data, state)
+    components = [c for c in all_components(data, state) if general or not c.general]
     scales: dict[str, float] = {}
     noise = {c.name for c in components if c.noise}
     floor = float(np.sqrt(np.mean(white**2)))
@@ -106,22 +134,23 @@ def search(data: PoseData, white: Array, given: Given) -> SearchResult:
         before = set(variances)
         kept = values, dict(variances), state
         sizes = estimate(g, variances, most)
-        sizes, steps = _select(g, sizes, components, most, limit, number >= len(COARSE))
+        pools = _pools(components, catalogue_first and number < len(COARSE))
+        sizes, steps = _select(g, sizes, components, pools, most, limit, number >= len(COARSE))
         path += steps
-        values = coefficients(g, sizes)
         variances = dict(sizes.variances)
+        values, moved = _damped(data, given, kept[0], coefficients(g, sizes), components, white)
         reshaped = _refined(components, g, sizes, X, b, state, scales, white)
         if reshaped is not None:
-            components, values = reshaped, kept[0]
-            X, blocks, scales = whitened(state, given, values, components, scales, white)
+            X, blocks, scales = whitened(state, given, kept[0], reshaped, scales, white)
             g = gram(X, blocks, scales, b)
             sizes = estimate(g, variances, most)
-            values, variances = coefficients(g, sizes), dict(sizes.variances)
-        moved = state_at(data, given, values, components)
+            other = coefficients(g, sizes)
+            tried = state_at(data, given, other, reshaped)
+            if _misfit(tried, white) < _misfit(moved, white):
+                components, values, moved, variances = reshaped, other, tried, dict(sizes.variances)
         change = float(np.sqrt(np.mean(((moved.predicted - state.predicted) / white) ** 2)))
         state = moved
-        worse = float(np.sqrt(np.mean(((data.outputs - moved.predicted) / white) ** 2)))
-        if worse > 1.2 * np.sqrt(g.squares / g.rows) + 3.0:  # components against each other: the step is not taken
+        if _misfit(moved, white) > 1.5 * g.squares / g.rows + 10.0:  # components against each other: no step
             values, variances, state = kept
             saws = {c.name for c in components if c.cause == "quantisation"} & set(sizes.variances)
             rejected += [c.shape[0] for c in components if c.name in saws]
@@ -145,26 +174,73 @@ def search(data: PoseData, white: Array, given: Given) -> SearchResult:
     return SearchResult(data, given, white, components, g, X, sizes, values, state, path)
 
 
+Pools = Sequence[Mapping[str, Component]]
+
+
+def _pools(components: Sequence[Component], catalogue_first: bool) -> Pools:
+    """Components in the order in which they are tried: the next pool once none of one gains."""
+    simple = {c.name: c for c in components if not c.general}
+    named = {c.name: c for c in simple.values() if c.cause}
+    every = {c.name: c for c in components}
+    return [named, simple, every] if catalogue_first else [simple, every]
+
+
+def _damped(
+    data: PoseData,
+    given: Given,
+    before: Coefficients,
+    after: Coefficients,
+    components: Sequence[Component],
+    white: Array,
+) -> tuple[Coefficients, State]:
+    """The step from `before` to `after`, halved as long as half of it leaves less."""
+    state = state_at(data, given, after, components)
+    for _ in range(HALVINGS):
+        half = _between(before, after)
+        other = state_at(data, given, half, components)
+        if _misfit(other, white) >= _misfit(state, white):
+            break
+        after, state = half, other
+    return after, state
+
+
+def _misfit(state: State, white: Array) -> float:
+    """Mean square of the residual over the noise."""
+    return float(np.mean(((state.data.outputs - state.predicted) / white) ** 2))
+
+
+def _between(before: Coefficients, after: Coefficients) -> Coefficients:
+    """Halfway; a component that only one of them has, begins or ends at zero."""
+    names = {**before.of, **after.of}
+    nothing = np.zeros(1)
+    of = {name: (before.of.get(name, nothing) + after.of.get(name, nothing)) / 2 for name in names}
+    return Coefficients((before.base + after.base) / 2, of)
+
+
 def _select(
-    g: Gram, sizes: Sizes, components: Sequence[Component], most: Mapping[str, float], limit: float, last: bool
+    g: Gram,
+    sizes: Sizes,
+    components: Sequence[Component],
+    pools: Pools,
+    most: Mapping[str, float],
+    limit: float,
+    last: bool,
 ) -> tuple[Sizes, list[str]]:
     """Components added, exchanged and removed until nothing gains more than `limit`."""
     by_name = {c.name: c for c in components}
-    simple = {c.name: c for c in components if not c.general}
     steps: list[str] = []
     seen: set[frozenset[str]] = set()
     sizes = _pruned(g, sizes, by_name, most, steps)
-    stale: dict[str, float] = {}
+    stale: list[dict[str, float]] = [{} for _ in pools]
+    pools = [dict(pool) for pool in pools]
     while len(sizes.variances) < MOST_COMPONENTS:
-        enough = max(limit, SPILL * (sizes.deviance - g.rows))
-        best = _best(g, sizes, simple, stale)
-        if (best is None or best[1] <= enough) and stale:
-            stale = {}
-            best = _best(g, sizes, simple, stale)
-        if best is None or best[1] <= enough:
-            best = _best(g, sizes, by_name)
-        if best is not None and best[1] > enough:
-            sizes = estimate(g, {**sizes.variances, best[0]: best[2]}, most, 12)
+        best = _next(g, sizes, pools, stale, max(limit, SPILL * (sizes.deviance - g.rows)))
+        if best is not None:
+            larger = estimate(g, {**sizes.variances, best[0]: best[2]}, most, 12)
+            if _cancels(g, larger):
+                pools = [{name: c for name, c in pool.items() if name != best[0]} for pool in pools]
+                continue
+            sizes = larger
             steps.append(f"+{best[0]}")
             if by_name[best[0]].reshaped is not None:
                 break  # its shape is found first: its misfit looks like other places
@@ -180,6 +256,32 @@ def _select(
         seen.add(frozenset(after.variances))
         sizes = _pruned(g, after, by_name, most, steps)
     return estimate(g, sizes.variances, most), steps
+
+
+def _cancels(g: Gram, sizes: Sizes) -> bool:
+    """Whether a component adds far more than there is to explain, so that another one takes it off again."""
+    at = 0
+    for name in sizes.variances:
+        block = g.blocks[name]
+        u = sizes.coefficients[at : at + block.stop - block.start]
+        at += len(u)
+        if float(u @ g.products[block, block] @ u) > CANCELS * g.squares:
+            return True
+    return False
+
+
+def _next(
+    g: Gram, sizes: Sizes, pools: Pools, stale: Sequence[dict[str, float]], enough: float
+) -> tuple[str, float, float] | None:
+    """The component of the first pool that gains enough; None where none does."""
+    for pool, known in zip(pools, stale, strict=True):
+        best = _best(g, sizes, pool, known)
+        if known and (best is None or best[1] <= enough):
+            known.clear()
+            best = _best(g, sizes, pool, known)
+        if best is not None and best[1] > enough:
+            return best
+    return None
 
 
 def _best(
@@ -232,11 +334,18 @@ def _exchanged(
         if name not in sizes.variances:
             continue
         others = without(g, sizes, name)
+        alone = estimate(g, others.variances, most, 12)
+        if alone.deviance - sizes.deviance - by_name[name].price <= LEAVE:  # the others take its part
+            steps.append(f"-{name}")
+            sizes = alone
+            continue
         lost = others.deviance - sizes.deviance - by_name[name].price
         best = _best(g, others, by_name)
         if best is None or best[0] == name or best[1] < lost + 1.0:
             continue
         tried = estimate(g, {**others.variances, best[0]: best[2]}, most, 12)
+        if _cancels(g, tried):
+            continue
         better = sizes.deviance + by_name[name].price - tried.deviance - by_name[best[0]].price
         if better > 1.0:
             steps.append(f"{name}>{best[0]}")

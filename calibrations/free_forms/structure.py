@@ -15,13 +15,18 @@ from calibrations.free_forms.form import CROSS, Form
 from calibrations.free_forms.geometry import Geometry, geometry
 from calibrations.free_forms.naming import ActingPlace, places
 from calibrations.free_forms.poses import PoseData
-from calibrations.free_forms.search import SearchResult, search
+from calibrations.free_forms.search import NOISE_ALONE, SearchResult, search
 from calibrations.geometry.orientation import out_of_plane
+from calibrations.geometry.smooth import smooth_columns
+from calibrations.means.noise import correlation_known
 from calibrations.table import Array, Table
 
+CORRELATED = 1.5  # times the stated noise: neighbours that differ by more contradict independent samples
 TOO_SMALL = 0.93  # of a stated noise: a residual below contradicts it
 FLOOR_ROUNDS = 2  # in which the noise floor is found from the residual
 OUTLYING = 4.0  # times the usual residual: more counts as so much
+SEEN_FORM = 0.9  # of a place's variance: the form of the catalogue itself, not one near it
+FIRST_POSES = 0.06  # of a record
 KEPT = 0.1  # noise floors: rough columns that together add less are left out of a form
 LINEAR = {"cross-response": "cross", "z-response": "out-of-plane"}  # places with a linear part, and their drivers
 
@@ -30,6 +35,7 @@ class FloorSource(StrEnum):
     """Where the noise of a mean is known from."""
 
     SAMPLES = "the standard deviation and the number of samples of each mean"
+    CORRELATED = "neighbouring poses differ by so much, and whether the samples of a mean are independent is not stated"
     NEIGHBOURS = "neighbouring poses differ by so much, and the noise of a mean is not stated"
     CONTRADICTED = "the standard deviations of the samples contain more than noise"
 
@@ -46,9 +52,26 @@ class Structure:
 
     @property
     def causes(self) -> tuple[str, ...]:
-        """Catalogue effects that are named, the largest place first."""
-        named = [cause for place in self.places if place.material for cause in place.causes]
+        """Catalogue effects that are named, the largest place first.
+
+        What the data cannot separate from a larger cause is not named: one mechanism has one name. Beside something
+        larger that is unknown, an effect is named only where its own form, and not one that follows anything, is seen.
+        """
+        largest = max((place.size for place in self.unknown), default=0.0)
+        named: list[str] = []
+        for place in self.places:
+            if place.material and (place.size >= largest or (place.share >= SEEN_FORM and not self._follows(place))):
+                named += [c for c in place.causes if not self._same_as_one_of(c, named)]
         return tuple(dict.fromkeys([*named, *self.geometry.causes]))
+
+    def _follows(self, place: ActingPlace) -> bool:
+        """Whether a place acts by components that follow many things: branches, slip elements, a random walk."""
+        return place.name == "history" or any("/walk-" in name for name in place.components)
+
+    def _same_as_one_of(self, cause: str, named: list[str]) -> bool:
+        """Whether the data cannot separate a cause from one of those that are named."""
+        return any(other in self.alternatives.get(cause, ()) or cause in self.alternatives.get(other, ())
+                   for other in named)  # fmt: skip
 
     @property
     def unknown(self) -> tuple[ActingPlace, ...]:
@@ -59,7 +82,20 @@ class Structure:
     def alternatives(self) -> dict[str, tuple[str, ...]]:
         """By cause, what the data cannot separate from it."""
         found = {c: p.inseparable_from for p in self.places if p.material for c in p.causes if p.inseparable_from}
+        if any("hysteresis" in place.causes for place in self.places):
+            found |= {c: tuple(sorted({*found.get(c, ()), "hysteresis"})) for c in self._short_lived}
         return found | dict(self.geometry.alternatives or {})
+
+    @property
+    def _short_lived(self) -> tuple[str, ...]:
+        """Causes that decay within the first poses, as the memory of what came before them does."""
+        acting = [self.result.component(name) for place in self.places for name in place.components]
+        return tuple(c.cause for c in acting if c.cause.startswith("warm-up") and c.shape[0] < FIRST_POSES)
+
+    def refinements(self, place: ActingPlace) -> tuple[str, ...]:
+        """Catalogue effects that act at a place, without a free form of theirs, and are not its causes."""
+        acting = [self.result.component(name) for name in place.components]
+        return tuple(c.cause for c in acting if c.cause and c.form is None and c.cause not in place.causes)
 
     def constants(self, cause: str) -> dict[str, float]:
         """Constants by which a catalogue effect is the function that was found."""
@@ -110,7 +146,7 @@ class Structure:
         for k in range(channels):
             count = form.count(k)
             rest = np.cumsum(added[at : at + count][::-1])[::-1] / self.result.data.n  # from each column on
-            whole = form.basis(k).kind in ("play", "products")
+            whole = form.basis(k).kind in ("play", "products", "ramp")
             sizes.append(size if count else 0.0)
             kept.append(count if whole else max(min(count, 1), int(np.sum(rest > KEPT**2))))
             at += count
@@ -130,22 +166,51 @@ def find_structure(
     source = FloorSource.SAMPLES
     if white is None:
         white, source = _neighbours(data), FloorSource.NEIGHBOURS
-    result = search(data, white, given)
-    for _ in range(FLOOR_ROUNDS):
-        again = _scatter(result, source)
-        if again is None:
-            break
-        white, source = again, FloorSource.NEIGHBOURS if source is FloorSource.NEIGHBOURS else FloorSource.CONTRADICTED
-        result = search(data, white, given)
+    elif not correlation_known(table) and _is_correlated(data, white, given):
+        white, source = np.maximum(white, _neighbours(data)), FloorSource.CORRELATED
+    result, source = _searched(data, white, given, source)
+    white = result.white
     acting = places(result)
     floor = float(np.sqrt(np.mean(white**2)))
     shape = geometry(result, {p.name: p.size * floor for p in acting}, geometries, has)
     return Structure(result, tuple(acting), shape, white, source)
 
 
+def _searched(data: PoseData, white: Array, given: Given, source: FloorSource) -> tuple[SearchResult, FloorSource]:
+    """The search, and where its noise is known from: again with the noise of the residual where that contradicts.
+
+    Components that can follow almost anything wait until the noise is known, because they follow noise as well.
+    """
+    result = search(data, white, given)
+    found = _scatter(result, source, alike=True)
+    if found is None:
+        return result, source
+    source = FloorSource.CONTRADICTED if source is FloorSource.SAMPLES else source
+    for _ in range(FLOOR_ROUNDS):
+        result = search(data, found, given, general=False)
+        again = _scatter(result, source, alike=False)
+        if again is None:
+            break
+        found = again
+    return (result if result.ratio < NOISE_ALONE else search(data, found, given)), source
+
+
+def _is_correlated(data: PoseData, white: Array, given: Given) -> bool:
+    """Whether the samples of a mean are correlated: neighbours differ by more than independent samples would let them,
+    and no place that acts is the reason.
+    """
+    if np.all(_neighbours(data) < CORRELATED * white):
+        return False
+    return search(data, white, given, general=False).ratio > 1 / TOO_SMALL
+
+
 def _neighbours(data: PoseData) -> Array:
-    """White noise from second differences of neighbouring poses, the same for all rows of an axis."""
-    y = data.outputs
+    """White noise from second differences of neighbouring poses, the same for all rows of an axis.
+
+    Smooth functions of the angles are removed first: they differ from pose to pose as noise does.
+    """
+    smooth = np.column_stack([np.ones(data.n), smooth_columns(data.table)])
+    y = data.outputs - (smooth @ np.linalg.lstsq(smooth, data.outputs.T, rcond=1e-9)[0]).T
     if data.n < 5:
         return np.full(y.shape, float(np.std(y)) or 1.0)
     second = y[:, 2:] - 2 * y[:, 1:-1] + y[:, :-2]
@@ -153,27 +218,31 @@ def _neighbours(data: PoseData) -> Array:
     return np.tile(np.maximum(std, 1e-9 * np.ptp(y, axis=1))[:, None], (1, data.n))
 
 
-def _scatter(result: SearchResult, source: FloorSource) -> Array | None:
-    """White noise of equal rows as the residual has it; None where the noise that was used agrees.
+def _scatter(result: SearchResult, source: FloorSource, alike: bool) -> Array | None:
+    """White noise as the residual has it; None where the noise that was used agrees.
 
     Noise from the samples is only replaced where the residual is clearly smaller: a larger one may hold more effects.
+    Rows are `alike` at first: what follows the samples' variance may be an effect that the search has not seen yet.
     """
     left = result.residual
-    ratio = float(np.sqrt(left @ left / result.freedom))
+    ratio = result.ratio
     if ratio > TOO_SMALL and (source is FloorSource.SAMPLES or ratio < 1 / TOO_SMALL):
         return None
     r = left.reshape(result.white.shape) * result.white
-    white = np.stack([_rows_noise(result, k, row) for k, row in enumerate(r)])
+    white = np.stack([_rows_noise(result, k, row, alike) for k, row in enumerate(r)])
     return white * np.sqrt(left.size / result.freedom) if np.all(white > 0) else None
 
 
-def _rows_noise(result: SearchResult, k: int, residual: Array) -> Array:
-    """Noise of each row of one channel, (n,): a constant part, and a part that follows the samples' variance."""
+def _rows_noise(result: SearchResult, k: int, residual: Array, alike: bool) -> Array:
+    """Noise of each row of one channel, (n,): a constant part, and parts that follow the samples' variance."""
     usual = np.median(np.abs(residual - np.median(residual))) / 0.6745
-    squares = np.minimum(residual**2, (OUTLYING * usual) ** 2)
     spread = result.data.spread
-    if spread is None or np.ptp(spread[k]) == 0:
+    if alike or spread is None or np.ptp(spread[k]) == 0:
         return np.full(len(residual), usual)
-    shares = np.column_stack([np.ones(len(residual)), spread[k] ** 2 / np.mean(spread[k] ** 2)])
-    parts, _ = nnls(shares / usual**2, squares / usual**2)
-    return np.asarray(np.sqrt(shares @ parts))
+    power = spread[k] ** 2 / np.mean(spread[k] ** 2)
+    shares = np.column_stack([np.ones(len(residual)), power, power**2])  # the last: an effect of a noisy variance
+    variance = np.full(len(residual), np.inf)
+    for _ in range(3):
+        squares = np.minimum(residual**2, OUTLYING**2 * variance)
+        variance = shares @ nnls(shares / usual**2, squares / usual**2)[0]
+    return np.asarray(np.sqrt(variance))

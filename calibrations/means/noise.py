@@ -167,6 +167,8 @@ def white_std(table: Table) -> Array | None:
 
     Samples that a coarse converter all gave one code say nothing of their noise: it is taken as that of the others.
     """
+    if all(_noise_name(name) in table for name in table.output_names):
+        return np.column_stack([table.column(_noise_name(name)) for name in table.output_names])
     names = [_std_name(name) for name in table.output_names]
     if "n" not in table or not all(name in table for name in names):
         return None
@@ -178,6 +180,12 @@ def white_std(table: Table) -> Array | None:
     factors = np.array([inflation(table, axis) for axis in table.axes])
     mean: Array = std * np.sqrt(factors / table.column("n")[:, None])
     return mean
+
+
+def with_white(table: Table, white: Array) -> Table:
+    """The table with the white noise of each mean, shape (axes, n), as a residual has shown it."""
+    names = map(_noise_name, table.output_names)
+    return replace(table, columns={**table.columns, **dict(zip(names, white, strict=True))})
 
 
 def norm_std(table: Table, std: Array) -> Array:
@@ -247,6 +255,10 @@ def _summed(covariance: Array, n: int) -> tuple[float, int]:
     last = int(beyond[0])
     true = sums[last] / (1 - (2 * last + 1) / n)  # each lag has lost true / n by the block's mean
     return float(true / (covariance[0] + true / n)), last
+
+
+def _noise_name(output: str) -> str:
+    return f"{_std_name(output)}_of_mean"
 
 
 def _std_name(output: str) -> str:

@@ -4,7 +4,7 @@
     --offset O     the first set of a kind
     --folder DIR   sets/*.csv.gz and truth.json (default: tests/data/hidden)
     --limit S      seconds for one set; a longer search counts as an error
-    --show         every set with a wrong answer
+    --show         every set with a wrong answer, and the places that act, with their sizes in noise floors
 
 A line a kind. `exact`: every cause is named and nothing else. A cause counts as named, too, if the answer lists it as
 an alternative of the named cause and the pair is in ALIKE. Times are processor time of this process; run with
@@ -86,7 +86,8 @@ def shipped(path: Path) -> Answer:
     """The answer of `rig discover`, in this process."""
     result = cal.discover(cal.read(path), "linear")
     held_out = result.findings.end.held_out_excess
-    return Answer(str(result.verdict), result.causes, result.alternatives, held_out)
+    places = ", ".join(f"{place.name} {place.size:.1f}" for place in result.findings.places)
+    return Answer(str(result.verdict), result.causes, result.alternatives, held_out, places)
 
 
 def score(name: str, truth: Sequence[str], answer: Answer, processor_s: float) -> Score:

@@ -9,7 +9,7 @@ from scipy.interpolate import BSpline
 from calibrations.discovery.results import Discovery
 from calibrations.discovery.verdict import Verdict
 from calibrations.effects.catalogue import catalogue
-from calibrations.errors import ModelError, TooFewRows
+from calibrations.errors import ModelError
 from calibrations.fitting.fit import Fit, evaluate, fit, refit
 from calibrations.free_forms import bases
 from calibrations.free_forms.bases import DEGREE, Harmonics, Line, Play, Products, Spline, Waves, spline
@@ -30,7 +30,7 @@ def poses(added: Array, seed: int = 0) -> Table:
 
 
 def discover(table: Table) -> Discovery[Fit]:
-    return dataset(table).discover_places(read_model("linear"), catalogue())
+    return dataset(table).discover(read_model("linear"), catalogue())
 
 
 def columns_of_sweep() -> dict[str, Array]:
@@ -136,11 +136,13 @@ def test_an_unknown_place_is_refused_with_the_nearest() -> None:
 
 
 def test_an_exact_form_of_the_catalogue_leaves_no_free_form() -> None:
-    result = discover(poses(1e-3 * forces_of_sweep()[:, :2] ** 3))
-    assert result.causes == ("cubic-nonlinearity",)
-    assert [step.name for step in result.steps] == ["cubic-nonlinearity"]
-    assert result.verdict is Verdict.ADEQUATE
-    assert [place.name for place in result.findings.places] == ["own-response"]
+    """Two effects: one alone would need no search for places."""
+    added = 1e-3 * forces_of_sweep()[:, :2] ** 3
+    added[:, 0] += 2e-3 * forces_of_sweep()[:, 2] ** 2
+    result = discover(poses(added))
+    assert set(result.causes) == {"cubic-nonlinearity", "z-axis-bias"}
+    assert len(result.steps) == 2
+    assert {place.name for place in result.findings.places} == {"own-response", "z-response"}
 
 
 def test_a_form_that_the_catalogue_lacks_is_an_unknown_effect_at_its_place() -> None:
@@ -194,10 +196,6 @@ def test_forces_of_the_chain_drive_the_form() -> None:
     assert form.columns(table, forces, forces[:, 0], 0)[:, 0] == pytest.approx(forces[:, 2])
 
 
-def test_places_need_poses_and_enough_of_them() -> None:
-    table = poses(np.zeros((len(forces_of_sweep()), 2)))
-    with pytest.raises(TooFewRows, match="8 poses cannot show where something acts; measure at least 24"):
-        discover(table.rows(np.arange(8)))
-    turned = Table.from_columns("positions", dict(zip(("ax", "ay", "az"), np.eye(3), strict=True)), source="turned.csv")
-    with pytest.raises(ModelError, match=r"turned.csv: places .* this is a table of positions"):
-        discover(turned)
+def test_in_few_poses_effects_are_searched_without_places() -> None:
+    found = discover(poses(1e-3 * forces_of_sweep()[:, :2] ** 3).rows(np.arange(8)))
+    assert found.findings.places == ()

@@ -4,8 +4,7 @@ import json
 
 import pytest
 
-from tests.benchmark.hidden import FOLDER, Answer, score, summary, timed
-from tests.benchmark.places import by_places
+from tests.benchmark.hidden import FOLDER, Answer, score, shipped, summary, timed
 
 
 def test_a_named_cause_replaces_a_hidden_one_only_if_the_answer_lists_it() -> None:
@@ -41,7 +40,7 @@ def test_an_exception_of_the_search_is_an_error_and_no_answer() -> None:
 @pytest.mark.parametrize("name", ["single-010", "null-154", "pair-270"])
 def test_the_search_for_places_names_one_cause_and_none_on_a_clean_sensor(name: str) -> None:
     truth = json.loads((FOLDER / "truth.json").read_text())[name]["causes"]
-    answer = by_places(FOLDER / "sets" / f"{name}.csv.gz")
+    answer = shipped(FOLDER / "sets" / f"{name}.csv.gz")
     assert list(answer.causes) == truth
     assert answer.held_out is not None
     assert answer.held_out < 1.15

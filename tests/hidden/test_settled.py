@@ -109,10 +109,10 @@ def test_what_leaves_only_noise_is_a_rival_however_likely_another_is(
 
 
 def test_what_took_anothers_place_has_it_as_its_rival() -> None:
-    """Warming up describes the room better than its thermometer does."""
+    """The room settles as a sensor warms up."""
     found = found_on("inseparable/settling room, bias", 10, 5010)
-    assert (found.verdict, found.causes) == ("ambiguous", ("warm-up-bias",))
-    assert "temperature-bias" in found.alternatives["warm-up-bias"]
+    assert (found.verdict, found.causes) == ("ambiguous", ("temperature-bias",))
+    assert "warm-up-bias" in found.alternatives["temperature-bias"]
 
 
 @pytest.mark.slow

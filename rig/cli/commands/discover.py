@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 @model_option
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="Write the final model to this file.")
 @click.option("--live", is_flag=True, help="Measure on the bench, and choose the next experiment.")
-@click.option("--places", is_flag=True, help="Find where in the signal chain something acts before naming effects.")
 @click.option("--time", "minutes", type=click.FloatRange(min=0, min_open=True), help="Rig time for --live, minutes.")
 @watch_options
 @check_option
@@ -31,7 +30,6 @@ def command(
     several: tuple[str, ...],
     out: Path | None,
     live: bool,
-    places: bool,
     minutes: float | None,
     unattended: bool,
     answers: Path | None,
@@ -43,8 +41,8 @@ def command(
     With --live there is no DATA: the program measures in steps until more data do not change the result, or until
     the time is over (default: the duration of the standard sweep).
 
-    With --places the search first finds the places of the signal chain that act, with curves of unknown form, and
-    then names the effects of the catalogue that are their causes. A curve without a cause stays in the model as
+    In poses the search first finds the places of the signal chain that act, with curves of unknown form, and then
+    names the effects of the catalogue that are their causes. A curve without a cause stays in the model as
     `free:PLACE`.
     """
     if live:
@@ -52,17 +50,13 @@ def command(
 
         if several:
             raise click.UsageError("--live measures its own data; remove DATA or --live")
-        if places:
-            raise click.UsageError("--places analyses data that are there; remove --live or --places")
         return discover_live(request, out, minutes, unattended, answers, check, as_json)
     if not several:
         raise click.UsageError("give DATA (a file or a run), or --live to measure")
-    return _discover(request, several, out, places, check, as_json)
+    return _discover(request, several, out, check, as_json)
 
 
-def _discover(
-    request: Request, several: tuple[str, ...], out: Path | None, places: bool, check: bool, as_json: bool
-) -> int:
+def _discover(request: Request, several: tuple[str, ...], out: Path | None, check: bool, as_json: bool) -> int:
     from calibrations.discovery.verdict import Verdict
     from calibrations.documents import discovery_document
     from rig.cli.terminal.words import discovery, own_effect, parameters, pattern_advice, planned, warning
@@ -71,8 +65,7 @@ def _discover(
 
     question = loaded(request, note, out)
     data = question.data if len(several) == 1 else _together(several, request, question)
-    search = data.discover_places if places else data.discover
-    result = planned(search(question.model, question.effects), request, question.effects)
+    result = planned(data.discover(question.model, question.effects), request, question.effects)
     path = write_model(result.end, question.model, out, note)
     reached = str(path) if path else request.model or question.model.name
     own = (result.pattern if len(several) == 1 else None, reached, request)
