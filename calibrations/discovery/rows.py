@@ -248,7 +248,7 @@ class Rows(Dataset[Fit]):
         start, end = searched.start, searched.end
         if (reason := rejection(end)) is not None:
             return self._rejected(start, reason)
-        better = plainer(start, searched.causes_alone)
+        better = plainer(start, searched.causes_alone if searched.causes else end)
         left = better or (structure_of(end) if end.pooled_excess > MATERIAL else None)
         if left is None and any(place.unknown for place in searched.structure.places):
             left = structure_of(searched.causes_alone)
