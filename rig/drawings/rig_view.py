@@ -51,7 +51,7 @@ class Solid:
         for face in self.faces:
             normal = np.cross(face[1] - face[0], face[2] - face[1])
             normal /= np.linalg.norm(normal)
-            if normal @ camera.toward > 1e-6:
+            if normal @ camera.toward > EDGE_ON:
                 fill = shaded(self.colour, float(normal @ LIGHT / np.linalg.norm(LIGHT)))
                 yield svg.polygon(camera.project(face), fill, fill, 0.6, stroke_linejoin="round")
 
@@ -92,6 +92,7 @@ def shaded(colour: str, light: float) -> str:
 STEEL, DARK, ALUMINIUM, LIGHT_METAL = "#8b98a6", "#5b6875", "#c3ccd5", "#dde3e9"
 BOARD, BOARD_EDGE, PACKAGE = "#2f7d5b", "#1c5b40", "#3a4450"
 LAB = np.eye(3)
+EDGE_ON = 1e-6  # cosine: a face that is turned away less is seen along its edge, whatever rounding makes of it
 CAMERA_FROM = (0.62, -1.0, 0.62)
 AXIS_LENGTH = 0.95
 GRAVITY = np.array([[-1.35, -0.9, 0.75], [-1.35, -0.9, -0.15]])  # from, to
@@ -102,7 +103,7 @@ POSITIONER_HALF, POSITIONER_HEIGHT = 0.46, 0.26
 def rig_view(attitude: Attitude, centre: tuple[float, float], scale: float) -> Iterator[str]:
     """The rig from the front, a little from the right and from above."""
     camera = Camera(CAMERA_FROM, scale, centre)
-    faces_us = bool(attitude.tilted[2] @ camera.toward > 0)
+    faces_us = bool(attitude.tilted[2] @ camera.toward > -EDGE_ON)
     for solid in [*_stand(), *_bracket(attitude, faces_us)]:
         yield from solid.drawn(camera)
     yield _axis_of_alpha(camera)

@@ -18,7 +18,7 @@ RUN = re.compile(r"\b\d{8}-\d{6}-([a-z]+(?:-[a-z]+)*)-[0-9a-f]{3}\b")
 DATE = re.compile(r"\b\d{4}-\d\d-\d\d(?:([T ])\d\d:\d\d(:\d\d(?:\.\d+)?)?(Z|\+00:00)?)?")
 NUMBER = re.compile(r"(?<![\w.])(\d+)(\.\d+)?(e[-+]?\d+)?")
 FILLER = re.compile(r"(?:[\s#─━═]|--+)+")
-RELATIVE, LAST_DIGITS = 0.01, 1.5  # by how much a number may differ: of itself, or of its last digit
+RELATIVE, LAST_DIGITS = 0.1, 1.5  # by how much a number may differ: of itself (processors round otherwise), or its end
 
 
 def commands(transcript: str) -> list[str]:

@@ -6,6 +6,7 @@ from calibrations.table import Array, Table
 
 HOUR_S = 3600.0
 WAVES = range(2, 8)
+ROUNDING = 1e-12  # of an output
 
 
 def _half_waves(k: int) -> Parameter:
@@ -64,7 +65,8 @@ def _wanders(table: Table) -> bool:
     u = (table.time_s - table.time_s.min()) / (np.ptp(table.time_s) or 1.0) - 0.5
     line = np.column_stack([smooth, np.ones(table.n), u])
     squares = [_left(line, table.outputs), _left(np.hstack([line, _waves(u)]), table.outputs)]
-    gain = table.n * np.sum(np.log(squares[0] / np.maximum(squares[1], np.finfo(float).tiny)))
+    rounding = table.n * (ROUNDING * np.abs(table.outputs).max(axis=0)) ** 2  # outputs without noise leave no more
+    gain = table.n * np.sum(np.log(np.maximum(squares[0], rounding) / np.maximum(squares[1], rounding)))
     return bool(gain > len(table.axes) * len(WAVES) * np.log(table.n))
 
 
