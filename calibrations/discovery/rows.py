@@ -140,7 +140,8 @@ class Rows(Dataset[Fit]):
             return self._found(path, effects, origin)
         from calibrations.discovery.structural import search_structure  # only this search needs it
 
-        return self._with_structure(search_structure(start, effects), outliers, origin)
+        searched = search_structure(start, effects)
+        return self._with_structure(searched, outliers, searched.start if origin is start else origin)
 
     @property
     def shows_places(self) -> bool:
@@ -248,7 +249,7 @@ class Rows(Dataset[Fit]):
         start, end = searched.start, searched.end
         if (reason := rejection(end)) is not None:
             return self._rejected(start, reason)
-        better = plainer(start, searched.causes_alone if searched.causes else end)
+        better = plainer(start, end, searched.causes_alone if searched.causes else None)
         left = better or (structure_of(end) if end.pooled_excess > MATERIAL else None)
         if left is None and any(place.unknown for place in searched.structure.places):
             left = structure_of(searched.causes_alone)

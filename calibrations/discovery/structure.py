@@ -140,12 +140,13 @@ def _patternless(fit: Fit) -> Pattern | None:
     return Pattern(f"{what} without a pattern, {max(slow, scatter):.1f} x the noise floor", np.zeros((0, 0, 0)))
 
 
-def plainer(begin: Fit, end: Fit) -> Pattern | None:
+def plainer(begin: Fit, end: Fit, named: Fit | None = None) -> Pattern | None:
     """The pattern that explains what the model of `begin` misses better than the effects added up to `end`.
 
     Both are compared by likelihood under the noise without its slow part, which would take up either; a parameter
     costs log(rows), and so does the choice among the patterns. In a motion, whose rows repeat each other, a step at the
-    beginning is an effect that is always there: nothing competes.
+    beginning is an effect that is always there: nothing competes. `named`: the effects without free forms, which follow
+    any pattern and tell nothing of its cause.
     """
     if end is begin or begin.table.type.moving:
         return None
@@ -154,7 +155,11 @@ def plainer(begin: Fit, end: Fit) -> Pattern | None:
     price = float(np.log(start.residual.size))
     tried = [(worth(p, screen) - price, p) for p in patterns(start.table, start.channels)]
     best, pattern = max(tried, key=lambda each: each[0], default=(-np.inf, None))
-    if pattern is None or not best > _by_effects(end, start) + PATTERN_BETTER or _contains(pattern, begin, end, screen):
+    if (
+        pattern is None
+        or not best > _by_effects(end, start) + PATTERN_BETTER
+        or _contains(pattern, begin, named or end, screen)
+    ):
         return None
     return sharpened(pattern, screen)
 

@@ -46,7 +46,7 @@ def test_the_glossary_has_the_keys_of_a_document(
     _, document, problem = recorded.command(command, run, "--json", *out)
     assert document, problem
     undescribed = set(keys(json.loads(document))) - NAMES - ORDINARY
-    assert not undescribed
+    assert not undescribed, sorted(undescribed)
 
 
 def test_the_glossary_has_kinds_columns_and_verdicts() -> None:
