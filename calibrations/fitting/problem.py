@@ -66,9 +66,10 @@ class Problem:
             )
         layout = Layout.of(model, table)
         found = problem(table, layout)
-        if table.n * len(found.channels) <= len(layout.slots):
+        free = int(np.sum(~np.isfinite(layout.prior)))
+        if table.n * len(found.channels) <= free:
             raise TooFewRows(
-                f"{table.source}: {table.n} rows cannot determine the {len(layout.slots)} parameters of {model.name}; "
+                f"{table.source}: {table.n} rows cannot determine the {free} parameters of {model.name}; "
                 "measure more poses, or take a smaller model"
             )
         return found

@@ -136,6 +136,8 @@ class Sizes:
 
 def solve(g: Gram, variances: Mapping[str, float]) -> Sizes:
     """Coefficients and deviance at these variances."""
+    if not variances:
+        return Sizes({}, np.zeros(0), np.zeros((0, 0)), g.squares)
     rows = g.indices(variances)
     widths = [g.blocks[name].stop - g.blocks[name].start for name in variances]
     std = np.sqrt(np.repeat(list(variances.values()), widths))
