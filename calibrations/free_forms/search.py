@@ -1,4 +1,4 @@
-"""Forward selection with backward elimination and exchange on the restricted likelihood, around Gauss-Newton steps."""
+"""The search for the components that act: rounds of selection and Gauss-Newton steps, from two beginnings."""
 
 from __future__ import annotations
 
@@ -19,24 +19,18 @@ from calibrations.free_forms.reml import (
     coefficients,
     estimate,
     gain_of_columns,
-    gains,
     gram,
-    loss,
     whitened,
     without,
 )
+from calibrations.free_forms.selection import ENTER, pools_of, select
 from calibrations.table import Array
 
-ENTER = 16.0  # gain in -2 log restricted likelihood for one component more: 1 % of clean sensors (`chance`)
-LEAVE = 12.0
 COARSE = (1e-3, 2e-5)  # of the misfit, at each linearisation: less may be a second-order remainder
 ROUNDS = 7
-MOST_COMPONENTS = 24
-SPILL = 0.03  # of the misfit that is left: a place that gains less takes up part of what acts elsewhere
 LARGEST = 4.0  # of the mean square of the first misfit: more is two components against each other
 HALVINGS = 6  # of a step that overshoots
 NOISE_ALONE, FEW = 1.04, 3  # residual over noise and components of a search that needs no second beginning
-CANCELS = 6.0  # of the squares of the first misfit: more in one component is taken off by others
 SLOW_MOST = 0.5  # slow noise, in noise floors, at most (rms)
 
 
@@ -134,8 +128,8 @@ def _descent(data: PoseData, white: Array, given: Given, general: bool, catalogu
         before = set(variances)
         kept = values, dict(variances), state
         sizes = estimate(g, variances, most)
-        pools = _pools(components, catalogue_first and number < len(COARSE))
-        sizes, steps = _select(g, sizes, components, pools, most, limit, number >= len(COARSE))
+        pools = pools_of(components, catalogue_first and number < len(COARSE))
+        sizes, steps = select(g, sizes, components, pools, most, limit, number >= len(COARSE))
         path += steps
         variances = dict(sizes.variances)
         values, moved = _damped(data, given, kept[0], coefficients(g, sizes), components, white)
@@ -174,17 +168,6 @@ def _descent(data: PoseData, white: Array, given: Given, general: bool, catalogu
     return SearchResult(data, given, white, components, g, X, sizes, values, state, path)
 
 
-Pools = Sequence[Mapping[str, Component]]
-
-
-def _pools(components: Sequence[Component], catalogue_first: bool) -> Pools:
-    """Components in the order in which they are tried: the next pool once none of one gains."""
-    simple = {c.name: c for c in components if not c.general}
-    named = {c.name: c for c in simple.values() if c.cause}
-    every = {c.name: c for c in components}
-    return [named, simple, every] if catalogue_first else [simple, every]
-
-
 def _damped(
     data: PoseData,
     given: Given,
@@ -215,142 +198,6 @@ def _between(before: Coefficients, after: Coefficients) -> Coefficients:
     nothing = np.zeros(1)
     of = {name: (before.of.get(name, nothing) + after.of.get(name, nothing)) / 2 for name in names}
     return Coefficients((before.base + after.base) / 2, of)
-
-
-def _select(
-    g: Gram,
-    sizes: Sizes,
-    components: Sequence[Component],
-    pools: Pools,
-    most: Mapping[str, float],
-    limit: float,
-    last: bool,
-) -> tuple[Sizes, list[str]]:
-    """Components added, exchanged and removed until nothing gains more than `limit`."""
-    by_name = {c.name: c for c in components}
-    steps: list[str] = []
-    seen: set[frozenset[str]] = set()
-    sizes = _pruned(g, sizes, by_name, most, steps)
-    stale: list[dict[str, float]] = [{} for _ in pools]
-    pools = [dict(pool) for pool in pools]
-    while len(sizes.variances) < MOST_COMPONENTS:
-        best = _next(g, sizes, pools, stale, max(limit, SPILL * (sizes.deviance - g.rows)))
-        if best is not None:
-            larger = estimate(g, {**sizes.variances, best[0]: best[2]}, most, 12)
-            if _cancels(g, larger):
-                pools = [{name: c for name, c in pool.items() if name != best[0]} for pool in pools]
-                continue
-            sizes = larger
-            steps.append(f"+{best[0]}")
-            if by_name[best[0]].reshaped is not None:
-                break  # its shape is found first: its misfit looks like other places
-            sizes = _pruned(g, sizes, by_name, most, steps)
-            if frozenset(sizes.variances) not in seen:
-                seen.add(frozenset(sizes.variances))
-                continue
-        if not last:
-            break
-        after = _exchanged(g, sizes, by_name, most, steps)
-        if set(after.variances) == set(sizes.variances) or frozenset(after.variances) in seen:
-            break
-        seen.add(frozenset(after.variances))
-        sizes = _pruned(g, after, by_name, most, steps)
-    return estimate(g, sizes.variances, most), steps
-
-
-def _cancels(g: Gram, sizes: Sizes) -> bool:
-    """Whether a component adds far more than there is to explain, so that another one takes it off again."""
-    at = 0
-    for name in sizes.variances:
-        block = g.blocks[name]
-        u = sizes.coefficients[at : at + block.stop - block.start]
-        at += len(u)
-        if float(u @ g.products[block, block] @ u) > CANCELS * g.squares:
-            return True
-    return False
-
-
-def _next(
-    g: Gram, sizes: Sizes, pools: Pools, stale: Sequence[dict[str, float]], enough: float
-) -> tuple[str, float, float] | None:
-    """The component of the first pool that gains enough; None where none does."""
-    for pool, known in zip(pools, stale, strict=True):
-        best = _best(g, sizes, pool, known)
-        if known and (best is None or best[1] <= enough):
-            known.clear()
-            best = _best(g, sizes, pool, known)
-        if best is not None and best[1] > enough:
-            return best
-    return None
-
-
-def _best(
-    g: Gram, sizes: Sizes, by_name: Mapping[str, Component], stale: dict[str, float] | None = None
-) -> tuple[str, float, float] | None:
-    """The component that gains most, price taken off, and its variance.
-
-    Gains mostly fall when components are added: with `stale` gains of an earlier call the most promising are computed
-    first, until none of the others promises more.
-    """
-    taken = {by_name[name].family for name in sizes.variances if name in by_name} - {""}
-    names = [n for n, c in by_name.items() if n not in sizes.variances and c.family not in taken and n in g.blocks]
-    known = {} if stale is None else stale
-    names.sort(key=lambda n: -known.get(n, np.inf))
-    best: tuple[str, float, float] | None = None
-    for part in [names[k : k + 6] for k in range(0, len(names), 6)] if known else [names]:
-        if not part or (best is not None and best[1] > known.get(part[0], np.inf)):
-            break
-        for n, (gained, variance) in gains(g, sizes, part).items():
-            known[n] = gained - by_name[n].price
-            if best is None or known[n] > best[1]:
-                best = n, known[n], variance
-    return best
-
-
-def _pruned(
-    g: Gram, sizes: Sizes, by_name: Mapping[str, Component], most: Mapping[str, float], steps: list[str]
-) -> Sizes:
-    """Without components whose loss costs less than they must gain, the least first."""
-    while True:
-        costs = {n: loss(g, sizes, n) - by_name[n].price for n in sizes.variances if not by_name[n].noise}
-        if not costs:
-            return sizes
-        name = min(costs, key=lambda n: costs[n])
-        if costs[name] > LEAVE:
-            return sizes
-        rest = {k: v for k, v in sizes.variances.items() if k != name}
-        after = estimate(g, rest, most, 12)
-        if after.deviance - sizes.deviance - by_name[name].price > LEAVE:
-            return sizes
-        steps.append(f"-{name}")
-        sizes = after
-
-
-def _exchanged(
-    g: Gram, sizes: Sizes, by_name: Mapping[str, Component], most: Mapping[str, float], steps: list[str]
-) -> Sizes:
-    """With each component replaced where another one in its stead is likelier."""
-    for name in [n for n in sizes.variances if not by_name[n].noise]:
-        if name not in sizes.variances:
-            continue
-        others = without(g, sizes, name)
-        alone = estimate(g, others.variances, most, 12)
-        if alone.deviance - sizes.deviance - by_name[name].price <= LEAVE:  # the others take its part
-            steps.append(f"-{name}")
-            sizes = alone
-            continue
-        lost = others.deviance - sizes.deviance - by_name[name].price
-        best = _best(g, others, by_name)
-        if best is None or best[0] == name or best[1] < lost + 1.0:
-            continue
-        tried = estimate(g, {**others.variances, best[0]: best[2]}, most, 12)
-        if _cancels(g, tried):
-            continue
-        better = sizes.deviance + by_name[name].price - tried.deviance - by_name[best[0]].price
-        if better > 1.0:
-            steps.append(f"{name}>{best[0]}")
-            sizes = tried
-    return sizes
 
 
 def _refined(
