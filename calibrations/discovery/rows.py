@@ -40,7 +40,7 @@ from calibrations.errors import ModelError
 from calibrations.fitting.determined import blind_to, undetermined
 from calibrations.fitting.fit import Fit, evaluate, fit, refit
 from calibrations.fitting.sensed import axis_of, milli_unit, pooled_milli
-from calibrations.means.noise import rms
+from calibrations.means.noise import correlation_known, rms
 from calibrations.model import Model
 from calibrations.table import Array, Table
 from calibrations.text import quantity, rounded
@@ -419,9 +419,13 @@ class Rows(Dataset[Fit]):
 
 
 def _explained(path: Path) -> bool:
-    """Whether the effects of a path leave no more and no less than the noise of the samples, and no pattern."""
+    """Whether the effects of a path leave no more and no less than the noise of the samples, and no pattern.
+
+    Where the samples of a mean may be correlated, more than their noise may be left.
+    """
     end = path.end
-    as_noise = end.noise.known and LEAST_NOISE < end.pooled_excess < NO_MORE_THAN_NOISE
+    most = NO_MORE_THAN_NOISE if correlation_known(end.table) else np.inf
+    as_noise = end.noise.known and LEAST_NOISE < end.pooled_excess < most
     return as_noise and structure_of(end) is None and is_complete(path)
 
 

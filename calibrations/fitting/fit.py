@@ -12,6 +12,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.linalg import lstsq
 from scipy.optimize import OptimizeResult, least_squares
 
 from calibrations.fitting.held_out import folds, held_out
@@ -303,8 +304,9 @@ def _step(J: Array, left: Array, damping: float, low: Array, high: Array) -> Arr
         size = np.linalg.norm(columns, axis=0)
         most = size.max(initial=0.0) or 1.0
         damped = np.vstack([columns / most, np.diag(np.sqrt(damping) * size / most)]) if damping else columns / most
-        step[free] = np.linalg.lstsq(damped, np.append(-side / most, np.zeros(len(damped) - len(side))),
-                                     rcond=RELATIVE_RANK)[0]  # fmt: skip
+        # by orthogonal factors: singular values need not converge on free forms of hundreds of columns
+        side = np.append(-side / most, np.zeros(len(damped) - len(side)))
+        step[free] = lstsq(damped, side, cond=RELATIVE_RANK, lapack_driver="gelsy", check_finite=False)[0]
         beyond = free & ((step < low) | (step > high))
         if not beyond.any():
             break

@@ -18,10 +18,8 @@ from calibrations.free_forms.poses import PoseData
 from calibrations.free_forms.search import NOISE_ALONE, SearchResult, search
 from calibrations.geometry.orientation import out_of_plane
 from calibrations.geometry.smooth import smooth_columns
-from calibrations.means.noise import correlation_known
 from calibrations.table import Array, Table
 
-CORRELATED = 1.5  # times the stated noise: neighbours that differ by more contradict independent samples
 TOO_SMALL = 0.93  # of a stated noise: a residual below contradicts it
 FLOOR_ROUNDS = 2  # in which the noise floor is found from the residual
 OUTLYING = 4.0  # times the usual residual: more counts as so much
@@ -35,7 +33,6 @@ class FloorSource(StrEnum):
     """Where the noise of a mean is known from."""
 
     SAMPLES = "the standard deviation and the number of samples of each mean"
-    CORRELATED = "neighbouring poses differ by so much, and whether the samples of a mean are independent is not stated"
     NEIGHBOURS = "neighbouring poses differ by so much, and the noise of a mean is not stated"
     CONTRADICTED = "the standard deviations of the samples contain more than noise"
 
@@ -166,8 +163,6 @@ def find_structure(
     source = FloorSource.SAMPLES
     if white is None:
         white, source = _neighbours(data), FloorSource.NEIGHBOURS
-    elif not correlation_known(table) and _is_correlated(data, white, given):
-        white, source = np.maximum(white, _neighbours(data)), FloorSource.CORRELATED
     result, source = _searched(data, white, given, source)
     white = result.white
     acting = places(result)
@@ -193,15 +188,6 @@ def _searched(data: PoseData, white: Array, given: Given, source: FloorSource) -
             break
         found = again
     return (result if result.ratio < NOISE_ALONE else search(data, found, given)), source
-
-
-def _is_correlated(data: PoseData, white: Array, given: Given) -> bool:
-    """Whether the samples of a mean are correlated: neighbours differ by more than independent samples would let them,
-    and no place that acts is the reason.
-    """
-    if np.all(_neighbours(data) < CORRELATED * white):
-        return False
-    return search(data, white, given, general=False).ratio > 1 / TOO_SMALL
 
 
 def _neighbours(data: PoseData) -> Array:

@@ -31,7 +31,7 @@ def terms(draw: st.DrawFn, name: str, unit: str) -> Term:
             std = draw(st.none() | numbers.map(abs))
             why = None if identified else draw(words)
             own = parameter.unit.replace("{out}", unit)
-            estimates.append(Estimate(parameter.name, axis, draw(numbers), std, own, identified, why))
+            estimates.append(Estimate(parameter.name, axis, draw(numbers.filter(bool)), std, own, identified, why))
     constants = {key: draw(numbers) for key in effect.constants if draw(st.booleans())}
     return Term(effect, tied, tuple(estimates), constants)
 
