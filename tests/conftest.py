@@ -36,3 +36,14 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
     if os.environ.get("RIG_NO_SKIP") and reporter and reporter.stats.get("skipped") and not session.exitstatus:
         session.exitstatus = pytest.ExitCode.TESTS_FAILED
         reporter.write_line("RIG_NO_SKIP: a skipped test counts as failed", red=True)
+
+
+KNOWN_FAILURES = Path(__file__).with_name("known_failures.txt")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Tests that are known to fail run as well, and do not fail the session."""
+    known = {line for line in KNOWN_FAILURES.read_text().splitlines() if line and not line.startswith("#")}
+    for item in items:
+        if item.nodeid in known:
+            item.add_marker(pytest.mark.xfail(reason="a known failure: docs/decisions/0042", strict=False))
