@@ -245,7 +245,7 @@ class Findings(Generic[F]):
     def given(self) -> Judgement:
         """The judgement on the given model."""
         return Judgement(
-            model=self.start.model.name, missing=self.names, added=self.added, undetermined=self.undetermined[0],
+            model=self.start.model.name, missing=self._lacking, added=self.added, undetermined=self.undetermined[0],
             closest=self._closest, provisional=not self.settled, **self._common,
         )  # fmt: skip
 
@@ -256,6 +256,12 @@ class Findings(Generic[F]):
             model=self.start.model.name, added=self.causes, refinements=self.refinements,
             undetermined=self.undetermined[1], closest=self._closest, **self._common,
         )  # fmt: skip
+
+    @property
+    def _lacking(self) -> tuple[str, ...]:
+        """The effects of the steps; curves at unknown places are told by their places."""
+        unknown = any(place.unknown for place in self.places)
+        return tuple(name for name in self.names if not (unknown and name.startswith("free:")))
 
     @property
     def _common(self) -> dict[str, Any]:
