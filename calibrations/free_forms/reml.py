@@ -23,6 +23,7 @@ from calibrations.free_forms.components import Component
 from calibrations.table import Array
 
 RANK = 1e-11  # of the largest eigenvalue of the base's products
+NOTHING = 1e-9  # of the largest base column: a smaller one is rounding, as the axis out of the plane at one inclination
 LEAST_BESIDE = 1e-3  # of a component's squares: less beside the base is not magnified
 ROUNDS = 40
 SETTLED = 0.02  # of a variance
@@ -88,6 +89,7 @@ def gram(X: Array, blocks: Mapping[str, slice], scales: Mapping[str, float], b: 
 def eliminated(G: Array, blocks: Mapping[str, slice], scales: Mapping[str, float], b: int, rows: int) -> Gram:
     """The same from the products of all columns."""
     size = np.sqrt(np.maximum(np.diag(G)[:b], 1e-300))
+    size = np.where(size > NOTHING * size.max(), size, np.inf)
     values, vectors = np.linalg.eigh(G[:b, :b] / np.outer(size, size))
     kept = values > RANK * values[-1]
     inverse = (vectors[:, kept] / values[kept]) @ vectors[:, kept].T / np.outer(size, size)

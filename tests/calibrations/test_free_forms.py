@@ -15,6 +15,7 @@ from calibrations.free_forms import bases
 from calibrations.free_forms.bases import DEGREE, Harmonics, Line, Play, Products, Spline, Waves, spline
 from calibrations.free_forms.effect import FreeForm, free_form, place_of
 from calibrations.free_forms.form import Form
+from calibrations.free_forms.reml import gram
 from calibrations.geometry.orientation import nominal_pose, specific_force
 from calibrations.loop import dataset
 from calibrations.model.file import dump_model, parse_model, read_model
@@ -199,3 +200,13 @@ def test_forces_of_the_chain_drive_the_form() -> None:
 def test_in_few_poses_effects_are_searched_without_places() -> None:
     found = discover(poses(1e-3 * forces_of_sweep()[:, :2] ** 3).rows(np.arange(8)))
     assert found.findings.places == ()
+
+
+def test_a_base_column_of_rounding_takes_up_nothing() -> None:
+    rng = np.random.default_rng(1)
+    X = rng.standard_normal((50, 4))  # two columns of the base, one of a component, the data
+    X[:, 1] *= 1e-14
+    g = gram(X, {"curve": slice(0, 1)}, {"curve": 1.0}, 2)
+    alone = gram(X[:, [0, 2, 3]], {"curve": slice(0, 1)}, {"curve": 1.0}, 1)
+    assert (g.base_rank, g.base_inverse[1, 1]) == (1, 0.0)
+    assert g.squares == pytest.approx(alone.squares)
