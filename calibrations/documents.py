@@ -116,6 +116,7 @@ def _in_doubt(result: Diagnosis[F] | Discovery[F]) -> Document:
         "disturbances": [dict(each) for each in result.findings.disturbances],
         "places": places_document(result),
         "residual_structure": result.residual_structure,
+        "left_out": list(result.findings.data.left_out),
         "outliers": list(result.outliers),
         "next_experiment": experiment_document(result.next_experiment),
     }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
@@ -66,11 +66,14 @@ def diagnose(data: Table, model: GivenModel) -> Diagnosis[Fit]:
     return diagnosed(data, _model(model))
 
 
-def discover(data: Table, model: GivenModel) -> Discovery[Fit]:
-    """`model` with the effects that it misses on `data`, added one by one."""
+def discover(data: Table, model: GivenModel, without: Sequence[str] = ()) -> Discovery[Fit]:
+    """`model` with the effects that it misses on `data`, added one by one.
+
+    `without`: places of the signal chain, such as "own-response", that the search leaves out.
+    """
     from calibrations.loop import discover as discovered
 
-    return discovered(data, _model(model))
+    return discovered(data, _model(model), without=without)
 
 
 def noise(data: Table | Array, rate_hz: float | None = None) -> NoiseAnalysis:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, overload
 
 from calibrations.discovery.dataset import Dataset
@@ -54,12 +54,21 @@ def diagnose(data: Table | Still, model: Model, effects: Effects | None = None) 
 
 
 @overload
-def discover(data: Table, model: Model, effects: Effects | None = None) -> Discovery[Fit]: ...
+def discover(
+    data: Table, model: Model, effects: Effects | None = None, without: Sequence[str] = ()
+) -> Discovery[Fit]: ...
 @overload
-def discover(data: Still, model: Model, effects: Effects | None = None) -> Discovery[NoiseFit]: ...
-def discover(data: Table | Still, model: Model, effects: Effects | None = None) -> Discovery[Any]:
-    """`model` with all effects that it misses on the data. Raises what `fit` raises."""
-    return dataset(data).discover(model, catalogue() if effects is None else effects)
+def discover(
+    data: Still, model: Model, effects: Effects | None = None, without: Sequence[str] = ()
+) -> Discovery[NoiseFit]: ...
+def discover(
+    data: Table | Still, model: Model, effects: Effects | None = None, without: Sequence[str] = ()
+) -> Discovery[Any]:
+    """`model` with all effects that it misses on the data. Raises what `fit` raises.
+
+    `without`: places of the signal chain, such as own-response, that the search leaves out.
+    """
+    return dataset(data).without(without).discover(model, catalogue() if effects is None else effects)
 
 
 @overload

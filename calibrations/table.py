@@ -49,6 +49,7 @@ class Table:
     labels: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     numbers: NDArray[np.intp] | None = None  # of the rows in what they were taken from; None: 0, 1, 2 ...
     noise: Mapping[str, tuple[tuple[float, float], ...]] = field(default_factory=dict)  # by axis: `known_noise`
+    left_out: tuple[str, ...] = ()  # places of the signal chain in which no search looks for a cause
 
     @staticmethod
     def from_columns(

@@ -63,6 +63,20 @@ class Dataset(ABC, Generic[F]):
         """What the comparison is, where there is another one; "" where there is none."""
         return ""
 
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Places of the signal chain in which no search looks for a cause."""
+        return ()
+
+    def without(self, places: Sequence[str]) -> Dataset[F]:
+        """The same data for a search that leaves out these places of the signal chain. Raises ModelError."""
+        if not places:
+            return self
+        raise ModelError(
+            f"{self.source}: the search in a still record has no places of the signal chain to leave out; "
+            "remove --without"
+        )
+
     @abstractmethod
     def fit(self, model: Model) -> F:
         """The model with its parameters estimated. Raises ModelError, DataError, TooFewRows."""

@@ -36,10 +36,12 @@ from calibrations.discovery.structure import plainer, structure_of
 from calibrations.discovery.verdict import Verdict
 from calibrations.effects import Effect
 from calibrations.effects.expression_effect import effect_for
-from calibrations.errors import ModelError
+from calibrations.errors import ModelError, nearest
 from calibrations.fitting.determined import blind_to, undetermined
 from calibrations.fitting.fit import Fit, evaluate, fit, refit
 from calibrations.fitting.sensed import axis_of, milli_unit, pooled_milli
+from calibrations.free_forms.effect import place_of_effect, place_to_leave_out
+from calibrations.free_forms.requested import RequestedForm
 from calibrations.means.noise import correlation_known, rms
 from calibrations.model import Model
 from calibrations.table import Array, Table
@@ -105,6 +107,27 @@ class Rows(Dataset[Fit]):
         """That of a motion: the report also shows the models of its sweep."""
         return self.table.type.note
 
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Places of the signal chain in which no search looks for a cause."""
+        return self.table.left_out
+
+    def without(self, places: Sequence[str]) -> Rows:
+        """The same table for a search that leaves out these places. Raises ModelError for an unknown place."""
+        chosen = tuple(dict.fromkeys(place_to_leave_out(place) for place in places))
+        for place in chosen:
+            column = place.removeprefix("column:")
+            if column not in (place, "std", *self.table.columns):
+                hint = nearest(column, self.table.columns)
+                raise ModelError(f"{place} cannot be left out: {self.source} has no column {column}{hint}")
+        return Rows(replace(self.table, left_out=chosen)) if chosen else self
+
+    def _searchable(self, effects: Mapping[str, Effect]) -> Mapping[str, Effect]:
+        """The effects that act at none of the places that are left out."""
+        if not self.left_out:
+            return effects
+        return {name: effect for name, effect in effects.items() if place_of_effect(name) not in self.left_out}
+
     def fit(self, model: Model) -> Fit:
         """Least squares. Raises what `fit` raises."""
         return fit(model, self.table)
@@ -133,6 +156,16 @@ class Rows(Dataset[Fit]):
         return self._searched(start, self._left_out(start), origin, effects)
 
     def _searched(
+        self, start: Fit, outliers: tuple[int, ...], origin: Fit, effects: Mapping[str, Effect]
+    ) -> Findings[Fit]:
+        effects = self._searchable(effects)
+        found = self._searched_among(start, outliers, origin, effects)
+        if not self.left_out:
+            return found
+        said = f"Places left out of the search: {', '.join(self.left_out)}."
+        return replace(found, remarks=(*found.remarks, said))
+
+    def _searched_among(
         self, start: Fit, outliers: tuple[int, ...], origin: Fit, effects: Mapping[str, Effect]
     ) -> Findings[Fit]:
         path = find_path(start, outliers, effects, most=1 if self.shows_places else MOST_EFFECTS)
@@ -344,6 +377,8 @@ class Rows(Dataset[Fit]):
         """Raises ModelError where the table lacks a column, or the effect is defined for another kind."""
         if (why := effect.excluded(self.table)) is not None:
             t = self.table
+            if isinstance(effect, RequestedForm) and t.content in effect.kinds:
+                raise ModelError(f"{effect.name} {why} ({t.source})")
             raise ModelError(f"{effect.name} {why}; {t.source} is a table of {t.kind}: {', '.join(t.columns)}")
 
     def errors_document(self, found: Fit) -> dict[str, Any]:

@@ -19,6 +19,7 @@ from calibrations.fitting.held_out import folds, held_out
 from calibrations.fitting.identifiability import RELATIVE_RANK, estimates
 from calibrations.fitting.noise_fit import estimate, widening
 from calibrations.fitting.problem import Problem
+from calibrations.fitting.requested_forms import requested, with_sizes, without_requested
 from calibrations.means.noise import Noise, rms, white_only
 from calibrations.model import Model
 from calibrations.model.model import Parameters
@@ -169,7 +170,12 @@ class Fit(Result):
 
 
 def fit(model: Model, table: Table) -> Fit:
-    """The model with parameters estimated from `table`. Raises TooFewRows, ModelError, DataError."""
+    """The model with parameters estimated from `table`. Raises TooFewRows, ModelError, DataError.
+
+    Free forms of the model that have no sizes yet get them from the table.
+    """
+    if requested(model):
+        return refit(fit(without_requested(model), table), model)
     problem = Problem.of(model, table)
     return _alternate(
         problem, white_only(problem.white, problem.gap_s, len(problem.channels), problem.given), problem.layout.starts()
@@ -177,7 +183,12 @@ def fit(model: Model, table: Table) -> Fit:
 
 
 def refit(before: Fit, model: Model, start: Array | None = None) -> Fit:
-    """A changed model on the data of `before`, from the noise found there; `start` for all its parameters."""
+    """A changed model on the data of `before`, from the noise found there; `start` for all its parameters.
+
+    Raises ModelError where a free form of the model has no sizes yet, and the data cannot show them.
+    """
+    if requested(model):
+        model = with_sizes(model, before)
     problem = Problem.of(model, before.table)
     return _alternate(problem, before.noise, problem.layout.starts() if start is None else [start])
 
@@ -197,6 +208,8 @@ def _alternate(problem: Problem, noise: Noise, starts: list[Array]) -> Fit:
 
 def evaluate(model: Model, table: Table) -> Fit | None:
     """The model with the values that it has, on `table`; None where it has none."""
+    if requested(model):
+        return None
     problem = Problem.of(model, table)
     theta = problem.layout.known()
     if theta is None:

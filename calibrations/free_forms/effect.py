@@ -35,17 +35,52 @@ PLACES = {
     "time-scale": "scale factor over the time",
     "output": "output of all axes over the output itself: the converter",
 }  # and column:NAME, a logged column
+GEOMETRY_PLACE = "geometry"  # a matrix and two angles: no free form, but a search can leave it out
+EFFECTS_AT = {
+    "stage-angle-alpha": (),
+    "stage-angle-beta": ("stage-eccentricity", "stage-backlash"),
+    "own-response": ("quadratic-nonlinearity", "cubic-nonlinearity", "odd-quadratic-nonlinearity",
+                     "scale-factor-asymmetry", "dead-zone", "saturation"),
+    "cross-response": ("cross-axis-bias",),
+    "z-response": ("z-axis-bias",),
+    "scale-over-cross": ("cross-axis-scale",),
+    "scale-over-z": ("z-axis-scale",),
+    "force": (),
+    "history": ("hysteresis",),
+    "temperature-bias": ("temperature-bias", "temperature-hysteresis"),
+    "temperature-scale": ("temperature-scale",),
+    "time-bias": ("warm-up-bias", "bias-drift"),
+    "time-scale": ("warm-up-scale",),
+    "output": ("adc-nonlinearity", "quantisation"),
+    "column:supply_v": ("supply-sensitivity",),
+    "column:std": ("vibration-rectification",),
+    GEOMETRY_PLACE: ("axis-misalignment", "axis-nonorthogonality", "stage-zero-offset", "base-tilt"),
+}  # the catalogue effects of each place  # fmt: skip
+
+
+def place_of_effect(name: str) -> str:
+    """The place at which an effect of a model acts; "" for bias, scale factor and effects of one's own."""
+    if name.startswith(PREFIX):
+        return name.removeprefix(PREFIX)
+    return next((place for place, effects in EFFECTS_AT.items() if name in effects), "")
 
 
 def place_of(name: str) -> str:
     """The place of `free:PLACE`. Raises ModelError with the nearest place."""
     place = name.removeprefix(PREFIX)
+    if place == GEOMETRY_PLACE:
+        raise ModelError(f"geometry has no free form: add {', '.join(EFFECTS_AT[GEOMETRY_PLACE][:2])} in its stead")
     if place not in PLACES and not place.startswith("column:"):
         raise ModelError(
             f'no free form acts at "{place}"{nearest(place, PLACES)} A logged column is written {PREFIX}column:NAME. '
             f"The places are {', '.join(PLACES)}"
         )
     return place
+
+
+def place_to_leave_out(name: str) -> str:
+    """The place, if a search can leave it out. Raises ModelError with the nearest place."""
+    return name if name == GEOMETRY_PLACE else place_of(name)
 
 
 def check_forms(forms: tuple[Form, ...], place: str) -> tuple[Form, ...]:

@@ -40,8 +40,8 @@ Make = Callable[[tuple[float, ...]], Component]
 
 
 def components(data: PoseData, first: State) -> list[Component]:
-    """Every component that this table can show."""
-    return [
+    """Every component that this table can show, but those at places that the search leaves out."""
+    every = [
         *_slow_noise(data),
         *_stages(data, first),
         *_own(data, first),
@@ -53,6 +53,7 @@ def components(data: PoseData, first: State) -> list[Component]:
         *_columns(data, first),
         *_general(first),
     ]
+    return [c for c in every if c.place not in data.table.left_out]
 
 
 def _slow_noise(data: PoseData) -> list[Component]:

@@ -26,6 +26,8 @@ def find_saw(
 
     rejected  frequencies of rejected saws; one with more than SAW_REJECTIONS is not proposed again
     """
+    if "output" in data.table.left_out:
+        return None
     span = float(np.ptp(data.outputs)) or 1.0
     noise = float(np.median(data.spread)) if data.spread is not None else 0.0
     highest = min(SAW_VISIBLE / noise if noise > 0 else np.inf, 20_000 / SAW_POINTS / span)

@@ -126,16 +126,19 @@ def _term(entry: _Effect, source: str, known: Mapping[str, Effect], unit: str) -
 
 
 def _effect(entry: _Effect, source: str, known: Mapping[str, Effect]) -> Effect:
-    if entry.forms is not None:
+    if entry.forms is not None or entry.effect.startswith("free:"):
         return _free(entry, source)
     return _written(entry, source, known) if entry.expression is not None else _known(entry, source, known)
 
 
 def _free(entry: _Effect, source: str) -> Effect:
-    """The free forms of a place: all of them is in the file."""
+    """The free forms of a place: all of them is in the file, or the first fit finds their sizes."""
     from calibrations.free_forms.effect import read_forms  # few models have one
+    from calibrations.free_forms.requested import named
 
     try:
+        if entry.forms is None:
+            return named(entry.effect, {})
         return read_forms(entry.effect, entry.forms or [])
     except ValidationError as error:
         first = error.errors()[0]

@@ -16,6 +16,8 @@ from calibrations.discovery.dataset import Dataset
 from calibrations.discovery.results import Comparison, Diagnosis, F, Findings, Step
 from calibrations.effects import Effect
 from calibrations.errors import CalibrationError, ModelError
+from calibrations.free_forms.effect import PREFIX
+from calibrations.free_forms.requested import named as free_form_at
 from calibrations.model import Model
 from rig.errors import RecordError
 from rig.services.content import Content, content_of
@@ -77,7 +79,12 @@ class ModelSession(Generic[F]):
         return self.data.step(effect, self.end)
 
     def written(self, name: str, text: str) -> Effect:
-        """An effect of one's own, as an expression. Raises ModelError, ExpressionError with the place in the text."""
+        """An effect of one's own: an expression, or a free form as `free:PLACE`.
+
+        Raises ModelError, ExpressionError with the place in the text.
+        """
+        if text.startswith(PREFIX):
+            return free_form_at(text, self.effects)
         if name in self.effects:
             raise ModelError(f"{name} is already in the catalogue; give yours another name")
         return self.data.expression(name, text)

@@ -29,10 +29,11 @@ NAME = re.compile(r"[A-Za-z0-9_-]+")  # no useful expression looks like this
 def command(request: Request, effect: str, name: str | None, out: Path, as_json: bool) -> int:
     """Add EFFECT to a model, fit both models to the data, and write the new model. The old model file stays.
 
-    EFFECT is a name in the catalogue (`rig effects`), a Python file of your own (my_effect.py), or, with --name, an
-    expression such as "a*sin(5*beta) + b*cos(5*beta)" or "beta_deg += a*sin(5*beta)". In an expression alpha, beta and
-    mount are in rad, ax, ay, az in g, t in s, temperature in C, supply in V; direction, flip and other columns of the
-    data have their own names; every other name is a parameter. The model file contains the expression.
+    EFFECT is a name in the catalogue (`rig effects`), a free form (free:PLACE, such as free:own-response: a smooth
+    curve whose size the data show), a Python file of your own (my_effect.py), or, with --name, an expression such as
+    "a*sin(5*beta) + b*cos(5*beta)" or "beta_deg += a*sin(5*beta)". In an expression alpha, beta and mount are in rad,
+    ax, ay, az in g, t in s, temperature in C, supply in V; direction, flip and other columns of the data have their
+    own names; every other name is a parameter. The model file contains the expression.
     """
     from calibrations.discovery.verdict import Verdict
     from calibrations.documents import discovery_document
@@ -42,7 +43,8 @@ def command(request: Request, effect: str, name: str | None, out: Path, as_json:
 
     question = loaded(request, note, out)
     added = _find_effect(effect, name, question)
-    result = question.data.add(added, question.model, {**question.effects, added.name: added})
+    searched = question.effects if effect.startswith("free:") else {**question.effects, added.name: added}
+    result = question.data.add(added, question.model, searched)
     result = planned(result, request, question.effects)
     path = write_model(result.end, question.model, out, note)
     if as_json:
@@ -60,9 +62,13 @@ def command(request: Request, effect: str, name: str | None, out: Path, as_json:
 
 def _find_effect(effect: str, name: str | None, question: Loaded) -> Effect:
     """The effect by name, from an expression or from a file. Raises UnknownName, ModelError, ExpressionError."""
-    from calibrations.effects.catalogue import find, read_effect
+    from calibrations.effects.catalogue import read_effect
     from calibrations.errors import ModelError
+    from calibrations.free_forms.effect import PREFIX
+    from calibrations.free_forms.requested import named
 
+    if effect.startswith(PREFIX):
+        return named(effect, question.effects)
     if name is not None:
         if name in question.effects:
             raise ModelError(f"{name} is already in the catalogue (`rig effects {name}`); give yours another name")
@@ -71,4 +77,4 @@ def _find_effect(effect: str, name: str | None, question: Loaded) -> Effect:
         return read_effect(Path(effect))
     if effect not in question.effects and not NAME.fullmatch(effect):
         raise ModelError(f'there is no effect "{effect}"; if this is an expression, give it a name: --name my-effect')
-    return find(effect, question.effects)
+    return named(effect, question.effects)

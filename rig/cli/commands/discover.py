@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 @click.argument("data", nargs=-1)
 @model_option
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="Write the final model to this file.")
+@click.option("--without", multiple=True, metavar="PLACE", help="A place to leave out of the search; may be repeated.")
 @click.option("--live", is_flag=True, help="Measure on the bench, and choose the next experiment.")
 @click.option("--time", "minutes", type=click.FloatRange(min=0, min_open=True), help="Rig time for --live, minutes.")
 @watch_options
@@ -29,6 +30,7 @@ def command(
     request: Request,
     several: tuple[str, ...],
     out: Path | None,
+    without: tuple[str, ...],
     live: bool,
     minutes: float | None,
     unattended: bool,
@@ -43,20 +45,25 @@ def command(
 
     In poses the search first finds the places of the signal chain that act, with curves of unknown form, and then
     names the effects of the catalogue that are their causes. A curve without a cause stays in the model as
-    `free:PLACE`.
+    `free:PLACE`. --without PLACE leaves out a place, with the effects that act there: own-response, history, output,
+    column:NAME and so on (a wrong name lists all), or geometry.
     """
     if live:
         from rig.cli.terminal.live import discover_live
 
         if several:
             raise click.UsageError("--live measures its own data; remove DATA or --live")
+        if without:
+            raise click.UsageError("--without is for measured DATA; remove it or --live")
         return discover_live(request, out, minutes, unattended, answers, check, as_json)
     if not several:
         raise click.UsageError("give DATA (a file or a run), or --live to measure")
-    return _discover(request, several, out, check, as_json)
+    return _discover(request, several, out, without, check, as_json)
 
 
-def _discover(request: Request, several: tuple[str, ...], out: Path | None, check: bool, as_json: bool) -> int:
+def _discover(
+    request: Request, several: tuple[str, ...], out: Path | None, without: tuple[str, ...], check: bool, as_json: bool
+) -> int:
     from calibrations.discovery.verdict import Verdict
     from calibrations.documents import discovery_document
     from rig.cli.terminal.words import discovery, own_effect, parameters, pattern_advice, planned, warning
@@ -65,6 +72,7 @@ def _discover(request: Request, several: tuple[str, ...], out: Path | None, chec
 
     question = loaded(request, note, out)
     data = question.data if len(several) == 1 else _together(several, request, question)
+    data = data.without(without)
     result = planned(data.discover(question.model, question.effects), request, question.effects)
     path = write_model(result.end, question.model, out, note)
     reached = str(path) if path else request.model or question.model.name

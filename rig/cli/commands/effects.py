@@ -15,10 +15,13 @@ from rig.cli.terminal.output import bench_option, emit, json_option
 @bench_option
 @json_option
 def command(effect: str | None, bench_file: Path | None, as_json: bool) -> None:
-    """List the catalogue of physical effects, or show one EFFECT in full."""
+    """List the catalogue of physical effects, or show one EFFECT in full.
+
+    EFFECT may be a free form, free:PLACE: a smooth curve of unknown form at a place of the signal chain.
+    """
     from calibrations.compensation.forward import known_at_run_time
     from calibrations.effects import Effect
-    from calibrations.effects.catalogue import find
+    from calibrations.free_forms.requested import named
     from rig.services.load import effects_of
 
     known = effects_of(bench_file)
@@ -40,7 +43,7 @@ def command(effect: str | None, bench_file: Path | None, as_json: bool) -> None:
             "source": e.source,
         }
 
-    shown = [find(effect, known)] if effect else list(known.values())
+    shown = [named(effect, known)] if effect else list(known.values())
     if as_json:
         emit({"schema": "rig.effects/1", "effects": [document(e) for e in shown]})
     elif effect:

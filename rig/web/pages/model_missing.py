@@ -236,7 +236,8 @@ def formula(text: str, unit: str) -> str:
 
 HELP = (
     "alpha, beta (rad), alpha_deg, beta_deg, ax ay az (g), t (s), temperature (°C), supply (V), direction, any other "
-    "column; every other name is a parameter. Before +=: v, vx, vy, vz, alpha_deg or beta_deg."
+    "column; every other name is a parameter. Before +=: v, vx, vy, vz, alpha_deg or beta_deg. Or a curve of unknown "
+    "form: free:PLACE, such as free:own-response."
 )
 
 

@@ -1,0 +1,166 @@
+"""Sizes of the free forms that a person asks for by place, estimated beside a model by restricted likelihood.
+
+The forms of the place compete as in the search for places, without those that can follow almost anything, such as a
+random walk. One of them is always kept, however small: a person asked for it, and at a size near zero it changes
+nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from calibrations.effects import Effect
+from calibrations.errors import ModelError
+from calibrations.free_forms.bases import Harmonics, Line
+from calibrations.free_forms.chain import Given, State, base_size, start, state_at
+from calibrations.free_forms.components import Component, free
+from calibrations.free_forms.effect import free_form
+from calibrations.free_forms.form import Factor, Form
+from calibrations.free_forms.geometry import GEOMETRY, Geometry
+from calibrations.free_forms.places import components
+from calibrations.free_forms.poses import PoseData
+from calibrations.free_forms.reml import beside_base, coefficients, estimate, gains, gram, whitened
+from calibrations.free_forms.requested import RequestedForm
+from calibrations.free_forms.search import SearchResult
+from calibrations.free_forms.selection import ENTER, select
+from calibrations.free_forms.structure import FloorSource, Structure
+from calibrations.model import Model
+from calibrations.model.chain import forward
+from calibrations.table import Array
+
+if TYPE_CHECKING:
+    from calibrations.fitting.fit import Fit
+
+BASE = ("bias", "scale-factor", *GEOMETRY)  # effects whose linear parts the search has in its base
+ROUNDS = 6
+FLOOR_KNOWN = 0.02  # of the noise: a smaller change of a noise that only the residual shows
+SMALLEST = 1e-3  # noise floors: what a form adds that the data do not show
+
+
+def requested(model: Model) -> tuple[RequestedForm, ...]:
+    """The free forms of a model that have no sizes yet."""
+    return tuple(term.effect for term in model.terms if isinstance(term.effect, RequestedForm))
+
+
+def without_requested(model: Model) -> Model:
+    """The model without the free forms that have no sizes yet."""
+    for effect in requested(model):
+        model = replace(model, terms=tuple(term for term in model.terms if term.effect is not effect))
+    return model
+
+
+def with_sizes(model: Model, before: Fit) -> Model:
+    """The model with sizes for its free forms, from the data of `before`, which is the model without them.
+
+    Raises ModelError with the data that would be needed.
+    """
+    for effect in requested(model):
+        sized = estimated(before, effect)
+        terms = tuple(replace(term, effect=sized) if term.effect is effect else term for term in model.terms)
+        model = replace(model, terms=terms)
+    return model
+
+
+def beyond_base(fit: Fit) -> Given:
+    """What the model's effects beyond bias, scale factor and geometry contribute."""
+    problem = fit.problem
+    others = [term.name for term in fit.model.terms if term.name not in BASE]
+    shape = fit.residual.shape
+    if not others:
+        return Given(np.zeros(shape), np.zeros((*shape, 0)))
+    steps = problem.layout.steps(fit.theta)
+    base = [step for step in steps if step[0].name in BASE]
+    contribution = (forward(fit.table, steps) - forward(fit.table, base)).T
+    mask = np.any([problem.layout.of_effect(name) for name in others], axis=0)
+    return Given(contribution, -fit.jacobian[:, :, mask])
+
+
+def estimated(before: Fit, effect: RequestedForm) -> Effect:
+    """The free form with the sizes that the data of `before` show. Raises ModelError."""
+    table = before.table
+    if (why := effect.excluded(table)) is not None:
+        raise ModelError(f"{effect.name} {why} ({table.source})")
+    table = replace(table, left_out=())
+    data, given = PoseData.of(table), beyond_base(before)
+    first = state_at(data, given, start(data, given), ())
+    every = components(data, first)
+    forms = [c for c in every if c.place == effect.place and c.form is not None and not c.general]
+    forms = [*_completing(effect.place, data, first), *forms]
+    if not forms:
+        raise ModelError(f"{effect.name} cannot be estimated from {table.source}: what drives it does not change there")
+    result = _estimated(before, data, given, [c for c in every if c.noise], forms)
+    whole = Structure(result, (), Geometry(), result.white, FloorSource.SAMPLES)
+    return free_form(tuple(whole._sized(name) for name in result.active))
+
+
+def _completing(place: str, data: PoseData, first: State) -> list[Component]:
+    """Forms whose part in the search belongs to an effect of the catalogue: lines, and the first harmonic of beta."""
+    if place == "stage-angle-beta":
+        return [free(Form(place, "first", "beta", (Harmonics(1, 1),), shared=True), first)]
+    if place in ("temperature-bias", "temperature-scale"):
+        T = data.table.column("temperature_c")
+        factor: Factor = "force" if place.endswith("scale") else ""
+        return [free(Form(place, "line", "temperature", (Line(float(T.min()), float(T.max())),), factor), first)]
+    if place == "column:std" and data.spread is not None:
+        lines = tuple(Line(float(q.min()), float(q.max())) for q in data.spread**2)
+        return [free(Form(place, "line", "variance", lines), first)]
+    return []
+
+
+def _estimated(
+    before: Fit, data: PoseData, given: Given, noise: list[Component], forms: list[Component]
+) -> SearchResult:
+    """The forms that act, with their sizes; where the noise is not known, that of the residual."""
+    stated = before.problem.white
+    white = np.tile(before.noise.floor[:, None], (1, data.n)) if stated is None else stated
+    for _ in range(ROUNDS):
+        result = _sized(data, given, white, noise, forms)
+        if stated is not None:
+            break
+        found = white * result.ratio
+        settled = abs(result.ratio - 1) < FLOOR_KNOWN
+        white = found
+        if settled:
+            break
+    return result
+
+
+def _sized(data: PoseData, given: Given, white: Array, noise: list[Component], forms: list[Component]) -> SearchResult:
+    """Selection among the forms and Gauss-Newton steps."""
+    every = [*noise, *forms]
+    values = start(data, given)
+    state = state_at(data, given, values, ())
+    floor = float(np.sqrt(np.mean(white**2)))
+    most = {c.name: (0.5 * floor) ** 2 for c in noise}
+    variances = {c.name: (0.1 * floor) ** 2 for c in noise}
+    scales: dict[str, float] = {}
+    b = base_size(data, given)
+    by_name = {c.name: c for c in forms}
+    pools = [by_name]
+    for number in range(ROUNDS):
+        X, blocks, scales = whitened(state, given, values, every, scales, white)
+        g = gram(X, blocks, scales, b)
+        if number == 0:
+            X, scales = beside_base(X, g, b)
+            g = gram(X, blocks, scales, b)
+        sizes = estimate(g, variances, most)
+        sizes, _ = select(g, sizes, every, pools, most, ENTER, number > 0)
+        if not any(name in sizes.variances for name in by_name) and len(sizes.variances) == len(noise):
+            gained = gains(g, sizes, list(by_name))
+            best = max(gained, key=lambda name: gained[name][0])
+            least = (SMALLEST * floor) ** 2
+            sizes = estimate(g, {**sizes.variances, best: max(gained[best][1], least)}, most)
+        variances = dict(sizes.variances)
+        values = coefficients(g, sizes)
+        moved = state_at(data, given, values, every)
+        change = float(np.sqrt(np.mean(((moved.predicted - state.predicted) / white) ** 2)))
+        state = moved
+        if number > 0 and change < FLOOR_KNOWN:
+            break
+    X, blocks, scales = whitened(state, given, values, every, scales, white)
+    g = gram(X, blocks, scales, b)
+    sizes = estimate(g, variances, most)
+    return SearchResult(data, given, white, every, g, X, sizes, coefficients(g, sizes), state, ())
