@@ -243,9 +243,10 @@ class Findings(Generic[F]):
 
     @cached_property
     def given(self) -> Judgement:
-        """The judgement on the given model."""
+        """The judgement on the given model; on the one before the added effects where no further one is missing."""
+        begun = self.origin if self.added and not self._lacking else self.start
         return Judgement(
-            model=self.start.model.name, missing=self._lacking, added=self.added, undetermined=self.undetermined[0],
+            model=begun.model.name, missing=self._lacking, added=self.added, undetermined=self.undetermined[0],
             closest=self._closest, provisional=not self.settled, **self._common,
         )  # fmt: skip
 

@@ -207,15 +207,16 @@ def parameter_correlation(found: Fit, drawn: Budget, inputs: Iterable[Contributi
     G = row_gains(cautious)
     by_noise, _ = covariance(cautious.information, found.problem.layout.typical)
     own = np.sqrt(sum((line.std**2 for line in drawn.given if line.kind == "A" and line.std is not None), np.zeros(1)))
-    joint = _normalised(by_noise) * np.outer(own, own)
+    joint = normalised(by_noise) * np.outer(own, own)
     for c in inputs:
         if c.std:
             each = input_effects(found, G, c)
             joint = joint + c.std**2 * each.T @ each
-    return _normalised(joint)
+    return normalised(joint)
 
 
-def _normalised(covariance: Array) -> Array:
+def normalised(covariance: Array) -> Array:
+    """The correlation matrix of a covariance matrix (p, p); NaN where a variance is 0."""
     std = np.sqrt(np.diag(covariance))
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(covariance / np.outer(std, std))

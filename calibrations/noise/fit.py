@@ -132,8 +132,8 @@ def _shape(effect: Effect, found: ChannelFit) -> Values:
     return {p.name: found.values[effect.name][p.name] for p in effect.parameters[1:]}
 
 
-def power_deviations(found: ChannelFit) -> Deviations:
-    """Standard deviation of each strength's square and of each shape, by (effect, parameter)."""
+def power_covariance(found: ChannelFit) -> tuple[list[tuple[str, str]], Array]:
+    """Each strength's square and each shape as (effect, parameter), and their covariance (p, p)."""
     columns: dict[tuple[str, str], Array] = {}
     for effect in found.effects:
         strength, values = effect.parameters[0].name, found.values[effect.name]
@@ -144,9 +144,14 @@ def power_deviations(found: ChannelFit) -> Deviations:
             columns[effect.name, p.name] = (found.part_of(effect, ahead) - found.part_of(effect, behind)) / (2 * step)
     J = information(np.column_stack(list(columns.values())), found.expected, found.freedom)
     scale = np.sqrt(np.maximum(np.diag(J), np.finfo(float).tiny))
-    variance = np.diag(np.linalg.pinv(J / np.outer(scale, scale))) / scale**2
     wider = max(1.0, found.excess)
-    return dict(zip(columns, (wider * np.sqrt(variance)).tolist(), strict=True))
+    return list(columns), wider**2 * np.linalg.pinv(J / np.outer(scale, scale)) / np.outer(scale, scale)
+
+
+def power_deviations(found: ChannelFit) -> Deviations:
+    """Standard deviation of each strength's square and of each shape, by (effect, parameter)."""
+    names, matrix = power_covariance(found)
+    return dict(zip(names, np.sqrt(np.diag(matrix)).tolist(), strict=True))
 
 
 def _line_estimates(found: ChannelFit, unit: str) -> Iterator[Estimate]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from calibrations.noise.deviations import minimum_s
 from calibrations.noise.patterns import TWO_LEVELS
 from calibrations.noise.record import Sensed
 from calibrations.noise.samples import COARSE
-from calibrations.text import columns, duration, exponent, sentence
+from calibrations.text import columns, duration, exponent, rounded, sentence
 
 PREFIXES = ((1.0, ""), (1e3, "m"), (1e6, "u"), (1e9, "n"), (1e12, "p"))
 MEANS = {
@@ -24,6 +24,7 @@ MEANS = {
 }
 NOISE = (COARSE, TWO_LEVELS)  # noise that the coefficients alone do not describe
 Factor = tuple[float, str]
+Cells = tuple[Sequence[str], Sequence[tuple[str, ...]]]  # head and rows
 
 
 def summary(analysis: NoiseAnalysis) -> str:
@@ -33,8 +34,8 @@ def summary(analysis: NoiseAnalysis) -> str:
     parts = [f"{record.source}: {record.n} samples at {record.rate_hz:g} Hz{length}\n", *_disturbances(analysis)]
     for axis, noise in analysis.channels.items():
         sensed = record.sensed.get(axis)
-        parts += [f"Noise of {axis}\n", _coefficients(noise, sensed), ""]
-        parts += [_density(noise, sensed), "", _allan(noise), ""]
+        parts += [f"Noise of {axis}\n", columns(*coefficient_table(noise, sensed)), ""]
+        parts += [density(noise, sensed), "", _allan(noise), ""]
     return "\n".join(parts).rstrip()
 
 
@@ -45,13 +46,14 @@ def remarks(analysis: NoiseAnalysis) -> Iterable[str]:
             yield f"The record cannot separate {name} from {' or '.join(rivals)}: record for longer."
 
 
-def _coefficients(noise: ChannelNoise, sensed: Sensed | None) -> str:
-    rows = []
+def coefficient_table(noise: ChannelNoise, sensed: Sensed | None) -> Cells:
+    """Head and rows of the coefficients of one channel: in its unit, and in that of what is sensed if it is known."""
+    rows: list[tuple[str, ...]] = []
     for name, coefficient in noise.coefficients.items():
         second = () if sensed is None else (_shown(coefficient, sensed.factor, sensed.unit, noise.unit),)
         meaning = MEANS.get(name, "") + _detail(coefficient)
         rows.append((name, _shown(coefficient, 1.0, noise.unit, noise.unit), *second, meaning))
-    return columns(("process", "coefficient", *(() if sensed is None else ("or",)), ""), rows)
+    return ("process", "coefficient", *(() if sensed is None else ("or",)), ""), rows
 
 
 def _disturbances(analysis: NoiseAnalysis) -> Iterable[str]:
@@ -97,7 +99,7 @@ def _shown(coefficient: Coefficient, factor: float, unit: str, base: str) -> str
         return "not known"
     if coefficient.upper is not None:
         scale, prefix = _prefixed(coefficient.upper * factor, unit)
-        return f"not identified, below {coefficient.upper * factor * scale:.2g} {prefix}{unit}{per}"
+        return f"not identified, below {rounded(coefficient.upper * factor * scale, 2)} {prefix}{unit}{per}"
     value, std = coefficient.value * factor, coefficient.std * factor
     scale, prefix = _prefixed(value, unit)
     digits = min(9, max(0, 1 - exponent(float(f"{std * scale:.1e}"))))
@@ -112,7 +114,7 @@ def _prefixed(value: float, unit: str) -> Factor:
     return next(((f, p) for f, p in PREFIXES if abs(value) * f >= 1), (1.0, ""))
 
 
-def _density(noise: ChannelNoise, sensed: Sensed | None) -> str:
+def density(noise: ChannelNoise, sensed: Sensed | None) -> str:
     """White noise as data sheets give it: one-sided, and so sqrt(2) times the coefficient of the Allan deviation."""
     white = noise.coefficients["white-noise"]
     if not white.identified:

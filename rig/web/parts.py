@@ -193,8 +193,9 @@ def message(error: Exception) -> str:
 
 def for_page(text: str) -> str:
     """A sentence of the command line with typographic signs: −, ±, ×, °C."""
-    signs = re.sub(r"(?<![\w.)\]-])-(?=\d)", "−", text.replace(" +- ", " ± "))
-    return re.sub(r"(?<=\d) x (?=the |that |its )", " × ", re.sub(r"(?<=\d) (deg)?C\b", " °C", signs))
+    signs = re.sub(r"(?<![\w.)\]-])-(?=\d)", "−", text.replace("+-", "±"))
+    signs = re.sub(r"(?<=\d) (deg)?C\b", " °C", signs)
+    return re.sub(r"(?<=\d) x (?=the |that |its )", " × ", signs)
 
 
 # Settings of a procedure as text: `step_deg = 10.0` is shown as `step (deg)`, `10`.

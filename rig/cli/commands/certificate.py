@@ -47,12 +47,10 @@ def command(
     Results are compared with the limits of the bench file (limits.results, such as bias-x) by guarded acceptance. Exit
     status 1: a result exceeds its limit, or the data cannot be used and no certificate is written.
     """
-    from calibrations.fitting.fit import fit
-    from calibrations.model.file import read_model
     from calibrations.presentation.certificate.content import document
-    from calibrations.presentation.certificate.results import figures, require_reference
+    from calibrations.presentation.certificate.results import require_reference
     from rig.bench import read_bench
-    from rig.services.issue import Asked, issue, limits
+    from rig.services.certify import Certified, certified, failed_results
     from rig.services.load import is_still, loaded_table
     from rig.services.request import Request
 
@@ -62,23 +60,14 @@ def command(
     table, given, effects = loaded_table(Request(data, model, bench_file), note)
     require_reference(table.source, table.kind)
     bench = read_bench(bench_file) if bench_file is not None else None
-    earlier, of = given, Path(model).name
-    if before is not None:
-        earlier, of = read_model(before, effects), Path(before).name
-    fresh = bool(earlier.params) and earlier.provenance.get("data_sha256") != table.digest
-    fitted = fit(given, table)
-    figured = figures(fitted, earlier if fresh else None, limits(data, bench))
-    since = str(earlier.provenance.get("created", "of unknown date"))[:10]
-    details = Asked(number, customer, f"the model {of}, {since}" if fresh else "")
-    certificate = issue(data, fitted, figured, bench, details)
+    certificate = certified(Certified(data, table, given, Path(model).name, effects, bench, before), number, customer)
     for path in paths:
         _write(path, certificate)
-    failed = [o.name for o in figured.outcomes if o.decision is not None and o.decision.statement == "fail"]
     if as_json:
         emit(document(certificate) | {"files": [str(path) for path in paths]})
     else:
         click.echo("\n".join([*_lines(certificate), *(f"written: {path}" for path in paths)]))
-    return int(bool(failed))
+    return int(bool(failed_results(certificate)))
 
 
 def _paths(out: Path) -> list[Path]:
@@ -92,24 +81,17 @@ def _paths(out: Path) -> list[Path]:
 
 def _write(path: Path, certificate: Certificate) -> None:
     """Write one format of the certificate."""
-    from calibrations.presentation.certificate.dcc import dcc
-    from calibrations.presentation.certificate.pages import html
     from rig.files import write_whole
+    from rig.services.certify import written
 
-    if path.suffix == ".pdf":
-        from calibrations.presentation.certificate.pages import pdf
-
-        write_whole(path, pdf(certificate))
-    else:
-        write_whole(path, {".html": html, ".xml": dcc}[path.suffix](certificate))
+    write_whole(path, written(certificate, path.suffix))
 
 
 def _lines(certificate: Certificate) -> list[str]:
-    from calibrations.presentation.certificate.sections import results_table, verdict
+    from calibrations.presentation.certificate.sections import results_table
     from calibrations.text import columns
+    from rig.services.certify import certificate_head
 
     table = results_table(certificate)
-    conformity = verdict(certificate)
-    remark = f"; conformity: {conformity}" if conformity else ""
-    head = f"{certificate.headline}, No. {certificate.number}{remark}"
-    return [head, "", columns(table.head, table.rows), "", *certificate.figures.remarks, *certificate.remarks]
+    results = columns(table.head, table.rows)
+    return [certificate_head(certificate), "", results, "", *certificate.figures.remarks, *certificate.remarks]

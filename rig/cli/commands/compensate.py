@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import hashlib
 import re
-import shlex
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from rig.cli.terminal.output import bench_option, emit, json_option, note
 
 if TYPE_CHECKING:
-    from calibrations.compensation.inverse import Compensation, Range
+    from calibrations.compensation.inverse import Range
     from calibrations.model import Model
 
 
@@ -58,20 +56,20 @@ def command(
     The code corrects every effect that can be inverted at run time; for the others it states the error that remains.
     The number of steps is fixed, with a proof that it is enough over the whole range.
     """
-    from calibrations.compensation.document import make_vectors, summary
+    from calibrations.compensation.document import summary
     from calibrations.compensation.inverse import compensated_residual, invert_model
     from calibrations.model.file import dump_model, read_model
-    from rig.files import make_folder, program, write_whole
+    from rig.files import make_folder, write_whole
+    from rig.services.compensation import compensation_lines, how_to_test, origin_of, source_files
     from rig.services.load import check_unit, effects_of
-    from rig.services.provenance import today
 
     if picture is not None and data is None:
         raise click.UsageError("--picture shows the test of --data: also give --data DATA")
     effects = effects_of(bench_file)
     found = read_model(model, effects)
     made = invert_model(found, _range(found, reach, given), without, precision)
-    origin = _origin(model, name, dump_model(found), program(), today())
-    files = _writer(language)(made, origin, make_vectors(made))
+    origin = origin_of(model, name, dump_model(found))
+    files = source_files(made, language, origin)
     beside = None
     if data is not None:
         from rig.services.tables import load
@@ -94,29 +92,13 @@ def command(
         click.echo(
             "\n".join(
                 [
-                    *_lines(made),
+                    *compensation_lines(made),
                     *(beside.lines() if beside else []),
                     *(f"written: {path}" for path in paths),
-                    *_how_to_test(language, out, origin.name),
+                    *how_to_test(language, str(out), origin.name),
                 ]
             )
         )
-
-
-def _how_to_test(language: str, out: Path, name: str) -> list[str]:
-    """The command that compiles and tests the written files; nothing for JSON, which has the reference vectors."""
-    if language == "python":
-        return [f"To test: python {shlex.quote(str(out / name))}.py"]
-    if language == "c":
-        program = f"cc -std=c99 -O2 -D{name.upper()}_MAIN {name}.c {name}_self_test.c -lm -o {name}_self_test"
-        return [f"To compile and test: cd {shlex.quote(str(out))} && {program} && ./{name}_self_test && echo passed"]
-    return []
-
-
-def _writer(language: str) -> Callable[..., dict[str, str]]:
-    from calibrations.compensation import c99, document, python_source
-
-    return {"c": c99.files, "python": python_source.files, "json": document.files}[language]
 
 
 def _range(model: Model, reach: float | None, given: Sequence[str]) -> Range:
@@ -137,48 +119,3 @@ def _input(text: str) -> tuple[str, tuple[float, float]]:
     if not ends[0] < ends[1]:
         raise click.UsageError(f"--input {text!r}: write NAME=LOW:HIGH, as in temperature_c=0:60")
     return name, ends
-
-
-def _origin(model: str, name: str | None, text: str, program: str, date: str) -> Any:
-    from calibrations.compensation.document import Origin
-
-    path = Path(model)
-    digest = hashlib.sha256(path.read_bytes() if path.is_file() else text.encode()).hexdigest()
-    return Origin(_identifier(name or path.stem), path.name, digest, program, date)
-
-
-def _identifier(name: str) -> str:
-    """A valid name in C and Python."""
-    made = re.sub(r"\W+", "_", name, flags=re.ASCII).strip("_").lower()
-    return made if made[:1].isalpha() else f"sensor_{made}".rstrip("_")
-
-
-def _lines(made: Compensation) -> list[str]:
-    """Method, proof and remaining errors, in words."""
-    from calibrations.compensation.document import (
-        coverage_text,
-        error_text,
-        operations_text,
-        steps_text,
-        uncertainty_text,
-    )
-    from calibrations.compensation.forward import LEFT_OUT
-
-    bound, costs = made.bound, made.costs
-    method = f"{steps_text(made)}, {operations_text(made)}; each step reduces the error to {bound.q:.2g} of it or less"
-    lines = [f"{made.model.name}: {method}, proved for +-{made.range.reach:g} {made.unit}."]
-    for fate in made.forward.fates:
-        if fate.how == LEFT_OUT:
-            size = costs.left_out[fate.effect]
-            cost = (
-                f"error {error_text(size.rms, made.unit)} rms, {error_text(size.most, made.unit)} at most"
-                if size
-                else "error unknown"
-            )
-            lines.append(f"Not corrected: {fate.effect}: {fate.why}; {cost}.")
-    if costs.out_of_gravity is not None:
-        lines.append(
-            "az is not measured; its value from gravity has an error of "
-            f"{error_text(costs.out_of_gravity.most, made.unit)} at most."
-        )
-    return [*lines, uncertainty_text(made), coverage_text(made)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -19,6 +20,7 @@ from rig.web.pages import run_record
 from rig.web.pages.model_choice import Choice
 from rig.web.pages.model_missing import Missing
 from rig.web.pages.model_noise import NoisePictures
+from rig.web.pages.model_parameters import ParametersBox
 from rig.web.pages.model_pictures import Pictures
 from rig.web.parts import Cancelled, Counted, box, div, failed, for_page, message, off_loop, state, words
 
@@ -77,14 +79,21 @@ class Workbench:
         self.analysis.clear()
         with self.analysis:
             rows = form == "rows"
-            self.pictures: Pictures | NoisePictures = Pictures(self._exclude_dialog()) if rows else NoisePictures()
+            with div("stack"):
+                self.pictures: Pictures | NoisePictures = Pictures(self._exclude_dialog()) if rows else NoisePictures()
+                self.parameters = ParametersBox(self)
             self.missing = Missing(self, own=rows)
         self.keys["a"] = Key("add the shown effect", self.missing.add_shown)
         self.keys["u"] = Key("undo the last effect", self.undo)
         self.keys["x"] = Key("next axis", self.pictures.next_axis)
         self.keys["g"] = Key("switch between V and g", self.pictures.other_unit)
         self.keys["l"] = Key("exclude the selected poses", self.pictures.leave_selected)
+        self.keys["t"] = Key("go to the parameters", self.see_parameters)
         self.keys["Escape"] = Key("clear the selection", partial(self.pictures.select, []))
+
+    def see_parameters(self) -> None:
+        """Scroll to the parameters."""
+        ui.run_javascript("document.querySelector('.parameters')?.scrollIntoView({block: 'start'})")
 
     def _exclude_dialog(self) -> Callable[[Sequence[int]], None] | None:
         """The dialog that excludes selected poses; None for data that are not a run of the rig."""
@@ -156,7 +165,7 @@ class Workbench:
         self.pictures.show(compared, session)
         self.verdict.error(compared, session)
         self.chosen.grown(session)
-        await self._diagnose(session, turn)
+        await asyncio.gather(self.parameters.show(session), self._diagnose(session, turn))
 
     async def _diagnose(self, session: ModelSession[Any], turn: int) -> None:
         self.search.cancelled = True  # the result of the previous search is not needed
@@ -175,6 +184,7 @@ class Workbench:
                 return
         if turn == self.turn:
             self.verdict.found(self.diagnoses[key])
+            self.parameters.diagnosed(self.diagnoses[key])
             await self.missing.show(self.diagnoses[key])
 
     def cancel(self) -> None:

@@ -45,6 +45,7 @@ class Choice:
             ui.button(icon="refresh", on_click=page.afresh).props("flat dense aria-label='Read again'").tooltip(
                 "Read the data again"
             )
+            ui.button("Parameters", icon="tune", on_click=page.see_parameters).props("outline dense")
             self.undo = ui.button("Undo", icon="undo", on_click=page.undo).props("outline dense")
             self.save = ui.button("Save model", icon="save", on_click=self._ask_name).props("outline dense")
             self.report = ui.button("Report", icon="description", on_click=self._report).props("outline dense")

@@ -1,0 +1,158 @@
+"""The parameters of a model as text: value, standard uncertainty, unit, change by the last effect, correlations."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from calibrations.discovery.results import FittedModel
+from calibrations.fitting.budget import make_budget, normalised, parameter_correlation
+from calibrations.fitting.fit import Fit, cautiously
+from calibrations.fitting.identifiability import covariance
+from calibrations.fitting.inputs import input_contributions
+from calibrations.model import Estimate, Model, Term
+from calibrations.noise.fit import NoiseFit, power_covariance
+from calibrations.table import Array
+from calibrations.text import minus, prefixed, rounded, unit, value_text
+
+HEAD = ("effect", "parameter", "axis", "value", "standard uncertainty", "unit", "last change")
+TOLD = 0.05  # standard uncertainties: a smaller change is none
+WHOLE = 10.0  # a value keeps its unit down to a tenth of it: 0.97 V/g, 97 mV/g
+STRONG = 0.1  # correlations that are listed
+NEW, SAME, NOT_IDENTIFIED = "new", "unchanged", "not identified"
+
+
+@dataclass(frozen=True)
+class ParameterRow:
+    """One parameter. `change`: by the last added effect, "" before one. `why`: why it is not identified, else ""."""
+
+    effect: str
+    name: str
+    axis: str
+    value: str
+    std: str
+    unit: str
+    change: str
+    why: str
+    doc: str
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """Texts in the order of `HEAD`; the reason in place of the value."""
+        value = f"{NOT_IDENTIFIED}: {self.why}" if self.why else self.value
+        return self.effect, self.name, self.axis, value, self.std, self.unit, self.change
+
+
+@dataclass(frozen=True)
+class Correlated:
+    """Two parameters by their names, and their correlation coefficient."""
+
+    first: str
+    second: str
+    coefficient: float
+
+
+def parameter_rows(model: Model, before: Model | None = None) -> list[ParameterRow]:
+    """A row for each parameter of `model`, with its change since the model `before`, where there is one."""
+    earlier = {_key(term, e): e for term, e in _estimates(before)} if before is not None else {}
+    rows = []
+    for term, e in _estimates(model):
+        change = "" if before is None else _change(e, earlier.get(_key(term, e)))
+        doc = next((p.doc for p in term.effect.parameters if p.name == e.name), "")
+        rows.append(_row(term.name, e, change, doc))
+    for term in model.terms:
+        rows += [
+            ParameterRow(term.name, "curve", axis, f"{n} coefficients", "", "", "", "", "a free curve")
+            for axis, n in term.coefficients.items()
+        ]
+    return rows
+
+
+def tab_separated(rows: Sequence[ParameterRow]) -> str:
+    """The table as text for a spreadsheet."""
+    return "\n".join("\t".join(cells) for cells in (HEAD, *(row.cells for row in rows)))
+
+
+def correlations(found: FittedModel) -> list[Correlated]:
+    """Pairs of identified parameters with |r| of `STRONG` or more, strongest first.
+
+    For data with an uncertainty budget they include the shared inputs, as in the certificate; else the noise alone.
+    """
+    pairs = [pair for names, matrix in _matrices(found) for pair in _pairs(names, matrix)]
+    return sorted(pairs, key=lambda pair: -abs(pair.coefficient))
+
+
+def _estimates(model: Model) -> Iterator[tuple[Term, Estimate]]:
+    return ((term, e) for term in model.terms for e in term.quantities)
+
+
+def _key(term: Term, e: Estimate) -> tuple[str, str, str]:
+    return term.name, e.name, e.axis
+
+
+def _row(effect: str, e: Estimate, change: str, doc: str) -> ParameterRow:
+    name = e.name.replace("_", " ")
+    if not e.identified:
+        return ParameterRow(effect, name, e.axis, NOT_IDENTIFIED, "", "", change, e.why or "the data do not tell", doc)
+    factor, of = _scale(e)
+    if not e.std:
+        return ParameterRow(effect, name, e.axis, minus(f"{e.value * factor:.6g}"), "–", of, change, "", doc)
+    value = value_text(e.value * factor, e.std * factor)
+    return ParameterRow(effect, name, e.axis, value, rounded(e.std * factor, 2), of, change, "", doc)
+
+
+def _scale(e: Estimate) -> tuple[float, str]:
+    """Factor and unit in which value and uncertainty are written."""
+    return prefixed(unit(e.unit), max(abs(e.value), e.std or 0.0) * WHOLE)
+
+
+def _change(e: Estimate, before: Estimate | None) -> str:
+    if before is None:
+        return NEW
+    if before.identified != e.identified:
+        return "now identified" if e.identified else "was identified"
+    if not e.identified:
+        return SAME
+    by, std = e.value - before.value, before.std or e.std or 0.0
+    if abs(by) <= TOLD * std:
+        return SAME
+    factor, of = prefixed(unit(e.unit), abs(by))
+    beyond = f" ({rounded(abs(by) / std, 2)} × its uncertainty)" if std else ""
+    return f"{'+' if by > 0 else ''}{minus(rounded(by * factor, 2))} {of}".rstrip() + beyond
+
+
+def _matrices(found: FittedModel) -> Iterator[tuple[list[str], Array]]:
+    """Names and correlation matrix of parameters that were fitted together."""
+    if isinstance(found, Fit):
+        every = [(term, e) for term in found.model.terms for e in term.estimates]
+        shown = [k for k, (term, e) in enumerate(every) if e.identified and e.std and e in term.quantities]
+        if shown:
+            names = [_name(every[k][0].name, every[k][1].name, every[k][1].axis) for k in shown]
+            yield names, _of_rows(found)[np.ix_(shown, shown)]
+    elif isinstance(found, NoiseFit):
+        for each in found.channels:
+            if each.effects:
+                keys, matrix = power_covariance(each)
+                yield [_name(effect, name, each.channel.axis) for effect, name in keys], normalised(matrix)
+
+
+def _of_rows(found: Fit) -> Array:
+    inputs: Any = input_contributions(found.table) if found.table.type.budget else ()
+    if inputs and (drawn := make_budget(found, inputs)).given:
+        return parameter_correlation(found, drawn, inputs)
+    return normalised(covariance(cautiously(found).information, found.problem.layout.typical)[0])
+
+
+def _name(effect: str, parameter: str, axis: str) -> str:
+    parts = [effect, "" if parameter.replace("_", "-") == effect else parameter.replace("_", " "), axis]
+    return " ".join(filter(None, parts))
+
+
+def _pairs(names: Sequence[str], matrix: Array) -> Iterator[Correlated]:
+    for k, first in enumerate(names):
+        for j in range(k):
+            if np.isfinite(matrix[k, j]) and abs(matrix[k, j]) >= STRONG:
+                yield Correlated(names[j], first, float(matrix[k, j]))

@@ -1,0 +1,82 @@
+"""The compensation of a model as source code: for `rig compensate` and the workbench."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import shlex
+from collections.abc import Callable
+from pathlib import Path
+
+from calibrations.compensation.document import (
+    Origin,
+    coverage_text,
+    error_text,
+    make_vectors,
+    operations_text,
+    steps_text,
+    uncertainty_text,
+)
+from calibrations.compensation.forward import LEFT_OUT
+from calibrations.compensation.inverse import Compensation
+from rig.files import program
+from rig.services.provenance import today
+
+LANGUAGES = ("c", "python", "json")
+PRECISIONS = ("double", "float")
+
+
+def origin_of(model: str, name: str | None, text: str) -> Origin:
+    """Where the code comes from. `model`: name or file; `text`: the model as a file has it."""
+    path = Path(model)
+    digest = hashlib.sha256(path.read_bytes() if path.is_file() else text.encode()).hexdigest()
+    return Origin(identifier(name or path.stem), path.name, digest, program(), today())
+
+
+def source_files(made: Compensation, language: str, origin: Origin) -> dict[str, str]:
+    """The files by name. `language`: one of `LANGUAGES`."""
+    return _writer(language)(made, origin, make_vectors(made))
+
+
+def identifier(name: str) -> str:
+    """A valid name in C and Python."""
+    made = re.sub(r"\W+", "_", name, flags=re.ASCII).strip("_").lower()
+    return made if made[:1].isalpha() else f"sensor_{made}".rstrip("_")
+
+
+def how_to_test(language: str, folder: str, name: str) -> list[str]:
+    """The command that compiles and tests the written files; nothing for JSON, which has the reference vectors."""
+    if language == "python":
+        return [f"To test: python {shlex.quote(str(Path(folder) / name))}.py"]
+    if language == "c":
+        compiled = f"cc -std=c99 -O2 -D{name.upper()}_MAIN {name}.c {name}_self_test.c -lm -o {name}_self_test"
+        return [f"To compile and test: cd {shlex.quote(folder)} && {compiled} && ./{name}_self_test && echo passed"]
+    return []
+
+
+def compensation_lines(made: Compensation) -> list[str]:
+    """Method, proof and remaining errors, in words."""
+    bound, costs = made.bound, made.costs
+    method = f"{steps_text(made)}, {operations_text(made)}; each step reduces the error to {bound.q:.2g} of it or less"
+    lines = [f"{made.model.name}: {method}, proved for +-{made.range.reach:g} {made.unit}."]
+    for fate in made.forward.fates:
+        if fate.how == LEFT_OUT:
+            size = costs.left_out[fate.effect]
+            cost = (
+                f"error {error_text(size.rms, made.unit)} rms, {error_text(size.most, made.unit)} at most"
+                if size
+                else "error unknown"
+            )
+            lines.append(f"Not corrected: {fate.effect}: {fate.why}; {cost}.")
+    if costs.out_of_gravity is not None:
+        lines.append(
+            "az is not measured; its value from gravity has an error of "
+            f"{error_text(costs.out_of_gravity.most, made.unit)} at most."
+        )
+    return [*lines, uncertainty_text(made), coverage_text(made)]
+
+
+def _writer(language: str) -> Callable[..., dict[str, str]]:
+    from calibrations.compensation import c99, document, python_source
+
+    return {"c": c99.files, "python": python_source.files, "json": document.files}[language]

@@ -1,0 +1,176 @@
+"""Certificate and compensation of the present model, with the questions of the command line."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from nicegui import ui
+
+from rig.web.desk import models
+from rig.web.parts import div, for_page, message, off_loop, words
+
+if TYPE_CHECKING:
+    from calibrations.compensation.inverse import Range
+    from calibrations.model import Model
+    from rig.services.session import ModelSession
+
+GIVEN = "given"  # the model that the session began with
+
+
+class Asking:
+    """A dialog with questions, a button that makes a document, and the answer or the error below it."""
+
+    def __init__(self, title: str, about: str) -> None:
+        with ui.dialog() as self.dialog, ui.card().style("min-width: min(560px, 92vw)"):
+            words(title, "title")
+            words(about, "quiet small")
+            self.fields = div("settings").style("width: 100%")
+            self.below = div("stack")
+            self.answer = div("stack")
+            with div("row-of"):
+                self.make = ui.button("Make and download", icon="download", on_click=self._make)
+                ui.button("Close", on_click=self.dialog.close).props("flat")
+
+    async def _make(self) -> None:
+        """Make the document off the event loop; the reason stays in the dialog if that fails."""
+        self.make.props("loading")
+        self.make.disable()
+        self.answer.clear()
+        try:
+            content, name, lines = await off_loop(self.made)
+            ui.download.content(content, name)
+            with self.answer:
+                words(f"Downloaded: {name}", "chip good")
+                for line in lines:
+                    words(for_page(line), "small")
+        except Exception as error:
+            with self.answer, div("").props("role=alert"):
+                words(message(error), "fault")
+        finally:
+            self.make.props(remove="loading")
+            self.make.enable()
+
+    def made(self) -> tuple[bytes | str, str, list[str]]:
+        """Content, file name, and what to know of it."""
+        raise NotImplementedError
+
+
+class CertificateDialog(Asking):
+    """`rig certificate`: the form, the number, the customer, and the model in use until now."""
+
+    def __init__(self, session: ModelSession[Any], bench_file: Path | None) -> None:
+        super().__init__(
+            "Calibration certificate",
+            "Results and uncertainty budgets, as found and as left. Results are judged by the limits of the bench.",
+        )
+        self.session, self.bench_file = session, bench_file
+        earlier = models(default="none, or the given model if it has values from other data")
+        with self.fields:
+            self.form = ui.select({".html": "HTML", ".pdf": "PDF", ".xml": "DCC XML"}, label="Form", value=".html")
+            self.number = ui.input("Number (empty: run and digest)")
+            self.customer = ui.input("Customer (empty: that of the bench)")
+            self.before = ui.select(earlier, label="As found: model in use until now", value="")
+        for field in (self.form, self.number, self.customer, self.before):
+            field.props("dense options-dense")
+        self.dialog.open()
+
+    def made(self) -> tuple[bytes | str, str, list[str]]:
+        """The certificate of the present model."""
+        from rig.bench import read_bench
+        from rig.services.certify import Certified, certificate_head, certified, failed_results, written
+
+        session, form = self.session, str(self.form.value)
+        of = Certified(
+            session.request.data,
+            session.data.table,  # type: ignore[attr-defined] # the button is enabled for rows
+            session.end.model if session.steps else session.model,
+            session.end.model.name,
+            session.effects,
+            read_bench(self.bench_file) if self.bench_file is not None else None,
+            str(self.before.value) or None,
+        )
+        found = certified(of, str(self.number.value or "").strip(), str(self.customer.value or "").strip())
+        failed = failed_results(found)
+        lines = [certificate_head(found), *found.figures.remarks, *found.remarks]
+        lines += [f"Beyond its limit: {name}" for name in failed]
+        return written(found, form), f"{found.number}{form}", lines
+
+
+class CompensationDialog(Asking):
+    """`rig compensate`: language, name, precision, ranges, and effects to leave out."""
+
+    def __init__(self, session: ModelSession[Any]) -> None:
+        super().__init__(
+            "Compensation",
+            "Source code for the product: from outputs to reference axes, in a fixed number of steps, with a proof "
+            "that they are enough over the whole range.",
+        )
+        self.model: Model = session.complete_model()
+        from calibrations.compensation.inverse import Range
+
+        self.default = Range.for_model(self.model)
+        with self.fields:
+            languages = {"c": "C99", "python": "Python", "json": "JSON, for writers of other languages"}
+            self.language = ui.select(languages, label="Language", value="c")
+            self.name = ui.input("Name of files and functions", value=Path(session.request.data).stem)
+            self.precision = ui.select({"double": "double", "float": "float"}, label="Precision", value="double")
+            self.reach = ui.number("Largest value of each axis", value=self.default.reach, min=0)
+            self.inputs = {
+                name: (ui.number(f"{name}: lowest", value=low), ui.number(f"{name}: highest", value=high))
+                for name, (low, high) in self._inputs().items()
+            }
+        with self.below:
+            self.without = ui.select(list(self.model.effects), label="Leave out", multiple=True, value=[])
+        for field in (
+            self.language,
+            self.name,
+            self.precision,
+            self.reach,
+            self.without,
+            *sum(self.inputs.values(), ()),
+        ):
+            field.props("dense options-dense").style("min-width: 200px")
+        self.dialog.open()
+
+    def _inputs(self) -> dict[str, tuple[float, float]]:
+        """The inputs that the model's own effects need, with their usual ranges."""
+        needed = {name for term in self.model.terms for name in term.effect.needs}
+        return {name: ends for name, ends in self.default.beside.items() if name in needed}
+
+    def _range(self) -> Range:
+        """The range of the proof. Raises RigError for ends that are not in order."""
+        from calibrations.compensation.inverse import Range
+        from rig.errors import RigError
+
+        ends = {name: (float(low.value), float(high.value)) for name, (low, high) in self.inputs.items()}
+        for name, (low, high) in ends.items():
+            if not low < high:
+                raise RigError(f"{name}: the lowest value {low:g} must be below the highest, {high:g}")
+        reach = float(self.reach.value or 0)
+        if not reach > 0:
+            raise RigError(f"The largest value of each axis is {reach:g}; it must be above 0")
+        return Range.for_model(self.model, reach, **ends)
+
+    def made(self) -> tuple[bytes | str, str, list[str]]:
+        """All files in one archive."""
+        from calibrations.compensation.inverse import invert_model
+        from calibrations.model.file import dump_model
+        from rig.services.compensation import compensation_lines, how_to_test, origin_of, source_files
+
+        language = str(self.language.value)
+        made = invert_model(self.model, self._range(), list(self.without.value or ()), str(self.precision.value))
+        origin = origin_of(self.model.name, str(self.name.value or "").strip() or None, dump_model(self.model))
+        files = source_files(made, language, origin)
+        packed = io.BytesIO()
+        with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+            for name, text in files.items():
+                archive.writestr(f"{origin.name}/{name}", text)
+        lines = [
+            f"Files: {', '.join(files)}",
+            *compensation_lines(made),
+            *how_to_test(language, origin.name, origin.name),
+        ]
+        return packed.getvalue(), f"{origin.name}.zip", lines

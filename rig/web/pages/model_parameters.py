@@ -1,0 +1,177 @@
+"""The calibration itself on the model page: parameters, correlations, noise coefficients, and documents from them."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from nicegui import ui
+
+from calibrations.noise.analysis import NoiseAnalysis
+from calibrations.noise.dataset import NoiseFindings
+from calibrations.presentation.noise_text import coefficient_table, density
+from calibrations.presentation.parameter_table import HEAD, STRONG, correlations, parameter_rows, tab_separated
+from calibrations.text import minus, unit
+from rig.web.pages.model_documents import CertificateDialog, CompensationDialog
+from rig.web.parts import box, div, for_page, message, off_loop, table, words
+
+if TYPE_CHECKING:
+    from calibrations.discovery.results import Diagnosis
+    from calibrations.presentation.parameter_table import Correlated, ParameterRow
+    from rig.services.session import ModelSession
+    from rig.web.pages.model import Workbench
+
+MOST_PAIRS = 12
+COPY = """(text) => {
+  const old = () => { const t = document.createElement('textarea'); t.value = text; document.body.append(t); t.select();
+    document.execCommand('copy'); t.remove(); };
+  return navigator.clipboard ? navigator.clipboard.writeText(text).catch(old) : old();
+}"""
+
+
+class ParametersBox:
+    """The parameters of the present model, and what can be made of them."""
+
+    def __init__(self, page: Workbench) -> None:
+        self.page = page
+        self.rows: list[ParameterRow] = []
+        self.turn = 0
+        with box("parameters stack") as self.box:
+            with div("row-of"):
+                words("Parameters", "title spread")
+                self.buttons = [
+                    ui.button("Copy table", icon="content_copy", on_click=self.copy),
+                    ui.button("Download model", icon="download", on_click=self.download),
+                    ui.button("Certificate", icon="workspace_premium", on_click=self.certificate),
+                    ui.button("Compensation", icon="code", on_click=self.compensation),
+                ]
+                for button in self.buttons:
+                    button.props("outline dense").disable()
+            self.values = div("wide-table")
+            self.pairs = div("stack")
+            self.noise = div("stack")
+
+    async def show(self, session: ModelSession[Any]) -> None:
+        """Show the parameters of the session's model; the change is that by the last effect."""
+        self.turn += 1
+        turn = self.turn
+        before = session.steps[-1].before.model if session.steps else None
+        self.rows = await off_loop(parameter_rows, session.end.model, before)
+        if turn != self.turn:
+            return
+        rows = session.data.form == "rows"
+        for button, usable in zip(self.buttons, (True, True, rows, rows), strict=True):
+            button.set_enabled(usable)
+        self.values.clear()
+        with self.values:
+            _values(self.rows, changed=bool(session.steps))
+        self.noise.clear()
+        self.pairs.clear()
+        try:
+            found = await off_loop(correlations, session.end)
+        except Exception as error:
+            with self.pairs:
+                words(f"No correlations: {message(error)}", "quiet small")
+            return
+        if turn == self.turn:
+            self.pairs.clear()
+            with self.pairs:
+                _pairs(found)
+
+    def diagnosed(self, result: Diagnosis[Any]) -> None:
+        """Show the noise coefficients of a still record: those of `rig noise`, from the search that has just ended."""
+        findings = result.findings
+        if not isinstance(findings, NoiseFindings):
+            return
+        still = findings.data.still  # type: ignore[attr-defined] # the data of noise findings are a still record
+        self.noise.clear()
+        with self.noise:
+            for axis, noise in NoiseAnalysis(still, findings.search).channels.items():
+                words(f"Noise coefficients of {axis}, by all processes that the search found", "title")
+                head, rows = coefficient_table(noise, still.sensed.get(axis))
+                with div("wide-table"):
+                    table(("", *head), [(SYMBOLS.get(row[0], ""), *map(_written, row)) for row in rows])
+                words(_written(density(noise, still.sensed.get(axis))), "quiet small")
+
+    async def copy(self) -> None:
+        """Copy the table for a spreadsheet."""
+        ui.run_javascript(f"({COPY})({json.dumps(tab_separated(self.rows))})")
+        ui.notify("The table is in the clipboard.", type="positive")
+
+    def download(self) -> None:
+        """Download the model file."""
+        if self.page.session is not None:
+            self._download(self.page.session)
+
+    def _download(self, session: ModelSession[Any]) -> None:
+        from calibrations.model.file import dump_model
+
+        try:
+            text = dump_model(session.complete_model())
+        except Exception as error:
+            ui.notify(message(error), type="negative", multi_line=True)
+            return
+        ui.download.content(text, f"{Path(self.page.data).stem}-model.yaml")
+
+    def certificate(self) -> None:
+        """Ask the questions of a certificate."""
+        if self.page.session is not None:
+            CertificateDialog(self.page.session, self.page.desk.bench_file)
+
+    def compensation(self) -> None:
+        """Ask the questions of a compensation."""
+        if self.page.session is not None:
+            CompensationDialog(self.page.session)
+
+
+SYMBOLS = {"white-noise": "N", "flicker-noise": "B", "rate-random-walk": "K", "quantisation-noise": "Q"}
+
+
+def _values(rows: list[ParameterRow], changed: bool) -> None:
+    """The table; without a change its column is left out."""
+    head = HEAD if changed else HEAD[:-1]
+    with ui.element("table").classes("plain-table"):
+        with ui.element("tr"):
+            for name in head:
+                with ui.element("th"):
+                    words(name)
+        for row in rows:
+            with ui.element("tr"):
+                cells = (row.effect, row.name, row.axis, row.value, row.std, row.unit, row.change)
+                for name, cell in zip(head, cells[: len(head)], strict=True):
+                    with ui.element("td"):
+                        _cell(row, name, cell)
+
+
+def _cell(row: ParameterRow, name: str, text: str) -> None:
+    """One cell: the meaning under the pointer, the reason below a value that is not identified."""
+    shown = words(text, "chip doubt" if row.why and name == "value" else "number")
+    if name == "parameter" and row.doc:
+        with shown:
+            ui.tooltip(row.doc)
+    if row.why and name == "value":
+        words(f"because {for_page(row.why)}", "quiet small why-not")
+
+
+def _written(text: str) -> str:
+    """A coefficient of the terminal with the signs of the page: µV/√Hz."""
+    return re.sub(r"\bu(?=[Vg]\b)", "µ", unit(for_page(text)))
+
+
+def _pairs(found: list[Correlated]) -> None:
+    if not found:
+        words(f"No two parameters are correlated by {STRONG:g} or more.", "quiet small")
+        return
+    strongest = found[0]
+    title = f"{len(found)} correlations of {STRONG:g} or more; strongest: {_number(strongest.coefficient)}"
+    with ui.expansion(title).props("dense").classes("small"):
+        rows = [(pair.first, pair.second, _number(pair.coefficient)) for pair in found[:MOST_PAIRS]]
+        table(("parameter", "and", "correlation"), rows)
+        if len(found) > MOST_PAIRS:
+            words(f"{len(found) - MOST_PAIRS} more are weaker; the certificate has the whole matrix.", "quiet small")
+
+
+def _number(value: float) -> str:
+    return minus(f"{value:.3f}")
