@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrations.compensation.graph import OPERATIONS, Node, sort_nodes, variable_names
+from calibrations.compensation.graph import OPERATIONS, Node, Table, sort_nodes, variable_names
 from calibrations.table import Array
 
 # Values and slopes of a graph over a range: interval arithmetic, rounded outwards.
@@ -100,12 +100,20 @@ def evaluate_interval(
             found[node] = ranges[node.name], point_interval(np.broadcast_to(own, (len(by), *n)).copy())
         elif node.constant:
             found[node] = point_interval(np.full(n, node.value)), point_interval(np.zeros((len(by), *n)))
+        elif node.table is not None:
+            found[node] = _tabulated(node.table, found[node.inner[0]])
         else:
             found[node] = _applied(node.operation, *(found[inner] for inner in node.inner))
     return [found[root] for root in roots]
 
 
 Pair = tuple[Interval, Interval]
+
+
+def _tabulated(table: Table, inner: Pair) -> Pair:
+    x, dx = inner
+    low, high, least, most = table.bounds(x.low, x.high)
+    return _outward(low, high), _outward(least, most) * dx
 
 
 def _applied(name: str, *inner: Pair) -> Pair:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from calibrations.compensation.cost import PASSES
 from calibrations.compensation.document import Origin, ReferenceVectors, header_lines, unit_of_input
-from calibrations.compensation.graph import OPERATIONS
+from calibrations.compensation.graph import OPERATIONS, Table
 from calibrations.compensation.inverse import Compensation
 from calibrations.compensation.program import Line
 
@@ -78,7 +78,7 @@ def _source(made: Compensation, n: str) -> str:
 
 #include <math.h>
 
-{n}_output {n}_compensate(const {n}_input *in{_taking_memory(made, n)})
+{_tables(made, n, f)}{n}_output {n}_compensate(const {n}_input *in{_taking_memory(made, n)})
 {{
 {taken}{before}    {n}_output out;
     int step;
@@ -88,6 +88,37 @@ def _source(made: Compensation, n: str) -> str:
 {_remembered(made, n, f)}    return out;
 }}
 {_in_gravity(made, n, f)}"""
+
+
+def _tables(made: Compensation, n: str, f: str) -> str:
+    """A function for each table."""
+    return "".join(_table(name, table, n, f) for name, table in made.program.tables.items())
+
+
+def _table(name: str, table: Table, n: str, f: str) -> str:
+    last = len(table.pieces)
+    rows = "".join(f"        {{{', '.join(_word(c, f) for c in piece)}}},\n" for piece in table.pieces)
+    return f"""/* A curve: c0 + c1 u + c2 u^2 + c3 u^3 on each piece, u = 0..1, and constant beyond the last piece. */
+static {n}_real {name}(const {n}_real x)
+{{
+    static const {n}_real pieces[{last}][4] = {{
+{rows}    }};
+    {n}_real s = (x - {_operand(table.low, f)}) / {_word(table.step, f)};
+    {n}_real u;
+    int i;
+
+    s = s > 0 ? s : 0;
+    s = s < {last} ? s : {last};
+    i = s < {last - 1} ? (int)s : {last - 1};
+    u = s - ({n}_real)i;
+    return ((pieces[i][3] * u + pieces[i][2]) * u + pieces[i][1]) * u + pieces[i][0];
+}}
+
+"""
+
+
+def _operand(value: float, f: str) -> str:
+    return f"({_word(value, f)})" if value < 0 else _word(value, f)
 
 
 def _taking_memory(made: Compensation, n: str) -> str:

@@ -15,6 +15,7 @@ import numpy as np
 
 from calibrations.compensation.forward import FORCES, INVERTED, Forward, steps_of
 from calibrations.compensation.program import Program
+from calibrations.effects.thermometer import RATE
 from calibrations.errors import CalibrationError
 from calibrations.geometry.orientation import nominal_pose, specific_force
 from calibrations.geometry.stage_path import turning_points
@@ -273,6 +274,8 @@ def _sweep(model: Model, spans: Mapping[str, Span]) -> Table:
     columns |= {
         name: (low + high) / 2 + (high - low) / 2 * wave for name, (low, high) in spans.items() if name not in columns
     }
+    if RATE in columns and "temperature_c" in columns:
+        columns[RATE] = np.gradient(columns["temperature_c"], columns["t_s"])
     return Table.from_columns("poses", columns, source="a simulated sweep")
 
 

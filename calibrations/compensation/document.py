@@ -3,7 +3,9 @@
 `before`, `loop` and `after` are lines [name, operation, [operands]]; operands are names and numbers. Run `before` once,
 start every output at 0, and run `loop` `steps` times, each time setting the outputs to `next`. Names in `remembered`
 are
-0 before the first sample; run `after` once, then set each to its operand.
+0 before the first sample; run `after` once, then set each to its operand. The operation "table" has the operands x and
+the name of one of `tables`: with s = (x - low) / step, limited to 0 .. the number of pieces, and u = s - i within piece
+i, its value is c0 + c1 u + c2 u^2 + c3 u^3.
 """
 
 from __future__ import annotations
@@ -24,6 +26,7 @@ from calibrations.compensation.graph import evaluate_nodes
 from calibrations.compensation.inverse import Compensation
 from calibrations.compensation.program import Line
 from calibrations.documents import parameters_document
+from calibrations.effects.thermometer import RATE
 from calibrations.model import Estimate
 from calibrations.table import Array
 from calibrations.text import as_written
@@ -37,7 +40,8 @@ UNIT_TEXT = {
 }
 PROVENANCE_TITLES = {"data": "data", "data_sha256": "SHA-256 of the data", "created": "calibrated", "sensor": "sensor",
         "serial": "serial number", "gravity_m_s2": "local gravity, m/s^2"}  # fmt: skip
-UNITS = {"temperature_c": "C", "supply_v": "V", "t_s": "s since the power came on"}
+UNITS = {"temperature_c": "C", "supply_v": "V", "t_s": "s since the power came on",
+         RATE: "C/s, rate of change of temperature_c; 0 at a steady temperature"}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -142,6 +146,14 @@ def _how(made: Compensation) -> Iterator[str]:
         f"below {left}, without rounding."
     )
     yield f"Operations: {operations_text(made)}."
+    if tables := made.program.tables:
+        size = sum(4 * len(table.pieces) for table in tables.values())
+        yield (
+            f"Tables: {len(tables)}, with {size} numbers, of curves whose form is not known. Each piece is a cubic, "
+            "and beyond the data of the calibration the curve is constant. The proof includes them."
+        )
+        for name, table in tables.items():
+            yield f"  {name}  from {table.low:.6g} to {table.low + table.step * len(table.pieces):.6g}"
 
 
 def _effects(made: Compensation) -> Iterator[str]:
@@ -217,8 +229,10 @@ def _uncertainty(made: Compensation) -> Iterator[str]:
 def _parameters(made: Compensation) -> Iterator[str]:
     yield "Parameters, with standard uncertainties:"
     for term in made.model.terms:
-        for e in term.estimates:
+        for e in term.quantities:
             yield f"  {term.name} {f'{e.name} {e.axis}'.strip()} = {_value(e)} {e.unit}".rstrip()
+        for axis, count in term.coefficients.items():
+            yield f"  {term.name} {f'curve {axis}'.strip()}: {count} coefficient{'s' if count > 1 else ''}"
 
 
 def _value(e: Estimate) -> str:
@@ -285,6 +299,10 @@ def files(made: Compensation, origin: Origin, checks: ReferenceVectors) -> dict[
         "next": list(program.next),
         "after": [_line(line) for line in program.after],
         "remembered": dict(program.remembered),
+        "tables": {
+            name: {"low": table.low, "step": table.step, "pieces": [list(piece) for piece in table.pieces]}
+            for name, table in program.tables.items()
+        },
         "self_test": {
             "tolerance": checks.tolerance,
             "inputs": checks.inputs.tolist(),

@@ -18,9 +18,12 @@ from typing import Any
 import numpy as np
 
 from calibrations.compensation.graph import Node, variable, variable_names
+from calibrations.compensation.tables import trace_free_form
 from calibrations.compensation.trace import NotTraced, RunTime, Traced, as_traced, trace_expression
 from calibrations.effects import Effect, Values
+from calibrations.effects.thermometer import RATE
 from calibrations.errors import ModelError
+from calibrations.free_forms.effect import FreeForm
 from calibrations.model import Model, Term
 from calibrations.model.chain import Step
 from calibrations.table import AXES, NUMBERS
@@ -30,7 +33,7 @@ from calibrations.tables import KINDS
 
 IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 TAKEN = re.compile(
-    r"t\d+|in|out|step|math|memory|a[xyz]|v[xyz]|m\d+[xyz]"  # of the sources themselves
+    r"t\d+|table\d+|in|out|step|math|memory|a[xyz]|v[xyz]|m\d+[xyz]"  # of the sources themselves
     r"|auto|case|char|const|default|do|double|enum|extern|float|goto|inline|int|long|register|restrict|short|signed"
     r"|sizeof|static|struct|switch|typedef|union|unsigned|void|volatile"  # of C
     r"|abs|min|max|fabs|sqrt|exp|log|sin|cos"  # functions
@@ -44,7 +47,7 @@ def can_be_written(name: str) -> bool:
 
 INVERTED, OF_THE_RIG, NOISE, LEFT_OUT = "inverted", "of the rig", "noise", "left out"
 NOTHING = "nothing: noise cannot be compensated"
-KNOWN = ("temperature_c", "supply_v", "t_s")  # inputs that a product may have besides the outputs
+KNOWN = ("temperature_c", "supply_v", "t_s", RATE)  # inputs that a product may have besides the outputs
 FORCES = ("ax", "ay", "az")
 
 
@@ -192,7 +195,19 @@ def _outputs(steps: Sequence[Step], runtime: RunTime) -> tuple[Traced, dict[str,
                 memory |= dict(zip(row, as_traced(each).nodes[0], strict=True))
             v = v + part
         elif "transduction" in effect.places:
-            v = v + (trace_expression(effect, a, table, p) if effect.expression else effect.transduction(a, table, p))
+            v = v + _response(effect, a, table, p)
     for effect, p in steps:
-        v = effect.output(v, table, p)
+        if isinstance(effect, FreeForm) and "output" in effect.places:
+            v = v + trace_free_form(effect, a, v, table, p)
+        else:
+            v = effect.output(v, table, p)
     return as_traced(v), memory
+
+
+def _response(effect: Effect, a: Any, table: Any, p: Values) -> Traced:
+    """What an effect adds to the outputs, shape (1, 3)."""
+    if effect.expression:
+        return trace_expression(effect, a, table, p)
+    if isinstance(effect, FreeForm):
+        return trace_free_form(effect, a, Traced(as_traced(np.zeros((1, 3))).nodes), table, p)
+    return as_traced(effect.transduction(a, table, p))

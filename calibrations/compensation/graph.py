@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -66,19 +66,43 @@ OPERATIONS: Mapping[str, Operation] = {
     ">=": _compared(">=", np.greater_equal),
     "==": _compared("==", np.equal),
     "!=": _compared("!=", np.not_equal),
+    "table": Operation(lambda x, table: table(x), "{1}({0})", "{1}({0})", "table"),  # {1}: the table's name
 }  # fmt: skip
 
 MANY = 1 << 16  # nodes in the cache
 
 
+class Table(Protocol):
+    """A function of one variable, such as a `CubicTable`: hashable, with bounds over an interval."""
+
+    @property
+    def low(self) -> float:
+        """Where the first piece begins."""
+
+    @property
+    def step(self) -> float:
+        """Width of a piece."""
+
+    @property
+    def pieces(self) -> tuple[tuple[float, float, float, float], ...]:
+        """Cubics in 0..1, lowest power first."""
+
+    def __call__(self, x: Any) -> Array:
+        """The function at x."""
+
+    def bounds(self, low: Array, high: Array) -> tuple[Array, Array, Array, Array]:
+        """Least and greatest value and slope for x from `low` to `high`."""
+
+
 @dataclass(frozen=True, eq=False)
 class Node:
-    """A number, a variable called `name`, or an operation on `inner`."""
+    """A number, a variable called `name`, or an operation on `inner`; the operation "table" has a `table`."""
 
     operation: str
     inner: tuple[Node, ...] = ()
     value: float = 0.0
     name: str = ""
+    table: Table | None = None
 
     @property
     def constant(self) -> bool:
@@ -106,6 +130,12 @@ def apply_operation(operation: str, *inner: Node) -> Node:
         with np.errstate(all="ignore"):
             return number(float(OPERATIONS[operation].apply(*(node.value for node in inner))))
     return _shortened(operation, inner) or _made(operation, inner)
+
+
+@lru_cache(MANY)
+def tabulated(table: Table, x: Node) -> Node:
+    """The table at x."""
+    return number(float(table(x.value))) if x.constant else Node("table", (x,), table=table)
 
 
 def power(base: Node, exponent: int) -> Node:
@@ -141,7 +171,8 @@ def evaluate_nodes(roots: Iterable[Node], values: Mapping[str, Array]) -> list[A
         elif node.constant:
             found[node] = np.asarray(node.value)
         else:
-            found[node] = OPERATIONS[node.operation].apply(*(found[inner] for inner in node.inner))
+            table = () if node.table is None else (node.table,)
+            found[node] = OPERATIONS[node.operation].apply(*(found[inner] for inner in node.inner), *table)
     return [found[root] for root in roots]
 
 

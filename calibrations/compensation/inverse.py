@@ -23,6 +23,7 @@ from calibrations.compensation.forward import (
 )
 from calibrations.compensation.graph import variable_names
 from calibrations.compensation.program import Program, write_program
+from calibrations.effects.thermometer import RATE, temperature_rate_c_s
 from calibrations.errors import DataError, ModelError
 from calibrations.fitting.fit import fit
 from calibrations.means.noise import rms
@@ -37,7 +38,12 @@ DEFAULT_REACH = {
     "field": 1.5,
     "deg/s": 300.0,
 }  # default range of the sensed quantity, to either side
-DEFAULT_INPUTS = {"temperature_c": (-20.0, 85.0), "supply_v": (4.75, 5.25), "t_s": (0.0, 1e7)}  # C, V, s
+DEFAULT_INPUTS = {
+    "temperature_c": (-20.0, 85.0),
+    "supply_v": (4.75, 5.25),
+    "t_s": (0.0, 1e7),
+    RATE: (-0.02, 0.02),
+}  # C, V, s, C/s
 DEFAULT_TOLERANCE = {"double": 1e-12, "float": 1e-7}  # remaining error after the last step, as a share of the range
 
 
@@ -206,12 +212,17 @@ def compensated_residual(made: Compensation, table: Table) -> Residual:
     )
 
 
+def _input(name: str, table: Table) -> Array:
+    """An input of a program in the rows of a table."""
+    if name == RATE:
+        return temperature_rate_c_s(table)
+    return table.column(f"{name}_v" if name[0] == "v" else name)
+
+
 def _compensated(made: Compensation, table: Table, a: Array) -> dict[str, Array]:
     """The program's output; an axis without measurement follows from gravity and the side that is up."""
     program = made.program
-    inputs = {
-        name: table.column(f"{name}_v" if name[0] == "v" else name) for name in program.inputs if name not in FORCES
-    }
+    inputs = {name: _input(name, table) for name in program.inputs if name not in FORCES}
     memory = memory_at(table, sensed(a, table, steps_of(made.model)), made.forward)
     if made.costs.out_of_gravity is not None:
         return restore_axis_by_gravity(program, inputs | memory, np.where(a[:, 2] < 0, -1.0, 1.0))

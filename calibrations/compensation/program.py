@@ -9,18 +9,19 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from calibrations.compensation.bound import Bound
 from calibrations.compensation.forward import Forward
-from calibrations.compensation.graph import OPERATIONS, Node, apply_operation, number, sort_nodes, variable
+from calibrations.compensation.graph import OPERATIONS, Node, Table, apply_operation, number, sort_nodes, variable
 from calibrations.table import Array
 
 
 @dataclass(frozen=True)
 class Line:
-    """`name` = operation of `inner`: names of earlier lines or inputs, or numbers."""
+    """`name` = operation of `inner`: names of earlier lines, inputs or tables, or numbers."""
 
     name: str
     operation: str
@@ -42,6 +43,7 @@ class Program:
     steps: int
     after: tuple[Line, ...] = ()
     remembered: Mapping[str, str | float] = field(default_factory=dict)
+    tables: Mapping[str, Table] = field(default_factory=dict)
 
     @property
     def operations(self) -> Mapping[str, int]:
@@ -54,7 +56,8 @@ class Program:
 
     def run(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
         """The sought and the stored values, for inputs of one shape; stored inputs are 0 by default."""
-        values: dict[str, Array] = {name: np.asarray(inputs[name], float) for name in self.inputs}
+        values: dict[str, Any] = {name: np.asarray(inputs[name], float) for name in self.inputs}
+        values |= self.tables
         values |= {name: np.asarray(inputs.get(name, 0.0), float) for name in self.remembered}
         _do(self.before, values)
         values |= {name: np.zeros(np.shape(values[self.inputs[0]])) for name in self.sought}
@@ -90,6 +93,7 @@ def write_program(forward: Forward, bound: Bound) -> Program:
         steps=bound.steps,
         after=tuple(after),
         remembered={name: named.word(node) for name, node in forward.memory.items()},
+        tables={name: table for table, name in named.tables.items()},
     )
 
 
@@ -99,10 +103,13 @@ class _Names:
     def __init__(self) -> None:
         self._of: dict[Node, str] = {}
         self._lines = 0
+        self.tables: dict[Table, str] = {}
 
     def line(self, node: Node) -> Line:
         """The node as the next line."""
         inner = tuple(self.word(each) for each in node.inner)
+        if node.table is not None:
+            inner = (*inner, self.tables.setdefault(node.table, f"table{len(self.tables)}"))
         self._of[node] = f"t{self._lines}"
         self._lines += 1
         return Line(self._of[node], node.operation, inner)
@@ -137,10 +144,10 @@ def _following(nodes: list[Node], sought: set[str]) -> set[Node]:
     return found
 
 
-def _do(lines: tuple[Line, ...], values: dict[str, Array]) -> None:
+def _do(lines: tuple[Line, ...], values: dict[str, Any]) -> None:
     for line in lines:
         values[line.name] = OPERATIONS[line.operation].apply(*(_value(name, values) for name in line.inner))
 
 
-def _value(name: str | float, values: Mapping[str, Array]) -> Array:
+def _value(name: str | float, values: Mapping[str, Any]) -> Any:
     return values[name] if isinstance(name, str) else np.asarray(name)

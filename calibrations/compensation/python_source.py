@@ -29,7 +29,7 @@ VECTORS = (  # inputs that the model makes of true values, and the true values
 {rows})
 
 
-{_declared_memory(made)}def compensate({", ".join([*program.inputs, *_memory(made)])}):
+{_tables(made)}{_declared_memory(made)}def compensate({", ".join([*program.inputs, *_memory(made)])}):
     """Return ({sought}) in {made.unit}{"; `memory` is then that of the next sample" if _memory(made) else ""}."""
 {_recalled(made)}{before}    {" = ".join(program.sought)} = 0.0
     for _ in range(STEPS):
@@ -52,6 +52,27 @@ if __name__ == "__main__":
     raise SystemExit(failed != 0)
 '''
     return {f"{origin.name}.py": text}
+
+
+def _tables(made: Compensation) -> str:
+    """A function for each table."""
+    return "".join(
+        f'''{name.upper()} = (  # c0 + c1 u + c2 u^2 + c3 u^3 on each piece, u = 0..1
+{"".join(f"    {piece},{chr(10)}" for piece in table.pieces)})
+
+
+def {name}(x):
+    """Return the curve at x; beyond the first and the last piece it is constant."""
+    s = min(max(0.0, (x - {_word(table.low)}) / {_word(table.step)}), {float(len(table.pieces))!r})
+    i = min(int(s), {len(table.pieces) - 1})
+    c0, c1, c2, c3 = {name.upper()}[i]
+    u = s - i
+    return ((c3 * u + c2) * u + c1) * u + c0
+
+
+'''
+        for name, table in made.program.tables.items()
+    )
 
 
 def _memory(made: Compensation) -> list[str]:

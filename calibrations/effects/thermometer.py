@@ -8,15 +8,28 @@ import numpy as np
 
 from calibrations.table import Array, Table
 
+RATE = "temperature_rate_c_s"  # input of a product: how fast its thermometer's reading changes, C/s
 SMOOTHED_ROWS, FEWEST_SMOOTHED = 11, 5  # of a thermometer, whose noise would hide its lag
 
 
 def sensor_temperature_c(table: Table, lead_s: float) -> Array:
     """The temperature that the thermometer shows `lead_s` later, deg C, shape (n,).
 
-    As logged where that is 0, and in a single row, which has no later reading.
+    As logged where that is 0. A single row has no later reading: there the column `temperature_rate_c_s` tells it,
+    and without this column it is as logged.
     """
-    return leading_temperature(table, lead_s) if lead_s and table.n > 1 else table.column("temperature_c")
+    if lead_s and table.n > 1:
+        return leading_temperature(table, lead_s)
+    if lead_s and RATE in table:
+        return table.column("temperature_c") + lead_s * table.column(RATE)
+    return table.column("temperature_c")
+
+
+def temperature_rate_c_s(table: Table) -> Array:
+    """How fast the thermometer's reading changes, C/s, shape (n,): as logged, else from the reading; rows in order."""
+    if RATE in table:
+        return table.column(RATE)
+    return np.asarray(np.gradient(leading_temperature(table, 0.0), table.time_s))
 
 
 @lru_cache(maxsize=64)

@@ -37,6 +37,11 @@ class Spline:
         """Number of columns."""
         return self.intervals + DEGREE - self.order
 
+    @property
+    def on_splines(self) -> Array:
+        """The columns as sums of cubic B-splines on knots of equal distance, shape (intervals + 3, count)."""
+        return _turned(self.low, self.high, self.intervals, self.order)[1]
+
     def __call__(self, x: Array) -> Array:
         """Columns at x (n,), shape (n, count)."""
         inside = np.clip(x, self.low, self.high - 1e-12 * (self.high - self.low))

@@ -153,8 +153,7 @@ class FreeForm(Effect):
 
     def _coefficients(self, p: Values, k: int) -> Array:
         """Coefficients of all forms for axis k."""
-        values = [(p[_name(form, j)], form.shared) for form in self.forms for j in range(form.count(k))]
-        return np.array([float(v if shared else v[k]) for v, shared in values])
+        return np.concatenate([coefficients_of(form, p, k) for form in self.forms])
 
     def _columns(self, table: Table, force: Array, response: Array, k: int) -> Array:
         """Columns of all forms for axis k, shape (n, count)."""
@@ -205,6 +204,12 @@ class _OnAngle(FreeForm):
         if self.forms[0].driver == "alpha":
             return replace(pose, alpha=pose.alpha + error)
         return replace(pose, beta=pose.beta + error)
+
+
+def coefficients_of(form: Form, p: Values, k: int) -> Array:
+    """Coefficients of one form for axis k, shape (count,)."""
+    values = [p[_name(form, j)] for j in range(form.count(k))]
+    return np.array([float(v if form.shared else v[k]) for v in values])
 
 
 def _name(form: Form, j: int) -> str:

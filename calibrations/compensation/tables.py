@@ -1,0 +1,169 @@
+"""Curves of unknown form in a compensation: a piecewise cubic table of each, and the graph of a free form with it.
+
+A table is the curve itself, not an approximation: a spline is a cubic between its knots. Its bounds over an interval
+are those of Bernstein coefficients, so that the proof of the inverse holds with it.
+
+Source  Farouki, The Bernstein polynomial basis: a centennial retrospective, CAGD 29 (2012) 379.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from calibrations.compensation.graph import Node, apply_operation, number, power, tabulated
+from calibrations.compensation.trace import NotTraced, RunTime, Traced, as_nodes, as_traced
+from calibrations.effects import Values
+from calibrations.effects.thermometer import sensor_temperature_c
+from calibrations.free_forms.bases import Line, Products, Ramp, Spline
+from calibrations.free_forms.effect import FreeForm, coefficients_of
+from calibrations.free_forms.form import CROSS, Form
+from calibrations.table import Array
+
+PARTS = 8  # of a piece, whose bounds are taken together
+ROUNDING = 64 * np.finfo(float).eps  # of the largest coefficient, for the arithmetic of a piece
+
+
+@dataclass(frozen=True)
+class CubicTable:
+    """A function that is a cubic in u = 0..1 on each piece of width `step` from `low` on, and constant beyond.
+
+    `pieces` holds c0, c1, c2, c3 of c0 + c1 u + c2 u^2 + c3 u^3.
+    """
+
+    low: float
+    step: float
+    pieces: tuple[tuple[float, float, float, float], ...]
+
+    def __call__(self, x: Any) -> Array:
+        """The function at x, any shape."""
+        n = len(self.pieces)
+        s = np.clip((np.asarray(x, float) - self.low) / self.step, 0.0, float(n))
+        i = np.minimum(np.nan_to_num(s).astype(int), n - 1)
+        c0, c1, c2, c3 = np.moveaxis(self._array[i], -1, 0)
+        u = s - i
+        return np.asarray(((c3 * u + c2) * u + c1) * u + c0)
+
+    @cached_property
+    def _array(self) -> Array:
+        return np.array(self.pieces)
+
+    def bounds(self, low: Array, high: Array) -> tuple[Array, Array, Array, Array]:
+        """Least and greatest value, and least and greatest slope, of the function for x from `low` to `high`."""
+        edges, values, slopes = self._parts
+        ends = self(low), self(high)
+        value = [np.minimum(*ends), np.maximum(*ends)]
+        slope = [np.full(np.shape(low), np.inf), np.full(np.shape(low), -np.inf)]
+        beyond = (low <= edges[0]) | (high >= edges[-1])  # constant there
+        slope = [np.where(beyond, 0.0, each) for each in slope]
+        reach = self.step * 1e-9  # a knot belongs to both pieces
+        for k in range(len(values)):
+            inside = (low <= edges[k + 1] + reach) & (high >= edges[k] - reach)
+            value[0] = np.where(inside, np.minimum(value[0], values[k].min()), value[0])
+            value[1] = np.where(inside, np.maximum(value[1], values[k].max()), value[1])
+            slope[0] = np.where(inside, np.minimum(slope[0], slopes[k].min()), slope[0])
+            slope[1] = np.where(inside, np.maximum(slope[1], slopes[k].max()), slope[1])
+        little = ROUNDING * float(np.abs(self._array).max())
+        return value[0] - little, value[1] + little, slope[0] - little / self.step, slope[1] + little / self.step
+
+    @cached_property
+    def _parts(self) -> tuple[Array, Array, Array]:
+        """Edges of all parts, and the Bernstein coefficients of value and slope in each: their hull holds both."""
+        h = 1 / PARTS
+        edges, values, slopes = [self.low], [], []
+        for i, (c0, c1, c2, c3) in enumerate(self.pieces):
+            for j in range(PARTS):
+                u = j * h
+                d0 = c0 + u * (c1 + u * (c2 + u * c3))
+                d1, d2, d3 = h * (c1 + u * (2 * c2 + 3 * u * c3)), h**2 * (c2 + 3 * u * c3), h**3 * c3
+                b = np.array([d0, d0 + d1 / 3, d0 + 2 * d1 / 3 + d2 / 3, d0 + d1 + d2 + d3])
+                values.append(b)
+                slopes.append(3 * np.diff(b) / (h * self.step))
+                edges.append(self.low + self.step * (i + (j + 1) * h))
+        return np.array(edges), np.array(values), np.array(slopes)
+
+
+def spline_table(basis: Spline, coefficients: Array) -> CubicTable:
+    """The function of a spline basis with these coefficients of its first columns."""
+    b = basis.on_splines[:, : len(coefficients)] @ coefficients
+    b0, b1, b2, b3 = b[:-3], b[1:-2], b[2:-1], b[3:]
+    c = np.column_stack([b0 + 4 * b1 + b2, 3 * (b2 - b0), 3 * (b0 - 2 * b1 + b2), b3 - b0 + 3 * (b1 - b2)]) / 6
+    step = (basis.high - basis.low) / basis.intervals
+    return CubicTable(basis.low, step, tuple((float(p), float(q), float(r), float(s)) for p, q, r, s in c))
+
+
+def trace_free_form(effect: FreeForm, a: Traced, v: Traced, table: RunTime, p: Values) -> Traced:
+    """What the free form adds to the outputs, shape (1, 3), for forces a and outputs v before it, (1, 3) each.
+
+    Raises NotTraced for a form that no product can follow.
+    """
+    out = as_nodes(np.zeros((1, 3)))
+    for k in range(len(table.axes)):
+        for form in effect.forms:
+            part = _part(form, coefficients_of(form, p, k), a.nodes[0], v.nodes[0, k], table, k)
+            out[0, k] = apply_operation("+", out[0, k], part)
+    return as_traced(Traced(out))
+
+
+def _part(form: Form, u: Array, a: Any, v: Node, table: RunTime, k: int) -> Node:
+    """One form at axis k, with its coefficients u."""
+    basis = form.basis(k)
+    if isinstance(basis, Products):
+        f = _total([_times(float(c), _product([power(x, e) for x, e in zip(a, powers, strict=True)]))
+                    for c, powers in zip(u, basis.powers, strict=False)])  # fmt: skip
+    else:
+        x = _driver(form, a, v, table, k)
+        if isinstance(basis, Spline):
+            f = tabulated(spline_table(basis, u), x) if len(u) else number(0.0)
+        elif isinstance(basis, Line):
+            half = (basis.high - basis.low) / 2 or 1.0
+            slope = float(np.sum(u)) / half
+            f = apply_operation("+", _times(slope, x), number(-slope * (basis.low + basis.high) / 2))
+        elif isinstance(basis, Ramp):
+            columns = [number(1.0), apply_operation("abs", x), x]
+            f = _total([_times(float(c), column) for c, column in zip(u, columns, strict=False)])
+        else:
+            raise NotTraced(f"a product cannot follow its {basis.kind}")
+    if form.factor == "force":
+        return apply_operation("*", a[k], f)
+    if form.factor == "load":
+        return apply_operation("*", apply_operation("abs", a[CROSS[k]]), f)
+    if form.factor:
+        raise NotTraced(f"a product does not know the {form.factor}")
+    return f
+
+
+def _driver(form: Form, a: Any, v: Node, table: RunTime, k: int) -> Node:
+    """What drives a function of axis k."""
+    if form.driver in ("own", "cross", "out-of-plane"):
+        node: Node = a[{"own": k, "cross": CROSS[k], "out-of-plane": (2, 2, 1)[k]}[form.driver]]
+        return node
+    if form.driver == "output":
+        return v
+    if form.driver == "temperature":
+        column: Any = sensor_temperature_c(table, form.lead_s)  # type: ignore[arg-type]
+        return as_traced(column).nodes[0]  # type: ignore[no-any-return]
+    if form.driver.startswith("column:"):
+        return table.column(form.driver.removeprefix("column:")).nodes[0]  # type: ignore[no-any-return]
+    raise NotTraced(f"a product does not know the {form.driver}")
+
+
+def _times(factor: float, x: Node) -> Node:
+    return apply_operation("*", number(factor), x)
+
+
+def _total(nodes: list[Node]) -> Node:
+    found = number(0.0)
+    for node in nodes:
+        found = apply_operation("+", found, node)
+    return found
+
+
+def _product(nodes: list[Node]) -> Node:
+    found = number(1.0)
+    for node in nodes:
+        found = apply_operation("*", found, node)
+    return found
