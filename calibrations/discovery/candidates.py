@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.special import fdtrc
 
 from calibrations.criteria import INSEPARABLE, MATERIAL, MOST_BY_FORM, SAME_SHAPE, SIGNIFICANT
-from calibrations.discovery.results import Candidate
+from calibrations.discovery.results import Candidate, Step
 from calibrations.discovery.significance import Screen, Search, of_search, twice_log_likelihood
 from calibrations.effects import Effect
 from calibrations.fitting.fit import Fit, refit
@@ -94,6 +94,30 @@ def _tail(twice_gain: float, rows: int, rank: int, free: float) -> float:
 def schwarz(c: RowCandidate, rows: int) -> float:
     """Gain less the price of the parameters, log(rows) each."""
     return c.gain - c.rank * float(np.log(rows))
+
+
+def with_planned(found: Sequence[RowCandidate], step: Step[Fit]) -> list[RowCandidate]:
+    """The candidates with the effect of a planned step first, as its full fit shows it. It may be a free form."""
+    before, after = step.before, step.after
+    own = next((c for c in found if c.name == step.name), None)
+    if own is None:
+        own = _free(next(t.effect for t in after.model.terms if t.name == step.name), before, after)
+    full = replace(own, excess_after=after.pooled_excess, held_out_after=after.held_out_excess)
+    others = [c for c in found if c.name != step.name]
+    return _with_probabilities([full, *others], before.residual.size, before.held_out_excess)
+
+
+def _free(effect: Effect, before: Fit, after: Fit) -> RowCandidate:
+    """A free form as a candidate, from the fit with it; its rank is that of the columns that it could have."""
+    screen = Screen(before)
+    start, columns, basis = _columns(screen, effect)
+    gain, rank = twice_log_likelihood(after) - twice_log_likelihood(before), basis.shape[1]
+    free = min(before.residual.size - before.jacobian.shape[2] - rank, before.noise.freedom)
+    return RowCandidate(
+        effect=effect, rank=rank, gain=gain, p_value=_tail(gain, before.residual.size, rank, max(free, 1)),
+        probability=0.0, excess_after=after.pooled_excess, held_out_after=after.held_out_excess,
+        start=start, columns=columns, basis=basis,
+    )  # fmt: skip
 
 
 def added(before: Fit, c: RowCandidate) -> Fit:

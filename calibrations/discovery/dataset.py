@@ -107,7 +107,7 @@ class Dataset(ABC, Generic[F]):
 
     @abstractmethod
     def candidates(self, before: F, plan: Findings[F], effects: Mapping[str, Effect]) -> tuple[Candidate, ...]:
-        """Every effect alone on top of a fit that belongs to a search."""
+        """Every effect alone on top of a fit that belongs to a search, the next one of `plan` first."""
 
     def beginning(self, model: Model) -> tuple[Dataset[F], F]:
         """(the data without gross outliers, the model fitted to them)."""
@@ -116,15 +116,12 @@ class Dataset(ABC, Generic[F]):
     def followed(self, plan: Findings[F], k: int, effects: Mapping[str, Effect]) -> Findings[F]:
         """The rest of a search once its first `k` steps are taken."""
         start = plan.steps[k - 1].after
-        found = self.candidates(start, plan, effects)
-        following = plan.names[k : k + 1]
+        rest = replace(plan, added=(*plan.added, *plan.names[:k]), steps=plan.steps[k:])
         return replace(
-            plan,
+            rest,
             start=start,
             baseline=start,
-            added=(*plan.added, *plan.names[:k]),
-            steps=plan.steps[k:],
-            candidates=tuple(sorted(found, key=lambda c: c.name not in following)),
+            candidates=self.candidates(start, rest, effects),
             undetermined=(self.undetermined(start), plan.undetermined[1]),
         )
 

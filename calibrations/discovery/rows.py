@@ -25,7 +25,7 @@ from calibrations.criteria import (
     WRONG_FLOOR,
 )
 from calibrations.design.experiment import separating_experiment
-from calibrations.discovery.candidates import candidates, with_rivals
+from calibrations.discovery.candidates import candidates, with_planned, with_rivals
 from calibrations.discovery.dataset import Cells, Dataset
 from calibrations.discovery.outliers import caution, fit_without, kept, told
 from calibrations.discovery.places import places
@@ -184,9 +184,10 @@ class Rows(Dataset[Fit]):
         """
         return self.table.type.stage_angles and self.table.n >= FEWEST_FOR_PLACES and not self.table.noise
 
-    def candidates(self, before: Fit, plan: Findings[Fit], effects: Mapping[str, Effect]) -> tuple[Candidate, ...]:  # noqa: ARG002
-        """One round of the search."""
-        return tuple(candidates(before, effects))
+    def candidates(self, before: Fit, plan: Findings[Fit], effects: Mapping[str, Effect]) -> tuple[Candidate, ...]:
+        """One round of the search, the next effect of the plan first."""
+        found = candidates(before, effects)
+        return tuple(with_planned(found, plan.steps[0]) if plan.steps else found)
 
     def beginning(self, model: Model) -> tuple[Rows, Fit]:
         """(the table without gross outliers, the model fitted to it)."""

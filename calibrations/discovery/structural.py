@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from calibrations.criteria import MATERIAL, SIGNIFICANT
-from calibrations.discovery.candidates import RowCandidate, added, candidates, with_rivals
+from calibrations.discovery.candidates import RowCandidate, candidates, with_planned, with_rivals
 from calibrations.discovery.results import Step
 from calibrations.discovery.search import first_order
 from calibrations.discovery.significance import chance
@@ -120,15 +120,13 @@ def _first(start: Fit, steps: list[Step[Fit]], found: list[RowCandidate]) -> tup
 
     The rivals of an effect are those of the search that adds effects; beside others they are not asked.
     """
-    own = next((c for c in found if steps and c.name == steps[0].name), None)
-    if own is None:
+    if not steps:
         return tuple(found)
-    after = added(start, own)
+    own, *others = with_planned(found, steps[0])
     alone = sum(not step.name.startswith(PREFIX) for step in steps) == 1
-    rivals = with_rivals(own, found, start).indistinguishable_from if alone else own.indistinguishable_from
-    full = replace(own, excess_after=after.pooled_excess, held_out_after=after.held_out_excess,
-                   indistinguishable_from=rivals)  # fmt: skip
-    return full, *(c for c in found if c is not own)
+    if alone and not own.name.startswith(PREFIX):
+        own = with_rivals(own, found, start)
+    return own, *others
 
 
 @dataclass(frozen=True)

@@ -118,8 +118,9 @@ class StillRecord(Dataset[NoiseFit]):
     def candidates(
         self, before: NoiseFit, plan: Findings[NoiseFit], effects: Mapping[str, Effect]
     ) -> tuple[Candidate, ...]:
-        """Every process alone."""
-        return candidates(search(before.still, before.model, effects), before, plan.alternatives)
+        """Every process alone, the next one of the plan first."""
+        found = candidates(search(before.still, before.model, effects), before, plan.alternatives)
+        return tuple(sorted(found, key=lambda c: c.name not in plan.names[:1]))
 
     def figures(self, found: NoiseFit) -> dict[str, str]:
         """Mismatch of the spectrum, also on the other half, and of the Allan deviation."""

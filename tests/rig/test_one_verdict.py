@@ -30,7 +30,7 @@ from tests.calibrations import shaken, synthetic, test_common_floor, turned
 from tests.rig.conftest import Ended
 
 Rig = Callable[..., Ended]
-MOST_STEPS = 14
+MOST_STEPS = 20
 MOST_MODULES = 150
 LIKELY = 0.5
 
