@@ -90,7 +90,7 @@ def search_structure(start: Fit, effects: Mapping[str, Effect]) -> StructuralSea
         if other.held_out_excess < end.held_out_excess:
             end, forms = other, others
     needed = [name for name in basic if chance(*first_order(end, name, shared=True)) < SIGNIFICANT]
-    chosen = _at(end, [*causes, *forms])
+    chosen = [*_largest_first(_at(end, causes), end, found), *_at(end, forms)]
     if needed != basic:
         base = _freed(start, needed, effects)
         end = together(base, chosen)
@@ -215,6 +215,22 @@ def causes_alone(end: Fit, forms: list[Addition]) -> Fit:
 def _at(end: Fit, added: list[Addition]) -> list[Addition]:
     """The additions, starting from the values of `end`."""
     return [replace(a, estimates=end.model.estimates(a.effect.name) or a.estimates) for a in added]
+
+
+def _largest_first(added: list[Addition], end: Fit, found: Structure) -> list[Addition]:
+    """The additions by the size of their place; those of the geometry by what they contribute to the outputs."""
+    sizes = {c: place.size for place in found.places for c in (*place.causes, *found.refinements(place))}
+    for name in (a.effect.name for a in added if a.effect.name not in sizes):
+        mask = end.problem.layout.of_effect(name)
+        contribution = end.jacobian[:, :, mask] @ end.theta[mask]
+        basic = np.any([end.problem.layout.of_effect(own) for own in BASIC], axis=0)
+        sizes[name] = float(np.sqrt(np.mean((_beside(contribution, end.jacobian[:, :, basic]) / found.white) ** 2)))
+    return sorted(added, key=lambda a: -sizes[a.effect.name])
+
+
+def _beside(values: Array, columns: Array) -> Array:
+    """Values (channels, n) without what columns (channels, n, k) explain of each channel."""
+    return np.stack([v - c @ np.linalg.lstsq(c, v, rcond=None)[0] for v, c in zip(values, columns, strict=True)])
 
 
 def _with(model: Model, added: list[Addition]) -> Model:

@@ -85,7 +85,9 @@ def test_a_hidden_effect_is_found_added_saved_and_undone(workbench: Workbench, t
 
 
 def test_an_effect_of_ones_own_with_a_mistake_and_then_right(workbench: Workbench, tmp_path: Path) -> None:
-    page = looked_at(workbench, unexplained(tmp_path, "worm gear"), "No effect of the catalogue explains the residual")
+    page = looked_at(
+        workbench, unexplained(tmp_path, "worm gear"), "An effect that is not in the catalogue acts at stage-angle-beta"
+    )
     text, add = page.get_by_label("Expression, such as"), page.get_by_role("button", name="Add effect")
     expect(text).to_have_value(re.compile("sin"))  # what is left proposes itself
     text.fill("a*sin(5*betta) + b*cos(5*beta)")
