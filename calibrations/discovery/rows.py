@@ -174,6 +174,8 @@ class Rows(Dataset[Fit]):
         from calibrations.discovery.structural import search_structure  # only this search needs it
 
         searched = search_structure(start, effects)
+        if searched.steps and path.steps and _unseen_error(path.end) <= _unseen_error(searched.end):
+            return self._found(path, effects, origin)  # what needs more must foretell more
         return self._with_structure(searched, outliers, searched.start if origin is start else origin)
 
     @property
@@ -463,6 +465,11 @@ def _explained(path: Path) -> bool:
     most = NO_MORE_THAN_NOISE if correlation_known(end.table) else np.inf
     as_noise = end.noise.known and LEAST_NOISE < end.pooled_excess < most
     return as_noise and structure_of(end) is None and is_complete(path)
+
+
+def _unseen_error(found: Fit) -> float:
+    """Rms error on unseen rows, in the output's unit: the floors of two fits may differ."""
+    return found.held_out_excess * float(np.sqrt(np.mean(found.noise.floor**2)))
 
 
 def _fall(before: float, after: float) -> str:

@@ -16,12 +16,16 @@ from calibrations.free_forms.geometry import Geometry, geometry
 from calibrations.free_forms.naming import ActingPlace, places
 from calibrations.free_forms.poses import PoseData
 from calibrations.free_forms.search import NOISE_ALONE, SearchResult, search
+from calibrations.free_forms.selection import ENTER
 from calibrations.geometry.orientation import out_of_plane
 from calibrations.geometry.smooth import smooth_columns
 from calibrations.table import Array, Table
 
 TOO_SMALL = 0.93  # of a stated noise: a residual below contradicts it
+LARGER_NOISE = 1.5  # times the stated: less may be forms that are nearly right
 FLOOR_ROUNDS = 2  # in which the noise floor is found from the residual
+NO_NOISE = 1e-3  # of the noise of all rows: all samples of a mean are one code of the converter
+LEAST_WHITE = 0.1  # the same: the noise that such a mean is given, though its samples show none
 OUTLYING = 4.0  # times the usual residual: more counts as so much
 SEEN_FORM = 0.9  # of a place's variance: the form of the catalogue itself, not one near it
 FIRST_POSES = 0.06  # of a record
@@ -163,9 +167,14 @@ def find_structure(
     source = FloorSource.SAMPLES
     if white is None:
         white, source = _neighbours(data), FloorSource.NEIGHBOURS
-    result, source = _searched(data, white, given, source)
+    usual = np.sqrt(np.mean(white**2, axis=1, keepdims=True))
+    if np.any(one_code := white < NO_NOISE * usual):  # these rows have less noise than others, and contradict nothing
+        result = search(data, np.where(one_code, LEAST_WHITE * usual, white), given)
+    else:
+        result, source = _searched(data, white, given, source)
     white = result.white
-    acting = places(result)
+    result, factor = _in_larger_noise(result, given)
+    acting = [replace(p, size=p.size * factor, largest=p.largest * factor) for p in places(result)]
     floor = float(np.sqrt(np.mean(white**2)))
     shape = geometry(result, {p.name: p.size * floor for p in acting}, geometries, has)
     return Structure(result, tuple(acting), shape, white, source)
@@ -188,6 +197,25 @@ def _searched(data: PoseData, white: Array, given: Given, source: FloorSource) -
             break
         found = again
     return (result if result.ratio < NOISE_ALONE else search(data, found, given)), source
+
+
+def _in_larger_noise(result: SearchResult, given: Given) -> tuple[SearchResult, float]:
+    """The search in noise as large as what it left, where that is likelier, and the factor on the noise; else 1.
+
+    Scatter that nothing explains makes every component significant that follows it a little.
+    """
+    best, white = (result.criterion, result, 1.0), result.white
+    factor = 1.0
+    for _ in range(FLOOR_ROUNDS):
+        factor *= best[1].ratio
+        if best[1].ratio < LARGER_NOISE:
+            break
+        other = search(result.data, factor * white, given)
+        scale = 2 * (other.gram.rows - other.gram.base_rank) * float(np.log(factor))
+        if other.criterion + scale + ENTER >= best[0]:
+            break
+        best = other.criterion + scale + ENTER, other, factor
+    return best[1], best[2]
 
 
 def _neighbours(data: PoseData) -> Array:
