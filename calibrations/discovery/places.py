@@ -79,6 +79,14 @@ def places(found: Fit) -> tuple[Place, ...]:
     return tuple(each.place for each in _fails(found)[:MOST_PLACES])
 
 
+def rows_at(found: Fit, place: Place) -> NDArray[np.intp]:
+    """The rows of a place, as indices of the fit's table; empty for a place of another fit."""
+    for where, low, high, rows in (*_parts(found.table), *_sides(found)):
+        if (where, low, high) == (place.where, place.low, place.high):
+            return rows
+    return np.zeros(0, np.intp)
+
+
 def _fails(found: Fit) -> list[_Stretch]:
     """Places where the residual is more than noise, worst first; at most one for each column and channel."""
     tried: list[_Stretch] = []

@@ -97,6 +97,22 @@ class ModelSession(Generic[F]):
         """One step back; the beginning stays as it is."""
         return self._with(self.steps[:-1])
 
+    def removed(self, name: str) -> ModelSession[F]:
+        """The same without the added effect `name`; the later ones are fitted again.
+
+        An effect that the data cannot have without it is left out as well, with a note.
+        """
+        kept = [step.after.model.terms[-1].effect for step in self.steps if step.name != name]
+        first = next((k for k, step in enumerate(self.steps) if step.name == name), len(self.steps))
+        session = self._with(self.steps[:first])
+        for effect in kept[first:]:
+            try:
+                session = session.with_step(session.tried(effect))
+            except CalibrationError as error:
+                note = f"{effect.name} is not in the model any more: {error}"
+                session = replace(session, notes=(*session.notes, note))
+        return session
+
     def _with(self, steps: tuple[Step[F], ...]) -> ModelSession[F]:
         start, steps = self.data.in_one_floor(self.start, steps)
         return replace(self, start=start, steps=steps)

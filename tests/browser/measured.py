@@ -30,6 +30,16 @@ def thousand(folder: Path) -> str:
     return _written(folder, "thousand", World(IDEAL, 3).dwell_mean(alpha, beta, direction=np.ones(1000, dtype=int)))
 
 
+def two_faults(folder: Path) -> str:
+    """180 poses of a sensor that is turned by 0.3 deg about z in its package, with a quadratic term in both outputs."""
+    rng = np.random.default_rng(4)
+    alpha, beta = np.repeat(np.linspace(30.0, 150.0, 5), 36), np.tile(np.arange(0.0, 360.0, 10.0), 5)
+    direction = np.radians(beta + 0.3)
+    load = np.sin(np.radians(alpha)) * np.array([np.cos(direction), np.sin(direction)])
+    vx, vy = 2.5 + load + 0.004 * load**2 + 5e-5 * rng.standard_normal(load.shape)
+    return _written(folder, "two-faults", {"alpha_deg": alpha, "beta_deg": beta, "vx_v": vx, "vy_v": vy})
+
+
 def hundred_thousand(folder: Path) -> str:
     """A raw log of 100,000 rows: 1,000 samples at each of 100 poses."""
     rng = np.random.default_rng(1)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from urllib.parse import urlencode
 
 from nicegui import ui
@@ -23,7 +24,8 @@ from rig.services.request import Request
 from rig.services.two_runs import Pair, again, both, parameters_of, results_of
 from rig.web.desk import Desk, models
 from rig.web.frame import Key, frame
-from rig.web.parts import box, div, failed, message, off_loop, redraw, table, waiting, words
+from rig.web.parts import box, div, failed, message, off_loop, table, waiting, words
+from rig.web.pictures import downloads, draw, remember
 
 # Pictures of one axis: for two tables, or for two still records.
 
@@ -59,7 +61,9 @@ class Pictures:
         with div("two" if len(comparison.titles) > 1 else ""):
             for title in comparison.titles:
                 with box("picture"):
-                    words(title, "title")
+                    with div("title"):
+                        words(title, "grow")
+                        downloads(partial(self.plots.__getitem__, len(self.plots)), title)
                     plot = ui.plotly({"data": [], "layout": {}}).classes("tall-plot").props(f'aria-label="{title}"')
                     self.plots.append(plot)
         self.draw()
@@ -68,7 +72,7 @@ class Pictures:
         """Draw all pictures again."""
         charts = self.comparison.draw(int(self.axis.value or 0), bool(self.unit.value))
         for plot, chart in zip(self.plots, charts, strict=True):
-            redraw(plot, figure(chart, f"{self.axis.value} {self.unit.value}"))
+            draw(plot, chart, f"{self.axis.value} {self.unit.value}")
 
     def next_axis(self) -> None:
         """Select the next channel."""
@@ -201,8 +205,11 @@ def _parameters(model: str, pairs: list[Pair]) -> None:
     title = f"Differences of the parameters of {model}"
     with div("two beside"):
         with box("picture"):
-            words(title, "title")
+            with div("title"):
+                words(title, "grow")
+                downloads(lambda: plot, title)
             plot = ui.plotly(figure(chart, "differences", False)).props(f'aria-label="{title}"')
+            remember(plot, chart)
             plot.style(f"height: {height_px(chart)}px; width: 100%")
             words("Second minus first, with ± two standard uncertainties; ◆ differs by more.", "quiet small")
         with box("stack"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import date
+from functools import partial
 from urllib.parse import urlencode
 
 from nicegui import events, ui
@@ -14,7 +15,6 @@ from calibrations.analyses.stability import YEAR_DAYS
 from calibrations.criteria import BASELINE_RUNS, FEWEST_RUNS
 from calibrations.presentation.chart import Chart, Panel, one
 from calibrations.presentation.charts.history import EWMA, INDIVIDUALS, RANGES, control_panels, life
-from calibrations.presentation.interactive import figure
 from calibrations.text import estimate_text, minus, rounded, unit
 from rig.errors import RigError
 from rig.services.charts import life_of
@@ -32,7 +32,8 @@ from rig.services.history import (
 )
 from rig.services.history_words import agreements, but_stale, chart_verdict, near, next_due, significance, summary
 from rig.services.provenance import today
-from rig.web.parts import Link, box, div, failed, for_page, message, off_loop, redraw, table, words
+from rig.web.parts import Link, box, div, failed, for_page, message, off_loop, table, words
+from rig.web.pictures import downloads, draw
 
 MODEL = "linear"
 
@@ -197,7 +198,9 @@ class HistoryPictures:
         self.model = model
         with div("pictures three"):
             with box("picture wide"):
-                self.title = words(LIFE, "title")
+                with div("title"):
+                    self.title = words(LIFE, "grow")
+                    downloads(lambda: self.life, LIFE)
                 self.life = self._plot(LIFE)
                 self.text_box = words("", "quiet small")
             self.few = box("wide state")
@@ -207,13 +210,15 @@ class HistoryPictures:
             self.charts: dict[str, ui.plotly] = {}
             for title in (INDIVIDUALS, EWMA, RANGES):
                 with box("picture") as place:
-                    words(title, "title")
+                    with div("title"):
+                        words(title, "grow")
+                        downloads(partial(self.charts.get, title), title)
                     self.charts[title] = self._plot(title)
                 self.boxes.append(place)
 
     def show(self, q: Quantity) -> None:
         """Draw all pictures again."""
-        redraw(self.life, figure(_bare(life(life_of(q))), f"life {q.name}"))
+        draw(self.life, _bare(life(life_of(q))), f"life {q.name}")
         self.text_box.set_text(_legend(q))
         self.few.set_visibility(q.chart is None)
         for place in self.boxes:
@@ -221,7 +226,7 @@ class HistoryPictures:
         if q.chart is not None:
             days, keys = [each.day for each in q.of], [each.data for each in q.of]
             for title, panel in control_panels(q.name, q.chart, q.unit, days, keys).items():
-                redraw(self.charts[title], figure(_bare(panel), f"{title} {q.name}"))
+                draw(self.charts[title], _bare(panel), f"{title} {q.name}")
 
     def _plot(self, title: str) -> ui.plotly:
         plot = ui.plotly({"data": [], "layout": {}}).classes("plot").props(f'aria-label="{title}"')

@@ -11,6 +11,7 @@ from urllib.parse import urlencode
 from nicegui import ui
 
 from calibrations.discovery.verdict import Verdict
+from calibrations.text import rounded
 from rig.errors import RecordError
 from rig.services.content import Content, content_of
 from rig.services.exclusion import numbered_run
@@ -25,7 +26,7 @@ from rig.web.pages.model_pictures import Pictures
 from rig.web.parts import Cancelled, Counted, box, div, failed, for_page, message, off_loop, state, words
 
 if TYPE_CHECKING:
-    from calibrations.discovery.results import Comparison, Diagnosis, Step
+    from calibrations.discovery.results import Comparison, Diagnosis, Place, Step
     from rig.services.session import ModelSession
 
 
@@ -50,6 +51,7 @@ class Workbench:
         self.turn = 0  # results of older requests are ignored
         self.diagnoses: dict[tuple[str, ...], Diagnosis[Any]] = {}
         self.seen: tuple[bool, Content] | None = None
+        self.discovering = False  # effects are added one after another
 
     def build(self) -> None:
         """Build the page; long computations start when the browser shows it."""
@@ -69,6 +71,7 @@ class Workbench:
             self.newer = div("")
             self.notes = div("stack")
             self.verdict = VerdictBox()
+            self.places = div("")
             self.analysis = div("analysis")
         self.keys = keys
         self._lay_out("rows")
@@ -130,6 +133,23 @@ class Workbench:
         ui.timer(LOOK_S, self._look_for_changes)
         await self.show(session)
 
+    def _show_places(self, compared: Comparison[Any]) -> None:
+        """The places where the model fails; a click selects their poses."""
+        self.places.clear()
+        if not compared.fails:
+            return
+        rows = compared.data.form == "rows"
+        with self.places, box("row-of places").props('role=group aria-label="Where the model fails"'):
+            words("Fails at", "k")
+            for place in compared.fails:
+                where, _, what = for_page(place.text).partition(": ")
+                at = f"{where}, {place.axis}: {rounded(place.excess, 2)} ×" if rows else f"{where}, {place.axis}"
+                with ui.button(at, on_click=partial(self._show_place, place)).props("outline dense"):
+                    ui.tooltip(f"{what}. Click to select these {compared.fit.measured.type.rows}" if rows else what)
+
+    def _show_place(self, place: Place) -> None:
+        self.pictures.show_place(place)
+
     async def _look_for_changes(self) -> None:
         """Say that the run grows, or that data or model have changed, with a button that updates the analysis."""
         if self.session is None:
@@ -164,7 +184,9 @@ class Workbench:
             return
         self.pictures.show(compared, session)
         self.verdict.error(compared, session)
+        self._show_places(compared)
         self.chosen.grown(session)
+        self.missing.grown(session)
         await asyncio.gather(self.parameters.show(session), self._diagnose(session, turn))
 
     async def _diagnose(self, session: ModelSession[Any], turn: int) -> None:
@@ -189,6 +211,7 @@ class Workbench:
 
     def cancel(self) -> None:
         """Cancel the search for missing effects."""
+        self.discovering = False
         self.turn += 1
         self.search.cancelled = True
         self.verdict.cancelled()
@@ -198,6 +221,41 @@ class Workbench:
         """Start the cancelled search again."""
         if self.session is not None:
             await self._diagnose(self.session, self.turn)
+
+    async def discover(self) -> None:
+        """Add what is missing step by step, and show each step, until no effect is missing or a person stops it."""
+        self.discovering = True
+        count = 0
+        try:
+            while self.session is not None and self.discovering:
+                result = self.diagnoses.get(self.session.names)
+                if result is None or not result.missing or not result.findings.steps:
+                    break
+                step, count = result.findings.steps[0], count + 1
+                self.missing.discovering(step.name, count, count + len(result.missing) - 1)
+                await self.add(step)
+        finally:
+            self.discovering = False
+            self.missing.discovered()
+        left = self.diagnoses.get(self.session.names) if self.session is not None else None
+        if left is not None and left.missing:  # stopped: offer the rest again
+            await self.missing.show(left)
+
+    async def remove(self, name: str) -> None:
+        """Remove one of the added effects; the later ones are fitted again."""
+        if self.session is None:
+            return
+        self.verdict.wait(f"Removing {name} and fitting the others")
+        try:
+            session = await off_loop(self.session.removed, name)
+        except Exception as error:
+            ui.notify(message(error), type="negative", multi_line=True)
+            return
+        for note in session.notes[len(self.session.notes) :]:
+            with self.notes, box("note"):
+                words(note, "small")
+        self.diagnoses = {key: found for key, found in self.diagnoses.items() if name not in key}
+        await self.show(session)
 
     async def add(self, step: Step[Any]) -> None:
         """Add an effect to the model."""
@@ -239,7 +297,6 @@ LOOKS = {
     Verdict.UNEXPLAINED: "doubt",
     Verdict.NO_RESPONSE: "bad",
 }
-MOST_PLACES = 3
 
 
 class VerdictBox:
@@ -288,8 +345,7 @@ class VerdictBox:
 
 
 def _failing(compared: Comparison[Any]) -> str:
-    """The data and the places where the model fails."""
-    places = "; ".join(place.text for place in compared.fails[:MOST_PLACES])
-    what = f"{compared.fit.model.name} on {compared.data.description}"
-    text = f"{what}. Fails: {places}." if places else f"{what}. No place fails."
+    """The model and the data; the places where it fails have a row of their own."""
+    what = f"{compared.fit.model.name} on {compared.data.description}."
+    text = what if compared.fails else f"{what} No place fails."
     return " ".join(filter(None, (text, compared.data.note)))

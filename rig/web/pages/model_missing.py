@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import partial
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlencode
 
@@ -17,6 +18,7 @@ from rig.web.parts import box, div, facts, failed, message, off_loop, waiting, w
 if TYPE_CHECKING:
     from calibrations.discovery.patterns import Pattern
     from calibrations.discovery.results import Candidate, Diagnosis, Step
+    from rig.services.session import ModelSession
     from rig.web.pages.model import Workbench
     from rig.web.parts import Counted
 
@@ -34,6 +36,8 @@ class Missing:
         self.tried: dict[str, Step[Any]] = {}
         with div("side"):
             words("Missing effects", "title")
+            self.added = div("row-of added")
+            self.steps = div("")
             self.cards = div("stack")
             self.own = Own(page)
         self.own.box.set_visibility(own)
@@ -60,6 +64,34 @@ class Missing:
             for _ in range(3):
                 ui.skeleton(height="58px").style("margin-top: 8px")
 
+    def grown(self, session: ModelSession[Any]) -> None:
+        """Show the added effects; each can be removed."""
+        self.added.clear()
+        if not session.steps:
+            return
+        with self.added:
+            words("Added:", "quiet small")
+            for name in session.names:
+                button = ui.button(name, on_click=partial(self.page.remove, name))
+                button.props(f'outline dense no-caps icon-right=close aria-label="Remove {name}"')
+                with button:
+                    ui.tooltip(f"Remove {name}; the others are fitted again")
+
+    def discovering(self, name: str, at: int, of: int) -> None:
+        """Show the present step of the discovery, with a button that ends it after this step."""
+        self.steps.clear()
+        with self.steps, box("stack").props("role=status"):
+            words(f"Step {at} of {of}: adding {name}")
+            ui.linear_progress((at - 1) / of, show_value=False).props("aria-label='progress of the discovery'")
+            ui.button("Stop after this step", icon="stop", on_click=self._stop).props("dense flat")
+
+    def discovered(self) -> None:
+        """The discovery has ended."""
+        self.steps.clear()
+
+    def _stop(self) -> None:
+        self.page.discovering = False
+
     def cancelled(self) -> None:
         """The search was cancelled; an effect of your own can still be tested."""
         self.cards.clear()
@@ -84,6 +116,9 @@ class Missing:
                 self._nothing_to_add(result)
             if missing and result.judgement.provisional:
                 words("Provisional: may change when further effects are added.", "quiet small")
+            if len(result.missing) > 1 and result.findings.steps and not self.page.discovering:
+                title = f"Discover: add all {len(result.missing)} effects"
+                ui.button(title, icon="auto_fix_high", on_click=self.page.discover).props("dense outline")
             cards = [Card(self, c, result, missing and not k) for k, c in enumerate(result.candidates[:FIRST])]
             if len(result.candidates) > FIRST:
                 self._others(result)

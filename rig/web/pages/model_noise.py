@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
 from nicegui import ui
@@ -20,11 +21,11 @@ from calibrations.presentation.charts.noise import (
     steps_chart,
     units,
 )
-from calibrations.presentation.interactive import figure
-from rig.web.parts import box, div, redraw, words
+from rig.web.parts import box, div, words
+from rig.web.pictures import downloads, draw
 
 if TYPE_CHECKING:
-    from calibrations.discovery.results import Comparison, Step
+    from calibrations.discovery.results import Comparison, Place, Step
     from calibrations.noise.fit import NoiseFit
     from rig.services.session import ModelSession
 
@@ -54,7 +55,9 @@ class NoisePictures:
             self.plots: dict[str, ui.plotly] = {}
             for name, title in TITLES.items():
                 with box("picture wide" if name == "record" else "picture"):
-                    words(title, "title")
+                    with div("title"):
+                        words(title, "grow")
+                        downloads(partial(self.plots.get, name), title.partition(";")[0])
                     plot = ui.plotly({"data": [], "layout": {}}).classes("plot")
                     self.plots[name] = plot.props(f'aria-label="{title}"')
 
@@ -94,8 +97,8 @@ class NoisePictures:
             "record": record(found.channel, into),
         }
         for name, panel in panels.items():
-            redraw(self.plots[name], figure(one(panel), f"{name} {found.channel.axis} {into.unit}"))
-        redraw(self.plots["waterfall"], figure(steps_chart(self.session.start, self.session.steps), "waterfall", False))
+            draw(self.plots[name], one(panel), f"{name} {found.channel.axis} {into.unit}")
+        draw(self.plots["waterfall"], steps_chart(self.session.start, self.session.steps), "waterfall", False)
 
     def next_axis(self) -> None:
         """Select the next channel."""
@@ -106,6 +109,13 @@ class NoisePictures:
         """Switch between V and g, if the scale factor is known."""
         if len(self.unit.options) > 1:
             self.unit.set_value(not self.unit.value)
+
+    def show_place(self, place: Place) -> None:
+        """Show the output that fails there."""
+        if self.compared is not None:
+            axes = list(self.compared.fit.still.axes)
+            if place.axis in axes:
+                self.axis.set_value(axes.index(place.axis))
 
     def select(self, points: Sequence[int]) -> None:
         """No effect: averaging times are not poses."""

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from nicegui import events, ui
 
+from calibrations.discovery.places import rows_at
+from calibrations.fitting.sensed import axis_of
 from calibrations.presentation.chart import one
 from calibrations.presentation.charts import motion
 from calibrations.presentation.charts.discovery import levels, waterfall
@@ -16,9 +19,10 @@ from calibrations.presentation.charts.fit import failure, is_function, measureme
 from calibrations.presentation.interactive import figure
 from calibrations.presentation.residual import Column, Shown, choices, first_choices, residual_units
 from rig.web.parts import box, div, redraw, words
+from rig.web.pictures import downloads, draw, remember
 
 if TYPE_CHECKING:
-    from calibrations.discovery.results import Comparison, Step
+    from calibrations.discovery.results import Comparison, Place, Step
     from calibrations.fitting.fit import Fit
     from rig.services.session import ModelSession
 
@@ -75,10 +79,12 @@ class Pictures:
         with box("picture"):
             with div("title"):
                 words(TITLES[name])
+                ui.element("div").classes("space")
                 if name == "residual":
                     self.considered = ui.button(icon="close", on_click=lambda: self.consider(None))
                     self.considered.props("flat dense size=sm icon-right=close").props(remove="icon")
                     self.considered.set_visibility(False)
+                downloads(partial(self.plots.get, name), TITLES[name])
             self.legends[name] = words("", "legend quiet")
             plot = ui.plotly({"data": [], "layout": {}}).classes("plot").props(f'aria-label="{TITLES[name]}"')
             self.plots[name] = plot
@@ -170,8 +176,9 @@ class Pictures:
             drawn = figure(one(replace(panel, title="", second=None)), keep, "select" if linked else "zoom")
             if linked and self.selected:
                 drawn["data"][_dots(drawn)]["selectedpoints"] = self.selected
+            remember(self.plots[name], one(panel))
             redraw(self.plots[name], drawn)
-        redraw(self.plots["waterfall"], figure(waterfall(levels(session)), "waterfall", False))
+        draw(self.plots["waterfall"], waterfall(levels(session)), "waterfall", False)
         self._tell(shown)
 
     def _legends(self, shown: Shown, plain: Column) -> None:
@@ -202,6 +209,16 @@ class Pictures:
         """Open the dialog that excludes the selected rows."""
         if self.selected and self.fit is not None and self.leave_out is not None:
             self.leave_out([int(number) for number in self.fit.table.numbered(self.shown.rows[self.selected])])
+
+    def show_place(self, place: Place) -> None:
+        """Select the rows of a place where the model fails, on the output that fails there."""
+        if self.fit is None:
+            return
+        axes = [axis_of(channel) for channel in self.fit.channels]
+        if place.axis in axes:
+            self.axis.set_value(axes.index(place.axis))
+        there = rows_at(self.fit, place)
+        self.select(np.flatnonzero(np.isin(self.shown.rows, there)).tolist())
 
     def _brushed(self, event: events.GenericEventArguments) -> None:
         self.select(event.args if isinstance(event.args, list) else [])

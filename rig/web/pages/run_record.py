@@ -26,6 +26,7 @@ from rig.web.desk import Desk
 from rig.web.frame import frame
 from rig.web.pages.history_results import HistoryRequest
 from rig.web.parts import box, div, facts, failed, message, off_loop, setting_label, setting_text, table, words
+from rig.web.pictures import downloads, remember
 
 MOST_NAMED = 8
 
@@ -103,6 +104,7 @@ class OverTime:
         with div("row-of"):
             self.kind = ui.select([], label="of", on_change=self.draw).props("dense options-dense")
             self.name = ui.select([], label="over time", on_change=self.draw).props("dense options-dense")
+            downloads(lambda: self.plot, "Run over time")
         self.kind.on("update:model-value", self._choose)
         for select in (self.kind, self.name):
             select.style("min-width: 150px").set_visibility(False)
@@ -151,7 +153,9 @@ class OverTime:
         if course is None or self.name.value not in course.names:
             return
         name = str(self.name.value)
-        self.lay_out().update_figure(figure(course_chart(course, name, self.time), name))
+        chart = course_chart(course, name, self.time)
+        remember(self.lay_out(), chart)
+        self.lay_out().update_figure(figure(chart, name))
 
     def lay_out(self) -> ui.plotly:
         """The plot; made at the first call, so that the browser loads Plotly early."""

@@ -1,0 +1,52 @@
+"""Discover at a click, removal of any effect, places where the model fails, and downloads of pictures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from urllib.parse import quote
+
+import pytest
+from playwright.sync_api import expect
+
+from tests.browser.conftest import Workbench
+from tests.browser.measured import two_faults
+
+pytestmark = pytest.mark.slow
+
+BARS = "[aria-label*=' by model'] .bars .point"
+
+
+def test_all_effects_are_added_at_a_click_and_any_can_be_removed(workbench: Workbench, tmp_path: Path) -> None:
+    page = workbench.visit(f"/?data={quote(two_faults(tmp_path))}")
+    headline = page.locator(".verdict .headline").first
+    expect(headline).to_contain_text("misses")
+    page.locator(".places").get_by_role("button").first.click()
+    expect(page.get_by_role("button", name="Clear selection")).to_be_visible()
+    expect(page.get_by_role("button", name="Clear selection")).to_be_enabled()
+    workbench.shot(page, "discover-places")
+    page.get_by_role("button", name="Discover: add all 2 effects").click()
+    expect(page.get_by_text("Step 1 of 2: adding").or_(page.get_by_text("Step 2 of 2: adding"))).to_be_visible()
+    expect(page.locator(BARS)).to_have_count(3)
+    expect(headline).to_contain_text("Remaining error: 0.9")
+    expect(page.get_by_role("button", name="Discover")).to_have_count(0)
+    removes = page.locator(".added").get_by_role("button")
+    expect(removes).to_have_count(2)
+    names = [each.get_attribute("aria-label") or "" for each in removes.all()]
+    workbench.shot(page, "discovered")
+    page.get_by_role("button", name=names[0]).click()
+    expect(removes).to_have_count(1)
+    expect(page.get_by_role("button", name=names[1])).to_be_visible()
+    expect(page.locator(BARS)).to_have_count(2)
+    expect(headline).to_contain_text(f"misses {names[0].removeprefix('Remove ')}")
+    workbench.fits(page)
+
+
+def test_every_picture_is_downloaded_as_svg_and_png(workbench: Workbench, tmp_path: Path) -> None:
+    page = workbench.visit(f"/?data={quote(two_faults(tmp_path))}")
+    expect(page.locator("[aria-label='Residuals'] .points path").first).to_be_attached()
+    for title, form, begins in (("Residuals", "SVG", b"<?xml"), ("Error by model", "PNG", b"\x89PNG")):
+        page.get_by_role("button", name=f"Download: {title}").click()
+        with page.expect_download() as download:
+            page.get_by_role("menuitem", name=form).or_(page.get_by_text(form, exact=True)).first.click()
+        assert Path(download.value.path()).read_bytes().startswith(begins)
+        assert download.value.suggested_filename == f"{title.lower().replace(' ', '-')}.{form.lower()}"
