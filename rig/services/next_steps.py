@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from calibrations.tables import FITTED
@@ -90,6 +91,58 @@ def _commands(run: Run) -> Iterator[str]:
             yield f"Next: rig report {data} --out night.html"
             return
         yield f"Next: rig compare {data}, rig discover {data}, rig report {data} --out report.html"
+
+
+# The same on a page: what a command does, a button opens.
+
+COMMAND = re.compile(r"rig (\w+)(?: (level-check|check-standard|soak|sweep))?(?: --[\w-]+(?: [\w.]+)?)*")
+LONGER_SETTING = re.compile(r" \(--([\w-]+) ([\d.e+]+)\)")
+PAGES = {  # of a command: the button's label and the address; {run} is the run
+    "compare": ("Model", "/?data={run}"),
+    "discover": ("Model", "/?data={run}"),
+    "fit": ("Model", "/?data={run}"),
+    "exclude": ("Model", "/?data={run}"),
+    "show": ("Record", "/record/{run}"),
+    "resume": ("Run", "/run"),
+    "control": ("History", "/history"),
+}
+
+
+@dataclass(frozen=True)
+class PageStep:
+    """A sentence without commands, and the addresses that replace them by the labels of their buttons."""
+
+    text: str
+    to: Mapping[str, str]
+
+
+def page_steps(run: Run, excluded: Mapping[int, str]) -> list[PageStep]:
+    """`next_steps` for a page."""
+    lines = [*_left_out(excluded), *_failed(run), *_marginal(run), *_unjudged(run.results)]
+    steps = [_page_step(line, run) for line in lines]
+    if run.state != "complete":
+        steps.append(PageStep("The run is not complete. Resume it on the page Run.", {"Run": "/run"}))
+    elif run.procedure == "check-standard":
+        steps.append(PageStep("The history compares it with the earlier runs of this sensor.", {"History": "/history"}))
+    return steps
+
+
+def _page_step(line: str, run: Run) -> PageStep:
+    to: dict[str, str] = {}
+
+    def opened(found: re.Match[str]) -> str:
+        command, procedure = found.groups()
+        if procedure:
+            to[f"Measure {procedure}"] = f"/run?procedure={procedure}"
+            return f"the procedure {procedure}"
+        label, address = PAGES.get("exclude" if "--poses" in found[0] else command, ("Model", PAGES["compare"][1]))
+        to[label] = address.format(run=run.run)
+        return f"the page {label}"
+
+    if longer := LONGER_SETTING.search(line):
+        to["Measure longer"] = f"/run?procedure={run.procedure}&{longer[1].replace('-', '_')}={longer[2]}"
+    text = COMMAND.sub(opened, line.replace(f" {run.run}", ""))
+    return PageStep(LONGER_SETTING.sub("", text), to)
 
 
 def results_table(results: Mapping[str, Any]) -> list[str]:

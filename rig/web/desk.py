@@ -21,11 +21,13 @@ FILES = "files"  # folder of uploaded files
 
 @dataclass
 class Desk:
-    """`dark`: None follows the browser. `sessions`: the open model sessions by data and model, in the order of use."""
+    """`dark`: None follows the browser. `sessions`: the open model sessions by data and model, in the order of use.
+    `reports`: HTML by the content of the data."""
 
     bench_file: Path | None
     dark: bool | None = None
     sessions: OrderedDict[tuple[str, str], ModelSession[Any]] = field(default_factory=OrderedDict)
+    reports: OrderedDict[str, str] = field(default_factory=OrderedDict)
 
     def open(self, data: str, model: str) -> ModelSession[Any]:
         """The open session if its data and model are still the same, else a new one with the same added effects.
@@ -50,6 +52,12 @@ class Desk:
         self.sessions.move_to_end((data, model))
         while len(self.sessions) > MOST_OPEN:
             self.sessions.popitem(last=False)
+
+    def keep_report(self, key: str, text: str) -> None:
+        """Store a report by the content that it is of."""
+        self.reports[key] = text
+        while len(self.reports) > MOST_OPEN:
+            self.reports.popitem(last=False)
 
     def forget(self, data: str) -> None:
         """Close the sessions of `data`, which may have changed."""

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from rig.record import Run
-from rig.services.next_steps import REMEDIES, next_steps, results_table
+from rig.services.next_steps import REMEDIES, next_steps, page_steps, results_table
 
 RUN = Run("r1", "poses", "sweep", "complete", {}, {}, {}, "", {}, "", "", None, None, {}, 20)
 
@@ -95,3 +95,20 @@ def test_results_are_a_table() -> None:
         ["d-tolerance", "0.0012", "V", "-"],
     ]
     assert results_table({}) == []
+
+
+@pytest.mark.parametrize("remedy", REMEDIES.values())
+def test_a_page_has_buttons_in_place_of_commands(remedy: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rig.services.next_steps.REMEDIES", {"": remedy})
+    (step,) = page_steps(replace(RUN, results={"mass": result("fail")}), {})
+    assert "rig " not in step.text
+    assert "--" not in step.text
+    assert bool(step.to) == ("rig " in remedy)
+    assert all(to.startswith("/") and "{" not in to for to in step.to.values())
+
+
+def test_a_page_proposes_the_longer_measurement() -> None:
+    run = replace(RUN, settings={"duration_s": 60.0}, results={"noise-rms-x": result("marginal")})
+    (step,) = page_steps(run, {})
+    assert step.to == {"Measure longer": "/run?procedure=sweep&duration_s=240"}
+    assert "4 times the duration halves" in step.text

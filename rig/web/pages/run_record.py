@@ -19,13 +19,26 @@ from rig.services.charts import Course, RunTime, course_chart, kind_of
 from rig.services.exclusion import exclude, numbered_run
 from rig.services.export import export
 from rig.services.history import lives
-from rig.services.next_steps import next_steps
+from rig.services.next_steps import PageStep, page_steps
 from rig.services.report import reported
 from rig.services.request import Request
 from rig.web.desk import Desk
 from rig.web.frame import frame
 from rig.web.pages.history_results import HistoryRequest
-from rig.web.parts import box, div, facts, failed, message, off_loop, setting_label, setting_text, table, words
+from rig.web.pages.run_report import RunReport
+from rig.web.parts import (
+    box,
+    div,
+    facts,
+    failed,
+    for_page,
+    message,
+    off_loop,
+    setting_label,
+    setting_text,
+    table,
+    words,
+)
 from rig.web.pictures import downloads, remember
 
 MOST_NAMED = 8
@@ -202,13 +215,14 @@ class OneRun:
     def __init__(self, desk: Desk, run: Run, excluded: dict[int, str], known: Mapping[str, int]) -> None:
         self.desk, self.run = desk, run
         self._head()
+        headline = div("")
         with div("two"):
             with div("stack"):
                 with box("stack"):
                     words("Results", "title")
                     _results(run)
-                    for line in next_steps(run, excluded):
-                        words(line, "quiet small")
+                    for step in page_steps(run, excluded):
+                        _step(step)
                     for sensor, count in known.items():
                         ui.link(
                             f"{count} runs of the sensor {sensor}: history", HistoryRequest(sensor).address
@@ -228,6 +242,8 @@ class OneRun:
                         listed(run.run, ui.navigate.reload)
                 with box("stack"):
                     self._notes()
+        if run.state == "complete" and run.rows:
+            RunReport(desk, run, headline)
         ui.timer(0.0, lambda: self.over_time.follow(run.run), once=True)
 
     def _head(self) -> None:
@@ -314,6 +330,14 @@ def _results(run: Run) -> None:
                 with ui.element("td"):
                     if result["verdict"]:
                         words(result["verdict"], f"chip {LOOKS[result['verdict']]}")
+
+
+def _step(step: PageStep) -> None:
+    """What to do next: a sentence, and buttons to the pages where it is done."""
+    with div("row-of"):
+        words(for_page(step.text), "quiet small grow")
+        for label, to in step.to.items():
+            ui.button(label, on_click=partial(ui.navigate.to, to)).props("outline dense")
 
 
 def _made(run: Run) -> dict[str, str]:

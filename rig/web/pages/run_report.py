@@ -1,0 +1,87 @@
+"""The report of a run inside its page: sentences, tables and pictures, as `rig report` writes them."""
+
+from __future__ import annotations
+
+import html
+import re
+
+from nicegui import ui
+from nicegui.element import Element
+
+from rig.record import Run
+from rig.services.content import content_of
+from rig.services.report import reported
+from rig.services.request import Request
+from rig.web.desk import Desk
+from rig.web.parts import box, div, failed, message, off_loop, waiting, words
+
+# the frame is as high as the report; a report has no scripts, and the page's policy lets it load nothing
+FITTED = (
+    "const fit = () => { this.style.height = '0'; "
+    "this.style.height = this.contentDocument.documentElement.scrollHeight + 'px' }; "
+    "fit(); this.contentWindow.addEventListener('resize', e => { if (this.clientWidth !== this.wide) "
+    "{ this.wide = this.clientWidth; fit() } }); this.wide = this.clientWidth"
+)
+HEADLINE = re.compile(r"<h1[^>]*>(.*?)</h1>", re.DOTALL)
+
+
+class RunReport:
+    """The report of a run, or of each sensor of a batch. It is made once for each content of the data."""
+
+    def __init__(self, desk: Desk, run: Run, headline: Element) -> None:
+        """`headline`: where the first sentence of the report appears."""
+        self.desk, self.run, self.headline = desk, run, headline
+        self.names = [f"{run.run}/{sensor}" for sensor in run.bench.get("sensors", {})] or [run.run]
+        with box("stack report"):
+            with div("row-of"):
+                words("Report", "title")
+                self.sensor = ui.toggle(self.names, value=self.names[0], on_change=self.show).props("dense no-caps")
+                self.sensor.set_visibility(len(self.names) > 1)
+            self.place = div("")
+        ui.timer(0.0, self.show, once=True)
+
+    @property
+    def data(self) -> str:
+        """The run, or the chosen sensor of it."""
+        return str(self.sensor.value)
+
+    async def show(self) -> None:
+        """Make the report, unless it is made already, and show it."""
+        data = self.data
+        self.place.clear()
+        with self.place:
+            waiting("Fitting the model, searching for missing effects, drawing")
+        try:
+            text = await off_loop(self.text, data)
+        except Exception as error:
+            self.place.clear()
+            with self.place:
+                failed("This run has no report", message(error))
+            return
+        if data != self.data:
+            return
+        self.place.clear()
+        with self.place:
+            ui.html(_framed(f"Report on {data}", text), sanitize=False)
+        self.headline.clear()
+        if found := HEADLINE.search(text):
+            with self.headline, box("row-of verdict").props("role=status"):
+                words(html.unescape(re.sub(r"<[^>]*>", "", found[1])).strip(), "headline grow")
+                ui.button("Report below", icon="south", on_click=self.see).props("flat dense")
+
+    def see(self) -> None:
+        """Scroll to the report."""
+        ui.run_javascript("document.querySelector('.report')?.scrollIntoView({block: 'start'})")
+
+    def text(self, data: str) -> str:
+        """The report as HTML. Raises what `reported` raises."""
+        key = content_of(data, None).key
+        if key not in self.desk.reports:
+            _, make = reported(Request(data, None, self.desk.bench_file), lambda _: None)
+            self.desk.keep_report(key, make())
+        return self.desk.reports[key]
+
+
+def _framed(title: str, text: str) -> str:
+    """A frame that shows an HTML text, as high as it needs."""
+    return f'<iframe title="{html.escape(title)}" onload="{FITTED}" srcdoc="{html.escape(text)}"></iframe>'

@@ -1,0 +1,48 @@
+"""The report of a run inside its page: the night of a soak, the figure of a motion test; buttons, no commands."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from procedures.catalogue import find
+from procedures.settings import parse
+from rig.bench import read_bench
+from rig.cli.terminal.watch import Quiet
+from rig.record import Record
+from rig.runs.runner import start
+from tests.browser.conftest import Workbench
+
+pytestmark = pytest.mark.slow
+
+
+def measured(workbench: Workbench, name: str, settings: dict[str, Any]) -> Page:
+    """The page of a new run."""
+    procedure = find(name)
+    with Record() as record:
+        run = start(record, read_bench(), procedure, parse(procedure, settings), Quiet({})).run.run
+    return workbench.visit(f"/record/{run}")
+
+
+def test_the_night_of_a_soak_is_told_and_drawn(workbench: Workbench) -> None:
+    page = measured(workbench, "soak", {"duration_s": "1200", "interval_s": "300", "off_s": "60"})
+    report = page.frame_locator(".report iframe")
+    expect(report.get_by_role("heading", name="Course")).to_be_visible()
+    expect(report.get_by_role("heading", name="Forecasts")).to_be_visible()
+    expect(page.locator(".verdict .headline")).to_contain_text("teady")
+    expect(report.locator("svg").first).to_be_visible()
+    frame = page.locator(".report iframe")
+    page.wait_for_function("f => f.scrollHeight <= f.clientHeight && f.clientHeight > 900", arg=frame.element_handle())
+    workbench.shot(page, "run-report")
+    workbench.fits(page)
+
+
+def test_the_figure_of_a_motion_test_is_in_its_page_without_commands(workbench: Workbench) -> None:
+    page = measured(workbench, "motion", {})
+    report = page.frame_locator(".report iframe")
+    expect(report.get_by_text("displacement sensor").first).to_be_visible()
+    expect(page.get_by_text("Settings", exact=True)).to_be_visible()
+    assert "rig report" not in page.locator("body").inner_text()
+    assert "rig compare" not in page.locator("body").inner_text()
