@@ -12,8 +12,8 @@ from calibrations.table import Array
 
 
 @njit(cache=True, nogil=True)
-def slip(a: Array, on_the_way: Array, pressed: Array, limits: Array) -> Array:
-    """Force held by elements of equal stiffness that stick and slip, at each row, shape (n, 3), 1 where all slip.
+def slip_elements(a: Array, on_the_way: Array, pressed: Array, limits: Array) -> Array:
+    """Force held by elements of equal stiffness that stick and slip, at each row, shape (n, elements, 3), g.
 
     a            (n, 3) specific force, g
     on_the_way   (n, turns, 3) points where it turned round before each row
@@ -21,7 +21,7 @@ def slip(a: Array, on_the_way: Array, pressed: Array, limits: Array) -> Array:
     limits       (elements,) g; an element follows the force and slips at its limit; rows in order of time
     """
     n, axes = a.shape
-    state = np.zeros_like(a)
+    state = np.zeros((n, len(limits), axes))
     for k in range(axes):
         held = np.zeros(len(limits))
         last = 0.0
@@ -32,8 +32,13 @@ def slip(a: Array, on_the_way: Array, pressed: Array, limits: Array) -> Array:
                     limit = limits[e] * pressed[i, k]
                     held[e] = min(limit, max(-limit, held[e] + here - last))
                 last = here
-            state[i, k] = np.sum(held) / np.sum(limits)
+            state[i, :, k] = held
     return state
+
+
+def slip(a: Array, on_the_way: Array, pressed: Array, limits: Array) -> Array:
+    """Force held by all elements, shape (n, 3), 1 where all slip."""
+    return np.asarray(slip_elements(a, on_the_way, pressed, limits).sum(axis=1) / limits.sum())
 
 
 @njit(cache=True, nogil=True)

@@ -27,6 +27,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
+from calibrations.effects.kernels import slip_elements
 from calibrations.effects.thermometer import leading_temperature
 from calibrations.free_forms.bases import Basis, Play, Products
 from calibrations.free_forms.poses import side, way
@@ -124,12 +125,5 @@ def _slipping(table: Table, basis: Play, approach_deg: float) -> Array:
     """Forces of the slip elements over their widths, shape (3, n, widths)."""
     widths = np.array(basis.widths)
     driver = specific_force(nominal_pose(table))
-    held, last = np.zeros((3, len(widths))), np.zeros(3)
-    out = np.empty((3, table.n, len(widths)))
-    path = np.concatenate([way(table, approach_deg), driver[:, None]], axis=1)
-    for i, points in enumerate(path):
-        for here in points:
-            held = np.minimum(np.maximum(held + (here - last)[:, None], -widths), widths)
-            last = here
-        out[:, i] = held
-    return np.asarray(out / widths)
+    held = slip_elements(driver, way(table, approach_deg), np.ones_like(driver), widths)
+    return np.ascontiguousarray(np.moveaxis(held, 2, 0) / widths)
