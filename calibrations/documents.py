@@ -5,14 +5,18 @@ They are the same for every kind of data; `Dataset` adds the fields that one kin
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from calibrations.discovery.curves import PlaceCurve, place_curves
 from calibrations.discovery.dataset import Dataset
 from calibrations.discovery.plausibility import Finding
 from calibrations.discovery.results import Candidate, Comparison, Diagnosis, Discovery, F, Step
+from calibrations.discovery.summary import step_shares, summary_lines
 from calibrations.model import Model
+from calibrations.table import Array
 
 if TYPE_CHECKING:
     from calibrations.design.expected import Expected
@@ -100,12 +104,39 @@ def discovery_document(result: Discovery[F], path: str | None) -> Document:
         "data": result.findings.data.source,
         "verdict": result.verdict.value,
         "text": result.judgement.text,
-        "steps": [step_document(step, result.findings.data) for step in result.steps],
+        "steps": _steps(result),
+        "summary": _summary(result),
         "causes": list(result.causes),
         "refinements": list(result.refinements),
         **_in_doubt(result),
         "model": path,
     }
+
+
+def _steps(result: Discovery[F]) -> list[Document]:
+    """The steps; of rows with the share of the variance beyond the noise that each explains on unseen data."""
+    data = result.findings.data
+    steps = [step_document(step, data) for step in result.steps]
+    shares = step_shares(result) if data.form == "rows" else []  # type: ignore[arg-type]
+    return [step | {"share": share} for step, share in zip(steps, shares, strict=True)] if shares else steps
+
+
+def _summary(result: Discovery[F]) -> list[Document]:
+    """A line for each place that acts, and for each further effect that was added; none for a still record."""
+    lines = summary_lines(result) if result.findings.data.form == "rows" else []  # type: ignore[arg-type]
+    return [
+        {
+            "place": line.place,
+            "effects": list(line.effects),
+            "size": line.size,
+            "unit": line.unit,
+            "share": line.share,
+            "certainty": line.certainty,
+            "in_another_form": line.in_another_form,
+            "inseparable_from": list(line.inseparable_from),
+        }
+        for line in lines
+    ]
 
 
 def _in_doubt(result: Diagnosis[F] | Discovery[F]) -> Document:
@@ -126,6 +157,7 @@ def places_document(result: Diagnosis[F] | Discovery[F]) -> list[Document]:
     """The places of the signal chain that act, the largest first; none where the search does not tell."""
     acting, data = result.findings.places, result.findings.data
     total = sum(place.rms**2 for place in acting) or 1.0
+    curves = place_curves(result.findings) if acting else {}  # type: ignore[arg-type]  # only rows have places
     return [
         {
             "place": place.name,
@@ -138,9 +170,31 @@ def places_document(result: Diagnosis[F] | Discovery[F]) -> list[Document]:
             "explained_by": list(place.causes),
             "explained_share": place.share if place.causes else 0.0,
             "inseparable_from": list(place.inseparable_from),
+            **_curve_fields(curves.get(place.name), bool(place.causes)),
         }
         for place in acting
     ]
+
+
+def _curve_fields(curve: PlaceCurve | None, explained: bool) -> Document:
+    """The curve of a place, its symmetry, and an expression where its form is unknown; null where there is none."""
+    if curve is None:
+        return {"symmetry": None, "expression": None, "curve": None}
+    at = curve.at[curve.largest]  # one grid for all axes
+
+    def on_grid(values: Mapping[str, Array]) -> Document:
+        return {axis: np.interp(at, curve.at[axis], each).tolist() for axis, each in values.items()}
+
+    document = {
+        "driver": curve.driver,
+        "driver_unit": curve.driver_unit,
+        "unit": curve.unit,
+        "at": at.tolist(),
+        "value": on_grid(curve.value),
+        "std": on_grid(curve.std),
+    }
+    expression = None if explained else curve.expression
+    return {"symmetry": curve.symmetry or None, "expression": expression, "curve": document}
 
 
 def step_document(step: Step[F], data: Dataset[F]) -> Document:

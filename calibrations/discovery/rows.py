@@ -33,6 +33,7 @@ from calibrations.discovery.plausibility import Finding, refusal, rejection
 from calibrations.discovery.results import Candidate, Diagnosis, Discovery, Findings, Place, Step
 from calibrations.discovery.search import Path, Settled, cost, find_path, first_order, is_complete, recounted, settled
 from calibrations.discovery.structure import plainer, structure_of
+from calibrations.discovery.summary import step_shares
 from calibrations.discovery.verdict import Verdict
 from calibrations.effects import Effect
 from calibrations.effects.expression_effect import effect_for
@@ -412,11 +413,12 @@ class Rows(Dataset[Fit]):
     def step_table(self, found: Discovery[Fit]) -> Cells:
         """The error of each model, with bars."""
         fits = [(found.start.model.name, found.start), *((f"+ {s.name}", s.after) for s in found.steps)]
+        shares = ["", *("-" if share is None else f"{100 * share:.1f} %" for share in step_shares(found))]
         rows = [
-            (name, f"{each.pooled_excess:.2f}", f"{each.held_out_excess:.2f}", _bar(each, found.start))
-            for name, each in fits
+            (name, f"{each.pooled_excess:.2f}", f"{each.held_out_excess:.2f}", share, _bar(each, found.start))
+            for (name, each), share in zip(fits, shares, strict=True)
         ]
-        return ("model", "error / floor", self.unseen, ""), rows
+        return ("model", "error / floor", self.unseen, "share", ""), rows
 
     def candidate_table(self, result: Diagnosis[Fit], candidates: Sequence[Candidate]) -> Cells:
         """Held-out error, chance and probability of each candidate."""

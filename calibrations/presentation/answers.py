@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
+import numpy as np
+
 from calibrations.discovery.results import Comparison, Diagnosis, Discovery
+from calibrations.discovery.summary import summary_lines, sure
 from calibrations.documents import places_document, why
 from calibrations.text import columns, quantity
 
@@ -51,22 +54,48 @@ def discovery_text(result: Discovery[Any], experiment: Iterable[str] = ()) -> st
     lines = [result.judgement.text, *data.remarks(result.end), *experiment]
     lines += [f"But {result.caution}."] if result.caution else []
     parts = [columns(*data.step_table(result)), "\n".join(lines)]
-    if result.findings.places:
-        parts.insert(1, _places(result))
+    if data.form == "rows" and (summary := _summary(result)):
+        parts[1:1] = filter(None, [summary, unknown_text(result)])
     return "\n\n".join(parts)
 
 
-def _places(result: Discovery[Any]) -> str:
-    """Where something acts, how much, and why."""
+def unknown_text(result: Discovery[Any]) -> str:
+    """The curves of unknown form, a line each: symmetry, range, band, and an expression to add; "" without any."""
+    lines = []
+    for place in places_document(result):
+        if place["explained_by"] or (curve := place["curve"]) is None:
+            continue
+        axis = max(curve["value"], key=lambda a: float(np.ptp(curve["value"][a])))
+        value, band = np.array(curve["value"][axis]), float(np.mean(curve["std"][axis]))
+        text = (
+            f"Unknown form at {place['place']}: from {quantity(float(value.min()), curve['unit'])} to "
+            f"{quantity(float(value.max()), curve['unit'])} ({axis}), standard uncertainty "
+            f"{quantity(band, curve['unit'])} on average"
+        )
+        if place["symmetry"]:
+            text += f"; {place['symmetry']}{' ' + curve['driver_unit'] if 'about' in place['symmetry'] else ''}"
+        lines.append(f"{text}.")
+        if place["expression"]:
+            name = f"{place['place'].replace(':', '-').replace('_', '-')}-form"
+            lines.append(f"    It looks like: {place['expression']}")
+            lines.append(
+                f'    To add that in its stead: rig add "{place["expression"]}" --name {name} --model MODEL '
+                f"--data {result.findings.data.source} --out MODEL2"
+            )
+    return "\n".join(lines)
+
+
+def _summary(result: Discovery[Any]) -> str:
+    """Where something acts, which effect it is, how much, and how certain; "" without any."""
     rows = [
         (
-            place["place"],
-            ", ".join(place["explained_by"]) or "unknown form",
-            quantity(place["size"], place["unit"]),
-            f"{place['size_over_floor']:.3g}",
-            f"{100 * place['share']:.2g} %",
-            ", ".join(place["inseparable_from"]) or "-",
+            line.place,
+            line.effect,
+            f"{line.size:.3g} {line.unit}",
+            f"{100 * line.share:.3g} %",
+            sure(line.certainty),
+            ", ".join(line.inseparable_from) or "-",
         )
-        for place in places_document(result)
+        for line in summary_lines(result)
     ]
-    return columns(("place", "effect", "size", "size / floor", "share", "cannot be separated from"), rows)
+    return columns(("place", "effect", "size", "share", "certainty", "cannot be separated from"), rows) if rows else ""

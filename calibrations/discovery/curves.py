@@ -1,0 +1,296 @@
+"""What acts at a place of the signal chain as a curve over what drives it, with its band, symmetry and expression.
+
+A curve is what the effects of the place contribute to the final model's prediction, effects of the catalogue and free
+form together, averaged over poses of the same driver. Constant and linear parts over the forces, which belong to bias,
+scale factor and geometry, are taken off. The band is the standard uncertainty by the parameters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from calibrations.discovery.results import Findings
+from calibrations.fitting.fit import Fit
+from calibrations.fitting.identifiability import covariance
+from calibrations.free_forms.effect import PREFIX, place_of_effect
+from calibrations.free_forms.form import CROSS
+from calibrations.geometry.orientation import out_of_plane
+from calibrations.model.chain import forward, static_force
+from calibrations.table import Array, Table
+
+MOST_POINTS = 48  # of a curve
+NEARLY_ALL = 0.9  # of the variance of a curve: it is even, or odd
+DESCRIBED = 0.8  # of it that an expression must explain to be proposed
+LESS_PLAIN = 0.02  # of it that a less plain expression must explain beyond a plainer one
+LEAST_STD = 0.02  # of a curve's rms: a smaller band does not weigh more
+STEP_RAD = 1e-5  # of a numerical derivative by an angle
+WAVES = 9  # in a turn, at most
+
+DRIVERS = {  # place -> driver, its unit, what the curve is multiplied by
+    "stage-angle-alpha": ("alpha_deg", "deg", "angle"),
+    "stage-angle-beta": ("beta_deg", "deg", "angle"),
+    "own-response": ("own force", "g", ""),
+    "cross-response": ("force along the other axis", "g", ""),
+    "z-response": ("force out of the plane", "g", ""),
+    "scale-over-cross": ("force along the other axis", "g", "force"),
+    "scale-over-z": ("force out of the plane", "g", "force"),
+    "temperature-bias": ("temperature_c", "degC", ""),
+    "temperature-scale": ("temperature_c", "degC", "force"),
+    "time-bias": ("t_s", "s", ""),
+    "time-scale": ("t_s", "s", "force"),
+    "output": ("output", "{out}", ""),
+}  # and a logged column
+
+
+@dataclass(frozen=True)
+class PlaceCurve:
+    """The curve of a place. `value` and `std` by axis, shape (m,), over `at` by axis, (m,), in `unit`.
+
+    Stage angles have one curve for all axes, under the name of the angle. `explained` has the part of the effects of
+    the catalogue alone.
+    """
+
+    place: str
+    driver: str
+    driver_unit: str
+    unit: str
+    at: Mapping[str, Array]
+    value: Mapping[str, Array]
+    std: Mapping[str, Array]
+    explained: Mapping[str, Array]
+
+    @property
+    def largest(self) -> str:
+        """The axis with the largest curve."""
+        return max(self.value, key=lambda axis: float(np.std(self.value[axis])))
+
+    @cached_property
+    def symmetry(self) -> str:
+        """The symmetry of the largest curve, in words; "" where it has none that can be said."""
+        axis = self.largest
+        return _symmetry(self.driver, self.at[axis], self.value[axis])
+
+    @cached_property
+    def expression(self) -> str | None:
+        """An expression that describes the largest curve and can be added; None where none does."""
+        axis = self.largest
+        return _proposed(self, axis, self.at[axis], self.value[axis], self.std[axis])
+
+
+def place_curves(findings: Findings[Fit]) -> dict[str, PlaceCurve]:
+    """The curve of each place of a search that acts, by name; places without one driver have none."""
+    end = findings.end
+    found = (place_curve(end, place.name) for place in findings.places)
+    return {curve.place: curve for curve in found if curve is not None}
+
+
+def place_curve(end: Fit, place: str) -> PlaceCurve | None:
+    """The curve of one place in a fitted model; None where the model has no effect there, or it has no one driver."""
+    names = [term.name for term in end.model.terms if place_of_effect(term.name) == place]
+    known = DRIVERS.get(place) or _logged(place, end.table)
+    if not names or known is None:
+        return None
+    driver, driver_unit, factor = known
+    groups = _groups(end, place, driver, factor)
+    base = None if factor == "angle" else [_base(driver, factor, x, weight) for _, x, weight in groups.values()]
+    value, std = _contribution(end, names, base)
+    named = [name for name in names if not name.startswith(PREFIX)]
+    explained = _contribution(end, named, base)[0] if named else np.zeros(value.shape)
+    at, values, bands, parts = {}, {}, {}, {}
+    for axis, (rows, x, weight) in groups.items():
+        averaged = _averaged(x, weight, value[rows].ravel(), std[rows].ravel(), explained[rows].ravel())
+        at[axis], values[axis], bands[axis], parts[axis] = averaged
+    if not at:
+        return None
+    unit = {"": end.problem.unit, "force": f"{end.problem.unit}/g", "angle": "deg"}[factor]
+    driver_unit = driver_unit.replace("{out}", end.problem.unit)
+    return PlaceCurve(place, driver, driver_unit, unit, at, values, bands, parts)
+
+
+def _logged(place: str, table: Table) -> tuple[str, str, str] | None:
+    name = place.removeprefix("column:")
+    return (name, "", "") if name != place and name in table else None
+
+
+def _base(driver: str, factor: str, x: Array, weight: Array) -> Array:
+    """Orthonormal columns (n, k) that belong to bias, scale factor and geometry, whatever the place."""
+    force = [weight] if factor else [x] if "force" in driver else []
+    return np.asarray(np.linalg.qr(np.column_stack([np.ones(len(x)), *force]))[0])
+
+
+def _contribution(end: Fit, names: list[str], base: list[Array] | None) -> tuple[Array, Array]:
+    """What effects contribute to the prediction beside the base, and its standard uncertainty, (channels, n)."""
+    steps = end.problem.layout.steps(end.theta)
+    rest = [step for step in steps if step[0].name not in names]
+    value = (forward(end.table, steps) - forward(end.table, rest)).T
+    mask = np.any([end.problem.layout.of_effect(name) for name in names], axis=0)
+    cov = covariance(end.information, end.problem.layout.typical)[0][np.ix_(mask, mask)]
+    J = end.jacobian[:, :, mask]
+    if base is not None:
+        value = np.stack([v - Q @ (Q.T @ v) for v, Q in zip(value, base, strict=True)])
+        J = np.stack([j - Q @ (Q.T @ j) for j, Q in zip(J, base, strict=True)])
+    return value, np.sqrt(np.maximum(np.einsum("cni,ij,cnj->cn", J, cov, J), 0.0))
+
+
+def _groups(end: Fit, place: str, driver: str, factor: str) -> dict[str, tuple[list[int], Array, Array]]:
+    """By axis: channels, what drives the place, and what the curve is multiplied by, for all their rows."""
+    table, count = end.table, len(end.table.axes)
+    force = static_force(table, end.problem.layout.steps(end.theta))
+    if factor == "angle":
+        channels = list(range(count))
+        by = np.concatenate([_by_angle(end, place)[k] for k in channels])
+        return {place.removeprefix("stage-angle-"): (channels, np.tile(table.column(driver), count), by)}
+    found = {}
+    for k, axis in enumerate(table.axes):
+        x = {
+            "own force": force[:, k],
+            "force along the other axis": force[:, CROSS[k]],
+            "force out of the plane": out_of_plane(force)[:, k],
+            "output": table.outputs[:, k],
+        }.get(driver)
+        x = table.column(driver) if x is None else x
+        found[axis] = [k], x, force[:, k] if factor == "force" else np.ones(table.n)
+    return found
+
+
+def _by_angle(end: Fit, place: str) -> Array:
+    """d output / d stage angle, per deg, (channels, n)."""
+    name = f"{place.removeprefix('stage-angle-')}_deg"
+    steps = end.problem.layout.steps(end.theta)
+
+    def moved(by: float) -> Array:
+        columns = {**end.table.columns, name: end.table.column(name) + by}
+        return forward(_with(end.table, columns), steps)
+
+    return np.asarray((moved(STEP_RAD) - moved(-STEP_RAD)).T / (2 * STEP_RAD))
+
+
+def _with(table: Table, columns: Mapping[str, Array]) -> Table:
+    return Table(table.kind, columns, table.constants, table.source, table.labels, table.numbers, table.noise)
+
+
+def _averaged(x: Array, weight: Array, value: Array, std: Array, explained: Array) -> tuple[Array, Array, Array, Array]:
+    """A curve f with value = weight f(x), by least squares at each of at most MOST_POINTS places along x."""
+    distinct = np.unique(np.round(x, 6))
+    if len(distinct) <= MOST_POINTS:
+        part = np.searchsorted(distinct, np.round(x, 6))
+    else:
+        edges = np.quantile(x, np.linspace(0, 1, MOST_POINTS + 1))
+        part = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, MOST_POINTS - 1)
+    squares = np.bincount(part, weight**2)
+    kept = np.flatnonzero(squares > 1e-6 * squares.max())
+    rows = np.bincount(part)
+    at = (np.bincount(part, x) / np.maximum(rows, 1))[kept]
+
+    def mean(values: Array) -> Array:
+        return np.asarray((np.bincount(part, weight * values) / np.where(squares > 0, squares, 1.0))[kept])
+
+    band = np.sqrt(np.bincount(part, (weight * std) ** 2 * rows[part]) / np.where(squares > 0, squares, 1.0) ** 2)
+    return at, mean(value), band[kept], mean(explained)
+
+
+def _symmetry(driver: str, x: Array, value: Array) -> str:
+    if len(x) < 6 or not np.ptp(value) > 0:
+        return ""
+    if driver == "beta_deg":
+        k = int(np.argmax([_share(_wave(np.radians(x), k), value) for k in range(1, WAVES + 1)])) + 1
+        return f"{k} wave{'s' * (k > 1)} in a turn of beta"
+    middle = 0.0 if "force" in driver else (x.min() + x.max()) / 2
+    half = min(x.max() - middle, middle - x.min())
+    if half <= 0:
+        return ""
+    u = np.linspace(-half, half, 41)
+    v = np.interp(middle + u, x, value)
+    v = v - v.mean()
+    even = float(np.sum(((v + v[::-1]) / 2) ** 2) / np.sum(v**2)) if np.any(v) else 0.0
+    about = f"about {middle:.3g}"
+    if even > NEARLY_ALL:
+        return f"even {about}"
+    return f"odd {about}" if even < 1 - NEARLY_ALL else f"neither even nor odd {about}"
+
+
+def _wave(x: Array, k: float) -> Array:
+    return np.column_stack([np.sin(k * x), np.cos(k * x)])
+
+
+def _proposed(curve: PlaceCurve, axis: str, x: Array, value: Array, std: Array) -> str | None:
+    """The plainest expression that explains nearly as much of the curve as the best."""
+    variable = _variable(curve.driver, axis)
+    if variable is None or len(x) < 6 or not np.ptp(value) > 0:
+        return None
+    line = "force" in curve.driver  # constant and line over a force belong to bias and geometry
+    base = np.column_stack([np.ones(len(x)), x] if line else [np.ones(len(x))])
+    weight = 1 / np.maximum(std, LEAST_STD * float(np.std(value)))
+    total = _left(np.ones((len(x), 1)), value, weight)
+    rest = _left(base, value, weight)
+    best: tuple[float, str] | None = None
+    for columns, text in _shapes(curve, x, variable):
+        share = 1 - _left(np.column_stack([base, columns]), value, weight) / rest if rest > 1e-12 * total else 0.0
+        if share > DESCRIBED and (best is None or share > best[0] + LESS_PLAIN):
+            best = share, text
+    if best is None:
+        return None
+    if curve.unit == "deg":
+        return f"{curve.driver} += {best[1]}"
+    target = "v" if not line and curve.unit == "V" else f"v{axis}"
+    return f"{target} += {f'a{axis}*(' if curve.unit.endswith('/g') else ''}{best[1]}{')' * curve.unit.endswith('/g')}"
+
+
+def _variable(driver: str, axis: str) -> str | None:
+    """The driver's name in an expression; None where it has none."""
+    other = {"x": "y", "y": "x", "z": "x"}.get(axis, "")
+    words = {
+        "alpha_deg": "alpha", "beta_deg": "beta", "temperature_c": "temperature", "t_s": "t", "supply_v": "supply",
+        "own force": f"a{axis}", "force along the other axis": f"a{other}", "force out of the plane": "az",
+        "output": None,
+    }  # fmt: skip
+    return words.get(driver, driver)
+
+
+def _shapes(curve: PlaceCurve, x: Array, u: str) -> Iterator[tuple[Array, str]]:
+    """Columns of shapes over x with their expressions, the plainest first."""
+    if curve.unit == "deg":
+        turned = np.radians(x)
+        for k in range(1, WAVES + 1):
+            yield _wave(turned, k), f"a*sin({k}*{u}) + b*cos({k}*{u})" if k > 1 else f"a*sin({u}) + b*cos({u})"
+        return
+    if "force" not in curve.driver:
+        yield x[:, None], f"a*{u}"
+    span = float(np.ptp(x)) or 1.0
+    if "force" not in curve.driver:
+        z = (x - (x.min() + x.max()) / 2) / span
+        yield np.column_stack([z, z**2]), f"a*({u} - b)**2"
+    else:
+        yield x[:, None] ** 2, f"a*{u}**2"
+        yield x[:, None] ** 3, f"a*{u}**3"
+        yield np.abs(x)[:, None], f"a*abs({u})"
+        yield (x * np.abs(x))[:, None], f"a*{u}*abs({u})"
+        yield x[:, None] ** 4, f"a*{u}**4"
+    if curve.driver == "t_s":
+        yield from (
+            (np.exp(-(x - x.min()) / (s * span))[:, None], f"a*exp(-{u}/c)") for s in (0.03, 0.1, 0.2, 0.4, 0.8)
+        )
+    for s in (0.05, 0.1, 0.2, 0.4):
+        for c in np.linspace(x.min() + 0.1 * span, x.max() - 0.1 * span, 9):
+            yield np.tanh((x - c) / (s * span))[:, None], f"a*tanh(({u} - b)/c)"
+    for c in np.linspace(x.min() + 0.1 * span, x.max() - 0.1 * span, 17):
+        yield np.maximum(x - c, 0)[:, None], f"a*max({u} - b, 0)"
+    for waves in np.arange(0.5, 6.1, 0.25):
+        yield _wave(x, 2 * np.pi * waves / span), f"a*sin(c*{u}) + b*cos(c*{u})"
+
+
+def _left(columns: Array, value: Array, weight: Array) -> float:
+    X, y = columns * weight[:, None], value * weight
+    size = np.maximum(np.linalg.norm(X, axis=0), 1e-300)
+    rest = y - X @ (np.linalg.lstsq(X / size, y, rcond=1e-9)[0] / size)
+    return float(rest @ rest)
+
+
+def _share(columns: Array, value: Array) -> float:
+    ones = np.ones(len(value))
+    whole = _left(ones[:, None], value, ones)
+    return 1 - _left(np.column_stack([ones, columns]), value, ones) / whole if whole > 0 else 0.0

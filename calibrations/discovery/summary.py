@@ -1,0 +1,98 @@
+"""The summary of a discovery: one line for each place that acts, and one for each further effect that was added.
+
+Shares are those of the variance beyond the noise. A step's share is the fall of the error on unseen data; the share of
+a line is its part of the squares of all lines.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibrations.discovery.results import Discovery
+from calibrations.discovery.search import first_order
+from calibrations.discovery.significance import chance
+from calibrations.fitting.fit import Fit
+from calibrations.fitting.sensed import in_milli, milli_unit, pooled_milli
+from calibrations.free_forms.effect import PREFIX, place_of_effect
+from calibrations.means.noise import rms
+from calibrations.table import Array
+
+UNKNOWN = "unknown form"
+NO_VARIANCE = 0.1  # of the noise's: a model that leaves less beyond it has nothing to share out
+
+
+@dataclass(frozen=True)
+class Line:
+    """One cause. `size` in thousandths of what is sensed, rms; `certainty`: 1 less the chance that noise does as much.
+
+    `effects`: () where the form is unknown. `in_another_form`: a free form beside them follows what they leave.
+    """
+
+    place: str
+    effects: tuple[str, ...]
+    size: float
+    unit: str
+    share: float
+    certainty: float
+    inseparable_from: tuple[str, ...]
+    in_another_form: bool = False
+
+    @property
+    def effect(self) -> str:
+        """The effects in words."""
+        names = ", ".join(self.effects) or UNKNOWN
+        return f"{names} (another form)" if self.in_another_form else names
+
+
+def step_shares(found: Discovery[Fit]) -> list[float | None]:
+    """By step, the share that it explains of the variance beyond the noise, on unseen data; below 0 where it rises.
+
+    None where the given model leaves no more than noise.
+    """
+    whole = found.start.held_out_excess**2 - 1
+    if whole < NO_VARIANCE:
+        return [None for _ in found.steps]
+    return [float((s.held_out_before**2 - s.held_out_after**2) / whole) for s in found.steps]
+
+
+def summary_lines(found: Discovery[Fit]) -> list[Line]:
+    """The lines, largest first."""
+    findings, end = found.findings, found.end
+    floor, unit = pooled_milli(end)[1], milli_unit(end)
+    added = {step.name for step in found.steps}
+    alternatives = found.alternatives
+    lines, told = [], set[str]()
+    for place in findings.places:
+        effects = tuple(c for c in place.causes if c in added)
+        if not effects and f"{PREFIX}{place.name}" not in added:
+            continue  # a cause of another name takes it up, or the search stopped before
+        rivals = dict.fromkeys([*place.inseparable_from, *(r for e in effects for r in alternatives.get(e, ()))])
+        certainty = 1 - place.p_value
+        lines.append((place.name, effects, place.size * floor, certainty, tuple(rivals)))
+        told |= {*effects, f"{PREFIX}{place.name}"}
+    for step in found.steps:
+        if step.name in told or (step.name in found.refinements and not step.name.startswith(PREFIX)):
+            continue
+        change = rms(in_milli_rows(step.after.residual - step.before.residual, end))
+        p = chance(*first_order(end, step.name, shared=True))
+        effects = () if step.name.startswith(PREFIX) else (step.name,)
+        at = place_of_effect(step.name) or "-"
+        lines.append((at, effects, float(np.sqrt(np.mean(change**2))), 1 - p, tuple(alternatives.get(step.name, ()))))
+    total = sum(size**2 for _, _, size, _, _ in lines) or 1.0
+    made = [
+        Line(at, e, size, unit, size**2 / total, certainty, rivals, bool(e) and f"{PREFIX}{at}" in added)
+        for at, e, size, certainty, rivals in lines
+    ]
+    return sorted(made, key=lambda line: -line.size)
+
+
+def in_milli_rows(values: Array, fit: Fit) -> Array:
+    """Residuals (channels, n) in thousandths of what is sensed."""
+    return np.asarray(in_milli(values.T, fit).T)
+
+
+def sure(certainty: float) -> str:
+    """A certainty in words: never 100 %."""
+    return "> 99.99 %" if certainty > 0.9999 else f"{100 * certainty:.4g} %"

@@ -1,0 +1,96 @@
+"""Curves of places, their symmetry and expressions, and the summary of a discovery."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from calibrations.discovery.curves import place_curve, place_curves
+from calibrations.discovery.rows import Rows
+from calibrations.discovery.summary import step_shares, summary_lines, sure
+from calibrations.effects.catalogue import catalogue
+from calibrations.free_forms.requested import named
+from calibrations.loop import discover
+from calibrations.model.file import read_model
+from calibrations.presentation.answers import discovery_text
+from tests.calibrations.test_requested_forms import CURVES, FORCES, WARMING, table, with_form
+
+
+def test_a_curve_is_the_function_that_acts_within_its_band() -> None:
+    found = with_form("own-response", table(CURVES["own-response"]))
+    curve = place_curve(found, "own-response")
+    assert curve is not None
+    for axis, k in (("x", 0), ("y", 1)):
+        x = FORCES[:, k]
+        line = np.polyfit(x, 1e-3 * np.sin(4 * x), 1)  # linear parts belong to bias and scale factor
+        true = 1e-3 * np.sin(4 * curve.at[axis]) - np.polyval(line, curve.at[axis])
+        assert np.max(np.abs(curve.value[axis] - true)) < 1.2e-4
+        assert np.mean(np.abs(curve.value[axis] - true) < 3 * curve.std[axis] + 2e-5) > 0.9
+    assert curve.symmetry == "odd about 0"
+
+
+@pytest.mark.parametrize(
+    ("place", "columns", "expression"),
+    [
+        ("cross-response", {}, "vx += a*sin(c*ay) + b*cos(c*ay)"),
+        ("column:humidity", {"humidity": WARMING}, "v += a*(humidity - b)**2"),
+    ],
+)
+def test_an_expression_is_proposed_that_has_the_form_of_the_curve(
+    place: str, columns: dict[str, np.ndarray], expression: str
+) -> None:
+    curve = place_curve(with_form(place, table(CURVES[place], **columns)), place)
+    assert curve is not None
+    assert curve.expression is not None
+    assert curve.expression.replace("vy", "vx").replace("ax", "ay") == expression
+
+
+def test_harmonics_of_the_stage_are_counted() -> None:
+    wave = 5e-3 * np.cos(5 * np.radians(table().column("beta_deg")))
+    data = table(wave[:, None] * np.column_stack([-FORCES[:, 1], FORCES[:, 0]]))
+    curve = place_curve(with_form("stage-angle-beta", data), "stage-angle-beta")
+    assert curve is not None
+    assert curve.symmetry == "5 waves in a turn of beta"
+    assert curve.expression == "beta_deg += a*sin(5*beta) + b*cos(5*beta)"
+    assert np.ptp(curve.value["beta"]) == pytest.approx(np.degrees(1e-2), rel=0.05)
+
+
+def test_a_place_without_an_effect_or_without_one_driver_has_no_curve() -> None:
+    found = with_form("history", table())
+    assert place_curve(found, "own-response") is None
+    assert place_curve(found, "history") is None
+
+
+def test_the_summary_has_a_line_for_each_cause_and_the_shares_of_the_steps_add_up() -> None:
+    found = discover(table(1e-3 * np.cos(4 * FORCES[:, [1, 0]]) + 1e-3 * FORCES[:, :2] ** 3), read_model("linear"))
+    lines = summary_lines(found)
+    assert sum(line.share for line in lines) == pytest.approx(1.0)
+    assert {line.place for line in lines} == {"cross-response", "own-response"}
+    own = next(line for line in lines if line.place == "own-response")
+    cubic = 1e-3 * FORCES[:, 0] ** 3
+    rest = cubic - np.polyval(np.polyfit(FORCES[:, 0], cubic, 1), FORCES[:, 0])
+    assert own.size == pytest.approx(1e3 * np.std(rest), rel=0.1)
+    whole = found.start.held_out_excess**2 - 1
+    assert sum(share or 0.0 for share in step_shares(found)) == pytest.approx(
+        1 - (found.end.held_out_excess**2 - 1) / whole
+    )
+    document = found.to_dict()
+    assert [line["place"] for line in document["summary"]] == [line.place for line in lines]
+    assert [step["share"] for step in document["steps"]] == step_shares(found)
+    curves = place_curves(found.findings)
+    for place in document["places"]:
+        assert len(place["curve"]["at"]) == len(place["curve"]["value"]["x"])
+        assert place["symmetry"] == curves[place["place"]].symmetry
+    text = discovery_text(found)
+    assert all(line.effect in text for line in lines)
+    assert "certainty" in text
+
+
+def test_without_variance_beyond_the_noise_a_step_has_no_share() -> None:
+    found = Rows(table()).add(named("free:own-response", {}), read_model("linear"), catalogue())
+    assert step_shares(found) == [None]
+    assert found.to_dict()["steps"][0]["share"] is None
+
+
+def test_a_certainty_is_never_whole() -> None:
+    assert (sure(1.0), sure(0.95)) == ("> 99.99 %", "95 %")
