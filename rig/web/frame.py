@@ -21,6 +21,7 @@ from rig.web.parts import message
 # The present run in the head of every page: progress, pause and stop.
 
 LOOK_S = 0.5
+TITLE = "rig workbench"
 STOP_KEY = "F8"  # the one key that acts on the rig from every page, also while a person types
 PHASES = {"starting": "starts", "running": "runs", "asking": "asks you", "paused": "is paused"}
 
@@ -29,6 +30,7 @@ class Strip:
     """Reads the status twice a second; hidden without a present run."""
 
     def __init__(self) -> None:
+        self.title = ""
         with ui.element("div").classes("under-way").props("role=status") as self.box:
             self.link = ui.link("", "/run")
             self.pause = ui.button("Pause", icon="pause", on_click=lambda: control_run(control.pause)).props(
@@ -46,10 +48,23 @@ class Strip:
         status = control.latest()
         active = status is not None and status.phase != "ended"
         self.box.set_visibility(active)
+        self._title(status if active else None)
         if status is not None and active:
             count = f" {status.done}/{status.total}" if status.total else ""
             self.link.set_text(f"{status.procedure}{count} {PHASES[status.phase]}")
             self.pause.set_visibility(status.phase == "running" and status.seat != "nobody")
+
+    def _title(self, status: Status | None) -> None:
+        """Show in the browser's tab how far the run is, and that it asks; "" before the first run of this page."""
+        if status is None:
+            title = TITLE if self.title else ""
+        else:
+            share = f"{100 * status.done // status.total} % " if status.total else ""
+            asks = "❗ " if status.phase in ("asking", "paused") else ""
+            title = f"{asks}{share}{status.procedure} {PHASES[status.phase]}"
+        if title != self.title:
+            self.title = title
+            ui.page_title(title)
 
 
 def control_run(how: Callable[[Status], None]) -> None:

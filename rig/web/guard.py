@@ -38,7 +38,7 @@ HEADERS = (
     (b"cross-origin-opener-policy", b"same-origin"),
     (b"cross-origin-resource-policy", b"same-origin"),
 )
-UNKNOWN = "This page needs a token. Open the address that `rig web` printed; every start has a new one."
+UNKNOWN = "This page needs a token. Open the address that `rig web` printed."
 ELSEWHERE = "This is not the address of the workbench. Open the address that `rig web` printed."
 
 

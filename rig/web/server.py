@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import secrets
 import signal
 import socket
 from collections.abc import Callable, Iterator
@@ -16,13 +15,12 @@ from nicegui import run, ui
 
 from rig.errors import RigError
 from rig.web.desk import Desk
+from rig.web.frame import TITLE
 from rig.web.guard import TOKEN, Guard, names
 from rig.web.pages import register
 
 LOCAL = "127.0.0.1"
 PORT = 8473  # preferred, so that an open page finds a restarted server
-TOKEN_BYTES = 24
-TITLE = "rig workbench"
 
 
 @dataclass(frozen=True)
@@ -39,13 +37,13 @@ class Place:
         return f"http://{self.host}:{self.port}/?{TOKEN}={self.token}"
 
 
-def serve(desk: Desk, host: str, port: int | None, ready: Callable[[Place], None]) -> None:
+def serve(desk: Desk, host: str, port: int | None, token: str, ready: Callable[[Place], None]) -> None:
     """Serve until SIGINT or SIGTERM; calls `ready` with the address when pages can be opened.
 
     Raises RigError if the address is not available; without `port` any free port is used.
     """
     listener = _listen(host, port)
-    place = Place(host, listener.getsockname()[1], secrets.token_urlsafe(TOKEN_BYTES))
+    place = Place(host, listener.getsockname()[1], token)
     app = FastAPI(openapi_url=None)
     register(desk)
     run.process_pool_start_method = "spawn"  # the pool is not used; this avoids a warning

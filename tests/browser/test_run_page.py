@@ -117,9 +117,11 @@ def test_questions_are_asked_and_a_wrong_answer_is_refused(workbench: Workbench)
     begin(page)
     phase(page, "asks you")
     expect(page.locator(".question")).to_contain_text("face down")  # the first mounting was one of the checks
+    expect(page).to_have_title(re.compile(r"❗ \d+ % sweep asks you"))
     workbench.shot(page, "question")
     page.locator(".question").get_by_role("button", name="yes").click()
     phase(page, "complete")
+    expect(page).to_have_title("rig workbench")
 
 
 def test_a_plan_that_cannot_be_says_why_and_does_not_start(workbench: Workbench) -> None:

@@ -76,3 +76,15 @@ def test_a_server_that_is_to_end_waits_for_no_search(browser: Browser, tmp_path:
             assert server.wait(20) == 0
         finally:
             server.kill()
+
+
+def test_the_address_lasts_over_a_restart_until_a_new_token_is_asked_for() -> None:
+    said = []
+    for options in ((), (), ("--new-token",)):
+        words = [*WEB, "--json", *options]
+        with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as server:
+            assert server.stdout is not None
+            said.append(json.loads(server.stdout.readline())["url"].partition("token=")[2])
+            server.terminate()
+            assert server.wait(20) == 0
+    assert said[0] == said[1] != said[2]

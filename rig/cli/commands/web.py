@@ -26,18 +26,22 @@ HERE = ("127.0.0.1", "localhost", "::1")
     help="Address to listen at. Another address opens the workbench to other machines.",
 )
 @click.option("--no-open", is_flag=True, help="Print the address and open no browser.")
+@click.option("--new-token", is_flag=True, help="Replace the kept token: older addresses and open pages end.")
 @bench_option
 @json_option
-def command(port: int | None, host: str, no_open: bool, bench_file: Path | None, as_json: bool) -> None:
+def command(
+    port: int | None, host: str, no_open: bool, new_token: bool, bench_file: Path | None, as_json: bool
+) -> None:
     """Serve the workbench until Ctrl-C; print its address, and open it in the browser.
 
-    The address contains a token; the server answers no request without it. Only this machine can connect, unless --host
-    gives another address: then anyone who can read the network traffic can read the token. A run continues after the
-    server ends.
+    The address contains a token; the server answers no request without it. The token is kept for this user, so the
+    address lasts. Only this machine can connect, unless --host gives another address: then anyone who can read the
+    network traffic can read the token. A run continues after the server ends.
     """
     from rig.bench import read_bench
     from rig.web.desk import Desk
     from rig.web.server import serve
+    from rig.web.token import kept_token
 
     read_bench(bench_file)  # an error appears here and not on a page
     if host not in HERE:
@@ -54,4 +58,4 @@ def command(port: int | None, host: str, no_open: bool, bench_file: Path | None,
         if not no_open and not as_json:
             webbrowser.open(place.url)
 
-    serve(Desk(bench_file), host, port, ready)
+    serve(Desk(bench_file), host, port, kept_token(new_token), ready)
