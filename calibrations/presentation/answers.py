@@ -65,7 +65,7 @@ def unknown_text(result: Discovery[Any]) -> str:
     for place in places_document(result):
         if place["explained_by"] or (curve := place["curve"]) is None:
             continue
-        axis = max(curve["value"], key=lambda a: float(np.ptp(curve["value"][a])))
+        axis = max(curve["value"], key=lambda a: float(np.std(curve["value"][a])))
         value, band = np.array(curve["value"][axis]), float(np.mean(curve["std"][axis]))
         text = (
             f"Unknown form at {place['place']}: from {quantity(float(value.min()), curve['unit'])} to "
