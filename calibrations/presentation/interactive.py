@@ -45,6 +45,7 @@ def figure(chart: c.Chart, keep: str, drag: Literal["select", "zoom", False] = "
     """Data, layout and configuration for Plotly. `drag`: what drawing a box does."""
     data: list[Trace] = []
     layout: dict[str, Any] = {
+        "barmode": "overlay",  # as the static renderer draws bars: the later over the earlier
         "margin": dict(MARGIN),
         "showlegend": False,
         "hovermode": "closest",

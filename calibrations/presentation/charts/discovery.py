@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import log10
-from typing import Protocol
 
 import numpy as np
 
@@ -40,6 +39,7 @@ from calibrations.presentation.charts.fit import (
     scale_of,
 )
 from calibrations.presentation.charts.motion import evaluation
+from calibrations.presentation.charts.places import Falling, place_pictures
 from calibrations.presentation.residual import Shown, choices, first_choices
 from calibrations.text import rounded
 
@@ -72,16 +72,6 @@ class Measure:
     over: str = "the noise floor"
     seen: str = "rows of the fit"
     unseen: str = "rows not used in the fit"
-
-
-class Falling(Protocol):
-    """A fit, and the steps from there: a discovery, or a model that a person extends."""
-
-    @property
-    def start(self) -> Fit: ...
-
-    @property
-    def steps(self) -> tuple[Step[Fit], ...]: ...
 
 
 def levels(found: Falling) -> list[Level]:
@@ -155,6 +145,7 @@ def album(found: Discovery[Fit], compared: Comparison[Fit], motion: MotionResult
         Picture("residual", "Residual", left, residual_chart(fit)),
         Picture("failure", "Residual pattern", mapped, failure_chart(fit)),
         *(_curve(step, found) for step in tried(found)),
+        *place_pictures(found),
     ]
 
 

@@ -140,6 +140,7 @@ def report(
         motion=motion_section(motion) if motion else None,
         pictures=shown,
         curves=[drawn for name, drawn in shown.items() if name.startswith("effect-")],
+        places=[drawn for name, drawn in shown.items() if name.startswith("place-") or name == "shares"],
     )
 
 

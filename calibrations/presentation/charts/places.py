@@ -1,0 +1,233 @@
+"""Charts of places of the signal chain: the curve of each with its band, and the falling error as shares by place."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from calibrations.discovery.curves import PlaceCurve, place_curve
+from calibrations.discovery.results import Step
+from calibrations.effects import Effect
+from calibrations.effects.catalogue import catalogue
+from calibrations.errors import CalibrationError
+from calibrations.fitting.fit import Fit, fit
+from calibrations.free_forms.effect import EFFECTS_AT, PREFIX, place_of_effect
+from calibrations.model import Model
+from calibrations.model.chain import forward
+from calibrations.presentation.chart import (
+    AMBER,
+    BAND,
+    BLUE,
+    GREEN,
+    INK,
+    PURPLE,
+    QUIET,
+    VERMILION,
+    Axis,
+    Band,
+    Bars,
+    Chart,
+    Line,
+    Panel,
+    Picture,
+    Rule,
+    Series,
+    beside,
+    one,
+)
+from calibrations.table import Array, Table
+from calibrations.text import rounded
+
+MOST_PLACES, MOST_FORMS = 6, 3  # that are drawn: places, and catalogue forms through the curve of one
+MOST_ROWS = 130  # to which a form is fitted
+LEAST_SHARE = 0.3  # of a curve's variance that a form must take up to be drawn
+COVERAGE = 1.96  # standard uncertainties: a band of 95 %
+FEWEST_BARS, ROW = 4, 0.42  # rows that there is room for; inches a row
+BASE = ("bias", "scale-factor")
+REST, LINEAR, OTHERS = "not explained", "bias, scale factor and geometry", "other places"
+MOST_SHARES = 5  # places with a colour of their own
+SHARES_CAPTION = (
+    "Variance of the residual beyond the noise, by the place of the signal chain that causes it; each model leaves "
+    "less. The last part is what no effect of the model explains."
+)
+PLACE_COLOURS = (BLUE, VERMILION, GREEN, AMBER, PURPLE)
+FORM_COLOURS = (VERMILION, GREEN, PURPLE)
+
+
+class Falling(Protocol):
+    """A fit, and the steps from there: a discovery, or a model that a person extends."""
+
+    @property
+    def start(self) -> Fit: ...
+
+    @property
+    def steps(self) -> tuple[Step[Fit], ...]: ...
+
+
+@dataclass(frozen=True)
+class Through:
+    """A form of the catalogue through the curve of a place: its own curve, and its share of that one's variance."""
+
+    name: str
+    curve: PlaceCurve
+    share: float
+
+
+def place_pictures(found: Falling) -> list[Picture]:
+    """The falling error as shares by place, and the curve of each place of the last model, the largest first."""
+    end = _end(found)
+    curves = model_curves(end)
+    if not curves:
+        return []
+    shares = Picture("shares", "Explained share by place", SHARES_CAPTION, shares_chart(found))
+    return [*([shares] if found.steps else []), *(_picture(curve, forms_through(end, curve)) for curve in curves)]
+
+
+def model_curves(end: Fit) -> list[PlaceCurve]:
+    """The curve of each place at which the model has an effect, the largest first."""
+    if end.table.content != "poses":
+        return []
+    places = dict.fromkeys(place_of_effect(term.name) for term in end.model.terms)
+    found = [curve for place in places if place and (curve := place_curve(end, place)) is not None]
+    return sorted(found, key=lambda curve: -_size(curve, end))[:MOST_PLACES]
+
+
+def forms_through(end: Fit, curve: PlaceCurve) -> list[Through]:
+    """Forms of the catalogue fitted to the curve of unknown form at a place, the best first; none beside no such curve.
+
+    They are fitted to what bias, scale factor and this place predict, without noise.
+    """
+    if not end.model.holds(f"{PREFIX}{curve.place}"):
+        return []
+    steps = end.problem.layout.steps(end.theta)
+    own = [step for step in steps if step[0].name in BASE or place_of_effect(step[0].name) == curve.place]
+    predicted = forward(end.table, own)
+    outputs = dict(zip(end.table.output_names, predicted.T, strict=True))
+    table = replace(end.table, columns={**end.table.columns, **outputs})
+    table = table.rows(np.arange(0, table.n, max(1, table.n // MOST_ROWS)))  # without noise, a part of the poses does
+    base = replace(end.model, terms=tuple(term for term in end.model.terms if term.name in BASE))
+    known = catalogue()
+    effects = [known[name] for name in EFFECTS_AT.get(curve.place, ()) if name in known]
+    fitted = [through for effect in effects if (through := _through(base, effect, end, table, curve)) is not None]
+    return sorted((t for t in fitted if t.share >= LEAST_SHARE), key=lambda t: -t.share)[:MOST_FORMS]
+
+
+def _through(base: Model, effect: Effect, end: Fit, table: Table, curve: PlaceCurve) -> Through | None:
+    """One form; None where it cannot be fitted to this table."""
+    if effect.excluded(end.table) is not None:
+        return None
+    try:
+        own = place_curve(fit(base.with_effect(effect), table), curve.place)
+    except (CalibrationError, np.linalg.LinAlgError):
+        return None
+    if own is None:
+        return None
+    left = total = 0.0
+    for axis, value in curve.value.items():
+        form = np.interp(curve.at[axis], own.at[axis], own.value[axis])
+        left += float(np.sum((value - form - np.mean(value - form)) ** 2))
+        total += float(np.sum((value - np.mean(value)) ** 2))
+    return Through(effect.name, own, 1 - left / total if total > 0 else 0.0)
+
+
+def curve_chart(curve: PlaceCurve, forms: Sequence[Through] = ()) -> Chart:
+    """A panel for each axis: the curve with its band of 95 %, and forms of the catalogue through it."""
+    return beside([curve_panel(curve, axis, forms) for axis in curve.value], 3.2, share_y=True)
+
+
+def curve_panel(curve: PlaceCurve, axis: str, forms: Sequence[Through] = ()) -> Panel:
+    """The curve of one axis."""
+    scale, unit = _scaled(curve.unit)
+    at, value, band = curve.at[axis], scale * curve.value[axis], COVERAGE * scale * curve.std[axis]
+    series: list[Series] = [
+        Rule(0.0, width=0.7),
+        Band(at, value - band, value + band, "95 % band"),
+        Line(at, value, "curve", INK, 1.8, markers=len(at) < 12),
+    ]
+    for colour, form in zip(FORM_COLOURS, forms, strict=False):
+        own = form.curve
+        label = f"{form.name}: {100 * max(form.share, 0.0):.0f} %"
+        series.append(Line(own.at[axis], scale * own.value[axis], label, colour, 1.4, "dash"))
+    driver = f"{curve.driver.removesuffix('_deg').removesuffix('_c').replace('_', ' ')}"
+    x = Axis(f"{driver}, {curve.driver_unit}" if curve.driver_unit else driver)
+    first = axis == next(iter(curve.value))
+    y = Axis(f"{curve.place}, {unit}" if first else "")
+    return Panel(tuple(series), x, y, axis, legend="best" if first else "")
+
+
+def shares_chart(found: Falling) -> Chart:
+    """For each model the part of the first model's excess variance that it leaves, divided among the places."""
+    names, shares = shares_by_place(found)
+    rows = len(shares)
+    ends = np.cumsum(shares, axis=1)
+    left = [f"{100 - 100 * each[-1]:.0f} % explained" for each in ends]
+    left[0] = f"{rounded(found.start.pooled_excess)} × the noise floor"
+    series = []
+    for k in range(len(names) - 1, -1, -1):  # the longest bars below the others
+        texts = left if k == len(names) - 1 else [""] * rows
+        colour = {REST: BAND, LINEAR: QUIET, OTHERS: INK}.get(names[k], PLACE_COLOURS[k % len(PLACE_COLOURS)])
+        series.append(Bars(0.0, 100 * ends[:, k], [colour] * rows, texts, [False] * rows, names[k]))
+    models = (found.start.model.name, *(f"+ {step.name}" for step in found.steps))
+    y = Axis(low=-0.5, high=max(rows, FEWEST_BARS) - 0.5, names=models, reverse=True)
+    x = Axis("remaining variance beyond the noise, % of that of the first model", low=0.0, high=135.0)
+    return one(Panel(tuple(series), x, y, legend="outside"), 0.9 + ROW * max(rows, FEWEST_BARS))
+
+
+def shares_by_place(found: Falling) -> tuple[list[str], Array]:
+    """Places, and the part of the first model's excess variance that each still holds, (models, places).
+
+    The last place is what no step explains. A step's part is the fall of the variance when it is added.
+    """
+    errors = np.array([found.start.pooled_excess, *(step.after.pooled_excess for step in found.steps)]) ** 2
+    gains = np.maximum(-np.diff(errors), 0.0)
+    rest = max(float(errors[-1]) - 1.0, 0.0)
+    total = float(gains.sum()) + rest or 1.0
+    at = [_named(step.name) for step in found.steps]
+    size = {name: sum(g for g, a in zip(gains, at, strict=True) if a == name) for name in at}
+    names = sorted(size, key=lambda name: (name == LINEAR, -size[name]))
+    few = [name for name in names if name != LINEAR][MOST_SHARES:]
+    at = [OTHERS if name in few else name for name in at]
+    names = [*(name for name in names if name not in few), *([OTHERS] if few else [])]
+    shares = np.zeros((len(errors), len(names) + 1))
+    for row in range(len(errors)):
+        for k in range(row, len(gains)):
+            shares[row, names.index(at[k])] += gains[k] / total
+    shares[:, -1] = rest / total
+    return [*names, REST], shares
+
+
+def _named(effect: str) -> str:
+    """The place of an effect, as a legend has it."""
+    if effect in BASE:
+        return LINEAR
+    place = place_of_effect(effect)
+    return LINEAR if place == "geometry" else place or effect
+
+
+def _end(found: Falling) -> Fit:
+    return found.steps[-1].after if found.steps else found.start
+
+
+def _size(curve: PlaceCurve, end: Fit) -> float:
+    """Size of a curve: its rms; that of a stage angle in the output that the angle changes."""
+    rms = max(float(np.std(value)) for value in curve.value.values())
+    return rms * (np.radians(1.0) * float(np.ptp(end.table.outputs)) / 2 if curve.unit == "deg" else 1.0)
+
+
+def _scaled(unit: str) -> tuple[float, str]:
+    """Factor and unit that make small numbers readable."""
+    return (1e3, f"m{unit}") if unit.startswith("V") else (1.0, unit)
+
+
+def _picture(curve: PlaceCurve, forms: Sequence[Through]) -> Picture:
+    caption = "The curve of this place in the model, with its band of 95 % (grey)."
+    if forms:
+        share = f"{forms[0].name} takes up {100 * max(forms[0].share, 0.0):.0f} % of its variance"
+        caption += f" Broken lines: forms of the catalogue that are fitted to it; {share}."
+    if curve.symmetry:
+        caption += f" The curve is {curve.symmetry}." if "wave" not in curve.symmetry else f" It has {curve.symmetry}."
+    name = f"place-{curve.place.replace(':', '-')}"
+    return Picture(name, f"Curve of {curve.place}", caption, curve_chart(curve, forms))
