@@ -271,7 +271,8 @@ def test_rms_in_mg_is_that_of_the_residual() -> None:
 def test_the_album_holds_every_picture_once() -> None:
     pictures = album(warm(), compare(warm_table(), read_model("linear")))
     names = [picture.name for picture in pictures]
-    assert names == ["waterfall", "measurement", "residual", "failure", "effect-temperature-bias"]
+    places = ["shares", "place-temperature-bias"]
+    assert names == ["waterfall", "measurement", "residual", "failure", "effect-temperature-bias", *places]
     assert all(picture.title and picture.caption.endswith(".") for picture in pictures)
 
 

@@ -12,7 +12,15 @@ import pytest
 from calibrations.importing.foreign import write_csv
 from tests.calibrations.test_pictures import warm_table
 
-NAMES = ["waterfall", "measurement", "residual", "failure", "effect-temperature-bias"]
+NAMES = [
+    "waterfall",
+    "measurement",
+    "residual",
+    "failure",
+    "effect-temperature-bias",
+    "shares",
+    "place-temperature-bias",
+]
 
 
 @pytest.fixture
