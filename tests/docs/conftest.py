@@ -18,7 +18,7 @@ def follow(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> Callable[[list[Commands]], None]:
     """Call every `rig` command of a page, RUN being the newest run, and look for the output that the page shows."""
-    for name in ("docs", "tests"):
+    for name in ("docs", "rig", "tests"):
         (tmp_path / name).symlink_to(ROOT / name)
     monkeypatch.chdir(tmp_path)
 

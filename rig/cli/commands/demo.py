@@ -1,12 +1,26 @@
-"""demo: a calibration on the simulated rig: sweep, compare, diagnose, add, report."""
+"""demo: find three hidden faults of a simulated sensor, and compare them with what was hidden."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from rig.cli.terminal.output import emit, json_option, note
+
+if TYPE_CHECKING:
+    from procedures.questions import Question
+    from procedures.session import Reading
+    from rig.bench import Bench
+    from rig.cli.terminal.progress import Progress
+    from rig.planning.plan import Plan
+    from rig.record import Kept
+    from rig.runs.runner import Decision, Outcome
+
+SETTINGS = {"inclinations_deg": "90,30,150,60", "step_deg": "30"}  # 104 poses show the three faults
+MEASURING = 0.4  # share of the bar
 
 
 @click.command("demo")
@@ -17,49 +31,100 @@ from rig.cli.terminal.output import emit, json_option, note
     type=click.Path(file_okay=False, path_type=Path),
     help="Folder for the model and the report.",
 )
+@click.option("--realistic", is_flag=True, help="The default rig with all its faults at once; takes minutes.")
 @json_option
-def command(folder: Path, as_json: bool) -> None:
-    """Sweep a simulated sensor, find the effects that its linear model misses, add them, and write a report."""
+def command(folder: Path, realistic: bool, as_json: bool) -> None:
+    """Measure a simulated sensor with three hidden faults, find them, and compare them with what was hidden.
+
+    --realistic is the second act: the default simulated rig, a standard sweep of 518 poses, and all faults at once.
+    """
     from calibrations.documents import discovery_document
     from calibrations.loop import compare, discover
     from calibrations.model.file import read_model
     from calibrations.presentation.charts.discovery import album
     from calibrations.presentation.report.report import report
-    from procedures.catalogue import find
-    from procedures.settings import parse
     from rig.bench import read_bench
-    from rig.cli.terminal.watch import watching
+    from rig.bench.file import DEMO
+    from rig.cli.terminal.progress import working
     from rig.cli.terminal.words import discovery
-    from rig.cli.terminal.words import table as shown
     from rig.files import make_folder, program, write_whole
-    from rig.record import Record
-    from rig.runs.runner import start
+    from rig.services.hidden_faults import hidden_faults
     from rig.services.provenance import today, write_model
     from rig.services.tables import load
 
     make_folder(folder)
-    note("1  Sweep: both stages move a simulated ADXL203 through 518 poses, over the protocols of the instruments.")
-    sweep, bench = find("sweep"), read_bench()
-    with watching(sweep, bench, False, None) as observer, Record() as record:
-        outcome = start(record, bench, sweep, parse(sweep, {}), observer)
+    bench, settings = (read_bench(), {}) if realistic else (read_bench(DEMO), SETTINGS)
+    note(
+        "The default simulated rig: all its faults act at once. The analysis does not know them."
+        if realistic
+        else "A simulated sensor has three hidden faults. The analysis does not know them."
+    )
+    with working("connecting", 0.0) as progress:
+        run = _measured(bench, settings, progress)
+        progress.text, progress.share = "searching for missing effects", MEASURING
+        table, linear = load(run), read_model("linear")
+        found = discover(table, linear)
+        progress.text, progress.share = "writing the report", 0.9
+        model, page = folder / "model.yaml", folder / "report.html"
+        faults = hidden_faults(bench, found.end, found.start)
+        comparison = compare(table, linear)
+        write_whole(page, report(found, comparison, today(), program(), album(found, comparison)))
+    write_model(found.end, linear, model, note)
+    if as_json:
+        document = discovery_document(found, str(model))
+        emit({**document, "run": run, "report": str(page), "hidden_faults": faults.document()})
+        return
+    click.echo(f"{discovery(found)}\n\nWhat was hidden, and what was found (rms change of the output):\n")
+    click.echo(faults.text())
+    click.echo(f"\nReport: {page}   open it with: xdg-open {page}\nModel:  {model}\nRun:    {run}")
+    click.echo("The same in a browser: rig web" + ("" if realistic else "\nThe second act: rig demo --realistic"))
+
+
+def _measured(bench: Bench, settings: Mapping[str, str], progress: Progress) -> str:
+    """The id of a sweep on the bench. Raises the error that ended it."""
+    from procedures.catalogue import find
+    from procedures.settings import parse
+    from rig.record import Record
+    from rig.runs.runner import start
+
+    sweep = find("sweep")
+    with Record() as record:
+        outcome = start(record, bench, sweep, parse(sweep, dict(settings)), _Watch(progress))
     if outcome.error is not None:
         raise outcome.error
-    run = outcome.run.run
-    table, linear = load(run), read_model("linear")
+    return outcome.run.run
 
-    note("2  Compare: the linear model of the manufacturer and the measurement.")
-    comparison = compare(table, linear)
-    places = "\n".join(f"   {place.text}" for place in comparison.fails[:3])
-    note(f"\n{shown(comparison.data.error_table(comparison.fit))}\n\n{places}\n")
 
-    note("3  Diagnose and add until no effect is missing.\n")
-    discovery_result = discover(table, linear)
-    model, page = folder / "model.yaml", folder / "report.html"
-    write_model(discovery_result.end, linear, model, note)
-    write_whole(page, report(discovery_result, comparison, today(), program(), album(discovery_result, comparison)))
-    if as_json:
-        emit({**discovery_document(discovery_result, str(model)), "run": run, "report": str(page)})
-        return
-    click.echo(discovery(discovery_result))
-    click.echo(f"\n4  Report: {page} shows where the model failed and how the error fell; {model} is the new model.\n")
-    click.echo(f"The run is {run}. Try: rig diagnose {run}, rig effects, rig import YOUR.csv")
+class _Watch:
+    """The observer of the demonstration's sweep: it moves the bar."""
+
+    def __init__(self, progress: Progress) -> None:
+        self._progress, self._total, self._done = progress, 1, 0
+
+    def planned(self, plan: Plan) -> None:
+        """A simulated run needs no confirmation."""
+
+    def begun(self, run: str) -> None:
+        """Shown at the end."""
+
+    def doing(self, text: str) -> None:
+        """Not shown."""
+
+    def expect(self, total: int, done: int) -> None:
+        self._total, self._done = max(total, 1), done
+
+    def kept(self, kept: Kept) -> None:  # noqa: ARG002
+        self._done += 1
+        self._progress.text = f"measuring, {self._done} of {self._total} poses"
+        self._progress.share = MEASURING * self._done / self._total
+
+    def read(self, reading: Reading) -> None:
+        """Not shown."""
+
+    def ask(self, question: Question, instead: str | None) -> str:
+        if instead is None:
+            raise RuntimeError(f"the simulated technician has no answer to: {question.text}")
+        return instead
+
+    def interrupted(self, outcome: Outcome) -> Decision:  # noqa: ARG002
+        return "end"

@@ -1,0 +1,59 @@
+"""Progress of work that takes longer than a second, on standard error.
+
+In a terminal: one line that is written again and then removed. In a pipe or a file: one line a second.
+"""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import TextIO
+
+EVERY_S = 1.0
+WIDTH = 30  # characters of a bar
+ERASE = "\r\x1b[K"
+
+
+@dataclass
+class Progress:
+    """What is being done, and how much of it is done (0 to 1; None: not known). Assign to both at any time."""
+
+    text: str
+    share: float | None = None
+    began_s: float = field(default_factory=time.monotonic)
+
+    def line(self) -> str:
+        """The present state in one line."""
+        seconds = f"{time.monotonic() - self.began_s:.0f} s"
+        if self.share is None:
+            return f"{self.text}: {seconds}"
+        full = round(WIDTH * min(max(self.share, 0.0), 1.0))
+        return f"[{'#' * full}{'.' * (WIDTH - full)}] {100 * self.share:3.0f} %  {self.text}, {seconds}"
+
+
+@contextmanager
+def working(text: str, share: float | None = None) -> Iterator[Progress]:
+    """Show the progress of the block after its first second, every second. Shorter work shows nothing."""
+    shown, stream, ended = Progress(text, share), sys.stderr, threading.Event()
+    thread = threading.Thread(target=_show, args=(shown, stream, stream.isatty(), ended), daemon=True)
+    thread.start()
+    try:
+        yield shown
+    finally:
+        ended.set()
+        thread.join()
+
+
+def _show(shown: Progress, stream: TextIO, terminal: bool, ended: threading.Event) -> None:
+    drawn = False
+    while not ended.wait(EVERY_S):
+        stream.write(f"{ERASE}{shown.line()}" if terminal else f"{shown.line()}\n")
+        stream.flush()
+        drawn = True
+    if drawn and terminal:
+        stream.write(ERASE)
+        stream.flush()

@@ -1,0 +1,135 @@
+"""`rig demo`: the faults that the bench file hides are those that the analysis finds; and the progress of long work."""
+
+from __future__ import annotations
+
+import dataclasses
+import io
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from calibrations.effects.catalogue import catalogue
+from calibrations.fitting.fit import fit
+from calibrations.model.file import read_model
+from calibrations.table import Table
+from drivers.world.config import ADXL203, WorldConfig
+from drivers.world.world import World
+from procedures.sweep import grid
+from rig.bench import read_bench
+from rig.bench.file import DEMO
+from rig.cli.terminal import progress
+from rig.services.hidden_faults import MATERIAL, MECHANISMS, Curve, hidden_faults, matched
+
+SAME = {
+    "unequal or uneven plates": "quadratic-nonlinearity",
+    "package bends as it warms": "temperature-bias",
+    "sensor soldered at an angle": "axis-misalignment",
+}
+
+
+def swept() -> Table:
+    """The demonstration's poses in its world."""
+    bench = read_bench(DEMO)
+    poses = list(grid((90.0, 30.0, 150.0, 60.0), 30.0))
+    angles = [p.alpha_deg for p in poses], [p.beta_deg for p in poses]
+    world = World(WorldConfig.from_mapping(bench.world), bench.seed)
+    columns = world.dwell_mean(*angles, direction=[p.direction for p in poses], dwell_s=1.0, interval_s=0.01)
+    return Table.from_columns("poses", {name: np.asarray(v, float) for name, v in columns.items()})
+
+
+def test_each_hidden_fault_of_the_demonstration_is_found_at_its_size() -> None:
+    table, linear = swept(), read_model("linear")
+    model = linear
+    for name in SAME.values():
+        model = model.with_effect(catalogue()[name])
+    found = hidden_faults(read_bench(DEMO), fit(model, table), fit(linear, table))
+    assert {m.fault.name: m.effect.name for m in found.material if m.effect} == SAME
+    for m in found.material:
+        assert m.effect is not None
+        assert m.effect.std is not None
+        assert 0 < m.effect.std < 0.2 * m.fault.size
+        assert abs(m.effect.size - m.fault.size) < 4 * m.effect.std
+
+
+def test_a_fault_that_no_effect_follows_is_not_found() -> None:
+    curves = np.eye(4)[:, :, None]
+    hidden, other = Curve("friction", curves[0]), Curve("own", curves[1])
+    found = matched([hidden], [other], 0.01, "V")
+    assert found.matches[0].effect is None
+    assert found.extra == (other,)
+    assert "not found" in found.text()
+
+
+def test_every_fault_of_the_default_rig_has_a_name() -> None:
+    named = {path for paths in MECHANISMS.values() for path in paths}
+    other = ("magnetometer", "gyroscope", "noise", "converter", "level", "sensor.x.friction", "sensor.y.friction")
+    unnamed = [p for p in leaves(ADXL203) if p not in named and not p.startswith(other)]
+    assert [p for p in unnamed if not p.endswith("wobble_phase_deg") and not p.startswith("heat.")] == []
+    assert all(dataclasses.is_dataclass(WorldConfig()) and _exists(path) for path in named)
+
+
+def leaves(settings: dict[str, Any], path: str = "") -> list[str]:
+    """The paths of all numbers in nested settings."""
+    found = []
+    for name, value in settings.items():
+        found += leaves(value, f"{path}{name}.") if isinstance(value, dict) else [f"{path}{name}"]
+    return found
+
+
+def _exists(path: str) -> bool:
+    value: Any = WorldConfig.ideal()
+    for name in path.split("."):
+        value = getattr(value, name)
+    return isinstance(value, float)
+
+
+@pytest.mark.parametrize(("terminal", "lines"), [(False, 2), (True, 0)])
+def test_long_work_shows_its_progress(terminal: bool, lines: int) -> None:
+    class Stream(io.StringIO):
+        def isatty(self) -> bool:
+            return terminal
+
+    stream = Stream()
+    waits = iter([False, False, True])
+
+    class Ended:
+        def wait(self, timeout: float) -> bool:
+            assert timeout == progress.EVERY_S
+            return next(waits)
+
+    progress._show(progress.Progress("searching", 0.5), stream, terminal, Ended())  # type: ignore[arg-type]
+    assert stream.getvalue().count("searching") == 2
+    assert stream.getvalue().count("\n") == lines
+    assert stream.getvalue().endswith(progress.ERASE) == terminal
+
+
+def test_short_work_shows_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+    with progress.working("searching"):
+        pass
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.slow
+def test_the_demonstration_finds_what_was_hidden(rig: Callable[..., Any], tmp_path: Path) -> None:
+    document = json.loads(rig("demo", "--folder", str(tmp_path / "demo"), "--json").out)
+    assert {row["fault"]: row["effect"] for row in document["hidden_faults"]} == SAME
+    assert all(abs(row["found"] - row["size"]) < 4 * row["std"] for row in document["hidden_faults"])
+    assert document["verdict"] == "adequate"
+    assert document["steps"][0]["excess_before"] > 10
+    assert document["steps"][-1]["held_out_after"] < 1.15
+    assert "<html" in Path(document["report"]).read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+def test_the_realistic_demonstration_tells_what_it_did_not_find(rig: Callable[..., Any], tmp_path: Path) -> None:
+    document = json.loads(rig("demo", "--realistic", "--folder", str(tmp_path / "demo"), "--json").out)
+    rows = document["hidden_faults"]
+    large = [row for row in rows if row["size_over_floor"] >= MATERIAL]
+    assert len(large) > 8
+    assert document["steps"][-1]["held_out_after"] < 4
+    assert any(row["effect"] for row in large[:3])
+    assert document["places"]
