@@ -30,7 +30,7 @@ GROUPS = {
     "Find what is missing": (
         "compare", "fit", "diagnose", "add", "discover", "noise", "report", "effects", "models",
     ),
-    "Hand over": ("certificate", "compensate", "export", "push"),
+    "Hand over": ("certificate", "compensate", "export", "export-model", "push"),
     "Look after": ("control", "history", "doctor"),
     "Many sensors": ("fleet",),
 }  # fmt: skip

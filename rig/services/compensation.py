@@ -1,12 +1,13 @@
-"""The compensation of a model as source code: for `rig compensate` and the workbench."""
+"""The compensation of a model as source code, and files for other programs: for the commands and the workbench."""
 
 from __future__ import annotations
 
 import hashlib
 import re
 import shlex
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 from calibrations.compensation.document import (
     Origin,
@@ -19,6 +20,7 @@ from calibrations.compensation.document import (
 )
 from calibrations.compensation.forward import LEFT_OUT
 from calibrations.compensation.inverse import Compensation
+from calibrations.exporting.simulated import Exported
 from rig.files import program
 from rig.services.provenance import today
 
@@ -74,6 +76,34 @@ def compensation_lines(made: Compensation) -> list[str]:
             f"{error_text(costs.out_of_gravity.most, made.unit)} at most."
         )
     return [*lines, uncertainty_text(made), coverage_text(made)]
+
+
+def export_lines(made: Exported) -> list[str]:
+    """Errors, losses and remarks of a file for another program, in words."""
+    lines = [
+        f"{sensor}: the file's outputs differ from the model's by {error_text(rms, unit)} rms, "
+        f"{error_text(most, unit)} at most."
+        for sensor, rms, most, unit in made.errors
+    ]
+    return [*lines, *(loss.text for loss in made.losses), *made.notes]
+
+
+def export_document(made: Exported, form: str, models: Sequence[str], out: Path) -> dict[str, Any]:
+    """The JSON document `rig.export-model/1`."""
+    return {
+        "schema": "rig.export-model/1",
+        "for": form,
+        "models": list(models),
+        "file": str(out),
+        "errors": [
+            {"sensor": sensor, "rms": rms, "largest": most, "unit": unit} for sensor, rms, most, unit in made.errors
+        ],
+        "lost": [
+            {"effect": loss.effect, "why": loss.why, "rms": loss.rms, "largest": loss.most, "unit": loss.unit}
+            for loss in made.losses
+        ],
+        "notes": list(made.notes),
+    }
 
 
 def _writer(language: str) -> Callable[..., dict[str, str]]:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
+from rig.cli.terminal.options import input_range
 from rig.cli.terminal.output import bench_option, emit, json_option, note
 
 if TYPE_CHECKING:
@@ -106,16 +106,4 @@ def _range(model: Model, reach: float | None, given: Sequence[str]) -> Range:
 
     if reach is not None and not reach > 0:
         raise click.UsageError(f"--range is {reach:g}; it must be above 0")
-    return Range.for_model(model, reach, **dict(map(_input, given)))
-
-
-def _input(text: str) -> tuple[str, tuple[float, float]]:
-    parts = re.fullmatch(r"([a-z]\w*)=([^:]+):([^:]+)", text)
-    try:
-        name, low, high = parts.groups() if parts else ("", "", "")
-        ends = float(low), float(high)
-    except ValueError:
-        ends = (1.0, 0.0)
-    if not ends[0] < ends[1]:
-        raise click.UsageError(f"--input {text!r}: write NAME=LOW:HIGH, as in temperature_c=0:60")
-    return name, ends
+    return Range.for_model(model, reach, **dict(map(input_range, given)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import wraps
@@ -150,3 +151,16 @@ def request_options(function: Callable[..., Any]) -> Callable[..., Any]:
     for option in reversed(OPTIONS):
         inside = option(inside)
     return inside
+
+
+def input_range(text: str) -> tuple[str, tuple[float, float]]:
+    """The name and range in `NAME=LOW:HIGH`. Raises UsageError."""
+    parts = re.fullmatch(r"([a-z]\w*)=([^:]+):([^:]+)", text)
+    try:
+        name, low, high = parts.groups() if parts else ("", "", "")
+        ends = float(low), float(high)
+    except ValueError:
+        ends = (1.0, 0.0)
+    if not ends[0] < ends[1]:
+        raise click.UsageError(f"--input {text!r}: write NAME=LOW:HIGH, as in temperature_c=0:60")
+    return name, ends
