@@ -66,6 +66,7 @@ def unknown_text(result: Discovery[Any]) -> str:
         if place["explained_by"] or (curve := place["curve"]) is None:
             continue
         axis = max(curve["value"], key=lambda a: float(np.std(curve["value"][a])))
+        axis = (place["expression"] or "")[1:2] if (place["expression"] or "")[:2] in ("vx", "vy", "vz") else axis
         value, band = np.array(curve["value"][axis]), float(np.mean(curve["std"][axis]))
         text = (
             f"Unknown form at {place['place']}: from {quantity(float(value.min()), curve['unit'])} to "
@@ -77,7 +78,9 @@ def unknown_text(result: Discovery[Any]) -> str:
         lines.append(f"{text}.")
         if place["expression"]:
             name = f"{place['place'].replace(':', '-').replace('_', '-')}-form"
-            lines.append(f"    It looks like: {place['expression']}")
+            one = place["expression"].startswith(("vx +=", "vy +=", "vz +=")) and len(curve["value"]) > 1
+            other = " (one output; the others need the same with their own axes)" if one else ""
+            lines.append(f"    It looks like: {place['expression']}{other}")
             lines.append(
                 f'    To add that in its stead: rig add "{place["expression"]}" --name {name} --model MODEL '
                 f"--data {result.findings.data.source} --out MODEL2"
