@@ -28,6 +28,7 @@ class Component:
     shape     values in which the columns are not linear; `step` by which they are first changed
     constants by which the catalogue effect is the same function, such as the thermometer's lead
     starts    values of the effect's parameters that belong to the shape: (parameter, axis or "", value)
+    contains  the effect that its cause becomes where the shape vanishes
     """
 
     name: str
@@ -46,6 +47,7 @@ class Component:
     reshaped: Callable[[tuple[float, ...]], Component] | None = None
     constants: tuple[tuple[str, float], ...] = ()
     starts: tuple[tuple[str, str, float], ...] = ()
+    contains: str = ""
 
     def jacobian(self, state: State) -> Array:
         """d output / d coefficients, (channels, n, m)."""

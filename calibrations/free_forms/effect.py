@@ -99,7 +99,7 @@ def check_forms(forms: tuple[Form, ...], place: str) -> tuple[Form, ...]:
                 f"{where}: {wrong} has {counts[wrong]} entries for {len(form.sizes)} axes; give 1, or 1 an axis"
             )
         if any(
-            not (size == 0) <= form.count(k) <= form.basis(k).count * (size > 0) for k, size in enumerate(form.sizes)
+            not (size > 0) <= form.count(k) <= form.basis(k).count * (size > 0) for k, size in enumerate(form.sizes)
         ):
             raise ModelError(f"{where} keeps more columns than its basis has, or none, or some of size 0")
     return forms

@@ -124,6 +124,8 @@ def _named(
             break
         chosen.append(best)
         share = tried[best]
+    wider = {comp.contains: comp.cause for comp in map(result.component, names) if comp.contains}
+    chosen = list(dict.fromkeys(wider.get(cause, cause) for cause in chosen))  # one mechanism, one name
     enough = NAMED if len(set(chosen) - acting) < MOST_FORMS else NAMED_TOGETHER
     return (tuple(chosen), share) if share >= enough else ((), share)
 

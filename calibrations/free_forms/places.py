@@ -288,6 +288,7 @@ def _temperature(data: PoseData, first: State) -> list[Component]:
                 Component(
                     f"temperature-bias/temperature-hysteresis@{part}", "temperature-bias", "response",
                     "temperature-hysteresis", "temperature-bias/play", GENERAL, _timed(held),
+                    contains="temperature-bias",
                 )
             )  # fmt: skip
     return found
