@@ -7,8 +7,8 @@ PX4        accelerometer (x - T - OFF) SCALE; gyroscope x - T - OFF; magnetomete
 ArduPilot  accelerometer (x - P(t) + P(tc) - OFFS) SCAL; gyroscope x - P(t) + P(tc) - OFFS; P = p1 d + p2 d^2 + p3 d^3,
            d = t - 35 limited as above, tc CALTEMP, p in 1e-6; magnetometer M (x + OFS), in mgauss
 
-Source  PX4: Accelerometer, Gyroscope and Magnetometer of the library sensor_calibration, temperature_compensation;
-        ArduPilot: AP_InertialSensor, AP_InertialSensor_tempcal, AP_Compass.
+Source  PX4: the library sensor_calibration, temperature_compensation; ArduPilot: AP_InertialSensor,
+        AP_InertialSensor_tempcal, AP_Compass.
 """
 
 from __future__ import annotations
