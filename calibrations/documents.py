@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from calibrations.discovery.curves import PlaceCurve, place_curves
 from calibrations.discovery.dataset import Dataset
 from calibrations.discovery.plausibility import Finding
 from calibrations.discovery.results import Candidate, Comparison, Diagnosis, Discovery, F, Step
@@ -21,6 +20,7 @@ from calibrations.table import Array
 if TYPE_CHECKING:
     from calibrations.design.expected import Expected
     from calibrations.design.experiment import Experiment
+    from calibrations.discovery.curves import PlaceCurve
 
 Document = dict[str, Any]
 
@@ -157,7 +157,11 @@ def places_document(result: Diagnosis[F] | Discovery[F]) -> list[Document]:
     """The places of the signal chain that act, the largest first; none where the search does not tell."""
     acting, data = result.findings.places, result.findings.data
     total = sum(place.rms**2 for place in acting) or 1.0
-    curves = place_curves(result.findings) if acting else {}  # type: ignore[arg-type]  # only rows have places
+    if not acting:
+        return []
+    from calibrations.discovery.curves import place_curves  # few results have places
+
+    curves = place_curves(result.findings)  # type: ignore[arg-type]  # only rows have places
     return [
         {
             "place": place.name,

@@ -16,8 +16,8 @@ import numpy as np
 from calibrations.discovery.results import Findings
 from calibrations.fitting.fit import Fit
 from calibrations.fitting.identifiability import covariance
-from calibrations.free_forms.effect import PREFIX, place_of_effect
 from calibrations.free_forms.form import CROSS
+from calibrations.free_forms.place_names import PREFIX, place_of_effect
 from calibrations.geometry.orientation import out_of_plane
 from calibrations.model.chain import forward, static_force
 from calibrations.table import Array, Table

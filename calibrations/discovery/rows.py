@@ -41,8 +41,7 @@ from calibrations.errors import ModelError, nearest
 from calibrations.fitting.determined import blind_to, undetermined
 from calibrations.fitting.fit import Fit, evaluate, fit, refit
 from calibrations.fitting.sensed import axis_of, milli_unit, pooled_milli
-from calibrations.free_forms.effect import place_of_effect, place_to_leave_out
-from calibrations.free_forms.requested import RequestedForm
+from calibrations.free_forms.place_names import PREFIX, place_of_effect
 from calibrations.means.noise import correlation_known, rms
 from calibrations.model import Model
 from calibrations.table import Array, Table
@@ -115,13 +114,17 @@ class Rows(Dataset[Fit]):
 
     def without(self, places: Sequence[str]) -> Rows:
         """The same table for a search that leaves out these places. Raises ModelError for an unknown place."""
+        if not places:
+            return self
+        from calibrations.free_forms.effect import place_to_leave_out  # few searches leave out a place
+
         chosen = tuple(dict.fromkeys(place_to_leave_out(place) for place in places))
         for place in chosen:
             column = place.removeprefix("column:")
             if column not in (place, "std", *self.table.columns):
                 hint = nearest(column, self.table.columns)
                 raise ModelError(f"{place} cannot be left out: {self.source} has no column {column}{hint}")
-        return Rows(replace(self.table, left_out=chosen)) if chosen else self
+        return Rows(replace(self.table, left_out=chosen))
 
     def _searchable(self, effects: Mapping[str, Effect]) -> Mapping[str, Effect]:
         """The effects that act at none of the places that are left out."""
@@ -381,7 +384,7 @@ class Rows(Dataset[Fit]):
         """Raises ModelError where the table lacks a column, or the effect is defined for another kind."""
         if (why := effect.excluded(self.table)) is not None:
             t = self.table
-            if isinstance(effect, RequestedForm) and t.content in effect.kinds:
+            if effect.name.startswith(PREFIX) and t.content in effect.kinds:
                 raise ModelError(f"{effect.name} {why} ({t.source})")
             raise ModelError(f"{effect.name} {why}; {t.source} is a table of {t.kind}: {', '.join(t.columns)}")
 

@@ -21,8 +21,9 @@ from calibrations.effects import Effect
 from calibrations.fitting.fit import Fit, evaluate, fit, refit
 from calibrations.fitting.problem import Problem
 from calibrations.free_forms.chain import Given
-from calibrations.free_forms.effect import PREFIX, free_form
+from calibrations.free_forms.effect import free_form
 from calibrations.free_forms.geometry import GEOMETRY
+from calibrations.free_forms.place_names import PREFIX
 from calibrations.free_forms.structure import FloorSource, Structure, find_structure
 from calibrations.means.noise import with_white
 from calibrations.model import Estimate, Model, Term

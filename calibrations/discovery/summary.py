@@ -15,7 +15,7 @@ from calibrations.discovery.search import first_order
 from calibrations.discovery.significance import chance
 from calibrations.fitting.fit import Fit
 from calibrations.fitting.sensed import in_milli, milli_unit, pooled_milli
-from calibrations.free_forms.effect import PREFIX, place_of_effect
+from calibrations.free_forms.place_names import PREFIX, place_of_effect
 from calibrations.means.noise import rms
 from calibrations.table import Array
 
@@ -59,6 +59,8 @@ def step_shares(found: Discovery[Fit]) -> list[float | None]:
 
 def summary_lines(found: Discovery[Fit]) -> list[Line]:
     """The lines, largest first."""
+    if not found.steps:
+        return []  # where the output does not respond there is no scale either
     findings, end = found.findings, found.end
     floor, unit = pooled_milli(end)[1], milli_unit(end)
     added = {step.name for step in found.steps}

@@ -19,7 +19,7 @@ from calibrations.fitting.held_out import folds, held_out
 from calibrations.fitting.identifiability import RELATIVE_RANK, estimates
 from calibrations.fitting.noise_fit import estimate, widening
 from calibrations.fitting.problem import Problem
-from calibrations.fitting.requested_forms import requested, with_sizes, without_requested
+from calibrations.free_forms.place_names import PREFIX
 from calibrations.means.noise import Noise, rms, white_only
 from calibrations.model import Model
 from calibrations.model.model import Parameters
@@ -174,7 +174,9 @@ def fit(model: Model, table: Table) -> Fit:
 
     Free forms of the model that have no sizes yet get them from the table.
     """
-    if requested(model):
+    if _requests(model):
+        from calibrations.fitting.requested_forms import without_requested
+
         return refit(fit(without_requested(model), table), model)
     problem = Problem.of(model, table)
     return _alternate(
@@ -187,7 +189,9 @@ def refit(before: Fit, model: Model, start: Array | None = None) -> Fit:
 
     Raises ModelError where a free form of the model has no sizes yet, and the data cannot show them.
     """
-    if requested(model):
+    if _requests(model):
+        from calibrations.fitting.requested_forms import with_sizes
+
         model = with_sizes(model, before)
     problem = Problem.of(model, before.table)
     return _alternate(problem, before.noise, problem.layout.starts() if start is None else [start])
@@ -208,7 +212,7 @@ def _alternate(problem: Problem, noise: Noise, starts: list[Array]) -> Fit:
 
 def evaluate(model: Model, table: Table) -> Fit | None:
     """The model with the values that it has, on `table`; None where it has none."""
-    if requested(model):
+    if _requests(model):
         return None
     problem = Problem.of(model, table)
     theta = problem.layout.known()
@@ -218,6 +222,15 @@ def evaluate(model: Model, table: Table) -> Fit | None:
     noise = white_only(problem.white, problem.gap_s, len(problem.channels), problem.given)
     noise = estimate(noise, residual, _free(problem, jacobian), problem.smooth)
     return Fit(replace(model, unit=table.unit), problem, theta, noise, residual, jacobian)
+
+
+def _requests(model: Model) -> bool:
+    """Whether a free form of the model has no sizes yet. Few models have a free form, and its modules load slowly."""
+    if not any(term.name.startswith(PREFIX) for term in model.terms):
+        return False
+    from calibrations.fitting.requested_forms import requested
+
+    return bool(requested(model))
 
 
 def _free(problem: Problem, jacobian: Array) -> Array:

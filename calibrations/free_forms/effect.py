@@ -15,54 +15,9 @@ from pydantic import TypeAdapter
 from calibrations.effects import Effect, Parameter, Values
 from calibrations.errors import ModelError, nearest
 from calibrations.free_forms.form import ANGLES, Form
+from calibrations.free_forms.place_names import EFFECTS_AT, GEOMETRY_PLACE, PLACES, PREFIX
 from calibrations.geometry.orientation import Pose, nominal_pose, specific_force
 from calibrations.table import AXES, Array, Table
-
-PREFIX = "free:"
-PLACES = {
-    "stage-angle-alpha": "error of the angle alpha over alpha",
-    "stage-angle-beta": "error of the angle beta over beta, and over the side from which it came",
-    "own-response": "output over the specific force along the own axis",
-    "cross-response": "output over the specific force along the other axis in the plane",
-    "z-response": "output over the specific force along the axis out of the plane",
-    "scale-over-cross": "scale factor over the specific force along the other axis in the plane",
-    "scale-over-z": "scale factor over the specific force along the axis out of the plane",
-    "force": "output over products of forces along several axes",
-    "history": "output over the forces passed on the way: slip elements and branches",
-    "temperature-bias": "output over the temperature",
-    "temperature-scale": "scale factor over the temperature",
-    "time-bias": "output over the time",
-    "time-scale": "scale factor over the time",
-    "output": "output of all axes over the output itself: the converter",
-}  # and column:NAME, a logged column
-GEOMETRY_PLACE = "geometry"  # a matrix and two angles: no free form, but a search can leave it out
-EFFECTS_AT = {
-    "stage-angle-alpha": (),
-    "stage-angle-beta": ("stage-eccentricity", "stage-backlash"),
-    "own-response": ("quadratic-nonlinearity", "cubic-nonlinearity", "odd-quadratic-nonlinearity",
-                     "scale-factor-asymmetry", "dead-zone", "saturation"),
-    "cross-response": ("cross-axis-bias",),
-    "z-response": ("z-axis-bias",),
-    "scale-over-cross": ("cross-axis-scale",),
-    "scale-over-z": ("z-axis-scale",),
-    "force": (),
-    "history": ("hysteresis",),
-    "temperature-bias": ("temperature-bias", "temperature-hysteresis"),
-    "temperature-scale": ("temperature-scale",),
-    "time-bias": ("warm-up-bias", "bias-drift"),
-    "time-scale": ("warm-up-scale",),
-    "output": ("adc-nonlinearity", "quantisation"),
-    "column:supply_v": ("supply-sensitivity",),
-    "column:std": ("vibration-rectification",),
-    GEOMETRY_PLACE: ("axis-misalignment", "axis-nonorthogonality", "stage-zero-offset", "base-tilt"),
-}  # the catalogue effects of each place  # fmt: skip
-
-
-def place_of_effect(name: str) -> str:
-    """The place at which an effect of a model acts; "" for bias, scale factor and effects of one's own."""
-    if name.startswith(PREFIX):
-        return name.removeprefix(PREFIX)
-    return next((place for place, effects in EFFECTS_AT.items() if name in effects), "")
 
 
 def place_of(name: str) -> str:

@@ -13,8 +13,9 @@ import numpy as np
 from calibrations.effects import Effect
 from calibrations.effects.catalogue import find
 from calibrations.errors import nearest
-from calibrations.free_forms.effect import PLACES, PREFIX, FreeForm, place_of
+from calibrations.free_forms.effect import FreeForm, place_of
 from calibrations.free_forms.form import ANGLES
+from calibrations.free_forms.place_names import PLACES, PREFIX
 from calibrations.geometry.stage_path import approached, last_turn
 from calibrations.table import Table
 

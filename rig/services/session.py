@@ -16,7 +16,7 @@ from calibrations.discovery.dataset import Dataset
 from calibrations.discovery.results import Comparison, Diagnosis, F, Findings, Step
 from calibrations.effects import Effect
 from calibrations.errors import CalibrationError, ModelError
-from calibrations.free_forms.effect import PREFIX
+from calibrations.free_forms.place_names import PREFIX
 from calibrations.free_forms.requested import named as free_form_at
 from calibrations.model import Model
 from rig.errors import RecordError

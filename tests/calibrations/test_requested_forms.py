@@ -12,7 +12,7 @@ from calibrations.effects.catalogue import catalogue
 from calibrations.errors import CalibrationError, ModelError
 from calibrations.fitting.fit import Fit, evaluate, fit
 from calibrations.free_forms.chain import Given, start, state_at
-from calibrations.free_forms.effect import EFFECTS_AT, GEOMETRY_PLACE, PLACES, place_of_effect
+from calibrations.free_forms.place_names import EFFECTS_AT, GEOMETRY_PLACE, PLACES, place_of_effect
 from calibrations.free_forms.places import components
 from calibrations.free_forms.poses import PoseData
 from calibrations.free_forms.requested import DRIVERS, RequestedForm, named

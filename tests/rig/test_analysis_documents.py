@@ -33,7 +33,11 @@ CANDIDATE = {
 TOLD = {"deviations": float, "probability": float}
 EXPERIMENT = {"procedure": str, "settings": dict, "separates": [[str]], "why": str, "command": str}
 EXPERIMENT |= {"duration_s": float, "expected": TOLD | {"alone": TOLD}}
-STEP = {"added": str, **dict.fromkeys(("excess_before", "excess_after", "held_out_before", "held_out_after"), float)}
+STEP = {
+    "added": str,
+    "share": (float, type(None)),
+    **dict.fromkeys(("excess_before", "excess_after", "held_out_before", "held_out_after"), float),
+}
 PARAMETER = {
     "effect": str,
     "axis": (str, type(None)),
@@ -148,6 +152,7 @@ def test_diagnose(rig: Rig, clean: str, bent: str) -> None:
         "residual_structure": (str, type(None)),
         "outliers": [int],
         "places": [dict],
+        "left_out": [str],
         "text": str,
         "missing": [str],
         "provisional": bool,

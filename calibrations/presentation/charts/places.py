@@ -14,7 +14,7 @@ from calibrations.effects import Effect
 from calibrations.effects.catalogue import catalogue
 from calibrations.errors import CalibrationError
 from calibrations.fitting.fit import Fit, fit
-from calibrations.free_forms.effect import EFFECTS_AT, PREFIX, place_of_effect
+from calibrations.free_forms.place_names import EFFECTS_AT, PREFIX, place_of_effect
 from calibrations.model import Model
 from calibrations.model.chain import forward
 from calibrations.presentation.chart import (

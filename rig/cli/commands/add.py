@@ -64,7 +64,7 @@ def _find_effect(effect: str, name: str | None, question: Loaded) -> Effect:
     """The effect by name, from an expression or from a file. Raises UnknownName, ModelError, ExpressionError."""
     from calibrations.effects.catalogue import read_effect
     from calibrations.errors import ModelError
-    from calibrations.free_forms.effect import PREFIX
+    from calibrations.free_forms.place_names import PREFIX
     from calibrations.free_forms.requested import named
 
     if effect.startswith(PREFIX):
