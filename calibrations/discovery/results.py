@@ -163,6 +163,11 @@ class Step(Generic[F]):
     alone: float | None = None
 
     @property
+    def effect(self) -> Effect:
+        """The added effect. The model keeps its effects in the order of the signal chain: it need not be the last."""
+        return next(term.effect for term in self.after.model.terms if term.effect.name == self.name)
+
+    @property
     def held_out_before(self) -> float:
         """Error on unseen data without the effect."""
         return self.before.held_out_excess

@@ -513,7 +513,7 @@ def _causes(steps: tuple[Step[Fit], ...]) -> tuple[str, ...]:
     tied = {term.name for term in steps[0].before.model.terms if term.tied}
     end = steps[-1].after
     costs = {s.name: (first_order(end, s.name, shared=True) if s.name in tied else cost(end, s.name))[0] for s in steps}
-    approximate = [s.name for s in steps if not s.after.model.terms[-1].effect.exact]
+    approximate = [s.name for s in steps if not s.effect.exact]
     greatest = max((costs[name] for name in approximate), default=0.0)
     return tuple(name for name, lost in costs.items() if name not in approximate or lost >= REFINEMENT * greatest)
 

@@ -371,8 +371,8 @@ def _opened(url: URL) -> tuple[str, Engine]:
 
 
 def now() -> str:
-    """ISO 8601, UTC."""
-    return datetime.now(UTC).isoformat(timespec="milliseconds")
+    """ISO 8601, UTC; microseconds, so that no two runs of a record begin at the same time."""
+    return datetime.now(UTC).isoformat(timespec="microseconds")
 
 
 def _new_run(to: Connection, values: Mapping[str, Any]) -> str:

@@ -102,7 +102,7 @@ class ModelSession(Generic[F]):
 
         An effect that the data cannot have without it is left out as well, with a note.
         """
-        kept = [step.after.model.terms[-1].effect for step in self.steps if step.name != name]
+        kept = [step.effect for step in self.steps if step.name != name]
         first = next((k for k, step in enumerate(self.steps) if step.name == name), len(self.steps))
         session = self._with(self.steps[:first])
         for effect in kept[first:]:
@@ -172,7 +172,7 @@ def brought_up_to_date(old: ModelSession[Any]) -> ModelSession[Any]:
         f"The data or the model have changed since this page was last open: {was or 'a file'}, now {now or 'new'}."
     ]
     for step in old.steps:
-        effect = step.after.model.terms[-1].effect
+        effect = step.effect
         try:
             new = new.among({**new.effects, effect.name: effect})
             new = new.with_step(new.tried(effect))

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import os
 import re
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import contextmanager
@@ -13,6 +15,7 @@ from dataclasses import dataclass
 from functools import partial
 from threading import Thread
 from typing import Any, ParamSpec, TypeVar
+from weakref import WeakSet
 
 from nicegui import ui
 from nicegui.element import Element
@@ -156,12 +159,28 @@ def redraw(plot: ui.plotly, figure: dict[str, Any]) -> None:
         plot.update_figure(figure)
 
 
+_CALCULATIONS = WeakSet[Thread]()
+
+
 async def off_loop(call: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
     """Call in a thread, so that the page stays responsive. The server does not wait for the thread when it ends."""
     future = Future[R]()
     work = partial(copy_context().run, call, *args, **kwargs)
-    Thread(target=_settled, args=(future, work), name=call.__name__, daemon=True).start()
+    thread = Thread(target=_settled, args=(future, work), name=call.__name__, daemon=True)
+    _CALCULATIONS.add(thread)
+    thread.start()
     return await asyncio.wrap_future(future)
+
+
+def leave_calculations() -> None:
+    """End the process at once, with status 0, if a calculation still runs.
+
+    The interpreter would end its thread at the next line of Python; inside of C++ that aborts the whole process.
+    """
+    if any(thread.is_alive() for thread in _CALCULATIONS):
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(0)
 
 
 def _settled(future: Future[R], work: Callable[[], R]) -> None:

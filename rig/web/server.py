@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import signal
 import socket
 from collections.abc import Callable, Iterator
@@ -18,6 +19,7 @@ from rig.web.desk import Desk
 from rig.web.frame import TITLE
 from rig.web.guard import TOKEN, Guard, names
 from rig.web.pages import register
+from rig.web.parts import leave_calculations
 
 LOCAL = "127.0.0.1"
 PORT = 8473  # preferred, so that an open page finds a restarted server
@@ -62,6 +64,7 @@ def serve(desk: Desk, host: str, port: int | None, token: str, ready: Callable[[
     )
     with _ignored_signals(), listener:
         _Server(config, lambda: ready(place)).run(sockets=[listener])
+    atexit.register(leave_calculations)
 
 
 class _Server(uvicorn.Server):

@@ -44,6 +44,7 @@ def test_all_effects_are_added_at_a_click_and_any_can_be_removed(workbench: Work
 def test_every_picture_is_downloaded_as_svg_and_png(workbench: Workbench, tmp_path: Path) -> None:
     page = workbench.visit(f"/?data={quote(two_faults(tmp_path))}")
     expect(page.locator("[aria-label='Residuals'] .points path").first).to_be_attached()
+    expect(page.locator(BARS).first).to_be_attached()
     for title, form, begins in (("Residuals", "SVG", b"<?xml"), ("Error by model", "PNG", b"\x89PNG")):
         page.get_by_role("button", name=f"Download: {title}").click()
         with page.expect_download() as download:

@@ -31,6 +31,17 @@ def test_an_effect_is_tried_added_and_undone(turned: ModelSession) -> None:
     assert turned.undone().end is turned.end
 
 
+def test_any_added_effect_is_removed_and_the_others_stay(turned: ModelSession) -> None:
+    grown = turned
+    for name in ("quadratic-nonlinearity", "axis-misalignment", "stage-eccentricity"):
+        grown = grown.with_step(grown.tried(grown.effects[name]))
+    assert [step.effect.name for step in grown.steps] == list(grown.names)
+    for name in grown.names:
+        left = grown.removed(name)
+        assert left.names == tuple(each for each in grown.names if each != name)
+        assert {term.effect.name for term in left.end.model.terms} == {"bias", "scale-factor", *left.names}
+
+
 def test_where_no_column_tells_the_noise_the_error_falls_and_rises_again(tmp_path: Path) -> None:
     write_csv(magnetometer(), path := tmp_path / "hemisphere.csv")
     begun = model_session(Request(str(path), "field"))

@@ -260,7 +260,7 @@ class Workbench:
     async def add(self, step: Step[Any]) -> None:
         """Add an effect to the model."""
         if self.session is not None:
-            if (effect := step.after.model.terms[-1].effect).expression:
+            if (effect := step.effect).expression:
                 self.session = self.session.among({**self.session.effects, effect.name: effect})
             await self.show(self.session.with_step(step))
 

@@ -151,6 +151,8 @@ class Missing:
             hint = waiting("Planning on the bench")
         try:
             found = await off_loop(page.session.with_next, result, notes.append)
+            if hint.is_deleted:  # the page shows another model by now
+                return
             experiment = found.next_experiment
             assert experiment is not None  # noqa: S101 it had one before
             hint.set_text(" ".join([next_words(experiment), next_takes(experiment), *notes]))
@@ -161,7 +163,8 @@ class Missing:
                     "outline dense"
                 )
         except Exception as error:
-            hint.set_text(message(error))
+            if not hint.is_deleted:
+                hint.set_text(message(error))
 
     async def look_at(self, c: Candidate, look: bool = False) -> None:
         """Draw the candidate in the residual; with `look`, against the column that it follows."""
