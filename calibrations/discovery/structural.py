@@ -176,14 +176,14 @@ def separately(base: Fit, found: Structure, added: list[Addition]) -> list[Addit
     Beside other effects that are missing, the search for a nonlinear parameter goes astray.
     """
     names = {a.effect.name: a for a in added}
-    everything = np.sum([place.curve for place in found.places], axis=0) if found.places else 0.0
+    everything = np.sum([place.contribution for place in found.places], axis=0) if found.places else 0.0
     model = _with(base.model, [a for name, a in names.items() if name in GEOMETRY])
     linear = fit(model, _less(base.table, everything)) if model is not base.model else base
     known: dict[str, tuple[Estimate, ...]] = {term.name: term.estimates for term in linear.model.terms}
     for place in found.places:
         own = [names[cause] for cause in (*place.causes, *found.refinements(place)) if cause in names]
         if own:
-            alone = fit(_with(linear.model, own), _less(base.table, everything - place.curve))
+            alone = fit(_with(linear.model, own), _less(base.table, everything - place.contribution))
             known |= {a.effect.name: alone.model.estimates(a.effect.name) for a in own}
     return [replace(a, estimates=known.get(name, a.estimates)) for name, a in names.items()]
 

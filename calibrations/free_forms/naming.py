@@ -42,6 +42,7 @@ class ActingPlace:
     gain: float
     inseparable_from: tuple[str, ...]
     curve: Array  # (channels, n), in the output's unit, freed of what the base takes up
+    contribution: Array  # the same with what the base could take up
 
     @property
     def rms(self) -> float:
@@ -67,9 +68,8 @@ def places(result: SearchResult) -> list[ActingPlace]:
         by_place.setdefault(result.component(name).place, []).append(name)
     base = result.columns[:, :b]
     Q = np.linalg.qr(base / np.maximum(np.linalg.norm(base, axis=0), 1e-300))[0]
-    curves = {
-        place: _freed(Q, np.sum([_part(result, n, b) for n in names], axis=0)) for place, names in by_place.items()
-    }
+    whole = {place: np.sum([_part(result, n, b) for n in names], axis=0) for place, names in by_place.items()}
+    curves = {place: _freed(Q, contribution) for place, contribution in whole.items()}
     sizes = {place: float(np.sqrt(np.mean(curve**2))) for place, curve in curves.items()}
     largest = max(sizes.values(), default=0.0)
     out = []
@@ -77,9 +77,11 @@ def places(result: SearchResult) -> list[ActingPlace]:
         causes, share = _named(result, place, names, curves[place], Q, b)
         material = sizes[place] >= max(LEAST_SIZE, LEAST_SHARE * largest)
         gain, others = _rivals(result, names)
-        curve = curves[place].reshape(result.white.shape) * result.white
+        curve, contribution = (x[place].reshape(result.white.shape) * result.white for x in (curves, whole))
         out.append(
-            ActingPlace(place, sizes[place], largest, tuple(names), causes, share, material, gain, others, curve)
+            ActingPlace(
+                place, sizes[place], largest, tuple(names), causes, share, material, gain, others, curve, contribution
+            )
         )
     return sorted(out, key=lambda p: -p.size)
 
