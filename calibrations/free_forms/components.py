@@ -12,6 +12,7 @@ from calibrations.free_forms.form import ANGLES, Form
 from calibrations.table import Array
 
 Columns = Callable[[State], Array]  # (channels, n, m)
+Starts = tuple[tuple[str, str, float], ...]
 Basis = Callable[[State, int], Array]  # (n, m) of one channel
 
 
@@ -27,7 +28,7 @@ class Component:
     form      the free form that it is, or that takes the place of the effect's own form
     shape     values in which the columns are not linear; `step` by which they are first changed
     constants by which the catalogue effect is the same function, such as the thermometer's lead
-    starts    values of the effect's parameters that belong to the shape: (parameter, axis or "", value)
+    starts    values of the effect's parameters, (parameter, axis or "", value), from the coefficients of the columns
     contains  the effect that its cause becomes where the shape vanishes
     """
 
@@ -46,7 +47,7 @@ class Component:
     step: tuple[float, ...] = ()
     reshaped: Callable[[tuple[float, ...]], Component] | None = None
     constants: tuple[tuple[str, float], ...] = ()
-    starts: tuple[tuple[str, str, float], ...] = ()
+    starts: Callable[[Array], Starts] | None = None
     contains: str = ""
 
     def jacobian(self, state: State) -> Array:

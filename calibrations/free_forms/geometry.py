@@ -22,7 +22,7 @@ from calibrations.table import Array
 GEOMETRY = ("axis-nonorthogonality", "axis-misalignment", "stage-zero-offset", "base-tilt")
 CAUSE_PRICE, PARAMETER_PRICE = 12.0, 2.0  # of chi-square
 CLOSE = 8.0  # of chi-square: explanations that this data does not tell apart
-LINEAR_PART = 1.0  # of a curve's size: the standard deviation of a mechanism's own linear part
+LINEAR_PART = 2.0  # of a curve's size: the standard deviation of a mechanism's own linear part
 LEAST_LINE = 0.3  # noise floors: a smaller linear part is left out
 SEEN = 3.5  # standard uncertainties: a smaller linear part may be noise
 IMMATERIAL = 0.15  # noise floors: a smaller angle is no matter

@@ -6,7 +6,7 @@ adds to the output. Constant and linear parts over the forces are in the base (`
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -135,7 +135,7 @@ def _own(data: PoseData, first: State) -> list[Component]:
         return lambda shape: Component(
             name, place, "response", "dead-zone", f"{place}/dead-zone", price, per_axis(_dead(shape)),
             shape=shape, step=tuple(0.3 * w for w in shape), reshaped=dead(name),
-            starts=tuple(("width", axis, abs(w)) for axis, w in zip(data.axes, shape, strict=True)),
+            starts=lambda _: tuple(("width", axis, abs(w)) for axis, w in zip(data.axes, shape, strict=True)),
         )  # fmt: skip
 
     found += [dead(f"{place}/dead-zone@{width:.4f}")((width,) * data.channels) for width in DEAD_G]
@@ -156,6 +156,7 @@ def _saturations(data: PoseData, first: State) -> list[Component]:
         return lambda shape: Component(
             name, place, "response", "saturation", f"{place}/saturation", price, _saturated(shape, side),
             shape=shape, step=(0.02,) * len(shape), reshaped=saturated(name, side),
+            starts=lambda loss: (*_levels(first, shape, side), ("loss", "", float(np.clip(-loss[0], 0.01, 1.0)))),
         )  # fmt: skip
 
     found = []
@@ -169,6 +170,20 @@ def _saturations(data: PoseData, first: State) -> list[Component]:
             )
             found.append(saturated(f"{place}/saturation@{name}{end}", side)(shape))
     return found
+
+
+def _levels(first: State, shape: tuple[float, ...], side: int) -> tuple[tuple[str, str, float], ...]:
+    """The outputs at which saturation begins, from its specific forces, g; the end of the outputs on the other side."""
+    found: list[tuple[str, str, float]] = []
+    for k, axis in enumerate(first.data.axes):
+        slope, offset = np.polyfit(first.force[:, k], first.response[k], 1)
+        outputs = first.data.outputs[k]
+        ends = {"high": outputs.max(), "low": outputs.min()}
+        levels = shape[2 * k : 2 * k + 2] if side == 0 else shape[k : k + 1]
+        found += [(name, axis, float(ends[name])) for name in ends if side and name != ("high" if side > 0 else "low")]
+        names = ("high", "low") if side == 0 else ("high",) if side > 0 else ("low",)
+        found += [(name, axis, float(slope * a + offset)) for name, a in zip(names, levels, strict=True)]
+    return tuple(found)
 
 
 def _saturated(levels: tuple[float, ...], side: int) -> Columns:
@@ -334,7 +349,8 @@ def _time(data: PoseData, first: State) -> list[Component]:
     for place, factor, cause, drift, price in places:
         for tau in WARMING:
             name = f"{place}/{cause}@{tau:.3f}"
-            found.append(_warming(u, span, name, place, cause, price + 2 * np.log(len(WARMING)), factor)((tau,)))
+            more = price + 2 * np.log(len(WARMING))
+            found.append(_warming(data.axes, u, span, name, place, cause, more, factor)((tau,)))
         line = Form(place, "line", "time", (Line(begin, begin + span),), factor)
         found.append(free(line, first, drift, price))
         found.append(free(Form(place, "curve", "time", (spline(t, 12),), factor), first, price=price))
@@ -354,15 +370,20 @@ def _time(data: PoseData, first: State) -> list[Component]:
     return found
 
 
-def _warming(u: Array, span_s: float, name: str, place: str, cause: str, price: float, factor: Factor) -> Make:
+def _warming(
+    axes: Sequence[str], u: Array, span_s: float, name: str, place: str, cause: str, price: float, factor: Factor
+) -> Make:
     """An exponential approach by its time constant, as a share of the record."""
 
     def at(shape: tuple[float, ...]) -> Component:
         left = np.exp(-u / max(shape[0], 1e-3))[:, None]
         return Component(
             name, place, "response", cause, f"{place}/{cause}", price, _times_force(left) if factor else _timed(left),
-            shape=shape, step=(0.2 * shape[0],), reshaped=_warming(u, span_s, name, place, cause, price, factor),
-            starts=(("time_constant", "", shape[0] * span_s),),
+            shape=shape, step=(0.2 * shape[0],), reshaped=_warming(axes, u, span_s, name, place, cause, price, factor),
+            starts=lambda amplitudes: (
+                *(("amplitude", axis, float(a)) for axis, a in zip(axes, amplitudes, strict=True)),
+                ("time_constant", "", shape[0] * span_s),
+            ),
         )  # fmt: skip
 
     return at

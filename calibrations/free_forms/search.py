@@ -23,7 +23,7 @@ from calibrations.free_forms.reml import (
     whitened,
     without,
 )
-from calibrations.free_forms.selection import ENTER, pools_of, select
+from calibrations.free_forms.selection import ENTER, pools_of, prices, select
 from calibrations.table import Array
 
 COARSE = (1e-3, 2e-5)  # of the misfit, at each linearisation: less may be a second-order remainder
@@ -32,6 +32,7 @@ LARGEST = 4.0  # of the mean square of the first misfit: more is two components 
 HALVINGS = 6  # of a step that overshoots
 NOISE_ALONE, FEW = 1.04, 3  # residual over noise and components of a search that needs no second beginning
 SLOW_MOST = 0.5  # slow noise, in noise floors, at most (rms)
+SLOW_FIRST = 0.15  # the same while the first components are found: it would take up part of them
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +83,7 @@ class SearchResult:
     @property
     def criterion(self) -> float:
         """-2 log restricted likelihood, and what each component must gain."""
-        return self.sizes.deviance + sum(ENTER + self.component(name).price for name in self.active)
+        return self.sizes.deviance + ENTER * len(self.active) + prices(self.component(name) for name in self.active)
 
 
 def search(data: PoseData, white: Array, given: Given, general: bool = True) -> SearchResult:
@@ -124,6 +125,8 @@ def _descent(data: PoseData, white: Array, given: Given, general: bool, catalogu
             g = gram(X, blocks, scales, b)
             largest = LARGEST * g.squares / g.rows * floor**2
             most |= {c.name: largest for c in components if not c.noise}
+        slow = SLOW_FIRST if number < len(COARSE) else SLOW_MOST
+        most |= dict.fromkeys(noise, (slow * floor) ** 2)
         limit = caution * (max(ENTER, COARSE[number] * g.squares) if number < len(COARSE) else ENTER)
         before = set(variances)
         kept = values, dict(variances), state

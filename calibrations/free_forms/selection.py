@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -11,9 +11,33 @@ from calibrations.free_forms.reml import Gram, Sizes, estimate, gains, loss, wit
 
 ENTER = 16.0  # gain in -2 log restricted likelihood for one component more: 1 % of clean sensors (`chance`)
 LEAVE = 12.0
+SAME_PLACE = 6.0  # less for a component at a place that acts already: it is another form of one mechanism
 MOST_COMPONENTS = 24
 SPILL = 0.03  # of the misfit that is left: a place that gains less takes up part of what acts elsewhere
 CANCELS = 6.0  # of the squares of the first misfit: more in one component is taken off by others
+
+
+def acting_places(names: Iterable[str], by_name: Mapping[str, Component]) -> set[str]:
+    """Places of active components."""
+    return {by_name[name].place for name in names if name in by_name}
+
+
+def price(component: Component, acting: Collection[str]) -> float:
+    """What a component must gain more than another beside the places that act; less at one of them.
+
+    A component that can follow almost anything is no other form of what acts there.
+    """
+    return component.price - (SAME_PLACE if component.place in acting and not component.general else 0.0)
+
+
+def prices(components: Iterable[Component]) -> float:
+    """What components must gain more, each beside those before it."""
+    total, acting = 0.0, set[str]()
+    for component in components:
+        total += price(component, acting)
+        acting.add(component.place)
+    return total
+
 
 Pools = Sequence[Mapping[str, Component]]
 
@@ -105,12 +129,13 @@ def _best(
     names = [n for n, c in by_name.items() if n not in sizes.variances and c.family not in taken and n in g.blocks]
     known = {} if stale is None else stale
     names.sort(key=lambda n: -known.get(n, np.inf))
+    acting = acting_places(sizes.variances, by_name)
     best: tuple[str, float, float] | None = None
     for part in [names[k : k + 6] for k in range(0, len(names), 6)] if known else [names]:
         if not part or (best is not None and best[1] > known.get(part[0], np.inf)):
             break
         for n, (gained, variance) in gains(g, sizes, part).items():
-            known[n] = gained - by_name[n].price
+            known[n] = gained - price(by_name[n], acting)
             if best is None or known[n] > best[1]:
                 best = n, known[n], variance
     return best
@@ -121,7 +146,8 @@ def _pruned(
 ) -> Sizes:
     """Without components whose loss costs less than they must gain, the least first."""
     while True:
-        costs = {n: loss(g, sizes, n) - by_name[n].price for n in sizes.variances if not by_name[n].noise}
+        each = {n: price(c, acting_places(sizes.variances.keys() - {n}, by_name)) for n, c in by_name.items()}
+        costs = {n: loss(g, sizes, n) - each[n] for n in sizes.variances if not by_name[n].noise}
         if not costs:
             return sizes
         name = min(costs, key=lambda n: costs[n])
@@ -129,7 +155,7 @@ def _pruned(
             return sizes
         rest = {k: v for k, v in sizes.variances.items() if k != name}
         after = estimate(g, rest, most, 12)
-        if after.deviance - sizes.deviance - by_name[name].price > LEAVE:
+        if after.deviance - sizes.deviance - each[name] > LEAVE:
             return sizes
         steps.append(f"-{name}")
         sizes = after
@@ -143,19 +169,21 @@ def _exchanged(
         if name not in sizes.variances:
             continue
         others = without(g, sizes, name)
+        beside = acting_places(others.variances, by_name)
+        own = price(by_name[name], beside)
         alone = estimate(g, others.variances, most, 12)
-        if alone.deviance - sizes.deviance - by_name[name].price <= LEAVE:  # the others take its part
+        if alone.deviance - sizes.deviance - own <= LEAVE:  # the others take its part
             steps.append(f"-{name}")
             sizes = alone
             continue
-        lost = others.deviance - sizes.deviance - by_name[name].price
+        lost = others.deviance - sizes.deviance - own
         best = _best(g, others, by_name)
         if best is None or best[0] == name or best[1] < lost + 1.0:
             continue
         tried = estimate(g, {**others.variances, best[0]: best[2]}, most, 12)
         if _cancels(g, tried):
             continue
-        better = sizes.deviance + by_name[name].price - tried.deviance - by_name[best[0]].price
+        better = sizes.deviance + own - tried.deviance - price(by_name[best[0]], beside)
         if better > 1.0:
             steps.append(f"{name}>{best[0]}")
             sizes = tried

@@ -70,9 +70,10 @@ class Structure:
         return place.name == "history" or any("/walk-" in name for name in place.components)
 
     def _same_as_one_of(self, cause: str, named: list[str]) -> bool:
-        """Whether the data cannot separate a cause from one of those that are named."""
-        return any(other in self.alternatives.get(cause, ()) or cause in self.alternatives.get(other, ())
-                   for other in named)  # fmt: skip
+        """Whether the data cannot separate a cause from one of those that are named, or from its place."""
+        own = set(self.alternatives.get(cause, ()))
+        at = {place.name for place in self.places if set(named) & set(place.causes) and cause not in place.causes}
+        return bool(own & (at | set(named))) or any(cause in self.alternatives.get(other, ()) for other in named)
 
     @property
     def unknown(self) -> tuple[ActingPlace, ...]:
@@ -109,8 +110,10 @@ class Structure:
 
     def starts(self, cause: str) -> tuple[tuple[str, str, float], ...]:
         """Values of a cause's parameters from which its fit starts: (parameter, axis or "", value)."""
-        acting = [self.result.component(name) for place in self.places for name in place.components]
-        return next((c.starts for c in acting if c.cause == cause and c.starts), ())
+        for component in (self.result.component(name) for place in self.places for name in place.components):
+            if component.cause == cause and component.starts is not None:
+                return component.starts(self.result.values.of[component.name])
+        return ()
 
     def forms(self, place: ActingPlace) -> tuple[Form, ...]:
         """The free forms that act at a place, with their sizes."""

@@ -98,7 +98,7 @@ class Layout:
             for pick, members in zip(picks, groups.values(), strict=True):
                 for k in members:
                     vector[k] = choices[k][min(pick, len(choices[k]) - 1)]
-            vectors.append(vector)
+            vectors.append(np.clip(vector, *self.bounds))
         return vectors
 
     def _known(self) -> dict[int, float]:
