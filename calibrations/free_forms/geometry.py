@@ -23,6 +23,7 @@ GEOMETRY = ("axis-nonorthogonality", "axis-misalignment", "stage-zero-offset", "
 CAUSE_PRICE, PARAMETER_PRICE = 12.0, 2.0  # of chi-square
 CLOSE = 8.0  # of chi-square: explanations that this data does not tell apart
 LINEAR_PART = 2.0  # of a curve's size: the standard deviation of a mechanism's own linear part
+FORM_PART = 0.1  # of a place's size: what its form may differ by from the one that acts there
 LEAST_LINE = 0.3  # noise floors: a smaller linear part is left out
 SEEN = 3.5  # standard uncertainties: a smaller linear part may be noise
 IMMATERIAL = 0.15  # noise floors: a smaller angle is no matter
@@ -59,7 +60,7 @@ def geometry(result: SearchResult, sizes: Mapping[str, float], effects: Mapping[
     b = own_base_size(data)
     active = g.indices(result.sizes.variances)
     cross = g.base_inverse @ g.base_products[:, active]
-    covariance = (g.base_inverse + cross @ result.sizes.inverse @ cross.T)[:b, :b]
+    covariance = (g.base_inverse + cross @ result.sizes.inverse @ cross.T + _of_forms(result, sizes))[:b, :b]
     q = pick @ result.values.base[:b]
     C = pick @ covariance @ pick.T
     std = np.sqrt(np.maximum(np.diag(C), 0.0))
@@ -81,6 +82,18 @@ def geometry(result: SearchResult, sizes: Mapping[str, float], effects: Mapping[
         if places and abs(angle) > max(LEAST_LINE * floor / mean_gain, SEEN * uncertainty):
             lines[places[0]] = max(lines.get(places[0], 0.0), float(abs(angle)) * mean_gain)
     return Geometry(causes, alternatives, lines)
+
+
+def _of_forms(result: SearchResult, sizes: Mapping[str, float]) -> Array:
+    """Covariance of the base, (b, b), that another form of each place that acts would cause."""
+    g = result.gram
+    active = result.sizes.variances.keys()
+    total = np.zeros(g.base_inverse.shape)
+    for component in result.components:
+        if component.place in sizes and component.form is not None and component.name not in active:
+            leak = g.base_inverse @ g.base_products[:, g.blocks[component.name]]
+            total += (FORM_PART * sizes[component.place]) ** 2 * leak @ leak.T
+    return total
 
 
 def _angles(result: SearchResult, gain: Array) -> tuple[Array, list[tuple[str, ...]]]:

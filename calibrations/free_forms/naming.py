@@ -23,6 +23,7 @@ LEAST_UNKNOWN, LEAST_UNKNOWN_SHARE = 1.0, 0.05  # the same two of a place withou
 LEAST_SHARE = 0.015  # of the largest place's size
 JUMPS = 4.0  # excess kurtosis of a walk's increments: 500 of a Gaussian process keep within +-1
 CLOSE = 10.0  # of -2 log likelihood: not told apart
+FORM_OF, MOSTLY = 0.25, 0.85  # size beside a larger place, and share of its gain that another form there takes up
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,7 @@ def places(result: SearchResult) -> list[ActingPlace]:
     for place, names in by_place.items():
         causes, share = _named(result, place, names, curves[place], Q, b)
         material = sizes[place] >= max(LEAST_SIZE, LEAST_SHARE * largest)
-        gain, others = _rivals(result, names)
+        gain, others = _rivals(result, names, {other for other in sizes if sizes[place] < FORM_OF * sizes[other]})
         curve, contribution = (x[place].reshape(result.white.shape) * result.white for x in (curves, whole))
         out.append(
             ActingPlace(
@@ -175,17 +176,24 @@ def _left(columns: Sequence[Array], y: Array) -> float:
     return float(rest @ rest)
 
 
-def _rivals(result: SearchResult, names: Sequence[str]) -> tuple[float, tuple[str, ...]]:
-    """What the place gains, and causes at other places that would gain nearly as much in its stead."""
+def _rivals(result: SearchResult, names: Sequence[str], larger: set[str]) -> tuple[float, tuple[str, ...]]:
+    """What the place gains, and causes at other places that would do in its stead.
+
+    Of one component those that gain nearly as much. At a `larger` place that acts, also a form that gains most of it:
+    the form of a mechanism is never quite that of the catalogue.
+    """
     others = result.sizes
     for name in names:
         others = without(result.gram, others, name)
     lost = others.deviance - result.sizes.deviance
-    if len(names) > 1:
-        return lost, ()
-    place, own = result.component(names[0]).place, result.component(names[0])
-    rest = [c.name for c in result.components if c.name not in result.sizes.variances and c.place != place]
-    gained = gains(result.gram, others, rest)
-    close = {result.component(n).cause or result.component(n).place for n, (g, _) in gained.items()
-             if g - result.component(n).price > lost - own.price - CLOSE}  # fmt: skip
-    return lost, tuple(sorted(close - {own.cause}))
+    acting = [result.component(name) for name in names]
+    rest = [c for c in result.components if c.name not in result.sizes.variances and c.place != acting[0].place]
+    gained = gains(result.gram, others, [c.name for c in rest])
+    near = lost - acting[0].price - CLOSE if len(names) == 1 else np.inf
+    most = MOSTLY * lost
+    close = {
+        c.cause or c.place
+        for c in rest
+        if gained[c.name][0] - c.price > (min(near, most) if c.place in larger and not c.general else near)
+    }
+    return lost, tuple(sorted(close - {component.cause for component in acting}))
