@@ -86,13 +86,16 @@ def geometry(result: SearchResult, sizes: Mapping[str, float], effects: Mapping[
 
 def _of_forms(result: SearchResult, sizes: Mapping[str, float]) -> Array:
     """Covariance of the base, (b, b), that another form of each place that acts would cause."""
-    g = result.gram
-    active = result.sizes.variances.keys()
+    g, active = result.gram, result.sizes.variances.keys()
+    floor = float(np.sqrt(np.mean(result.white**2)))
     total = np.zeros(g.base_inverse.shape)
     for component in result.components:
         if component.place in sizes and component.form is not None and component.name not in active:
-            leak = g.base_inverse @ g.base_products[:, g.blocks[component.name]]
-            total += (FORM_PART * sizes[component.place]) ** 2 * leak @ leak.T
+            block = g.blocks[component.name]
+            columns = result.columns[:, len(total) + block.start : len(total) + block.stop]
+            adds = floor * np.sqrt(np.sum(columns**2) / len(columns))  # to the output, for coefficients of 1
+            leak = g.base_inverse @ g.base_products[:, block]
+            total += (FORM_PART * sizes[component.place] / adds) ** 2 * leak @ leak.T
     return total
 
 
