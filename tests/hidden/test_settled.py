@@ -53,12 +53,12 @@ def test_a_rival_is_judged_with_its_shape_fitted() -> None:
     assert found_on("own/ageing reference", 30, 6166).alternatives == {"bias-drift": ("warm-up-bias",)}
 
 
-def test_a_little_that_is_left_beside_a_cause_is_told_and_not_decided() -> None:
+def test_a_cause_of_another_form_keeps_a_curve_beside_it() -> None:
     """Beams that warm as two masses do, where the catalogue has one time constant."""
     found = found_on("own/warming beams", 30, 6158)
-    assert (found.causes, found.verdict) == (("warm-up-scale",), "ambiguous")
-    assert found.residual_structure is not None
-    assert not found.undecided  # by another experiment
+    assert (found.causes, found.verdict) == (("warm-up-scale",), "adequate")
+    assert [step.name for step in found.steps] == ["warm-up-scale", "free:time-scale"]
+    assert found.steps[-1].held_out_after < 1.15 < found.steps[0].held_out_after
 
 
 def cycled(lag_k: float) -> Table:
