@@ -19,8 +19,8 @@ LEAST_NEEDED = 0.02  # the same of a form without which the others, as the catal
 NAMED = 0.5  # of it that one form must take up: else the cause is unknown
 MOST_FORMS, NAMED_TOGETHER = 2, 0.8  # forms that only approximate a curve, and what two of them must take up
 LEAST_SIZE = 0.6  # noise floors: a smaller place is a refinement
-LEAST_UNKNOWN, LEAST_UNKNOWN_SHARE = 1.0, 0.05  # the same two of a place without a cause
 LEAST_SHARE = 0.015  # of the largest place's size
+LEAST_UNKNOWN, LEAST_UNKNOWN_SHARE = 1.0, 0.05  # the same two of a place without a cause
 JUMPS = 4.0  # excess kurtosis of a walk's increments: 500 of a Gaussian process keep within +-1
 CLOSE = 10.0  # of -2 log likelihood: not told apart
 FORM_OF, MOSTLY = 0.25, 0.85  # size beside a larger place, and share of its gain that another form there takes up
@@ -76,8 +76,10 @@ def places(result: SearchResult) -> list[ActingPlace]:
     out = []
     for place, names in by_place.items():
         causes, share = _named(result, place, names, curves[place], Q, b)
-        material = sizes[place] >= max(LEAST_SIZE, LEAST_SHARE * largest)
         gain, others = _rivals(result, names, {other for other in sizes if sizes[place] < FORM_OF * sizes[other]})
+        least = LEAST_UNKNOWN_SHARE if all("/walk-" in name for name in names) else LEAST_SHARE  # it follows anything
+        own = float(np.sqrt(max(gain, 0.0) / len(result.columns)))  # in noise floors: what no other place could take up
+        material = own >= LEAST_SIZE and sizes[place] >= least * largest
         curve, contribution = (x[place].reshape(result.white.shape) * result.white for x in (curves, whole))
         out.append(
             ActingPlace(
