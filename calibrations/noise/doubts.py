@@ -33,10 +33,11 @@ from calibrations.noise.comparison import noise_levels, stretches
 from calibrations.noise.fit import fit_effects
 from calibrations.noise.likelihood import ChannelFit
 from calibrations.noise.lines import Line, strongest_line
-from calibrations.noise.patterns import DRIFT, FOLLOWS, SETTLING, STEP, TWO_LEVELS, Pattern
+from calibrations.noise.patterns import DRIFT, FOLLOWS, SETTLING, STEP, Pattern
 from calibrations.noise.record import Channel
 from calibrations.noise.samples import hidden_in
 from calibrations.noise.search import Search
+from calibrations.noise.telegraph import TWO_LEVELS
 from calibrations.spectrum import GAUSS_MARKOV, Bands, slow_bands
 
 LINE, LEVEL, STRETCH = "line", "level", "spectrum"

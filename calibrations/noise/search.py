@@ -34,8 +34,9 @@ from calibrations.noise.fit import (
 from calibrations.noise.likelihood import ChannelFit
 from calibrations.noise.lines import Lines
 from calibrations.noise.mixtures import Mixture, Mixtures, chance, likelihood, tube
-from calibrations.noise.patterns import FOLLOWS, Pattern, Telegraph, pattern_of, refitted, telegraph_of
+from calibrations.noise.patterns import FOLLOWS, Pattern, pattern_of, refitted
 from calibrations.noise.record import Channel, Still
+from calibrations.noise.telegraph import Telegraph, telegraph_of
 
 
 @dataclass(frozen=True)

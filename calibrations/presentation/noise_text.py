@@ -8,9 +8,9 @@ import numpy as np
 
 from calibrations.noise.analysis import ChannelNoise, Coefficient, NoiseAnalysis
 from calibrations.noise.deviations import minimum_s
-from calibrations.noise.patterns import TWO_LEVELS
 from calibrations.noise.record import Sensed
 from calibrations.noise.samples import COARSE
+from calibrations.noise.telegraph import TWO_LEVELS
 from calibrations.text import columns, duration, exponent, rounded, sentence
 
 PREFIXES = ((1.0, ""), (1e3, "m"), (1e6, "u"), (1e9, "n"), (1e12, "p"))

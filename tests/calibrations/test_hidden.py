@@ -13,9 +13,10 @@ from calibrations.loop import diagnose, discover
 from calibrations.model.file import read_model
 from calibrations.noise.analysis import analyse, noise_document
 from calibrations.noise.fit import fit_channel
-from calibrations.noise.patterns import pattern_of, telegraph_of
+from calibrations.noise.patterns import pattern_of
 from calibrations.noise.record import Reduction, Samples, reduce_record
 from calibrations.noise.samples import COARSE, Hidden, hidden_in, hidden_step
+from calibrations.noise.telegraph import telegraph_of
 from calibrations.table import Array
 from tests.calibrations.hidden_noise import RECORDS, telegraph
 

@@ -13,8 +13,8 @@ from calibrations.loop import diagnose, discover
 from calibrations.model.file import read_model
 from calibrations.noise.analysis import analyse
 from calibrations.noise.fit import fit_channel
-from calibrations.noise.patterns import TWO_LEVELS, Telegraph, telegraph_of
 from calibrations.noise.record import Samples, Still, reduce_record
+from calibrations.noise.telegraph import TWO_LEVELS, Telegraph, telegraph_of
 from calibrations.table import Array
 from tests.calibrations.hidden_noise import RATE_HZ, _relaxing, telegraph, traps, walk, white
 
