@@ -22,6 +22,7 @@ from sqlalchemy.exc import InvalidatePoolError
 from rig.errors import RecordError
 from rig.record.schema import SCHEMA, give_sha256, upgrade
 
+FILE = "record.db"
 RECOVER = "move it to another folder, or copy its readable rows with `rig doctor --recover FOLDER`"
 FAILURES = {  # primary code of SQLite: fault and remedy
     sqlite3.SQLITE_FULL: "cannot be written: the disk is full; free some space, then continue with `rig resume`",

@@ -23,10 +23,9 @@ from sqlalchemy import Connection, delete, insert, select, union, update
 from rig.errors import RecordError
 from rig.record import codec
 from rig.record.checksum import COVERED, is_damaged
-from rig.record.file import decoded, open_file
+from rig.record.file import FILE, decoded, open_file
 from rig.record.schema import DAMAGED, blocks, metadata, poses, readings, runs
 
-FILE = "record.db"
 UNREADABLE = (sqlite3.Error, UnicodeDecodeError)  # the second: SQLite quotes unreadable bytes in its messages
 
 

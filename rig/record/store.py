@@ -18,8 +18,7 @@ from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from sqlalchemy import URL, Connection, Engine, Integer, Row, Select, exists, false, func, insert, select, true, update
-from sqlalchemy import Table as SqlTable
+from sqlalchemy import URL, Connection, Engine, func, insert, select, true, update
 from sqlalchemy.exc import DatabaseError
 
 from calibrations.table import Table
@@ -30,14 +29,29 @@ from rig.files import RECORD, home
 from rig.lease import is_held
 from rig.record import codec
 from rig.record.checksum import is_damaged, with_checksum
-from rig.record.file import RECOVER, open_file
+from rig.record.file import FILE, RECOVER, open_file
+from rig.record.rows import (
+    BESIDE,
+    LAST,
+    POSE,
+    damage_text,
+    dwell_of,
+    kept_of,
+    place_text,
+    pose_of,
+    put,
+    put_state,
+    run_of,
+    select_beginning,
+    select_named,
+    select_runs,
+    sound,
+)
 from rig.record.schema import (
-    arrivals,
     blocks,
     columns,
     dwells,
     events,
-    insert_or,
     is_new,
     log,
     newest_first,
@@ -46,14 +60,10 @@ from rig.record.schema import (
     runs,
     states,
 )
-from rig.record.values import Block, Event, Kept, Line, Run
+from rig.record.values import Event, Kept, Line, Run
 
-FILE = "record.db"
-LAST = "last"  # the newest run, in the place of an id
 MOST_LISTED = 5
 MOST_LINES = 1000  # of the log in memory
-_POSE = ("alpha_deg", "beta_deg", "direction", "path", "mount_deg", "flip", "up", "rate_deg_s")
-_BESIDE = ("t_s", "temperature_c", "alpha_read_deg", "beta_read_deg")
 
 
 class Record:
@@ -133,18 +143,18 @@ class Record:
     def keep(self, run: str, number: int, kept: Kept, state: Mapping[str, Any] | None) -> None:
         """Add pose, samples and the `state` of the simulated bench, in one transaction."""
         key = {"run": run, "number": number}
-        pose = {name: getattr(kept.pose, name) for name in _POSE}
+        pose = {name: getattr(kept.pose, name) for name in POSE}
         samples = {name: getattr(kept.samples, name) for name in ("rate_hz", "start_s")}
         samples |= {"channels": list(kept.samples.channels), "codec": codec.CODEC}
         samples |= {"samples": codec.encode(kept.samples.volts)}
         measured = kept.dwell
         dwell = {"n": measured.n, "means": dict(measured.means), "stds": dict(measured.stds)}
         with self._engine.begin() as to:
-            pose |= {name: getattr(kept, name) for name in _BESIDE}
+            pose |= {name: getattr(kept, name) for name in BESIDE}
             for table, values in ((poses, pose), (blocks, samples), (dwells, dwell)):
                 to.execute(insert(table), with_checksum(table, key | values))
             if state is not None:
-                _put_state(to, run, state)
+                put_state(to, run, state)
             self._put_lines(to)
 
     def keep_readings(self, run: str, read: Iterable[Reading], state: Mapping[str, Any] | None) -> None:
@@ -152,9 +162,9 @@ class Record:
         with self._engine.begin() as to:
             for reading in read:
                 row = with_checksum(readings, {"run": run, "at": now(), **vars(reading)})
-                _put(to, readings, row, ("run", "name"))
+                put(to, readings, row, ("run", "name"))
             if state is not None:
-                _put_state(to, run, state)
+                put_state(to, run, state)
             self._put_lines(to)
 
     def log(self, run: str, clock_s: float, who: str, what: str, text: str) -> None:
@@ -180,7 +190,7 @@ class Record:
     def keep_state(self, run: str, state: Mapping[str, Any]) -> None:
         """Store the state of the simulated bench before the first pose."""
         with self._engine.begin() as to:
-            _put_state(to, run, state)
+            put_state(to, run, state)
 
     def set_state(
         self, run: str, state: str, message: str | None = None, results: Mapping[str, Any] | None = None
@@ -223,14 +233,14 @@ class Record:
     def runs(self) -> list[Run]:
         """Every readable run, newest first; `damaged_runs` has the others."""
         with self._reading() as at:
-            rows = at.execute(_select_runs().order_by(newest_first(at))).all()
-        return [self._seen(_run(row)) for row in rows if not is_damaged(runs, row._mapping)]
+            rows = at.execute(select_runs().order_by(newest_first(at))).all()
+        return [self._seen(run_of(row)) for row in rows if not is_damaged(runs, row._mapping)]
 
     def damaged_runs(self) -> list[str]:
         """A sentence for each run with a damaged entry, newest first."""
         with self._reading() as at:
-            rows = at.execute(_select_runs().order_by(newest_first(at))).all()
-        return [_damage(row.run) for row in rows if is_damaged(runs, row._mapping)]
+            rows = at.execute(select_runs().order_by(newest_first(at))).all()
+        return [damage_text(row.run) for row in rows if is_damaged(runs, row._mapping)]
 
     def damaged_rows(self) -> list[str]:
         """A phrase for each row of a run, except its entry, that changed on the disk."""
@@ -238,7 +248,7 @@ class Record:
         with self._reading() as at:
             for table in (poses, blocks, dwells, readings, columns):
                 rows = at.execution_options(yield_per=32).execute(select(table))
-                found += [_place(row, table) for row in rows if is_damaged(table, row._mapping)]
+                found += [place_text(row, table) for row in rows if is_damaged(table, row._mapping)]
         return found
 
     def run(self, name: str) -> Run:
@@ -247,12 +257,12 @@ class Record:
         Raises UnknownRun with a suggestion; RecordError if the entry of the run is damaged.
         """
         with self._reading() as at:
-            rows = at.execute(_named(at, name)).all() or at.execute(_beginning(name)).all()
+            rows = at.execute(select_named(at, name)).all() or at.execute(select_beginning(name)).all()
             known = at.execute(select(runs.c.procedure if name.startswith(f"{LAST} ") else runs.c.run)).scalars().all()
         if len(rows) == 1:
             if is_damaged(runs, rows[0]._mapping):
-                raise RecordError(f"{self.where}: {_damage(rows[0].run)}")
-            return self._seen(_run(rows[0]))
+                raise RecordError(f"{self.where}: {damage_text(rows[0].run)}")
+            return self._seen(run_of(rows[0]))
         if rows:
             listed = ", ".join(sorted(row.run for row in rows)[:MOST_LISTED])
             raise UnknownRun(f"{len(rows)} runs in {self.where} begin with {name!r}: {listed}; write more of the id")
@@ -264,7 +274,7 @@ class Record:
         chosen = (poses.c.run == run) & poses.c.excluded.is_(None)
         query = select(poses).where(chosen).order_by(poses.c.number)
         with self._reading() as at:
-            return [_pose(_sound(row, poses)) for row in at.execute(query)]
+            return [pose_of(sound(row, poses)) for row in at.execute(query)]
 
     def excluded(self, run: str) -> dict[int, str]:
         """The reason of each excluded pose, by its number."""
@@ -289,7 +299,7 @@ class Record:
         """The run's readings, in the order of their names."""
         query = select(readings).where(readings.c.run == run).order_by(readings.c.name)
         with self._reading() as at:
-            rows = [_sound(row, readings) for row in at.execute(query)]
+            rows = [sound(row, readings) for row in at.execute(query)]
         return [Reading(row.name, row.value, row.unit, row.std) for row in rows]
 
     def kept(self, run: str) -> Iterator[Kept]:
@@ -300,7 +310,7 @@ class Record:
             options = at.execution_options(yield_per=32)
             for row in options.execute(query.order_by(poses.c.number)):
                 if row.excluded is None or not any(is_damaged(table, row._mapping) for table in (poses, blocks)):
-                    yield _kept(_sound(row, poses, blocks))
+                    yield kept_of(sound(row, poses, blocks))
 
     def dwells(self, run: str, after: int = -1) -> list[tuple[int, Dwell]]:
         """Means and scatter of every pose with a number above `after`, without the excluded ones.
@@ -311,9 +321,9 @@ class Record:
         query = select(poses, dwells).join_from(poses, dwells, same, isouter=True)
         chosen = (poses.c.run == run) & (poses.c.number > after) & poses.c.excluded.is_(None)
         with self._reading() as at:
-            rows = [_sound(row, poses, dwells) for row in at.execute(query.where(chosen).order_by(poses.c.number))]
+            rows = [sound(row, poses, dwells) for row in at.execute(query.where(chosen).order_by(poses.c.number))]
         older = {kept.number: kept.dwell for kept in self.kept(run)} if any(row.n is None for row in rows) else {}
-        return [(row.number, older.get(row.number) or _dwell(row)) for row in rows]
+        return [(row.number, older.get(row.number) or dwell_of(row)) for row in rows]
 
     def state(self, run: str) -> dict[str, Any] | None:
         """The state of the simulated bench after the last pose; None on a real bench."""
@@ -337,7 +347,7 @@ class Record:
         """The columns of an imported table: numbers, and texts, by name."""
         query = select(columns).where(columns.c.run == run).order_by(columns.c.position)
         with self._reading() as at:
-            rows = [_sound(row, columns) for row in at.execute(query)]
+            rows = [sound(row, columns) for row in at.execute(query)]
         numbers = {row.name: np.frombuffer(row.numbers, "<f8") for row in rows if row.numbers is not None}
         return numbers, {row.name: tuple(row.texts) for row in rows if row.numbers is None}
 
@@ -382,82 +392,3 @@ def _new_run(to: Connection, values: Mapping[str, Any]) -> str:
         row = {"results": {}, "identities": {}, **values, "run": run, "created": now(), "uid": uuid.uuid4().hex}
         if is_new(to, runs, with_checksum(runs, row)):
             return run  # else a run of the same second has this id
-
-
-def _put_state(to: Connection, run: str, state: Mapping[str, Any]) -> None:
-    _put(to, states, {"run": run, "state": dict(state)}, ("run",))
-
-
-def _put(to: Connection, table: SqlTable, values: Mapping[str, Any], key: Sequence[str]) -> None:
-    """Insert a row, or replace the one of the same key."""
-    to.execute(insert_or(to, table).values(values).on_conflict_do_update(index_elements=list(key), set_=dict(values)))
-
-
-def _select_runs() -> Select[Any]:
-    kept = select(func.count()).where(poses.c.run == runs.c.run).scalar_subquery()
-    imported = select(func.max(func.length(columns.c.numbers, type_=Integer) // 8)).where(columns.c.run == runs.c.run)
-    on_its_way = exists().where(arrivals.c.run == runs.c.run, arrivals.c.digest.is_(None))
-    return select(runs, func.coalesce(imported.scalar_subquery(), kept).label("rows")).where(~on_its_way)
-
-
-def _named(at: Connection, name: str) -> Select[Any]:
-    """The run of this id; the newest one for `last`, or the newest of a procedure for `last PROCEDURE`."""
-    last, _, procedure = name.partition(" ")
-    if last != LAST:
-        return _select_runs().where(runs.c.run == name)
-    chosen = _select_runs().where(runs.c.procedure == procedure) if procedure else _select_runs()
-    return chosen.order_by(newest_first(at)).limit(1)
-
-
-def _beginning(name: str) -> Select[Any]:
-    """The runs whose id begins so; none for no beginning."""
-    return _select_runs().where(runs.c.run.startswith(name, autoescape=True) if name else false())
-
-
-def _run(row: Row[Any]) -> Run:
-    return Run(**{name: value for name, value in row._mapping.items() if name != "checksum"})
-
-
-def _pose(row: Row[Any]) -> Pose:
-    return Pose(**{name: row._mapping[poses.c[name]] for name in _POSE})
-
-
-def _sound(row: Row[Any], *tables: SqlTable) -> Row[Any]:
-    """The row of `tables`. Raises RecordError if it changed on the disk."""
-    damaged = next((table for table in tables if is_damaged(table, row._mapping)), None)
-    if damaged is None:
-        return row
-    if damaged in (readings, columns):
-        raise RecordError(f"{_place(row, damaged)}; {RECOVER}")
-    raise RecordError(
-        f"{_place(row, damaged)}; exclude it with `rig exclude "
-        f"{row.run} {row.number} --reason damaged`, or restore a copy of the record"
-    )
-
-
-def _place(row: Row[Any], table: SqlTable) -> str:
-    """The phrase about a row that changed on the disk."""
-    which = f" {table.name[:-1]} {row.name!r}" if "name" in table.c else f" pose {row.number}"
-    return f"run {row.run},{which}: its values changed on the disk ({table.name})"
-
-
-def _damage(run: str) -> str:
-    """The sentence about a run with a damaged entry."""
-    return f"run {run}: its entry is damaged; `rig doctor --recover FOLDER` copies its poses and the other runs"
-
-
-def _dwell(row: Row[Any]) -> Dwell:
-    return Dwell(_pose(row), row.t_s, row.means, row.stds, row.n, row.temperature_c)
-
-
-def _kept(row: Row[Any]) -> Kept:
-    where = f"run {row.run}, pose {row.number}"
-    if row.codec != codec.CODEC:
-        raise RecordError(f"{where}: the samples have the unknown format {row.codec!r}; update the program")
-    try:
-        volts = codec.decode(row.samples)
-    except ValueError as error:
-        raise RecordError(f"{where}: {error}; restore a copy of the record") from None
-    pose = _pose(row)
-    block = Block(volts, tuple(row.channels), row.rate_hz, row.start_s)
-    return Kept(pose, block, excluded=row.excluded, number=row.number, **{name: row._mapping[name] for name in _BESIDE})

@@ -1,0 +1,106 @@
+"""Rows of the database: selections of runs, checks for changes on the disk, rows as values, replacement of a row."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from sqlalchemy import Connection, Integer, Row, Select, exists, false, func, select
+from sqlalchemy import Table as SqlTable
+
+from procedures.session import Dwell, Pose
+from rig.errors import RecordError
+from rig.record import codec
+from rig.record.checksum import is_damaged
+from rig.record.file import RECOVER
+from rig.record.schema import arrivals, columns, insert_or, newest_first, poses, readings, runs, states
+from rig.record.values import Block, Kept, Run
+
+LAST = "last"  # the newest run, in the place of an id
+POSE = ("alpha_deg", "beta_deg", "direction", "path", "mount_deg", "flip", "up", "rate_deg_s")
+BESIDE = ("t_s", "temperature_c", "alpha_read_deg", "beta_read_deg")
+
+
+def select_runs() -> Select[Any]:
+    """Every complete run, with the number of its rows: poses, or the values of an imported column."""
+    kept = select(func.count()).where(poses.c.run == runs.c.run).scalar_subquery()
+    imported = select(func.max(func.length(columns.c.numbers, type_=Integer) // 8)).where(columns.c.run == runs.c.run)
+    on_its_way = exists().where(arrivals.c.run == runs.c.run, arrivals.c.digest.is_(None))
+    return select(runs, func.coalesce(imported.scalar_subquery(), kept).label("rows")).where(~on_its_way)
+
+
+def select_named(at: Connection, name: str) -> Select[Any]:
+    """The run of this id; the newest one for `last`, or the newest of a procedure for `last PROCEDURE`."""
+    last, _, procedure = name.partition(" ")
+    if last != LAST:
+        return select_runs().where(runs.c.run == name)
+    chosen = select_runs().where(runs.c.procedure == procedure) if procedure else select_runs()
+    return chosen.order_by(newest_first(at)).limit(1)
+
+
+def select_beginning(name: str) -> Select[Any]:
+    """The runs whose id begins so; none for no beginning."""
+    return select_runs().where(runs.c.run.startswith(name, autoescape=True) if name else false())
+
+
+def run_of(row: Row[Any]) -> Run:
+    """The run of a row of `select_runs`."""
+    return Run(**{name: value for name, value in row._mapping.items() if name != "checksum"})
+
+
+def pose_of(row: Row[Any]) -> Pose:
+    """The pose of a row of `poses`."""
+    return Pose(**{name: row._mapping[poses.c[name]] for name in POSE})
+
+
+def sound(row: Row[Any], *tables: SqlTable) -> Row[Any]:
+    """The row of `tables`. Raises RecordError if it changed on the disk."""
+    damaged = next((table for table in tables if is_damaged(table, row._mapping)), None)
+    if damaged is None:
+        return row
+    if damaged in (readings, columns):
+        raise RecordError(f"{place_text(row, damaged)}; {RECOVER}")
+    raise RecordError(
+        f"{place_text(row, damaged)}; exclude it with `rig exclude "
+        f"{row.run} {row.number} --reason damaged`, or restore a copy of the record"
+    )
+
+
+def place_text(row: Row[Any], table: SqlTable) -> str:
+    """The phrase about a row that changed on the disk."""
+    which = f" {table.name[:-1]} {row.name!r}" if "name" in table.c else f" pose {row.number}"
+    return f"run {row.run},{which}: its values changed on the disk ({table.name})"
+
+
+def damage_text(run: str) -> str:
+    """The sentence about a run with a damaged entry."""
+    return f"run {run}: its entry is damaged; `rig doctor --recover FOLDER` copies its poses and the other runs"
+
+
+def dwell_of(row: Row[Any]) -> Dwell:
+    """The dwell of a joined row of `poses` and `dwells`."""
+    return Dwell(pose_of(row), row.t_s, row.means, row.stds, row.n, row.temperature_c)
+
+
+def kept_of(row: Row[Any]) -> Kept:
+    """A pose and its samples. Raises RecordError if the samples have an unknown format or cannot be decoded."""
+    where = f"run {row.run}, pose {row.number}"
+    if row.codec != codec.CODEC:
+        raise RecordError(f"{where}: the samples have the unknown format {row.codec!r}; update the program")
+    try:
+        volts = codec.decode(row.samples)
+    except ValueError as error:
+        raise RecordError(f"{where}: {error}; restore a copy of the record") from None
+    pose = pose_of(row)
+    block = Block(volts, tuple(row.channels), row.rate_hz, row.start_s)
+    return Kept(pose, block, excluded=row.excluded, number=row.number, **{name: row._mapping[name] for name in BESIDE})
+
+
+def put_state(to: Connection, run: str, state: Mapping[str, Any]) -> None:
+    """Insert or replace the state of the simulated bench of a run."""
+    put(to, states, {"run": run, "state": dict(state)}, ("run",))
+
+
+def put(to: Connection, table: SqlTable, values: Mapping[str, Any], key: Sequence[str]) -> None:
+    """Insert a row, or replace the one of the same key."""
+    to.execute(insert_or(to, table).values(values).on_conflict_do_update(index_elements=list(key), set_=dict(values)))
