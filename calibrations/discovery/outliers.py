@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from calibrations.criteria import GROSS, MOST_GROSS, SAME_G
+from calibrations.estimators.robust import robust_std
 from calibrations.fitting.fit import Fit, fit
 from calibrations.geometry.orientation import nominal_pose, specific_force
 from calibrations.model import Model
@@ -27,7 +28,6 @@ LEAVE_OUT = (
     "check them; to leave them out of every analysis, use `rig exclude RUN POSE --reason TEXT`, or in a file a column "
     "`excluded` with 1"
 )
-TO_STD = 1.4826  # median of absolute deviations to standard deviation
 
 
 def gross(found: Fit) -> NDArray[np.intp]:
@@ -39,8 +39,8 @@ def gross(found: Fit) -> NDArray[np.intp]:
     around = found.residual[:, _nearest(place)]
     middle = np.median(around, axis=2)
     own = found.residual - middle
-    spread = TO_STD * np.median(np.abs(around - middle[:, :, None]), axis=2)
-    usual = TO_STD * np.median(np.abs(own), axis=1, keepdims=True)
+    spread = robust_std(around - middle[:, :, None], axis=2)
+    usual = robust_std(own, axis=1)[:, None]
     out = np.flatnonzero(np.any(np.abs(own) > GROSS * np.maximum(spread, usual), axis=0))
     rows = np.array(
         [row for row in map(int, out) if not (_lasts(row, found, own) or _returns(row, found, own, place))],

@@ -1,8 +1,8 @@
 """Estimators: unknowns from measurements that are linear in them, all at once or one after another.
 
     least_squares   all at once, weighted
-    recursive       one after another, with the same answer: what is told while poses come
     kalman          unknowns that change by themselves: prediction and correction
+    robust          a standard deviation that outliers hardly change
     approach        an exponential approach to a steady state, followed by a bank of Kalman filters
 
 Source  Book 18.2-18.4, equations (18.1)-(18.10).

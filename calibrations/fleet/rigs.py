@@ -17,6 +17,7 @@ from scipy.special import fdtrc, stdtr
 
 from calibrations.criteria import FAR_SENSOR, FEWEST_SENSORS_PER_RIG, SIGNIFICANT
 from calibrations.effects import Effect, Values
+from calibrations.estimators.robust import robust_std
 from calibrations.fleet.look import StageScore
 from calibrations.geometry.orientation import nominal_pose, specific_force
 from calibrations.table import Array, Table
@@ -55,7 +56,6 @@ def correct_stage_errors(table: Table, errors: StageErrors, effects: Mapping[str
 # Inseparable: an error common to all rigs from one of the sensors' design, and an error of a rig from one of a batch
 # where each batch was on one rig. Errors are therefore relative to the median of the rigs that batches connect.
 
-TO_STD = 1.4826
 DETERMINED = 1e-8  # share of an information matrix: less is not known
 
 
@@ -217,7 +217,7 @@ def _far(sensors: Sequence[Measured], y: Array, v: Array) -> NDArray[np.bool_]:
         places.setdefault((each.batch, each.rig), []).append(k)
     for chosen in map(np.array, places.values()):
         off = np.abs(y[chosen] - np.median(y[chosen]))
-        far[chosen] = off > FAR_SENSOR * np.sqrt((TO_STD * np.median(off)) ** 2 + v[chosen])
+        far[chosen] = off > FAR_SENSOR * np.sqrt(robust_std(off) ** 2 + v[chosen])
     return far
 
 

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr, stdtr
 
 from calibrations.criteria import FALSE_OUTLIER, FEWEST_SIBLINGS, MOST_USUAL
+from calibrations.estimators.robust import robust_std
 from calibrations.table import Array
 
 # One quantity of many siblings: its mean and spread in the batch, and what each one's own value is in their light.
@@ -37,7 +38,6 @@ from calibrations.table import Array
 
 GRID = 80
 HALVINGS = 40
-TO_STD = 1.4826  # median of absolute deviations to standard deviation
 
 
 @dataclass(frozen=True)
@@ -135,7 +135,7 @@ def fit_siblings(y: Array, v: Array) -> Siblings:
 def _suspects(y: Array, v: Array) -> NDArray[np.bool_]:
     """Values far from the median; none where fewer than FEWEST would be left."""
     middle = float(np.median(y))
-    spread = TO_STD * float(np.median(np.abs(y - middle)))
+    spread = float(robust_std(y - middle))
     out = np.abs(y - middle) > MOST_USUAL * np.sqrt(spread**2 + v)
     return out if int(np.sum(~out)) >= FEWEST_SIBLINGS else np.zeros(len(y), dtype=bool)
 
