@@ -16,6 +16,9 @@ SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 PREFIXED = ("V", "g", "deg", "K", "h", "s")  # units that take a prefix
 PREFIXES = ((1.0, ""), (1e3, "m"), (1e6, "µ"), (1e9, "n"))
 MOST_DECIMALS = 12  # of the concise form; smaller uncertainties are written out
+INFINITE_FREEDOM = 1e4  # degrees of freedom from which on ∞ is written
+FREEDOM_ROUNDING = 1e-6  # of a number of degrees of freedom
+NEGLIGIBLE = 1e-3  # share of the combined uncertainty, from which on a source shows in its digits
 LARGE_STD = 100.0  # from here on the digits in brackets would be before the decimal point
 
 
@@ -82,6 +85,16 @@ def rounded(value: float, digits: int = 3) -> str:
     if SMALL <= power <= LARGE:
         return minus(f"{round(value, digits - 1 - power):.{max(digits - 1 - power, 0)}f}")
     return minus(f"{value / 10.0**power:.{digits - 1}f}") + times_ten_to(power)
+
+
+def freedom_text(freedom: float) -> str:
+    """Degrees of freedom, cut to a whole number, as the coverage factor has it (GUM G.4.1)."""
+    return f"{math.floor(freedom + FREEDOM_ROUNDING):d}" if freedom < INFINITE_FREEDOM else "∞"
+
+
+def contribution_text(std: float, combined: float) -> str:
+    """A contribution to a combined standard uncertainty, in the same unit."""
+    return rounded(std, 2) if std > NEGLIGIBLE * combined else "negligible"
 
 
 def tick_text(value: float) -> str:

@@ -65,6 +65,11 @@ def rate_scales(table: Table) -> Array:
     return np.where(turned, np.sum(away * table.outputs, axis=0) / np.where(turned, squares, 1.0), 0.0)
 
 
+def is_turned(table: Table, axis: int) -> float:
+    """1 if the sensor was turned about this axis, else 0."""
+    return float(rate_scales(table)[axis] != 0)
+
+
 def specific_force_g(table: Table) -> Array:
     """Specific force from the columns ax, ay, az, g, shape (n, 3): calibrated by six faces, or else by its magnitude.
 

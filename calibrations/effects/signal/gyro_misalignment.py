@@ -4,14 +4,10 @@ from itertools import permutations
 import numpy as np
 
 from calibrations.effects import Constant, Effect, Parameter, Values
-from calibrations.geometry.rate_table import rate_scales
+from calibrations.geometry.rate_table import is_turned
 from calibrations.table import AXES, Array, Table
 
 PAIRS = tuple(permutations(AXES, 2))
-
-
-def _turned(table: Table, axis: int) -> float:
-    return float(rate_scales(table)[axis] != 0)
 
 
 def _lean(own: str, other: str) -> Parameter:
@@ -49,9 +45,9 @@ class GyroMisalignment(Effect):
     yz = _lean("y", "z")
     zx = _lean("z", "x")
     zy = _lean("z", "y")
-    turned_x = Constant(partial(_turned, axis=0))
-    turned_y = Constant(partial(_turned, axis=1))
-    turned_z = Constant(partial(_turned, axis=2))
+    turned_x = Constant(partial(is_turned, axis=0))
+    turned_y = Constant(partial(is_turned, axis=1))
+    turned_z = Constant(partial(is_turned, axis=2))
 
     def force(self, a: Array, table: Table, p: Values) -> Array:
         axes: Array = np.zeros((3, 3))

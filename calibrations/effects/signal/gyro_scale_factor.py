@@ -3,12 +3,8 @@ from functools import partial
 import numpy as np
 
 from calibrations.effects import Constant, Effect, Parameter, Values
-from calibrations.geometry.rate_table import rate_scales
+from calibrations.geometry.rate_table import is_turned, rate_scales
 from calibrations.table import AXES, Array, Table
-
-
-def _turned(table: Table, axis: int) -> float:
-    return float(rate_scales(table)[axis] != 0)
 
 
 def _mean_of_turned(table: Table) -> float:
@@ -32,9 +28,9 @@ class GyroScaleFactor(Effect):
     kinds = ("rates",)
 
     scale = Parameter("{out}/(deg/s)", typical=1.0, where="turned", guess=rate_scales, doc="change of output per deg/s")
-    turned_x = Constant(partial(_turned, axis=0))
-    turned_y = Constant(partial(_turned, axis=1))
-    turned_z = Constant(partial(_turned, axis=2))
+    turned_x = Constant(partial(is_turned, axis=0))
+    turned_y = Constant(partial(is_turned, axis=1))
+    turned_z = Constant(partial(is_turned, axis=2))
     assumed = Constant(_mean_of_turned)
 
     def transduction(self, a: Array, table: Table, p: Values) -> Array:

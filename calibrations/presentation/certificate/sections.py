@@ -8,12 +8,9 @@ from dataclasses import dataclass
 
 from calibrations.presentation.certificate.content import RULE, Certificate, Decision, Outcome, Source
 from calibrations.presentation.certificate.results import CONSERVATIVE, WIDENED
-from calibrations.text import expanded_text, minus, rounded, unit, value_text
+from calibrations.text import contribution_text, expanded_text, freedom_text, minus, rounded, unit, value_text
 
-MANY = 1e4  # degrees of freedom from which on ∞ is written
 END_SCATTER = 2.67  # of a normal's 97.5 % quantile, in its standard deviation, times the root of the trials
-ROUNDING = 1e-6  # of a number of degrees of freedom
-NEGLIGIBLE = 1e-3  # of the combined uncertainty
 WIDE = 10  # columns of a correlation matrix side by side
 HEAVIEST = 3  # poses with the largest weight, given with a result
 METHOD = (
@@ -141,7 +138,7 @@ def _environment(c: Certificate) -> Section:
 def results_table(c: Certificate) -> Table:
     """The results as left: what a certificate is asked for first."""
     rows = tuple(
-        (_name(o), expanded_text(o.value, o.expanded), unit(o.unit), _coverage(o), _freedom(o.freedom),
+        (_name(o), expanded_text(o.value, o.expanded), unit(o.unit), _coverage(o), freedom_text(o.freedom),
          *(("–", "–") if o.decision is None else (_limits(o.decision), _statement(o.decision))))
         for o in c.figures.outcomes
     )  # fmt: skip
@@ -262,11 +259,6 @@ def _checked(o: Outcome) -> str:
     return f"{WIDENED} to the simulation" if o.simulated.verdict == WIDENED else o.simulated.verdict
 
 
-def _freedom(freedom: float) -> str:
-    """Cut to a whole number, as the coverage factor has it (GUM G.4.1)."""
-    return f"{math.floor(freedom + ROUNDING):d}" if freedom < MANY else "∞"
-
-
 def _limits(d: Decision) -> str:
     return minus(f"{d.low:g} to {d.high:g}")
 
@@ -282,6 +274,6 @@ def _line(s: Source, o: Outcome) -> tuple[str, ...]:
         s.kind,
         "–" if s.std is None else f"{rounded(s.std, 2)} {unit(s.unit)}".strip(),
         "–" if s.sensitivity is None else rounded(s.sensitivity, 2),
-        rounded(s.contribution, 2) if s.contribution > NEGLIGIBLE * o.std else "negligible",
-        _freedom(s.freedom),
+        contribution_text(s.contribution, o.std),
+        freedom_text(s.freedom),
     )

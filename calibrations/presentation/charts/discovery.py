@@ -76,12 +76,15 @@ class Measure:
 
 def levels(found: Falling) -> list[Level]:
     """The model as it was, then each effect added."""
-    start = Level(found.start.model.name, found.start.pooled_excess, found.start.held_out_excess, _rms(found.start))
-    after = [Level(f"+ {s.name}", s.after.pooled_excess, s.held_out_after, _rms(s.after)) for s in found.steps]
+    start = Level(
+        found.start.model.name, found.start.pooled_excess, found.start.held_out_excess, error_text(found.start)
+    )
+    after = [Level(f"+ {s.name}", s.after.pooled_excess, s.held_out_after, error_text(s.after)) for s in found.steps]
     return [start, *after]
 
 
-def _rms(fit: Fit) -> str:
+def error_text(fit: Fit) -> str:
+    """The rms error with its unit."""
     return f"{rounded(pooled_milli(fit)[0], 2)} {milli_unit(fit)}"
 
 

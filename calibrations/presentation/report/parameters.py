@@ -11,10 +11,7 @@ from calibrations.fitting.fit import Fit
 from calibrations.fitting.inputs import input_contributions
 from calibrations.fitting.matrices import calibration_matrices
 from calibrations.model import Estimate
-from calibrations.text import estimate_text, rounded, unit
-
-NEGLIGIBLE = 1e-3  # share of the combined uncertainty, from which on a source shows in its digits
-MANY = 1e4  # degrees of freedom from which on ∞ is written
+from calibrations.text import INFINITE_FREEDOM, contribution_text, estimate_text, freedom_text, rounded, unit
 
 
 def budget(found: Fit) -> dict[str, Any] | None:
@@ -49,7 +46,7 @@ def _parameter(drawn: Budget, k: int, effect: str, e: Estimate) -> dict[str, str
         "effect": effect,
         "name": _label(e),
         "combined": rounded(drawn.combined[k], 2),
-        "freedom": _freedom(drawn.freedom[k]),
+        "freedom": freedom_text(drawn.freedom[k]),
         "coverage": f"{drawn.coverage[k]:.2f}",
         "expanded": rounded(drawn.expanded[k], 2),
         "unit": unit(e.unit),
@@ -69,8 +66,8 @@ def _source(line: Line, k: int, combined: float) -> dict[str, str]:
         "kind": line.kind,
         "input": "–" if line.input_std is None else f"{rounded(line.input_std, 2)} {unit(line.unit)}".strip(),
         "sensitivity": "–" if line.sensitivity is None else rounded(line.sensitivity[k], 2),
-        "std": rounded(part, 2) if part > NEGLIGIBLE * combined else "negligible",
-        "freedom": _freedom(line.freedom),
+        "std": contribution_text(part, combined),
+        "freedom": freedom_text(line.freedom),
     }
 
 
@@ -91,7 +88,7 @@ def budget_document(found: Fit) -> dict[str, Any] | None:
                 "axis": e.axis or None,
                 "name": e.name,
                 "combined": float(drawn.combined[k]),
-                "freedom": float(drawn.freedom[k]) if drawn.freedom[k] < MANY else None,
+                "freedom": float(drawn.freedom[k]) if drawn.freedom[k] < INFINITE_FREEDOM else None,
                 "coverage_factor": float(drawn.coverage[k]),
                 "expanded": float(drawn.expanded[k]),
                 "contributions": {line.source: _of(line.std, k) for line in drawn.given},
@@ -100,10 +97,6 @@ def budget_document(found: Fit) -> dict[str, Any] | None:
         ],
         "not_given": list(drawn.not_given),
     }
-
-
-def _freedom(freedom: float) -> str:
-    return f"{freedom:.0f}" if freedom < MANY else "∞"
 
 
 AXES = "xyz"

@@ -22,7 +22,7 @@ from calibrations.fitting.sensed import in_milli, milli_unit, pooled_milli
 from calibrations.model import Estimate, Model, Term
 from calibrations.motion.reference import Bias
 from calibrations.presentation.chart import Picture
-from calibrations.presentation.charts.discovery import album
+from calibrations.presentation.charts.discovery import album, error_text
 from calibrations.presentation.report import parameters
 from calibrations.presentation.report.page import figure, page
 from calibrations.text import capital, estimate_text, joined, minus, probability, rounded, unbroken, unit
@@ -165,20 +165,15 @@ def spread_of_excess(fit: Fit) -> float:
     return float(1 / np.sqrt(2 * max(fit.residual.size - len(fit.theta), 1)))
 
 
-def _error_of(fit: Fit) -> str:
-    """The rms error with its unit."""
-    return f"{rounded(pooled_milli(fit)[0], 2)} {milli_unit(fit)}"
-
-
 def _first(found: Discovery[Fit]) -> dict[str, str]:
     level = {"seen": rounded(found.start.pooled_excess), "unseen": rounded(found.start.held_out_excess)}
-    return {"name": found.start.model.name, "error": _error_of(found.start), "role": "as given", **level}
+    return {"name": found.start.model.name, "error": error_text(found.start), "role": "as given", **level}
 
 
 def _step(step: Step[Fit], found: Discovery[Fit]) -> dict[str, str]:
     level = {"seen": rounded(step.after.pooled_excess), "unseen": rounded(step.held_out_after)}
     role = "cause" if step.name in found.causes else "refines the form of a cause"
-    return {"name": f"+ {step.name}", "error": _error_of(step.after), "role": role, **level}
+    return {"name": f"+ {step.name}", "error": error_text(step.after), "role": role, **level}
 
 
 def _candidate(c: Candidate, rank: int, out: str) -> dict[str, Any]:
