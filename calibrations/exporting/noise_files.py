@@ -20,7 +20,6 @@ from calibrations.table import STANDARD_GRAVITY
 
 WHITE, WALK = "white-noise", "rate-random-walk"
 SENSORS = {"accelerometer": ("m/s^2", "g", STANDARD_GRAVITY), "gyroscope": ("rad/s", "deg/s", 0.0174532925199432957)}
-DENSITIES = {"noise_density": "white noise", "random_walk": "random walk of the bias"}
 FLICKER_DEVIATION = 0.664  # Allan deviation of flicker noise with coefficient 1
 MARKOV_DEVIATION = 0.62  # largest one of a Gauss-Markov process with standard deviation 1
 WHY = "the format has white noise and a random walk"

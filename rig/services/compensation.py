@@ -25,7 +25,6 @@ from rig.files import program
 from rig.services.provenance import today
 
 LANGUAGES = ("c", "python", "json")
-PRECISIONS = ("double", "float")
 
 
 def origin_of(model: str, name: str | None, text: str) -> Origin:

@@ -21,7 +21,6 @@ from rig.web.guard import TOKEN, Guard, names
 from rig.web.pages import register
 from rig.web.parts import leave_calculations
 
-LOCAL = "127.0.0.1"
 PORT = 8473  # preferred, so that an open page finds a restarted server
 
 
