@@ -12,7 +12,7 @@ from statistics import median
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from tests.benchmark.child import ROOT, Ended, rig, subject
+from tests.benchmark.child import Ended, rig, subject
 
 MOST_MB = 500
 TARGET_S = {
@@ -53,7 +53,7 @@ def _figures(folder: Path) -> Iterator[tuple[str, Figure]]:
         yield f"diagnose, command: {name}", _commands("", folder, 2, "diagnose", data)
         warm = f"diagnose, warm: {name}"
         yield warm, _inside(warm, subject(folder, "diagnosis", data))
-    yield "demo", _demo(folder)
+    yield "demo", _commands("demo", folder, 1, "demo")
     yield "samples of one dwell", _inside("", subject(folder, "samples"))
     yield "dwell means of 518 poses", _inside("", subject(folder, "dwells"))
     for threads in (1, os.cpu_count() or 1):
@@ -134,12 +134,6 @@ def _noise(folder: Path) -> Figure:
     near = all(each[name]["rms_over_bound"] <= most[name] and 0.9 <= each[name]["coverage"] <= 0.98 for name in most)
     better = each["white-noise"]["times_better"] >= 4 and each["flicker-noise"]["times_better"] >= 2
     return {**said, "target_rms_over_bound": most, "target_ms": 20, "met": near and better and said["median_ms"] <= 20}
-
-
-def _demo(folder: Path) -> Figure:
-    if not (ROOT / "rig" / "cli" / "demo.py").is_file():
-        return {"note": "there is no `rig demo` yet"}
-    return _commands("demo", folder, 1, "demo")
 
 
 def _commands(name: str, folder: Path, repeats: int, *words: str) -> Figure:
