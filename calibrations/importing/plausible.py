@@ -137,6 +137,29 @@ UNIT_CHECKS: Mapping[str, Callable[[Array], Doubt | None]] = {
 }
 
 
+SHORTEST_POSE_S = 1.0  # to turn to a pose and to measure there
+LONGEST_POSE_S = 3600.0
+TIME_UNITS = {"ms": 1e-3, "min": 60.0, "h": 3600.0}
+
+
+def find_time_doubt(time_s: Array, poses: Array) -> Doubt | None:
+    """The doubt that a time column is in s: no stage turns from pose to pose so fast, or nobody waits so long.
+
+    `poses`, shape (n, k), are the stage angles. None without a change of pose, and for times that do not increase.
+    """
+    if len(time_s) < 3 or not np.all(np.diff(time_s) >= 0):
+        return None
+    turned = np.any(np.diff(poses, axis=0) != 0, axis=1)
+    if np.count_nonzero(turned) < len(turned) / 2:  # several rows at a pose: a log
+        return None
+    step = float(np.median(np.diff(time_s)[turned]))
+    if step <= 0 or SHORTEST_POSE_S <= step <= LONGEST_POSE_S:
+        return None
+    fits = next((u for u, s in TIME_UNITS.items() if SHORTEST_POSE_S <= step * s <= LONGEST_POSE_S), "")
+    low, high = float(time_s[0]), float(time_s[-1])
+    return f"runs from {low:g} to {high:g}; in s this is {step:.2g} s from one pose to the next", fits
+
+
 def check_at_rest(table: Table) -> None:
     """Check that an accelerometer at rest shows gravity. Raises DataError. Counts and magnetometers pass."""
     one_g = {"g": 1.0, "m/s2": table.gravity_m_s2}.get(table.unit)

@@ -16,13 +16,35 @@ import numpy as np
 
 from calibrations.criteria import FEWEST_POSITIONS
 from calibrations.errors import DataError, MissingConstant
-from calibrations.importing.plausible import covers_all_directions, field_unit, gravity_unit, likely_unit
+from calibrations.importing.plausible import (
+    Doubt,
+    covers_all_directions,
+    field_unit,
+    find_time_doubt,
+    gravity_unit,
+    likely_unit,
+)
 from calibrations.importing.raw_logs import average_raw_log
 from calibrations.importing.sheet import Sheet, is_number, parse_number
 from calibrations.importing.units import UNITS, ColumnMapping, column_unit, split_unit
 from calibrations.table import AXES, NUMBERS, Array, Constant, Table
 from calibrations.tables import KINDS
 
+# names of columns by kind of table; each second list belongs to another sensor
+COLUMN_NAMES: Mapping[str, Mapping[str, tuple[str, ...]]] = {
+    "poses": {
+        "": ("alpha_deg", "beta_deg", "vx_v", "vy_v", "vz_v", "direction", "t_s", "temperature_c", "supply_v",
+             "vx_std_v", "vy_std_v", "n", "flip"),
+    },
+    "positions": {"": ("ax", "ay", "az", "t_s", "temperature_c", "n"), "of a magnetometer": ("mx", "my", "mz")},
+    "rates": {
+        "": ("rate_deg_s", "gx", "gy", "gz", "ax", "ay", "az", "axis_x", "axis_y", "axis_z", "t_s", "temperature_c",
+             "n"),
+        "of named sections": ("path",),
+    },
+    "motion": {"": ("t_s", "vx_v", "vy_v", "displacement_m", "temperature_c", "supply_v")},
+    "still": {"": ("t_s", "vx_v", "vy_v", "vz_v", "temperature_c", "supply_v")},
+}  # fmt: skip
 AXIS = r"(?:^|[^a-z])(?P<axis>[xyz])(?:[^a-z]|$)"
 SCATTER = r"std|stdev|sigma|noise|scatter|deviation"
 # meaning of a name, the first match; {axis} is the letter x, y or z in it
@@ -64,6 +86,12 @@ SECTION = r"part|section|segment|phase|activity|label|step|^path$"  # of a sessi
 STD_COLUMNS = {"poses": "v{axis}_std_v", "positions": "a{axis}_std", "rates": "g{axis}_std"}
 
 
+def column_names(kind: str | None = None) -> list[str]:
+    """The names of columns that a file may have: of one kind of table, or of all."""
+    lists = COLUMN_NAMES.values() if kind is None else [COLUMN_NAMES[kind]]
+    return list(dict.fromkeys(name for of in lists for names in of.values() for name in names))
+
+
 def propose_mapping(laid: Sheet, kind: str | None = None, mapped: Sequence[ColumnMapping] = ()) -> list[ColumnMapping]:
     """`mapped`, and a mapping for the other columns; each of our names once."""
     kind = kind or likely_kind(laid, mapped)
@@ -78,7 +106,7 @@ def propose_mapping(laid: Sheet, kind: str | None = None, mapped: Sequence[Colum
             found.append(ColumnMapping(ours, name, _unit(laid, name, ours, values[name])))
     if kind == "rates":
         return _with_sections(found, laid)
-    return _with_gravity(found, values) if kind == "positions" else _with_scatter(found)
+    return _with_gravity(found, values) if kind == "positions" else _with_scatter(_with_time(found, laid))
 
 
 def likely_kinds(laid: Sheet, mapped: Iterable[ColumnMapping] = ()) -> list[str]:
@@ -230,6 +258,23 @@ def _with_sections(found: list[ColumnMapping], laid: Sheet) -> list[ColumnMappin
     given, section = {m.name for m in found} | set(laid.bare), _section(laid)
     lacks = section and not {"rate_deg_s", "path"} & given
     return [ColumnMapping("path", section), *found] if lacks else found
+
+
+def time_doubt(laid: Sheet, mapped: Iterable[ColumnMapping]) -> Doubt | None:
+    """The doubt about the unit of the time, as the first rows show it; None where a unit is stated."""
+    theirs = {m.name: m.theirs for m in mapped}
+    clock = next((m for m in mapped if m.name == "t_s" and not m.unit), None)
+    angles = [sample_values(laid, theirs[name]) for name in ("alpha_deg", "beta_deg") if name in theirs]
+    if clock is None or not angles or not all(map(len, angles)):
+        return None
+    time_s = sample_values(laid, clock.theirs)
+    return find_time_doubt(time_s, np.column_stack(angles)) if len(time_s) else None
+
+
+def _with_time(found: list[ColumnMapping], laid: Sheet) -> list[ColumnMapping]:
+    """The mapping in which a time that cannot be in s has the unit that fits."""
+    doubt = time_doubt(laid, found)
+    return [replace(m, unit=doubt[1]) if doubt and m.name == "t_s" else m for m in found]
 
 
 def _with_scatter(found: list[ColumnMapping]) -> list[ColumnMapping]:

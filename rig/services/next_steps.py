@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from calibrations.tables import FITTED
-from calibrations.text import bound, columns, concise, joined
+from calibrations.text import bound, columns, concise, estimate_text, joined, unit
 from rig.record import Run
+from rig.services.page_words import PageStep, page_step
 
 SPREADS = re.compile("tolerance|wander")  # uncertainties themselves: two digits
 # By the name of a result that is beyond its limit: what to look at. The first that fits counts.
@@ -93,56 +94,18 @@ def _commands(run: Run) -> Iterator[str]:
         yield f"Next: rig compare {data}, rig discover {data}, rig report {data} --out report.html"
 
 
-# The same on a page: what a command does, a button opens.
-
-COMMAND = re.compile(r"rig (\w+)(?: (level-check|check-standard|soak|sweep))?(?: --[\w-]+(?: [\w.]+)?)*")
-LONGER_SETTING = re.compile(r" \(--([\w-]+) ([\d.e+]+)\)")
-PAGES = {  # of a command: the button's label and the address; {run} is the run
-    "compare": ("Model", "/?data={run}"),
-    "discover": ("Model", "/?data={run}"),
-    "fit": ("Model", "/?data={run}"),
-    "exclude": ("Model", "/?data={run}"),
-    "show": ("Record", "/record/{run}"),
-    "resume": ("Run", "/run"),
-    "control": ("History", "/history"),
-}
-
-
-@dataclass(frozen=True)
-class PageStep:
-    """A sentence without commands, and the addresses that replace them by the labels of their buttons."""
-
-    text: str
-    to: Mapping[str, str]
+# The same on a page.
 
 
 def page_steps(run: Run, excluded: Mapping[int, str]) -> list[PageStep]:
     """`next_steps` for a page."""
     lines = [*_left_out(excluded), *_failed(run), *_marginal(run), *_unjudged(run.results)]
-    steps = [_page_step(line, run) for line in lines]
+    steps = [page_step(line.replace(f" {run.run}", ""), run.run, run.procedure) for line in lines]
     if run.state != "complete":
         steps.append(PageStep("The run is not complete. Resume it on the page Run.", {"Run": "/run"}))
     elif run.procedure == "check-standard":
         steps.append(PageStep("The history compares it with the earlier runs of this sensor.", {"History": "/history"}))
     return steps
-
-
-def _page_step(line: str, run: Run) -> PageStep:
-    to: dict[str, str] = {}
-
-    def opened(found: re.Match[str]) -> str:
-        command, procedure = found.groups()
-        if procedure:
-            to[f"Measure {procedure}"] = f"/run?procedure={procedure}"
-            return f"the procedure {procedure}"
-        label, address = PAGES.get("exclude" if "--poses" in found[0] else command, ("Model", PAGES["compare"][1]))
-        to[label] = address.format(run=run.run)
-        return f"the page {label}"
-
-    if longer := LONGER_SETTING.search(line):
-        to["Measure longer"] = f"/run?procedure={run.procedure}&{longer[1].replace('-', '_')}={longer[2]}"
-    text = COMMAND.sub(opened, line.replace(f" {run.run}", ""))
-    return PageStep(LONGER_SETTING.sub("", text), to)
 
 
 def results_table(results: Mapping[str, Any]) -> list[str]:
@@ -154,6 +117,62 @@ def results_table(results: Mapping[str, Any]) -> list[str]:
         for name, r in results.items()
     ]
     return columns(("result", "value", "limit", "verdict"), rows).splitlines()
+
+
+# The rows of the table on a page: what is yes or no, and a forecast, is a sentence.
+
+STEADY = re.compile(r"(?P<sensor>.*/)?steady-state(?P<axis>-\w)?")
+FORECAST = ("earliest", "expected", "latest")
+
+
+@dataclass(frozen=True)
+class ResultRow:
+    """One row: `limit` and `verdict` are "" without a limit."""
+
+    name: str
+    value: str
+    limit: str
+    verdict: str
+
+
+def result_rows(results: Mapping[str, Any]) -> list[ResultRow]:
+    """The rows on a page. The steady state of a soak is one sentence, with its time or its forecast."""
+    rows: list[ResultRow] = []
+    told: set[str] = set()
+    for name, r in results.items():
+        if name in told:
+            continue
+        limit, verdict = "" if r["limit"] is None else bound(r["value"], r["limit"]), r["verdict"] or ""
+        if (steady := STEADY.fullmatch(name)) is not None:
+            sensor, axis = steady["sensor"] or "", steady["axis"] or ""
+            parts = {
+                end: results[part]
+                for end in ("time", *FORECAST)
+                if (part := f"{sensor}steady-state-{end}{axis}") in results
+            }
+            told |= {f"{sensor}steady-state-{end}{axis}" for end, of in parts.items() if of["limit"] is None}
+            value = _steady_sentence(bool(r["value"]), parts)
+            rows.append(ResultRow(name, value, "must be reached" if limit else "", verdict))
+        elif name.rpartition("/")[2] == "gap" and not r["value"]:
+            rows.append(ResultRow(name, "none", limit, verdict))
+        else:
+            value = estimate_text(r["value"], r["std"])
+            value = f"{r['value']:.2g}" if SPREADS.search(name) else value
+            rows.append(ResultRow(name, f"{value} {unit(r['unit'])}".rstrip(), limit, verdict))
+    return rows
+
+
+def _steady_sentence(reached: bool, parts: Mapping[str, Any]) -> str:
+    """Whether and when the sensor is steady. `parts`: the results of the time and of its forecast that there are."""
+    said = {end: concise(r["value"], r["std"], r["unit"]) for end, r in parts.items()}
+    if reached:
+        return f"Reached {said['time']} after power-on." if "time" in said else "Reached."
+    if "expected" in said:
+        between = f"{said['earliest']} to {said['latest']} (95 %)"
+        return f"Not reached. Forecast: {said['expected']} after power-on, {between}."
+    if "earliest" in said:
+        return f"Not reached. Forecast: not before {said['earliest']} after power-on."
+    return "Not reached. There is no forecast."
 
 
 def _result_value(name: str, result: Mapping[str, Any]) -> str:

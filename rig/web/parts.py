@@ -25,6 +25,7 @@ from calibrations.errors import CalibrationError
 from drivers.errors import DriverError
 from procedures.errors import ProcedureError
 from rig.errors import RigError
+from rig.services.page_words import PageStep, page_step
 
 
 class Cancelled(Exception):
@@ -116,11 +117,32 @@ def waiting(text: str) -> ui.label:
         return words(text, "quiet")
 
 
-def failed(title: str, why: str) -> None:
-    """An error message."""
+def failed(title: str, why: str | Exception, data: str = "", to: Mapping[str, str] | None = None) -> None:
+    """An error message. `data`: the run or file that it is about; `to`: addresses of more buttons by their labels."""
+    step = page_step(why if isinstance(why, str) else raw_message(why), data)
     with box("error").props("role=alert"):
         words(title, "title")
-        words(why, "why quiet").style("white-space: pre-wrap")
+        words(for_page(step.text), "why quiet").style("white-space: pre-wrap")
+        buttons({**step.to, **(to or {})})
+
+
+def noted(text: str, data: str = "") -> None:
+    """A box with a remark on `data`; what a command does, its buttons do."""
+    with box("note"):
+        step_row(page_step(text, data), "small")
+
+
+def step_row(step: PageStep, classes: str = "") -> None:
+    """A sentence, and buttons to the pages where it is done."""
+    with div("row-of"):
+        words(for_page(step.text), f"{classes} grow")
+        buttons(step.to)
+
+
+def buttons(to: Mapping[str, str]) -> None:
+    """Buttons that open addresses, by their labels."""
+    for label, address in to.items():
+        ui.button(label, on_click=partial(ui.navigate.to, address)).props("outline dense")
 
 
 def facts(rows: Mapping[str, str]) -> None:
@@ -201,6 +223,11 @@ KNOWN = (CalibrationError, ProcedureError, DriverError, RigError)
 
 
 def message(error: Exception) -> str:
+    """The text of an error for a page: pages in place of commands."""
+    return for_page(page_step(raw_message(error)).text)
+
+
+def raw_message(error: Exception) -> str:
     """The text of an error; a fault of the program also goes to the server's log."""
     if isinstance(error, KNOWN):
         return str(error)

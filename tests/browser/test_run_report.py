@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import re
+from io import BytesIO
 from typing import Any
 
 import pytest
+from matplotlib.image import imread
 from playwright.sync_api import Page, expect
 
 from procedures.catalogue import find
@@ -37,6 +40,20 @@ def test_the_night_of_a_soak_is_told_and_drawn(workbench: Workbench) -> None:
     page.wait_for_function("f => f.scrollHeight <= f.clientHeight && f.clientHeight > 900", arg=frame.element_handle())
     workbench.shot(page, "run-report")
     workbench.fits(page)
+    row = page.get_by_role("row").filter(has_text="steady-state")
+    expect(row.first).to_contain_text(re.compile("Not reached. |Reached "))
+    assert _brightness(page) > 0.8
+    page.get_by_label("Light or dark").click(click_count=2)
+    expect(page.locator("body.body--dark")).to_be_attached()
+    assert _brightness(page) < 0.35
+    workbench.shot(page, "run-report-dark")
+    page.get_by_label("Light or dark").click()
+
+
+def _brightness(page: Page) -> float:
+    """The mean brightness of the report on the screen, 0 to 1."""
+    picture = imread(BytesIO(page.locator(".report iframe").screenshot()))
+    return float(picture[..., :3].mean())
 
 
 def test_the_figure_of_a_motion_test_is_in_its_page_without_commands(workbench: Workbench) -> None:

@@ -8,10 +8,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pexpect
 import pytest
 
+from calibrations.importing.plausible import find_time_doubt
+from calibrations.importing.units import ColumnMapping
 from rig.record import Record
+from rig.services.importing import opened, proposal
 
 THEIRS = "Zeit;inclination;table;Ux\n" + "".join(f"{k};90;{30 * k};{2500 + k}\n" for k in range(12))
 
@@ -75,3 +79,24 @@ def test_who_gives_up_has_imported_nothing(file: Path) -> None:
     assert terminal.exitstatus == 4
     with Record() as record:
         assert record.runs() == []
+
+
+def test_a_time_that_no_stage_can_follow_is_proposed_in_minutes(tmp_path: Path) -> None:
+    rows = [f"{0.1 * k:.1f};{90 - 30 * (k // 12)};{30 * (k % 12)};{2500 + k}" for k in range(36)]
+    text = "time;inclination;table;Ux\n" + "\n".join(rows)
+    (path := tmp_path / "minutes.csv").write_text(text)
+    found = proposal(opened(path))
+    assert found.columns["time"] == ColumnMapping("t_s", "time", "min")
+    assert found.doubt == ("runs from 0 to 3.5; in s this is 0.1 s from one pose to the next", "min")
+    path.write_text(text.replace("time;", "time (s);"))  # who states the unit is not asked
+    assert proposal(opened(path)).doubt is None
+
+
+def test_a_log_of_samples_and_slow_poses_have_no_doubt() -> None:
+    turned = np.column_stack([np.arange(30.0)])
+    assert find_time_doubt(0.01 * np.arange(30.0), turned // 10) is None
+    assert find_time_doubt(6.5 * np.arange(30.0), turned) is None
+    assert find_time_doubt(6500.0 * np.arange(30.0), turned) == (
+        "runs from 0 to 188500; in s this is 6.5e+03 s from one pose to the next",
+        "ms",
+    )

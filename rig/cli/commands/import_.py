@@ -11,19 +11,22 @@ import click
 
 from calibrations.errors import DataError, nearest
 from calibrations.importing.foreign import PATH, check_unit
-from calibrations.importing.proposal import import_command, likely_kind, missing_columns, propose_mapping, sample_values
+from calibrations.importing.proposal import (
+    COLUMN_NAMES,
+    NAME_PATTERNS,
+    column_names,
+    import_command,
+    likely_kind,
+    missing_columns,
+    propose_mapping,
+    sample_values,
+)
 from calibrations.importing.sheet import Sheet
 from calibrations.importing.units import ColumnMapping, parse_unit
 from calibrations.table import NUMBERS
 from rig.cli.terminal.output import emit, json_option, note
 
 LEAVE = "-"
-CHOICES = {
-    "poses": "alpha_deg beta_deg vx_v vy_v vz_v direction t_s temperature_c supply_v vx_std_v vy_std_v n flip",
-    "positions": "ax ay az t_s temperature_c n; of a magnetometer mx my mz",
-    "rates": "rate_deg_s gx gy gz ax ay az axis_x axis_y axis_z t_s temperature_c n; of named sections path",
-    "motion": "t_s vx_v vy_v displacement_m temperature_c supply_v",
-}
 
 
 @click.command("import")
@@ -43,20 +46,16 @@ def command(file: Path, kind: str | None, mapped: tuple[str, ...], given: tuple[
     program proposes names for unknown columns and asks.
     """
     from calibrations.files import open_text_file
-    from calibrations.importing.foreign import import_sheet, needs_mapping
+    from calibrations.importing.foreign import needs_mapping
     from calibrations.importing.sheet import read_sheet
     from calibrations.importing.units import ColumnMapping
-    from rig.record import Record
-    from rig.services.tables import averaged
+    from rig.services.importing import stored
 
     sheet = read_sheet(open_text_file(file))
     columns, constants = [ColumnMapping.parse(text) for text in mapped], _constants(given)
     if sys.stdin.isatty() and sys.stderr.isatty() and needs_mapping(sheet, kind, columns):
         kind, columns = ask_mapping(sheet, kind, columns, given)
-    imported = import_sheet(sheet, kind, columns, constants)
-    table = averaged(imported.table, note)
-    with Record.to_read() as record:
-        run = record.add_table(table, imported.settings)
+    run, table = stored(sheet, kind, columns, constants, note)
     if table.content == "positions" and {"ax", "mx"} <= set(table.columns):
         note("The run has the accelerometer; with --constant triad=m it has the magnetometer.")
     if as_json:
@@ -92,15 +91,13 @@ def ask_mapping(
     """
     note(f"{sheet.name} has columns with unknown names. Name them.")
     if kind is None:
-        kinds = click.Choice(sorted(CHOICES))
+        kinds = click.Choice(sorted(NAME_PATTERNS))
         question = (
             "Known stage angles (poses), still positions by hand (positions), rotation (rates), vibration (motion)"
         )
         kind = str(click.prompt(question, default=likely_kind(sheet, mapped), type=kinds, err=True))
-    note(
-        f"\nColumn names: {CHOICES.get(kind, '')}\n"
-        f"Enter accepts the proposal in brackets, {LEAVE} skips the column. Or type a name,"
-    )
+    names = "; ".join(" ".join(filter(None, (of, *names))) for of, names in COLUMN_NAMES[kind].items())
+    note(f"\nColumn names: {names}\nEnter accepts the proposal in brackets, {LEAVE} skips the column. Or type a name,")
     note("with a unit if it differs (vx_v:mV), or only a unit (mV).\n")
     whole = _columns(sheet, kind, mapped)
     while lacking := missing_columns(kind, sheet, whole):
@@ -148,7 +145,7 @@ def _parse_answer(
         return check_unit(replace(proposal, unit=parse_unit(answer)), source)
     name, colon, unit = answer.partition(":")
     if name not in NUMBERS | {PATH}:
-        raise DataError(f'"{name}" is not a column name{nearest(name, " ".join(CHOICES.values()).split())}')
+        raise DataError(f'"{name}" is not a column name{nearest(name, column_names())}')
     if name in {m.name for m in before}:
         raise DataError(f"{name} is already the name of another column")
     if colon and not parse_unit(unit):

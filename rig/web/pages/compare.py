@@ -24,7 +24,7 @@ from rig.services.request import Request
 from rig.services.two_runs import Pair, again, both, parameters_of, results_of
 from rig.web.desk import Desk, models
 from rig.web.frame import Key, frame
-from rig.web.parts import box, div, failed, message, off_loop, table, waiting, words
+from rig.web.parts import box, div, failed, noted, off_loop, table, waiting, words
 from rig.web.pictures import downloads, draw, remember
 
 # Pictures of one axis: for two tables, or for two still records.
@@ -149,14 +149,13 @@ def register(desk: Desk) -> None:
                     found = await off_loop(both, one, other, notes.append)
                 except Exception as error:
                     fitted.clear()
-                    failed("Cannot fit one model to both", message(error))
+                    failed("Cannot fit one model to both", error)
                     return
                 fitted.clear()
                 _parameters(found[0].model.name, parameters_of(*found))
                 pictures = Pictures(comparison_of(found))
                 for note in dict.fromkeys(notes):
-                    with box("note"):
-                        words(note, "small")
+                    noted(note)
             keys["x"] = Key("next axis", pictures.next_axis)
             keys["g"] = Key("switch between V and g", pictures.other_unit)
 
@@ -191,7 +190,7 @@ def _results(first: str, second: str) -> None:
             one, other = (record.run(run) for run, _, _ in names)
         pairs = results_of(one, other, (names[0][2], names[1][2]))
     except Exception as error:
-        failed("Cannot compare the results", message(error))
+        failed("Cannot compare the results", error)
         return
     if pairs:
         table(HEAD, [_row(pair) for pair in pairs])

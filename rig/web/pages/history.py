@@ -36,7 +36,7 @@ from rig.web.pages.history_results import (
     quantities_table,
     summary_of,
 )
-from rig.web.parts import LINKED, box, div, failed, message, off_loop, state, waiting, words
+from rig.web.parts import LINKED, box, div, failed, off_loop, state, waiting, words
 
 # The list of sensors.
 
@@ -96,7 +96,7 @@ def register(desk: Desk) -> None:
             try:
                 wanted, known = parse_request(request.query_params), calibrating(runs())
             except Exception as error:
-                failed("Cannot show this page", message(error))
+                failed("Cannot show this page", error)
                 return
             if not wanted.sensor:
                 listed(known)
@@ -159,7 +159,7 @@ class HistoryPage:
         except Exception as error:
             self.body.clear()
             with self.body:
-                failed(f"Cannot show the history of {self.request.sensor}", message(error))
+                failed(f"Cannot show the history of {self.request.sensor}", error)
             return
         self._lay_out(self.found)
         self._offer(self.found)

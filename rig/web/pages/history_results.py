@@ -32,7 +32,7 @@ from rig.services.history import (
 )
 from rig.services.history_words import agreements, but_stale, chart_verdict, near, next_due, significance, summary
 from rig.services.provenance import today
-from rig.web.parts import Link, box, div, failed, for_page, message, off_loop, table, words
+from rig.web.parts import Link, box, div, failed, for_page, off_loop, table, words
 from rig.web.pictures import downloads, draw
 
 MODEL = "linear"
@@ -146,7 +146,7 @@ class CompareBox:
         except Exception as error:
             self.result.clear()
             with self.result:
-                failed("Cannot compare these calibrations", message(error))
+                failed("Cannot compare these calibrations", error)
             return
         self.result.clear()
         with self.result:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Sequence
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlencode
 
@@ -15,6 +16,7 @@ from calibrations.text import rounded
 from rig.errors import RecordError
 from rig.services.content import Content, content_of
 from rig.services.exclusion import numbered_run
+from rig.services.page_words import IMPORT, address
 from rig.web.desk import Desk, runs
 from rig.web.frame import Key, frame
 from rig.web.pages import run_record
@@ -23,7 +25,7 @@ from rig.web.pages.model_missing import Missing
 from rig.web.pages.model_noise import NoisePictures
 from rig.web.pages.model_parameters import ParametersBox
 from rig.web.pages.model_pictures import Pictures
-from rig.web.parts import Cancelled, Counted, box, div, failed, for_page, message, off_loop, state, words
+from rig.web.parts import Cancelled, Counted, box, div, failed, for_page, message, noted, off_loop, state, words
 
 if TYPE_CHECKING:
     from calibrations.discovery.results import Comparison, Diagnosis, Place, Step
@@ -59,7 +61,7 @@ class Workbench:
             self.data = self.data or _newest()
         except RecordError as error:  # for example a lab that does not answer
             with frame(self.desk, "/"):
-                failed("The record cannot be read", message(error))
+                failed("The record cannot be read", error)
             return
         with frame(self.desk, "/") as keys:
             self.chosen = Choice(self)
@@ -120,13 +122,14 @@ class Workbench:
         except Exception as error:
             self.body.clear()
             with self.body:
-                failed(f"Cannot use this model with {self.data}", message(error))
+                to = {IMPORT: address(IMPORT, self.data)} if Path(self.data).is_file() else {}
+                failed(f"Cannot use this model with {self.data}", error, self.data, to)
             return
         self._lay_out(session.data.form)
         self.chosen.opened(session)
         for note in session.notes:
-            with self.notes, box("note"):
-                words(note, "small")
+            with self.notes:
+                noted(note, self.data)
         if found := run_record.left_out(self.data):
             with self.notes, ui.expansion(f"{len(found)} excluded from every analysis").props("dense").classes("box"):
                 run_record.listed(self.data, self.afresh)
@@ -252,8 +255,8 @@ class Workbench:
             ui.notify(message(error), type="negative", multi_line=True)
             return
         for note in session.notes[len(self.session.notes) :]:
-            with self.notes, box("note"):
-                words(note, "small")
+            with self.notes:
+                noted(note, self.data)
         self.diagnoses = {key: found for key, found in self.diagnoses.items() if name not in key}
         await self.show(session)
 

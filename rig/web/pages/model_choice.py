@@ -5,19 +5,20 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nicegui import events, ui
+from nicegui import ui
 
 from calibrations.errors import CalibrationError
 from rig.errors import RigError
 from rig.files import home
-from rig.web.desk import FILES, MODELS, models, runs, saved_models
+from rig.services.importing import asks, opened
+from rig.services.page_words import IMPORT, address
+from rig.web.desk import MODELS, models, runs, saved_models
+from rig.web.pages.import_file import upload
 from rig.web.parts import box, message, off_loop, words
 
 if TYPE_CHECKING:
     from rig.services.session import ModelSession
     from rig.web.pages.model import Workbench
-
-MOST_BYTES = 200_000_000
 
 
 class Choice:
@@ -72,17 +73,22 @@ class Choice:
     def _ask_file(self) -> None:
         with ui.dialog() as dialog, ui.card():
             words("Open a file", "title")
-            words("A CSV table with a header (alpha_deg, beta_deg, vx_v ...). Other names: rig import.", "quiet small")
-            ui.upload(on_upload=self._uploaded, auto_upload=True, max_file_size=MOST_BYTES).props("flat bordered")
+            words("A table with a header. If its columns have other names or units, you choose their meaning next.",
+                  "quiet small")  # fmt: skip
+            upload(self._uploaded)
         dialog.open()
 
-    async def _uploaded(self, event: events.UploadEventArguments) -> None:
-        folder = home() / FILES
-        folder.mkdir(parents=True, exist_ok=True)
-        path = folder / Path(event.file.name).name
-        await event.file.save(path)
+    async def _uploaded(self, path: Path) -> None:
+        """Open the file, or go to the page that asks for its columns."""
         self.page.desk.forget(str(path))
-        self.page.go(str(path), "")
+        try:
+            unknown = await off_loop(lambda: asks(opened(path)))
+        except CalibrationError:  # the page says what is wrong
+            unknown = False
+        if unknown:
+            ui.navigate.to(address(IMPORT, str(path)))
+        else:
+            self.page.go(str(path), "")
 
     def _ask_name(self) -> None:
         """Ask for a name and save the model for pages and command line."""

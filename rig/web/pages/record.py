@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Container
+from functools import partial
 from urllib.parse import urlencode
 
 from nicegui import events, ui
@@ -12,7 +13,7 @@ from rig.services.history import calibrating, members
 from rig.web.desk import Desk, runs
 from rig.web.frame import frame
 from rig.web.pages.history_results import HistoryRequest
-from rig.web.parts import LINKED, box, div, failed, message, state, words
+from rig.web.parts import LINKED, box, div, failed, state, words
 
 COLUMNS: list[dict[str, object]] = [
     {"name": "name", "label": "run", "field": "name", "align": "left", "sortable": True},
@@ -35,14 +36,17 @@ def register(desk: Desk) -> None:
             try:
                 found = runs()
             except Exception as error:
-                failed("The record cannot be read", message(error))
+                failed("The record cannot be read", error)
                 return
             if found:
                 Runs(found)
             else:
-                with state("The record is empty", "It stores every run of the rig with all samples, and files "
-                           "imported with `rig import`."):  # fmt: skip
+                why = "It stores every run of the rig with all samples, and your own files that you import."
+                with state("The record is empty", why):
                     ui.button("Measure", icon="play_arrow", on_click=lambda: ui.navigate.to("/run"))
+                    ui.button("Import a file", icon="upload_file", on_click=partial(ui.navigate.to, "/import")).props(
+                        "outline"
+                    )
 
 
 class Runs:
@@ -53,6 +57,9 @@ class Runs:
             with div("row-of"):
                 search = ui.input("Search: run, procedure, sensor, file").props("dense clearable").classes("grow")
                 self.hint = words("Select two to compare them.", "quiet small")
+                ui.button("Import a file", icon="upload_file", on_click=partial(ui.navigate.to, "/import")).props(
+                    "outline"
+                )
                 self.compare = ui.button("Compare", icon="compare_arrows", on_click=self._compare)
             known = calibrating(found)
             rows = [row for run in found for row in _rows(run, known)]

@@ -23,7 +23,7 @@ from rig.web.desk import Desk, lab_read
 from rig.web.frame import Key, frame
 from rig.web.pages.run_begin import BeginDialog, before_start, plan_facts
 from rig.web.pages.run_live import Live
-from rig.web.parts import box, div, facts, failed, message, off_loop, setting_label, setting_text, table, waiting, words
+from rig.web.parts import box, div, facts, failed, off_loop, setting_label, setting_text, table, waiting, words
 
 MOST_STRETCHES = 12
 DEFAULT_PROCEDURE = "sweep"
@@ -38,7 +38,7 @@ def register(desk: Desk) -> None:
             try:
                 bench = read_bench(desk.bench_file)
             except Exception as error:
-                failed("The bench file cannot be used", message(error))
+                failed("The bench file cannot be used", error)
                 return
             with div("run-page"):
                 with div("stack"):
@@ -78,7 +78,7 @@ class Instruments:
         except Exception as error:
             self.rows.clear()
             with self.rows:
-                failed("The bench cannot be checked", message(error))
+                failed("The bench cannot be checked", error)
             return
         rows = [
             (role, f"{'✓' if test.ok else '✗ FAILED'} {test.name}", test.detail)
@@ -166,7 +166,7 @@ class Planning:
             if asked == self.asked:
                 self.plan.clear()
                 with self.plan:
-                    failed("This procedure cannot run", message(error))
+                    failed("This procedure cannot run", error)
             return
         if asked == self.asked:
             self.found = found

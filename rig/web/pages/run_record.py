@@ -12,14 +12,14 @@ from urllib.parse import urlencode
 from nicegui import ui
 
 from calibrations.presentation.interactive import figure
-from calibrations.text import bound, estimate_text, joined, unit
+from calibrations.text import joined
 from rig.errors import RecordError
 from rig.record import Event, Record, Run
 from rig.services.charts import Course, RunTime, course_chart, kind_of
 from rig.services.exclusion import exclude, numbered_run
 from rig.services.export import export
 from rig.services.history import lives
-from rig.services.next_steps import PageStep, page_steps
+from rig.services.next_steps import page_steps, result_rows
 from rig.services.report import reported
 from rig.services.request import Request
 from rig.web.desk import Desk
@@ -36,6 +36,7 @@ from rig.web.parts import (
     off_loop,
     setting_label,
     setting_text,
+    step_row,
     table,
     words,
 )
@@ -203,7 +204,7 @@ def register(desk: Desk) -> None:
                     found, excluded = record.run(run), record.excluded(run)
                     known = lives(found, record.runs())
             except Exception as error:
-                failed("There is no such run", message(error))
+                failed("There is no such run", error)
                 ui.link("All runs", "/record")
                 return
             OneRun(desk, found, excluded, known)
@@ -222,7 +223,7 @@ class OneRun:
                     words("Results", "title")
                     _results(run)
                     for step in page_steps(run, excluded):
-                        _step(step)
+                        step_row(step, "quiet small")
                     for sensor, count in known.items():
                         ui.link(
                             f"{count} runs of the sensor {sensor}: history", HistoryRequest(sensor).address
@@ -320,24 +321,14 @@ def _results(run: Run) -> None:
         words("This procedure has no results." if run.state == "complete" else "The run is not complete.", "quiet")
         return
     with ui.element("table").classes("plain-table"):
-        for name, result in run.results.items():
-            limit = "" if result["limit"] is None else bound(result["value"], result["limit"])
-            value = f"{estimate_text(result['value'], result['std'])} {unit(result['unit'])}"
+        for row in result_rows(run.results):
             with ui.element("tr"):
-                for cell in (name, value, limit):
+                for cell in (row.name, for_page(row.value), row.limit):
                     with ui.element("td"):
                         words(cell)
                 with ui.element("td"):
-                    if result["verdict"]:
-                        words(result["verdict"], f"chip {LOOKS[result['verdict']]}")
-
-
-def _step(step: PageStep) -> None:
-    """What to do next: a sentence, and buttons to the pages where it is done."""
-    with div("row-of"):
-        words(for_page(step.text), "quiet small grow")
-        for label, to in step.to.items():
-            ui.button(label, on_click=partial(ui.navigate.to, to)).props("outline dense")
+                    if row.verdict:
+                        words(row.verdict, f"chip {LOOKS[row.verdict]}")
 
 
 def _made(run: Run) -> dict[str, str]:

@@ -13,7 +13,7 @@ from rig.services.content import content_of
 from rig.services.report import reported
 from rig.services.request import Request
 from rig.web.desk import Desk
-from rig.web.parts import box, div, failed, message, off_loop, waiting, words
+from rig.web.parts import box, div, failed, off_loop, waiting, words
 
 # the frame is as high as the report; a report has no scripts, and the page's policy lets it load nothing
 FITTED = (
@@ -56,7 +56,7 @@ class RunReport:
         except Exception as error:
             self.place.clear()
             with self.place:
-                failed("This run has no report", message(error))
+                failed("This run has no report", error, self.run.run)
             return
         if data != self.data:
             return

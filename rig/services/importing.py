@@ -1,0 +1,141 @@
+"""Import of a file with names and units that a person chooses: for `rig import` and the page Import."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from calibrations.errors import MissingColumn
+from calibrations.files import open_text_file
+from calibrations.importing.foreign import import_sheet, needs_mapping
+from calibrations.importing.plausible import Doubt
+from calibrations.importing.proposal import (
+    column_names,
+    likely_kind,
+    missing_columns,
+    propose_mapping,
+    time_doubt,
+)
+from calibrations.importing.sheet import Sheet, read_sheet
+from calibrations.importing.units import UNITS, ColumnMapping, column_unit
+from calibrations.presentation.chart import CANDIDATE, MEASURED, QUIET, Axis, Chart, Panel, Points, one
+from calibrations.table import AXES, NUMBERS, Constant, Table, guess_kind
+from rig.record import Record
+from rig.services.tables import averaged
+
+MOST_DRAWN = 4000
+COLOURS = (MEASURED, CANDIDATE, QUIET)
+SENSED = {"a": ("g", "mg", "m/s2", "counts"), "m": ("uT", "counts"), "g": ("deg/s", "rad/s", "counts")}  # of outputs
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """What a file may be. `columns`: for each of the file's columns the proposal, None for one that is not used."""
+
+    kind: str
+    columns: Mapping[str, ColumnMapping | None]
+    doubt: Doubt | None = None  # about the unit of the time
+
+
+@dataclass(frozen=True)
+class Preview:
+    """The table that an import would store, and remarks on it."""
+
+    table: Table
+    notes: tuple[str, ...]
+
+
+def opened(path: Path) -> Sheet:
+    """The sheet in a file. Raises DataError."""
+    return read_sheet(open_text_file(path))
+
+
+def asks(sheet: Sheet) -> bool:
+    """Whether a person has to name columns or units before the file can be used. Raises DataError."""
+    return needs_mapping(sheet, None, ()) or time_doubt(sheet, _own(sheet)) is not None
+
+
+def proposal(sheet: Sheet, kind: str | None = None) -> Proposal:
+    """The proposed mapping of a sheet, as `kind` or as the likely one."""
+    own = _own(sheet)
+    kind = kind or _kind(sheet, own)
+    allowed = column_names(kind)
+    proposed = propose_mapping(sheet, "poses" if kind == "still" else kind, own)
+    found = {m.theirs: m for m in proposed if m.name in allowed or m in own}
+    stated = [replace(m, unit=_stated(sheet, m.theirs)) if m.name == "t_s" else m for m in found.values()]
+    return Proposal(kind, {name: found.get(name) for name in sheet.header}, time_doubt(sheet, stated))
+
+
+def units_for(name: str) -> list[str]:
+    """The units that a column of this name may have in a file, its own unit first; none for a bare number."""
+    if own := column_unit(name):
+        return sorted((unit for unit, (into, _, _) in UNITS.items() if into == own), key=lambda unit: unit != own)
+    return list(SENSED.get(name[:1], ())) if name[1:] in AXES else []
+
+
+def lacking(sheet: Sheet, kind: str, columns: Sequence[ColumnMapping]) -> list[str]:
+    """The columns that the import still needs."""
+    return missing_columns(kind, sheet, columns) if kind != "still" else [] if _outputs(columns) else ["vx_v"]
+
+
+def preview(sheet: Sheet, kind: str, columns: Sequence[ColumnMapping], constants: Mapping[str, Constant]) -> Preview:
+    """The table of an import that is not stored. Raises DataError."""
+    notes: list[str] = []
+    table = averaged(import_sheet(sheet, kind, columns, constants).table, notes.append)
+    return Preview(table, tuple(notes))
+
+
+def stored(
+    sheet: Sheet,
+    kind: str | None,
+    columns: Sequence[ColumnMapping],
+    constants: Mapping[str, Constant],
+    tell: Callable[[str], None],
+) -> tuple[str, Table]:
+    """Store the sheet in the record: the name of the new run, and its table. Raises DataError, RecordError."""
+    imported = import_sheet(sheet, kind, columns, constants)
+    table = averaged(imported.table, tell)
+    with Record.to_read() as record:
+        return record.add_table(table, imported.settings), table
+
+
+def data_chart(table: Table) -> Chart:
+    """The outputs of a table over the stage angle beta, the time, or the row."""
+    every = max(1, -(-table.n // MOST_DRAWN))
+    name = next((each for each in ("beta_deg", "t_s") if each in table), "")
+    x = table.column(name) if name else np.arange(table.n, dtype=float)
+    outputs = [each for each in table.output_names if each in table]
+    dots = [
+        Points(x[::every], table.column(each)[::every], each, colour, size=4)
+        for each, colour in zip(outputs, COLOURS, strict=False)
+    ]
+    label = f"{name.rpartition('_')[0]} ({column_unit(name)})" if name else "row"
+    unit = column_unit(outputs[0]) or table.unit
+    return one(Panel(tuple(dots), Axis(label), Axis(f"outputs ({unit})"), legend="outside"))
+
+
+def _own(sheet: Sheet) -> list[ColumnMapping]:
+    """The columns that have our names already."""
+    named = zip(sheet.header, sheet.bare, sheet.units, strict=True)
+    return [ColumnMapping(bare, header, unit) for header, bare, unit in named if bare in NUMBERS]
+
+
+def _kind(sheet: Sheet, own: Sequence[ColumnMapping]) -> str:
+    try:
+        return guess_kind([m.name for m in own])
+    except MissingColumn:
+        kind = likely_kind(sheet, own)
+    names = {m.name for m in propose_mapping(sheet, kind, own)}
+    return "still" if kind == "poses" and not {"alpha_deg", "beta_deg"} & names and "vx_v" in names else kind
+
+
+def _stated(sheet: Sheet, theirs: str) -> str:
+    """The unit of a column in the file's header."""
+    return sheet.units[sheet.header.index(theirs)]
+
+
+def _outputs(columns: Sequence[ColumnMapping]) -> bool:
+    return any(m.name in ("vx_v", "vy_v", "vz_v") for m in columns)

@@ -1,0 +1,76 @@
+"""Messages of the command line as a page shows them: what a command does there, a button opens here."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from urllib.parse import urlencode
+
+MODEL, RECORD, RUN, HISTORY, IMPORT = "Model", "Record", "Run", "History", "Import"
+PAGES = {  # command: the page that does the same; a command that is not here stays in the text
+    **dict.fromkeys(("add", "certificate", "compare", "compensate", "diagnose", "discover", "exclude", "fit"), MODEL),
+    **dict.fromkeys(("models", "noise"), MODEL),
+    **dict.fromkeys(("report", "runs", "show"), RECORD),
+    **dict.fromkeys(("resume", "run"), RUN),
+    **dict.fromkeys(("control", "history"), HISTORY),
+    "import": IMPORT,
+}
+COMMAND = rf"rig (?P<command>{'|'.join(sorted(PAGES, key=len, reverse=True))})\b"
+WORDS = r"(?: (?P<procedure>level-check|check-standard|noise-floor|soak|sweep)\b)?"
+OPTIONS = r"(?P<options>(?: --[\w-]+(?: [\w.]+)?)*)"
+BLOCK = re.compile(rf"[:\s]*\n+ {{4}}{COMMAND}[^\n]*\n*")  # a line of its own, to copy
+QUOTED = re.compile(rf"`{COMMAND}{WORDS}(?P<options>[^`]*)`")
+BARE = re.compile(rf"(?<!the )(?<!a ){COMMAND}{WORDS}{OPTIONS}")
+LONGER = re.compile(r" \(--([\w-]+) ([\d.e+]+)\)")
+OPTION_WORDS = (  # options of `rig import` in messages, as the fields of its page
+    (re.compile(r"import it with(?= \(the page)"), "import it"),
+    (re.compile(r"with --column, (?:by its number, )?such as \S+"), "on the page Import"),
+    (re.compile(r"--column (\w+)=[^\s:]*:([\w/]+)"), r"\2 as the unit of \1"),
+    (re.compile(r"--constant (\w+)=([^\s);,]+)"), r"the constant \1 = \2"),
+)
+
+
+@dataclass(frozen=True)
+class PageStep:
+    """A sentence without commands, and the addresses that replace them by the labels of their buttons."""
+
+    text: str
+    to: Mapping[str, str]
+
+
+def page_step(line: str, data: str = "", procedure: str = "") -> PageStep:
+    """A message for a page. `data` is the run or file that it is about, `procedure` that of the run."""
+    to: dict[str, str] = {}
+
+    def opened(found: re.Match[str]) -> str:
+        named = found.groupdict()
+        if named.get("procedure") and named["command"] == RUN.lower():
+            to[f"Measure {named['procedure']}"] = f"/run?procedure={named['procedure']}"
+            return f"the procedure {named['procedure']}"
+        page = MODEL if "--poses" in (named.get("options") or "") else PAGES[named["command"]]
+        to[page] = address(page, data)
+        return f"the page {page}"
+
+    if longer := LONGER.search(line):
+        given = {"procedure": procedure, longer[1].replace("-", "_"): longer[2]}
+        to["Measure longer"] = f"/run?{urlencode(given)}"
+    text = LONGER.sub("", line)
+    text = BLOCK.sub(lambda found: f" ({opened(found)}).\n", text)
+    for pattern in (QUOTED, BARE):
+        text = pattern.sub(opened, text)
+    for pattern, plain in OPTION_WORDS:
+        text = pattern.sub(plain, text)
+    return PageStep(text.rstrip("\n"), to)
+
+
+def address(page: str, data: str) -> str:
+    """The address of a page, for data if they are known."""
+    if page == RECORD:
+        return f"/record/{data.partition('/')[0]}" if data and not re.search(r"[\\.]", data) else "/record"
+    if page == RUN:
+        return "/run"
+    if page == HISTORY:
+        return "/history"
+    path, name = ("/import", "file") if page == IMPORT else ("/", "data")
+    return f"{path}?{urlencode({name: data})}" if data else path

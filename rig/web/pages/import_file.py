@@ -1,0 +1,329 @@
+"""Import page: a file with columns of other names and units becomes a run of the record, by drop-downs."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from functools import partial
+from pathlib import Path
+from urllib.parse import urlencode
+
+from nicegui import events, ui
+
+from calibrations.importing.proposal import column_names, sample_values
+from calibrations.importing.sheet import Sheet
+from calibrations.importing.units import ColumnMapping, column_unit
+from calibrations.table import Constant
+from rig.files import home
+from rig.services.importing import Preview, data_chart, lacking, opened, preview, proposal, stored, units_for
+from rig.services.page_words import IMPORT, address
+from rig.web.desk import FILES, Desk
+from rig.web.frame import frame
+from rig.web.parts import box, div, facts, failed, message, noted, off_loop, waiting, words
+from rig.web.pictures import downloads, draw
+
+MOST_BYTES = 200_000_000
+UNUSED = ""
+KINDS = {
+    "poses": "Poses: the stage angles are known",
+    "positions": "Positions: still, in unknown directions",
+    "still": "Still record: single samples at rest",
+    "rates": "Rates: a gyroscope that is turned",
+    "motion": "Motion: with a displacement sensor",
+}
+CONSTANTS = {  # constants that a person may know, with the labels of their fields
+    "sensor": "Sensor",
+    "serial": "Serial number",
+    "date": "Date (2026-01-31)",
+    "sample_rate_hz": "Sample rate (Hz)",
+    "gravity_m_s2": "Gravity (m/s²)",
+    "turn_deg": "Angle of each turn (deg)",
+}
+OF_KIND = {"turn_deg": ("rates",), "sample_rate_hz": ("positions", "rates", "still", "motion")}  # else of all kinds
+PICTURE = "Data as imported"
+TIMES = ("s", "min", "h", "ms")
+
+
+def register(desk: Desk) -> None:
+    """The page at /import; the file may be part of the address."""
+
+    @ui.page("/import", title="Import a file")
+    async def page(file: str = "") -> None:
+        with frame(desk, "/record"):
+            if not file:
+                _choose()
+                return
+            ui.page_title(f"Import {Path(file).name}")
+            body = div("stack")
+            with body:
+                waiting(f"Reading {Path(file).name}")
+            try:
+                sheet = await off_loop(opened, Path(file))
+            except Exception as error:
+                body.clear()
+                with body:
+                    failed(f"{Path(file).name} cannot be imported", error, to={"Another file": "/import"})
+                return
+            body.clear()
+            with body:
+                ImportPage(sheet, Path(file))
+
+
+def _choose() -> None:
+    with box("stack"):
+        words("Import a file", "title")
+        words("A table of numbers: CSV, any separator, with or without a header; or JSON with named arrays.", "quiet")
+        upload(_go)
+
+
+async def _go(path: Path) -> None:
+    ui.navigate.to(address(IMPORT, str(path)))
+
+
+def upload(done: Callable[[Path], Awaitable[None]]) -> None:
+    """A field that takes a file from this computer; `done` receives its path on the server."""
+
+    async def received(event: events.UploadEventArguments) -> None:
+        folder = home() / FILES
+        path = folder / Path(event.file.name).name
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            await event.file.save(path)
+        except OSError as error:  # for example a full disk
+            ui.notify(message(error), type="negative", multi_line=True, timeout=0, close_button="Close")
+            return
+        await done(path)
+
+    ui.upload(on_upload=received, auto_upload=True, max_file_size=MOST_BYTES).props("flat bordered")
+
+
+class Column:
+    """One column of the file: what it is, and its unit. A unit that a person chooses is a stated one."""
+
+    def __init__(self, theirs: str, shown: str, page: ImportPage) -> None:
+        self.theirs, self.page = theirs, page
+        self.stated = ""
+        with ui.element("tr"):
+            with ui.element("td"):
+                words(theirs)
+            with ui.element("td"):
+                words(shown, "number small")
+            with ui.element("td"):
+                self.name = ui.select({UNUSED: "other"}, value=UNUSED, on_change=self._renamed)
+            with ui.element("td"):
+                self.unit = ui.select([], on_change=self._chosen)
+        for field, label in ((self.name, "meaning"), (self.unit, "unit")):
+            field.props(f'dense options-dense aria-label="{label} of {theirs}"')
+
+    def offer(self, names: list[str], proposed: ColumnMapping | None, stated: str) -> None:
+        """Offer the names of a kind of table, and select the proposal."""
+        self.stated = stated
+        self.name.set_options({UNUSED: "other", **{name: name for name in names}})
+        self.name.set_value(proposed.name if proposed is not None and proposed.name in names else UNUSED)
+        self._offer_units(proposed.unit if proposed is not None else "")
+
+    def _offer_units(self, unit: str) -> None:
+        name = str(self.name.value or "")
+        offered = units_for(name)
+        options = {unit: unit for unit in offered} if column_unit(name) else {"": "as it is", **{u: u for u in offered}}
+        shown = unit or column_unit(name)
+        self.unit.set_options({**options, shown: shown or "as it is"}, value=shown)
+        self.unit.set_visibility(bool(offered))
+
+    def _renamed(self) -> None:
+        self.stated = ""
+        self._offer_units("")
+        self.page.look()
+
+    def _chosen(self) -> None:
+        self.page.look()
+
+    def state(self, unit: str) -> None:
+        """Set the unit that a person gives."""
+        self.stated = unit
+        self.unit.set_value(unit)
+
+    @property
+    def mapping(self) -> ColumnMapping | None:
+        """The mapping as chosen; None for a column that is not used."""
+        name, unit = str(self.name.value or ""), str(self.unit.value or "")
+        if name == UNUSED:
+            return None
+        own = unit == column_unit(name) and not self.stated
+        return ColumnMapping(name, self.theirs, "" if own else unit)
+
+
+class ImportPage:
+    """The table of columns with proposals, the constants, the picture, and the button that imports."""
+
+    def __init__(self, sheet: Sheet, path: Path) -> None:
+        self.sheet, self.path = sheet, path
+        self.turn, self.quiet = 0, True
+        self.asked = False  # the unit of the time is in doubt and no person has stated it
+        proposed = proposal(sheet)
+        with box("row-of"):
+            words(f"Import {path.name}", "title grow")
+            self.kind = ui.select(KINDS, label="Kind of table", value=proposed.kind, on_change=self._other_kind)
+            self.kind.props("dense options-dense").style("min-width: 300px")
+            self.button = ui.button("Import", icon="download_done", on_click=self._import)
+        self.fault = div("stack")
+        self.question = div("")
+        with div("import-page"):
+            with box("stack"):
+                words("Columns", "title")
+                words("Each column of the file, what it means, and its unit. The proposals come from names and values; "
+                      "check them. Other columns are stored with their own names.", "quiet small")  # fmt: skip
+                with div("wide-table"), ui.element("table").classes("plain-table mapping"):
+                    with ui.element("tr"):
+                        for head in ("column of the file", "values", "meaning", "unit"):
+                            with ui.element("th"):
+                                words(head)
+                    self.columns = {name: Column(name, _shown(sheet, name), self) for name in sheet.header}
+                self._constants()
+            with div("stack"):
+                with box("picture"):
+                    with div("title"):
+                        words(PICTURE, "grow")
+                        downloads(lambda: self.plot, PICTURE)
+                    self.plot = ui.plotly({"data": [], "layout": {}}).classes("tall-plot")
+                    self.plot.props(f'aria-label="{PICTURE}"')
+                self.result = box("stack")
+        self._offer()
+
+    def _constants(self) -> None:
+        words("Constants", "title")
+        if self.sheet.constants:
+            facts({name: str(value) for name, value in self.sheet.constants.items()})
+        with div("settings"):
+            self.fields = {
+                name: ui.input(label, on_change=self.look).props("dense debounce=400")
+                for name, label in CONSTANTS.items()
+                if name not in self.sheet.constants
+            }
+
+    def _other_kind(self) -> None:
+        self._offer()
+
+    def _offer(self) -> None:
+        """Offer the columns of the kind of table, with the proposals."""
+        kind = str(self.kind.value)
+        proposed = proposal(self.sheet, kind)
+        self.quiet = True
+        for name, column in self.columns.items():
+            stated = self.sheet.units[self.sheet.header.index(name)]
+            column.offer(column_names(kind), proposed.columns[name], stated)
+        for name, field in self.fields.items():
+            field.set_visibility(kind in OF_KIND.get(name, KINDS))
+        self.quiet = False
+        self.question.clear()
+        self.asked = proposed.doubt is not None
+        self.button.set_enabled(not self.asked)
+        if proposed.doubt is not None:
+            self._ask(*proposed.doubt)
+        self.look()
+
+    def _ask(self, doubt: str, fits: str) -> None:
+        """Ask for the unit of the time; nothing is imported before the answer."""
+        clock = next(column for column in self.columns.values() if column.name.value == "t_s")
+        with self.question, box("question stack").props("role=group aria-label='Unit of the time'"):
+            words(f'Which unit has the time "{clock.theirs}"?', "title")
+            words(f"It {doubt}; no stage does that." + (f" It fits {fits}." if fits else ""), "quiet")
+            with div("row-of"):
+                for unit in TIMES:
+                    button = ui.button(unit, on_click=partial(self._answer, clock, unit)).props("no-caps")
+                    button.props("" if unit == fits else "outline")
+
+    def _answer(self, clock: Column, unit: str) -> None:
+        self.asked = False
+        self.question.clear()
+        clock.state(unit)
+        self.look()
+
+    @property
+    def mappings(self) -> list[ColumnMapping]:
+        """The columns that are used, as chosen."""
+        return [m for column in self.columns.values() if (m := column.mapping) is not None]
+
+    @property
+    def constants(self) -> dict[str, Constant]:
+        """The constants as typed; numbers where they are numbers."""
+        given = {name: str(field.value or "").strip() for name, field in self.fields.items() if field.visible}
+        return {name: _number(text) if name.count("_") else text for name, text in given.items() if text}
+
+    def look(self) -> None:
+        """Show what would be imported with the present choices."""
+        if not self.quiet:
+            with self.fault:  # whatever was clicked may be gone
+                ui.timer(0.0, self._preview, once=True)
+
+    async def _preview(self) -> None:
+        self.turn += 1
+        turn, kind, chosen = self.turn, str(self.kind.value), self.mappings
+        names = [m.name for m in chosen]
+        if twice := next((name for name in names if names.count(name) > 1), ""):
+            self._say("", f'Two columns have the meaning {twice}. Choose another one, or "other".')
+            return
+        if lacks := lacking(self.sheet, kind, chosen):
+            self._say("", f"Still needed: {', '.join(lacks)}. Choose the columns that hold them.")
+            return
+        try:
+            found = await off_loop(preview, self.sheet, kind, chosen, self.constants)
+        except Exception as error:
+            if turn == self.turn:
+                self._say("This cannot be imported yet", error)
+            return
+        if turn == self.turn:
+            self._show(found)
+
+    def _say(self, title: str, why: str | Exception) -> None:
+        self.button.disable()
+        self.fault.clear()
+        self.result.clear()
+        with self.fault:
+            if isinstance(why, str):
+                noted(why)
+            else:
+                failed(title, message(why))
+
+    def _show(self, found: Preview) -> None:
+        """The picture and the table's first values; the import is possible."""
+        self.fault.clear()
+        self.result.clear()
+        table = found.table
+        draw(self.plot, data_chart(table), "import")
+        with self.result:
+            words(f"{table.n} rows of {table.kind}", "title")
+            ranges = {name: f"{values.min():.6g} to {values.max():.6g} {column_unit(name)}".rstrip()
+                      for name, values in table.columns.items()}  # fmt: skip
+            facts(ranges)
+            for note in found.notes:
+                noted(note)
+        self.button.set_enabled(not self.asked)
+
+    async def _import(self) -> None:
+        self.button.disable()
+        self.button.props("loading")
+        try:
+            kind, chosen = str(self.kind.value), self.mappings
+            run, _ = await off_loop(stored, self.sheet, kind, chosen, self.constants, lambda _: None)
+        except Exception as error:
+            self.button.props(remove="loading")
+            self.button.enable()
+            self._say("The file was not imported", error)
+            return
+        ui.navigate.to(f"/?{urlencode({'data': run})}")
+
+
+def _shown(sheet: Sheet, name: str) -> str:
+    """The first values of a column and their range, or its first words."""
+    values = sample_values(sheet, name)
+    if not len(values):
+        return ", ".join(dict.fromkeys(row[sheet.header.index(name)] for row in sheet.sample[:20]))[:60]
+    first = ", ".join(f"{value:.6g}" for value in values[:3])
+    return f"{first} … ({values.min():.6g} to {values.max():.6g})"
+
+
+def _number(text: str) -> Constant:
+    try:
+        return float(text)
+    except ValueError:
+        return text

@@ -1,0 +1,108 @@
+"""The page Import in a browser: a foreign file is named by drop-downs, drawn, asked about, and stored as a run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from urllib.parse import quote
+
+import numpy as np
+import pytest
+from playwright.sync_api import Page, expect
+
+from rig.record import Record
+from tests.browser.conftest import Workbench
+
+pytestmark = pytest.mark.slow
+
+
+def foreign(folder: Path, clock: str = "Zeitpunkt") -> Path:
+    """125 poses in 12.4 minutes, outputs in mV, with names of another laboratory."""
+    rng = np.random.default_rng(5)
+    rows = []
+    for k in range(125):
+        alpha, beta = (90, 60, 120, 45, 135)[k // 25], (k % 25) * 15
+        load = np.sin(np.radians(alpha)) * np.array([np.cos(np.radians(beta)), np.sin(np.radians(beta))])
+        x, y = 2500 + 1000 * load + 0.2 * rng.standard_normal(2)
+        rows.append(f"{0.1 * k:.1f};{alpha};{beta};{x:.3f};{y:.3f};ok")
+    path = folder / "theirs.csv"
+    path.write_text(f"{clock};inclination;table;Ux;Uy;state\n" + "\n".join(rows) + "\n")
+    return path
+
+
+def choose(page: Page, field: str, value: str) -> None:
+    page.get_by_label(field, exact=True).click()
+    page.get_by_role("option", name=value, exact=True).click()
+
+
+def test_a_file_is_imported_by_drop_downs(workbench: Workbench, tmp_path: Path) -> None:
+    path = foreign(tmp_path)
+    page = workbench.visit("/record")
+    page.get_by_role("button", name="Import a file").click()
+    page.locator("input[type=file]").set_input_files(path)
+    expect(page.get_by_text("Import theirs.csv")).to_be_visible()
+    expect(page).to_have_title("Import theirs.csv")
+    for column, name in (("inclination", "alpha_deg"), ("table", "beta_deg"), ("Ux", "vx_v"), ("state", "other")):
+        expect(page.get_by_label(f"meaning of {column}", exact=True)).to_have_value(name)
+    expect(page.get_by_label("unit of Ux")).to_have_value("mV")
+    button = page.get_by_role("button", name="Import", exact=True)
+    expect(button).to_be_enabled()
+    expect(page.locator("[aria-label='Data as imported'] .points path")).to_have_count(250)
+    workbench.shot(page, "import")
+    choose(page, "unit of Ux", "V")
+    expect(page.get_by_role("alert")).to_contain_text("no sensor output exceeds")
+    expect(page.get_by_role("alert")).not_to_contain_text("--column")
+    expect(button).to_be_disabled()
+    choose(page, "unit of Ux", "mV")
+    expect(button).to_be_enabled()
+    choose(page, "meaning of table", "other")
+    expect(page.get_by_text("Still needed: beta_deg")).to_be_visible()
+    choose(page, "meaning of table", "beta_deg")
+    page.get_by_label("Serial number").fill("17")
+    expect(button).to_be_enabled()
+    workbench.fits(page)
+    workbench.shot(page, "import-tablet")
+    button.click()
+    page.wait_for_url("**/?data=*")
+    with Record() as record:
+        run = record.runs()[0]
+        columns = record.columns(run.run)[0]
+    assert run.constants["serial"] == "17"
+    assert columns["vx_v"][0] == pytest.approx(3.5, abs=1e-3)
+
+
+def test_a_time_that_fits_minutes_is_asked_about(workbench: Workbench, tmp_path: Path) -> None:
+    page = workbench.visit(f"/import?file={quote(str(foreign(tmp_path, 'time')))}")
+    question = page.get_by_role("group", name="Unit of the time")
+    expect(question).to_contain_text("It runs from 0 to 12.4; in s this is 0.1 s from one pose to the next")
+    expect(question).to_contain_text("It fits min.")
+    button = page.get_by_role("button", name="Import", exact=True)
+    expect(page.locator("[aria-label='Data as imported'] .points path")).to_have_count(250)
+    expect(button).to_be_disabled()
+    page.emulate_media(color_scheme="dark")
+    workbench.shot(page, "import-asked")
+    question.get_by_role("button", name="min", exact=True).click()
+    expect(question).to_have_count(0)
+    expect(page.get_by_text("0 to 744 s")).to_be_visible()
+    button.click()
+    page.wait_for_url("**/?data=*")
+    with Record() as record:
+        assert record.columns(record.runs()[0].run)[0]["t_s"][-1] == pytest.approx(744.0)
+
+
+def test_a_file_that_needs_names_leads_from_the_model_page(workbench: Workbench, tmp_path: Path) -> None:
+    page = workbench.visit(f"/?data={quote(str(foreign(tmp_path)))}")
+    alert = page.get_by_role("alert")
+    expect(alert).to_contain_text("Cannot use this model")
+    assert "rig import" not in alert.inner_text()
+    alert.get_by_role("button", name="Import").click()
+    expect(page.get_by_text("Import theirs.csv")).to_be_visible()
+
+
+def test_a_file_that_cannot_be_read_says_why(workbench: Workbench, tmp_path: Path) -> None:
+    (broken := tmp_path / "broken.csv").write_text("only words\nare here\n")
+    page = workbench.visit(f"/import?file={quote(str(broken))}")
+    expect(page.get_by_role("alert")).to_contain_text("broken.csv")
+    page.get_by_role("alert").get_by_role("button", name="Another file").click()
+    expect(page.get_by_text("Import a file")).to_be_visible()
+    page.goto(f"{workbench.origin}/import?file=nothing.csv")
+    expect(page.get_by_role("alert")).to_contain_text("nothing.csv")

@@ -1,0 +1,67 @@
+"""Messages of the command line as a page shows them."""
+
+from __future__ import annotations
+
+import pytest
+
+from rig.services.next_steps import result_rows
+from rig.services.page_words import page_step
+
+SUGGESTED = (
+    "x.csv: vx_v is missing\nThe names and values suggest this import:\n\n    rig import x.csv --column vx_v=U:mV\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("line", "text", "to"),
+    [
+        (
+            "run 7 has no pose yet; `rig resume` continues it",
+            "run 7 has no pose yet; the page Run continues it",
+            {"Run": "/run"},
+        ),
+        (
+            "give a still record; `rig run noise-floor` or `rig run soak` makes one",
+            "give a still record; the procedure noise-floor or the procedure soak makes one",
+            {"Measure noise-floor": "/run?procedure=noise-floor", "Measure soak": "/run?procedure=soak"},
+        ),
+        (
+            SUGGESTED,
+            "x.csv: vx_v is missing\nThe names and values suggest this import (the page Import).",
+            {"Import": "/import?file=x.csv"},
+        ),
+        ("`rig show RUN --poses` lists all", "the page Model lists all", {"Model": "/?data=x.csv"}),
+        ("a log needs t_s (in `rig import`, --constant sample_rate_hz=100)",
+         "a log needs t_s (in the page Import, the constant sample_rate_hz = 100)", {"Import": "/import?file=x.csv"}),
+        ("errors of the rig report nothing", "errors of the rig report nothing", {}),
+        ("`rig doctor --recover F` copies rows", "`rig doctor --recover F` copies rows", {}),
+    ],
+)  # fmt: skip
+def test_a_page_is_named_in_place_of_its_command(line: str, text: str, to: dict[str, str]) -> None:
+    step = page_step(line, "x.csv")
+    assert (step.text, dict(step.to)) == (text, to)
+
+
+def test_the_unit_is_named_in_place_of_its_option() -> None:
+    line = 'the column "vx_v" reaches 2500 V\nIf its unit is mV, import it with:\n\n    rig import x.csv --column vx_v=U:mV\n\nIf its unit is V after all, state it: --column vx_v=U:V'  # noqa: E501
+    assert page_step(line).text == (
+        'the column "vx_v" reaches 2500 V\nIf its unit is mV, import it (the page Import).\n'
+        "If its unit is V after all, state it: V as the unit of vx_v"
+    )
+
+
+def _result(value: float, limit: object = None, std: float | None = None) -> dict[str, object]:
+    return {"value": value, "std": std, "unit": "h", "limit": limit, "verdict": "fail" if limit else None}
+
+
+def test_the_steady_state_is_one_sentence() -> None:
+    forecast = {"earliest": _result(2.0), "expected": _result(3.0), "latest": _result(5.0, [0, 4])}
+    not_yet = {"A/steady-state-x": _result(0.0, [1, 1])}
+    not_yet |= {f"A/steady-state-{end}-x": result for end, result in forecast.items()}
+    rows = result_rows(not_yet)
+    assert [row.name for row in rows] == ["A/steady-state-x", "A/steady-state-latest-x"]  # a limit has its own row
+    assert rows[0].value == "Not reached. Forecast: 3 h after power-on, 2 h to 5 h (95 %)."
+    assert (rows[0].limit, rows[0].verdict) == ("must be reached", "fail")
+    reached = {"steady-state": _result(1.0), "steady-state-time": _result(3.25, std=0.11), "gap": _result(0.0)}
+    assert [row.value for row in result_rows(reached)] == ["Reached 3.25(11) h after power-on.", "none"]
+    assert result_rows({"steady-state": _result(0.0)})[0].value == "Not reached. There is no forecast."
