@@ -65,7 +65,7 @@ def test_the_token_becomes_a_cookie_and_leaves_the_address() -> None:
         ({"cookie": "rig-8473=wrong"}, "", 401),
         ({"cookie": "rig-8474=the-token"}, "", 401),  # that of another workbench on this machine
         ({"cookie": "rig-8473=\xe9"}, "", 401),
-        ({"cookie": f"{{odd}}=\"a b\"; rig-8473={SECRET}; =;"}, "", 200),  # another program of this host has odd ones
+        ({"cookie": f'{{odd}}="a b"; rig-8473={SECRET}; =;'}, "", 200),  # another program of this host has odd ones
         (COOKIE | {"host": "rig.attacker.example:8473"}, "", 403),  # DNS rebinding
         (COOKIE | {"origin": "http://attacker.example"}, "", 403),
         (COOKIE | {"origin": "http://127.0.0.1:9999"}, "", 403),
