@@ -7,7 +7,7 @@ again from there; shares of the error stay those of the model that the session b
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any, Generic
@@ -113,6 +113,35 @@ class ModelSession(Generic[F]):
                 session = replace(session, notes=(*session.notes, note))
         return session
 
+    @property
+    def added(self) -> tuple[str, ...]:
+        """The added effects as texts that `with_added` restores: a name, or NAME=EXPRESSION."""
+        effects = (step.effect for step in self.steps)
+        return tuple(f"{each.name}={each.expression}" if each.expression else each.name for each in effects)
+
+    def with_added(self, texts: Sequence[str]) -> ModelSession[F]:
+        """The same with exactly these added effects, given as `added` writes them.
+
+        The common beginning stays. An effect that the data cannot have is left out, with a note.
+        """
+        same = next((k for k, pair in enumerate(zip(self.added, texts, strict=False)) if pair[0] != pair[1]), None)
+        common = min(len(self.steps), len(texts)) if same is None else same
+        session = self if common == len(self.steps) else self._with(self.steps[:common])
+        for text in texts[common:]:
+            name, equals, expression = text.partition("=")
+            try:
+                known = session.effects.get(name)
+                if known is not None and known.expression == expression:
+                    effect = known
+                else:
+                    effect = session.written(name, expression if equals else text)
+                    session = session.among({**session.effects, effect.name: effect})
+                session = session.with_step(session.tried(effect))
+            except CalibrationError as error:
+                note = f"{name} is not in the model any more: {error}"
+                session = replace(session, notes=(*session.notes, note))
+        return session
+
     def _with(self, steps: tuple[Step[F], ...]) -> ModelSession[F]:
         start, steps = self.data.in_one_floor(self.start, steps)
         return replace(self, start=start, steps=steps)
@@ -171,11 +200,5 @@ def brought_up_to_date(old: ModelSession[Any]) -> ModelSession[Any]:
     notes = [
         f"The data or the model have changed since this page was last open: {was or 'a file'}, now {now or 'new'}."
     ]
-    for step in old.steps:
-        effect = step.effect
-        try:
-            new = new.among({**new.effects, effect.name: effect})
-            new = new.with_step(new.tried(effect))
-        except CalibrationError as error:
-            notes.append(f"{effect.name} is not in the model any more: {error}")
+    new = new.among({**old.effects, **new.effects}).with_added(old.added)
     return replace(new, notes=(*notes, *new.notes))

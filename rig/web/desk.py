@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections import OrderedDict
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rig.files import RECORD, home
+from rig.files import RECORD, home, write_whole
 from rig.record import Record, Run
 
 if TYPE_CHECKING:
@@ -16,6 +19,8 @@ if TYPE_CHECKING:
 
 MOST_OPEN = 6  # sessions in memory, each with its data
 MODELS = "models"  # folder of models saved by the workbench
+SESSIONS = "web-sessions.json"  # added effects by data and model
+MOST_KEPT = 50
 FILES = "files"  # folder of uploaded files
 
 
@@ -29,10 +34,11 @@ class Desk:
     sessions: OrderedDict[tuple[str, str], ModelSession[Any]] = field(default_factory=OrderedDict)
     reports: OrderedDict[str, str] = field(default_factory=OrderedDict)
 
-    def open(self, data: str, model: str) -> ModelSession[Any]:
+    def open(self, data: str, model: str, added: Sequence[str] | None = None) -> ModelSession[Any]:
         """The open session if its data and model are still the same, else a new one with the same added effects.
 
-        `model` "" is the default model. Raises the errors of `model_session`.
+        `model` "" is the default model. `added`: exactly these effects; None for those of the open session, or of the
+        one that an earlier server kept. Raises the errors of `model_session`.
         """
         from rig.services.content import content_of
         from rig.services.request import Request
@@ -41,8 +47,12 @@ class Desk:
         found = self.sessions.get((data, model))
         if found is None:
             found = model_session(Request(data, model or None, self.bench_file))
+            if added is None:
+                found = found.with_added(kept_effects(data, model))
         elif found.content.key != content_of(data, model or None).key:
             found = brought_up_to_date(found)
+        if added is not None:
+            found = found.with_added(added)
         self.keep(data, model, found)
         return found
 
@@ -52,6 +62,7 @@ class Desk:
         self.sessions.move_to_end((data, model))
         while len(self.sessions) > MOST_OPEN:
             self.sessions.popitem(last=False)
+        keep_effects(data, model, session.added)
 
     def keep_report(self, key: str, text: str) -> None:
         """Store a report by the content that it is of."""
@@ -63,6 +74,38 @@ class Desk:
         """Close the sessions of `data`, which may have changed."""
         for key in [key for key in self.sessions if key[0] == data]:
             del self.sessions[key]
+
+
+# The added effects of the last sessions, in a file: a server that starts again opens them as they were.
+
+
+def kept_effects(data: str, model: str) -> list[str]:
+    """The added effects of an earlier server's session; empty without one."""
+    return _kept().get(_name(data, model), [])
+
+
+def keep_effects(data: str, model: str, added: Sequence[str]) -> None:
+    """Store the added effects of a session. Where this is not possible, a restart forgets them."""
+    kept = _kept()
+    if kept.get(_name(data, model), []) == list(added):
+        return
+    kept.pop(_name(data, model), None)
+    if added:
+        kept[_name(data, model)] = list(added)
+    with suppress(OSError):
+        write_whole(home() / SESSIONS, json.dumps(dict(list(kept.items())[-MOST_KEPT:]), indent=1))
+
+
+def _name(data: str, model: str) -> str:
+    return f"{data} {model}"
+
+
+def _kept() -> dict[str, list[str]]:
+    try:
+        found = json.loads((home() / SESSIONS).read_text(encoding="utf-8"))
+        return {str(name): [str(text) for text in texts] for name, texts in found.items()}
+    except (OSError, ValueError, AttributeError, TypeError):
+        return {}
 
 
 def runs() -> list[Run]:

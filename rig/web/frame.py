@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -10,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from nicegui import app, ui
-from nicegui.events import KeyEventArguments
+from nicegui.events import GenericEventArguments, KeyEventArguments
 
 from rig.errors import RigError
 from rig.runs.background import control
@@ -31,6 +32,8 @@ class Strip:
 
     def __init__(self) -> None:
         self.title = ""
+        self.before: Status | None = None
+        self.begun = False
         with ui.element("div").classes("under-way").props("role=status") as self.box:
             self.link = ui.link("", "/run")
             self.pause = ui.button("Pause", icon="pause", on_click=lambda: control_run(control.pause)).props(
@@ -46,6 +49,9 @@ class Strip:
     def look(self) -> None:
         """Show the present status."""
         status = control.latest()
+        if self.begun and status is not None and (said := news(self.before, status)) is not None:
+            ui.run_javascript(f"if (window.tellRig) tellRig({json.dumps(said[0])}, {json.dumps(said[1])})")
+        self.before, self.begun = status, True
         active = status is not None and status.phase != "ended"
         self.box.set_visibility(active)
         self._title(status if active else None)
@@ -65,6 +71,51 @@ class Strip:
         if title != self.title:
             self.title = title
             ui.page_title(title)
+
+
+def news(before: Status | None, now: Status) -> tuple[str, str] | None:
+    """What a notification says: the run asks, is paused, or has ended since the last look; None for no news."""
+    same = before is not None and before.key == now.key
+    if before is not None and same and before.phase == now.phase and before.asked == now.asked:
+        return None
+    if now.phase == "asking" and now.asked is not None:
+        return f"{now.procedure} asks you", now.asked.text
+    if now.phase == "paused":
+        return f"{now.procedure} is paused", now.error or "Continue it or stop it on the page Run."
+    if now.phase == "ended" and same:
+        return f"{now.procedure}: {now.state or 'ended'}", f"{now.run} {now.error}".strip()
+    return None
+
+
+# Notifications of the browser. Browsers allow them after a click, and on https or on this machine only. All open pages
+# tell the same news under one tag, so it appears once.
+TELL = """<script>
+window.tellRig = (title, body) => {
+  if (!("Notification" in window) || Notification.permission !== "granted") return;
+  const said = new Notification(title, {body, tag: "rig " + title, icon: "data:,"});
+  said.onclick = () => { window.focus(); said.close(); };
+};
+</script>"""
+ASK = """async () => emit("Notification" in window ? await Notification.requestPermission() : "none")"""
+ANSWERS = {
+    "granted": "A notification appears when a run asks or ends.",
+    "denied": "The browser blocks notifications of this page. Allow them in the settings of the browser.",
+    "default": "Not allowed yet. Click again to be asked.",
+    "none": "This browser allows notifications only on https or on the computer of the server.",
+}
+
+
+def _bell() -> None:
+    """The button that asks the browser to allow notifications."""
+    button = ui.button(icon="notifications").props("flat round dense aria-label='Notify me when a run asks or ends'")
+    with button:
+        ui.tooltip("Notify me when a run asks or ends")
+
+    def answered(event: GenericEventArguments) -> None:
+        said = str(event.args)
+        ui.notify(ANSWERS.get(said, ANSWERS["default"]), type="positive" if said == "granted" else "warning")
+
+    button.on("click", answered, js_handler=ASK)
 
 
 def control_run(how: Callable[[Status], None]) -> None:
@@ -112,7 +163,7 @@ def frame(desk: Desk, here: str) -> Iterator[dict[str, Key]]:
     keys = {
         str(k): Key(f"go to {title}", partial(ui.navigate.to, to)) for k, (to, title) in enumerate(PAGES.items(), 1)
     }
-    ui.add_head_html('<link rel="stylesheet" href="/static/workbench.css">')
+    ui.add_head_html(f'<link rel="stylesheet" href="/static/workbench.css">{TELL}')
     ui.colors(primary="#0067a3", negative="#b3261e")
     with ui.element("header").classes("bar"):
         ui.label("rig workbench").classes("name")
@@ -124,6 +175,7 @@ def frame(desk: Desk, here: str) -> Iterator[dict[str, Key]]:
         ui.element("div").classes("space")
         Strip()
         keys[STOP_KEY] = Key("stop the run, also while a field has the focus", stop_run)
+        _bell()
         _keys(keys)
         _theme(desk)
     with ui.element("div").classes("stack sheet"):

@@ -162,12 +162,13 @@ class Link:
 
 
 def table(head: tuple[str, ...], rows: Sequence[tuple[str | Link, ...]]) -> None:
-    """A plain table of text and links."""
+    """A plain table of text and links, with a head or without."""
     with ui.element("table").classes("plain-table"):
-        with ui.element("tr"):
-            for name in head:
-                with ui.element("th"):
-                    words(name)
+        if head:
+            with ui.element("tr"):
+                for name in head:
+                    with ui.element("th"):
+                        words(name)
         for row in rows:
             with ui.element("tr"):
                 for cell in row:

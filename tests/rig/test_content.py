@@ -48,3 +48,14 @@ def test_a_session_of_changed_data_is_made_anew_with_its_effects(run: str) -> No
     assert again.names == ("axis-misalignment",)
     assert again.data.table.n == again.end.table.n == session.data.table.n - 2
     assert "have changed" in again.notes[0]
+
+
+def test_effects_are_restored_from_texts_also_by_another_server(run: str) -> None:
+    session = Desk(None).open(run, "linear")
+    own = session.with_added(["my-effect=a*sin(2*beta)", "nothing-such"])
+    assert own.added == ("my-effect=a*sin(2*beta)",)
+    assert own.notes[-1].startswith("nothing-such is not in the model any more")
+    assert own.with_added([]).added == ()
+    assert own.with_added([]).with_added(own.added).added == own.added
+    assert Desk(None).open(run, "linear", own.added).added == own.added
+    assert Desk(None).open(run, "linear").added == own.added

@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from urllib.parse import urlencode
 
+from fastapi import Request
 from nicegui import ui
 
 from calibrations.discovery.verdict import Verdict
@@ -17,6 +17,7 @@ from rig.errors import RecordError
 from rig.services.content import Content, content_of
 from rig.services.exclusion import numbered_run
 from rig.services.page_words import IMPORT, address
+from rig.web.address import ModelState, parse_state
 from rig.web.desk import Desk, runs
 from rig.web.frame import Key, frame
 from rig.web.pages import run_record
@@ -33,21 +34,24 @@ if TYPE_CHECKING:
 
 
 LOOK_S = 2.0
+LONGEST_ADDRESS = 4000  # characters; a longer one keeps the last state that fits
 
 
 def register(desk: Desk) -> None:
     """The page at /."""
 
     @ui.page("/")
-    def page(data: str = "", model: str = "") -> None:
-        Workbench(desk, data, model).build()
+    def page(request: Request) -> None:
+        Workbench(desk, parse_state(request.query_params)).build()
 
 
 class Workbench:
     """One open page: data, model session, pictures, candidates."""
 
-    def __init__(self, desk: Desk, data: str, model: str) -> None:
-        self.desk, self.data, self.model = desk, data, model
+    def __init__(self, desk: Desk, given: ModelState) -> None:
+        self.desk, self.given = desk, given
+        self.data, self.model = given.data, given.model
+        self.address = ""
         self.session: ModelSession[Any] | None = None
         self.search = Counted({})
         self.turn = 0  # results of older requests are ignored
@@ -85,7 +89,11 @@ class Workbench:
         with self.analysis:
             rows = form == "rows"
             with div("stack"):
-                self.pictures: Pictures | NoisePictures = Pictures(self._exclude_dialog()) if rows else NoisePictures()
+                self.pictures: Pictures | NoisePictures = (
+                    Pictures(self._exclude_dialog(), self.tell_address, self.given.selected)
+                    if rows
+                    else NoisePictures()
+                )
                 self.parameters = ParametersBox(self)
             self.missing = Missing(self, own=rows)
         self.keys["a"] = Key("add the shown effect", self.missing.add_shown)
@@ -111,21 +119,31 @@ class Workbench:
 
     def go(self, data: str, model: str) -> None:
         """Go to the address of data and model."""
-        given = {name: value for name, value in (("data", data), ("model", model)) if value}
-        ui.navigate.to(f"/?{urlencode(given)}" if given else "/")
+        ui.navigate.to(ModelState(data, model).address)
+
+    def tell_address(self) -> None:
+        """Write the present state into the address, so that it can be passed on, and survives a reload."""
+        if self.session is None:
+            return
+        selected = tuple(self.pictures.selected) if isinstance(self.pictures, Pictures) else ()
+        address = ModelState(self.data, self.model, self.session.added, selected).address
+        if address != self.address and len(address) < LONGEST_ADDRESS:
+            self.address = address
+            ui.navigate.history.replace(address)
 
     async def open(self) -> None:
         """Read the data, fit the model, and show the session."""
         self.verdict.wait(f"Reading {self.data} and fitting the model")
         try:
-            session = await off_loop(self.desk.open, self.data, self.model)
+            session = await off_loop(self.desk.open, self.data, self.model, self.given.added)
         except Exception as error:
             self.body.clear()
             with self.body:
                 to = {IMPORT: address(IMPORT, self.data)} if Path(self.data).is_file() else {}
                 failed(f"Cannot use this model with {self.data}", error, self.data, to)
             return
-        self._lay_out(session.data.form)
+        if session.data.form != "rows":  # what is laid out already may hold what a person wrote
+            self._lay_out(session.data.form)
         self.chosen.opened(session)
         for note in session.notes:
             with self.notes:
@@ -186,6 +204,7 @@ class Workbench:
         if turn != self.turn:
             return
         self.pictures.show(compared, session)
+        self.tell_address()
         self.verdict.error(compared, session)
         self._show_places(compared)
         self.chosen.grown(session)

@@ -109,7 +109,8 @@ class Missing:
         """Show the candidates, best first, and the curve of the best if an effect is missing."""
         self.cards.clear()
         self.tried, self.looked_at = {}, None
-        self.own.begin(result.pattern if result.verdict is Verdict.UNEXPLAINED else None)
+        if not self.own.written:  # a person may have written one meanwhile
+            self.own.begin(result.pattern if result.verdict is Verdict.UNEXPLAINED else None)
         missing = bool(result.missing)
         with self.cards:
             if not missing:
@@ -285,6 +286,7 @@ class Own:
     def __init__(self, page: Workbench) -> None:
         self.page, self.turn = page, 0
         self.step: Step[Any] | None = None
+        self.proposal = ""
         with box("own") as self.box:
             words("Your own effect", "title")
             self.hint = words("", "quiet small")
@@ -300,7 +302,11 @@ class Own:
         self.add.disable()
 
     def begin(self, pattern: Pattern | None = None) -> None:
-        """Start with a new state of the model; an unexplained pattern is the proposal."""
+        """Start with a new state of the model; an unexplained pattern is the proposal. What a person wrote stays."""
+        if self.written:
+            with self.box:
+                ui.timer(0.0, self.tries, once=True)
+            return
         self.step, self.turn = None, self.turn + 1
         self.add.disable()
         self.fault.set_text("")
@@ -308,7 +314,8 @@ class Own:
         proposed = pattern is not None and bool(pattern.expression)
         self.box.classes(add="proposed" if proposed else "", remove="" if proposed else "proposed")
         self.hint.set_text("This expression fits the remaining error. Test it, or write another." if proposed else "")
-        self.text.set_value(pattern.expression if pattern is not None and proposed else "")
+        self.proposal = pattern.expression if pattern is not None and proposed else ""
+        self.text.set_value(self.proposal)
         if pattern is not None and proposed:
             self.name.set_value(pattern.name)
 
@@ -345,6 +352,12 @@ class Own:
         self.page.pictures.consider(step)
         self.add.enable()
 
+    @property
+    def written(self) -> bool:
+        """Whether a person has written an expression."""
+        return str(self.text.value or "").strip() not in ("", self.proposal)
+
     async def _add(self) -> None:
-        if self.step is not None:
-            await self.page.add(self.step)
+        if (step := self.step) is not None:
+            self.text.set_value("")
+            await self.page.add(step)

@@ -43,9 +43,12 @@ POINTS = (
 class Pictures:
     """Pictures of a fit: axis, unit, column and selected rows."""
 
-    def __init__(self, leave_out: Callable[[Sequence[int]], None] | None) -> None:
-        """`leave_out` receives the numbers of selected rows; None if they cannot be excluded."""
-        self.leave_out = leave_out
+    def __init__(
+        self, leave_out: Callable[[Sequence[int]], None] | None, selects: Callable[[], None], first: Sequence[int]
+    ) -> None:
+        """`leave_out` receives the numbers of selected rows; None if they cannot be excluded. `selects` is called after
+        a selection. `first` are the points that are selected from the start."""
+        self.leave_out, self.selects, self.first = leave_out, selects, first
         self.fit: Fit | None = None
         self.session: ModelSession[Fit] | None = None
         self.step: Step[Fit] | None = None
@@ -95,7 +98,9 @@ class Pictures:
     def show(self, compared: Comparison[Fit], session: ModelSession[Fit]) -> None:
         """Show a new fit; selections stay if possible."""
         fit = compared.fit
-        if self.fit is None or self.fit.table.n != fit.table.n:
+        if self.fit is None:
+            self.selected = [k for k in self.first if k < fit.table.n]
+        elif self.fit.table.n != fit.table.n:
             self.selected = []
         self.fit, self.session, self.step = fit, session, None
         self.columns = choices(fit)
@@ -237,6 +242,7 @@ class Pictures:
             if not self.selected:
                 plot.run_plot_method("relayout", {"selections": []})
         self._tell(self.shown)
+        self.selects()
 
     def _tell(self, shown: Shown) -> None:
         """Show the selection, a remark on thinned points, or a hint."""

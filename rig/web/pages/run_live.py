@@ -18,7 +18,7 @@ from rig.runs.background.status import Asked, Status
 from rig.web.frame import control_run
 from rig.web.pages.run_begin import BeginDialog, before_resume
 from rig.web.pages.run_record import OverTime
-from rig.web.parts import box, div, failed, for_page, off_loop, words
+from rig.web.parts import box, div, failed, for_page, off_loop, table, words
 
 LOOK_S = 0.4
 PHASES = {
@@ -44,15 +44,17 @@ class Live:
         with box("stack live") as self.box:
             with div("row-of"):
                 self.title = words("", "title")
-                self.phase = words("", "chip")
+                self.phase = words("", "chip big-state")
+                self.big = words("", "big-share number")
                 self.to_record = ui.link("", "/record").classes("small grow")
                 self.buttons()
-            self.now = words("", "quiet")
+            self.now = words("", "now")
             self.bar = ui.linear_progress(0.0, show_value=False).props("aria-label=progress instant-feedback")
             self.count = words("", "small number")
             self.hint = words("", "quiet small")
             self.alarm = div("")
             self.question = div("")
+            self.tiles = div("tiles").props('role=group aria-label="Live values and their limits"')
             with div("values"):
                 self.values = div("")
                 self.attitude = div("attitude").on("click", self._enlarge)
@@ -123,6 +125,7 @@ class Live:
         self.phase.set_text(word)
         self.phase.classes(remove="good bad doubt plain", add=look)
         self.now.set_text(status.now if active else "")
+        self.big.set_text(f"{100 * status.done // status.total} %" if status.total else "")
         self.bar.set_value(status.done / status.total if status.total else 0.0)
         poses = f"{status.done} of {status.total} poses" if status.total else ""
         self.count.set_text("; ".join(filter(None, (poses, status.left if active else ""))))
@@ -186,21 +189,36 @@ class Live:
         control_run(lambda status: control.answer(status, text))
 
     def _values(self, status: Status) -> None:
-        """The last values with their limits."""
-        self.values.clear()
-        with self.values, ui.element("table").classes("plain-table"):
+        """The last values: large with their limits, the others in a table."""
+        self.tiles.clear()
+        with self.tiles:
             for value in status.values:
-                with ui.element("tr"):
-                    for cell in (value["name"], for_page(value["shown"]), _limits(value), for_page(value["remark"])):
-                        with ui.element("td"):
-                            words(cell)
-                    with ui.element("td"):
-                        if value["near"]:
-                            words(value["near"], "chip bad")
+                if value["limits"] is not None:
+                    _tile(value)
+        self.values.clear()
+        rest = [value for value in status.values if value["limits"] is None]
+        with self.values:
+            table((), [(value["name"], for_page(value["shown"]), for_page(value["remark"])) for value in rest])
         self.attitude.clear()
         if status.attitude:
             with self.attitude:
                 ui.html(_drawn(status.attitude), sanitize=False)
+
+
+def _tile(value: Mapping[str, Any]) -> None:
+    """One value, to be read from two metres: number, limits, and where it is between them."""
+    low, high = value["limits"]
+    at = 100 * min(max((value["reading"] - low) / (high - low), 0.0), 1.0) if high > low else 50.0
+    number, _, unit = for_page(value["shown"]).partition(" ")
+    with div("tile bad" if value["near"] else "tile"):
+        words(value["name"], "quiet small")
+        with div("row-of"):
+            words(number, "value number")
+            words(unit, "unit")
+        with div("between"):
+            div("").style(f"left: {at:.1f}%")
+        words(_limits(value), "small quiet number")
+        words(value["near"] or for_page(value["remark"]), "small")
 
 
 def _stopped_by_a_person(status: Status) -> bool:

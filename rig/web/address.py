@@ -1,0 +1,53 @@
+"""The state of the model page in its address: data, model, added effects, selected poses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from urllib.parse import urlencode
+
+from starlette.datastructures import QueryParams
+
+MOST_SELECTED = 100_000
+
+
+@dataclass(frozen=True)
+class ModelState:
+    """`added`: None if the address does not say. `selected`: the selected points, in order."""
+
+    data: str = ""
+    model: str = ""
+    added: tuple[str, ...] | None = None
+    selected: tuple[int, ...] = ()
+
+    @property
+    def address(self) -> str:
+        """The address, without what is empty. No added effect at all is an empty `add`."""
+        added = list(self.added) or [""] if self.added is not None else []
+        given = [("data", self.data), ("model", self.model), ("select", ranges(self.selected))]
+        query = urlencode([*((name, value) for name, value in given if value), *(("add", text) for text in added)])
+        return f"/?{query}" if query else "/"
+
+
+def parse_state(query: QueryParams) -> ModelState:
+    """The state of an address. A selection that cannot be read is none."""
+    added = tuple(text for text in query.getlist("add") if text) if "add" in query else None
+    return ModelState(query.get("data", ""), query.get("model", ""), added, numbers(query.get("select", "")))
+
+
+def ranges(selected: Sequence[int]) -> str:
+    """`0-36,40`: numbers in order as text."""
+    runs = [list(run) for _, run in groupby(enumerate(selected), lambda pair: pair[1] - pair[0])]
+    return ",".join(f"{run[0][1]}-{run[-1][1]}" if len(run) > 1 else str(run[0][1]) for run in runs)
+
+
+def numbers(text: str) -> tuple[int, ...]:
+    """The numbers in a text of `ranges`; empty for another text."""
+    found: set[int] = set()
+    for part in filter(None, text.split(",")):
+        low, _, high = part.partition("-")
+        if not low.isdecimal() or not (high or low).isdecimal() or int(high or low) > MOST_SELECTED:
+            return ()
+        found |= set(range(int(low), int(high or low) + 1))
+    return tuple(sorted(found))
