@@ -13,11 +13,14 @@ import numpy as np
 
 from calibrations.analyses.control_chart import Chart, control_chart
 from calibrations.criteria import BASELINE_RUNS, FEWEST_RUNS
+from calibrations.text import concise
 from drivers.errors import did_you_mean
 from rig.errors import RecordError, UnknownRun
 from rig.record import Run
 
 PROCEDURE = "check-standard"
+OUT = "out of control"
+HEAD = ("sensor", "quantity", "runs", "centre", "sigma", "last", "verdict")
 
 
 @dataclass(frozen=True)
@@ -52,6 +55,35 @@ def controlled(
         names = ", ".join(dict.fromkeys(sensor for sensor, _ in chosen))
         raise RecordError(f"{names}: {FEWEST_RUNS} check-standard runs are needed for a chart; there is one")
     return [_controlled(*key, mine, baseline) for key, mine in charted.items()]
+
+
+# In words, for the command and the page.
+
+
+def worst(found: Iterable[Controlled]) -> str:
+    """The worst verdict of all charts."""
+    verdicts = {each.chart.verdict for each in found}
+    return next(verdict for verdict in (OUT, "in control", "baseline") if verdict in verdicts)
+
+
+def row(each: Controlled) -> tuple[str, ...]:
+    """The cells below `HEAD`."""
+    chart = each.chart
+    last = concise(float(chart.values[-1]), chart.sigma, each.unit)
+    progress = f"{len(chart.values)} of {chart.judged}" if chart.verdict == "baseline" else str(len(chart.values))
+    centre, sigma = f"{chart.centre:.7g} {each.unit}", f"{chart.sigma:.2g} {each.unit}"
+    return each.sensor, each.quantity, progress, centre, sigma, last, chart.verdict
+
+
+def signals(each: Controlled) -> list[str]:
+    """A line for every run outside a limit."""
+    chart, name = each.chart, f"{each.sensor} {each.quantity}"
+    jumps = [
+        f"{each.runs[k]}: {name} is {(chart.values[k] - chart.centre) / chart.sigma:+.1f} sigma from the centre"
+        for k in chart.jumps
+    ]
+    first = chart.drifts[:1]
+    return jumps + [f"{each.runs[k]}: {name} has drifted: its weighted mean is outside the limit" for k in first]
 
 
 @dataclass(frozen=True)

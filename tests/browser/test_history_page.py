@@ -16,6 +16,7 @@ from rig.services.history_words import but_stale, near, next_due, summary
 from rig.web.pages.history_results import LIMIT_IS_GIVEN
 from tests.browser.conftest import Workbench
 from tests.rig.lives import calibrated
+from tests.rig.test_control import checks
 
 pytestmark = pytest.mark.slow
 
@@ -29,6 +30,19 @@ def test_an_empty_record_says_what_to_do(workbench: Workbench) -> None:
     expect(page.get_by_text("No sensor has a calibration yet")).to_be_visible()
     expect(page.get_by_text("# serial: 17")).to_be_visible()
     expect(page.get_by_role("button", name="Measure")).to_be_visible()
+
+
+def test_the_check_standard_has_its_charts(workbench: Workbench) -> None:
+    names = checks([2.50001, 2.49999] * 10 + [2.5001])
+    page = workbench.visit("/history")
+    expect(page.locator(".chip", has_text="out of control")).to_be_visible()
+    expect(page.get_by_text(f"{names[-1]}: CS-1 bias-x is")).to_be_visible()
+    for title, count in (("Individuals", 21), ("Moving ranges", 20)):
+        dots(page, f"Check standard: {title}", count)
+    workbench.shot(page, "check-standard")
+    workbench.fits(page)
+    page.get_by_role("button", name="Measure the check standard").click()
+    page.wait_for_url("**/run?procedure=check-standard")
 
 
 @pytest.fixture(scope="module")

@@ -8,12 +8,10 @@ from typing import Any
 import click
 
 from calibrations.criteria import BASELINE_RUNS, FEWEST_RUNS
-from calibrations.text import columns, concise
+from calibrations.text import columns
 from rig.cli.terminal.output import emit, json_option
 from rig.record import Record
-from rig.services.control import Controlled, controlled
-
-OUT = "out of control"
+from rig.services.control import HEAD, OUT, Controlled, controlled, row, signals, worst
 
 
 @click.command("control")
@@ -39,37 +37,12 @@ def command(sensor: str | None, baseline: int, since: str | None, folder: Path |
         found = controlled(record.runs(), sensor, baseline, since)
     written = _write(found, folder, form) if folder else []
     if as_json:
-        emit({"schema": "rig.control/1", "verdict": _verdict(found), "charts": [_document(each) for each in found]})
+        emit({"schema": "rig.control/1", "verdict": worst(found), "charts": [_document(each) for each in found]})
     else:
-        click.echo(columns(("sensor", "quantity", "runs", "centre", "sigma", "last", "verdict"), map(_row, found)))
-        lines = [line for each in found for line in _signals(each)]
-        click.echo("\n".join([*lines, *(f"written: {path}" for path in written), _verdict(found)]))
-    return int(_verdict(found) == OUT)
-
-
-def _verdict(found: list[Controlled]) -> str:
-    """The worst verdict of all charts."""
-    verdicts = {each.chart.verdict for each in found}
-    return next(verdict for verdict in (OUT, "in control", "baseline") if verdict in verdicts)
-
-
-def _row(each: Controlled) -> tuple[str, ...]:
-    chart = each.chart
-    last = concise(float(chart.values[-1]), chart.sigma, each.unit)
-    progress = f"{len(chart.values)} of {chart.judged}" if chart.verdict == "baseline" else str(len(chart.values))
-    centre, sigma = f"{chart.centre:.7g} {each.unit}", f"{chart.sigma:.2g} {each.unit}"
-    return each.sensor, each.quantity, progress, centre, sigma, last, chart.verdict
-
-
-def _signals(each: Controlled) -> list[str]:
-    """A line for every run outside a limit."""
-    chart, name = each.chart, f"{each.sensor} {each.quantity}"
-    jumps = [
-        f"{each.runs[k]}: {name} is {(chart.values[k] - chart.centre) / chart.sigma:+.1f} sigma from the centre"
-        for k in chart.jumps
-    ]
-    first = chart.drifts[:1]
-    return jumps + [f"{each.runs[k]}: {name} has drifted: its weighted mean is outside the limit" for k in first]
+        click.echo(columns(HEAD, map(row, found)))
+        lines = [line for each in found for line in signals(each)]
+        click.echo("\n".join([*lines, *(f"written: {path}" for path in written), worst(found)]))
+    return int(worst(found) == OUT)
 
 
 def _document(each: Controlled) -> dict[str, Any]:

@@ -26,6 +26,7 @@ from rig.services.history import (
 from rig.services.load import effects_of
 from rig.web.desk import Desk, models, runs
 from rig.web.frame import Key, frame
+from rig.web.pages.check_standards import CheckStandards
 from rig.web.pages.history_results import (
     ClosestBox,
     CompareBox,
@@ -94,12 +95,14 @@ def register(desk: Desk) -> None:
     def page(request: Request) -> None:
         with frame(desk, "/history") as keys:
             try:
-                wanted, known = parse_request(request.query_params), calibrating(runs())
+                found = runs()
+                wanted, known = parse_request(request.query_params), calibrating(found)
             except Exception as error:
                 failed("Cannot show this page", error)
                 return
             if not wanted.sensor:
                 listed(known)
+                CheckStandards(found)
                 return
             HistoryPage(desk, wanted, list(known), keys)
 

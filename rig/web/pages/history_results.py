@@ -218,7 +218,7 @@ class HistoryPictures:
 
     def show(self, q: Quantity) -> None:
         """Draw all pictures again."""
-        draw(self.life, _bare(life(life_of(q))), f"life {q.name}")
+        draw(self.life, bare(life(life_of(q))), f"life {q.name}")
         self.text_box.set_text(_legend(q))
         self.few.set_visibility(q.chart is None)
         for place in self.boxes:
@@ -226,7 +226,7 @@ class HistoryPictures:
         if q.chart is not None:
             days, keys = [each.day for each in q.of], [each.data for each in q.of]
             for title, panel in control_panels(q.name, q.chart, q.unit, days, keys).items():
-                draw(self.charts[title], _bare(panel), f"{title} {q.name}")
+                draw(self.charts[title], bare(panel), f"{title} {q.name}")
 
     def _plot(self, title: str) -> ui.plotly:
         plot = ui.plotly({"data": [], "layout": {}}).classes("plot").props(f'aria-label="{title}"')
@@ -237,7 +237,7 @@ class HistoryPictures:
         ui.navigate.to(model_of(str(event.args), self.model))
 
 
-def _bare(panel: Panel) -> Chart:
+def bare(panel: Panel) -> Chart:
     """The panel without its title, which the page shows above the picture."""
     return one(replace(panel, title="", remark=""))
 

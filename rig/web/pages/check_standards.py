@@ -1,0 +1,75 @@
+"""Control charts of the check standards on the history page: is the rig in control?"""
+
+from __future__ import annotations
+
+from functools import partial
+
+from nicegui import events, ui
+
+from calibrations.presentation.chart import Panel
+from calibrations.presentation.charts.history import control_panels
+from rig.errors import RecordError
+from rig.record import Run
+from rig.services.control import HEAD, OUT, PROCEDURE, controlled, row, signals, worst
+from rig.services.history import when
+from rig.web.pages.history_results import CLICKED, bare
+from rig.web.parts import box, div, failed, for_page, table, words
+from rig.web.pictures import downloads, draw
+
+LOOKS = {OUT: "bad", "in control": "good", "baseline": "plain"}
+
+
+class CheckStandards:
+    """The verdict, the table of all charts, and the charts of one quantity; a click on a point opens its run."""
+
+    def __init__(self, runs: list[Run]) -> None:
+        if not any(run.procedure == PROCEDURE for run in runs):
+            return
+        with box("stack"):
+            with div("row-of"):
+                words("Check standards", "title")
+                verdict = words("", "chip")
+                div("grow")
+                measure = partial(ui.navigate.to, f"/run?procedure={PROCEDURE}")
+                ui.button("Measure the check standard", icon="play_arrow", on_click=measure).props("outline dense")
+            try:
+                self.found = controlled(runs)
+            except RecordError as error:  # one run so far
+                verdict.set_visibility(False)
+                failed("There is no chart yet", error)
+                return
+            verdict.set_text(worst(self.found))
+            verdict.classes(LOOKS[worst(self.found)])
+            self.days = {run.run: when(run).date().isoformat() for run in runs}
+            with div("wide-table"):
+                table(HEAD, [tuple(map(for_page, row(each))) for each in self.found])
+            for line in (line for each in self.found for line in signals(each)):
+                words(for_page(line), "small")
+            names = {k: f"{each.sensor}: {each.quantity}" for k, each in enumerate(self.found)}
+            self.chosen = ui.select(names, value=0, label="Chart of", on_change=self.draw).props("dense options-dense")
+            self.chosen.style("min-width: 240px")
+            self.plots: dict[str, ui.plotly] = {}
+            with div("two"):
+                for title in self._panels():
+                    with div("picture"):
+                        with div("title"):
+                            words(title, "grow")
+                            downloads(partial(self.plots.get, title), title)
+                        plot = ui.plotly({"data": [], "layout": {}}).classes("live-plot")
+                        plot.props(f'aria-label="Check standard: {title}"')
+                        self.plots[title] = plot.on("plotly_click", _clicked, js_handler=CLICKED)
+        self.draw()
+
+    def draw(self) -> None:
+        """Draw the charts of the chosen quantity."""
+        for title, panel in self._panels().items():
+            draw(self.plots[title], bare(panel), f"{title} {self.chosen.value}")
+
+    def _panels(self) -> dict[str, Panel]:
+        each = self.found[int(self.chosen.value or 0)]
+        days = [self.days[run] for run in each.runs]
+        return control_panels(each.quantity, each.chart, each.unit, days, list(each.runs))
+
+
+def _clicked(event: events.GenericEventArguments) -> None:
+    ui.navigate.to(f"/record/{event.args}")
