@@ -21,6 +21,8 @@ from calibrations.errors import DataError
 
 LARGEST_BYTES = 1 << 30
 LONGEST_LINE_BYTES = 1 << 24
+SMALL_BYTES = 1 << 26  # unpacked; up to here a file may be packed however tightly
+TIGHTEST = 50  # unpacked bytes for a packed one; logs of sensors, which are noise, have less than 10
 HEAD_BYTES = 1 << 16
 MARKS = {codecs.BOM_UTF8: "utf-8-sig", codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"}
 CONTROLS = frozenset(range(32)) - set(b"\t\n\r\f") - {0x1A}  # 0x1A ends a text file in old Windows programs
@@ -77,10 +79,13 @@ def _bytes(path: Path) -> BinaryIO:
 
 
 class _Unpacked(gzip.GzipFile):
-    """A gzip file with a limit on its unpacked size, and on the length of a line, which is held in memory."""
+    """A gzip file with limits on its unpacked size, also relative to its packed size, because numbers are held in
+    memory before all lines are read; and on the length of a line, which is held in memory.
+    """
 
     def __init__(self, path: Path) -> None:
         super().__init__(path, "rb")
+        self._packed = path.stat().st_size
         self._taken = self._of_line = 0
 
     def read1(self, size: int = -1) -> bytes:
@@ -92,6 +97,11 @@ class _Unpacked(gzip.GzipFile):
         if self._of_line > LONGEST_LINE_BYTES:
             most = LONGEST_LINE_BYTES >> 20
             raise DataError(f"{self.name}: a line has more than {most} MiB; is it really a CSV file?")
+        if self._taken > max(SMALL_BYTES, TIGHTEST * self._packed):
+            raise DataError(
+                f"{self.name}: unpacks to more than {TIGHTEST} times its size, which measurements do not; "
+                "is it really a table? If it is, unpack it and import the unpacked file"
+            )
         if self._taken > LARGEST_BYTES:
             raise DataError(
                 f"{self.name}: holds more than {LARGEST_BYTES >> 30} GiB; unpack it and import a part of it"

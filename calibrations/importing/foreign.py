@@ -94,7 +94,8 @@ def _import_with(
     known |= _output_unit(chosen, kind, known.get("triad") == "m", laid.name)
     taken = {m.theirs for m in chosen}
     path = next((m.theirs for m in chosen if m.name == PATH), PATH)
-    words = [name for name in laid.header if name not in taken and _is_text(laid, name)]
+    first = zip(laid.header, laid.sample[0], strict=True)
+    words = [name for name, cell in first if name not in taken and _is_text(name, cell)]
     numbers, texts = read_cells(laid, list(dict.fromkeys([*words, path])) if path in laid.header else words)
     columns = {m.name: _converted(numbers[m.theirs], m) for m in chosen if m.name != PATH}
     columns |= {name: numbers[name] for name in kept if name in numbers}
@@ -160,9 +161,9 @@ def _unmapped_columns(laid: Sheet, chosen: Sequence[ColumnMapping], is_mapped: b
     return [name for name in laid.header if name not in gone] if laid.named or not is_mapped else []
 
 
-def _is_text(laid: Sheet, name: str) -> bool:
+def _is_text(name: str, cell: str) -> bool:
     """Whether a column holds words: the path, or an unknown column whose first cell is not a number."""
-    return name == "path" or (name not in NUMBERS and not is_number(laid.sample[0][laid.header.index(name)]))
+    return name == "path" or (name not in NUMBERS and not is_number(cell))
 
 
 def _converted(values: Array, m: ColumnMapping) -> Array:

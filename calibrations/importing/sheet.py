@@ -272,7 +272,7 @@ def _empty_behind(rows: Sequence[list[str]]) -> int:
 def _checked(header: list[str], where: str) -> list[str]:
     if "" in header:
         raise DataError(f"{where}: a column has no name" + _names(header, ": {}") + "; name every column")
-    if twice := next((name for name in header if header.count(name) > 1), None):
+    if twice := next((name for name, count in Counter(header).items() if count > 1), None):
         raise DataError(f'{where}: the column "{twice}" occurs twice; rename one')
     return header
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import gzip
 import re
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from calibrations import files
 from calibrations.errors import DataError, MissingColumn
 from calibrations.importing.foreign import read_csv, read_foreign, write_csv
 from calibrations.importing.units import ColumnMapping
@@ -162,3 +164,25 @@ def test_damaged_gzip_is_one_message(tmp_path: Path, cut: slice) -> None:
     path.write_bytes(whole[:200] + bytes(50) + whole[250:])
     with pytest.raises(DataError, match=r"theirs\.csv\.gz: cannot be read as text"):
         read_foreign(path, "positions", THREE)
+
+
+def test_time_to_read_grows_with_the_number_of_columns_not_with_its_square(tmp_path: Path) -> None:
+    """60,000 columns: a search of the header for each of them takes half a minute, one pass 0.3 s."""
+    many = 60_000
+    header = ",".join(["alpha_deg", "beta_deg", "vx_v", *(f"c{k}" for k in range(many))])
+    rows = "".join(f"90,{beta},2.5{',1' * many}\n" for beta in (0, 30))
+    begun = time.process_time()
+    table = read(tmp_path, f"{header}\n{rows}")
+    assert len(table.columns) >= many
+    assert time.process_time() - begun < 8
+
+
+def test_gzip_that_unpacks_beyond_measurements_is_refused_early(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    packed = tmp_path / "bomb.csv.gz"
+    packed.write_bytes(gzip.compress(b"alpha_deg,beta_deg,vx_v\n" + b"90,0,2.5\n" * 200_000))
+    assert read_csv(packed).n == 200_000  # small enough to be harmless
+    monkeypatch.setattr(files, "SMALL_BYTES", 1 << 16)
+    with pytest.raises(DataError, match=r"bomb\.csv\.gz: unpacks to more than 50 times its size"):
+        read_csv(packed)
