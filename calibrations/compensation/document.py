@@ -18,7 +18,7 @@ from textwrap import wrap
 from typing import Any
 
 import numpy as np
-from scipy.stats import qmc
+import scipy  # its room of statistics is loaded where it is first entered
 
 from calibrations.compensation.cost import ErrorSize
 from calibrations.compensation.forward import FORCES, INVERTED, LEFT_OUT, NOISE, OF_THE_RIG
@@ -262,7 +262,7 @@ class ReferenceVectors:
 def make_vectors(made: Compensation, count: int = COUNT) -> ReferenceVectors:
     """`count` vectors, a power of two; the first is a corner of the range, the second its middle."""
     ranges = dict.fromkeys(made.forward.sought, (-made.range.reach, made.range.reach)) | made.beside
-    unit = qmc.Sobol(len(ranges), scramble=False).random(count)
+    unit = scipy.stats.qmc.Sobol(len(ranges), scramble=False).random(count)
     low, high = np.array(list(ranges.values())).T
     at = dict(zip(ranges, (low + unit * (high - low)).T, strict=True))
     outputs = [np.broadcast_to(v, count) for v in _in_a_row(made, at, count)]

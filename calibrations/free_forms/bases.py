@@ -14,7 +14,7 @@ from functools import lru_cache
 from typing import Literal
 
 import numpy as np
-from scipy.interpolate import BSpline
+import scipy  # its room of interpolation is loaded where it is first entered
 
 from calibrations.table import Array
 
@@ -46,7 +46,7 @@ class Spline:
         """Columns at x (n,), shape (n, count)."""
         inside = np.clip(x, self.low, self.high - 1e-12 * (self.high - self.low))
         knots, turn = _turned(self.low, self.high, self.intervals, self.order)
-        return np.asarray(BSpline.design_matrix(inside, knots, DEGREE).toarray() @ turn)
+        return np.asarray(scipy.interpolate.BSpline.design_matrix(inside, knots, DEGREE).toarray() @ turn)
 
 
 @lru_cache(maxsize=256)
@@ -57,7 +57,7 @@ def _turned(low: float, high: float, intervals: int, order: int) -> tuple[Array,
     splines = len(knots) - DEGREE - 1
     nodes, weights = np.polynomial.legendre.leggauss(4)
     at = (low + step * (np.arange(intervals)[:, None] + (nodes + 1) / 2)).ravel()
-    derivative = BSpline(knots, np.eye(splines), DEGREE).derivative(order)(at) * step**order
+    derivative = scipy.interpolate.BSpline(knots, np.eye(splines), DEGREE).derivative(order)(at) * step**order
     penalty = derivative.T @ (np.tile(weights / 2, intervals)[:, None] * derivative)
     values, vectors = np.linalg.eigh(penalty)
     kept = values > NULL * values[-1]

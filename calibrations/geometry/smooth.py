@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from functools import lru_cache
 
 import numpy as np
-from scipy.linalg import qr
+import scipy  # its room of linear algebra is loaded where it is first entered
 
 from calibrations.geometry.orientation import nominal_pose, specific_force
 from calibrations.table import Array, Table
@@ -66,7 +66,7 @@ def _harmonics(a: Array, degree: int) -> Iterator[Array]:
 
 
 def _orthonormal(columns: Array) -> Array:
-    Q, R, _ = qr(columns, mode="economic", pivoting=True)
+    Q, R, _ = scipy.linalg.qr(columns, mode="economic", pivoting=True)
     size = np.abs(np.diag(R))
     return np.asarray(Q[:, size > 1e-8 * size[0]])
 

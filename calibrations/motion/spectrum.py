@@ -12,9 +12,8 @@ from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
-import scipy  # its signal room, large and seldom needed, is loaded where it is first entered
+import scipy  # its rooms, large and seldom needed, are loaded where they are first entered
 from numpy.typing import NDArray
-from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
 from calibrations.criteria import LONGEST_STEP, MOST_UNEVEN, SHORTEST_MOTION_S
 from calibrations.errors import DataError, TooFewRows
@@ -100,14 +99,14 @@ def apply_response(x: Array, rate_hz: float, response: Response) -> Array:
     n, mean = len(x), x.mean(axis=0).reshape(-1)
     flat = x.reshape(n, -1) - mean
     margin = min(n - 1, int(np.ceil(MARGIN_S * rate_hz)))
-    more = next_fast_len(n + 2 * margin, real=True) - n - 2 * margin
+    more = scipy.fft.next_fast_len(n + 2 * margin, real=True) - n - 2 * margin
     fade = ((1 + np.cos(np.pi * np.arange(1, margin + 1) / (margin + 1))) / 2)[:, None]
     before = (2 * flat[0] - flat[1 : margin + 1]) * fade
     behind = (2 * flat[-1] - flat[-2 : -margin - 2 : -1]) * fade
     whole = np.concatenate([before[::-1], flat, behind, np.zeros((more, flat.shape[1]))])
-    f = rfftfreq(len(whole), 1 / rate_hz)
+    f = scipy.fft.rfftfreq(len(whole), 1 / rate_hz)
     H = response(np.maximum(f, f[1] / 2))[:, None]  # the mean, which a response may treat apart, is not in here
-    out = irfft(rfft(whole, axis=0) * H, len(whole), axis=0)[margin : margin + n]
+    out = scipy.fft.irfft(scipy.fft.rfft(whole, axis=0) * H, len(whole), axis=0)[margin : margin + n]
     return np.asarray((out + mean * response(np.zeros(1)).real).reshape(x.shape))
 
 
@@ -140,8 +139,8 @@ def correct_at(response: Response, at_hz: float) -> Response:
 def periodogram(x: Array, rate_hz: float) -> tuple[Array, Array]:
     """(frequency, one-sided density) with a Hann window, the mean taken off; shape (n // 2 + 1,)."""
     window = np.hanning(len(x) + 2)[1:-1]
-    power = np.abs(rfft((x - x.mean()) * window)) ** 2
-    return rfftfreq(len(x), 1 / rate_hz), 2 * power / (rate_hz * np.sum(window**2))
+    power = np.abs(scipy.fft.rfft((x - x.mean()) * window)) ** 2
+    return scipy.fft.rfftfreq(len(x), 1 / rate_hz), 2 * power / (rate_hz * np.sum(window**2))
 
 
 NOMINAL_CORNER_HZ = 15.07  # 32 kOhm and 0.33 uF, Ang V, if the table gives none

@@ -32,7 +32,7 @@ from calibrations.tables import FITTED, MEANS
 from calibrations.text import joined
 from rig.errors import RigError
 from rig.services.load import LONGEST_BEGINNING, channels_alone, check_unit
-from rig.services.load import effects_of as checked
+from rig.services.request import effects_of as checked
 from rig.services.tables import averaged
 
 # A screening as a document of plain values, and back.

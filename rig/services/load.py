@@ -16,7 +16,6 @@ from calibrations.discovery.dataset import Dataset
 from calibrations.discovery.plausibility import doubt
 from calibrations.discovery.rows import Rows
 from calibrations.effects import Effect
-from calibrations.effects.catalogue import catalogue
 from calibrations.errors import DataError, ModelError
 from calibrations.fitting import table_noise
 from calibrations.fitting.table_noise import with_noise
@@ -28,7 +27,7 @@ from calibrations.model.file import read_model
 from calibrations.table import Table
 from rig.errors import UnknownRun
 from rig.files import require_out
-from rig.services.request import Request
+from rig.services.request import Request, effects_of
 from rig.services.tables import BESIDE, load
 
 if TYPE_CHECKING:
@@ -48,15 +47,6 @@ class Loaded:
     data: Dataset[Any]
     model: Model
     effects: Mapping[str, Effect]
-
-
-def effects_of(bench_file: Path | None) -> Mapping[str, Effect]:
-    """The catalogue, with the effects in the folder that the bench file names."""
-    if bench_file is None:
-        return catalogue()
-    from rig.bench import read_bench
-
-    return catalogue(read_bench(bench_file).folders.effects)
 
 
 def loaded(request: Request, tell: Tell, out: Path | None = None) -> Loaded:

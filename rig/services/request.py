@@ -1,9 +1,14 @@
-"""The request of an analysis: data, model, and options."""
+"""The request of an analysis: data, model, and options; and the effects that a bench file adds."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from calibrations.effects import Effect
 
 
 @dataclass(frozen=True)
@@ -25,3 +30,14 @@ class Request:
     def bench_words(self) -> str:
         """The option --bench for a proposed command, with a space before it; empty for the simulated rig."""
         return f" --bench {self.bench_file}" if self.bench_file else ""
+
+
+def effects_of(bench_file: Path | None) -> Mapping[str, Effect]:
+    """The catalogue, with the effects in the folder that the bench file names."""
+    from calibrations.effects.catalogue import catalogue
+
+    if bench_file is None:
+        return catalogue()
+    from rig.bench import read_bench
+
+    return catalogue(read_bench(bench_file).folders.effects)

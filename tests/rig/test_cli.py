@@ -46,6 +46,15 @@ def test_a_run_begins_without_what_only_reports_and_motions_need() -> None:
     assert not {"matplotlib", "scipy.signal", "scipy.stats", "scipy.interpolate"} & modules
 
 
+@pytest.mark.parametrize("name", ["effects", "models"])
+def test_a_list_loads_no_compiler_and_no_analysis(name: str) -> None:
+    """They took most of its second."""
+    _, modules = loaded(f"from rig.cli import main; main(['{name}'])")
+    assert "calibrations.effects.catalogue" in modules
+    slow = {"numba", "scipy.stats", "scipy.interpolate", "scipy.linalg", "scipy.optimize", "rig.services.load"}
+    assert not slow & modules
+
+
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_command_explains_itself(name: str, rig: Callable[..., Any]) -> None:
     ended = rig(name, "--help")

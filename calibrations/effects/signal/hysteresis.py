@@ -3,7 +3,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from calibrations.effects import Constant, Effect, Parameter, Values
-from calibrations.effects.kernels import slip
 from calibrations.geometry.orientation import other_in_plane
 from calibrations.geometry.stage_path import AS_STATED, approached, turning_points
 from calibrations.table import Array, Table
@@ -45,6 +44,8 @@ class Hysteresis(Effect):
 
     def transduction(self, a: Array, table: Table, p: Values) -> Array:
         path = turning_points(approached(table, float(p.approach_deg)))
+        from calibrations.effects.kernels import slip  # numba is slow to import
+
         return slip(a, path, _pressed(a, p), _limits(p)) * p.height
 
     def follow(self, a: Array, table: Table, p: Values, before: Sequence[Array]) -> tuple[Array, list[Array]]:

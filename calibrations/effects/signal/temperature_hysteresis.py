@@ -3,7 +3,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from calibrations.effects import Constant, Effect, Parameter, Values
-from calibrations.effects.kernels import play
 from calibrations.table import Array, Table
 
 PARTS = (0.05, 0.15, 0.35)  # of the range of temperatures: plays to begin with
@@ -39,6 +38,8 @@ class TemperatureHysteresis(Effect):
     reference_c = Constant(lambda table: float(np.mean(table.column("temperature_c"))))
 
     def transduction(self, a: Array, table: Table, p: Values) -> Array:
+        from calibrations.effects.kernels import play  # numba is slow to import
+
         return np.outer(play(table.column("temperature_c"), float(p.play)) - p.reference_c, p.slope)
 
     def follow(self, a: Array, table: Table, p: Values, before: Sequence[Array]) -> tuple[Array, list[Array]]:

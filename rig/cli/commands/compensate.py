@@ -61,7 +61,8 @@ def command(
     from calibrations.model.file import dump_model, read_model
     from rig.files import make_folder, write_whole
     from rig.services.compensation import compensation_lines, how_to_test, origin_of, source_files
-    from rig.services.load import check_unit, effects_of
+    from rig.services.load import check_unit
+    from rig.services.request import effects_of
 
     if picture is not None and data is None:
         raise click.UsageError("--picture shows the test of --data: also give --data DATA")

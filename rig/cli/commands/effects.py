@@ -19,10 +19,8 @@ def command(effect: str | None, bench_file: Path | None, as_json: bool) -> None:
 
     EFFECT may be a free form, free:PLACE: a smooth curve of unknown form at a place of the signal chain.
     """
-    from calibrations.compensation.forward import known_at_run_time
     from calibrations.effects import Effect
-    from calibrations.free_forms.requested import named
-    from rig.services.load import effects_of
+    from rig.services.request import effects_of
 
     known = effects_of(bench_file)
 
@@ -43,10 +41,16 @@ def command(effect: str | None, bench_file: Path | None, as_json: bool) -> None:
             "source": e.source,
         }
 
-    shown = [named(effect, known)] if effect else list(known.values())
+    shown = list(known.values())
+    if effect:
+        from calibrations.free_forms.requested import named  # slow to import; the list needs no free form
+
+        shown = [named(effect, known)]
     if as_json:
         emit({"schema": "rig.effects/1", "effects": [document(e) for e in shown]})
     elif effect:
+        from calibrations.compensation.forward import known_at_run_time
+
         e = shown[0]
         formula = e.formula.replace("{out}", "V").replace("\n", "\n    ")  # as docs/effects does for an output in V
         click.echo(f"{e.name}: {e.summary}\n\n    {formula}\n")

@@ -60,7 +60,7 @@ def command(
     from calibrations.model.file import read_model
     from rig.files import program, require_out, write_whole
     from rig.services.compensation import export_document, export_lines
-    from rig.services.load import effects_of
+    from rig.services.request import effects_of
 
     if form in NOISES and rate_hz is None:
         raise click.UsageError(f"--for {form} needs the number of measurements a second: give --rate HZ")

@@ -86,7 +86,7 @@ def command(
     file, or --limit. Exit status 1: the calibration at --at is stale, or a comparison does not agree.
     """
     from calibrations.model.file import read_model
-    from rig.services.load import effects_of
+    from rig.services.request import effects_of
 
     read = read_model(model, effects_of(bench_file))
     limits = changes(given)

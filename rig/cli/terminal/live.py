@@ -25,9 +25,8 @@ from rig.record import Record
 from rig.record.measured import Measured
 from rig.runs.live import FIRST, STANDARD, Live, Measurement, stands
 from rig.runs.runner import start
-from rig.services.load import effects_of
 from rig.services.provenance import write_model
-from rig.services.request import Request
+from rig.services.request import Request, effects_of
 from rig.services.tables import begun, joined_runs
 
 

@@ -23,7 +23,7 @@ from rig.services.history import (
     limits_of,
     when,
 )
-from rig.services.load import effects_of
+from rig.services.request import effects_of
 from rig.web.desk import Desk, models, runs
 from rig.web.frame import Key, frame
 from rig.web.pages.check_standards import CheckStandards
