@@ -45,7 +45,7 @@ class Instrument(Strict):
 
     driver: str
     url: str
-    unit: int = 1
+    unit: int = Field(default=1, ge=1, le=255)  # one byte on the wire; all instruments of a line obey unit 0
     stream_url: str | None = None
     settings: dict[str, Any] = {}
     faults: tuple[Fault, ...] = ()
