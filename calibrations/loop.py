@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, overload
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, TypeVar, cast, overload
+
+from threadpoolctl import threadpool_limits
 
 from calibrations.discovery.dataset import Dataset
 from calibrations.discovery.results import Comparison, Diagnosis, Discovery
@@ -20,6 +22,12 @@ if TYPE_CHECKING:
     from calibrations.noise.record import Still
 
 Effects = Mapping[str, Effect]
+Call = TypeVar("Call", bound=Callable[..., Any])
+
+
+def one_thread(call: Call) -> Call:
+    """The function with one thread of linear algebra: several wait for each other on matrices of this size."""
+    return cast(Call, threadpool_limits.wrap(limits=1, user_api="blas")(call))
 
 
 @overload
@@ -39,6 +47,7 @@ def dataset(data: Table | Still) -> Dataset[Any]:
 def compare(data: Table, model: Model) -> Comparison[Fit]: ...
 @overload
 def compare(data: Still, model: Model) -> Comparison[NoiseFit]: ...
+@one_thread
 def compare(data: Table | Still, model: Model) -> Comparison[Any]:
     """The model as it is, or fitted first where it has no values yet. Raises what `fit` raises."""
     return dataset(data).compare(model, catalogue())
@@ -48,6 +57,7 @@ def compare(data: Table | Still, model: Model) -> Comparison[Any]:
 def diagnose(data: Table, model: Model, effects: Effects | None = None) -> Diagnosis[Fit]: ...
 @overload
 def diagnose(data: Still, model: Model, effects: Effects | None = None) -> Diagnosis[NoiseFit]: ...
+@one_thread
 def diagnose(data: Table | Still, model: Model, effects: Effects | None = None) -> Diagnosis[Any]:
     """What `model` misses on the data. Raises what `fit` raises."""
     return dataset(data).diagnose(model, catalogue() if effects is None else effects)
@@ -61,6 +71,7 @@ def discover(
 def discover(
     data: Still, model: Model, effects: Effects | None = None, without: Sequence[str] = ()
 ) -> Discovery[NoiseFit]: ...
+@one_thread
 def discover(
     data: Table | Still, model: Model, effects: Effects | None = None, without: Sequence[str] = ()
 ) -> Discovery[Any]:
@@ -75,6 +86,7 @@ def discover(
 def add(effect: Effect, model: Model, data: Table, effects: Effects | None = None) -> Discovery[Fit]: ...
 @overload
 def add(effect: Effect, model: Model, data: Still, effects: Effects | None = None) -> Discovery[NoiseFit]: ...
+@one_thread
 def add(effect: Effect, model: Model, data: Table | Still, effects: Effects | None = None) -> Discovery[Any]:
     """`model` with one effect more, both fitted to the data. Raises ModelError, and what `fit` raises."""
     return dataset(data).add(effect, model, catalogue() if effects is None else effects)

@@ -87,7 +87,12 @@ def best_pair(before: Fit, found: list[RowCandidate]) -> tuple[RowCandidate, Row
 
 
 def _tail(twice_gain: float, rows: int, rank: int, free: float) -> float:
-    """Chance of such a gain on noise. F rather than chi-squared: the noise's level is estimated from these rows."""
+    """Chance of such a gain on noise. F rather than chi-squared: the noise's level is estimated from these rows.
+
+    Columns that the model could have already (rank 0) show nothing: any gain comes by chance.
+    """
+    if rank == 0:
+        return 1.0
     return float(fdtrc(rank, free, np.expm1(min(twice_gain / rows, 500.0)) * free / rank))
 
 

@@ -32,6 +32,7 @@ from calibrations.table import Array, Table
 
 BASIC = ("bias", "scale-factor")
 BASE = (*BASIC, *GEOMETRY)
+NO_WORSE = 1.02  # of the error before: a parameter more costs a degree of freedom, a fit gone astray more
 
 
 @dataclass(frozen=True)
@@ -79,9 +80,15 @@ def search_structure(start: Fit, effects: Mapping[str, Effect]) -> StructuralSea
     if found.floor_source is not FloorSource.SAMPLES and start.noise.known:
         start, base = (fit(f.model, with_white(f.table, found.white)) for f in (start, base))
         remarks = (f"The noise floor is that of the residual: {found.floor_source}.",)
-    causes = separately(base, found, additions(found, base.model, effects))
+    added = additions(found, base.model, effects)
+    causes = separately(base, found, added)
     forms = free_additions(found, base.model)
     end = together(base, [*causes, *forms])
+    if any(a.effect.rounds for a in added):  # the whole output is rounded, and not what the other places leave
+        as_searched = [a if a.effect.rounds else alone for a, alone in zip(added, causes, strict=True)]
+        other = together(base, [*as_searched, *forms])
+        if other.pooled_excess < end.pooled_excess:
+            causes, end = as_searched, other
     if end.held_out_excess > MATERIAL and not end.problem.rounds:
         # forms are found again beside the causes as the catalogue has them, so that they hold what these leave
         beside = structure(causes_alone(end, forms), effects)
@@ -89,13 +96,19 @@ def search_structure(start: Fit, effects: Mapping[str, Effect]) -> StructuralSea
         others = [*refined, *free_additions(beside, base.model)]
         other = together(base, [*_at(end, causes), *others])
         if other.held_out_excess < end.held_out_excess:
-            end, forms = other, others
+            end, causes, forms = other, _at(end, causes), others
     needed = [name for name in basic if chance(*first_order(end, name, shared=True)) < SIGNIFICANT]
     chosen = [*_largest_first(_at(end, causes), end, found), *_at(end, forms)]
     if needed != basic:
         base = _freed(start, needed, effects)
         end = together(base, chosen)
     fits = [base, *fitted(base, end, chosen)]
+    if any(later.pooled_excess > NO_WORSE * earlier.pooled_excess for earlier, later in pairwise(fits)):
+        names = [a.effect.name for a in chosen]
+        taken, falling = gradually(base, sorted([*causes, *forms], key=lambda a: names.index(a.effect.name)))
+        if falling[-1].pooled_excess < NO_WORSE * end.pooled_excess:
+            chosen, fits, end = taken, falling, falling[-1]
+            forms = [a for a in chosen if a.effect.name.startswith(PREFIX)]
     steps = _steps(start, needed, base, effects)
     steps += [Step(a.effect.name, *pair) for a, pair in zip(chosen, pairwise(fits), strict=True)]
     tried = _first(start, steps, candidates(start, effects))
@@ -203,6 +216,28 @@ def fitted(base: Fit, end: Fit, added: list[Addition]) -> list[Fit]:
     return [*fits, end] if added else []
 
 
+def gradually(base: Fit, added: list[Addition]) -> tuple[list[Addition], list[Fit]]:
+    """The additions that make the error no larger, each beside those before it, and the fits, the first of them `base`.
+
+    An effect far from the truth can lead the fit of all to a place from which no way leads back. One that does not help
+    yet, such as a quantiser beside a drift that is missing, is tried again beside the others.
+    """
+    taken: list[Addition] = []
+    fits = [base]
+    waiting = added
+    while waiting:
+        postponed: list[Addition] = []
+        for addition in waiting:
+            larger = refit(fits[-1], addition.to(fits[-1].model))
+            if larger.pooled_excess <= NO_WORSE * fits[-1].pooled_excess:
+                taken.append(addition)
+                fits.append(larger)
+            else:
+                postponed.append(addition)
+        waiting = postponed if len(postponed) < len(waiting) else []
+    return taken, fits
+
+
 def causes_alone(end: Fit, forms: list[Addition]) -> Fit:
     """The model without the free forms, at the values that it has beside them."""
     model = end.model
@@ -211,6 +246,21 @@ def causes_alone(end: Fit, forms: list[Addition]) -> Fit:
     alone = evaluate(model, end.table)
     assert alone is not None  # noqa: S101 every parameter has been fitted
     return alone
+
+
+def without_forms(end: Fit) -> Fit:
+    """The causes fitted to the data less what the free forms of the model add; `end` itself where it has none."""
+    forms = [term.name for term in end.model.terms if term.name.startswith(PREFIX)]
+    if not forms:
+        return end
+    model = end.model
+    for name in forms:
+        model = model.without(name)
+    alone = evaluate(model, end.table)
+    assert alone is not None  # noqa: S101 every parameter has been fitted
+    steps = (fit_.problem.layout.steps(fit_.theta) for fit_ in (end, alone))
+    whole, rest = (forward(end.table, each).T for each in steps)
+    return fit(model, _less(end.table, whole - rest))
 
 
 def _at(end: Fit, added: list[Addition]) -> list[Addition]:

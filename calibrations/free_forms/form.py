@@ -37,6 +37,7 @@ from calibrations.table import Array, Table
 Factor = Literal["", "force", "side", "load"]
 CROSS = (1, 0, 0)  # of x, y, z: the other axis in the plane
 ANGLES = ("alpha", "beta")
+MODELLED = ("own", "cross", "out-of-plane", "output")  # drivers that the parameters of a model change
 
 
 @dataclass(frozen=True)
@@ -88,8 +89,10 @@ class Form:
             out = np.column_stack([x**i * y**j * z**m for i, j, m in basis.powers])
         elif isinstance(basis, Play):
             out = np.asarray(_slipping(table, basis, self.approach_deg)[k])
-        else:
+        elif self.driver in MODELLED:
             out = basis(self.drive(table, force, response, k))[:, :kept]
+        else:
+            out = _of_table(self, table, k)[:, :kept]
         return np.asarray(out * self._factor(table, force, k)[:, None]) if self.factor else out
 
     def drive(self, table: Table, force: Array, response: Array, k: int) -> Array:
@@ -118,6 +121,15 @@ class Form:
         if self.factor == "load":
             return np.abs(force[:, CROSS[k]])
         return side(table, self.approach_deg)
+
+
+@lru_cache(maxsize=32)
+def _of_table(form: Form, table: Table, k: int) -> Array:
+    """Columns of axis k where a column of the table drives them, which no parameter of a model changes."""
+    nothing = np.zeros((table.n, 3))
+    basis = form.basis(k)
+    assert not isinstance(basis, (Play, Products))  # noqa: S101 forces drive these
+    return basis(form.drive(table, nothing, nothing[:, 0], k))
 
 
 @lru_cache(maxsize=32)

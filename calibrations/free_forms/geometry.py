@@ -2,8 +2,8 @@
 
 The linear parts of the fit are a vector q of small angles with a covariance. Each effect of the geometry is a linear
 map into it, from its own derivatives. A place that acts over another axis may have a linear part of its own, as large
-as its curve: so much is added to the covariance before anything is asked, so that no mechanism's linear part names a
-second cause.
+as the odd part of its curve: so much is added to the covariance before anything is asked, so that no mechanism's linear
+part names a second cause. An even curve, such as that of z-axis-bias, has a small one.
 """
 
 from __future__ import annotations
@@ -17,12 +17,15 @@ import numpy as np
 from calibrations.free_forms.chain import own_base_size
 from calibrations.free_forms.form import CROSS
 from calibrations.free_forms.search import SearchResult
+from calibrations.geometry.orientation import out_of_plane
 from calibrations.table import Array
 
 GEOMETRY = ("axis-nonorthogonality", "axis-misalignment", "stage-zero-offset", "base-tilt")
 CAUSE_PRICE, PARAMETER_PRICE = 12.0, 2.0  # of chi-square
 CLOSE = 8.0  # of chi-square: explanations that this data does not tell apart
-LINEAR_PART = 2.0  # of a curve's size: the standard deviation of a mechanism's own linear part
+LINEAR_PART = 2.0  # of a curve's odd part: the standard deviation of a mechanism's own linear part
+EVEN_PART = 1.0  # the same of its even part
+EVEN, ODD = (2, 4, 6), (3, 5)  # powers of the driver
 FORM_PART = 0.1  # of a place's size: what its form may differ by from the one that acts there
 LEAST_LINE = 0.3  # noise floors: a smaller linear part is left out
 SEEN = 3.5  # standard uncertainties: a smaller linear part may be noise
@@ -44,10 +47,12 @@ class Geometry:
     lines: Mapping[str, float] = field(default_factory=dict)
 
 
-def geometry(result: SearchResult, sizes: Mapping[str, float], effects: Mapping[str, Array], has: set[str]) -> Geometry:
+def geometry(
+    result: SearchResult, curves: Mapping[str, Array], effects: Mapping[str, Array], has: set[str]
+) -> Geometry:
     """The geometry that the linear parts show.
 
-    sizes    rms of each acting place, in the output's unit
+    curves   what each acting place adds, (channels, n), in the output's unit
     effects  d output / d parameters of each effect of the geometry, (channels, n, m)
     has      effects of the geometry that the given model has: they cost nothing
     """
@@ -60,13 +65,15 @@ def geometry(result: SearchResult, sizes: Mapping[str, float], effects: Mapping[
     b = own_base_size(data)
     active = g.indices(result.sizes.variances)
     cross = g.base_inverse @ g.base_products[:, active]
+    sizes = {place: float(np.sqrt(np.mean(curve**2))) for place, curve in curves.items()}
+    linear = {place: _linear_part(result, place, curve) for place, curve in curves.items()}
     covariance = (g.base_inverse + cross @ result.sizes.inverse @ cross.T + _of_forms(result, sizes))[:b, :b]
     q = pick @ result.values.base[:b]
     C = pick @ covariance @ pick.T
     std = np.sqrt(np.maximum(np.diag(C), 0.0))
     for i, places in enumerate(over):
-        size = max((sizes.get(place, 0.0) for place in places), default=0.0)
-        C[i, i] += (LINEAR_PART * size / mean_gain / 0.5) ** 2
+        size = max((linear.get(place, 0.0) for place in places), default=0.0)
+        C[i, i] += (size / mean_gain / 0.5) ** 2
     C += np.diag(np.full(len(q), (IMMATERIAL * floor / mean_gain) ** 2))
     root = np.linalg.cholesky(C)
     inverse = np.linalg.inv(root)
@@ -82,6 +89,23 @@ def geometry(result: SearchResult, sizes: Mapping[str, float], effects: Mapping[
         if places and abs(angle) > max(LEAST_LINE * floor / mean_gain, SEEN * uncertainty):
             lines[places[0]] = max(lines.get(places[0], 0.0), float(abs(angle)) * mean_gain)
     return Geometry(causes, alternatives, lines)
+
+
+def _linear_part(result: SearchResult, place: str, curve: Array) -> float:
+    """Standard deviation of the linear part that a place's mechanism may have, in the output's unit."""
+    force = result.state.force
+    drivers = {"cross-response": force[:, list(CROSS)].T, "z-response": out_of_plane(force).T}
+    whole = float(np.mean(curve**2))
+    if place not in drivers:
+        return float(LINEAR_PART * np.sqrt(whole))
+    even = 0.0
+    for d, row in zip(drivers[place], curve, strict=False):
+        X = np.column_stack([np.ones(len(d)), d, *(d**k for k in (*EVEN, *ODD))])
+        u = np.linalg.lstsq(X, row, rcond=1e-9)[0]
+        part = X[:, 2 : 2 + len(EVEN)] @ u[2 : 2 + len(EVEN)]
+        even += float(np.var(part)) / len(curve)
+    even = min(even, whole)
+    return float(np.sqrt(LINEAR_PART**2 * (whole - even) + EVEN_PART**2 * even))
 
 
 def _of_forms(result: SearchResult, sizes: Mapping[str, float]) -> Array:

@@ -112,13 +112,13 @@ def _named(
             forms.setdefault(comp.cause, []).append(comp)
     columns = {cause: _columns(result, comps, names, Q, b) for cause, comps in forms.items()}
     total = float(curve @ curve) or 1.0
-    acting = {result.component(name).cause for name in names}
+    acting = dict.fromkeys(result.component(name).cause for name in names)
     if all(result.component(name).form is None for name in names):
         return _needed({cause: columns[cause][0] for cause in acting}, curve, total)
     chosen: list[str] = []
     share = 0.0
     while True:
-        full = len(set(chosen) - acting) >= MOST_FORMS
+        full = len(set(chosen) - acting.keys()) >= MOST_FORMS
         tried = {}
         for cause in columns:
             if cause in chosen or (full and cause not in acting):
@@ -131,7 +131,7 @@ def _named(
         share = tried[best]
     wider = {comp.contains: comp.cause for comp in map(result.component, names) if comp.contains}
     chosen = list(dict.fromkeys(wider.get(cause, cause) for cause in chosen))  # one mechanism, one name
-    enough = NAMED if len(set(chosen) - acting) < MOST_FORMS else NAMED_TOGETHER
+    enough = NAMED if len(set(chosen) - acting.keys()) < MOST_FORMS else NAMED_TOGETHER
     return (tuple(chosen), share) if share >= enough else ((), share)
 
 

@@ -16,7 +16,7 @@ from calibrations.effects.kernels import play
 from calibrations.effects.thermometer import leading_temperature
 from calibrations.free_forms.bases import Harmonics, Line, Play, Products, Ramp, Waves, spline
 from calibrations.free_forms.chain import State
-from calibrations.free_forms.components import Basis, Columns, Component, free, per_axis
+from calibrations.free_forms.components import Basis, Columns, Component, Starts, free, per_axis
 from calibrations.free_forms.form import CROSS, Factor, Form
 from calibrations.free_forms.poses import LOGGED_DEG, SIDES, PoseData
 from calibrations.geometry.orientation import out_of_plane
@@ -31,7 +31,7 @@ WARMING = (0.04, 0.15, 0.6)  # of the record: time constants
 LEADS_S = (0.0, -90.0, 90.0)  # by which the sensor is ahead of the thermometer
 WAVES, WALK_WAVES = 24, 160  # of slow noise, and of a random walk, whose roughness is never small
 DEGREE = 4  # of a general function of the force's direction
-PLAYS_K = (0.05, 0.15, 0.35)  # of the range of temperatures
+PLAYS = (0.05, 0.15, 0.35)  # of the range of temperatures
 FEWEST_TIMED, FEWEST_NOISE = 12, 20  # rows that can show a function of time, and slow noise
 FEWEST_ANGLES, FINE_ANGLES = 8, 33  # different angles beta that can show harmonics, and fine ones
 FEWEST_INCLINATIONS = 4
@@ -297,16 +297,25 @@ def _temperature(data: PoseData, first: State) -> list[Component]:
         found.append(_over_temperature(data, first, place, factor, price)((0.0,)))
     if data.timed:
         temperature = leading_temperature(data.table, 0.0)
-        for part in PLAYS_K:
-            held = play(temperature, part * float(np.ptp(temperature)))[:, None]
-            found.append(
-                Component(
-                    f"temperature-bias/temperature-hysteresis@{part}", "temperature-bias", "response",
-                    "temperature-hysteresis", "temperature-bias/play", GENERAL, _timed(held),
-                    contains="temperature-bias",
-                )
-            )  # fmt: skip
+        for part in PLAYS:
+            name = f"temperature-bias/temperature-hysteresis@{part}"
+            found.append(_behind_play(name, temperature)((part * float(np.ptp(temperature)),)))
     return found
+
+
+def _behind_play(name: str, temperature: Array) -> Make:
+    """A line over the temperature behind a play, K."""
+
+    def at(shape: tuple[float, ...]) -> Component:
+        width = abs(shape[0])
+        return Component(
+            name, "temperature-bias", "response", "temperature-hysteresis", "temperature-bias/play", GENERAL,
+            _timed(play(temperature, width)[:, None]), contains="temperature-bias",
+            shape=shape, step=(0.05 * float(np.ptp(temperature)),), reshaped=_behind_play(name, temperature),
+            starts=lambda _: (("play", "", width),),
+        )  # fmt: skip
+
+    return at
 
 
 def _warmer(data: PoseData, first: State, name: str, place: str, factor: Factor, price: float) -> Make:
@@ -417,10 +426,22 @@ def saw(frequency: float, harmonics: int, price: float, step: float) -> Componen
 
         return Component(
             name, "output", "output", "quantisation", "output/quantisation", price, columns,
-            shape=shape, step=(step,), reshaped=at,
+            shape=shape, step=(step,), reshaped=at, starts=lambda found: _steps(shape[0], found[0], found[harmonics]),
         )  # fmt: skip
 
     return at((frequency,))
+
+
+def _steps(frequency: float, sine: float, cosine: float) -> Starts:
+    """Step, offset and noise of the quantiser whose saw has this first harmonic.
+
+    The saw of rounding is -(q / pi) exp(-2 (pi s / q)^2) sin(2 pi (V - o) / q) and harmonics (Widrow and Kollar, 2008).
+    """
+    step = 1 / frequency
+    fraction = np.clip(np.pi * np.hypot(sine, cosine) / step, 1e-6, 1.0)
+    noise = step / np.pi * np.sqrt(-np.log(fraction) / 2)
+    offset = step / (2 * np.pi) * np.arctan2(cosine, -sine)
+    return ("step", "", step), ("offset", "", float(offset)), ("noise", "", float(noise))
 
 
 def _columns(data: PoseData, first: State) -> list[Component]:

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
-from scipy.linalg.lapack import dpotri
+from scipy.linalg.lapack import dpotri, dpotrs
 
 from calibrations.free_forms.chain import Coefficients, Given, State, base_jacobian
 from calibrations.free_forms.components import Component
@@ -136,22 +136,52 @@ class Sizes:
         return float(np.trace(self.inverse[part, part])) / self.variances[name]
 
 
-def solve(g: Gram, variances: Mapping[str, float]) -> Sizes:
-    """Coefficients and deviance at these variances."""
-    if not variances:
-        return Sizes({}, np.zeros(0), np.zeros((0, 0)), g.squares)
-    rows = g.indices(variances)
-    widths = [g.blocks[name].stop - g.blocks[name].start for name in variances]
-    std = np.sqrt(np.repeat(list(variances.values()), widths))
-    K = g.products[np.ix_(rows, rows)] * np.outer(std, std)
-    K[np.diag_indices_from(K)] += 1.0  # H = D^-1 K D^-1 with D the standard deviations: well conditioned
-    root = _root(K)
-    side = g.with_data[rows]
-    inverse, _ = dpotri(root[0], lower=1)
-    inverse = (np.tril(inverse) + np.tril(inverse, -1).T) * np.outer(std, std)
-    answer = inverse @ side
-    logdet = 2 * float(np.sum(np.log(np.diag(root[0]))))
-    return Sizes(dict(variances), answer, inverse, g.squares - float(side @ answer) + logdet)
+@dataclass(frozen=True, eq=False)
+class _Solved:
+    """Coefficients (p,) at some variances, the lower triangle of H^-1 in units of `std`, and the deviance."""
+
+    variances: Mapping[str, float]
+    coefficients: Array
+    triangle: Array
+    std: Array
+    deviance: float
+
+    @property
+    def sizes(self) -> Sizes:
+        """The same with the whole inverse."""
+        lower = self.triangle * self.std[:, None]
+        lower *= self.std
+        inverse = np.tril(lower) + np.tril(lower, -1).T
+        return Sizes(dict(self.variances), self.coefficients, inverse, self.deviance)
+
+
+@dataclass(frozen=True, eq=False)
+class _Products:
+    """Products of the columns of the active components with each other, (p, p), and with the data, (p,)."""
+
+    products: Array
+    with_data: Array
+    squares: float
+    widths: tuple[int, ...]
+
+    @staticmethod
+    def of(g: Gram, names: Sequence[str]) -> _Products:
+        rows = g.indices(names)
+        widths = tuple(g.blocks[name].stop - g.blocks[name].start for name in names)
+        return _Products(g.products[np.ix_(rows, rows)], g.with_data[rows], g.squares, widths)
+
+    def solved(self, variances: Mapping[str, float]) -> _Solved:
+        if not variances:
+            return _Solved({}, np.zeros(0), np.zeros((0, 0)), np.zeros(0), self.squares)
+        std = np.sqrt(np.repeat(list(variances.values()), self.widths))
+        K = self.products * std[:, None]
+        K *= std
+        K[np.diag_indices_from(K)] += 1.0  # H = D^-1 K D^-1 with D the standard deviations: well conditioned
+        root, _ = _root(K)
+        logdet = 2 * float(np.sum(np.log(np.diag(root))))
+        answer = std * dpotrs(root, std * self.with_data, lower=1)[0]
+        triangle, _ = dpotri(root, lower=1, overwrite_c=1)
+        return _Solved(variances, answer, triangle, std, self.squares - float(self.with_data @ answer) + logdet)
 
 
 def _root(K: Array) -> tuple[Array, bool]:
@@ -170,29 +200,30 @@ def _root(K: Array) -> tuple[Array, bool]:
 def estimate(g: Gram, variances: Mapping[str, float], most: Mapping[str, float], rounds: int = ROUNDS) -> Sizes:
     """Variances of greatest restricted likelihood, none above `most`, by Fellner-Schall steps with extrapolation."""
     present = {name: min(v, most.get(name, np.inf)) for name, v in variances.items()}
-    fit = solve(g, present)
+    products = _Products.of(g, list(present))
+    fit = products.solved(present)
     for _ in range(rounds):
         changed, at, moved = {}, 0, 0.0
-        for name, v in present.items():
-            m = g.blocks[name].stop - g.blocks[name].start
+        shrunk = np.diag(fit.triangle)  # in units of the variances
+        for (name, v), m in zip(present.items(), products.widths, strict=True):
             part = slice(at, at + m)
             at += m
-            free = m - float(np.trace(fit.inverse[part, part])) / v
+            free = m - float(np.sum(shrunk[part]))
             size = float(fit.coefficients[part] @ fit.coefficients[part])
             factor = np.clip(size / max(v * free, 1e-300), 0.05, 20.0) ** 1.4
             changed[name] = float(np.clip(v * factor, 1e-16, most.get(name, 1e8)))
             moved = max(moved, abs(np.log(changed[name] / v)) * min(1.0, free / 0.01))
-        after = solve(g, changed)
+        after = products.solved(changed)
         if after.deviance > fit.deviance + 1e-6:  # too far: halfway back
             changed = {k: float(np.sqrt(v * present[k])) for k, v in changed.items()}
-            after = solve(g, changed)
+            after = products.solved(changed)
         gained = fit.deviance - after.deviance
         if gained < -0.5:
             break
         present, fit = changed, after
         if moved < SETTLED or abs(gained) < 0.01:
             break
-    return fit
+    return fit.sizes
 
 
 GRID = np.exp(np.linspace(-12.0, 6.0, 19))

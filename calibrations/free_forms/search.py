@@ -107,7 +107,7 @@ def _descent(data: PoseData, white: Array, given: Given, general: bool, catalogu
     state = state_at(data, given, values, ())
     components = [c for c in all_components(data, state) if general or not c.general]
     scales: dict[str, float] = {}
-    noise = {c.name for c in components if c.noise}
+    noise = [c.name for c in components if c.noise]
     floor = float(np.sqrt(np.mean(white**2)))
     variances = dict.fromkeys(noise, (0.1 * floor) ** 2)
     most: dict[str, float] = dict.fromkeys(noise, (SLOW_MOST * floor) ** 2)

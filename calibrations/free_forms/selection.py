@@ -14,7 +14,7 @@ LEAVE = 12.0
 SAME_PLACE = 6.0  # less for a component at a place that acts already: it is another form of one mechanism
 MOST_COMPONENTS = 24
 SPILL = 0.03  # of the misfit that is left: a place that gains less takes up part of what acts elsewhere
-CANCELS = 6.0  # of the squares of the first misfit: more in one component is taken off by others
+CANCELS = 1.5  # of the squares of the first misfit: more in one component is taken off by others
 
 
 def acting_places(names: Iterable[str], by_name: Mapping[str, Component]) -> set[str]:

@@ -177,9 +177,9 @@ def find_structure(
         result, source = _searched(data, white, given, source)
     white = result.white
     result, factor = _in_larger_noise(result, given)
-    acting = [replace(p, size=p.size * factor, largest=p.largest * factor) for p in places(result)]
-    floor = float(np.sqrt(np.mean(white**2)))
-    shape = geometry(result, {p.name: p.size * floor for p in acting}, geometries, has)
+    found = places(result)
+    shape = geometry(result, {place.name: place.curve for place in found}, geometries, has)
+    acting = [replace(p, size=p.size * factor, largest=p.largest * factor) for p in found]
     return Structure(result, tuple(acting), shape, white, source)
 
 

@@ -18,6 +18,7 @@ from calibrations.criteria import CERTAIN_PROBABILITY
 from calibrations.design.expected import Expected, expected_gain, pairs_separated, predict_data, vary_one_way
 from calibrations.design.experiment import MENU, Experiment
 from calibrations.discovery.results import Diagnosis, Discovery
+from calibrations.discovery.structural import without_forms
 from calibrations.effects import Effect
 from calibrations.errors import CalibrationError
 from calibrations.fitting.fit import Fit, refit
@@ -64,7 +65,8 @@ def proposed(result: Answer, effects: Mapping[str, Effect], bench: Bench, bench_
     frees = {a for a, _ in e.separates} & set(found.origin.model.effects)  # a value for each axis, and adds nothing
     if not found.data.foreseeable or frees or not e.separates:
         return replace(result, next_experiment=as_proposed(e, bench, bench_file))
-    return replace(result, next_experiment=chosen(Dispute.of(found.end, e.separates, effects), e, bench, bench_file))
+    dispute = Dispute.of(without_forms(found.end), e.separates, effects)
+    return replace(result, next_experiment=chosen(dispute, e, bench, bench_file))
 
 
 def possible(experiments: Iterable[Experiment], bench: Bench, within_s: float) -> Iterator[Experiment]:

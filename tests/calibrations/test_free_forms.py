@@ -1,6 +1,12 @@
 """Free forms: bases, effects of a model, and the search for places."""
 
+import os
+import subprocess
+import sys
 from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,12 +21,16 @@ from calibrations.free_forms import bases
 from calibrations.free_forms.bases import DEGREE, Harmonics, Line, Play, Products, Spline, Waves, spline
 from calibrations.free_forms.effect import FreeForm, free_form, place_of
 from calibrations.free_forms.form import Form
+from calibrations.free_forms.places import _steps
 from calibrations.free_forms.reml import gram
 from calibrations.geometry.orientation import nominal_pose, specific_force
 from calibrations.loop import dataset
 from calibrations.model.file import dump_model, parse_model, read_model
 from calibrations.table import Array, Table
 from tests.calibrations import synthetic
+from tests.hidden import sampled
+
+ROOT = Path(__file__).parents[2]
 
 
 def poses(added: Array, seed: int = 0) -> Table:
@@ -210,3 +220,55 @@ def test_a_base_column_of_rounding_takes_up_nothing() -> None:
     alone = gram(X[:, [0, 2, 3]], {"curve": slice(0, 1)}, {"curve": 1.0}, 1)
     assert (g.base_rank, g.base_inverse[1, 1]) == (1, 0.0)
     assert g.squares == pytest.approx(alone.squares)
+
+
+def test_an_even_curve_over_the_out_of_plane_axis_leaves_a_misalignment_its_name() -> None:
+    x, y, z = forces_of_sweep().T
+    turned = np.radians([0.75, -1.3, 0.4])
+    added = np.column_stack([turned[2] * y - turned[1] * z + 4e-3 * z**2, turned[0] * z - turned[2] * x])
+    found = discover(poses(added))
+    assert set(found.causes) == {"axis-misalignment", "z-axis-bias"}
+
+
+def test_the_saw_of_a_quantiser_tells_its_step_offset_and_noise() -> None:
+    step, offset, noise = 4e-3, 0.7e-3, 0.6e-3
+    v = np.linspace(0.0, 1.0, 20000, endpoint=False)
+    quantiser = catalogue()["quantisation"]
+    p = SimpleNamespace(step=step, offset=offset, noise=noise)
+    saw = quantiser.output(v, poses(np.zeros((len(forces_of_sweep()), 2))), p) - v  # type: ignore[arg-type]
+    turned = 2 * np.pi * v / step
+    sine, cosine = (float(2 * np.mean(saw * wave(turned))) for wave in (np.sin, np.cos))
+    found = {name: value for name, _, value in _steps(1 / step, sine, cosine)}
+    assert found == pytest.approx({"step": step, "offset": offset, "noise": noise}, rel=1e-2)
+
+
+@pytest.mark.slow
+def test_each_step_lowers_the_error_where_a_sharp_corner_is_hundreds_of_floors() -> None:
+    found = discover(sampled.measured(2, cause=sampled.clipped(3.3, 0.02)))
+    errors = [step.after.pooled_excess for step in found.findings.steps]
+    assert found.findings.steps[0].name == "saturation"
+    assert all(later < 1.02 * earlier for earlier, later in pairwise(errors))
+    assert errors[-1] < 1.5
+
+
+@pytest.mark.slow
+def test_the_hash_seed_of_the_process_changes_no_result() -> None:
+    code = (
+        "from tests.hidden import sampled; from calibrations.loop import discover;"
+        "from calibrations.model.file import read_model;"
+        "found = discover(sampled.measured(1, cause=sampled.lagging_stress(1e-3)), read_model('linear'));"
+        "print(found.causes, repr(found.findings.end.pooled_excess))"
+    )
+    places = {**os.environ, "PYTHONPATH": str(ROOT)}
+    ends = [
+        subprocess.run(
+            [sys.executable, "-c", code],
+            env=places | {"PYTHONHASHSEED": seed},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for seed in ("1", "2", "3")
+    ]
+    assert ends[0] == ends[1] == ends[2]
+    assert "temperature-hysteresis" in ends[0]
