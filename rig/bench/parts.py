@@ -45,7 +45,7 @@ class Instrument(Strict):
 
     driver: str
     url: str
-    unit: int = Field(default=1, ge=1, le=255)  # one byte on the wire; all instruments of a line obey unit 0
+    unit: int = Field(default=1, ge=0, le=255)  # one byte on the wire; `bench.check` refuses 0 on a serial line
     stream_url: str | None = None
     settings: dict[str, Any] = {}
     faults: tuple[Fault, ...] = ()

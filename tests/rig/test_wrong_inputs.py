@@ -70,7 +70,7 @@ BENCHES = {  # the text of the bench file, and the key that the message names
     "misspelt driver": ("instruments: {alpha: {driver: oriental, url: simulated}}", "instruments.alpha.driver"),
     "misspelt key": ("instrument: {}", "key instrument"),
     "no address": ("instruments: {alpha: {driver: oriental_az, url: usb 1}}", "instruments.alpha.url"),
-    "unit of all": (f"instruments: {{alpha: {{{STAGE}, unit: 0}}}}", "instruments.alpha.unit"),
+    "unit below zero": (f"instruments: {{alpha: {{{STAGE}, unit: -1}}}}", "instruments.alpha.unit"),
     "unit above a byte": (f"instruments: {{alpha: {{{STAGE}, unit: 999}}}}", "instruments.alpha.unit"),
     "unit as a word": (f"instruments: {{alpha: {{{STAGE}, unit: one}}}}", "instruments.alpha.unit"),
     "one unit twice": (f"instruments: {{alpha: {{{STAGE}}}, beta: {{{STAGE}}}}}", "instruments.beta.unit"),
