@@ -1,11 +1,12 @@
 # make demo: the whole story on the simulated rig.   make test: what is checked before a commit, in minutes.
 # make test-all: the long statistics, kills, browser and fuzzing as well: everything that CI checks.
+# make docs: the documentation site, into out/docs/index.html; its notebooks are executed when they have changed.
 # make audit: known weaknesses of the pinned dependencies; needs the network, so it is no part of make test.
 # Strict: an index that knows no weaknesses is no reason to find none.
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test test-all setup bench lint audit clean
+.PHONY: demo test test-all setup bench docs lint audit clean
 
 demo: setup
 	$(BIN)/rig demo --folder out/demo
@@ -24,6 +25,9 @@ lint: setup
 	$(BIN)/lint-imports --no-cache
 	$(BIN)/pytest -m "not slow" tests/docs
 
+docs: setup
+	$(BIN)/python -m sphinx -W --keep-going -q -b html docs out/docs
+
 bench: setup
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[bench]'
 	$(BIN)/python -m tests.benchmark
@@ -39,7 +43,7 @@ setup: .venv/ready
 # The stamp is newer than what it was made from, so that a second call starts at once.
 .venv/ready: pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test,fleet]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test,fleet,docs]'
 	for tool in mbpoll gcc clang chromium; do [ "$$(id -u)" != 0 ] || command -v $$tool >/dev/null || { apt-get -qq update && apt-get -qq install -y $$tool || true; }; done
 	command -v chromium >/dev/null || $(BIN)/python -m playwright install chromium || true
 	$(BIN)/python -m rig.warm
