@@ -192,6 +192,83 @@ class Positioner(Protocol):
     def stop(self) -> None: ...
 
 
+class NoiseAtRest(Protocol):
+    """The noise of a sensor at rest."""
+
+    @property
+    def rate_hz(self) -> float: ...
+
+
+class Stillness(Protocol):
+    """The test of a window: `noise` is its standard deviation over that at rest, `by` the test with the largest
+    ratio.
+    """
+
+    @property
+    def still(self) -> bool: ...
+    @property
+    def by(self) -> str: ...
+    @property
+    def noise(self) -> float: ...
+
+
+class HandCourse(Protocol):
+    """The positions so far of a sensor in a hand, and the orientation that it needs next. Directions are unit vectors
+    upward in the sensor's frame.
+    """
+
+    @property
+    def count(self) -> int: ...
+    @property
+    def ups(self) -> NDArray[np.float64]:
+        """Directions of the positions, shape (n, 3)."""
+
+    @property
+    def up(self) -> tuple[float, float, float]:
+        """The orientation that tells most."""
+
+    @property
+    def words(self) -> str:
+        """The same in words."""
+
+    @property
+    def turn(self) -> str:
+        """How to turn the sensor there; empty if that is not known."""
+
+    @property
+    def uncertainty_g(self) -> tuple[float, str]:
+        """The largest standard uncertainty as an error at 1 g, and its parameter."""
+
+    def is_new(self, mean: NDArray[np.float64]) -> bool:
+        """Whether a rest with this mean (3,) is worth taking."""
+
+
+class HandAnalysis(Protocol):
+    """The analysis behind positions by hand: the test of rest, and the choice of orientations."""
+
+    def learn(self, windows: Sequence[NDArray[np.float64]], rate_hz: float) -> NoiseAtRest | None:
+        """The noise from windows at rest, each (n, 3); None if they are too few or differ."""
+
+    def judge(self, rest: Sequence[NDArray[np.float64]], noise: NoiseAtRest) -> Stillness:
+        """The test of the last of successive windows, each (n, 3)."""
+
+    def course(self, dwells: Sequence[Dwell], noise: NoiseAtRest) -> HandCourse: ...
+
+
+@dataclass(frozen=True)
+class Guidance:
+    """What a person with a sensor in the hand does next. Nobody answers it: the program sees when it is done.
+
+    `up` is the direction that shall be upward in the sensor's frame. `taken`: directions of the positions so far.
+    `moves`: whether the sensor shall be turned.
+    """
+
+    text: str
+    up: tuple[float, float, float]
+    taken: tuple[tuple[float, ...], ...] = ()
+    moves: bool = True
+
+
 class Clock(Protocol):
     """The only way to wait."""
 
@@ -224,6 +301,9 @@ class Host(Protocol):
     def doing(self, text: str) -> None:
         """Report the present step to the observer."""
 
+    def guide(self, guidance: Guidance) -> None:
+        """Tell the person with the sensor in the hand what to do next."""
+
 
 def never(dwells: Sequence[Dwell], oven_c: float) -> bool:  # noqa: ARG001
     """`steady` of a plan: False, so the plan shows the longest run."""
@@ -235,6 +315,7 @@ class Session:
     """The bench for a procedure.
 
     `steady` decides whether bias and scale factor of the dwells are steady, in an oven at some C (0: no oven).
+    `by_hand` is the analysis behind positions of a sensor in a hand.
     """
 
     alpha: Stage
@@ -247,6 +328,7 @@ class Session:
     host: Host
     limits: Limits = Limits()
     steady: Callable[[Sequence[Dwell], float], bool] = never
+    by_hand: HandAnalysis | None = None
 
     def missing(self, poses: Iterable[Pose]) -> Iterator[Pose]:
         """The `poses` that are not in the record yet, in order. A pose that occurs twice is measured twice.

@@ -146,6 +146,14 @@ def exchange_design(rows: Array, poses: int, criterion: Criterion, seed: int = 0
     return min(designs, key=lambda chosen: criterion.loss(_covariance(rows[chosen])))
 
 
+def information_gain(measured: Array, candidates: Array, criterion: Criterion) -> Array:
+    """How much each of the scaled `candidates` (candidates, axes, p) adds to the rows `measured` (n, axes, p).
+
+    Shape (candidates,). With few rows measured, or none, a small ridge makes the information solvable.
+    """
+    return criterion.gain(_covariance(measured), candidates)
+
+
 def choose_repeats(rows: Array, chosen: Chosen, more: int, criterion: Criterion) -> Chosen:
     """Which of `chosen` to measure once more, each at most once: those that help most, one after another; (more,)."""
     left, taken = [int(k) for k in np.unique(chosen)], list[int]()

@@ -16,6 +16,7 @@ from pydantic import BaseModel, ValidationError
 
 from calibrations.table import gravity_fault
 from drivers.errors import LinkRefused, did_you_mean
+from drivers.handheld.world import handheld
 from drivers.manual_stage.person import PERSON
 from drivers.transport.address import Url
 from drivers.transport.faults import Fault, kinds_of
@@ -204,7 +205,10 @@ def _check_faults(key: str, instrument: Instrument) -> None:
 def _check_worlds(bench: Bench, path: Path) -> None:
     key = f"{path}, key world"
     try:
-        config = WorldConfig.from_mapping(bench.world)
+        settings, held = handheld(bench.world)
+        config = WorldConfig.from_mapping(settings)
+        if held is not None and bench.sensors:
+            raise BenchError(f"{key}: a hand holds one sensor; remove `hand` and `triad`, or the batch in `sensors`")
         for name, sensor in bench.sensors.items():
             key = f"{path}, key sensors.{name}.world"
             with_own(config, name, sensor.world)

@@ -20,6 +20,7 @@ from rig.errors import BenchError
 
 CURVE = "its keys are serial, date, near and far"
 DEFAULT = Path(__file__).with_name("default.yaml")
+HAND = DEFAULT.with_name("hand.yaml")  # a sensor in a hand
 DEMO = DEFAULT.with_name("demo.yaml")  # of `rig demo`
 
 

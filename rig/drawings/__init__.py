@@ -3,11 +3,13 @@
 attitude    the four numbers, and where the sensor's axes point
 page        the whole drawing as SVG: the rig, the tilt of alpha, the table of beta, what the sensor feels
 sketch      the table of beta in a terminal, as braille
+orientation_map    the orientations of a sensor in a hand, in a terminal
 named       which drawing belongs to a question
 """
 
 from rig.drawings.attitude import Attitude, drawing_of
+from rig.drawings.orientation_map import orientation_map
 from rig.drawings.page import page
 from rig.drawings.sketch import sketch
 
-__all__ = ["Attitude", "drawing_of", "page", "sketch"]
+__all__ = ["Attitude", "drawing_of", "orientation_map", "page", "sketch"]

@@ -25,6 +25,7 @@ from procedures.questions import Dial
 from procedures.session import Dwell, Host, Session
 from rig.bench import ROLES, Bench
 from rig.errors import InstrumentFailed
+from rig.instruments.by_hand import HandAnalysis
 from rig.instruments.guard import NOW_AND_THEN_S, GuardedClock, Look
 from rig.instruments.wiring import Wiring, wired
 
@@ -91,7 +92,9 @@ class Rig:
         """The session of a procedure. From now on `host` answers the questions to the person at the rig."""
         self.person.attended_by = Technician(host)
         parts: dict[str, Any] = {role: self.drivers.get(role) or absent(role) for role in ROLES}
-        return Session(**parts, clock=self.clock, host=host, limits=self.bench.limits, steady=_at_rest)
+        return Session(
+            **parts, clock=self.clock, host=host, limits=self.bench.limits, steady=_at_rest, by_hand=HandAnalysis()
+        )
 
     def read_deg(self) -> dict[str, float]:
         """The last readings of the dials of manual stages, by role."""

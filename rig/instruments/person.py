@@ -7,10 +7,12 @@ from __future__ import annotations
 
 from functools import singledispatch
 
+from drivers.handheld.world import HandheldWorld
 from drivers.manual_stage.twin import Hand
 from drivers.world.batch import Batch
 from drivers.world.world import World
 from procedures.questions import Choice, Confirm, Dial, Mounting, Number, PowerCycle, Question, Remount
+from procedures.session import Guidance
 from rig.instruments.instruments import Rig
 
 
@@ -20,6 +22,13 @@ def answer(question: Question, rig: Rig) -> str | None:
         return None
     rig.world.advance(max(rig.clock.now(), rig.world.now_s))
     return _done(question, rig, rig.world)
+
+
+def follow(guidance: Guidance, rig: Rig) -> None:
+    """Let the simulated hand begin with what it is told. There is none on a bench with a real instrument."""
+    if isinstance(rig.world, HandheldWorld) and rig.bench.simulated and guidance.moves:
+        rig.world.advance(max(rig.clock.now(), rig.world.now_s))
+        rig.world.turn_by_hand(guidance.up)
 
 
 @singledispatch

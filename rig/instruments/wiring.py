@@ -17,6 +17,7 @@ from typing import cast
 
 from drivers.clock import Clock, SimulatedClock, WallClock, serve_forever
 from drivers.errors import LinkRefused
+from drivers.handheld.world import HandheldWorld, handheld
 from drivers.instrument import Instrument as Driver
 from drivers.manual_stage.person import PERSON
 from drivers.transport import Address, Links
@@ -84,8 +85,11 @@ def wired(bench: Bench, tap: Tap | None = None) -> Iterator[Wiring]:
 
 
 def world_of(bench: Bench) -> World | Batch:
-    """The simulated world of the bench file, with every sensor of a batch."""
-    config = WorldConfig.from_mapping(bench.world)
+    """The simulated world of the bench file, with every sensor of a batch, or with a sensor in a hand."""
+    settings, held = handheld(bench.world)
+    config = WorldConfig.from_mapping(settings)
+    if held is not None:
+        return HandheldWorld(config, bench.seed, held)
     if not bench.sensors:
         return World(config, bench.seed)
     return Batch(config, bench.seed, {name: sensor.world for name, sensor in bench.sensors.items()})

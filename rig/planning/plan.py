@@ -20,11 +20,11 @@ from calibrations.errors import DataError
 from calibrations.geometry.error_table import ErrorTable
 from procedures.catalogue import Procedure
 from procedures.questions import Dial, Question
-from procedures.session import Dwell, Pose, Samples, Session
+from procedures.session import Dwell, Guidance, Pose, Samples, Session
 from rig.bench import ROLES, SIMULATED, TURNING, Bench
 from rig.errors import BenchError
 from rig.instruments.instruments import Rig, absent, connected
-from rig.instruments.person import answer
+from rig.instruments.person import answer, follow
 from rig.planning.planned import (
     Held,
     Ledger,
@@ -51,6 +51,8 @@ class RecordedTwin:
 
     def __getattr__(self, what: str) -> Any:
         count, act = getattr(self._planned, what), getattr(self._twin, what)
+        if what == "only":
+            return lambda *outputs: RecordedTwin(count(*outputs), act(*outputs))
 
         def both(*arguments: Any, **named: Any) -> Any:
             counted = count(*arguments, **named)
@@ -78,6 +80,9 @@ class RehearsalHost(PlanHost):
         self.ledger.held.append(Held(self.ledger.now_s, pose))  # the clock of the twins differs
         kept = Kept(pose, samples, samples.start_s, temperature_c)
         self.dwells.append(of_sensor(kept, self.rig.bench.first_sensor).dwell)
+
+    def guide(self, guidance: Guidance) -> None:
+        follow(guidance, self.rig)
 
     def ask(self, question: Question) -> str:
         done = answer(question, self.rig)

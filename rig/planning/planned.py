@@ -17,7 +17,7 @@ from drivers.instrument import OUTSIDE_ANGLE, OUTSIDE_POSITION, OUTSIDE_TEMPERAT
 from drivers.labjack_t7.driver import Settings as AdcSettings
 from drivers.omega_cn7500.driver import Settings as OvenSettings
 from procedures.questions import Choice, Number, Question
-from procedures.session import MOST_POSES, SHORTEST_APPROACH_DEG, Dwell, Pose, Reading, Samples
+from procedures.session import MOST_POSES, SHORTEST_APPROACH_DEG, Dwell, Guidance, Pose, Reading, Samples
 from rig.bench import Bench
 from rig.errors import PlanError
 from rig.record.values import Block
@@ -291,6 +291,9 @@ class PlanHost:
         return planned_answer(question)
 
     def doing(self, text: str) -> None:
+        """The steps of the plan are enough."""
+
+    def guide(self, guidance: Guidance) -> None:
         """The steps of the plan are enough."""
 
 

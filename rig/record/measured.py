@@ -26,20 +26,23 @@ from rig.record.values import CHANGED, Block, Kept, Run
 
 # The table of a magnetometer or a gyroscope.
 #
-# positions   a magnetometer: a row is the mean at one position; its attitude is not used; the field must be constant
+# positions   a magnetometer or an accelerometer: a row is the mean at one position; its attitude is not used; the field
+#             must be constant
 # rates       a gyroscope: a row is the mean of one turn or rest; the rate of the stage is positive by the right hand
 #             about the axis along the table's normal, so it is negative while beta rises
 #
 # Further columns of rates, from stages and mount: the axis of the turn in the sensor's frame (axis_x .. axis_z) and the
 # specific force in g (ax .. az).
 
-FIELD, RATE = ("mx", "my", "mz"), ("gx", "gy", "gz")
+FIELD, RATE, FORCE = ("mx", "my", "mz"), ("gx", "gy", "gz"), ("ax", "ay", "az")
 NOT_OF_THESE = ("filter_corner_hz", "approach_deg")  # constants of poses only
 
 
 def positions_table(run: Run, poses: Iterable[Kept]) -> Table:
-    """A row for each position of a magnetometer. Raises RecordError without one."""
-    return _table(run, list(poses), FIELD, {})
+    """A row for each position of a magnetometer or an accelerometer. Raises RecordError without one."""
+    kept = list(poses)
+    outputs = FORCE if kept and FORCE[0] in kept[0].dwell.means else FIELD
+    return _table(run, kept, outputs, {})
 
 
 def rates_table(run: Run, poses: Iterable[Kept]) -> Table:

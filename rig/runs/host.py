@@ -7,10 +7,10 @@ from datetime import UTC, datetime
 from typing import Any
 
 from procedures.questions import Question
-from procedures.session import Dwell, Pose, Reading, Samples
+from procedures.session import Dwell, Guidance, Pose, Reading, Samples
 from rig.errors import RunMismatch
 from rig.instruments.instruments import Rig
-from rig.instruments.person import answer
+from rig.instruments.person import answer, follow
 from rig.record import Kept, Record, Run
 from rig.record.measured import Measured, of_sensor
 from rig.runs.observer import Observer
@@ -105,6 +105,11 @@ class RunHost:
     def doing(self, text: str) -> None:
         self._log("doing", text)
         self._observer.doing(text)
+
+    def guide(self, guidance: Guidance) -> None:
+        self._log("guided", guidance.text)
+        follow(guidance, self._rig)
+        self._observer.guide(guidance)
 
     def _log(self, what: str, text: str) -> None:
         self._record.log(self._run, self._rig.clock.now(), "run", what, text)

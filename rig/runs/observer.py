@@ -18,7 +18,7 @@ from calibrations.analyses.forecast import Forecast
 from calibrations.text import duration
 from procedures.level_check import reversal
 from procedures.questions import Question
-from procedures.session import Limits, Reading
+from procedures.session import Guidance, Limits, Reading
 from rig.bench import Bench
 from rig.planning.plan import Plan
 from rig.record import Kept, Run
@@ -36,7 +36,8 @@ class RunView:
 
     `usual_v`: usual scatter of dwells of this kind, by channel. `tilt`: readings of the level by name, deg. `foreseen`:
     forecast of bias and scale factor in a soak. `so_far`: estimates from the poses so far, in other runs. `range_v`:
-    range of the converter. `simulated`: the rig's time is simulated.
+    range of the converter. `simulated`: the rig's time is simulated. `guidance`: what a person with the sensor in the
+    hand does next.
     """
 
     title: str
@@ -50,6 +51,7 @@ class RunView:
     tilt: Mapping[str, float] = field(default_factory=dict)
     foreseen: Mapping[str, Forecast] = field(default_factory=dict)
     so_far: Mapping[str, str] = field(default_factory=dict)
+    guidance: Guidance | None = None
 
     @property
     def count(self) -> str:
@@ -107,6 +109,10 @@ class RunViewer:
 
     def doing(self, text: str) -> None:
         self.view = replace(self.view, now=text)
+
+    def guide(self, guidance: Guidance) -> None:
+        """What a person with the sensor in the hand does next."""
+        self.view = replace(self.view, now=guidance.text, guidance=guidance)
 
     def expect(self, total: int, done: int) -> None:
         self.view = replace(self.view, progress=self.view.progress.expect(total, done))
@@ -183,6 +189,9 @@ class Observer(Protocol):
 
     def begun(self, run: str) -> None: ...
     def doing(self, text: str) -> None: ...
+    def guide(self, guidance: Guidance) -> None:
+        """What a person with the sensor in the hand does next; a sound marks the position that was taken."""
+
     def expect(self, total: int, done: int) -> None: ...
     def kept(self, kept: Kept) -> None: ...
     def read(self, reading: Reading) -> None: ...

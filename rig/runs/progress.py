@@ -98,7 +98,12 @@ def _rate_and_force(pose: Pose) -> Array:
 
 
 def _levelled(dwell: Dwell) -> Iterator[Row]:
-    """The two horizontal axes of a magnetometer, for hard iron and the square of the circle of this turn."""
+    """The two horizontal axes of a magnetometer, for hard iron and the square of the circle of this turn.
+
+    Positions by hand have no such turns, and no rows.
+    """
+    if "mx" not in dwell.means:
+        return
     pose, m = dwell.pose, np.array([dwell.means[f"m{axis}"] for axis in AXES])
     level = np.array([axis != pose.up for axis in AXES], dtype=float)
     turns = np.zeros(2 * len(EDGES))

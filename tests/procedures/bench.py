@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 
 from calibrations.table import Table
+from drivers.handheld.world import HandheldWorld
 from drivers.world.stage import Trajectory
 from drivers.world.world import World
 from procedures.questions import Mounting, Question
-from procedures.session import Dwell, Limits, Pose, Reading, Samples, Session
+from procedures.session import Dwell, Guidance, Limits, Pose, Reading, Samples, Session
 from rig.planning.planned import PlannedTurn
 from rig.record.values import Block, Kept
 
@@ -134,6 +135,7 @@ class Book:
     blocks: list[Kept] = field(default_factory=list)
     read: list[Reading] = field(default_factory=list)
     asked: list[str] = field(default_factory=list)
+    guided: list[Guidance] = field(default_factory=list)
 
     def kept(self) -> Sequence[Pose]:
         return [dwell.pose for dwell in self.dwells]
@@ -162,6 +164,12 @@ class Book:
         return question.checked("yes")
 
     def doing(self, text: str) -> None: ...
+
+    def guide(self, guidance: Guidance) -> None:
+        """A world with a hand follows."""
+        self.guided.append(guidance)
+        if isinstance(self.world, HandheldWorld) and guidance.moves:
+            self.world.turn_by_hand(guidance.up)
 
     def table(self) -> Table:
         """What was kept, as the table that analysis takes."""

@@ -10,6 +10,7 @@ import pytest
 from procedures.catalogue import find, paths
 from procedures.settings import parse
 from rig.bench import read_bench
+from rig.bench.file import HAND
 from rig.planning.plan import plan
 
 NAMES = list(paths())
@@ -32,10 +33,11 @@ def test_its_settings_have_types_units_and_defaults(name: str) -> None:
         assert kind in (float, int, bool, str) or get_origin(kind) in (tuple, Literal)
         assert parse(procedure, {setting: json.loads(json.dumps(default))})[setting] == default
         if kind is float:
-            assert setting.rpartition("_")[2] in ("deg", "s", "c", "hz", "v", "um")
+            assert setting.rpartition("_")[2] in ("deg", "s", "c", "hz", "v", "um", "g")
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_it_can_be_planned_on_the_simulated_rig(name: str) -> None:
     procedure = find(name)
-    assert plan(read_bench(), procedure, parse(procedure, {})).duration_s > 0
+    bench = read_bench(HAND if name == "hand-positions" else None)
+    assert plan(bench, procedure, parse(procedure, {})).duration_s > 0

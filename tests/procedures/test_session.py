@@ -72,6 +72,8 @@ class Book:
         self.said.append(question.text)
         return question.checked(self.answers[question.name])
 
+    def guide(self, guidance: object) -> None: ...
+
     def doing(self, text: str) -> None:
         self.said.append(text)
 

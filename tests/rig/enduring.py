@@ -13,7 +13,6 @@ import numpy as np
 
 from drivers.errors import DriverError
 from drivers.transport.faults import Fault, kinds_of
-from procedures.catalogue import paths
 from procedures.errors import ProcedureError
 from procedures.session import Reading
 from rig.bench import Bench
@@ -30,10 +29,10 @@ from tests.rig.misbehaving import (
     short,
     watched_bench,
 )
-from tests.rig.rigging import Onlooker
+from tests.rig.rigging import ON_STAGES, Onlooker
 
 End = Literal["complete", "stopped", "not begun"]
-PROCEDURES = sorted(paths())
+PROCEDURES = ON_STAGES
 BENCH = watched_bench()
 FAULTS = [(role, what) for role, part in BENCH.instruments.items() for what in kinds_of(part.driver)]
 NEEDS_A_GUARD = {"open-interlock"}  # felt only by a bench that has interlocks

@@ -13,9 +13,9 @@ from typing import Any
 
 from sqlalchemy import Engine, event
 
-from procedures.catalogue import find
+from procedures.catalogue import find, paths
 from procedures.questions import Question
-from procedures.session import Reading
+from procedures.session import Guidance, Reading
 from procedures.settings import parse
 from rig.planning.plan import Plan
 from rig.record import Kept
@@ -24,6 +24,7 @@ from rig.runs.runner import Decision, Outcome
 SMALL = {"step_deg": "90", "dwell_s": "0.2", "inclinations_deg": "90,45"}
 SMALL_ARGUMENTS = ("--step-deg", "90", "--dwell-s", "0.2", "--inclinations-deg", "90,45")
 POSES = 20  # of the small sweep
+ON_STAGES = sorted(set(paths()) - {"hand-positions"})  # what the simulated rig can run
 
 
 def small_sweep() -> tuple[Any, dict[str, Any]]:
@@ -55,6 +56,9 @@ class Onlooker:
 
     def doing(self, text: str) -> None:
         self.said.append(text)
+
+    def guide(self, guidance: Guidance) -> None:
+        self.said.append(guidance.text)
 
     def expect(self, total: int, done: int) -> None:
         self.expected.append((total, done))

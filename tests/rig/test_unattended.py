@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from drivers.world.world import World
-from procedures.catalogue import find, paths
+from procedures.catalogue import find
 from procedures.errors import NoAnswer, SafetyLimit
 from procedures.questions import Question
 from procedures.settings import parse
@@ -18,11 +18,11 @@ from rig.instruments.instruments import Rig
 from rig.planning.plan import plan
 from rig.record import Record
 from rig.runs.runner import Outcome, resume, start
-from tests.rig.rigging import Onlooker, small_sweep
+from tests.rig.rigging import ON_STAGES, Onlooker, small_sweep
 
 pytestmark = pytest.mark.sockets
 
-ASKING = [name for name in paths() if plan(read_bench(), find(name), parse(find(name), {})).asked]
+ASKING = [name for name in ON_STAGES if plan(read_bench(), find(name), parse(find(name), {})).asked]
 
 
 def bench_without_level() -> Bench:
@@ -63,7 +63,7 @@ def test_a_question_stops_every_procedure_that_has_one(name: str, deserted: list
     stops_and_says(outcome, deserted)
 
 
-@pytest.mark.parametrize("name", sorted(set(paths()) - set(ASKING)))
+@pytest.mark.parametrize("name", sorted(set(ON_STAGES) - set(ASKING)))
 def test_a_level_that_must_be_read_by_a_person_stops_the_others(name: str, deserted: list[str]) -> None:
     procedure = find(name)
     with Record() as record:

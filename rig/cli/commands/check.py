@@ -12,6 +12,7 @@ from calibrations.text import columns
 from drivers.instrument import Check, Identity
 from rig.bench import DEFAULT, read_bench
 from rig.bench.certificates import EXPIRED, certificates, expired
+from rig.bench.file import HAND
 from rig.cli.terminal.output import bench_option, emit, json_option, notes
 from rig.instruments.instruments import checked
 
@@ -21,14 +22,17 @@ NOT_MET, FAILED = 1, 3
 @click.command("check")
 @bench_option
 @click.option("--example", is_flag=True, help="Print the bench file of the simulated rig, as a start for your own.")
+@click.option(
+    "--example-hand", is_flag=True, help="Print the bench file of a simulated sensor in a hand, without stages."
+)
 @json_option
-def command(bench_file: Path | None, example: bool, as_json: bool) -> int:
+def command(bench_file: Path | None, example: bool, example_hand: bool, as_json: bool) -> int:
     """Connect to every instrument of the bench, identify it and run its self-test.
 
     Exit status 1: an instrument's certificate has expired. 3: an instrument does not answer, or fails its self-test.
     """
-    if example:
-        click.echo(DEFAULT.read_text(encoding="utf-8"), nl=False)
+    if example or example_hand:
+        click.echo((HAND if example_hand else DEFAULT).read_text(encoding="utf-8"), nl=False)
         return 0
     bench = read_bench(bench_file)
     found, due = checked(bench), certificates(bench)

@@ -12,7 +12,7 @@ from rig.cli.terminal.output import emit, json_option, note
 
 if TYPE_CHECKING:
     from procedures.questions import Question
-    from procedures.session import Reading
+    from procedures.session import Guidance, Reading
     from rig.bench import Bench
     from rig.cli.terminal.progress import Progress
     from rig.planning.plan import Plan
@@ -109,6 +109,9 @@ class _Watch:
 
     def doing(self, text: str) -> None:
         """Not shown."""
+
+    def guide(self, guidance: Guidance) -> None:
+        """No sensor is in a hand."""
 
     def expect(self, total: int, done: int) -> None:
         self._total, self._done = max(total, 1), done

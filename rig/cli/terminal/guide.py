@@ -17,7 +17,7 @@ from rich.text import Text
 from procedures.catalogue import Procedure
 from procedures.errors import BadAnswer, Declined, NoAnswer
 from procedures.questions import Choice, Question
-from procedures.session import Reading
+from procedures.session import Guidance, Reading
 from rig.bench import Bench
 from rig.cli.terminal.screen import before, drawn, screen
 from rig.drawings import Attitude, drawing_of, page
@@ -59,7 +59,8 @@ class Guide:
         """Show the plan on one screen; raises Declined if the person cancels it."""
         self._viewer.planned(plan)
         self._console.print(before(plan, self._procedure, self._bench, free_bytes(home()), datetime.now(UTC).date()))
-        self._draw(mounting(plan), "mounting")
+        if plan.reach:  # without stages there is no mounting
+            self._draw(mounting(plan), "mounting")
         if self.ask(BEGIN, "go") == "cancel":
             raise Declined("cancelled before the start; nothing moved and nothing was recorded")
 
@@ -70,6 +71,15 @@ class Guide:
 
     def doing(self, text: str) -> None:
         self._viewer.doing(text)
+
+    def guide(self, guidance: Guidance) -> None:
+        """Show the next orientation. A sound and a tick mark a position that was taken: the person looks elsewhere."""
+        before = self._viewer.view.guidance
+        self._viewer.guide(guidance)
+        if before is not None and len(guidance.taken) > len(before.taken):
+            self._console.bell()
+            self._console.print(f"✓ position {len(guidance.taken)} taken", style="green", highlight=False)
+        self._console.print(guidance.text, style="bold", highlight=False)
 
     def expect(self, total: int, done: int) -> None:
         self._viewer.expect(total, done)

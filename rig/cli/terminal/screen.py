@@ -19,7 +19,7 @@ from calibrations.text import duration, size
 from procedures.catalogue import Procedure
 from rig.bench import Bench
 from rig.bench.certificates import expired
-from rig.drawings import Attitude, sketch
+from rig.drawings import Attitude, orientation_map, sketch
 from rig.planning.plan import Plan, stretches
 from rig.planning.preparation import checks, stops
 from rig.runs.observer import RunView, Value, nearness, values
@@ -47,8 +47,16 @@ def screen(view: RunView, now_s: float) -> RenderableType:
     shown = Table.grid(padding=(0, 2))
     for row in _rows(view):
         shown.add_row(*row)
-    body = Group(_heading(view, now_s), ProgressBar(max(view.progress.total, 1), view.progress.done), Text(), shown)
-    return Panel(body, title=view.title, subtitle="Ctrl-C stops the stages", title_align="left", subtitle_align="right")
+    body: list[RenderableType] = [
+        _heading(view, now_s),
+        ProgressBar(max(view.progress.total, 1), view.progress.done),
+        Text(),
+        shown,
+    ]
+    if view.guidance is not None:
+        body.insert(3, Text("\n".join([*orientation_map(view.guidance), ""])))
+    subtitle = "Ctrl-C stops the stages" if view.guidance is None else "Ctrl-C ends; later: rig resume"
+    return Panel(Group(*body), title=view.title, subtitle=subtitle, title_align="left", subtitle_align="right")
 
 
 def _heading(view: RunView, now_s: float) -> Table:

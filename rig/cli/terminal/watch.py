@@ -13,7 +13,7 @@ from calibrations.files import read_mapping
 from procedures.catalogue import Procedure
 from procedures.errors import BadAnswer, NoAnswer
 from procedures.questions import Question
-from procedures.session import Reading
+from procedures.session import Guidance, Reading
 from rig.bench import Bench
 from rig.bench.certificates import EXPIRED
 from rig.cli.terminal.output import emit, note, notes
@@ -48,6 +48,10 @@ class Quiet:
 
     def doing(self, text: str) -> None:
         """Not shown."""
+
+    def guide(self, guidance: Guidance) -> None:
+        """Print what a person with the sensor in the hand does next."""
+        note(guidance.text)
 
     def expect(self, total: int, done: int) -> None:
         note(f"{total - done} of {total} poses remain")

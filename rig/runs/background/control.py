@@ -17,7 +17,7 @@ from types import TracebackType
 from typing import ParamSpec, Self
 
 from procedures.questions import Question
-from procedures.session import Reading
+from procedures.session import Guidance, Reading
 from rig.bench import Bench
 from rig.errors import Busy, RigError
 from rig.files import home
@@ -84,6 +84,10 @@ class PublishingObserver:
     def doing(self, text: str) -> None:
         self._observer.doing(text)
         self._publish(self._writer.doing, text)
+
+    def guide(self, guidance: Guidance) -> None:
+        self._observer.guide(guidance)
+        self._publish(self._writer.guide, guidance)
 
     def expect(self, total: int, done: int) -> None:
         self._observer.expect(total, done)

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from procedures.questions import Choice, Confirm, Question
-from procedures.session import Reading
+from procedures.session import Guidance, Reading
 from rig.bench import Bench, read_bench
 from rig.drawings import drawing_of
 from rig.files import home, write_whole
@@ -209,6 +209,10 @@ class StatusWriter:
 
     def doing(self, text: str) -> None:
         self._viewer.doing(text)
+        self.publish()
+
+    def guide(self, guidance: Guidance) -> None:
+        self._viewer.guide(guidance)
         self.publish()
 
     def expect(self, total: int, done: int) -> None:

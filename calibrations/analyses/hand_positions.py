@@ -1,0 +1,132 @@
+"""Calibration by hand as it goes on: which orientations are there, which one is next, and when the positions suffice.
+
+The positions suffice when the standard uncertainty of every parameter, as an error at full scale (1 g), is at most the
+wanted one. It comes from a fit to the positions so far. A fit that misses more than the noise is less certain, so a
+slipped or shaken position costs more positions.
+
+Source  Tedaldi, Pretto and Menegatti, ICRA 2014: calibration of a triad from positions of unknown orientation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from calibrations.analyses.stillness import NoiseAtRest
+from calibrations.design.orientations import (
+    KNOWN_AFTER,
+    Next,
+    directions_up,
+    is_other_side,
+    is_worth,
+    next_orientation,
+)
+from calibrations.effects.catalogue import catalogue
+from calibrations.fitting.fit import Fit, fit
+from calibrations.model.file import read_model
+from calibrations.table import AXES, Array, Table
+
+FEWEST = 12  # nine parameters, and three positions that check them
+MODEL, ANGLES = "linear", "axis-nonorthogonality"
+
+
+@dataclass(frozen=True)
+class HandPosition:
+    """The mean (3,) of a position, the standard deviation (3,) and number of its samples, and the `told` direction."""
+
+    mean: Array
+    std: Array
+    n: int
+    told: Array
+    t_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class HandCourse:
+    """The positions so far. `noise` is that of the sensor at rest."""
+
+    positions: tuple[HandPosition, ...]
+    noise: NoiseAtRest
+
+    @property
+    def count(self) -> int:
+        """Number of positions."""
+        return len(self.positions)
+
+    @property
+    def up(self) -> tuple[float, float, float]:
+        """The direction upward of the orientation that tells most."""
+        x, y, z = (float(part) for part in self.next.up)
+        return x, y, z
+
+    @property
+    def words(self) -> str:
+        """The orientation that tells most, in words."""
+        return self.next.words
+
+    @property
+    def turn(self) -> str:
+        """How to turn the sensor there from its last position; empty if that is not known."""
+        return self.next.turn
+
+    @property
+    def outputs(self) -> Array:
+        """Means of the positions, shape (n, 3)."""
+        return np.array([p.mean for p in self.positions]).reshape(-1, 3)
+
+    @cached_property
+    def ups(self) -> Array:
+        """Directions upward of the positions, unit vectors (n, 3)."""
+        return directions_up(self.outputs, np.array([p.told for p in self.positions]).reshape(-1, 3))
+
+    @cached_property
+    def next(self) -> Next:
+        """The orientation that tells most."""
+        return next_orientation(self.ups, self.ups[-1] if len(self.ups) else None)
+
+    def is_new(self, mean: Array) -> bool:
+        """Whether a rest with this mean (3,) is worth taking."""
+        if len(self.positions) < KNOWN_AFTER - 1:
+            return is_other_side(mean, self.outputs, float(self.noise.std.max()))
+        up = directions_up(np.vstack([self.outputs, mean]), np.vstack([self.ups, self.next.up]))[-1]
+        return is_worth(up, self.next.up, self.ups)
+
+    @cached_property
+    def uncertainty_g(self) -> tuple[float, str]:
+        """The largest standard uncertainty of a parameter as an error at 1 g, in g, and the parameter's key.
+
+        Infinite with fewer than FEWEST positions.
+        """
+        if len(self.positions) < FEWEST:
+            return np.inf, ""
+        return largest_uncertainty_g(fit_positions(hand_table(self.positions, self.noise)))
+
+
+def hand_table(positions: Sequence[HandPosition], noise: NoiseAtRest) -> Table:
+    """The table of positions. The noise of a mean is that of the blocks of a window, which a filter does not hide."""
+    means, count = np.array([p.mean for p in positions]), np.array([float(p.n) for p in positions])
+    blocks = np.maximum(1.0, count / max(1, round(noise.rate_hz * 0.05)))
+    columns = {f"a{axis}": means[:, k] for k, axis in enumerate(AXES)}
+    columns |= {f"a{axis}_std": np.full(len(means), np.sqrt(noise.sway[k])) for k, axis in enumerate(AXES)}
+    return Table.from_columns("positions", {**columns, "n": blocks}, {}, "positions by hand")
+
+
+def fit_positions(table: Table) -> Fit:
+    """Bias, scale factor and angles between the axes from a table of positions. Raises as `fit`."""
+    return fit(read_model(MODEL).with_effect(catalogue()[ANGLES]), table)
+
+
+def largest_uncertainty_g(found: Fit) -> tuple[float, str]:
+    """The largest standard uncertainty of a parameter as an error at 1 g, in g, and its key."""
+    scale = {e.axis: abs(e.value) for e in found.model.estimates("scale-factor")}
+    errors: dict[str, float] = {}
+    for key, estimate in found.params.items():
+        if estimate.std is None or not estimate.identified:
+            return np.inf, key
+        is_angle = key.startswith(ANGLES)
+        errors[key] = np.radians(estimate.std) if is_angle else estimate.std / scale[estimate.axis]
+    worst = max(errors, key=lambda key: errors[key])
+    return float(errors[worst]), worst

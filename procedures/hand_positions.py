@@ -1,0 +1,143 @@
+"""hand-positions: a person turns an accelerometer from rest to rest; no stage.
+
+Excites   bias, scale factor and nonorthogonality of three axes; nonlinearity, from more positions than these need.
+Blind to  misalignment to the case, because the orientations are not known; hysteresis; warm-up, in so short a time.
+Source    Tedaldi, Pretto and Menegatti, ICRA 2014; Skog et al. (2010), detectors of zero velocity.
+
+The program sees when the sensor is at rest, takes the position, and says which orientation it needs next.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from procedures.errors import NoAnswer, SettingError
+from procedures.session import Guidance, HandAnalysis, HandCourse, NoiseAtRest, Pose, Samples, Session
+
+KIND = "positions"
+ADAPTIVE = True
+OUTPUTS = ("ax", "ay", "az")
+WINDOW_S = 0.5  # of a test of rest
+LEARNED = 20  # windows of rest that show the noise
+FEWEST = 12  # positions: nine parameters, and three that check them
+TABLE = "Does the sensor lie on a table, and is its cable long enough to turn it upside down? Let it go."
+FLAT = (0.0, 0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Rest:
+    """Successive windows of one rest, as one block of samples."""
+
+    volts: NDArray[np.float64]
+    channels: Sequence[str]
+    rate_hz: float
+    start_s: float
+
+    @staticmethod
+    def of(windows: Sequence[Samples]) -> Rest:
+        """All `windows` joined."""
+        first = windows[0]
+        return Rest(np.concatenate([w.volts for w in windows]), first.channels, first.rate_hz, first.start_s)
+
+
+def hand_positions(
+    rig: Session, *, target_g: float = 0.001, rest_s: float = 2.0, most_positions: int = 40, wait_s: float = 120.0
+) -> None:
+    """Take positions at rest, each of `rest_s`, until every parameter is known to `target_g`.
+
+    `target_g` is a standard uncertainty as an error at 1 g: 0.001 is 1 mg of bias, 0.1 % of scale factor, 0.06 deg of
+    an angle. The run ends at `most_positions` in any case. It stops after `wait_s` without a new position.
+    """
+    if min(target_g, wait_s) <= 0 or rest_s < 2 * WINDOW_S or most_positions < FEWEST:
+        raise SettingError(
+            f"hand-positions: target_g and wait_s must be above 0, rest_s at least {2 * WINDOW_S:g}, most_positions at "
+            f"least {FEWEST}"
+        )
+    analysis = rig.by_hand
+    if analysis is None:
+        raise SettingError("hand-positions: this session has no analysis of positions; run it with `rig run`")
+    rig = replace(rig, adc=rig.adc.only(*OUTPUTS))
+    rig.confirm("at-rest", TABLE)
+    noise = _learn_noise(rig, analysis, wait_s)
+    while not _suffices(course := analysis.course(rig.measured(), noise), target_g, most_positions):
+        rig.host.expect(max(1, FEWEST - course.count))
+        rig.host.guide(_guidance(course, target_g))
+        rest = _next_rest(rig, analysis, course, noise, rest_s, wait_s)
+        rig.keep(Pose(0.0, 0.0, path=course.words), samples=rest, temperature_c=rig.oven.temperature_c())
+    rig.host.guide(_guidance(course, target_g, ended=True))
+
+
+def _suffices(course: HandCourse, target_g: float, most: int) -> bool:
+    return course.count >= most or course.uncertainty_g[0] <= target_g
+
+
+def _guidance(course: HandCourse, target_g: float, ended: bool = False) -> Guidance:
+    """What the person does next, in words, and what the drawing shows."""
+    worst_g, parameter = course.uncertainty_g
+    known = f"{parameter} is known to {1e3 * worst_g:.2g} mg, wanted {1e3 * target_g:g} mg" if parameter else ""
+    if ended:
+        text = f"{course.count} positions taken; {known}"
+    else:
+        turn = f" ({course.turn})" if course.turn else ""
+        text = "; ".join(filter(None, (f"position {course.count + 1}: {course.words}{turn}, then let go", known)))
+    ups = tuple(tuple(map(float, up)) for up in course.ups)
+    return Guidance(text, course.up, ups, not ended)
+
+
+def _learn_noise(rig: Session, analysis: HandAnalysis, wait_s: float) -> NoiseAtRest:
+    """The noise of the sensor at rest, from the first stretch of windows that are alike. Raises NoAnswer."""
+    rig.host.guide(
+        Guidance("leave the sensor on the table for 10 s: the program measures its noise", FLAT, moves=False)
+    )
+    windows: list[NDArray[np.float64]] = []
+    for _ in range(max(2 * LEARNED, round(wait_s / WINDOW_S))):
+        samples = rig.adc.acquire(WINDOW_S)
+        windows = [*windows, samples.volts][-LEARNED:]
+        if (noise := analysis.learn(windows, samples.rate_hz)) is not None:
+            return noise
+    raise NoAnswer(
+        f"the sensor was not at rest for {LEARNED * WINDOW_S:g} s within {wait_s:g} s; put it on a firm table away "
+        "from motors, let it go, and resume the run"
+    )
+
+
+def _next_rest(
+    rig: Session, analysis: HandAnalysis, course: HandCourse, noise: NoiseAtRest, rest_s: float, wait_s: float
+) -> Rest:
+    """The next rest at a new position. The first window of a rest is left out: the hand has just let go.
+
+    Raises NoAnswer after `wait_s` without one.
+    """
+    windows: list[Samples] = []
+    doing = _Doing(rig)
+    for _ in range(round(wait_s / WINDOW_S)):
+        windows.append(rig.adc.acquire(WINDOW_S))
+        found = analysis.judge([w.volts for w in windows], noise)
+        if not found.still:
+            doing.say(f"{course.words}: the sensor moves ({found.noise:.2g} times the noise at rest, by {found.by})")
+            windows = windows[1:] if found.by == "creep" else []
+        elif len(windows) * WINDOW_S <= rest_s:
+            doing.say(f"{course.words}: at rest, wait")
+        elif course.is_new((rest := Rest.of(windows[1:])).volts.mean(axis=0)):
+            return rest
+        else:
+            doing.say(f"this position is known already; needed: {course.words}")
+            windows = windows[1:]
+    raise NoAnswer(f"no new position for {wait_s:g} s; needed: {course.words}; {doing.text}; resume the run to go on")
+
+
+@dataclass
+class _Doing:
+    """The present step, reported once."""
+
+    rig: Session
+    text: str = ""
+
+    def say(self, text: str) -> None:
+        if text.partition("(")[0] != self.text.partition("(")[0]:
+            self.rig.host.doing(text)
+        self.text = text

@@ -1,0 +1,129 @@
+"""hand-positions on a simulated hand, without sockets."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from calibrations.analyses.hand_positions import FEWEST
+from drivers.handheld.hand import Hand
+from drivers.handheld.world import Handheld, HandheldWorld
+from drivers.world.config import WorldConfig
+from procedures.errors import Declined, NoAnswer, SettingError
+from procedures.hand_positions import hand_positions
+from procedures.session import Dwell, Guidance
+from rig.instruments.by_hand import HandAnalysis
+from tests.procedures.bench import Book, session
+
+CALM = Hand(slips=0.0, errs=0.0, clings=0.0)
+
+
+def taken(hand: Hand = CALM, seed: int = 1, dwells: tuple[Dwell, ...] = (), **settings: Any) -> Book:
+    world = HandheldWorld(WorldConfig.ideal(), seed, Handheld(hand=hand))
+    rig, book = session(world, dwells=dwells)
+    hand_positions(replace(rig, by_hand=HandAnalysis()), **settings)
+    return book
+
+
+@pytest.fixture(scope="module")
+def calm() -> Book:
+    return taken()
+
+
+def ups(book: Book) -> np.ndarray:
+    """Directions upward of the positions, by the true zero and gains."""
+    masses = (book.world.triad.x, book.world.triad.y, book.world.triad.z)  # type: ignore[attr-defined]
+    zero, gain = (np.array([getattr(m, name) for m in masses]) for name in ("zero_v", "volts_per_g"))
+    return np.array([(np.array([d.means[f"a{axis}"] for axis in "xyz"]) - zero) / gain for d in book.dwells])
+
+
+def test_a_calm_hand_needs_no_more_positions_than_the_parameters_do(calm: Book) -> None:
+    assert len(calm.dwells) == FEWEST
+    assert calm.asked == ["at-rest"]
+    assert calm.world.now_s < 120
+
+
+def test_each_position_is_what_the_person_was_told(calm: Book) -> None:
+    turns = [guidance for guidance in calm.guided if guidance.moves]
+    cosines = np.sum(ups(calm) * np.array([guidance.up for guidance in turns]), axis=1)
+    assert np.degrees(np.arccos(np.minimum(cosines, 1.0))).max() < 35  # an edge is missed by 8 deg about each axis
+    assert all(f": {d.pose.path}" in g.text for d, g in zip(calm.dwells, turns, strict=True))
+
+
+def test_each_position_is_two_seconds_at_rest(calm: Book) -> None:
+    assert {dwell.n for dwell in calm.dwells} == {2000}
+    noise_v = 1.2e-3
+    assert max(max(dwell.stds.values()) for dwell in calm.dwells) < 1.1 * noise_v
+    assert calm.dwells[0].temperature_c is not None
+
+
+def test_the_directions_so_far_go_with_the_guidance(calm: Book) -> None:
+    last = calm.guided[-1]
+    assert isinstance(last, Guidance)
+    assert not last.moves
+    assert "0.001" not in last.text
+    assert "wanted 1 mg" in last.text
+    assert np.array(last.taken) == pytest.approx(ups(calm), abs=0.02)
+
+
+def test_a_smaller_target_takes_more_positions(calm: Book) -> None:
+    finer = taken(target_g=9e-5)
+    assert len(calm.dwells) < len(finer.dwells) <= 40
+    assert len(taken(target_g=1e-9, most_positions=14).dwells) == 14
+
+
+def test_a_resumed_run_goes_on_after_its_last_position(calm: Book) -> None:
+    again = taken(dwells=tuple(calm.dwells[:9]))
+    assert len(again.dwells) == FEWEST
+    assert len(again.blocks) == FEWEST - 9
+
+
+def test_a_hand_that_trembles_slips_and_errs_still_ends() -> None:
+    hand = Hand(slips=0.4, errs=0.2, clings=0.3, patience_s=4.0, table_deg=5.0)
+    book = taken(hand, seed=4)
+    assert FEWEST <= len(book.dwells) <= 20
+    assert max(max(dwell.stds.values()) for dwell in book.dwells) < 1.15 * 1.2e-3
+
+
+def test_a_hand_that_never_lets_go_is_told_so() -> None:
+    with pytest.raises(NoAnswer, match=r"no new position for 20 s; needed: .* times the noise at rest"):
+        taken(replace(CALM, clings=1.0, clings_s=1e4), wait_s=20.0)
+
+
+def test_a_position_that_is_known_is_not_taken_twice() -> None:
+    """The hand always puts the sensor back as it was."""
+    world = HandheldWorld(WorldConfig.ideal(), 1, Handheld(hand=CALM))
+    rig, book = session(world)
+    book.guide = book.guided.append  # type: ignore[method-assign]
+    with pytest.raises(NoAnswer, match="this position is known already"):
+        hand_positions(replace(rig, by_hand=HandAnalysis()), wait_s=15.0)
+    assert len(book.dwells) == 1
+
+
+def test_the_first_rest_must_be_quiet() -> None:
+    world = HandheldWorld(WorldConfig.ideal(), 1, Handheld(hand=replace(CALM, patience_s=0.3)))
+    world.turn_by_hand((0.0, 0.0, 1.0))
+    rig, _ = session(world)
+    with pytest.raises(NoAnswer, match="not at rest for 10 s within 20 s"):
+        hand_positions(replace(rig, by_hand=HandAnalysis()), wait_s=20.0)
+
+
+@pytest.mark.parametrize(
+    "settings", [{"target_g": 0.0}, {"rest_s": 0.5}, {"most_positions": 9}, {"wait_s": 0.0}], ids=str
+)
+def test_settings_out_of_range_are_refused(settings: Mapping[str, Any]) -> None:
+    with pytest.raises(SettingError, match="hand-positions"):
+        taken(**settings)
+
+
+def test_a_sensor_that_is_not_on_the_table_is_not_measured() -> None:
+    world = HandheldWorld(WorldConfig.ideal(), 1, Handheld(hand=CALM))
+    rig, book = session(world)
+    book.ask = lambda question: "no"  # type: ignore[method-assign]
+    with pytest.raises(Declined):
+        hand_positions(replace(rig, by_hand=HandAnalysis()))
+    assert not book.dwells

@@ -1,0 +1,149 @@
+"""`rig run hand-positions` on the simulated hand: the run, its results, the analysis, and what a person sees."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from rich.console import Console
+
+from drivers.handheld.hand import Hand
+from drivers.handheld.world import HandheldWorld
+from procedures.catalogue import find
+from procedures.session import Guidance
+from procedures.settings import parse
+from rig.bench import read_bench
+from rig.bench.file import HAND
+from rig.cli.terminal.guide import Guide
+from rig.drawings import orientation_map
+from rig.errors import BenchError
+from rig.instruments.wiring import world_of
+from rig.planning.plan import plan
+from rig.planning.preparation import checks
+from rig.record import Record
+from rig.record.measured import table_of
+from rig.runs.runner import resume, start
+from tests.rig.rigging import Onlooker
+
+Rig = Callable[..., Any]
+RUN = ("run", "hand-positions", "--bench", str(HAND), "--unattended", "--json")
+UP = (0.0, 0.0, 1.0)
+
+
+@pytest.fixture
+def bench_with(tmp_path: Path) -> Callable[..., Path]:
+    """The bench of the hand with other keys of its world."""
+
+    def write(**world: Any) -> Path:
+        document = yaml.safe_load(HAND.read_text(encoding="utf-8"))
+        document["world"] |= world
+        path = tmp_path / "hand.yaml"
+        path.write_text(yaml.safe_dump(document), encoding="utf-8")
+        return path
+
+    return write
+
+
+@pytest.mark.slow
+@pytest.mark.sockets
+def test_a_run_finds_zeros_gains_and_angles(rig: Rig, rig_home: Path) -> None:
+    ended = rig(*RUN)
+    assert ended.status == 0, ended.err
+    found = json.loads(ended.out)["results"]
+    world = world_of(read_bench(HAND))
+    assert isinstance(world, HandheldWorld)
+    for axis in "xyz":
+        mass = getattr(world.triad, axis)
+        for name, true in ((f"bias-{axis}", mass.zero_v), (f"scale-{axis}", mass.volts_per_g)):
+            assert abs(found[name]["value"] - true) < 4 * found[name]["std"] + 3e-5  # the gains go with the cosines
+    assert found["uncertainty"]["value"] < 1e-3
+    assert rig("compare", "last", "--model", "linear", "--json").status == 0
+    verdict = json.loads(rig("diagnose", "last", "--json").out)
+    assert verdict["verdict"] in ("effect-missing", "ambiguous")  # common-scale has one gain for all axes
+
+
+@pytest.mark.slow
+@pytest.mark.sockets
+def test_a_stopped_run_goes_on_with_its_positions(rig_home: Path) -> None:
+    procedure, bench = find("hand-positions"), read_bench(HAND)
+
+    class Interrupting(Onlooker):
+        def kept(self, kept: Any) -> None:
+            super().kept(kept)
+            if len(self.seen) == 5:
+                raise KeyboardInterrupt
+
+    with Record() as record:
+        stopped = start(record, bench, procedure, parse(procedure, {}), Interrupting())
+        assert (stopped.run.state, stopped.run.rows) == ("stopped", 5)
+        ended = resume(record, stopped.run.run, looking := Onlooker())
+        assert (ended.run.state, len(looking.seen)) == ("complete", ended.run.rows - 5)
+        table = table_of(record, ended.run.run)
+    assert table.output_names == ("ax", "ay", "az")
+    assert {"t_s", "temperature_c", "n"} <= set(table.columns)
+    assert np.all(np.diff(table.time_s) > 0)
+
+
+@pytest.mark.slow
+@pytest.mark.sockets
+def test_an_accuracy_that_was_not_reached_is_a_result_that_is_missing(rig: Rig, rig_home: Path) -> None:
+    ended = rig(*RUN, "--target-g", "1e-6", "--most-positions", "12")
+    assert ended.status == 1
+    assert "wanted 1e-06 g; take more positions, or longer rests" in ended.err
+    assert "uncertainty" not in json.loads(ended.out)["results"]
+
+
+def test_a_bench_without_the_inputs_is_refused(rig: Rig, rig_home: Path) -> None:
+    ended = rig("run", "hand-positions", "--unattended")
+    assert ended.status != 0
+    assert "no input is wired to ax, ay, az" in ended.err
+
+
+def test_the_bench_file_is_an_example(rig: Rig) -> None:
+    assert rig("check", "--example-hand").out == HAND.read_text(encoding="utf-8")
+
+
+def test_a_hand_is_set_in_the_bench_file(bench_with: Callable[..., Path]) -> None:
+    world = world_of(read_bench(bench_with(hand={"slips": 1.0})))
+    assert isinstance(world, HandheldWorld)
+    assert world.script._hand == Hand(slips=1.0)
+    with pytest.raises(BenchError, match=r"hand\.slip.*Did you mean"):
+        read_bench(bench_with(hand={"slipz": 1.0}))
+
+
+def test_a_position_is_marked_by_a_sound_and_a_tick() -> None:
+    console = Console(file=io.StringIO(), width=100, force_terminal=True, color_system=None)
+    guide = Guide(find("hand-positions"), read_bench(HAND), {}, console)
+    guide.guide(Guidance("position 1: +z side up, then let go", UP))
+    assert "\a" not in console.file.getvalue()  # type: ignore[attr-defined]
+    guide.guide(Guidance("position 2: +x side up, then let go", (1.0, 0.0, 0.0), (UP,)))
+    shown = console.file.getvalue()  # type: ignore[attr-defined]
+    assert shown.count("\a") == 1
+    assert "✓ position 1 taken" in shown
+    assert "position 2: +x side up, then let go" in shown
+
+
+def test_the_map_shows_taken_lacking_and_next() -> None:
+    lines = orientation_map(Guidance("", (1.0, 0.0, 0.0), (UP, (0.0, -1.0, 0.0))))
+    assert lines[-1].startswith("● taken (2 of 26)")
+    assert lines[2].count("●") == 1
+    assert lines[2].count("◎") == 1
+    assert lines[3].count("●") == 1
+    assert sum(line.count("·") for line in lines[1:4]) == 23
+    ended = orientation_map(Guidance("", (1.0, 0.0, 0.0), (UP,), moves=False))
+    assert not any("◎" in line for line in ended[:-1])
+
+
+def test_without_stages_the_checks_are_those_of_a_hand() -> None:
+    procedure = find("hand-positions")
+    planned = plan(read_bench(HAND), procedure, parse(procedure, {}))
+    assert planned.poses >= 12
+    assert 60 < planned.duration_s < 300
+    assert any("upside down" in line for line in checks(planned))
+    assert not any("stages" in line for line in checks(planned))
