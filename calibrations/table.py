@@ -91,7 +91,10 @@ class Table:
         try:
             return float(value)
         except ValueError:
-            raise DataError(f'{self.source}: the constant "{name}" is {value!r}, not a number') from None
+            raise DataError(
+                f'{self.source}: the constant "{name}" is {value!r}, not a number; correct the line '
+                f"`# {name}: ...`, or remove it"
+            ) from None
 
     @property
     def content(self) -> str:
@@ -218,19 +221,24 @@ def _check_numbers(table: Table) -> None:
     for name in ("filter_corner_hz", "sample_rate_hz"):
         if not table.number(name, 1.0) > 0:
             raise DataError(f'{table.source}: the constant "{name}" is {table.constants[name]}; it must be above 0')
+    if abs(table.number("latitude_deg", 0.0)) > 90:
+        raise DataError(
+            f'{table.source}: the constant "latitude_deg" is {table.constants["latitude_deg"]}; it must be from -90 to '
+            "90: north is positive"
+        )
     if fault := gravity_fault(table.constants.get("gravity_m_s2", STANDARD_GRAVITY)):
         raise DataError(f'{table.source}: the constant "gravity_m_s2" is {fault}')
 
 
 def gravity_fault(value: Constant) -> str | None:
     """Why `value` is no local gravity on Earth, m/s^2, with the likely mistake; None where it is one."""
+    low, high = GRAVITY_M_S2
     try:
         gravity = float(value)
     except ValueError:
         point = str(value).replace(",", ".")
         hint = f"; write {point}, with a decimal point" if str(value).count(",") == 1 else ""
-        return f"{value!r}, not a number{hint}"
-    low, high = GRAVITY_M_S2
+        return f"{value!r}, not a number{hint or f'; give it in m/s^2, {low} to {high}'}"
     if low <= gravity <= high:
         return None
     scales = {"g": STANDARD_GRAVITY, "cm/s^2": 1e-2, "mm/s^2": 1e-3}

@@ -16,6 +16,7 @@ from procedures.level_check import check_level, prepare
 from procedures.pose_list import parse_poses
 from procedures.session import Pose, Session, bounded
 
+HALF_TURN_DEG = 180.0
 INCLINATIONS_DEG = (90.0, 30.0, 150.0, 60.0, 120.0, 45.0, 135.0)
 REFERENCE = Pose(90.0, 45.0, 1, "reference")  # both axes feel gravity; beta always rises to it
 Paths = Literal["grid", "ang"]
@@ -65,6 +66,9 @@ def grid(inclinations_deg: Sequence[float], step_deg: float, paths: Paths = "gri
         raise SettingError(f"sweep: step_deg is {step_deg:g}; give a step that divides 180 deg, such as 10")
     if not inclinations_deg:
         raise SettingError("sweep: inclinations_deg is empty; give at least one angle, such as 90")
+    for alpha in inclinations_deg:
+        if abs(alpha) > HALF_TURN_DEG:
+            raise SettingError(f"sweep: inclinations_deg has {alpha:g}; give angles from -180 to 180, such as 90")
     signed = [(alpha, -alpha) if paths == "ang" else (alpha,) for alpha in inclinations_deg]
     for alpha in dict.fromkeys(float(alpha) for pair in signed for alpha in pair):  # -0 is 0
         yield from turn(alpha, 0, 360, step_deg, "A+ to B-")

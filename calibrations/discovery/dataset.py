@@ -213,6 +213,10 @@ class Dataset(ABC, Generic[F]):
         """Why a fit of these data may mislead."""
         return []
 
+    def doubts(self, found: F) -> list[str]:  # noqa: ARG002
+        """What a fit shows to be wrong with its input."""
+        return []
+
     def noise_known(self, found: F) -> bool:  # noqa: ARG002
         """Whether the noise is known independently of what a fit leaves."""
         return True

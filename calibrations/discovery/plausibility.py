@@ -6,7 +6,7 @@ no response      an output that is constant, holds noise only, is stuck in many 
 two groups       rows that belong to two sensors: without a pattern in pose or time, and nothing between them
 wrong geometry   outputs that follow another axis, mirrored axes, angles that are exchanged or reversed
 
-Only tables of poses are checked: elsewhere the orientation is not known.
+Tables of poses are checked, and tables of rates whose axes of turn are stated: elsewhere the input is not known.
 
 Source  Wald and Wolfowitz (1940), runs of two kinds of rows; DeSarbo and Cron (1988), regression in two clusters.
 """
@@ -40,9 +40,11 @@ from calibrations.criteria import (
     TURNED_DEG,
     WEAK_RESPONSE,
 )
+from calibrations.discovery.readings import other_reading
 from calibrations.discovery.verdict import Verdict
 from calibrations.fitting.fit import Fit
 from calibrations.geometry.orientation import Pose, nominal_pose, specific_force
+from calibrations.geometry.rate_table import turn_axes
 from calibrations.means.noise import rms, white_std
 from calibrations.table import AXES, Array, Table
 
@@ -71,8 +73,12 @@ class Response:
 
 @lru_cache(maxsize=8)
 def findings(table: Table) -> tuple[Finding, ...]:
-    """What speaks against a table of poses, worst first; () for other kinds and for healthy data."""
-    if not table.type.stage_angles or table.n < FEWEST_RESPONSE_ROWS:
+    """What speaks against a table of poses or rates, worst first; () for other kinds and for healthy data."""
+    if table.n < FEWEST_RESPONSE_ROWS:
+        return ()
+    if table.type.turning:
+        return tuple(_of_rates(table))
+    if not table.type.stage_angles:
         return ()
     stated = response(table, specific_force(nominal_pose(table)))
     geometry = _geometry(table, stated)
@@ -155,7 +161,38 @@ def _silent(output: Array, stated: Response, k: int, name: str, floor: float | N
     return f"{name} does not follow the poses: they explain {share:.0%} of its variation of {1e3 * spread:.3g} mV rms"
 
 
-def _stuck(output: Array, a: Array, name: str) -> str | None:
+def _of_rates(table: Table) -> Iterator[Finding]:
+    """The same of gyroscopes, which follow the rate of the table about their own axes."""
+    if not (all(f"a{axis}" in table for axis in AXES) or all(f"axis_{axis}" in table for axis in AXES)):
+        return
+    rate = table.column("rate_deg_s")[:, None] * turn_axes(table)
+    about = rate / max(float(np.abs(rate).max()), np.finfo(float).tiny)
+    found = response(table, about)
+    turned = [k for k in range(len(table.axes)) if about[:, k].std() > EXCITED_G]
+    remedy = "check the columns, the sign of rate_deg_s, and the sensor's mount and cable"
+    for k in turned:
+        name, share, slope = table.output_names[k], float(found.share[k]), found.slope[k]
+        if (why := _stuck(table.outputs[:, k], about, name, table.unit, "the rate")) is not None:
+            yield Finding(NO_RESPONSE, f"{why}; check the sensor's supply, the cable and the channel of {AXES[k]}")
+        elif share < FOLLOWS_GRAVITY:
+            yield Finding(
+                NO_RESPONSE, f"{name} does not follow the rate, which explains {share:.0%} of its variation; {remedy}"
+            )
+        elif abs(slope[k]) < np.cos(np.radians(TURNED_DEG)) * np.linalg.norm(slope):
+            axis = AXES[int(np.argmax(np.abs(slope)))]
+            yield Finding(UNEXPLAINED, f"{name} follows the rate about {axis}, not about {AXES[k]}; {remedy}")
+    if (groups := _two_groups(table, about)) is not None:
+        yield groups
+    if reversed_ := [table.output_names[k] for k in turned if found.slope[k, k] < 0]:
+        yield Finding(
+            DOUBTFUL,
+            f"{' and '.join(reversed_)} fall{'s' if len(reversed_) == 1 else ''} where the rate rises, as of a table "
+            "that turns the other way or an inverted output; rates are positive by the right-hand rule about the "
+            "sensor's axis: check the sign of rate_deg_s and of the outputs",
+        )
+
+
+def _stuck(output: Array, a: Array, name: str, unit: str = "V", what: str = "gravity") -> str | None:
     """Why an output that responds in some rows does not in others; None where it does in all."""
     n, count = len(output), max(FEWEST_RESPONSE_ROWS, int(STUCK_ROWS * len(output)))
     order = np.sort(output)
@@ -180,14 +217,18 @@ def _stuck(output: Array, a: Array, name: str) -> str | None:
     aside = LEAST_ASIDE * float(np.ptp(expected))
     if min(np.mean(away > aside), np.mean(away < -aside)) < LEAST_OTHER_SIDE:
         return None
-    return f"{name} is stuck at {value:.5g} V in {rows.sum()} of {n} rows while gravity changes"
+    return f"{name} is stuck at {value:.5g} {unit} in {rows.sum()} of {n} rows while {what} changes"
 
 
-def _two_groups(table: Table) -> Finding | None:
-    """Rows of two sensors in one table: two linear responses, nothing between them, without a pattern."""
-    table = table.in_order()
-    pose = nominal_pose(table)
-    columns = np.column_stack([np.ones(table.n), specific_force(pose)])
+def _two_groups(table: Table, about: Array | None = None) -> Finding | None:
+    """Rows of two sensors in one table: two linear responses, nothing between them, without a pattern.
+
+    `about` is the known input, shape (n, 3); None for the specific force at the poses.
+    """
+    if about is None:
+        table = table.in_order()
+        about = specific_force(nominal_pose(table))
+    columns = np.column_stack([np.ones(table.n), about])
     labels, left, apart = _clusters(columns, table.outputs)
     share = float(labels.mean())
     if left > LEFT_WITHIN_GROUPS or not SMALLER_GROUP <= share <= 1 - SMALLER_GROUP or _patterned(table, labels):
@@ -200,8 +241,13 @@ def _two_groups(table: Table) -> Finding | None:
     return Finding(
         UNEXPLAINED,
         f"scatter without a pattern{times}: two groups of rows ({(~labels).sum()} and {labels.sum()}) differ by "
-        f"{1e3 * apart[axis]:.3g} mV in {table.axes[axis]}, as if two sensors were in one table; separate them",
+        f"{_apart(float(apart[axis]), table.unit)} in {table.axes[axis]}, as if two sensors were in one "
+        "table; separate them",
     )
+
+
+def _apart(size: float, unit: str) -> str:
+    return f"{1e3 * size:.3g} mV" if unit == "V" else f"{size:.3g} {unit}"
 
 
 def _clusters(columns: Array, outputs: Array) -> tuple[NDArray[np.bool_], float, Array]:
@@ -244,11 +290,13 @@ def _second(found: tuple[NDArray[np.bool_], float, Array]) -> float:
 
 def _patterned(table: Table, labels: NDArray[np.bool_]) -> bool:
     """Whether the groups follow from time, direction, path or angle: then they are an effect of the sensor or rig."""
-    alpha, beta = table.column("alpha_deg"), table.column("beta_deg")
     orders = [np.arange(table.n)]
     orders += [np.argsort(table.column(name), kind="stable") for name in ("temperature_c", "supply_v") if name in table]
     if any(_agreeing(labels, order) > PATTERNED for order in orders):
         return True
+    if table.type.turning:
+        return _agreeing(labels, np.argsort(table.column("rate_deg_s"), kind="stable")) > PATTERNED
+    alpha, beta = table.column("alpha_deg"), table.column("beta_deg")
     if min(_agreeing(labels, *_along(beta, alpha)), _agreeing(labels, *_along(alpha, beta))) > PATTERNED:
         return True
     kinds = [table.column(name) for name in ("direction", "flip", "mount_deg") if name in table]
@@ -274,6 +322,8 @@ def _along(angle: Array, other: Array) -> tuple[NDArray[np.intp], NDArray[np.boo
 
 def _geometry(table: Table, stated: Response) -> Finding | None:
     """What geometry explains the outputs where the stated one does not; None where it does, or nothing does."""
+    if (reading := other_reading(table, 1 - stated.share)) is not None:
+        return Finding(UNEXPLAINED, f"the outputs do not follow the poses as stated; they do if {reading}")
     explained = bool(np.all(stated.share >= EXPLAINED_BY_GEOMETRY))
     wrong = _assignment(table, stated, specific_force(nominal_pose(table))) if explained else None
     if explained and (wrong is None or wrong.verdict == DOUBTFUL):

@@ -27,6 +27,7 @@ from calibrations.criteria import (
 from calibrations.design.experiment import separating_experiment
 from calibrations.discovery.candidates import candidates, with_planned, with_rivals
 from calibrations.discovery.dataset import Cells, Dataset
+from calibrations.discovery.fit_doubts import fit_doubts
 from calibrations.discovery.outliers import caution, fit_without, kept, told
 from calibrations.discovery.places import places
 from calibrations.discovery.plausibility import Finding, refusal, rejection
@@ -458,7 +459,11 @@ class Rows(Dataset[Fit]):
 
     def cautions(self, found: Fit) -> list[str]:
         """Why a fit of all rows may mislead: a model that the data do not determine, rows that stand out."""
-        return list(filter(None, (undetermined(found), kept(found))))
+        return [*filter(None, (undetermined(found), kept(found))), *self.doubts(found)]
+
+    def doubts(self, found: Fit) -> list[str]:
+        """Noise that is stated wrongly, and parameters that no sensor has."""
+        return list(fit_doubts(found))
 
 
 def _explained(path: Path) -> bool:

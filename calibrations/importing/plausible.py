@@ -30,6 +30,9 @@ from calibrations.table import NUMBERS, Array, Table
 
 ARC_MINUTE_DEG = 1 / 60
 ROUNDING_DEG = 1e-3
+FEWEST_RATES = 3  # on one grid by chance: one table in ten thousand
+FASTEST_RAD_S = 60.0
+RATE_ROUNDING = 1e-3
 Doubt = tuple[str, str]  # the reason, and the unit that would fit, "" for none
 
 
@@ -108,6 +111,18 @@ def _angle(values: Array) -> Doubt | None:
     return f"runs from {values.min():.4g} to {values.max():.4g}, not on whole degrees: it looks like radians", "rad"
 
 
+def _rate(values: Array) -> Doubt | None:
+    """Rates that are whole multiples of 5 deg/s if they are in rad/s, and no round numbers as they are."""
+    some: Array = np.unique(np.round(np.abs(values), 6))
+    some = some[some > ROUNDING_DEG]
+    if len(some) < FEWEST_RATES or some[-1] > FASTEST_RAD_S or not _on_grid(some, np.pi / 36, RATE_ROUNDING):
+        return None
+    return (
+        f"runs from {values.min():.4g} to {values.max():.4g}, in whole multiples of 5 deg/s if it is in rad/s",
+        "rad/s",
+    )
+
+
 def _voltage(values: Array) -> Doubt | None:
     largest = float(np.max(np.abs(values)))
     if largest <= HIGHEST_V:
@@ -131,6 +146,7 @@ def _temperature(values: Array) -> Doubt | None:
 
 UNIT_CHECKS: Mapping[str, Callable[[Array], Doubt | None]] = {
     "deg": _angle,
+    "deg/s": _rate,
     "V": _voltage,
     "degC": _temperature,
     "m": _length,

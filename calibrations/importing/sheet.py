@@ -35,6 +35,7 @@ from calibrations.table import Array, Constant
 
 LONGEST_JSON = 1 << 26  # characters: a whole document is held in memory
 AXES = ("x", "y", "z")
+EMPTY = "the file is empty: a header line with column names is missing; export the measurements again"
 JSON_FORM = 'give arrays of equal length, {"mag": [[1, 2, 3], ...]}, or [{"mx": 1, ...}, ...]'
 
 
@@ -161,7 +162,7 @@ def read_sheet(source: Source) -> Sheet:
     separator = _separator(head)
     rows = list(split_rows(head, separator, source.name, start + 1))
     if not rows:
-        raise DataError(f"{source.name}: the file is empty: a header line with column names is missing")
+        raise DataError(f"{source.name}: {EMPTY}")
     width = _width(rows)
     rows = _without_titles(rows, width, constants)
     (line, header), named = rows[0], not all(map(is_number, rows[0][1]))
@@ -171,7 +172,7 @@ def read_sheet(source: Source) -> Sheet:
     header = _checked(header[:columns], f"{source.name}, line {line}") if named else list(map(str, range(1, width + 1)))
     below, units = _units(header, rows[1 if named else 0 :], named)
     if not below:
-        raise DataError(f"{source.name}: there are no rows below the header")
+        raise DataError(f"{source.name}: there are no rows below the header; export the measurements again")
     sample = tuple(tuple(cells[:columns]) for _, cells in below if len(cells) == width)
     if not sample:
         raise DataError(_another_width(source.name, *below[0], header))
@@ -231,7 +232,7 @@ def _head(source: Source) -> tuple[dict[str, Constant], int, list[str]]:
             key, colon, value = plain.lstrip("#").rstrip(";,\t ").partition(":")
             if colon and key.strip():
                 constants[key.strip()] = number_or_text(value.strip())
-    raise DataError(f"{source.name}: the file is empty: a header line with column names is missing")
+    raise DataError(f"{source.name}: {EMPTY}")
 
 
 def _separator(head: Sequence[str]) -> str | None:
@@ -293,7 +294,8 @@ def _is_units(cells: Sequence[str]) -> bool:
 
 
 def _another_width(name: str, line: int, cells: Sequence[str], header: Sequence[str]) -> str:
-    return f"{name}, line {line}: {len(cells)} values for {len(header)} columns{_names(header)}"
+    found = f"{len(cells)} values for {len(header)} columns{_names(header)}"
+    return f"{name}, line {line}: {found}; correct this line or remove it"
 
 
 def _names(header: Sequence[str], form: str = " ({})") -> str:

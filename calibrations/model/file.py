@@ -82,7 +82,7 @@ def parse_model(text: str, source: str, effects: Mapping[str, Effect] | None = N
     try:
         document = load_yaml(text)
     except ValueError as error:
-        raise ModelError(f"{source}: is not YAML: {error}") from None
+        raise ModelError(f"{source}: is not YAML: {error}; correct this place, with spaces and no tabs") from None
     if not isinstance(document, dict):
         raise ModelError(f"{source}: is not a model: a model file is a mapping that begins with `schema: {SCHEMA}`")
     try:
@@ -103,7 +103,7 @@ def parse_model(text: str, source: str, effects: Mapping[str, Effect] | None = N
 
 def _fault(error: Any) -> str:
     if error["type"] == "missing":
-        return "is missing"
+        return "is missing; `rig models` lists models, and `rig fit --out FILE` writes a complete file"
     if error["type"] != "extra_forbidden":
         return f"{error['msg']}, is {error['input']!r}"
     places: Mapping[int, type[BaseModel]] = {1: _File, 3: _Effect}  # such as effects, 0, parameters, 1, axis

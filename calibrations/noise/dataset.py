@@ -28,6 +28,7 @@ from calibrations.noise.doubts import (
     next_of,
     possible_corner_hz,
     reason_of,
+    record_doubts,
     structure_of,
 )
 from calibrations.noise.fit import NoiseFit, fit
@@ -317,6 +318,10 @@ class StillRecord(Dataset[NoiseFit]):
         if any(line.frequency_hz > each.channel.highest_hz for each in found.channels for line in each.lines):
             return ["Lines above half the corner of the low-pass are not part of the fit."]
         return []
+
+    def cautions(self, found: NoiseFit) -> list[str]:  # noqa: ARG002
+        """What a person should check in the record."""
+        return record_doubts(self.still.channels)
 
 
 def mismatch(found: NoiseFit) -> dict[str, float]:

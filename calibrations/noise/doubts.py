@@ -39,9 +39,12 @@ from calibrations.noise.samples import hidden_in
 from calibrations.noise.search import Search
 from calibrations.noise.telegraph import TWO_LEVELS
 from calibrations.spectrum import GAUSS_MARKOV, Bands, slow_bands
+from calibrations.table import Array
 
 LINE, LEVEL, STRETCH = "line", "level", "spectrum"
 MISFITS = (LINE, LEVEL, STRETCH)
+ALL_OF_JUMP = 0.98  # of the variance of means: a random walk leaves more than a tenth beside one step
+FEWEST_MEANS, FEWEST_BESIDE_JUMP = 50, 5
 
 
 @dataclass(frozen=True)
@@ -292,6 +295,39 @@ def next_of(found: Search, doubts: Mapping[str, tuple[str, ...]], structure: str
     if found.patterns:
         return experiment_for_pattern(found.patterns[0], found.still.length_s)
     return repeat_record(found.still.length_s) if structure is not None else None
+
+
+def record_doubts(channels: tuple[Channel, ...]) -> list[str]:
+    """What a person should check in a record whatever its model: odd samples that matter, and a level that jumps."""
+    advice = "use a part of the record without it, or measure again (`rig noise` shows where)"
+    odd = [
+        f"{each.text} ({channel.axis}): {advice}"
+        for channel in channels
+        for each in channel.oddities
+        if each.matters and each.hidden is None
+    ]
+    jumps = ((channel, _jump(channel.means)) for channel in channels)
+    return odd + [
+        f"the level of {channel.axis} changes by {jump[1]:.3g} {channel.unit} after {jump[0]:.0%} of the record, and "
+        f"nowhere else: the sensor was moved, or its supply changed; {advice}"
+        for channel, jump in jumps
+        if jump is not None
+    ]
+
+
+def _jump(means: Array) -> tuple[float, float] | None:
+    """(share of the record before it, height) of a step that is nearly all of the variation of the means, or None."""
+    n = len(means)
+    if n < FEWEST_MEANS or not np.ptp(means):
+        return None
+    about = means - means.mean()
+    count = np.arange(1, n)
+    sums = np.cumsum(about)[:-1]
+    gained = sums**2 * n / (count * (n - count))  # of the sum of squares, by two levels
+    k = int(np.argmax(gained))
+    if gained[k] < ALL_OF_JUMP * float(about @ about) or min(k + 1, n - k - 1) < FEWEST_BESIDE_JUMP:
+        return None
+    return (k + 1) / n, float(-sums[k] / (n - k - 1) - sums[k] / (k + 1))
 
 
 def disturbed(found: Search) -> bool:

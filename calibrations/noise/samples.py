@@ -33,6 +33,7 @@ from calibrations.criteria import (
     FEWEST_FOR_SCALE,
     FILTER_PERIODS,
     LEAST_DITHER,
+    MOST_PLACEHOLDERS,
     MOST_WILD,
     SHORTEST_STUCK,
     STUCK_BEYOND_CHANCE,
@@ -145,6 +146,7 @@ class Outliers:
         self._judged = 0
         self._scale = 0.0
         self._wild = Wild()
+        self._values = (np.inf, -np.inf)  # lowest and highest wild sample
 
     def add(self, samples: Array) -> None:
         """The next samples, shape (n,)."""
@@ -165,7 +167,9 @@ class Outliers:
             self._before -= len(head)
             self._judge(np.concatenate([head, rest, rest[-2 : -2 - SIDE : -1]]))
             self._waiting = rest[:0]
-        return self._wild if self._wild.count <= max(1, int(MOST_WILD * self._judged)) else Wild()
+        placeholder = self._values[0] == self._values[1]  # as 0 or -9.99 for a missing reading
+        most = MOST_PLACEHOLDERS if placeholder else MOST_WILD
+        return self._wild if self._wild.count <= max(1, int(most * self._judged)) else Wild()
 
     def _judge(self, part: Array) -> None:
         """All but the outer samples of a part."""
@@ -177,6 +181,8 @@ class Outliers:
         wild = np.flatnonzero(off > WILD_SAMPLE * self._scale)
         if len(wild) and self._scale > 0:
             self._note(self._before + SIDE + wild, off[wild])
+            low, high = self._values
+            self._values = min(low, float(middle[wild].min())), max(high, float(middle[wild].max()))
         self._judged += len(middle)
 
     def _note(self, at: NDArray[np.intp], off: Array) -> None:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrations.discovery.dataset import Dataset
+from calibrations.discovery.input_doubts import doubts
 from calibrations.discovery.plausibility import doubt
 from calibrations.discovery.rows import Rows
 from calibrations.effects import Effect
@@ -100,7 +101,8 @@ def rows_of(request: Request, effects: Mapping[str, Effect], tell: Tell) -> Tabl
             "samples, and adds any further scatter of the poses to the noise. Give the constants "
             "filter_corner_hz and sample_rate_hz."
         )
-    for why in filter(None, (earth_rate_warning(table), table_noise.scatter_remark(table), doubt(table))):
+    remarks = (earth_rate_warning(table), table_noise.scatter_remark(table), doubt(table), *doubts(table))
+    for why in filter(None, remarks):
         tell(f"{table.source}: {why}.")
     return table
 

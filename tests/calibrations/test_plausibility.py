@@ -163,5 +163,5 @@ def test_no_stage_zero_is_off_by_tens_of_degrees() -> None:
     d = healthy()
     found = discover(replace(d, alpha=d.alpha - 30).table(), read_model("linear"))
     assert found.verdict == "unexplained"
-    assert "alpha that is +30 deg off" in (found.residual_structure or "")
+    assert "the zero of alpha_deg is +30 deg off" in (found.residual_structure or "")
     assert "stage-zero-offset" not in found.causes

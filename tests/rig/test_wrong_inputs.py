@@ -61,6 +61,32 @@ MODELS = {
     "misspelt effect": "effects: {biass: {}}\n",
     "nested lists": "effects: [[[1]]]\n",
 }
+REMEDIES = (  # words of what to do
+    *(
+        "give",
+        "write",
+        "correct",
+        "remove",
+        "export",
+        "import",
+        "rename",
+        "name a column",
+        "name every",
+        "measure more",
+    ),
+    *(
+        "must be",
+        "must give",
+        "should be",
+        "Did you mean",
+        "There are:",
+        "Write",
+        "prints",
+        "save the sheet",
+        "begins with",
+    ),
+    *("set another", "a header line with column names, and rows"),
+)
 STAGE = "driver: oriental_az, url: simulated"
 ADC = "instruments: {adc: {driver: labjack_t7, url: simulated, settings: {channels: "
 BENCHES = {  # the text of the bench file, and the key that the message names
@@ -95,6 +121,7 @@ PLANS = [  # a procedure, a setting and its value
     ("sweep", "dwell-s", "inf"),
     ("sweep", "settle-s", "-3"),
     ("sweep", "inclinations-deg", ""),
+    ("sweep", "inclinations-deg", "90,400"),
     ("sweep", "pose-list", "none.csv"),
     ("sweep", "step", "10"),
     ("soak", "hours", "-1"),
@@ -118,6 +145,7 @@ def refused(
         assert (ended.status, ended.out) == (2, "")
         assert "rig: " in ended.err
         assert "Traceback" not in ended.err
+        assert any(word in ended.err for word in REMEDIES), ended.err
         return str(ended.err)
 
     return call

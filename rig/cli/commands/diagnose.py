@@ -31,6 +31,8 @@ def command(request: Request, check: bool, as_json: bool) -> int:
     result = planned(result, request, question.effects)
     if (untestable := question.data.untestable(result.fit, question.effects)) is not None:
         note(untestable)
+    if result.verdict is not Verdict.NO_RESPONSE:
+        notes(warning(question.data.doubts(result.fit)))
     name = request.model or question.model.name
     if as_json:
         own = own_effect(result.pattern, name, request)

@@ -1,0 +1,68 @@
+"""Plausible but physically wrong inputs: none of them gives wrong values without a word."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.rig.wrong_answers import HARMLESS, REFUSED, SILENT, WARNED, answer
+from tests.rig.wrong_measurements import GOOD, UNSEEN, WRONG
+from tests.rig.wrong_page import PAGE, answers, listed, unseen
+
+REMEDIES = (
+    *("check", "choose", "correct", "exchange", "give", "import", "leave", "measure", "remove", "separate", "sort"),
+    *("state", "take", "turn", "used once"),
+)
+SILENT_TODAY = [(kind, name) for kind, cases in UNSEEN.items() for name in cases]
+
+
+@pytest.mark.parametrize("kind", ["poses", "positions", "rates", "fields"])
+def test_a_good_file_has_no_remark(kind: str, tmp_path: Path) -> None:
+    good = GOOD[kind]()
+    (tmp_path / "good.csv").write_text(good.text())
+    assert (answer(tmp_path / "good.csv", good.model).text) == ""
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_no_wrong_input_passes_without_a_word(tmp_path: Path) -> None:
+    found = {(kind, name): each for kind, name, each in answers(tmp_path)}
+    assert {case: each.kind for case, each in found.items()} == listed()
+    for case, each in found.items():
+        assert each.kind in (REFUSED, WARNED, HARMLESS), case
+        assert each.kind == HARMLESS or any(word in each.text for word in REMEDIES), (case, each.text)
+
+
+def test_the_page_lists_every_input_and_none_is_silent() -> None:
+    rows = listed()
+    assert set(rows) == {(kind, name) for kind, cases in WRONG.items() for name in cases}
+    assert len(rows) >= 60
+    assert SILENT not in rows.values()
+    assert unseen() in PAGE.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(("kind", "name"), SILENT_TODAY)
+def test_what_a_file_cannot_show_is_listed_as_such(kind: str, name: str, tmp_path: Path) -> None:
+    """If one of these is found one day, it moves to the battery."""
+    wrong = UNSEEN[kind][name][0](GOOD[kind]())
+    (tmp_path / "wrong.csv").write_text(wrong.text())
+    assert answer(tmp_path / "wrong.csv", wrong.model).kind == SILENT
+
+
+@pytest.mark.parametrize("command", ["fit", "compare", "diagnose", "discover"])
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("beta with wrong steps a turn", "beta_deg is multiplied by 0.8"),
+        ("time in milliseconds", "in which no stage turns"),
+    ],
+)
+def test_every_command_says_it(rig: Callable[..., Any], tmp_path: Path, command: str, name: str, said: str) -> None:
+    wrong = WRONG["poses"][name](GOOD["poses"]())
+    (tmp_path / "wrong.csv").write_text(wrong.text())
+    ended = rig(command, str(tmp_path / "wrong.csv"), "--model", "linear", "--json")
+    assert said in ended.err + str(json.loads(ended.out)["residual_structure"])

@@ -1,0 +1,402 @@
+"""Plausible but physically wrong inputs: what a person, a cable or a program does to a good file of measurements.
+
+Each begins with a good file that is fitted without a remark, written out here by formulas of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from calibrations.table import Array
+from tests.calibrations.shaken import TWO, record
+from tests.calibrations.synthetic import components, turns
+from tests.calibrations.turned import in_iron
+
+NOISE_V = 50e-6  # of a mean
+SAMPLES = 5000.0
+CORNER_HZ, RATE_HZ = 15.07, 1000.0
+RHO = np.exp(-2 * np.pi * CORNER_HZ / RATE_HZ)  # from one sample to the next, behind a first-order low-pass
+INFLATION = (1 + RHO) / (1 - RHO)
+GRAVITY = 9.80131
+
+
+@dataclass(frozen=True)
+class File:
+    """Columns and constants of a file, and the model that is fitted to it; `gaps` of cells that are written as text."""
+
+    columns: Mapping[str, Array]
+    constants: Mapping[str, object] = field(default_factory=dict)
+    model: str = "linear"
+    texts: Mapping[tuple[int, str], str] = field(default_factory=dict)
+
+    @property
+    def n(self) -> int:
+        """Rows."""
+        return len(next(iter(self.columns.values())))
+
+    def text(self) -> str:
+        """The file as comma-separated values."""
+        rows = [
+            ",".join(self.texts.get((i, name), repr(float(values[i]))) for name, values in self.columns.items())
+            for i in range(self.n)
+        ]
+        return "\n".join([*(f"# {k}: {v}" for k, v in self.constants.items()), ",".join(self.columns), *rows, ""])
+
+    def changed(self, **columns: Array) -> File:
+        """The same with these columns."""
+        return replace(self, columns={**self.columns, **columns})
+
+    def stated(self, **constants: object) -> File:
+        """The same with these constants."""
+        return replace(self, constants={**self.constants, **constants})
+
+    def scaled(self, name: str, factor: float, offset: float = 0.0) -> File:
+        """The same with one column in another unit."""
+        return self.changed(**{name: self.columns[name] * factor + offset})
+
+    def scaled_all(self, names: str, factor: float) -> File:
+        """The same with several columns in another unit."""
+        return self.changed(**{name: self.columns[name] * factor for name in names.split()})
+
+    def swapped(self, one: str, other: str) -> File:
+        """The same with the values of two columns exchanged."""
+        return self.changed(**{one: self.columns[other], other: self.columns[one]})
+
+    def taken(self, rows: Array) -> File:
+        """Some rows, in this order."""
+        return replace(self, columns={name: values[rows] for name, values in self.columns.items()})
+
+    def some(self, share: float, seed: int = 6) -> Array:
+        """A random choice of rows, as a mask."""
+        return np.random.default_rng(seed).random(self.n) < share
+
+    def beside(self, other: File, every: int = 2) -> File:
+        """Rows of another sensor in place of one in `every`."""
+        rows = np.arange(self.n) % every == 1
+        return self.changed(**{k: np.where(rows, other.columns[k], v) for k, v in self.columns.items()})
+
+
+def poses(seed: int = 5, bias: float = 2.5, scale: float = 1.0) -> File:
+    """A dual-axis accelerometer on two stages."""
+    base, rng = turns(), np.random.default_rng(seed)
+    ax, ay, _ = components(base)
+    n = len(ax)
+    noise = NOISE_V * rng.standard_normal((2, n))
+    std = NOISE_V * np.sqrt(SAMPLES / INFLATION) * (1 + 0.02 * rng.standard_normal((2, n)))
+    return File(
+        {
+            **base,
+            "vx_v": bias + scale * ax + noise[0],
+            "vy_v": bias + 0.01 + 1.02 * scale * ay + noise[1],
+            "vx_std_v": std[0],
+            "vy_std_v": std[1],
+            "n": np.full(n, SAMPLES),
+            "temperature_c": 24.0 + 0.5 * np.sin(np.arange(n) / 60) + 0.002 * rng.standard_normal(n),
+        },
+        {"gravity_m_s2": GRAVITY, "filter_corner_hz": CORNER_HZ, "sample_rate_hz": RATE_HZ},
+    )
+
+
+def positions(seed: int = 1, factor: float = 1.0, bias: float = 0.03) -> File:
+    """A triaxial accelerometer held by hand, in g."""
+    rng = np.random.default_rng(seed)
+    u = Rotation.random(40, rng=rng).as_matrix()[:, 2]
+    a = 1.01 * factor * u + np.array([bias, -0.02, 0.05]) + 2e-4 * rng.standard_normal((40, 3))
+    std = 2e-3 * (1 + 0.05 * rng.standard_normal((3, 40)))
+    columns = {f"a{axis}": a[:, k] for k, axis in enumerate("xyz")}
+    columns |= {f"a{axis}_std": std[k] for k, axis in enumerate("xyz")}
+    return File(columns | {"n": np.full(40, 100.0), "t_s": 10.0 * np.arange(40)}, {"unit": "g"}, "common-scale")
+
+
+def rates(seed: int = 2, factor: float = 1.0) -> File:
+    """A gyroscope on a rate table, turned about six faces, with the accelerometer beside it."""
+    rng = np.random.default_rng(seed)
+    up = np.repeat(np.vstack([np.eye(3), -np.eye(3)]), 9, axis=0)
+    rate = np.tile([0.0, 20.0, -20.0, 50.0, -50.0, 90.0, -90.0, 140.0, -140.0], 6)
+    g = factor * rate[:, None] * up * np.array([1.0, 0.97, 1.02]) + np.array([0.3, -0.8, 0.15])
+    g += 0.0041781 * np.sin(np.radians(1.35)) * up + 0.002 * rng.standard_normal((54, 3))
+    columns = {f"g{axis}": g[:, k] for k, axis in enumerate("xyz")} | {
+        f"a{axis}": up[:, k] for k, axis in enumerate("xyz")
+    }
+    std = {f"g{axis}_std": np.full(54, 0.002 * np.sqrt(500)) for axis in "xyz"}
+    more = {"n": np.full(54, 500.0), "rate_deg_s": rate, "t_s": 20.0 * np.arange(54)}
+    return File(columns | std | more, {"latitude_deg": 1.35, "unit": "deg/s"}, "gyroscope")
+
+
+def fields(seed: int = 3) -> File:
+    """A magnetometer turned to all sides, in uT."""
+    m = in_iron(200, seed)
+    columns = {f"m{axis}": m[:, k] for k, axis in enumerate("xyz")}
+    std = {f"m{axis}_std": np.full(200, 0.05 * np.sqrt(100)) for axis in "xyz"}
+    return File(columns | std | {"n": np.full(200, 100.0)}, {"unit": "uT"}, "magnetometer")
+
+
+def motion() -> File:
+    """A shaken dual-axis accelerometer with a displacement sensor."""
+    table = record(TWO, attitudes=((45.0, 90.0), (90.0, 0.0), (30.0, 200.0)), constants={})
+    return File(dict(table.columns), table.constants)
+
+
+def still(seed: int = 4, minutes: float = 10.0) -> File:
+    """A sensor at rest: white noise behind its output filter, 100 samples a second."""
+    rng = np.random.default_rng(seed)
+    n = int(minutes * 6000)
+    return File(
+        {"t_s": np.arange(n) / 100, "vx_v": 2.5 + 1e-3 * rng.standard_normal(n)}, {"sample_rate_hz": 100}, "still"
+    )
+
+
+GOOD: Mapping[str, Callable[[], File]] = {
+    "poses": poses,
+    "positions": positions,
+    "rates": rates,
+    "fields": fields,
+    "motion": motion,
+    "still": still,
+}
+Spoil = Callable[[File], File]
+
+
+def _pick(file: File, rows: Array, name: str, value: float) -> File:
+    return file.changed(**{name: np.where(rows, value, file.columns[name])})
+
+
+def _in(file: File, cells: Callable[[float], str], name: str, rows: slice = slice(0, 3)) -> File:
+    values = file.columns[name]
+    return replace(file, texts={(i, name): cells(float(values[i])) for i in range(file.n)[rows]})
+
+
+def _back(file: File, seconds: float) -> File:
+    """A clock that is set back in the middle of the file."""
+    half = np.arange(file.n) >= file.n // 2
+    return file.changed(t_s=file.columns["t_s"] - np.where(half, seconds, 0.0))
+
+
+def _roll(name: str) -> Spoil:
+    return lambda f: f.changed(**{name: np.roll(f.columns[name], 1)})
+
+
+def _turned(f: File) -> File:
+    return f.changed(vx_v=2.5 + (f.columns["vy_v"] - 2.5), vy_v=5.0 - f.columns["vx_v"])
+
+
+def _clip(name: str, most: float) -> Spoil:
+    return lambda f: f.changed(**{name: np.minimum(f.columns[name], most)})
+
+
+def _all(names: str, of: Callable[[Array], Array]) -> Spoil:
+    return lambda f: f.changed(**{name: of(f.columns[name]) for name in names.split()})
+
+
+ANGLES, VOLTS, STDS = "alpha_deg beta_deg", "vx_v vy_v", "vx_std_v vy_std_v"
+A, M, G = "ax ay az", "mx my mz", "gx gy gz"
+
+WRONG: Mapping[str, Mapping[str, Spoil]] = {
+    "poses": {
+        "alpha and beta are exchanged": lambda f: f.swapped("alpha_deg", "beta_deg"),
+        "angles in radians": _all(ANGLES, np.radians),
+        "beta alone in radians": lambda f: f.changed(beta_deg=np.radians(f.columns["beta_deg"])),
+        "angles converted to degrees twice": _all(ANGLES, np.degrees),
+        "angles in gradians": _all(ANGLES, lambda v: v / 0.9),
+        "angles rounded to 10 deg": _all(ANGLES, lambda v: 10 * np.round(v / 10)),
+        "alpha counted from the horizontal": lambda f: f.changed(alpha_deg=90 - f.columns["alpha_deg"]),
+        "beta counts backwards": lambda f: f.scaled("beta_deg", -1.0),
+        "alpha counts backwards": lambda f: f.scaled("alpha_deg", -1.0),
+        "beta with wrong steps a turn": lambda f: f.scaled("beta_deg", 1.25),
+        "alpha with wrong steps a turn": lambda f: f.scaled("alpha_deg", 0.8),
+        "beta with half the gear ratio": lambda f: f.scaled("beta_deg", 0.5),
+        "steps a turn off by 1 %": lambda f: f.scaled("beta_deg", 1.01),
+        "the zero of beta is off by 90 deg": lambda f: f.scaled("beta_deg", 1.0, 90.0),
+        "the zero of alpha is off by 30 deg": lambda f: f.scaled("alpha_deg", 1.0, 30.0),
+        "beta lost a turn's tenth in mid-run": lambda f: f.changed(
+            beta_deg=f.columns["beta_deg"] + np.where(np.arange(f.n) > f.n // 2, 36.0, 0.0)
+        ),
+        "channels are exchanged": lambda f: f.swapped("vx_v", "vy_v"),
+        "one channel read twice": lambda f: f.changed(vy_v=f.columns["vx_v"]),
+        "the sensor is turned by 90 deg": _turned,
+        "the sensor is turned by 180 deg": _all(VOLTS, lambda v: 5.0 - v),
+        "the sensor is mounted face down": lambda f: f.changed(vy_v=5.0 - f.columns["vy_v"]),
+        "the sign of one output": lambda f: f.scaled("vx_v", -1.0),
+        "an output is stuck in most rows": lambda f: _pick(f, f.some(0.8), "vx_v", 2.5),
+        "an output is constant": lambda f: f.changed(vx_v=np.full(f.n, 2.5)),
+        "an output holds noise only": lambda f: f.changed(
+            vy_v=2.5 + NOISE_V * np.random.default_rng(7).standard_normal(f.n)
+        ),
+        "an output is saturated": _clip("vx_v", 3.0),
+        "both outputs are saturated at the supply": _all(VOLTS, lambda v: np.clip(v, 1.7, 3.3)),
+        "outputs are rounded to 0.1 V": _all(VOLTS, lambda v: np.round(v, 1)),
+        "outputs in mV": _all(VOLTS, lambda v: 1e3 * v),
+        "one output in mV": lambda f: f.scaled("vy_v", 1e3),
+        "outputs and their noise in mV": _all(f"{VOLTS} {STDS}", lambda v: 1e3 * v),
+        "outputs in ADC counts": _all(VOLTS, lambda v: np.round(v / 5 * 4096)),
+        "outputs before a divider of 10": _all(VOLTS, lambda v: v / 10),
+        "the rows of vx are shifted by one": _roll("vx_v"),
+        "the rows of the angles are shifted by one": lambda f: _roll("alpha_deg")(_roll("beta_deg")(f)),
+        "two sensors in one file": lambda f: f.beside(poses(8, 2.52)),
+        "two sensors in one file, of other scale": lambda f: f.beside(poses(8, 2.5, 1.05)),
+        "every row twice": lambda f: f.taken(np.repeat(np.arange(f.n), 2)),
+        "every row twice, without times": lambda f: replace(
+            f, columns={k: np.repeat(v, 2) for k, v in f.columns.items() if k != "t_s"}
+        ),
+        "two rows have a swapped sign": lambda f: _pick(f, np.isin(np.arange(f.n), (40, 90)), "vx_v", 0.1),
+        "rows are shuffled": lambda f: f.taken(np.random.default_rng(3).permutation(f.n)),
+        "outputs are shuffled": lambda f: f.changed(
+            **{k: np.random.default_rng(8).permutation(f.columns[k]) for k in VOLTS.split()}
+        ),
+        "time in milliseconds": lambda f: f.scaled("t_s", 1e3),
+        "time in minutes": lambda f: f.scaled("t_s", 1 / 60),
+        "time is constant": lambda f: f.scaled("t_s", 0.0),
+        "time starts again in mid-run": lambda f: f.changed(t_s=7.0 * (np.arange(f.n) % (f.n // 2))),
+        "variance in place of the standard deviation": _all(STDS, np.square),
+        "standard error in place of the standard deviation": _all(STDS, lambda v: v * np.sqrt(INFLATION / SAMPLES)),
+        "standard deviation in mV": _all(STDS, lambda v: 1e3 * v),
+        "standard deviation of one output in mV": lambda f: f.scaled("vy_std_v", 1e3),
+        "n is 1": lambda f: f.changed(n=np.ones(f.n)),
+        "n counts the rows": lambda f: f.changed(n=np.arange(1.0, f.n + 1)),
+        "n is 100 times too great": lambda f: f.scaled("n", 100.0),
+        "the filter's corner in rad/s": lambda f: f.stated(filter_corner_hz=2 * np.pi * CORNER_HZ),
+        "the filter's corner in kHz": lambda f: f.stated(filter_corner_hz=CORNER_HZ / 1e3),
+        "the filter's corner of another capacitor": lambda f: f.stated(filter_corner_hz=150.7),
+        "the sample rate in kHz": lambda f: f.stated(sample_rate_hz=1.0),
+        "the sample interval as the rate": lambda f: f.stated(sample_rate_hz=1e-3),
+        "gravity of 1": lambda f: f.stated(gravity_m_s2=1),
+        "gravity in cm/s^2": lambda f: f.stated(gravity_m_s2=980.131),
+        "gravity with a decimal comma": lambda f: f.stated(gravity_m_s2="9,80131"),
+        "local gravity is off by 0.3 %": lambda f: f.stated(gravity_m_s2=round(GRAVITY * 1.003, 5)),
+        "local gravity is off by 2 %": lambda f: f.stated(gravity_m_s2=round(GRAVITY * 1.02, 5)),
+        "temperature in kelvin": lambda f: f.scaled("temperature_c", 1.0, 273.15),
+        "temperature in Fahrenheit": lambda f: f.scaled("temperature_c", 1.8, 32.0),
+        "temperature in tenths of a degree": lambda f: f.scaled("temperature_c", 10.0),
+        "temperature in mV of the sensor": lambda f: f.scaled("temperature_c", 10.0, 500.0),
+        "a dropped decimal point": lambda f: _in(f, lambda v: f"{v:.5f}".replace(".", ""), "vx_v"),
+        "decimal commas in some rows": lambda f: _in(f, lambda v: f'"{v:.5f}"'.replace(".", ","), "vx_v"),
+        "NaN for missing readings": lambda f: _in(f, lambda _: "nan", "vx_v"),
+        "-999 for missing readings": lambda f: _pick(f, f.some(0.02), "vx_v", -999.0),
+        "-9.99 for missing readings": lambda f: _pick(f, f.some(0.02), "vx_v", -9.99),
+        "0 for missing readings": lambda f: _pick(f, f.some(0.02), "vx_v", 0.0),
+        "0 V from one row on": lambda f: _pick(f, np.arange(f.n) > 150, "vx_v", 0.0),
+        "-999 for missing temperatures": lambda f: _pick(f, f.some(0.02), "temperature_c", -999.0),
+        "0 for missing temperatures": lambda f: _pick(f, f.some(0.02), "temperature_c", 0.0),
+        "the header names vx for the temperature": lambda f: f.swapped("vx_v", "temperature_c"),
+        "the header names std for the output": lambda f: f.swapped("vx_v", "vx_std_v"),
+        "directions of the approach are reversed": lambda f: f.scaled("direction", -1.0),
+    },
+    "positions": {
+        "outputs in m/s^2 stated as g": _all(A, lambda v: 9.80665 * v),
+        "outputs in mg stated as g": _all(A, lambda v: 1e3 * v),
+        "one axis in m/s^2": lambda f: f.scaled("ax", 9.80665),
+        "one axis read twice": lambda f: f.changed(ay=f.columns["ax"]),
+        "an axis is constant": lambda f: f.changed(az=np.full(f.n, 0.02)),
+        "an axis is stuck in half of the rows": lambda f: _pick(f, f.some(0.5), "az", 0.4),
+        "an axis without its sign": lambda f: f.changed(az=np.abs(f.columns["az"])),
+        "an axis is saturated": _clip("ax", 0.6),
+        "rows of one axis are shifted by one": _roll("ay"),
+        "two sensors in one file": lambda f: f.beside(positions(1, 1.0, 0.13)),
+        "every row twice, without times": lambda f: replace(
+            f, columns={k: np.repeat(v, 2) for k, v in f.columns.items() if k != "t_s"}
+        ),
+        "variance in place of the standard deviation": _all("ax_std ay_std az_std", np.square),
+        "standard error in place of the standard deviation": _all("ax_std ay_std az_std", lambda v: v / 10),
+        "standard deviation in mg": _all("ax_std ay_std az_std", lambda v: 1e3 * v),
+        "-999 for missing readings": lambda f: _pick(f, np.arange(f.n) == 7, "ax", -999.0),
+        "0 for missing readings": lambda f: _pick(f, f.some(0.1), "ax", 0.0),
+        "the sensor moved in some positions": lambda f: f.changed(
+            **{k: f.columns[k] + np.where(np.arange(f.n) % 9 == 4, 0.2, 0.0) for k in A.split()}
+        ),
+    },
+    "rates": {
+        "the rate in rad/s": lambda f: f.changed(rate_deg_s=np.radians(f.columns["rate_deg_s"])),
+        "the rate in revolutions a minute": lambda f: f.scaled("rate_deg_s", 1 / 6),
+        "the rate without its sign": lambda f: f.changed(rate_deg_s=np.abs(f.columns["rate_deg_s"])),
+        "the table turns backwards": lambda f: f.scaled("rate_deg_s", -1.0),
+        "x and y are exchanged": lambda f: f.swapped("gx", "gy"),
+        "an axis has the wrong sign": lambda f: f.scaled("gz", -1.0),
+        "an axis is constant": lambda f: f.changed(gy=np.full(f.n, 0.3)),
+        "an axis is stuck in half of the rows": lambda f: _pick(f, f.some(0.5), "gx", 0.3),
+        "an axis is saturated": _clip("gx", 60.0),
+        "an axis in other units": lambda f: f.scaled("gx", 1e3),
+        "rows of the rate are shifted by one": _roll("rate_deg_s"),
+        "two sensors in one file": lambda f: f.beside(rates(2, 1.05)),
+        "variance in place of the standard deviation": _all("gx_std gy_std gz_std", np.square),
+        "standard error in place of the standard deviation": _all("gx_std gy_std gz_std", lambda v: v / 500**0.5),
+        "0 for missing readings": lambda f: _pick(f, f.some(0.1), "gx", 0.0),
+        "latitude in radians": lambda f: f.stated(latitude_deg=0.02356),
+        "latitude of 135": lambda f: f.stated(latitude_deg=135),
+        "gyroscope and accelerometer are exchanged": lambda f: (
+            f.swapped("gx", "ax").swapped("gy", "ay").swapped("gz", "az")
+        ),
+    },
+    "fields": {
+        "outputs in nT stated as uT": _all(M, lambda v: 1e3 * v),
+        "outputs in mG stated as uT": _all(M, lambda v: 10 * v),
+        "one axis in other units": lambda f: f.scaled("mx", 1e3),
+        "one axis read twice": lambda f: f.changed(my=f.columns["mx"]),
+        "an axis is constant": lambda f: f.changed(mz=np.full(f.n, 21.0)),
+        "an axis without its sign": lambda f: f.changed(mz=np.abs(f.columns["mz"] - 21)),
+        "an axis is saturated": _clip("mx", 40.0),
+        "rows of one axis are shifted by one": _roll("my"),
+        "two sensors in one file": lambda f: f.changed(mx=f.columns["mx"] + 5.0 * (np.arange(f.n) % 2)),
+        "variance in place of the standard deviation": _all("mx_std my_std mz_std", np.square),
+        "0 for missing readings": lambda f: _pick(f, f.some(0.1), "mx", 0.0),
+        "the accelerometer in the columns of the field": lambda f: f.changed(
+            **dict(zip(M.split(), Rotation.random(f.n, rng=np.random.default_rng(1)).as_matrix()[:, 2].T, strict=True))
+        ),
+    },
+    "motion": {
+        "time in milliseconds": lambda f: f.scaled("t_s", 1e3),
+        "displacement in mm": lambda f: f.scaled("displacement_m", 1e3),
+        "displacement in um": lambda f: f.scaled("displacement_m", 1e6),
+        "displacement with the wrong sign": lambda f: f.scaled("displacement_m", -1.0),
+        "the displacement sensor is stuck": lambda f: f.scaled("displacement_m", 0.0),
+        "displacement shifted by 10 rows": lambda f: f.changed(displacement_m=np.roll(f.columns["displacement_m"], 10)),
+        "velocity in place of displacement": lambda f: f.changed(
+            displacement_m=np.gradient(f.columns["displacement_m"], 1e-3)
+        ),
+        "outputs in mV": _all(VOLTS, lambda v: 1e3 * v),
+        "channels are exchanged": lambda f: f.swapped("vx_v", "vy_v"),
+        "alpha and beta are exchanged": lambda f: f.swapped("alpha_deg", "beta_deg"),
+        "an output is constant": lambda f: f.changed(vx_v=np.full(f.n, 2.5)),
+        "the filter's corner in rad/s": lambda f: f.stated(filter_corner_hz=2 * np.pi * CORNER_HZ),
+        "the filter's corner in kHz": lambda f: f.stated(filter_corner_hz=CORNER_HZ / 1e3),
+        "gravity of 1": lambda f: f.stated(gravity_m_s2=1),
+    },
+    "still": {
+        "time in milliseconds": lambda f: f.scaled("t_s", 1e3),
+        "time is constant": lambda f: f.scaled("t_s", 0.0),
+        "rows are shuffled": lambda f: f.taken(np.random.default_rng(3).permutation(f.n)),
+        "every row twice": lambda f: f.taken(np.repeat(np.arange(f.n), 2)),
+        "the clock is set back": lambda f: _back(f, 60.0),
+        "an output is constant": lambda f: f.changed(vx_v=np.full(f.n, 2.5)),
+        "an output is stuck for a minute": lambda f: _pick(f, abs(np.arange(f.n) - 20000) < 3000, "vx_v", 2.5),
+        "outputs in mV": lambda f: f.scaled("vx_v", 1e3),
+        "-999 for missing readings": lambda f: _pick(f, f.some(0.001), "vx_v", -999.0),
+        "0 for missing readings": lambda f: _pick(f, f.some(0.001), "vx_v", 0.0),
+        "the sensor was moved in mid-record": lambda f: f.changed(
+            vx_v=f.columns["vx_v"] + np.where(np.arange(f.n) > f.n // 2, 0.3, 0.0)
+        ),
+        "an output is saturated": _clip("vx_v", 2.501),
+    },
+}  # fmt: skip
+
+UNSEEN: Mapping[str, Mapping[str, tuple[Spoil, str]]] = {  # what no data of this kind can show, and what shows it
+    "positions": {
+        "x and y are exchanged": (
+            lambda f: f.swapped("ax", "ay"),
+            "only the magnitude of gravity is known; a run of poses at known angles shows it",
+        ),
+        "one axis has the wrong sign": (
+            lambda f: f.scaled("ax", -1.0),
+            "only the magnitude of gravity is known; a run of poses at known angles shows it",
+        ),
+    },
+    "poses": {
+        "outputs and their noise before a divider of 10": (
+            lambda f: f.scaled_all(f"{VOLTS} {STDS}", 0.1),
+            "a sensor of a tenth of the sensitivity gives the same file; compare with the data sheet",
+        ),
+    },
+}
