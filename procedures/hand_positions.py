@@ -25,6 +25,9 @@ WINDOW_S = 0.5  # of a test of rest
 LEARNED = 20  # windows of rest that show the noise
 FEWEST = 12  # positions: nine parameters, and three that check them
 TABLE = "Does the sensor lie on a table, and is its cable long enough to turn it upside down? Let it go."
+KNOWN = "this position is known already"
+SIDES = 6  # the first positions
+TRIES = 2  # rests at known positions before another orientation is wanted
 FLAT = (0.0, 0.0, 1.0)
 
 
@@ -63,10 +66,16 @@ def hand_positions(
     rig = replace(rig, adc=rig.adc.only(*OUTPUTS))
     rig.confirm("at-rest", TABLE)
     noise = _learn_noise(rig, analysis, wait_s)
-    while not _suffices(course := analysis.course(rig.measured(), noise), target_g, most_positions):
+    skipped: list[str] = []
+    while not _suffices(course := analysis.course(rig.measured(), noise, skipped), target_g, most_positions):
         rig.host.expect(max(1, FEWEST - course.count))
         rig.host.guide(_guidance(course, target_g))
         rest = _next_rest(rig, analysis, course, noise, rest_s, wait_s)
+        if rest is None:
+            skipped.append(course.words)
+            continue
+        if course.count >= SIDES:  # the directions are known, so no position has a wrong name any more
+            skipped.clear()
         rig.keep(Pose(0.0, 0.0, path=course.words), samples=rest, temperature_c=rig.oven.temperature_c())
     rig.host.guide(_guidance(course, target_g, ended=True))
 
@@ -107,25 +116,29 @@ def _learn_noise(rig: Session, analysis: HandAnalysis, wait_s: float) -> NoiseAt
 
 def _next_rest(
     rig: Session, analysis: HandAnalysis, course: HandCourse, noise: NoiseAtRest, rest_s: float, wait_s: float
-) -> Rest:
+) -> Rest | None:
     """The next rest at a new position. The first window of a rest is left out: the hand has just let go.
 
-    Raises NoAnswer after `wait_s` without one.
+    None after TRIES rests at known positions: an earlier position was not the one that the person was told, and is the
+    wanted one. Raises NoAnswer after `wait_s` without one.
     """
     windows: list[Samples] = []
-    doing = _Doing(rig)
+    doing, refused = _Doing(rig), 0
     for _ in range(round(wait_s / WINDOW_S)):
         windows.append(rig.adc.acquire(WINDOW_S))
         found = analysis.judge([w.volts for w in windows], noise)
         if not found.still:
             doing.say(f"{course.words}: the sensor moves ({found.noise:.2g} times the noise at rest, by {found.by})")
             windows = windows[1:] if found.by == "creep" else []
+            if refused >= TRIES:
+                return None
         elif len(windows) * WINDOW_S <= rest_s:
             doing.say(f"{course.words}: at rest, wait")
         elif course.is_new((rest := Rest.of(windows[1:])).volts.mean(axis=0)):
             return rest
         else:
-            doing.say(f"this position is known already; needed: {course.words}")
+            refused += not doing.text.startswith(KNOWN)
+            doing.say(f"{KNOWN}; needed: {course.words}")
             windows = windows[1:]
     raise NoAnswer(f"no new position for {wait_s:g} s; needed: {course.words}; {doing.text}; resume the run to go on")
 

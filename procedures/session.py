@@ -252,7 +252,8 @@ class HandAnalysis(Protocol):
     def judge(self, rest: Sequence[NDArray[np.float64]], noise: NoiseAtRest) -> Stillness:
         """The test of the last of successive windows, each (n, 3)."""
 
-    def course(self, dwells: Sequence[Dwell], noise: NoiseAtRest) -> HandCourse: ...
+    def course(self, dwells: Sequence[Dwell], noise: NoiseAtRest, skipped: Sequence[str]) -> HandCourse:
+        """The positions so far. Orientations that were `skipped` (their words) are not wanted."""
 
 
 @dataclass(frozen=True)

@@ -10,13 +10,14 @@ Source  Tedaldi, Pretto and Menegatti, ICRA 2014: calibration of a triad from po
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
 from calibrations.analyses.stillness import NoiseAtRest
 from calibrations.design.orientations import (
+    FIRST_SIDES,
     KNOWN_AFTER,
     Next,
     directions_up,
@@ -46,10 +47,11 @@ class HandPosition:
 
 @dataclass(frozen=True)
 class HandCourse:
-    """The positions so far. `noise` is that of the sensor at rest."""
+    """The positions so far. `noise` is that of the sensor at rest. Orientations `skipped` (k, 3) are not wanted."""
 
     positions: tuple[HandPosition, ...]
     noise: NoiseAtRest
+    skipped: Array = field(default_factory=lambda: np.zeros((0, 3)))
 
     @property
     def count(self) -> int:
@@ -85,7 +87,8 @@ class HandCourse:
     @cached_property
     def next(self) -> Next:
         """The orientation that tells most."""
-        return next_orientation(self.ups, self.ups[-1] if len(self.ups) else None)
+        last = self.ups[-1] if len(self.ups) else None
+        return next_orientation(np.vstack([self.ups, self.skipped]), last, FIRST_SIDES + len(self.skipped))
 
     def is_new(self, mean: Array) -> bool:
         """Whether a rest with this mean (3,) is worth taking."""

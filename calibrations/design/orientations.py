@@ -57,9 +57,13 @@ def directions_up(outputs: Array, told: Array) -> Array:
     return np.asarray(away / np.linalg.norm(away, axis=1, keepdims=True))
 
 
-def next_orientation(taken: Array, last: Array | None = None) -> Next:
-    """The orientation that tells most after those `taken` (n, 3). Among equals it is the nearest to `last` (3,)."""
-    candidates = ORIENTATIONS[:FIRST_SIDES] if len(taken) < FIRST_SIDES else ORIENTATIONS
+def next_orientation(taken: Array, last: Array | None = None, sides: int = FIRST_SIDES) -> Next:
+    """The orientation that tells most after those `taken` (n, 3). Among equals it is the nearest to `last` (3,).
+
+    Of the first `sides` orientations each is a whole side, as long as there is one that is not taken.
+    """
+    free = not len(taken) or (ORIENTATIONS[:FIRST_SIDES] @ taken.T).max(axis=1).min() < 1 - 1e-6
+    candidates = ORIENTATIONS[:FIRST_SIDES] if len(taken) < sides and free else ORIENTATIONS
     gains = gain(taken, candidates)
     near = candidates @ (candidates[0] if last is None else last)
     best = np.flatnonzero(gains >= gains.max() * (1 - ALIKE))

@@ -28,8 +28,11 @@ class HandAnalysis:
 
         return judge_window(rest, cast(Any, noise))
 
-    def course(self, dwells: Sequence[Dwell], noise: NoiseAtRest) -> HandCourse:
-        """The positions so far. The path of a pose has the orientation that was wanted, in words."""
+    def course(self, dwells: Sequence[Dwell], noise: NoiseAtRest, skipped: Sequence[str] = ()) -> HandCourse:
+        """The positions so far; orientations with the words `skipped` are not wanted.
+
+        The path of a pose has the orientation that was wanted, in words.
+        """
         from calibrations.analyses.hand_positions import HandCourse as Course
         from calibrations.analyses.hand_positions import HandPosition
         from calibrations.design.orientations import ORIENTATIONS, named_orientation
@@ -39,4 +42,5 @@ class HandAnalysis:
             told = named_orientation(dwell.pose.path)
             return HandPosition(mean, std, dwell.n, ORIENTATIONS[0] if told is None else told, dwell.t_s)
 
-        return Course(tuple(map(position, dwells)), cast(Any, noise))
+        unwanted = np.array([up for words in skipped if (up := named_orientation(words)) is not None]).reshape(-1, 3)
+        return Course(tuple(map(position, dwells)), cast(Any, noise), unwanted)

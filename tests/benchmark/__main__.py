@@ -68,6 +68,7 @@ def _figures(folder: Path) -> Iterator[tuple[str, Figure]]:
     yield "live discovery", _live(folder)
     yield "Allan deviation", _allan(folder)
     yield "noise coefficients", _noise(folder)
+    yield "positions by hand", json.loads(subject(folder, "hands", "100").out)
     yield "compensation in C", json.loads(subject(folder, "compensation").out)
     yield "100 kills", _inside("", subject(folder, "kills", "100"))
     yield "1,000 pushes from 8 rigs", json.loads(subject(folder, "push").out)

@@ -104,6 +104,24 @@ def test_a_position_that_is_known_is_not_taken_twice() -> None:
     assert len(book.dwells) == 1
 
 
+def test_a_side_that_was_taken_under_another_name_is_not_wanted_for_ever() -> None:
+    """At first the zero is not known, so a wrong side counts as the one that was told. Later that side is wanted."""
+    world = HandheldWorld(WorldConfig.ideal(), 1, Handheld(hand=CALM))
+    rig, book = session(world)
+    follow = book.guide
+
+    def wrong_at_first(guidance: Guidance) -> None:
+        wrong = guidance.moves and not guidance.taken
+        follow(replace(guidance, up=(0.0, 0.0, 1.0)) if wrong else guidance)
+
+    book.guide = wrong_at_first  # type: ignore[method-assign]
+    hand_positions(replace(rig, by_hand=HandAnalysis()))
+    assert FEWEST <= len(book.dwells) <= FEWEST + 2
+    wanted = [guidance.up for guidance in book.guided if guidance.moves]
+    assert wanted.count((0.0, 0.0, 1.0)) <= 2
+    assert np.linalg.svd(ups(book))[1].min() > 1.0
+
+
 def test_the_first_rest_must_be_quiet() -> None:
     world = HandheldWorld(WorldConfig.ideal(), 1, Handheld(hand=replace(CALM, patience_s=0.3)))
     world.turn_by_hand((0.0, 0.0, 1.0))

@@ -1,0 +1,191 @@
+"""Simulated sensors in simulated hands: calibrated by hand-positions, by two other prescriptions, and on a stage.
+
+The other prescriptions are those of two programs that calibrate without a stage; no code of theirs is used.
+
+imu_tk   30 s at rest, then 12 orientations or more, about 4 s each; a window of 101 samples is at rest if the norm of
+         its variances is below a multiple, 2 to 10, of that at first; the multiple with the least residual wins
+imucal   six sides, 3 s each, as Ferraris et al.: means of opposite sides give the zero of their own axis and the
+         gains; the sides count as exact
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from calibrations.design.orientations import ORIENTATIONS
+from calibrations.table import Array
+from drivers.handheld.hand import Hand
+from drivers.handheld.triad import noise_v, steady_v
+from drivers.handheld.world import INPUTS, Handheld, HandheldWorld
+from drivers.world.config import WorldConfig
+from procedures.hand_positions import hand_positions
+from procedures.session import Samples
+from rig.instruments.by_hand import HandAnalysis
+from rig.record.values import Block
+from tests.procedures.bench import Adc, session
+
+RATE_HZ = 200.0
+DEG = np.pi / 180
+ENOUGH = 12  # intervals for imu_tk
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Zeros b (3,) and matrix M (3, 3) of outputs v = b + M a, with the positions and the time that they took."""
+
+    b: Array
+    M: Array
+    positions: int
+    time_s: float
+
+    @property
+    def gains(self) -> Array:
+        """Output per g along each sensing axis, shape (3,)."""
+        return np.asarray(np.linalg.norm(self.M, axis=1))
+
+    @property
+    def angles_deg(self) -> Array:
+        """Departures of the sensing axes from 90 deg: xy, xz, yz; shape (3,)."""
+        rows = self.M / self.gains[:, None]
+        return np.asarray([np.arcsin(rows[i] @ rows[j]) / DEG for i, j in ((0, 1), (0, 2), (1, 2))])
+
+    def errors(self, true: Calibration) -> dict[str, Array]:
+        """Errors of zeros in mg, gains in per mille, angles in deg, each (3,)."""
+        return {
+            "bias_mg": 1e3 * (self.b - true.b) / true.gains,
+            "scale_per_mille": 1e3 * (self.gains / true.gains - 1),
+            "angle_deg": self.angles_deg - true.angles_deg,
+        }
+
+
+class SlowAdc(Adc):
+    """The converter of the bench of a hand: 200 Hz."""
+
+    def acquire(self, duration_s: float) -> Samples:
+        start_s, n = self.world.now_s, round(duration_s * RATE_HZ)
+        volts = self.world.adc_volts(self.channels, start_s, 1 / RATE_HZ, n)
+        return Block(volts, self.channels, RATE_HZ, start_s)
+
+
+def world_of(seed: int, hand: Hand | None = None) -> HandheldWorld:
+    """One sensor and one hand."""
+    return HandheldWorld(WorldConfig.ideal(), seed, Handheld(hand=hand or Hand()))
+
+
+def truth(world: HandheldWorld) -> Calibration:
+    """The calibration of a perfect laboratory."""
+    masses = world.triad.x, world.triad.y, world.triad.z
+    rows = [
+        mass.volts_per_g
+        * (np.cos(mass.leans_deg * DEG) * np.eye(3)[k] + np.sin(mass.leans_deg * DEG) * np.eye(3)[k - 2])
+        for k, mass in enumerate(masses)
+    ]
+    return Calibration(np.array([mass.zero_v for mass in masses]), np.array(rows), 0, 0.0)
+
+
+def by_procedure(seed: int, hand: Hand | None = None, target_g: float = 0.001) -> Calibration:
+    """hand-positions, with the estimate of all programs here."""
+    world = world_of(seed, hand)
+    rig, book = session(world)
+    hand_positions(replace(rig, adc=SlowAdc(world), by_hand=HandAnalysis()), target_g=target_g)
+    means = np.array([[dwell.means[name] for name in INPUTS] for dwell in book.dwells])
+    b, M, _ = magnitude_fit(means)
+    return Calibration(b, M, len(means), world.now_s)
+
+
+def by_imu_tk(seed: int, hand: Hand | None = None, positions: int = 16, every_s: float = 8.0) -> Calibration | None:
+    """The prescription of imu_tk; None if no multiple leaves 12 intervals ("not enough intervals").
+
+    The person gives each of `positions` `every_s`, as nothing tells whether it was taken.
+    """
+    world = world_of(seed, hand)
+    rng = np.random.default_rng([seed, 99])
+    blocks = [_samples(world, 30.0)]
+    order = rng.permutation(len(ORIENTATIONS))
+    for up in (order[k % len(order)] for k in range(positions)):
+        world.turn_by_hand(ORIENTATIONS[up])
+        blocks.append(_samples(world, every_s))
+    samples = np.vstack(blocks)
+    spread = _moving_variance(samples, 101)
+    at_first = float(np.median(spread[:5000]))
+    found = []
+    for multiple in range(2, 11):
+        means = _intervals(samples, spread < multiple * at_first, 101, round(1.0 * RATE_HZ))
+        if len(means) >= ENOUGH:
+            found.append((*magnitude_fit(means), len(means)))
+    if not found:
+        return None
+    b, M, _, count = min(found, key=lambda each: each[2])
+    return Calibration(b, M, count, world.now_s)
+
+
+def by_imucal(seed: int, hand: Hand | None = None, rest_s: float = 3.0) -> Calibration:
+    """The prescription of imucal: six sides; a person marks the rests afterwards, here without an error.
+
+    No side is a wrong one: with six sides a person notices it, and the method would not survive it.
+    """
+    world, means = world_of(seed, replace(hand or Hand(), errs=0.0)), []
+    for k in range(6):
+        up = np.eye(3)[k // 2] * (1 - 2 * (k % 2))
+        world.turn_by_hand(up)
+        _samples(world, 4.0)
+        while any(s.tremor for s in world.script.segments if s.start_s <= world.now_s < s.end_s):
+            _samples(world, 0.5)  # the person marks no stretch in which the hand holds the sensor
+        means.append(_samples(world, rest_s).mean(axis=0))
+    faces = np.array(means).reshape(3, 2, 3)
+    return Calibration(np.diag(faces.mean(axis=1)).copy(), (faces[:, 0] - faces[:, 1]).T / 2, 6, world.now_s)
+
+
+def on_stage(seed: int, dwell_s: float = 5.0) -> Calibration:
+    """26 exact orientations, `dwell_s` each, with a move of 4 s between them."""
+    world = world_of(seed)
+    rng = np.random.default_rng([seed, 98])
+    memory, wander, means = np.zeros(3), world.triad.wander_v * rng.standard_normal(3), []
+    for up in ORIENTATIONS:
+        n = round(dwell_s * RATE_HZ)
+        noise, memory, wander = noise_v(world.triad, memory, wander, 1 / RATE_HZ, n, rng)
+        means.append(steady_v(world.triad, up[None])[0] + noise.mean(axis=0))
+    columns = np.column_stack([np.ones(len(ORIENTATIONS)), ORIENTATIONS])
+    solved = np.linalg.lstsq(columns, np.array(means), rcond=None)[0]
+    return Calibration(solved[0], solved[1:].T, len(ORIENTATIONS), (dwell_s + 4.0) * len(ORIENTATIONS))
+
+
+def magnitude_fit(means: Array) -> tuple[Array, Array, float]:
+    """b (3,), lower triangular M (3, 3) and the rms residual in g, so that |M^-1 (v - b)| = 1 for all means (n, 3)."""
+    middle = means.mean(axis=0)
+    size = float(np.linalg.norm(means - middle, axis=1).mean())
+    lower = np.tril_indices(3)
+
+    def residual(theta: Array) -> Array:
+        inverse = np.zeros((3, 3))
+        inverse[lower] = theta[3:]
+        return np.asarray(np.linalg.norm(((means - middle) / size - theta[:3]) @ inverse.T, axis=1) - 1)
+
+    found = least_squares(residual, np.concatenate([np.zeros(3), np.eye(3)[lower]]))
+    inverse = np.zeros((3, 3))
+    inverse[lower] = found.x[3:]
+    return middle + size * found.x[:3], size * np.linalg.inv(inverse), float(np.sqrt(2 * found.cost / len(means)))
+
+
+def _samples(world: HandheldWorld, duration_s: float) -> Array:
+    return world.adc_volts(INPUTS, world.now_s + 1 / RATE_HZ, 1 / RATE_HZ, round(duration_s * RATE_HZ))
+
+
+def _moving_variance(samples: Array, width: int) -> Array:
+    """Norm of the three variances in a window about each sample, shape (n,)."""
+    centred = samples - samples.mean(axis=0)
+    first, second = (np.cumsum(np.vstack([np.zeros(3), part]), axis=0) for part in (centred, centred**2))
+    variance = (second[width:] - second[:-width]) / width - ((first[width:] - first[:-width]) / width) ** 2
+    norm = np.linalg.norm(variance, axis=1)
+    return np.pad(norm, (width // 2, len(samples) - len(norm) - width // 2), constant_values=np.inf)
+
+
+def _intervals(samples: Array, still: Array, width: int, shortest: int) -> Array:
+    """Means of the stretches at rest of `shortest` samples or more, shape (k, 3)."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(int), [0]])))
+    bounds = [(a, b) for a, b in pairwise(edges) if still[a] and b - a >= shortest]
+    return np.array([samples[a:b].mean(axis=0) for a, b in bounds]).reshape(-1, 3)
