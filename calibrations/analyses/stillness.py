@@ -28,7 +28,7 @@ BLOCK_S = 0.05  # longer than the correlation of the noise behind a filter of 15
 LEARNED_WINDOWS = 20
 SUCCESSIVE = 2 / 3  # efficiency of a variance from successive differences (von Neumann, 1941)
 EACH_AXIS = 1 / 2  # of the pooled degrees of freedom: each axis is divided by an uncertain variance of its own
-LEAST_FREEDOM = 1 / 8  # of the degrees of freedom of independent samples
+LEAST_FREEDOM = 1 / 16  # of the degrees of freedom of independent samples
 TESTS = ("shake", "sway", "creep")
 
 
@@ -96,15 +96,6 @@ def judge_window(rest: Sequence[Array], noise: NoiseAtRest) -> Stillness:
     creep = _creep_ratio(np.array([w.mean(axis=0) for w in rest]), noise, share) if len(rest) > 1 else 0.0
     spread = float(np.sqrt(np.mean(sum(_variances(rest[-1], noise.rate_hz)) / (noise.shake + noise.sway))))
     return Stillness(creep, "creep", spread) if creep > ratio else Stillness(ratio, by, spread)
-
-
-def is_quieter(window: Array, noise: NoiseAtRest) -> bool:
-    """Whether a window is certainly quieter than the noise: then the sensor was not at rest when it was learned."""
-    pairs = zip(_variances(window, noise.rate_hz), (noise.shake, noise.sway), noise.freedom, strict=True)
-    return all(
-        freedom > 0 and float(np.mean(v / known)) < fdtri(freedom, noise.windows * freedom, FALSE_ALARM / 10)
-        for v, known, freedom in pairs
-    )
 
 
 def _window_ratio(window: Array, noise: NoiseAtRest, alarm: float) -> tuple[float, str]:

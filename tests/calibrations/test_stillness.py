@@ -10,7 +10,6 @@ from calibrations.analyses.stillness import (
     FALSE_ALARM,
     LEARNED_WINDOWS,
     NoiseAtRest,
-    is_quieter,
     judge_window,
     learn_noise,
 )
@@ -91,14 +90,6 @@ def test_the_noise_is_not_learned_from_a_sensor_that_was_touched() -> None:
     assert learn_noise(touched, RATE_HZ) is None
     drifting = [w + 1e-3 * k for k, w in enumerate(windows)]
     assert learn_noise(drifting, RATE_HZ) is None
-
-
-def test_a_noise_that_was_learned_in_a_trembling_hand_is_too_large(noise: NoiseAtRest) -> None:
-    rng = np.random.default_rng(5)
-    held = learn_noise([w + 5e-3 * rng.standard_normal((WINDOW, 3)) for w in at_rest(LEARNED_WINDOWS, 4)], RATE_HZ)
-    assert held is not None
-    assert is_quieter(at_rest(1, 97)[0], held)
-    assert not any(is_quieter(w, noise) for w in at_rest(50, 96))
 
 
 def test_few_samples_in_a_block_leave_the_sway() -> None:
