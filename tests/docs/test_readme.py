@@ -1,4 +1,4 @@
-"""README.md, followed by a reader from top to bottom; and nothing that exists goes without a word."""
+"""README.md and the how-to pages, followed by a reader from top to bottom; and nothing goes without a word."""
 
 from __future__ import annotations
 
@@ -14,29 +14,37 @@ from rig.cli import Commands
 from rig.cli import rig as group
 from tests.docs.markdown import ROOT, commands, gist, section
 
-FOLLOWED = ("My own measurements", "My first real instrument")
+FOLLOWED = {
+    "README.md": "A calibration in minutes",
+    "docs/how-to/measurements.md": "My own measurements",
+    "docs/how-to/instrument.md": "My first real instrument",
+}
 COMMANDS = Commands().list_commands(click.Context(group))
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").rglob("*.md"))]
 LINK = re.compile(r"\]\(([^)#:\s]*)(?:#([^)\s]+))?\)")
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("title", FOLLOWED)
-def test_a_section_works_as_written(title: str, follow: Callable[..., Any]) -> None:
-    follow(commands(section("README.md", title)))
+@pytest.mark.parametrize(("page", "title"), FOLLOWED.items())
+def test_a_section_works_as_written(page: str, title: str, follow: Callable[..., Any]) -> None:
+    follow(commands(section(page, title)))
 
 
 @pytest.mark.slow
 def test_the_first_story_works_as_written_and_makes_the_picture(tmp_path: Path, follow: Callable[..., Any]) -> None:
-    follow(commands(section("README.md", "Find what is missing")))
+    follow(commands(section("docs/how-to/commands.md", "Find what is missing")))
     made, shown = tmp_path / "pictures" / "waterfall.svg", ROOT / "docs" / "falling-error.svg"
-    assert labels(made) == labels(shown), "docs/falling-error.svg: make it again as README.md says"
+    assert labels(made) == labels(shown), "docs/falling-error.svg: make it again as docs/how-to/commands.md says"
     assert shown.stat().st_size < 200_000
 
 
 def labels(picture: Path) -> list[str]:
     """The words in a picture."""
     return [gist(text) for text in re.findall(r">([^<>]+)</text>", picture.read_text(encoding="utf-8"))]
+
+
+def test_the_readme_is_one_page() -> None:
+    assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) < 130
 
 
 def test_the_two_commands_are_targets_of_the_makefile() -> None:
@@ -48,7 +56,7 @@ def test_the_two_commands_are_targets_of_the_makefile() -> None:
 
 def test_what_the_page_shows_of_an_own_effect_is_that_of_the_recipe() -> None:
     recipe = section("CONTRIBUTING.md", "An effect")
-    shown = re.findall(r"```text\n(.*?)```", section("README.md", "My own effect"), re.DOTALL)
+    shown = re.findall(r"```text\n(.*?)```", section("docs/how-to/effect.md", "My own effect"), re.DOTALL)
     assert shown[0] in recipe
     assert "worm-error" in shown[1]
 
