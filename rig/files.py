@@ -16,11 +16,15 @@ def require_out(out: Path, *inputs: str | Path | None) -> None:
     """Raises OutputError if the folder of `out` is missing, or if `out` is a device or one of the input files."""
     if not out.parent.is_dir():
         raise OutputError(f"{out}: there is no folder {out.parent}; make it, or give another file")
-    if out.exists() and not out.is_file():
-        raise OutputError(f"{out}: is not a regular file, so it is not overwritten; give another file")
+    _require_regular(out)
     for file in inputs:
         if file is not None and Path(file).exists() and out.exists() and out.samefile(file):
             raise OutputError(f"{out}: this would overwrite the input file {file}; give another file")
+
+
+def _require_regular(out: Path) -> None:
+    if out.exists() and not out.is_file():
+        raise OutputError(f"{out}: is not a regular file, so it is not overwritten; give another file")
 
 
 def make_folder(folder: Path) -> None:
@@ -32,7 +36,8 @@ def make_folder(folder: Path) -> None:
 
 
 def write_whole(out: Path, content: str | bytes) -> None:
-    """Write a file completely or not at all. Raises OutputError."""
+    """Write a file completely or not at all, and never in the place of a device. Raises OutputError."""
+    _require_regular(out)
     draft = out.with_name(f".{out.name}.{os.getpid()}")
     try:
         draft.write_bytes(content.encode() if isinstance(content, str) else content)

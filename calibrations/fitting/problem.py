@@ -214,7 +214,7 @@ class RateProblem(Problem):
     @staticmethod
     def check(model: Model, table: Table) -> None:  # noqa: ARG004
         """Raises DataError for an output that never changes."""
-        _check_changes(table, "each gyroscope output must change when the table turns")
+        _check_changes(table, "each gyroscope output must change when the table turns; check its channel and its cable")
 
 
 class PositionProblem(Problem):
@@ -228,7 +228,7 @@ class PositionProblem(Problem):
                 f"{table.source}: models of positions need the columns ax, ay, az, or mx, my, mz; "
                 f"it has: {', '.join(table.columns)}"
             )
-        _check_changes(table, "each axis must point up and down in the positions")
+        _check_changes(table, "each axis must point up and down in the positions; check its channel and its cable")
 
     @property
     def channels(self) -> tuple[str, ...]:

@@ -274,7 +274,7 @@ class Ends:
         """Raises DataError where the channel is at a limit, or does not change at all."""
         if len({value for value, _ in self._ends.values()}) == 1:
             raise DataError(
-                f"{source}: every sample is the same; is the sensor connected, powered and not at its limit?"
+                f"{source}: every sample is the same; check that the sensor is connected, powered and not at its limit"
             )
         for name, (value, count) in self._ends.items():
             if count > max(CLIPPED * self._n, CLIPPED_BEYOND_USUAL * self._alike * self._n, 3):

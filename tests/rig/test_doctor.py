@@ -56,7 +56,7 @@ def test_a_bench_goes_with_it_and_no_secret(rig: Callable[..., Any], tmp_path: P
 
 def test_an_archive_that_cannot_be_written_is_said(rig: Callable[..., Any], tmp_path: Path) -> None:
     ended = rig("doctor", "--out", str(tmp_path / "nowhere" / "doctor.zip"))
-    assert (ended.status, "give another with --out" in ended.err) == (2, True)
+    assert (ended.status, "give another file" in ended.err) == (2, True)
 
 
 def recorded(folder: Path, poses: int = 60) -> str:

@@ -192,7 +192,7 @@ def test_bad_input_is_one_message(rig: Rig, folder: Path, command: str) -> None:
         "gap.csv": "analyse the parts between the gaps separately",
         "late.csv": "samples must be evenly spaced: record again with every sample",
         "rate.csv": "the stated rate is 100 samples a second, the column t_s gives 10; correct one",
-        "constant.csv": "every sample is the same; is the sensor connected",
+        "constant.csv": "every sample is the same; check that the sensor is connected",
         "clipped.csv": "the channel is clipped; choose a wider range",
         "short.csv": "50 samples; the noise of a record needs 64 or more",
     }.items():

@@ -163,12 +163,24 @@ def test_a_line_break_in_a_name_makes_no_constant_in_an_export(tmp_path: Path) -
     assert (constants["gravity_m_s2"], sorted(constants)) == (9.8, ["gravity_m_s2", "sensor"])
 
 
-def test_a_device_is_not_overwritten(rig: Callable[..., Any], tmp_path: Path) -> None:
-    (tmp_path / "data.csv").write_text("alpha_deg,beta_deg,vx_v\n90,0,2.5\n90,90,3.5\n")
-    os.mkfifo(tmp_path / "device")
-    ended = rig("export", str(tmp_path / "data.csv"), "--format", "csv", "--out", str(tmp_path / "device"))
+WRITERS = (
+    ("export", "data.csv", "--format", "csv", "--out", "device"),
+    ("plan", "sweep", "--step-deg", "45", "--out", "device"),
+    ("draw", "--alpha", "45", "--beta", "90", "--out", "device.svg"),
+    ("doctor", "--out", "device"),
+)
+
+
+@pytest.mark.parametrize("words", WRITERS, ids=lambda words: words[0])
+def test_a_device_is_not_overwritten(
+    rig: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("data.csv").write_text("alpha_deg,beta_deg,vx_v\n90,0,2.5\n90,90,3.5\n")
+    os.mkfifo(words[-1])
+    ended = rig(*words)
     assert (ended.status, "is not a regular file" in ended.err) == (2, True)
-    assert (tmp_path / "device").is_fifo()
+    assert Path(words[-1]).is_fifo()
 
 
 def test_one_time_for_all_poses_is_no_fault_of_the_program(rig: Callable[..., Any], tmp_path: Path) -> None:

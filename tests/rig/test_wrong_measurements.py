@@ -14,7 +14,20 @@ from tests.rig.wrong_measurements import GOOD, UNSEEN, WRONG
 from tests.rig.wrong_page import PAGE, answers, listed, unseen
 
 REMEDIES = (
-    *("check", "choose", "correct", "exchange", "give", "import", "leave", "measure", "remove", "separate", "sort"),
+    *(
+        "check",
+        "choose",
+        "must be from",
+        "correct",
+        "exchange",
+        "give",
+        "import",
+        "leave",
+        "measure",
+        "remove",
+        "separate",
+        "sort",
+    ),
     *("state", "take", "turn", "used once"),
 )
 SILENT_TODAY = [(kind, name) for kind, cases in UNSEEN.items() for name in cases]

@@ -15,7 +15,7 @@ from calibrations.text import columns
 from rig.bench import read_bench
 from rig.cli.terminal.output import bench_option, emit, json_option
 from rig.errors import OutputError, RecordError
-from rig.files import home
+from rig.files import home, require_out
 from rig.record.recover import recover
 from rig.services.health import Finding, findings, last_run, list_runs, versions, without_secrets
 
@@ -43,6 +43,7 @@ def command(out: Path | None, run: str | None, folder: Path | None, bench_file: 
         return _recovered(folder, as_json)
     found = findings()
     archive = out or Path(f"rig-doctor-{datetime.now(UTC):%Y%m%d-%H%M%S}.zip")
+    require_out(archive)
     parts = _parts(found, run, bench_file)
     _write(archive, parts)
     if as_json:
