@@ -66,14 +66,16 @@ def diagnose(data: Table, model: GivenModel) -> Diagnosis[Fit]:
     return diagnosed(data, _model(model))
 
 
-def discover(data: Table, model: GivenModel, without: Sequence[str] = ()) -> Discovery[Fit]:
-    """`model` with the effects that it misses on `data`, added one by one.
+def discover(data: Table, model: GivenModel, without: Sequence[str] = (), enough: str = "") -> Discovery[Fit]:
+    """`model` with the effects that it misses on `data`, added one by one. Raises ModelError.
 
-    `without`: places of the signal chain, such as "own-response", that the search leaves out.
+    without   places of the signal chain, such as "own-response", that the search leaves out
+    enough    an error on unseen data at which the search stops, such as "0.5mg", "2mV" or "1.5floors"
     """
+    from calibrations.discovery.enough import parse_enough
     from calibrations.loop import discover as discovered
 
-    return discovered(data, _model(model), without=without)
+    return discovered(data, _model(model), without=without, enough=parse_enough(enough) if enough else None)
 
 
 def noise(data: Table | Array, rate_hz: float | None = None) -> NoiseAnalysis:

@@ -17,6 +17,7 @@ from calibrations.model import Model
 from calibrations.table import Table
 
 if TYPE_CHECKING:
+    from calibrations.discovery.enough import Enough
     from calibrations.noise.dataset import StillRecord
     from calibrations.noise.fit import NoiseFit
     from calibrations.noise.record import Still
@@ -65,21 +66,34 @@ def diagnose(data: Table | Still, model: Model, effects: Effects | None = None) 
 
 @overload
 def discover(
-    data: Table, model: Model, effects: Effects | None = None, without: Sequence[str] = ()
+    data: Table,
+    model: Model,
+    effects: Effects | None = None,
+    without: Sequence[str] = (),
+    enough: Enough | None = None,
 ) -> Discovery[Fit]: ...
 @overload
 def discover(
-    data: Still, model: Model, effects: Effects | None = None, without: Sequence[str] = ()
+    data: Still,
+    model: Model,
+    effects: Effects | None = None,
+    without: Sequence[str] = (),
+    enough: Enough | None = None,
 ) -> Discovery[NoiseFit]: ...
 @one_thread
 def discover(
-    data: Table | Still, model: Model, effects: Effects | None = None, without: Sequence[str] = ()
+    data: Table | Still,
+    model: Model,
+    effects: Effects | None = None,
+    without: Sequence[str] = (),
+    enough: Enough | None = None,
 ) -> Discovery[Any]:
     """`model` with all effects that it misses on the data. Raises what `fit` raises.
 
-    `without`: places of the signal chain, such as own-response, that the search leaves out.
+    without   places of the signal chain, such as own-response, that the search leaves out
+    enough    an error on unseen data at which the search stops
     """
-    return dataset(data).without(without).discover(model, catalogue() if effects is None else effects)
+    return dataset(data).without(without).discover(model, catalogue() if effects is None else effects, enough)
 
 
 @overload

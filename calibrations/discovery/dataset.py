@@ -14,6 +14,7 @@ from calibrations.errors import ModelError
 from calibrations.model import Model
 
 if TYPE_CHECKING:
+    from calibrations.discovery.enough import Enough
     from calibrations.presentation.chart import Chart
 
 Cells = tuple[Sequence[str], Sequence[Sequence[str]]]  # head and rows of a table of text
@@ -236,9 +237,14 @@ class Dataset(ABC, Generic[F]):
         """What the model misses."""
         return Diagnosis.of(self.search(model, effects))
 
-    def discover(self, model: Model, effects: Mapping[str, Effect]) -> Discovery[F]:
-        """The model with all effects that it misses."""
-        return Discovery.of(self.search(model, effects))
+    def discover(self, model: Model, effects: Mapping[str, Effect], enough: Enough | None = None) -> Discovery[F]:
+        """The model with all effects that it misses, or those that make the error small enough. Raises ModelError."""
+        found = self.search(model, effects)
+        return Discovery.of(found if enough is None else self.until(found, enough))
+
+    def until(self, found: Findings[F], enough: Enough) -> Findings[F]:  # noqa: ARG002
+        """The findings up to the first model whose error on unseen data is small enough. Raises ModelError."""
+        raise ModelError(f"{self.source}: the search in a still record has no error at which to stop; remove --enough")
 
     def add(self, effect: Effect, model: Model, effects: Mapping[str, Effect]) -> Discovery[F]:
         """The model with one effect more. Raises ModelError where it has the effect, or cannot have it."""

@@ -196,6 +196,7 @@ class Findings(Generic[F]):
     left          unexplained part of the residual, in words; `pattern` holds it as an expression
     spoilt        whether that makes every effect doubtful; `unresponsive`, whether an output does not follow the poses
     searched      whether further effects were searched for after the last step
+    enough        whether the steps end at an error that is as small as was asked
     undetermined  why the data do not determine the given model, and the final model
     set_aside     rows that the search left out, and why; `outliers` are their numbers
     reason        why the data cannot decide, in words
@@ -221,6 +222,7 @@ class Findings(Generic[F]):
     spoilt: bool = False
     unresponsive: bool = False
     searched: bool = True
+    enough: bool = False
     undetermined: tuple[str | None, str | None] = (None, None)
     set_aside: str | None = None
     outliers: tuple[int, ...] = ()
@@ -279,6 +281,7 @@ class Findings(Generic[F]):
             "spoilt": self.spoilt,
             "unresponsive": self.unresponsive,
             "searched": self.searched,
+            "enough": self.enough,
             "set_aside": self.set_aside,
             "error": self.end.pooled_excess,
             "floor": self.data.floor,

@@ -49,6 +49,7 @@ from calibrations.table import Array, Table
 from calibrations.text import quantity, rounded
 
 if TYPE_CHECKING:
+    from calibrations.discovery.enough import Enough
     from calibrations.discovery.structural import StructuralSearch
     from calibrations.presentation.chart import Chart
 
@@ -190,6 +191,12 @@ class Rows(Dataset[Fit]):
         Slow noise that is known from a still record is not yet among what that search can take for given.
         """
         return self.table.type.stage_angles and self.table.n >= FEWEST_FOR_PLACES and not self.table.noise
+
+    def until(self, found: Findings[Fit], enough: Enough) -> Findings[Fit]:
+        """The findings up to the first model whose error on unseen rows is small enough. Raises ModelError."""
+        from calibrations.discovery.enough import until  # few searches stop before their end
+
+        return until(found, enough)
 
     def candidates(self, before: Fit, plan: Findings[Fit], effects: Mapping[str, Effect]) -> tuple[Candidate, ...]:
         """One round of the search, the next effect of the plan first."""

@@ -25,7 +25,7 @@ from calibrations.free_forms.effect import free_form
 from calibrations.free_forms.geometry import GEOMETRY
 from calibrations.free_forms.place_names import PREFIX
 from calibrations.free_forms.structure import FloorSource, Structure, find_structure
-from calibrations.means.noise import with_white
+from calibrations.means.noise import white_only, with_white
 from calibrations.model import Estimate, Model, Term
 from calibrations.model.chain import forward
 from calibrations.table import Array, Table
@@ -202,8 +202,13 @@ def separately(base: Fit, found: Structure, added: list[Addition]) -> list[Addit
 
 
 def together(base: Fit, added: list[Addition]) -> Fit:
-    """All additions fitted at once."""
-    return refit(base, _with(base.model, added)) if added else base
+    """All additions fitted at once, in white noise first.
+
+    The noise of `base` has taken up what the additions explain, and free forms give way to a noise that is so large.
+    """
+    problem = base.problem
+    white = white_only(problem.white, problem.gap_s, len(problem.channels), problem.given)
+    return refit(replace(base, noise=white), _with(base.model, added)) if added else base
 
 
 def fitted(base: Fit, end: Fit, added: list[Addition]) -> list[Fit]:

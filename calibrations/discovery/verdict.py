@@ -3,7 +3,7 @@
 A verdict is always that of the model that is judged. A diagnosis judges the given model, a discovery the final model,
 with the effects that the search added.
 
-    adequate        no effect is missing, and the residual is noise
+    adequate        no effect is missing, and the residual is noise or an error as small as was asked
     effect-missing  effects of the catalogue are missing, and they explain the residual (given model only)
     ambiguous       the data cannot decide: another effect explains them as well, a small part of the residual may be
                     the form of a named cause, or the data do not determine the model
@@ -59,6 +59,7 @@ class Judgement:
     spoilt        whether that part makes every effect of the search doubtful
     unresponsive  whether that part is an output that does not follow the poses
     searched      whether further effects were searched for after the last one was added
+    enough        whether the search stopped at an error that is as small as was asked
     undetermined  why the data do not determine the model
     set_aside     the rows that the fit leaves out, and why
     error         error of the model with all missing effects, as a multiple of `floor`
@@ -77,6 +78,7 @@ class Judgement:
     spoilt: bool = False
     unresponsive: bool = False
     searched: bool = True
+    enough: bool = False
     undetermined: str | None = None
     set_aside: str | None = None
     closest: Closest | None = None
@@ -139,6 +141,8 @@ def decide(j: Judgement) -> Verdict:
     inseparable = any(j.alternatives.get(name) for name in (*j.missing, *j.added))
     if j.missing:
         return Verdict.AMBIGUOUS if inseparable else Verdict.EFFECT_MISSING
+    if j.enough:
+        return Verdict.AMBIGUOUS if inseparable else Verdict.ADEQUATE
     if residual is Residual.FORM or inseparable or j.undetermined is not None or _incomplete(j):
         return Verdict.AMBIGUOUS
     return Verdict.ADEQUATE
@@ -161,6 +165,8 @@ def headline(j: Judgement) -> str:
         return f"The model {j.model} misses {joined(j.missing)}."
     if j.added:
         return f"The model {j.model} misses {joined(j.added)}."
+    if j.enough:
+        return f"The model {j.model} needs no further effect."
     if j.undetermined is not None:
         return f"No effect is significant, but {j.undetermined}."
     if j.closest is not None:
@@ -182,7 +188,7 @@ def _details(j: Judgement) -> Iterator[str]:
             yield f"The model {j.model} also misses {joined(j.added)}."
         if j.unknown and not j.spoilt:
             yield _remaining(j)
-    elif not j.missing and j.closest is None and j.undetermined is None:
+    elif not (j.missing or j.enough) and j.closest is None and j.undetermined is None:
         yield _remaining(j)
     elif j.left is not None and not j.spoilt:
         yield f"Remaining with them: {j.left}."

@@ -35,7 +35,7 @@ NEWTON_STEPS = 20
 DAMPINGS = (0.0, 1e-3, 1e-2, 0.1, 1.0, 10.0)  # of each column's squares
 BOUND_ROUNDS = 3
 STRAIGHT = 1e-6  # of what is left: a step that foretells it better is a linear model's
-SMALL_GAIN = 1e-6  # of a sum of squares whose unit is the noise
+SMALL_GAIN = 3e-3  # of the mean square of what is left, or of the noise: it moves a parameter by 0.05 uncertainties
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -314,7 +314,7 @@ def _determined(problem: Problem, noise: Noise, start: Array) -> tuple[Array, fl
                 break
         if gain > 0:
             theta, left = after, least
-        if gain < SMALL_GAIN * max(1.0, 1e-3 * float(left @ left)):
+        if gain < SMALL_GAIN * max(1.0, float(left @ left) / len(left)):
             if stairs or not problem.rounds:
                 break
             stairs = True

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 @model_option
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="Write the final model to this file.")
 @click.option("--without", multiple=True, metavar="PLACE", help="A place to leave out of the search; may be repeated.")
+@click.option("--enough", metavar="ERROR", help="Stop at this error on unseen data: 0.5mg, 2mV or 1.5floors.")
 @click.option("--live", is_flag=True, help="Measure on the bench, and choose the next experiment.")
 @click.option("--time", "minutes", type=click.FloatRange(min=0, min_open=True), help="Rig time for --live, minutes.")
 @watch_options
@@ -31,6 +32,7 @@ def command(
     several: tuple[str, ...],
     out: Path | None,
     without: tuple[str, ...],
+    enough: str | None,
     live: bool,
     minutes: float | None,
     unattended: bool,
@@ -47,33 +49,44 @@ def command(
     names the effects of the catalogue that are their causes. A curve without a cause stays in the model as
     `free:PLACE`. --without PLACE leaves out a place, with the effects that act there: own-response, history, output,
     column:NAME and so on (a wrong name lists all), or geometry.
+
+    Effects are added the largest first. --enough ERROR stops at the first model whose error on unseen data is that
+    small, and names the effects that it leaves out.
     """
     if live:
         from rig.cli.terminal.live import discover_live
 
         if several:
             raise click.UsageError("--live measures its own data; remove DATA or --live")
-        if without:
-            raise click.UsageError("--without is for measured DATA; remove it or --live")
+        if without or enough:
+            raise click.UsageError(f"--{'without' if without else 'enough'} is for measured DATA; remove it or --live")
         return discover_live(request, out, minutes, unattended, answers, check, as_json)
     if not several:
         raise click.UsageError("give DATA (a file or a run), or --live to measure")
-    return _discover(request, several, out, without, check, as_json)
+    return _discover(request, several, out, without, enough, check, as_json)
 
 
 def _discover(
-    request: Request, several: tuple[str, ...], out: Path | None, without: tuple[str, ...], check: bool, as_json: bool
+    request: Request,
+    several: tuple[str, ...],
+    out: Path | None,
+    without: tuple[str, ...],
+    enough: str | None,
+    check: bool,
+    as_json: bool,
 ) -> int:
+    from calibrations.discovery.enough import parse_enough
     from calibrations.discovery.verdict import Verdict
     from calibrations.documents import discovery_document
     from rig.cli.terminal.words import discovery, own_effect, parameters, pattern_advice, planned, warning
     from rig.services.load import loaded
     from rig.services.provenance import write_model
 
+    small = parse_enough(enough) if enough else None
     question = loaded(request, note, out)
     data = question.data if len(several) == 1 else _together(several, request, question)
     data = data.without(without)
-    result = planned(data.discover(question.model, question.effects), request, question.effects)
+    result = planned(data.discover(question.model, question.effects, small), request, question.effects)
     if result.verdict is not Verdict.NO_RESPONSE:
         notes(warning(data.doubts(result.end)))
     path = write_model(result.end, question.model, out, note)

@@ -1,0 +1,111 @@
+"""A search that stops at an error that is small enough: `--enough 0.5mg`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calibrations.discovery.results import Findings
+from calibrations.errors import ModelError
+from calibrations.fitting.fit import Fit
+from calibrations.fitting.sensed import in_milli
+from calibrations.free_forms.place_names import PREFIX
+from calibrations.table import Array
+from calibrations.text import joined, prefixed, rounded, unit
+
+FLOORS = ("floor", "floors", "x")
+OUTPUT, SENSED = "output", "sensed"
+# unit -> (what it measures, factor to V or to g, deg/s or the field)
+UNITS: Mapping[str, tuple[str, str, float]] = {
+    "V": (OUTPUT, "V", 1.0), "mV": (OUTPUT, "V", 1e-3), "uV": (OUTPUT, "V", 1e-6), "µV": (OUTPUT, "V", 1e-6),
+    "count": (OUTPUT, "count", 1.0), "counts": (OUTPUT, "count", 1.0),
+    "g": (SENSED, "g", 1.0), "mg": (SENSED, "g", 1e-3), "ug": (SENSED, "g", 1e-6), "µg": (SENSED, "g", 1e-6),
+    "deg/s": (SENSED, "deg/s", 1.0), "mdeg/s": (SENSED, "deg/s", 1e-3),
+}  # fmt: skip
+_WRITTEN = re.compile(r"\s*(?P<value>[+-]?[\d.]+(?:[eE][+-]?\d+)?)\s*(?P<unit>\S*)\s*")
+
+
+@dataclass(frozen=True)
+class Enough:
+    """An error on unseen data at which a search stops. `of`: "floors", or a unit in `UNITS`."""
+
+    value: float
+    of: str
+
+    @property
+    def text(self) -> str:
+        """As a person writes it."""
+        return f"{self.value:g} noise floors" if self.of == "floors" else f"{self.value:g} {self.of}"
+
+    def limit(self, found: Fit) -> float:
+        """The same in noise floors of a fit. Raises ModelError where the data have another unit."""
+        if self.of == "floors":
+            return self.value
+        measures, base, factor = UNITS[self.of]
+        has = found.table.unit if measures == OUTPUT else found.table.input_unit
+        if base != has:
+            other = found.table.input_unit if measures == OUTPUT else found.table.unit
+            raise ModelError(
+                f"an error of {self.text} cannot be asked of this data, whose outputs are in {unit(found.table.unit)} "
+                f"and whose input is in {unit(found.table.input_unit)}; give it in {unit(has)}, {unit(other)} or floors"
+            )
+        floor = found.noise.floor if measures == OUTPUT else in_milli(found.noise.floor, found) / 1e3
+        return self.value * factor / _pooled(floor)
+
+    def error(self, found: Fit) -> str:
+        """The error on unseen data, in this unit."""
+        if self.of == "floors":
+            return f"{rounded(found.held_out_excess)} noise floors"
+        measures, base, _ = UNITS[self.of]
+        floor = found.noise.floor if measures == OUTPUT else in_milli(found.noise.floor, found) / 1e3
+        value = found.held_out_excess * _pooled(floor)
+        scale, name = prefixed(base, value)
+        return f"{rounded(scale * value)} {name}"
+
+
+def parse_enough(text: str) -> Enough:
+    """`0.5mg`, `2 mV` or `1.5floors`. Raises ModelError."""
+    found = _WRITTEN.fullmatch(text)
+    try:
+        value = float(found["value"]) if found else np.nan
+    except ValueError:
+        value = np.nan
+    name = found["unit"] if found else ""
+    if not value > 0 or not np.isfinite(value) or (name not in UNITS and name not in FLOORS):
+        raise ModelError(f'"{text}" is no error at which to stop; give a number with mg, mV or floors, such as 0.5mg')
+    return Enough(value, "floors" if name in FLOORS else name)
+
+
+def until(findings: Findings[Fit], enough: Enough) -> Findings[Fit]:
+    """The findings up to the first model whose error on unseen data is small enough. Raises ModelError."""
+    fits = [findings.baseline, *(step.after for step in findings.steps)]
+    k = next((k for k, found in enumerate(fits) if found.held_out_excess <= enough.limit(found)), None)
+    if k is None:
+        error = enough.error(findings.end)
+        remark = f"The error on {findings.data.unseen} is {error}, more than asked ({enough.text})."
+        return replace(findings, remarks=(*findings.remarks, remark))
+    kept, rest = findings.steps[:k], findings.steps[k:]
+    names = {step.name for step in kept}
+    remark = f"The error on {findings.data.unseen} is {enough.error(fits[k])}, as small as asked ({enough.text})."
+    if rest:
+        remark += f" Left out: {joined([step.name for step in rest])}."
+    return replace(
+        findings,
+        steps=kept,
+        causes=tuple(cause for cause in findings.causes if cause in names),
+        alternatives={name: others for name, others in findings.alternatives.items() if name in names},
+        separations={name: plan for name, plan in findings.separations.items() if name in names},
+        places=tuple(p for p in findings.places if names & {*p.causes, f"{PREFIX}{p.name}"}),
+        left=None,
+        pattern=None,
+        enough=True,
+        remarks=(*findings.remarks, remark),
+    )
+
+
+def _pooled(floor: Array) -> float:
+    """Rms over the channels."""
+    return float(np.sqrt(np.mean(floor**2)))
