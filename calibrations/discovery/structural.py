@@ -25,13 +25,14 @@ from calibrations.free_forms.effect import free_form
 from calibrations.free_forms.geometry import GEOMETRY
 from calibrations.free_forms.place_names import PREFIX
 from calibrations.free_forms.structure import FloorSource, Structure, find_structure
-from calibrations.means.noise import white_only, with_white
+from calibrations.means.noise import Noise, white_only, with_white
 from calibrations.model import Estimate, Model, Term
 from calibrations.model.chain import forward
 from calibrations.table import Array, Table
 
 BASIC = ("bias", "scale-factor")
 BASE = (*BASIC, *GEOMETRY)
+BASE_STEPS = 2  # of Gauss and Newton's: hardly anything of the base is not linear
 NO_WORSE = 1.02  # of the error before: a parameter more costs a degree of freedom, a fit gone astray more
 
 
@@ -172,7 +173,7 @@ def structure(start: Fit, effects: Mapping[str, Effect]) -> Structure:
 def additions(found: Structure, model: Model, effects: Mapping[str, Effect]) -> list[Addition]:
     """The catalogue effects that the structure adds to a model: the largest place first, then geometry."""
     causes = [cause for place in found.places for cause in (*place.causes, *found.refinements(place))]
-    names = dict.fromkeys([*causes, *found.geometry.causes])
+    names = dict.fromkeys([*causes, *found.geometry.causes, *found.geometry.refinements])
     starts = {c: tuple(Estimate(name, axis, value, None, "") for name, axis, value in found.starts(c)) for c in names}
     return [Addition(effects[c], found.constants(c), starts[c]) for c in names if c in effects and not model.holds(c)]
 
@@ -189,14 +190,13 @@ def separately(base: Fit, found: Structure, added: list[Addition]) -> list[Addit
     Beside other effects that are missing, the search for a nonlinear parameter goes astray.
     """
     names = {a.effect.name: a for a in added}
-    everything = np.sum([place.contribution for place in found.places], axis=0) if found.places else 0.0
     model = _with(base.model, [a for name, a in names.items() if name in GEOMETRY])
-    linear = fit(model, _less(base.table, everything)) if model is not base.model else base
+    linear = fit(model, _less(base.table, found.others(None))) if model is not base.model else base
     known: dict[str, tuple[Estimate, ...]] = {term.name: term.estimates for term in linear.model.terms}
     for place in found.places:
         own = [names[cause] for cause in (*place.causes, *found.refinements(place)) if cause in names]
         if own:
-            alone = fit(_with(linear.model, own), _less(base.table, everything - place.contribution))
+            alone = fit(_with(linear.model, own), _less(base.table, found.others(place)))
             known |= {a.effect.name: alone.model.estimates(a.effect.name) for a in own}
     return [replace(a, estimates=known.get(name, a.estimates)) for name, a in names.items()]
 
@@ -206,9 +206,26 @@ def together(base: Fit, added: list[Addition]) -> Fit:
 
     The noise of `base` has taken up what the additions explain, and free forms give way to a noise that is so large.
     """
+    if not added:
+        return base
     problem = base.problem
     white = white_only(problem.white, problem.gap_s, len(problem.channels), problem.given)
-    return refit(replace(base, noise=white), _with(base.model, added)) if added else base
+    model = _with(base.model, added)
+    return refit(replace(base, noise=white), model, _begun(base, model, white))
+
+
+def _begun(base: Fit, model: Model, noise: Noise) -> Array:
+    """The values of a model to start from, those of its base fitted beside the others.
+
+    Each addition was fitted alone, and took its own bias and scale factor with it.
+    """
+    problem = Problem.of(model, base.table)
+    theta = problem.layout.starts()[0]
+    own = np.any([problem.layout.of_effect(term.name) for term in base.model.terms], axis=0)
+    for _ in range(BASE_STEPS):
+        white = noise.whiten(np.dstack([problem.residual(theta)[:, :, None], problem.jacobian(theta)[:, :, own]]))
+        theta[own] -= np.linalg.lstsq(white[:, 1:], white[:, 0], rcond=1e-12)[0]
+    return theta
 
 
 def fitted(base: Fit, end: Fit, added: list[Addition]) -> list[Fit]:

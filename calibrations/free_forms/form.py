@@ -27,7 +27,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from calibrations.effects.kernels import slip_elements
+from calibrations.effects.kernels import play, slip_elements
 from calibrations.effects.thermometer import leading_temperature
 from calibrations.free_forms.bases import Basis, Play, Products
 from calibrations.free_forms.poses import side, way
@@ -88,7 +88,8 @@ class Form:
             x, y, z = force.T
             out = np.column_stack([x**i * y**j * z**m for i, j, m in basis.powers])
         elif isinstance(basis, Play):
-            out = np.asarray(_slipping(table, basis, self.approach_deg)[k])
+            lagging = _lagging(table, basis, self.lead_s) if self.driver == "temperature" else None
+            out = np.asarray(_slipping(table, basis, self.approach_deg)[k]) if lagging is None else lagging
         elif self.driver in MODELLED:
             out = basis(self.drive(table, force, response, k))[:, :kept]
         else:
@@ -130,6 +131,13 @@ def _of_table(form: Form, table: Table, k: int) -> Array:
     basis = form.basis(k)
     assert not isinstance(basis, (Play, Products))  # noqa: S101 forces drive these
     return basis(form.drive(table, nothing, nothing[:, 0], k))
+
+
+@lru_cache(maxsize=32)
+def _lagging(table: Table, basis: Play, lead_s: float) -> Array:
+    """What the temperature is ahead of itself behind plays of these widths, over the widths, shape (n, widths)."""
+    temperature = leading_temperature(table, lead_s)
+    return np.column_stack([(temperature - play(temperature, width)) / width for width in basis.widths])
 
 
 @lru_cache(maxsize=32)

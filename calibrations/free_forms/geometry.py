@@ -38,11 +38,15 @@ OVER_Z = ("z-response", "scale-over-z", "force", "stage-angle-alpha")
 class Geometry:
     """Which effects of the geometry are causes.
 
+    sizes         what each of them adds to the output, rms, in noise floors
+    refinements   what else the fit needs: angles that may as well be the form of something that acts
     alternatives  what else would do for each
     lines         linear parts that no cause bears, by place: output at 1 g, in its unit
     """
 
     causes: tuple[str, ...] = ()
+    sizes: Mapping[str, float] = field(default_factory=dict)
+    refinements: tuple[str, ...] = ()
     alternatives: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     lines: Mapping[str, float] = field(default_factory=dict)
 
@@ -70,25 +74,22 @@ def geometry(
     covariance = (g.base_inverse + cross @ result.sizes.inverse @ cross.T + _of_forms(result, sizes))[:b, :b]
     q = pick @ result.values.base[:b]
     C = pick @ covariance @ pick.T
-    std = np.sqrt(np.maximum(np.diag(C), 0.0))
-    for i, places in enumerate(over):
-        size = max((linear.get(place, 0.0) for place in places), default=0.0)
-        C[i, i] += (size / mean_gain / 0.5) ** 2
     C += np.diag(np.full(len(q), (IMMATERIAL * floor / mean_gain) ** 2))
-    root = np.linalg.cholesky(C)
-    inverse = np.linalg.inv(root)
+    own = [2 * max((linear.get(place, 0.0) for place in places), default=0.0) / mean_gain for places in over]
     whole = g.base_inverse.shape[0]
     base = result.columns[:, :whole]
     maps = {
-        name: inverse @ pick @ (g.base_inverse @ (base.T @ (J / result.white[:, :, None]).reshape(len(base), -1)))[:b]
+        name: pick @ (g.base_inverse @ (base.T @ (J / result.white[:, :, None]).reshape(len(base), -1)))[:b]
         for name, J in effects.items()
     }
-    causes, alternatives, left = _chosen(inverse @ q, maps, has)
+    values, alternatives, _ = _chosen(q, C + np.diag(np.square(own)), maps, has)
+    sizes_of = {name: float(np.sqrt(np.mean((effects[name] @ v) ** 2))) / floor for name, v in values.items()}
+    refinements, _, left = _chosen(q, C, maps, has | values.keys())
     lines: dict[str, float] = {}
-    for places, angle, uncertainty in zip(over, root @ left, std, strict=True):
+    for places, angle, uncertainty in zip(over, left, np.sqrt(np.diag(C)), strict=True):
         if places and abs(angle) > max(LEAST_LINE * floor / mean_gain, SEEN * uncertainty):
             lines[places[0]] = max(lines.get(places[0], 0.0), float(abs(angle)) * mean_gain)
-    return Geometry(causes, alternatives, lines)
+    return Geometry(tuple(values), sizes_of, tuple(refinements), alternatives, lines)
 
 
 def _linear_part(result: SearchResult, place: str, curve: Array) -> float:
@@ -144,21 +145,29 @@ def _angles(result: SearchResult, gain: Array) -> tuple[Array, list[tuple[str, .
 
 
 def _chosen(
-    q: Array, maps: Mapping[str, Array], has: set[str]
-) -> tuple[tuple[str, ...], dict[str, tuple[str, ...]], Array]:
-    """The cheapest set of effects that explains the whitened angles q, what else would do, and what q keeps."""
+    q: Array, C: Array, maps: Mapping[str, Array], has: set[str]
+) -> tuple[dict[str, Array], dict[str, tuple[str, ...]], Array]:
+    """The cheapest effects that explain the angles q of covariance C, with their parameters; what else would do; the rest."""
+    root = np.linalg.cholesky(C)
+    q = np.linalg.solve(root, q)
+    maps = {name: np.linalg.solve(root, part) for name, part in maps.items()}
     free = [maps[name] for name in maps if name in has]
     others = [name for name in maps if name not in has]
-    scored: list[tuple[float, tuple[str, ...], Array]] = []
+    scored: list[tuple[float, tuple[str, ...], Array, Array]] = []
     for count in range(len(others) + 1):
         for names in combinations(others, count):
             parts = [*free, *(maps[name] for name in names)]
             A = np.hstack([np.zeros((len(q), 0)), *parts])
             answer, _, rank, _ = np.linalg.lstsq(A, q, rcond=1e-7)
             left = q - A @ answer
-            scored.append((float(left @ left) + CAUSE_PRICE * count + PARAMETER_PRICE * int(rank), names, left))
+            price = CAUSE_PRICE * count + PARAMETER_PRICE * int(rank)
+            scored.append((float(left @ left) + price, names, left, answer))
     scored.sort(key=lambda s: s[0])
-    best, chosen, left = scored[0]
-    close = [names for score, names, _ in scored[1:] if score < best + CLOSE and len(names) <= len(chosen)]
+    best, chosen, left, answer = scored[0]
+    close = [names for score, names, *_ in scored[1:] if score < best + CLOSE and len(names) <= len(chosen)]
     rivals = {name for names in close for name in names} - set(chosen)
-    return chosen, {name: tuple(sorted(rivals)) for name in chosen if rivals}, left
+    ends = np.cumsum([part.shape[1] for part in free] + [maps[name].shape[1] for name in chosen])
+    values = {
+        name: answer[end - maps[name].shape[1] : end] for name, end in zip(chosen, ends[len(free) :], strict=True)
+    }
+    return values, {name: tuple(sorted(rivals)) for name in chosen if rivals}, root @ left

@@ -11,7 +11,7 @@ from scipy.stats import chi2, kurtosis
 from calibrations.free_forms.chain import base_size
 from calibrations.free_forms.components import Component
 from calibrations.free_forms.reml import gains, without
-from calibrations.free_forms.search import SearchResult
+from calibrations.free_forms.search import SearchResult, climb
 from calibrations.table import Array
 
 NEXT_FORM = 0.05  # of a place's variance that a second form must take up: less is the form of the first
@@ -23,6 +23,7 @@ LEAST_SHARE = 0.015  # of the largest place's size
 LEAST_UNKNOWN, LEAST_UNKNOWN_SHARE = 1.0, 0.05  # the same two of a place without a cause
 JUMPS = 4.0  # excess kurtosis of a walk's increments: 500 of a Gaussian process keep within +-1
 CLOSE = 10.0  # of -2 log likelihood: not told apart
+UNSEEN = 0.3  # noise floors: what an effect leaves of a curve, and a wider one does not, says nothing of the mechanism
 FORM_OF, MOSTLY = 0.25, 0.85  # size beside a larger place, and share of its gain that another form there takes up
 
 
@@ -43,7 +44,6 @@ class ActingPlace:
     gain: float
     inseparable_from: tuple[str, ...]
     curve: Array  # (channels, n), in the output's unit, freed of what the base takes up
-    contribution: Array  # the same with what the base could take up
 
     @property
     def rms(self) -> float:
@@ -69,8 +69,9 @@ def places(result: SearchResult) -> list[ActingPlace]:
         by_place.setdefault(result.component(name).place, []).append(name)
     base = result.columns[:, :b]
     Q = np.linalg.qr(base / np.maximum(np.linalg.norm(base, axis=0), 1e-300))[0]
-    whole = {place: np.sum([_part(result, n, b) for n in names], axis=0) for place, names in by_place.items()}
-    curves = {place: _freed(Q, contribution) for place, contribution in whole.items()}
+    curves = {
+        place: _freed(Q, np.sum([_part(result, n, b) for n in names], axis=0)) for place, names in by_place.items()
+    }
     sizes = {place: float(np.sqrt(np.mean(curve**2))) for place, curve in curves.items()}
     largest = max(sizes.values(), default=0.0)
     out = []
@@ -80,11 +81,9 @@ def places(result: SearchResult) -> list[ActingPlace]:
         least = LEAST_UNKNOWN_SHARE if all("/walk-" in name for name in names) else LEAST_SHARE  # it follows anything
         own = float(np.sqrt(max(gain, 0.0) / len(result.columns)))  # in noise floors: what no other place could take up
         material = own >= LEAST_SIZE and sizes[place] >= least * largest
-        curve, contribution = (x[place].reshape(result.white.shape) * result.white for x in (curves, whole))
+        curve = curves[place].reshape(result.white.shape) * result.white
         out.append(
-            ActingPlace(
-                place, sizes[place], largest, tuple(names), causes, share, material, gain, others, curve, contribution
-            )
+            ActingPlace(place, sizes[place], largest, tuple(names), causes, share, material, gain, others, curve)
         )
     return sorted(out, key=lambda p: -p.size)
 
@@ -114,7 +113,8 @@ def _named(
     total = float(curve @ curve) or 1.0
     acting = dict.fromkeys(result.component(name).cause for name in names)
     if all(result.component(name).form is None for name in names):
-        return _needed({cause: columns[cause][0] for cause in acting}, curve, total)
+        needed, share = _needed({cause: columns[cause][0] for cause in acting}, curve, total)
+        return _one_name(result, names, needed, curve, Q), share
     chosen: list[str] = []
     share = 0.0
     while True:
@@ -129,10 +129,38 @@ def _named(
             break
         chosen.append(best)
         share = tried[best]
-    wider = {comp.contains: comp.cause for comp in map(result.component, names) if comp.contains}
-    chosen = list(dict.fromkeys(wider.get(cause, cause) for cause in chosen))  # one mechanism, one name
-    enough = NAMED if len(set(chosen) - acting.keys()) < MOST_FORMS else NAMED_TOGETHER
-    return (tuple(chosen), share) if share >= enough else ((), share)
+    found = _one_name(result, names, chosen, curve, Q)
+    enough = NAMED if len(set(found) - acting.keys()) < MOST_FORMS else NAMED_TOGETHER
+    return (found, share) if share >= enough else ((), share)
+
+
+def _one_name(
+    result: SearchResult, names: Sequence[str], chosen: Sequence[str], curve: Array, Q: Array
+) -> tuple[str, ...]:
+    """The causes with one name for an effect and the wider one that contains it.
+
+    It is the wider one where the other, at its best shape, leaves a part of the curve that can be seen.
+    """
+    told = dict.fromkeys(chosen)
+    for outer in (comp for comp in map(result.component, names) if comp.contains):
+        alone = [c for c in result.components if c.cause == outer.contains and c.place == outer.place and not c.form]
+        left = min((_left_at_best(result, c, curve, Q) for c in alone), default=np.inf)
+        name = outer.cause if np.sqrt(left / len(curve)) > UNSEEN else outer.contains
+        told = dict.fromkeys(name if cause in (outer.cause, outer.contains) else cause for cause in told)
+    return tuple(told)
+
+
+def _left_at_best(result: SearchResult, comp: Component, curve: Array, Q: Array) -> float:
+    """What a component leaves of a curve, sum of squares, at the shape that leaves least."""
+
+    def left(shape: tuple[float, ...]) -> float:
+        made = comp.reshaped(shape) if comp.reshaped is not None else comp
+        X = made.jacobian(result.state) / result.white[:, :, None]
+        return _left([_freed(Q, X.reshape(-1, X.shape[2]))], curve)
+
+    if comp.reshaped is None:
+        return left(comp.shape)
+    return left(climb(lambda shape: -left(shape), comp.shape, comp.step))
 
 
 def _needed(columns: Mapping[str, Array], curve: Array, total: float) -> tuple[tuple[str, ...], float]:

@@ -32,6 +32,7 @@ LEADS_S = (0.0, -90.0, 90.0)  # by which the sensor is ahead of the thermometer
 WAVES, WALK_WAVES = 24, 160  # of slow noise, and of a random walk, whose roughness is never small
 DEGREE = 4  # of a general function of the force's direction
 PLAYS = (0.05, 0.15, 0.35)  # of the range of temperatures
+BRANCHES = (0.02, 0.035, 0.06, 0.1, 0.17, 0.28, 0.45)  # the same: plays that together are a hysteresis of any shape
 FEWEST_TIMED, FEWEST_NOISE = 12, 20  # rows that can show a function of time, and slow noise
 FEWEST_ANGLES, FINE_ANGLES = 8, 33  # different angles beta that can show harmonics, and fine ones
 FEWEST_INCLINATIONS = 4
@@ -300,7 +301,24 @@ def _temperature(data: PoseData, first: State) -> list[Component]:
         for part in PLAYS:
             name = f"temperature-bias/temperature-hysteresis@{part}"
             found.append(_behind_play(name, temperature)((part * float(np.ptp(temperature)),)))
+        widths = tuple(part * float(np.ptp(temperature)) for part in BRANCHES)
+        form = Form("temperature-bias", "branches", "temperature", (Play(widths),))
+        found.append(
+            free(
+                form, first, "temperature-hysteresis", GENERAL, contains="temperature-bias", starts=_middle_play(widths)
+            )
+        )
     return found
+
+
+def _middle_play(widths: tuple[float, ...]) -> Callable[[Array], Starts]:
+    """Where the fit of one play begins: the mean of the plays, by their weights."""
+
+    def starts(found: Array) -> Starts:
+        weights = np.abs(found.reshape(-1, len(widths))).sum(axis=0)
+        return (("play", "", float(weights @ widths / max(float(weights.sum()), np.finfo(float).tiny))),)
+
+    return starts
 
 
 def _behind_play(name: str, temperature: Array) -> Make:

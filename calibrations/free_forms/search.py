@@ -226,14 +226,14 @@ def _refined(
             J = comp.reshaped(shape).jacobian(state) / scales[comp.name] / white[:, :, None]
             return gain_of_columns(g, rest, X, b, J.reshape(-1, J.shape[2]))[0]
 
-        best = _climbed(gained, comp.shape, comp.step)
+        best = climb(gained, comp.shape, comp.step)
         if best != comp.shape:
             changed[i] = comp.reshaped(best)
             moved = True
     return changed if moved else None
 
 
-def _climbed(
+def climb(
     gained: Callable[[tuple[float, ...]], float], shape: tuple[float, ...], step: tuple[float, ...]
 ) -> tuple[float, ...]:
     """The shape of greatest gain nearby: each value in turn, by a parabola through three points, steps halved."""

@@ -10,9 +10,9 @@ import numpy as np
 from scipy.optimize import nnls
 
 from calibrations.free_forms.bases import Line
-from calibrations.free_forms.chain import Given
+from calibrations.free_forms.chain import Coefficients, Given, state_at
 from calibrations.free_forms.form import CROSS, Form
-from calibrations.free_forms.geometry import Geometry, geometry
+from calibrations.free_forms.geometry import LINEAR_PART, Geometry, geometry
 from calibrations.free_forms.naming import ActingPlace, places
 from calibrations.free_forms.poses import PoseData
 from calibrations.free_forms.search import NOISE_ALONE, SearchResult, search
@@ -56,14 +56,16 @@ class Structure:
         """Catalogue effects that are named, the largest place first.
 
         What the data cannot separate from a larger cause is not named: one mechanism has one name. Beside something
-        larger that is unknown, an effect is named only where its own form, and not one that follows anything, is seen.
+        larger that is unknown, an effect is named only where its own form, and not one that follows anything, is seen,
+        and a geometry only where it is larger than a linear part of what is unknown.
         """
         largest = max((place.size for place in self.unknown), default=0.0)
         named: list[str] = []
         for place in self.places:
             if place.material and (place.size >= largest or (place.share >= SEEN_FORM and not self._follows(place))):
                 named += [c for c in place.causes if not self._same_as_one_of(c, named)]
-        return tuple(dict.fromkeys([*named, *self.geometry.causes]))
+        seen = [c for c in self.geometry.causes if self.geometry.sizes[c] >= LINEAR_PART * largest]
+        return tuple(dict.fromkeys([*named, *seen]))
 
     def _follows(self, place: ActingPlace) -> bool:
         """Whether a place acts by components that follow many things: branches, slip elements, a random walk."""
@@ -93,6 +95,13 @@ class Structure:
         """Causes that decay within the first poses, as the memory of what came before them does."""
         acting = [self.result.component(name) for place in self.places for name in place.components]
         return tuple(c.cause for c in acting if c.cause.startswith("warm-up") and c.shape[0] < FIRST_POSES)
+
+    def others(self, place: ActingPlace | None) -> Array:
+        """What all places but one add to the output through the chain, (channels, n), in its unit; None: all places."""
+        result = self.result
+        kept = {name: result.values.of[name] for name in (place.components if place else ())}
+        alone = state_at(result.data, result.given, Coefficients(result.values.base, kept), result.components)
+        return result.state.predicted - alone.predicted
 
     def refinements(self, place: ActingPlace) -> tuple[str, ...]:
         """Catalogue effects that act at a place, without a free form of theirs, and are not its causes."""
