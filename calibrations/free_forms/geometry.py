@@ -147,7 +147,10 @@ def _angles(result: SearchResult, gain: Array) -> tuple[Array, list[tuple[str, .
 def _chosen(
     q: Array, C: Array, maps: Mapping[str, Array], has: set[str]
 ) -> tuple[dict[str, Array], dict[str, tuple[str, ...]], Array]:
-    """The cheapest effects that explain the angles q of covariance C, with their parameters; what else would do; the rest."""
+    """The cheapest effects that explain the angles q, of covariance C, by their parameters; their rivals; the rest.
+
+    `maps`: d q / d parameters of each effect; `has`: effects that cost nothing.
+    """
     root = np.linalg.cholesky(C)
     q = np.linalg.solve(root, q)
     maps = {name: np.linalg.solve(root, part) for name, part in maps.items()}
@@ -158,7 +161,8 @@ def _chosen(
         for names in combinations(others, count):
             parts = [*free, *(maps[name] for name in names)]
             A = np.hstack([np.zeros((len(q), 0)), *parts])
-            answer, _, rank, _ = np.linalg.lstsq(A, q, rcond=1e-7)
+            solved, _, rank, _ = np.linalg.lstsq(A, q, rcond=1e-7)
+            answer = np.asarray(solved, dtype=float)
             left = q - A @ answer
             price = CAUSE_PRICE * count + PARAMETER_PRICE * int(rank)
             scored.append((float(left @ left) + price, names, left, answer))
