@@ -24,7 +24,8 @@ from calibrations.free_forms.chain import Given
 from calibrations.free_forms.effect import free_form
 from calibrations.free_forms.geometry import GEOMETRY
 from calibrations.free_forms.place_names import PREFIX
-from calibrations.free_forms.structure import FloorSource, Structure, find_structure
+from calibrations.free_forms.stairs import before_stairs, find_stairs, fitted_stairs
+from calibrations.free_forms.structure import FloorSource, Structure, find_structure, with_stairs
 from calibrations.means.noise import Noise, white_only, with_white
 from calibrations.model import Estimate, Model, Term
 from calibrations.model.chain import forward
@@ -33,6 +34,7 @@ from calibrations.table import Array, Table
 BASIC = ("bias", "scale-factor")
 BASE = (*BASIC, *GEOMETRY)
 BASE_STEPS = 2  # of Gauss and Newton's: hardly anything of the base is not linear
+STAIRS = "quantisation"
 NO_WORSE = 1.02  # of the error before: a parameter more costs a degree of freedom, a fit gone astray more
 
 
@@ -76,28 +78,19 @@ def search_structure(start: Fit, effects: Mapping[str, Effect]) -> StructuralSea
     """The effects and free forms that the model of `start` misses."""
     basic = [name for name in BASIC if name in effects and not start.model.holds(name)]
     base = _freed(start, basic, effects)
-    found = structure(base, effects)
+    behind = _behind_stairs(base, effects)
     remarks: tuple[str, ...] = ()
-    if found.floor_source is not FloorSource.SAMPLES and start.noise.known:
-        start, base = (fit(f.model, with_white(f.table, found.white)) for f in (start, base))
-        remarks = (f"The noise floor is that of the residual: {found.floor_source}.",)
-    added = additions(found, base.model, effects)
-    causes = separately(base, found, added)
-    forms = free_additions(found, base.model)
-    end = together(base, [*causes, *forms])
-    if any(a.effect.rounds for a in added):  # the whole output is rounded, and not what the other places leave
-        as_searched = [a if a.effect.rounds else alone for a, alone in zip(added, causes, strict=True)]
-        other = together(base, [*as_searched, *forms])
-        if other.pooled_excess < end.pooled_excess:
-            causes, end = as_searched, other
-    if end.held_out_excess > MATERIAL and not end.problem.rounds:
-        # forms are found again beside the causes as the catalogue has them, so that they hold what these leave
-        beside = structure(causes_alone(end, forms), effects)
-        refined = separately(base, beside, additions(beside, end.model, effects))
-        others = [*refined, *free_additions(beside, base.model)]
-        other = together(base, [*_at(end, causes), *others])
-        if other.held_out_excess < end.held_out_excess:
-            end, causes, forms = other, _at(end, causes), others
+    if behind is not None and behind.end.held_out_excess <= MATERIAL:
+        best = behind
+    else:
+        found = structure(base, effects)
+        if found.floor_source is not FloorSource.SAMPLES and start.noise.known:
+            start, base = (fit(f.model, with_white(f.table, found.white)) for f in (start, base))
+            remarks = (f"The noise floor is that of the residual: {found.floor_source}.",)
+        best = _named_and_fitted(base, found, effects)
+        if behind is not None and behind.end.held_out_excess < best.end.held_out_excess and not remarks:
+            best = behind
+    found, causes, forms, end = best.found, best.causes, best.forms, best.end
     needed = [name for name in basic if chance(*first_order(end, name, shared=True)) < SIGNIFICANT]
     chosen = [*_largest_first(_at(end, causes), end, found), *_at(end, forms)]
     if needed != basic:
@@ -114,6 +107,61 @@ def search_structure(start: Fit, effects: Mapping[str, Effect]) -> StructuralSea
     steps += [Step(a.effect.name, *pair) for a, pair in zip(chosen, pairwise(fits), strict=True)]
     tried = _first(start, steps, candidates(start, effects))
     return StructuralSearch(start, tuple(steps), found, tried, causes_alone(end, forms), remarks)
+
+
+@dataclass(frozen=True)
+class _Named:
+    """A structure, the additions of its causes and of its free forms, and the fit of all of them."""
+
+    found: Structure
+    causes: list[Addition]
+    forms: list[Addition]
+    end: Fit
+
+
+def _named_and_fitted(base: Fit, found: Structure, effects: Mapping[str, Effect]) -> _Named:
+    """Causes and free forms of a structure, fitted; where that leaves more than noise, once more beside the causes."""
+    added = additions(found, base.model, effects)
+    causes = separately(base, found, added)
+    forms = free_additions(found, base.model)
+    end = together(base, [*causes, *forms])
+    if any(a.effect.rounds for a in added):  # the whole output is rounded, and not what the other places leave
+        as_searched = [a if a.effect.rounds else alone for a, alone in zip(added, causes, strict=True)]
+        other = together(base, [*as_searched, *forms])
+        if other.pooled_excess < end.pooled_excess:
+            causes, end = as_searched, other
+    if end.held_out_excess > MATERIAL and not end.problem.rounds:
+        # forms are found again beside the causes as the catalogue has them, so that they hold what these leave
+        beside = structure(causes_alone(end, forms), effects)
+        refined = separately(base, beside, additions(beside, end.model, effects))
+        others = [*refined, *free_additions(beside, base.model)]
+        other = together(base, [*_at(end, causes), *others])
+        if other.held_out_excess < end.held_out_excess:
+            causes, forms, end = _at(end, causes), others, other
+    return _Named(found, causes, forms, end)
+
+
+def _behind_stairs(base: Fit, effects: Mapping[str, Effect]) -> _Named | None:
+    """What acts before a coarse converter, searched for in the outputs before their rounding; None: no stairs show."""
+    white = base.problem.white
+    if STAIRS not in effects or base.model.holds(STAIRS) or white is None or "output" in base.table.left_out:
+        return None
+    stairs = find_stairs(base.table, base.table.outputs.T - base.residual, white)
+    if stairs is None:
+        return None
+    smooth = fit(base.model, before_stairs(base.table, white, stairs))
+    found = structure(smooth, effects)
+    causes = separately(smooth, found, additions(found, smooth.model, effects))
+    forms = free_additions(found, smooth.model)
+    stairs = fitted_stairs(base.table, found.result.state.predicted, white, stairs)
+    values = {"step": stairs.step, "offset": stairs.offset, "noise": stairs.noise}
+    rounding = Addition(
+        effects[STAIRS], {}, tuple(Estimate(name, "", value, None, "") for name, value in values.items())
+    )
+    end = together(base, [*causes, rounding, *forms])
+    if together(base, [*causes, *forms]).pooled_excess < NO_WORSE * end.pooled_excess:
+        return None  # as well without: a regular sweep gathers outputs by itself
+    return _Named(with_stairs(found, base.residual, stairs, white), [*causes, rounding], forms, end)
 
 
 def _freed(start: Fit, names: list[str], effects: Mapping[str, Effect]) -> Fit:

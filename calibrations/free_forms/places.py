@@ -303,11 +303,10 @@ def _temperature(data: PoseData, first: State) -> list[Component]:
             found.append(_behind_play(name, temperature)((part * float(np.ptp(temperature)),)))
         widths = tuple(part * float(np.ptp(temperature)) for part in BRANCHES)
         form = Form("temperature-bias", "branches", "temperature", (Play(widths),))
+        more = {"general": True, "contains": "temperature-bias", "starts": _middle_play(widths)}
         found.append(
-            free(
-                form, first, "temperature-hysteresis", GENERAL, contains="temperature-bias", starts=_middle_play(widths)
-            )
-        )
+            free(form, first, "temperature-hysteresis", GENERAL, **more)
+        )  # after transients: it settles as they do
     return found
 
 

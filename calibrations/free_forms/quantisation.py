@@ -11,6 +11,7 @@ from calibrations.free_forms.chain import State
 from calibrations.free_forms.components import Component
 from calibrations.free_forms.places import saw
 from calibrations.free_forms.poses import PoseData
+from calibrations.free_forms.stairs import SAW
 from calibrations.table import Array
 
 SAW_POINTS = 3.0  # frequencies in a resolved interval
@@ -26,7 +27,7 @@ def find_saw(
 
     rejected  frequencies of rejected saws; one with more than SAW_REJECTIONS is not proposed again
     """
-    if "output" in data.table.left_out:
+    if {"output", SAW} & set(data.table.left_out):
         return None
     span = float(np.ptp(data.outputs)) or 1.0
     noise = float(np.median(data.spread)) if data.spread is not None else 0.0

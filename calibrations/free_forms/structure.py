@@ -17,6 +17,7 @@ from calibrations.free_forms.naming import ActingPlace, places
 from calibrations.free_forms.poses import PoseData
 from calibrations.free_forms.search import NOISE_ALONE, SearchResult, search
 from calibrations.free_forms.selection import ENTER
+from calibrations.free_forms.stairs import SAW, Stairs
 from calibrations.geometry.orientation import out_of_plane
 from calibrations.geometry.smooth import smooth_columns
 from calibrations.table import Array, Table
@@ -166,6 +167,24 @@ class Structure:
         return replace(form, sizes=tuple(sizes), kept=tuple(kept))
 
 
+def with_stairs(found: Structure, left: Array, stairs: Stairs, white: Array) -> Structure:
+    """The structure of the outputs before their rounding, with the converter's stairs as one more cause.
+
+    left    residual of the linear model, (channels, n), whose part that the stairs may be is their curve
+    white   of each mean, (channels, n): sizes are counted in it again
+    """
+    floor = float(np.sqrt(np.mean(white**2)))
+    size = stairs.rms / floor
+    largest = max([size, *(place.rms / floor for place in found.places)])
+    places = [replace(p, size=p.rms / floor, largest=largest) for p in found.places if p.name != "output"]
+    own = next((p for p in found.places if p.name == "output"), None)
+    causes = ("quantisation", *(own.causes if own and own.material else ()))
+    components, gain = (own.components, own.gain) if own else ((), 2 * left.size * float(np.log1p(size)))
+    curve = np.clip(left, -stairs.step / 2, stairs.step / 2)
+    places.append(ActingPlace("output", size, largest, components, causes, 1.0, True, gain, (), curve))
+    return replace(found, places=tuple(sorted(places, key=lambda p: -p.size)), white=white)
+
+
 def find_structure(
     table: Table, white: Array | None, given: Given, geometries: Mapping[str, Array], has: set[str]
 ) -> Structure:
@@ -182,6 +201,8 @@ def find_structure(
     usual = np.sqrt(np.mean(white**2, axis=1, keepdims=True))
     if np.any(one_code := white < NO_NOISE * usual):  # these rows have less noise than others, and contradict nothing
         result = search(data, np.where(one_code, LEAST_WHITE * usual, white), given)
+    elif SAW in table.left_out:  # the noise is what the stairs hide of each row: never the same for all
+        result = search(data, white, given)
     else:
         result, source = _searched(data, white, given, source)
     white = result.white

@@ -1,0 +1,77 @@
+"""The stairs of a coarse converter: found in the outputs, and taken off."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+import calibrations as cal
+from calibrations.free_forms.stairs import before_stairs, find_stairs, fitted_stairs
+from calibrations.table import Array, Table
+from tests.calibrations.synthetic import components, turns
+
+POSES = turns(step_deg=7.5)
+SAMPLES = 256
+NORMAL = norm.ppf((np.arange(2000) + 0.5) / 2000)  # equally likely values of a normal distribution
+
+
+def before(bend: float = 0.0) -> Array:
+    """Outputs before their rounding, (2, n)."""
+    x, y, _ = components(POSES)
+    return np.stack([2.5 + 0.98 * a + bend * np.abs(a) for a in (x, y)])
+
+
+def table(values: Array, step: float, noise: float, seed: int = 4) -> Table:
+    """Means of samples of such noise, each rounded to a multiple of the step; 0: not rounded."""
+    samples = values[..., None] + noise * NORMAL
+    means = (step * np.round(samples / step) if step else samples).mean(axis=2)
+    means = means + noise / np.sqrt(SAMPLES) * np.random.default_rng(seed).standard_normal(values.shape)
+    columns = dict(zip(("vx_v", "vy_v"), means, strict=True))
+    columns |= {f"{name}_std_v": np.full(values.shape[1], noise) for name in ("vx", "vy")}
+    return Table.from_columns("poses", {**POSES, **columns, "n": np.full(values.shape[1], SAMPLES)}, source="made")
+
+
+def white(values: Array, noise: float) -> Array:
+    return np.full(values.shape, noise / np.sqrt(SAMPLES))
+
+
+@pytest.mark.parametrize(("step", "noise"), [(0.004, 0.0007), (0.008, 0.0008)])
+def test_stairs_are_found_at_their_height_and_place(step: float, noise: float) -> None:
+    values = before()
+    measured = table(values, step, noise)
+    found = find_stairs(measured, values, white(values, noise))
+    assert found is not None
+    assert found.step == pytest.approx(step, rel=1e-3)
+    sharp = fitted_stairs(measured, values, white(values, noise), found)
+    assert abs(sharp.offset / step - np.round(sharp.offset / step)) < 0.05
+
+
+def test_outputs_that_are_not_rounded_have_no_stairs() -> None:
+    for seed in range(5):
+        measured = table(before(), 0.0, 0.0008, seed)
+        assert find_stairs(measured, before(), white(before(), 0.0008)) is None
+
+
+def test_a_converter_without_stairs_is_no_quantiser_though_a_regular_sweep_gathers_outputs() -> None:
+    found = cal.discover(table(before(0.008), 0.0, 0.0008), "linear")
+    assert found.causes == ("scale-factor-asymmetry",)
+
+
+def test_outputs_before_their_rounding_are_within_their_stated_uncertainty() -> None:
+    values, step, noise = before(), 0.008, 0.0008
+    measured = table(values, step, noise)
+    stairs = find_stairs(measured, values, white(values, noise))
+    assert stairs is not None
+    made = before_stairs(measured, white(values, noise), fitted_stairs(measured, values, white(values, noise), stairs))
+    std = np.stack([made.column(f"{name.removesuffix('_v')}_std_v_of_mean") for name in made.output_names])
+    pull = (made.outputs.T - values) / std
+    assert np.sqrt(np.mean(pull**2)) < 1.5
+    assert np.max(std) < 0.4 * step
+    assert np.quantile(std, 0.1) < 0.05 * step
+
+
+def test_an_effect_before_a_coarse_converter_is_found_beside_it() -> None:
+    found = cal.discover(table(before(0.006), 0.008, 0.0008), "linear")
+    assert set(found.causes) == {"quantisation", "scale-factor-asymmetry"}
+    assert found.end.held_out_excess < 1.25
