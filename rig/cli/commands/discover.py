@@ -87,8 +87,6 @@ def _discover(
     data = question.data if len(several) == 1 else _together(several, request, question)
     data = data.without(without)
     result = planned(data.discover(question.model, question.effects, small), request, question.effects)
-    if result.verdict is not Verdict.NO_RESPONSE:
-        notes(warning(data.doubts(result.end)))
     path = write_model(result.end, question.model, out, note)
     reached = str(path) if path else request.model or question.model.name
     own = (result.pattern if len(several) == 1 else None, reached, request)
