@@ -28,7 +28,15 @@ author = "the authors of rig"
 release = installed("inertial-rig")
 version = release
 
-extensions = ["myst_nb", "sphinx.ext.autodoc", "mathml", "plain_docstrings", "command_reference", "repository_pages"]
+extensions = [
+    "myst_nb",
+    "sphinx.ext.autodoc",
+    "mathml",
+    "plain_docstrings",
+    "command_reference",
+    "repository_pages",
+    "whole_streams",
+]
 exclude_patterns = ["extensions"]
 suppress_warnings = ["config.cache"]
 smartquotes = False  # options begin with two hyphens
@@ -42,7 +50,7 @@ nb_execution_timeout = 120
 nb_execution_raise_on_error = True
 nb_execution_show_tb = True
 nb_output_stderr = "remove"  # progress
-nb_merge_streams = True
+
 nb_number_source_lines = False
 
 autodoc_typehints = "signature"
