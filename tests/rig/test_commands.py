@@ -59,11 +59,14 @@ def test_settings_are_given_in_three_ways(rig: Rig) -> None:
     assert [plan["poses"] for plan in plans] == [7 * 9 * 2] * 3
 
 
-def test_a_plan_beyond_a_limit_is_bad_input_and_a_run_of_it_is_stopped(rig: Rig) -> None:
+def test_a_plan_beyond_a_limit_is_bad_input_and_a_run_of_it_is_stopped(rig: Rig, tmp_path: Path) -> None:
+    bench = tmp_path / "bench.yaml"
+    default = (Path(__file__).parents[2] / "rig" / "bench" / "default.yaml").read_text(encoding="utf-8")
+    bench.write_text(default.replace("limits_deg: [-400, 400]", "limits_deg: [-100, 400]", 1), encoding="utf-8")
     for command, status in (("plan", 2), ("run", 4)):
-        ended = rig(command, "sweep", "--inclinations-deg", "500")
+        ended = rig(command, "sweep", "--bench", str(bench), "--inclinations-deg", "-120")
         assert (ended.status, ended.out) == (status, "")
-        assert "alpha: 500 deg is outside its limits -400 .. 400 deg; nothing was moved. Ask" in ended.err
+        assert "alpha: -120 deg is outside its limits -100 .. 400 deg; nothing was moved. Ask" in ended.err
 
 
 def test_plan_prints_moves_limits_and_time(rig: Rig, rig_home: Path) -> None:
