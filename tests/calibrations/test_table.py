@@ -72,7 +72,7 @@ EARTH = "which is not gravity at any place on Earth"
         (-9.81, f"-9.81, {EARTH}; give it in m/s^2, 9.76 to 9.84"),
         ("nan", f"nan, {EARTH}; give it in m/s^2, 9.76 to 9.84"),
         ("9,80131", "'9,80131', not a number; write 9.80131, with a decimal point"),
-        ("ten", "'ten', not a number"),
+        ("ten", "'ten', not a number; give it in m/s^2, 9.76 to 9.84"),
     ],
 )
 def test_a_gravity_that_is_not_of_this_earth_is_refused(value: str | float, says: str) -> None:
