@@ -284,9 +284,10 @@ def _at_once(problem: Problem, noise: Noise, start: Array) -> tuple[Array, float
     J, before = white[:, 1:] * typical, white[:, 0]
     step = np.linalg.lstsq(J, -before, rcond=None)[0]
     theta = start + typical * step
+    if np.any(theta < low) or np.any(theta > high):
+        return None
     left = np.append(noise.whiten(problem.residual(theta)[:, :, None])[:, 0], rows @ theta)
-    linear = np.linalg.norm(before + J @ step - left) <= STRAIGHT * np.linalg.norm(left)
-    if not linear or np.any(theta < low) or np.any(theta > high):
+    if np.linalg.norm(before + J @ step - left) > STRAIGHT * np.linalg.norm(left):
         return None
     return theta, float(left @ left) / 2
 

@@ -28,6 +28,7 @@ WIDTHS_G = tuple(np.geomspace(0.01, 1.8, 14).tolist())  # of slip elements
 DEAD_G = (0.003, 0.012, 0.05)
 ENDS = (0.75, 0.9, 0.97, 0.99)  # of an axis's range, where saturation begins
 WARMING = (0.04, 0.15, 0.6)  # of the record: time constants
+SHORTEST_PART = 1e-3  # the same: shorter ones are over before the second pose
 LEADS_S = (0.0, -90.0, 90.0)  # by which the sensor is ahead of the thermometer
 WAVES, WALK_WAVES = 24, 160  # of slow noise, and of a random walk, whose roughness is never small
 DEGREE = 4  # of a general function of the force's direction
@@ -402,13 +403,14 @@ def _warming(
     """An exponential approach by its time constant, as a share of the record."""
 
     def at(shape: tuple[float, ...]) -> Component:
-        left = np.exp(-u / max(shape[0], 1e-3))[:, None]
+        part = max(shape[0], SHORTEST_PART)
+        left = np.exp(-u / part)[:, None]
         return Component(
             name, place, "response", cause, f"{place}/{cause}", price, _times_force(left) if factor else _timed(left),
             shape=shape, step=(0.2 * shape[0],), reshaped=_warming(axes, u, span_s, name, place, cause, price, factor),
             starts=lambda amplitudes: (
                 *(("amplitude", axis, float(a)) for axis, a in zip(axes, amplitudes, strict=True)),
-                ("time_constant", "", shape[0] * span_s),
+                ("time_constant", "", part * span_s),
             ),
         )  # fmt: skip
 
