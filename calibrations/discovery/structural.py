@@ -88,8 +88,6 @@ def search_structure(start: Fit, effects: Mapping[str, Effect]) -> StructuralSea
             start, base = (fit(f.model, with_white(f.table, found.white)) for f in (start, base))
             remarks = (f"The noise floor is that of the residual: {found.floor_source}.",)
         best = _named_and_fitted(base, found, effects)
-        if behind is not None and behind.end.held_out_excess < best.end.held_out_excess and not remarks:
-            best = behind
     found, causes, forms, end = best.found, best.causes, best.forms, best.end
     needed = [name for name in basic if chance(*first_order(end, name, shared=True)) < SIGNIFICANT]
     chosen = [*_largest_first(_at(end, causes), end, found), *_at(end, forms)]
@@ -130,6 +128,10 @@ def _named_and_fitted(base: Fit, found: Structure, effects: Mapping[str, Effect]
         other = together(base, [*as_searched, *forms])
         if other.pooled_excess < end.pooled_excess:
             causes, end = as_searched, other
+        smooth = [a for a in causes if not a.effect.rounds]
+        other = together(base, [*smooth, *forms])
+        if other.pooled_excess < NO_WORSE * end.pooled_excess:  # as well without
+            causes, end = smooth, other
     if end.held_out_excess > MATERIAL and not end.problem.rounds:
         # forms are found again beside the causes as the catalogue has them, so that they hold what these leave
         beside = structure(causes_alone(end, forms), effects)
