@@ -35,6 +35,7 @@ BASIC = ("bias", "scale-factor")
 BASE = (*BASIC, *GEOMETRY)
 BASE_STEPS = 2  # of Gauss and Newton's: hardly anything of the base is not linear
 STAIRS = "quantisation"
+NEARLY = 1.5  # noise floors: with more the stairs were not the right ones
 NO_WORSE = 1.02  # of the error before: a parameter more costs a degree of freedom, a fit gone astray more
 
 
@@ -88,6 +89,8 @@ def search_structure(start: Fit, effects: Mapping[str, Effect]) -> StructuralSea
             start, base = (fit(f.model, with_white(f.table, found.white)) for f in (start, base))
             remarks = (f"The noise floor is that of the residual: {found.floor_source}.",)
         best = _named_and_fitted(base, found, effects)
+        if behind is not None and not remarks and behind.end.held_out_excess < min(best.end.held_out_excess, NEARLY):
+            best = behind
     found, causes, forms, end = best.found, best.causes, best.forms, best.end
     needed = [name for name in basic if chance(*first_order(end, name, shared=True)) < SIGNIFICANT]
     chosen = [*_largest_first(_at(end, causes), end, found), *_at(end, forms)]
