@@ -25,6 +25,34 @@ SMALL_BYTES = 1 << 26  # unpacked; up to here a file may be packed however tight
 TIGHTEST = 50  # unpacked bytes for a packed one; logs of sensors, which are noise, have less than 10
 HEAD_BYTES = 1 << 16
 MARKS = {codecs.BOM_UTF8: "utf-8-sig", codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"}
+KNOWN_BINARY = (  # first bytes, name, and a way to CSV with the tools of the field
+    (b"ULog\x01\x12\x35", "a PX4 ULog", "convert it with ulog2csv (of pyulog)"),
+    (
+        b"\xa3\x95\x80",
+        "an ArduPilot DataFlash log",
+        (
+            "convert one message with mavlogdump.py --format csv --types ACC (of pymavlink); "
+            "the autopilot logs ACC, GYR and MAG after its own correction"
+        ),
+    ),
+    (b"#ROSBAG V2.0", "a ROS 1 bag", "convert one topic with rostopic echo -b FILE -p TOPIC > imu.csv"),
+    (
+        b"\x89MCAP0\r\n",
+        "an MCAP log",
+        "of ROS 2: play it, and save one topic with ros2 topic echo --csv TOPIC > imu.csv",
+    ),
+    (
+        b"SQLite format 3\0",
+        "an SQLite database",
+        "of ROS 2: play it, and save one topic with ros2 topic echo --csv TOPIC > imu.csv",
+    ),
+    (b"MATLAB ", "a MATLAB file", "write its columns in MATLAB with writetable(table(...), 'imu.csv')"),
+    (b"\x89HDF\r\n\x1a\n", "an HDF5 file", "write its columns as CSV, for example with h5py and numpy.savetxt"),
+    (b"PAR1", "a Parquet file", "write it as CSV, for example with pandas: read_parquet, to_csv"),
+    (b"\x93NUMPY", "a NumPy array", "write it with numpy.savetxt(..., delimiter=',')"),
+    (b"PK\x03\x04", "a zip archive (Excel, NumPy .npz)", "save the sheet as CSV, or the arrays with numpy.savetxt"),
+    (b"H Product:Blackbox", "a Betaflight Blackbox log", "convert it with blackbox_decode"),
+)
 CONTROLS = frozenset(range(32)) - set(b"\t\n\r\f") - {0x1A}  # 0x1A ends a text file in old Windows programs
 
 
@@ -116,6 +144,9 @@ def _encoding(head: bytes, path: Path) -> str:
             return encoding
     binary = next((k for k, byte in enumerate(head) if byte in CONTROLS), None)
     if binary is not None:
+        for first, what, remedy in KNOWN_BINARY:
+            if head.startswith(first):
+                raise DataError(f"{path}: is {what}, not text; {remedy}, and import the CSV file")
         raise DataError(
             f"{path}: is not text (byte {binary} is {head[binary]:#04x}); is it really a CSV file? "
             "From a spreadsheet, save the sheet as CSV"
