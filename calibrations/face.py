@@ -33,11 +33,13 @@ class Columns(Protocol):
         """(name, column) pairs."""
 
 
-def read(path: Path | str, kind: str | None = None) -> Table:
-    """The table in a data file. Raises DataError naming file, line and column."""
+def read(path: Path | str, kind: str | None = None, topic: str | None = None) -> Table:
+    """The table in a data file: CSV, JSON, HDF5, MATLAB, NumPy, Parquet, Excel; `topic` names the group or worksheet
+    of a file that has several. Raises DataError naming file, line and column.
+    """
     from calibrations.importing.foreign import read_csv
 
-    return read_csv(path, kind)
+    return read_csv(path, kind, topic)
 
 
 def table(columns: Columns, kind: str, constants: Mapping[str, Constant] | None = None) -> Table:

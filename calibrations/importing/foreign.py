@@ -15,7 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from calibrations.errors import DataError, MissingColumn, nearest
-from calibrations.files import open_text_file, text_source
+from calibrations.files import text_source
+from calibrations.importing.binary import open_sheet
 from calibrations.importing.plausible import check_at_rest, find_unit_doubts
 from calibrations.importing.proposal import import_command, missing_columns, suggest_import
 from calibrations.importing.sessions import RATE, is_session, sample_rates
@@ -43,6 +44,7 @@ class ImportedTable:
         names = {None: "blanks", ",": "comma", ";": "semicolon", "\t": "tab"}
         return {
             "file": Path(self.sheet.name).name,
+            **({"topic": self.sheet.topic} if self.sheet.topic else {}),
             "separator": names.get(self.sheet.separator, self.sheet.separator),
             "columns": {m.name: m.text.partition("=")[2] for m in self.mapped},
             "constants": dict(self.table.constants),
@@ -50,13 +52,18 @@ class ImportedTable:
 
 
 def read_foreign(
-    path: Path, kind: str | None, mapped: Sequence[ColumnMapping] = (), constants: Mapping[str, Constant] | None = None
+    path: Path,
+    kind: str | None,
+    mapped: Sequence[ColumnMapping] = (),
+    constants: Mapping[str, Constant] | None = None,
+    topic: str | None = None,
 ) -> Table:
-    """The table in the file `path`. Mapped columns take our names; the others keep their names in the header.
+    """The table in the file `path`, of the topic `topic` where a file has several. Mapped columns take our names; the
+    others keep their names in the header.
 
     Raises DataError with file, line and column.
     """
-    return import_sheet(read_sheet(open_text_file(path)), kind, mapped, constants).table
+    return import_sheet(open_sheet(path, topic), kind, mapped, constants).table
 
 
 def import_sheet(
@@ -89,14 +96,15 @@ def _import_with(
         kind = kind or guess_kind([*(m.name for m in chosen), *kept])
     except MissingColumn as error:
         what = error if look_like_names(laid.header) else "a header line with column names is missing"
-        raise MissingColumn(f"{laid.name}, line {laid.line}: {what}") from None
+        raise MissingColumn(f"{laid.place}: {what}") from None
     known = {**laid.constants, **constants}
     known |= _output_unit(chosen, kind, known.get("triad") == "m", laid.name)
     taken = {m.theirs for m in chosen}
     path = next((m.theirs for m in chosen if m.name == PATH), PATH)
     first = zip(laid.header, laid.sample[0], strict=True)
     words = [name for name, cell in first if name not in taken and _is_text(name, cell)]
-    numbers, texts = read_cells(laid, list(dict.fromkeys([*words, path])) if path in laid.header else words)
+    needed = {*taken - {path}, *NUMBERS}
+    numbers, texts = read_cells(laid, list(dict.fromkeys([*words, path])) if path in laid.header else words, needed)
     columns = {m.name: _converted(numbers[m.theirs], m) for m in chosen if m.name != PATH}
     columns |= {name: numbers[name] for name in kept if name in numbers}
     labels = {k: texts[k] for k in kept if k in texts} | ({PATH: texts[path]} if path in texts else {})
@@ -239,12 +247,12 @@ def drop_duplicate_rows(table: Table) -> tuple[Table, str | None]:
 # Reading accepts all that needs no mapping; writing uses commas and decimal points.
 
 
-def read_csv(path: Path | str, kind: str | None = None) -> Table:
-    """The table in the file `path`; without `kind` it is guessed from the columns.
+def read_csv(path: Path | str, kind: str | None = None, topic: str | None = None) -> Table:
+    """The table in the file `path`, of text or of a known binary format; without `kind` it is guessed from the columns.
 
     Raises DataError with file, line and column.
     """
-    return read_foreign(Path(path), kind)
+    return read_foreign(Path(path), kind, topic=topic)
 
 
 def parse_csv(content: str, source: str, kind: str | None = None) -> Table:

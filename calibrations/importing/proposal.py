@@ -82,6 +82,7 @@ NAME_PATTERNS: Mapping[str, Sequence[tuple[str, str]]] = {
         (r"^t(_?s)?$|time|elapsed|seconds", "t_s"),
     ),
 }
+INDEXED = re.compile(r"(?P<name>.*(?:acc|gyr|mag).*)\[(?P<index>\d)\]$", re.IGNORECASE)
 SECTION = r"part|section|segment|phase|activity|label|step|^path$"  # of a session by hand, in a column of words
 STD_COLUMNS = {"poses": "v{axis}_std_v", "positions": "a{axis}_std", "rates": "g{axis}_std"}
 
@@ -154,7 +155,8 @@ def import_command(
     laid: Sheet, kind: str | None, mapped: Sequence[ColumnMapping], constants: Sequence[str] = ()
 ) -> str:
     """The `rig import` command with this mapping."""
-    words = ["rig", "import", laid.name, *(["--kind", kind] if kind else [])]
+    topic = ["--topic", laid.topic] if laid.topic else []
+    words = ["rig", "import", laid.name, *topic, *(["--kind", kind] if kind else [])]
     words += [word for m in mapped for word in ("--column", replace(m, theirs=_shortest(laid, m.theirs)).text)]
     words += [word for constant in constants for word in ("--constant", constant)]
     return shlex.join(words)
@@ -200,8 +202,22 @@ def sample_values(laid: Sheet, name: str) -> Array:
     return np.array([parse_number(cell) for cell in cells]) if all(map(is_number, cells)) else np.zeros(0)
 
 
+def sensed_by(header: Iterable[str], topic: str) -> str:
+    """The sensor whose three axes, or whose poses, a topic and its columns name: a, m or g; "" for none."""
+    bare = {split_unit(name)[0] for name in header}
+    if {"vx_v", "alpha_deg"} & bare:
+        return "a"
+    for names in (bare & NUMBERS, {_by_name(f"{topic}_{name}", "positions") for name in bare}):
+        for sensor in "amg":
+            if names.issuperset(sensor + axis for axis in AXES):
+                return sensor
+    return ""
+
+
 def _by_name(bare: str, kind: str) -> str:
     """Our name for theirs, "" for a name without a known meaning."""
+    if (found := INDEXED.match(bare)) and int(found["index"]) < len(AXES):
+        bare = f"{found['name']}_{AXES[int(found['index'])]}"  # accSmooth[0] of Betaflight
     words = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", bare)
     axis = next((m["axis"] for m in re.finditer(AXIS, re.sub(r"[^a-z]", " ", words.lower()))), "")
     lower = words.lower()

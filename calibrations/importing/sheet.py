@@ -13,7 +13,7 @@ import re
 from array import array
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain, islice
 from math import isfinite
 from typing import Any
@@ -123,6 +123,8 @@ class Sheet:
     Without a header (`named` is false) columns are called "1", "2", ... `width` counts the cells of a row; it
     exceeds the
     number of columns where a spreadsheet appended empty cells. `sample` holds the first rows.
+
+    A binary file has its columns in `cells`, and no text; `topic` names the table in a file that has several.
     """
 
     source: Source
@@ -135,6 +137,20 @@ class Sheet:
     first: int
     sample: tuple[tuple[str, ...], ...]
     constants: dict[str, Constant]
+    cells: Mapping[str, Array | tuple[str, ...]] | None = None
+    topic: str = ""
+    notes: tuple[str, ...] = ()
+
+    def of_topic(self, topic: str, notes: tuple[str, ...]) -> Sheet:
+        """The same sheet as a topic of a file that has several, with remarks for the person."""
+        return replace(self, topic=topic, notes=notes)
+
+    @property
+    def place(self) -> str:
+        """The header's place in messages."""
+        if self.cells is None:
+            return f"{self.name}, line {self.line}"
+        return f"{self.name}, topic {self.topic}" if self.topic else self.name
 
     @property
     def name(self) -> str:
@@ -308,14 +324,39 @@ def look_like_names(header: Iterable[str]) -> bool:
     return all(NAME.fullmatch(name) for name in header)
 
 
-def read_cells(sheet: Sheet, texts: Collection[str]) -> tuple[Mapping[str, Array], Mapping[str, tuple[str, ...]]]:
+def read_cells(
+    sheet: Sheet, texts: Collection[str], needed: Collection[str] = ()
+) -> tuple[Mapping[str, Array], Mapping[str, tuple[str, ...]]]:
     """Every column by its name in the header: columns of numbers, and the columns in `texts`.
 
+    Of columns in memory, those outside `needed` that are not all finite are left out: a log has many that are unused.
     Raises DataError with file, line and column.
     """
+    if sheet.cells is not None:
+        return _in_memory(sheet, sheet.cells, texts, needed)
     if not texts and (numbers := _at_once(sheet)) is not None:
         return dict(zip(sheet.header, numbers.T, strict=True)), {}
     return _one_by_one(sheet, texts)
+
+
+def _in_memory(
+    sheet: Sheet, cells: Mapping[str, Array | tuple[str, ...]], texts: Collection[str], needed: Collection[str]
+) -> tuple[Mapping[str, Array], Mapping[str, tuple[str, ...]]]:
+    numbers, words = {}, {}
+    for name, values in cells.items():
+        if isinstance(values, tuple) or name in texts:
+            if name in needed and name not in texts:
+                raise DataError(f'{sheet.place}: the column "{name}" has no numbers; choose another column')
+            words[name] = values if isinstance(values, tuple) else tuple(f"{v:g}" for v in values)
+        elif np.isfinite(values).all():
+            numbers[name] = values
+        elif name in needed:
+            row = int(np.flatnonzero(~np.isfinite(values))[0])
+            raise DataError(
+                f'{sheet.place}, row {row + 1}, column "{name}": {values[row]} is not a finite number; '
+                "correct the value or remove the row"
+            )
+    return numbers, words
 
 
 def _at_once(sheet: Sheet) -> Array | None:

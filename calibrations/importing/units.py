@@ -20,6 +20,7 @@ UNITS: Mapping[str, tuple[str, float, float]] = {
     "m": ("m", 1.0, 0.0), "mm": ("m", 1e-3, 0.0), "um": ("m", 1e-6, 0.0),
     "g": ("g", 1.0, 0.0), "mg": ("g", 1e-3, 0.0), "m/s2": ("m/s2", 1.0, 0.0),
     "count": ("count", 1.0, 0.0), "counts": ("count", 1.0, 0.0), "uT": ("uT", 1.0, 0.0),
+    "nT": ("uT", 1e-3, 0.0), "tesla": ("uT", 1e6, 0.0), "gauss": ("uT", 100.0, 0.0), "mgauss": ("uT", 0.1, 0.0),
     "deg/s": ("deg/s", 1.0, 0.0), "rad/s": ("deg/s", 180 / np.pi, 0.0),
 }  # fmt: skip
 SUFFIXES = {"_deg_s": "deg/s", "_v": "V", "_deg": "deg", "_c": "degC", "_s": "s", "_m": "m"}

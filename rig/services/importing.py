@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from calibrations.errors import MissingColumn
-from calibrations.files import open_text_file
+from calibrations.importing.binary import open_sheet
 from calibrations.importing.foreign import import_sheet, needs_mapping
 from calibrations.importing.plausible import Doubt
 from calibrations.importing.proposal import (
@@ -19,7 +19,7 @@ from calibrations.importing.proposal import (
     propose_mapping,
     time_doubt,
 )
-from calibrations.importing.sheet import Sheet, read_sheet
+from calibrations.importing.sheet import Sheet
 from calibrations.importing.units import UNITS, ColumnMapping, column_unit
 from calibrations.presentation.chart import CANDIDATE, MEASURED, QUIET, Axis, Chart, Panel, Points, one
 from calibrations.table import AXES, NUMBERS, Constant, Table, guess_kind
@@ -48,9 +48,9 @@ class Preview:
     notes: tuple[str, ...]
 
 
-def opened(path: Path) -> Sheet:
-    """The sheet in a file. Raises DataError."""
-    return read_sheet(open_text_file(path))
+def opened(path: Path, topic: str | None = None) -> Sheet:
+    """The sheet in a file, of the topic `topic` where it has several. Raises DataError, SeveralTopics."""
+    return open_sheet(path, topic)
 
 
 def asks(sheet: Sheet) -> bool:
@@ -83,7 +83,7 @@ def lacking(sheet: Sheet, kind: str, columns: Sequence[ColumnMapping]) -> list[s
 
 def preview(sheet: Sheet, kind: str, columns: Sequence[ColumnMapping], constants: Mapping[str, Constant]) -> Preview:
     """The table of an import that is not stored. Raises DataError."""
-    notes: list[str] = []
+    notes = list(sheet.notes)
     table = averaged(import_sheet(sheet, kind, columns, constants).table, notes.append)
     return Preview(table, tuple(notes))
 
@@ -96,6 +96,8 @@ def stored(
     tell: Callable[[str], None],
 ) -> tuple[str, Table]:
     """Store the sheet in the record: the name of the new run, and its table. Raises DataError, RecordError."""
+    for remark in sheet.notes:
+        tell(remark)
     imported = import_sheet(sheet, kind, columns, constants)
     table = averaged(imported.table, tell)
     with Record.to_read() as record:

@@ -101,7 +101,10 @@ def sparse(path: Path) -> None:
     ("make", "says"),
     [
         (sparse, "the file has 2.0 GiB; the limit is 1 GiB; write the mean of each pose instead of samples"),
-        (lambda path: path.write_bytes(b"PK\x03\x04" + bytes(100)), "is a zip archive (Excel, NumPy .npz), not text"),
+        (
+            lambda path: path.write_bytes(b"PK\x03\x04" + bytes(100)),
+            "is a cut zip archive (Excel or NumPy .npz)",
+        ),
         (lambda path: path.write_bytes("1;2\n".encode("utf-16-le")), "is not text (byte 1 is 0x00)"),
         (lambda path: path.write_bytes(b"a;b\n\x81\x8d"), "is not text in UTF-8; is it really a CSV file?"),
         (

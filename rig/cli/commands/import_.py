@@ -38,22 +38,39 @@ LEAVE = "-"
 @click.option(
     "--constant", "given", multiple=True, metavar="KEY=VALUE", help="A constant, such as gravity_m_s2=9.81744."
 )
+@click.option("--topic", metavar="NAME", help="Topic, group or worksheet of a file that has several.")
 @json_option
-def command(file: Path, kind: str | None, mapped: tuple[str, ...], given: tuple[str, ...], as_json: bool) -> None:
+def command(
+    file: Path,
+    kind: str | None,
+    mapped: tuple[str, ...],
+    given: tuple[str, ...],
+    topic: str | None,
+    as_json: bool,
+) -> None:
     """Store FILE in the record. A raw log is averaged over its still intervals.
+
+    FILE is CSV, JSON, HDF5, MATLAB, NumPy, Parquet or Excel; its first bytes tell which.
 
     THEIRS is a name in the file's header, or a column number from 1 if the file has no header. In a terminal the
     program proposes names for unknown columns and asks.
     """
-    from calibrations.files import open_text_file
     from calibrations.importing.foreign import needs_mapping
-    from calibrations.importing.sheet import read_sheet
+    from calibrations.importing.topics import SeveralTopics
     from calibrations.importing.units import ColumnMapping
-    from rig.services.importing import stored
+    from rig.services.importing import opened, stored
 
-    sheet = read_sheet(open_text_file(file))
+    asked = sys.stdin.isatty() and sys.stderr.isatty()
+    try:
+        sheet = opened(file, topic)
+    except SeveralTopics as several:
+        if not asked:
+            raise
+        note(str(several))
+        choice = click.Choice(several.topics)
+        sheet = opened(file, click.prompt("Topic", default=several.proposed or None, type=choice, err=True))
     columns, constants = [ColumnMapping.parse(text) for text in mapped], _constants(given)
-    if sys.stdin.isatty() and sys.stderr.isatty() and needs_mapping(sheet, kind, columns):
+    if asked and needs_mapping(sheet, kind, columns):
         kind, columns = ask_mapping(sheet, kind, columns, given)
     run, table = stored(sheet, kind, columns, constants, note)
     if table.content == "positions" and {"ax", "mx"} <= set(table.columns):
