@@ -16,6 +16,7 @@ from calibrations.importing.arrays import (
     npz_topics,
     parquet_topics,
 )
+from calibrations.importing.flight_logs import dataflash_topics, ulog_topics
 from calibrations.importing.sheet import Sheet, read_sheet
 from calibrations.importing.topics import Topic, topic_sheet
 
@@ -25,8 +26,11 @@ READERS: Mapping[bytes, Callable[[Path], list[Topic]]] = {
     HDF5_MARK: hdf5_topics,
     b"PAR1": parquet_topics,
     b"\x93NUMPY": npy_topics,
+    b"ULog\x01\x12\x35": ulog_topics,
+    b"\xa3\x95\x80": dataflash_topics,
 }
 CANNOT = {  # first bytes of what no library reads, and what to do
+    b"ULogEnc": "is an encrypted PX4 ULog; decrypt it with decrypt_ulog.py of PX4-Autopilot and the log's private key",
     b"PARE": "is an encrypted Parquet file; save it without encryption",
     b"\xd0\xcf\x11\xe0": (
         "is an old Excel workbook (.xls), or one with a password; save it as .xlsx without a password, or as CSV"

@@ -50,7 +50,8 @@ def command(
 ) -> None:
     """Store FILE in the record. A raw log is averaged over its still intervals.
 
-    FILE is CSV, JSON, HDF5, MATLAB, NumPy, Parquet or Excel; its first bytes tell which.
+    FILE is CSV, JSON, HDF5, MATLAB, NumPy, Parquet, Excel, ULog (PX4) or DataFlash (ArduPilot); its first bytes tell
+    which.
 
     THEIRS is a name in the file's header, or a column number from 1 if the file has no header. In a terminal the
     program proposes names for unknown columns and asks.
