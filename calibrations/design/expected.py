@@ -11,7 +11,7 @@ Source  Atkinson and Fedorov, Biometrika 62 (1975), 57-70; Dette, Melas and Guch
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -85,29 +85,44 @@ def _beyond(noncentrality: float, threshold: float) -> float:
 
 
 def vary_one_way(right: Fit, wrong: Fit, table: Table) -> Expected:
-    """As `expected`, where `right` is: predictions come from both fits' own history, the noise from that of `right`."""
+    """As `expected_gain`, where `right` is: the noise is that of `right`."""
+    least = _distance(right, wrong, table)
+    return Expected(least(False), least(True))
+
+
+def distance_alone(right: Fit, wrong: Fit, table: Table) -> float:
+    """Lambda of the new data alone, where `right` is."""
+    return _distance(right, wrong, table)(False)
+
+
+def _distance(right: Fit, wrong: Fit, table: Table) -> Callable[[bool], float]:
+    """Lambda of the new data, as a function of whether the present data count as well.
+
+    Predictions come from both fits' own history.
+    """
     whole = joined([right.table, table])
-    known, new = np.arange(whole.n) < right.table.n, np.arange(whole.n) >= right.table.n
+    known = np.arange(whole.n) < right.table.n
     truth = right.problem.on(whole).residual(right.theta)
     mistaken = wrong.problem.on(whole)
     noise = noise_on_rows(right.noise, right.problem.on(table))
 
-    def white(columns: Array) -> tuple[Array, Array]:
-        """Rows of the data at hand, and of the new; both (channels, n, k) -> (rows, k)."""
-        return right.noise.whiten(columns[:, known]), noise.whiten(columns[:, new])
+    def least(together: bool) -> float:
+        def white(columns: Array) -> Array:
+            """(channels, n, k) -> (rows, k)."""
+            new = noise.whiten(columns[:, ~known])
+            return np.concatenate([right.noise.whiten(columns[:, known]), new]) if together else new
 
-    def least(parts: slice) -> float:
         def distance(theta: Array) -> Array:
-            return np.concatenate(white((mistaken.residual(theta) - truth)[:, :, None])[parts])[:, 0]
+            return white((mistaken.residual(theta) - truth)[:, :, None])[:, 0]
 
         def slope(theta: Array) -> Array:
-            return np.concatenate(white(mistaken.jacobian(theta))[parts])
+            return white(mistaken.jacobian(theta))
 
         size, bounds = mistaken.layout.typical, mistaken.layout.bounds
         found = least_squares(distance, wrong.theta, slope, bounds, x_scale=size, ftol=CLOSE_GAIN, max_nfev=ROUNDS)
         return 2 * float(found.cost)
 
-    return Expected(least(slice(1, None)), least(slice(None)))
+    return least
 
 
 # A model taken to be true before any data: what a plan is made for.

@@ -12,6 +12,14 @@ from calibrations.table import Array
 
 
 @njit(cache=True, nogil=True)
+def _moved(held: Array, last: float, here: float, limits: Array, pressed: float) -> None:
+    """Move all elements from the force `last` to `here`, each as far as its limit."""
+    for e in range(len(limits)):
+        limit = limits[e] * pressed
+        held[e] = min(limit, max(-limit, held[e] + here - last))
+
+
+@njit(cache=True, nogil=True)
 def slip_elements(a: Array, on_the_way: Array, pressed: Array, limits: Array) -> Array:
     """Force held by elements of equal stiffness that stick and slip, at each row, shape (n, elements, 3), g.
 
@@ -28,17 +36,31 @@ def slip_elements(a: Array, on_the_way: Array, pressed: Array, limits: Array) ->
         for i in range(n):
             for j in range(on_the_way.shape[1] + 1):
                 here = on_the_way[i, j, k] if j < on_the_way.shape[1] else a[i, k]
-                for e in range(len(limits)):
-                    limit = limits[e] * pressed[i, k]
-                    held[e] = min(limit, max(-limit, held[e] + here - last))
+                _moved(held, last, here, limits, pressed[i, k])
                 last = here
             state[i, :, k] = held
     return state
 
 
+@njit(cache=True, nogil=True)
 def slip(a: Array, on_the_way: Array, pressed: Array, limits: Array) -> Array:
-    """Force held by all elements, shape (n, 3), 1 where all slip."""
-    return np.asarray(slip_elements(a, on_the_way, pressed, limits).sum(axis=1) / limits.sum())
+    """Force held by all elements of `slip_elements`, shape (n, 3), 1 where all slip."""
+    n, axes = a.shape
+    total = limits.sum()
+    found = np.empty((n, axes))
+    for k in range(axes):
+        held = np.zeros(len(limits))
+        last = 0.0
+        for i in range(n):
+            for j in range(on_the_way.shape[1] + 1):
+                here = on_the_way[i, j, k] if j < on_the_way.shape[1] else a[i, k]
+                _moved(held, last, here, limits, pressed[i, k])
+                last = here
+            together = held[0]
+            for e in range(1, len(limits)):
+                together += held[e]
+            found[i, k] = together / total
+    return found
 
 
 @njit(cache=True, nogil=True)

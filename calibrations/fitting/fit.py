@@ -12,7 +12,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.linalg import lstsq
+from scipy.linalg import lstsq, qr
 from scipy.optimize import OptimizeResult, least_squares
 
 from calibrations.fitting.held_out import folds, held_out
@@ -307,8 +307,11 @@ def _determined(problem: Problem, noise: Noise, start: Array) -> tuple[Array, fl
     for _ in range(NEWTON_STEPS):
         J = np.vstack([noise.whiten(problem.jacobian(theta, stairs=stairs)), rows]) * typical
         low, high = ((bound - theta) / typical for bound in problem.layout.bounds)
+        # a rotation of the rows changes no step, and leaves as many rows as columns for every damping
+        rotated = qr(np.column_stack([J, left]), mode="r", overwrite_a=True, check_finite=False)[0]
+        R: Array = np.asarray(rotated[: J.shape[1] + 1], dtype=np.float64)
         for damping in DAMPINGS:
-            after = theta + typical * _step(J, left, damping, low, high)
+            after = theta + typical * _step(R[:, :-1], R[:, -1], damping, low, high)
             least = white(after)
             gain = float(left @ left - least @ least)
             if gain > 0:

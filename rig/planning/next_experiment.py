@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from calibrations.criteria import CERTAIN_PROBABILITY
-from calibrations.design.expected import Expected, expected_gain, pairs_separated, predict_data, vary_one_way
+from calibrations.design.expected import Expected, distance_alone, expected_gain, pairs_separated, predict_data
 from calibrations.design.experiment import MENU, Experiment
 from calibrations.discovery.results import Diagnosis, Discovery
 from calibrations.discovery.structural import without_forms
@@ -118,18 +118,35 @@ def chosen(
     `by_physics` is the experiment if no candidate of the menu helps; its text then says what the bench lacks. `judged`:
     whether the new data are analysed alone or with the present data, in order of preference.
     """
-    foreseeable = [_predicted(dispute, e, bench, bench_file) for e in menu]
-    return best_of([e for e in foreseeable if e is not None], judged) or as_proposed(by_physics, bench, bench_file)
+    predicted = []
+    for e, planned in sorted(_plans(menu, bench, bench_file), key=lambda pair: pair[0].duration_s or 0.0):
+        if (found := _predicted(dispute, e, planned)) is not None:
+            predicted.append(found)
+            if _certain(found, judged[0]) and len(found.separates) == len(dispute.rivals):
+                break  # no longer experiment can be better
+    return best_of(predicted, judged) or as_proposed(by_physics, bench, bench_file)
+
+
+def _plans(menu: Sequence[Experiment], bench: Bench, bench_file: Path | None) -> Iterator[tuple[Experiment, Plan]]:
+    """The experiments that the bench can do, each with its plan."""
+    for e in menu:
+        with suppress(LimitError, ProcedureError, BenchError):
+            yield planned_experiment(e, bench, bench_file)
 
 
 def best_of(experiments: Sequence[Experiment], judged: Sequence[str]) -> Experiment | None:
     """The shortest experiment that certainly separates most pairs; else that with most information per minute."""
     for probability in judged:
-        enough = [e for e in experiments if getattr(e.expected, probability) >= CERTAIN_PROBABILITY]
+        enough = [e for e in experiments if _certain(e, probability)]
         if enough:
             return min(enough, key=lambda e: (-len(e.separates), e.duration_s or 0.0))
     telling = [e for e in experiments if _per_minute(e) > 0]
     return max(telling, key=_per_minute, default=None)
+
+
+def _certain(e: Experiment, probability: str) -> bool:
+    """Whether it separates the explanations; `probability` as in `judged`."""
+    return bool(getattr(e.expected, probability) >= CERTAIN_PROBABILITY)
 
 
 def _per_minute(e: Experiment) -> float:
@@ -138,13 +155,12 @@ def _per_minute(e: Experiment) -> float:
     return 60 * found / max(e.duration_s or 0.0, 1.0) if found > LEAST else 0.0
 
 
-def _predicted(dispute: Dispute, e: Experiment, bench: Bench, bench_file: Path | None) -> Experiment | None:
-    """The experiment with its expected result; None if the bench cannot do it or its data cannot be predicted.
+def _predicted(dispute: Dispute, e: Experiment, planned: Plan) -> Experiment | None:
+    """The experiment with its expected result; None if its data cannot be predicted.
 
     The temperature of a room is not known in advance: effects that depend on it are only predicted in an oven.
     """
     try:
-        e, planned = planned_experiment(e, bench, bench_file)
         planned_columns = columns(planned, dispute.best.table)
         if dispute.of_temperature and "temperature_c" not in planned_columns:
             return None
@@ -155,7 +171,7 @@ def _predicted(dispute: Dispute, e: Experiment, bench: Bench, bench_file: Path |
     separated = {
         pair: gains[pair] for pair in gains if pairs_separated(gains[pair].together) >= CERTAIN_PROBABILITY
     } or gains
-    shown = [vary_one_way(found, dispute.nothing, table).alone for found in (dispute.best, *dispute.rivals.values())]
+    shown = [distance_alone(found, dispute.nothing, table) for found in (dispute.best, *dispute.rivals.values())]
     worst = Expected(min(x.alone for x in separated.values()), min(x.together for x in separated.values()), min(shown))
     return replace(e, separates=tuple(separated), expected=worst)
 
