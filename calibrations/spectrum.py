@@ -31,9 +31,8 @@ from functools import lru_cache
 from types import MappingProxyType
 
 import numpy as np
+import scipy  # its rooms are loaded where they are first entered: a list of effects needs none
 from numpy.typing import NDArray
-from scipy.fft import dct
-from scipy.special import sici
 
 from calibrations.table import Array
 
@@ -171,14 +170,14 @@ def flickering(number: Array) -> Array:
     From the generalised covariance -2 log(t): (2 / pi) (Si(pi k) - (1 - cos(pi k)) / (pi k)), 0.774 for the first.
     """
     a = np.pi * np.where(number > 0, number, 1.0)
-    return np.where(number > 0, 2 / np.pi * (sici(a)[0] - (1 - np.cos(a)) / a), 1.0)
+    return np.where(number > 0, 2 / np.pi * (scipy.special.sici(a)[0] - (1 - np.cos(a)) / a), 1.0)
 
 
 def slow_bands(means: Array, sampling: Sampling, corner_hz: float = np.inf) -> Bands:
     """Of a record's means, shape (n,), up to half the corner of the output's filter."""
     n = len(means)
     highest = min(n, 2 + int(corner_hz * n * sampling.interval_s) if np.isfinite(corner_hz) else n)
-    power = dct(means, type=2, norm="ortho")[1:highest] ** 2 * sampling.interval_s
+    power = scipy.fft.dct(means, type=2, norm="ortho")[1:highest] ** 2 * sampling.interval_s
     empty = _slow_grid(n, highest, sampling, corner_hz)
     return replace(empty, density=np.add.reduceat(power, _edges(highest - 1)[:-1]) / empty.freedom)
 

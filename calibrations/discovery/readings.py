@@ -14,7 +14,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import least_squares
+import scipy  # its room of optimization is loaded where it is first entered
 
 from calibrations.criteria import (
     EXCITED_G,
@@ -130,7 +130,7 @@ def _refined(angle: _Angle, table: Table, *, free_scale: bool) -> _Angle:
     def error(step: Array) -> Array:
         return np.ravel(_residual(moved(step).force(table), table.outputs) / size)
 
-    return moved(least_squares(error, np.zeros(2 if free_scale else 1), x_scale=10.0, max_nfev=30).x)
+    return moved(scipy.optimize.least_squares(error, np.zeros(2 if free_scale else 1), x_scale=10.0, max_nfev=30).x)
 
 
 def _shifted(table: Table, limit: float) -> str | None:

@@ -12,8 +12,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import scipy  # its room of optimization is loaded where it is first entered
 from scipy.linalg import lstsq, qr
-from scipy.optimize import OptimizeResult, least_squares
 
 from calibrations.fitting.held_out import folds, held_out
 from calibrations.fitting.identifiability import RELATIVE_RANK, estimates
@@ -253,11 +253,11 @@ def _minimise(problem: Problem, noise: Noise, start: Array) -> tuple[Array, floa
     def residual(theta: Array) -> Array:
         return np.append(noise.whiten(problem.residual(theta)[:, :, None])[:, 0], rows @ theta)
 
-    def descended(start: Array, stairs: bool) -> OptimizeResult:
+    def descended(start: Array, stairs: bool) -> scipy.optimize.OptimizeResult:
         def jacobian(theta: Array) -> Array:
             return np.vstack([noise.whiten(problem.jacobian(theta, stairs=stairs)), rows])
 
-        return least_squares(
+        return scipy.optimize.least_squares(
             residual,
             start,
             jac=jacobian,

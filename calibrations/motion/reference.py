@@ -13,8 +13,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy  # its room of optimization is loaded where it is first entered
 from scipy.linalg import cho_solve_banded, cholesky_banded
-from scipy.optimize import minimize_scalar
 
 from calibrations.criteria import FEWEST_MOTION_PERIODS, HIGHEST_MOTION, HIGHEST_MOTION_HZ, MOST_SINES, PROMINENT
 from calibrations.errors import DataError
@@ -188,7 +188,7 @@ def smooth(x: Array) -> Smoothed:
     def deviance(log_ratio: float) -> float:
         return _solved(x, penalty, float(np.exp(log_ratio)))[2]
 
-    found = minimize_scalar(deviance, bounds=LOG_RANGE, method="bounded", options={"xatol": 0.05})
+    found = scipy.optimize.minimize_scalar(deviance, bounds=LOG_RANGE, method="bounded", options={"xatol": 0.05})
     ratio = float(np.exp(found.x))
     values, noise_std, _ = _solved(x, penalty, ratio)
     return Smoothed(values, ratio, noise_std)

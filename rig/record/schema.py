@@ -6,7 +6,7 @@ import hashlib
 import json
 import sqlite3
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from sqlalchemy import (
     JSON,
@@ -27,9 +27,11 @@ from sqlalchemy import (
     inspect,
     text,
 )
-from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.sql.expression import TextClause
 from sqlalchemy.types import TypeEngine
+
+if TYPE_CHECKING:
+    from sqlalchemy.dialects import postgresql, sqlite
 
 SERVER = "postgresql"
 
@@ -82,6 +84,8 @@ def is_new(to: Connection, table: Table, values: Mapping[str, Any]) -> bool:
 
 def insert_or(to: Connection, table: Table) -> sqlite.Insert | postgresql.Insert:
     """An insert with a clause for an existing key."""
+    from sqlalchemy.dialects import postgresql, sqlite  # slow to import, and nothing that only reads needs them
+
     return postgresql.insert(table) if to.dialect.name == SERVER else sqlite.insert(table)
 
 

@@ -1,8 +1,8 @@
 from functools import lru_cache
 
 import numpy as np
+import scipy  # its rooms are loaded where they are first entered: a list of effects needs none
 from numpy.typing import NDArray
-from scipy.special import ndtr
 
 from calibrations.effects import Effect, Parameter, Values
 from calibrations.geometry.smooth import smooth_columns
@@ -68,7 +68,9 @@ class Quantisation(Effect):
         noise = max(float(p.noise / p.step), LEAST_NOISE)
         mean = nearest
         for j in range(CODES):
-            mean = mean + ndtr((beyond - 0.5 - j) / noise) - ndtr((-beyond - 0.5 - j) / noise)
+            mean = (
+                mean + scipy.special.ndtr((beyond - 0.5 - j) / noise) - scipy.special.ndtr((-beyond - 0.5 - j) / noise)
+            )
         return np.asarray(p.offset + p.step * mean)
 
 

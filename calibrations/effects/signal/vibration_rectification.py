@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
+import scipy  # its rooms are loaded where they are first entered: a list of effects needs none
 
 from calibrations.effects import Constant, Effect, Parameter, Values
 from calibrations.motion.spectrum import find_records
@@ -63,5 +63,5 @@ def mean_square_g2(table: Table) -> Array:
     squares = (table.column("acceleration_m_s2") / table.gravity_m_s2) ** 2
     for record in find_records(table):
         width = max(1, round(SECOND * record.rate_hz))
-        squares[record.rows] = uniform_filter1d(squares[record.rows], width, mode="nearest")
+        squares[record.rows] = scipy.ndimage.uniform_filter1d(squares[record.rows], width, mode="nearest")
     return np.asarray(squares)
