@@ -14,7 +14,7 @@ from typing import TypeGuard
 SMALL, LARGE = -4, 6  # powers of ten beyond which a number is written with one
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 PREFIXED = ("V", "g", "deg", "K", "h", "s")  # units that take a prefix
-PREFIXES = ((1.0, ""), (1e3, "m"), (1e6, "µ"), (1e9, "n"))
+PREFIXES = ((1.0, ""), (1e3, "m"), (1e6, "µ"), (1e9, "n"), (1e12, "p"))
 MOST_DECIMALS = 12  # of the concise form; smaller uncertainties are written out
 INFINITE_FREEDOM = 1e4  # degrees of freedom from which on ∞ is written
 FREEDOM_ROUNDING = 1e-6  # of a number of degrees of freedom
@@ -176,8 +176,13 @@ def prefixed(of: str, reach: float) -> tuple[float, str]:
     """(factor, unit with prefix) for values up to `reach` in the unit `of`, as `unit` writes it."""
     if not of.startswith(PREFIXED):
         return 1.0, of
-    factor, prefix = next(((f, p) for f, p in PREFIXES if reach * f >= 1), PREFIXES[-1])
-    return factor, f"{prefix}{of}"
+    factor, letter = prefix(reach)
+    return factor, f"{letter}{of}"
+
+
+def prefix(size: float) -> tuple[float, str]:
+    """(factor, prefix) that make a number of this size 1 or more; none where no prefix does."""
+    return next(((factor, letter) for factor, letter in PREFIXES if abs(size) * factor >= 1), PREFIXES[0])
 
 
 def labelled(name: str, of: str) -> str:

@@ -16,6 +16,7 @@ import numpy as np
 from calibrations.effects.catalogue import catalogue
 from calibrations.errors import DataError, ModelError
 from calibrations.fitting.fit import fit
+from calibrations.geometry.orientation import UPRIGHT_DEG
 from calibrations.means.noise import rms
 from calibrations.model import Estimate, Model
 from calibrations.model.chain import force, respond, sensed
@@ -247,11 +248,9 @@ def _motion_part(x: Array, record: Record, found: Reference) -> Array:
 # The two models that the paper judges by motion, fitted to a sweep of the same sensor.
 #
 # linear     the manufacturer's, Ang (1)-(3): bias and scale factor of each axis from +1 g and -1 g
-# physical   the shipped physical model, fitted jointly; with hysteresis where the sweep goes both ways, as the loop
-# would
-#            otherwise be taken for squares and products. A motion is met between its branches, where it adds nothing.
-
-UPRIGHT_DEG = {"x": (0.0, 180.0), "y": (90.0, 270.0)}  # beta at +1 g and at -1 g, with alpha at 90 deg
+# physical   the shipped physical model, fitted jointly; with hysteresis where the sweep goes both ways, because the
+#            loop would otherwise be taken for squares and products. A motion is met between its branches, where it
+#            adds nothing.
 
 
 def linear_from_turns(sweep: Table) -> Model:

@@ -23,7 +23,6 @@ from scipy.special import fdtri
 from calibrations.table import Array
 
 FALSE_ALARM = 1e-3  # probability that a window at rest counts as motion
-WINDOW_S = 0.5
 BLOCK_S = 0.05  # longer than the correlation of the noise behind a filter of 15 Hz
 LEARNED_WINDOWS = 20
 SUCCESSIVE = 2 / 3  # efficiency of a variance from successive differences (von Neumann, 1941)

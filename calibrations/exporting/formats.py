@@ -12,7 +12,6 @@ from calibrations.model import Model
 AUTOPILOTS = {"px4": autopilots.px4, "ardupilot": autopilots.ardupilot}
 MATRICES = {"imu_calib": robotics.imu_calib, "imu_tk": robotics.imu_tk, "imucal": robotics.imucal}
 NOISES = {"kalibr": noise_files.kalibr, "openvins": noise_files.openvins}
-FORMATS = (*AUTOPILOTS, *MATRICES, *NOISES)
 
 
 def export_model(
@@ -24,7 +23,7 @@ def export_model(
     reach: float | None = None,
     spans: Mapping[str, tuple[float, float]] | None = None,
 ) -> Exported:
-    """The models of one unit's sensors as a file of `form`, one of FORMATS.
+    """The models of one unit's sensors as a file of `form`, a name in AUTOPILOTS, MATRICES or NOISES.
 
     `reach` and `spans`: ranges of the input, and of temperature and others, over which errors are computed. Raises
     ModelError if the format cannot hold such a sensor.

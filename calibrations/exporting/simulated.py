@@ -21,7 +21,6 @@ DIRECTIONS = 300  # of the input, spread evenly over the sphere
 LEVELS = {"temperature_c": 13}  # of an input over its range
 OTHER_LEVELS = 3
 REACH = {"g": 1.0, "field": 1.0, "deg/s": 300.0}  # default size of the input: gravity, the field, a turn by hand
-REFERENCES = {"temperature_c": "reference_c", "supply_v": "reference_v"}  # constants of models
 HISTORY = "its inverse needs earlier samples"
 
 

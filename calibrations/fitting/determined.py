@@ -30,11 +30,6 @@ from calibrations.table import Array
 ROUNDING = 1e-9  # of a leverage
 
 
-def unseen_variance(found: Fit) -> float:
-    """Mean variance of the error on an unseen row over that of noise; 1 where parameters are known exactly."""
-    return _mean_variance(leverages(found))
-
-
 def leverages(found: Fit) -> Array:
     """The diagonal of the hat matrix, shape (channels, n): 1 where the fit goes through a value, whatever it is."""
     jacobian = np.vstack([found.whitened[:, 1:], found.problem.layout.prior_rows])
@@ -45,7 +40,8 @@ def leverages(found: Fit) -> Array:
     return np.asarray(np.sum(kept**2, axis=1))[: found.residual.size].reshape(found.residual.shape)
 
 
-def _mean_variance(leverage: Array) -> float:
+def unseen_variance(leverage: Array) -> float:
+    """Mean variance of the error on an unseen row over that of noise; 1 where parameters are known exactly."""
     return float(np.mean(1 / np.maximum(1 - leverage, 1e-12)))
 
 
@@ -54,10 +50,10 @@ def undetermined(found: Fit) -> str | None:
     if why := magnetometer_coverage_warning(found.table):
         return why
     leverage = leverages(found)
-    variance, lone = _mean_variance(leverage), leverage > 1 - ROUNDING
+    variance, lone = unseen_variance(leverage), leverage > 1 - ROUNDING
     if variance <= MOST_UNCERTAIN:
         return None
-    if lone.any() and not lone.all() and _mean_variance(leverage[~lone]) <= MOST_UNCERTAIN:
+    if lone.any() and not lone.all() and unseen_variance(leverage[~lone]) <= MOST_UNCERTAIN:
         return _unchecked(found, lone)
     rows = "positions" if found.table.type.magnitude else "rows"
     times = f"{np.sqrt(variance):.1f}" if variance < 1e4 else "many"

@@ -17,6 +17,8 @@ import numpy as np
 
 from calibrations.table import Array, Table
 
+UPRIGHT_DEG = {"x": (0.0, 180.0), "y": (90.0, 270.0)}  # beta at +1 g and at -1 g, with alpha at 90 deg
+
 
 @dataclass(frozen=True)
 class Pose:

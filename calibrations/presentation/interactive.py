@@ -31,7 +31,6 @@ ROW_GAP = 56  # px below a row of panels: its axis
 COLUMN_GAP = 0.09  # of the width, left of a panel: its axis
 SYMBOLS = {"cross": "cross-thin-open"}
 DAY_S = 86400.0
-FEW_DECADES = 2.5
 FEW_INTEGERS = 12  # each has its mark
 TITLE_PX, LEGEND_PX = 22, 18  # above panels
 ROUNDING = 1e-9
@@ -177,7 +176,7 @@ def _axis(axis: c.Axis) -> dict[str, Any]:
 
 def _marks(axis: c.Axis) -> dict[str, Any]:
     """Marks at 1, 2 and 5 times powers of ten, where the axis has few of these powers."""
-    if axis.low is None or axis.high is None or np.log10(axis.high / axis.low) >= FEW_DECADES:
+    if axis.low is None or axis.high is None or np.log10(axis.high / axis.low) >= c.FEW_DECADES:
         return {}
     powers = range(exponent(axis.low), exponent(axis.high) + 1)
     values = [digit * 10.0**power for power in powers for digit in (1, 2, 5)]

@@ -11,9 +11,8 @@ from calibrations.noise.deviations import minimum_s
 from calibrations.noise.record import Sensed
 from calibrations.noise.samples import COARSE
 from calibrations.noise.telegraph import TWO_LEVELS
-from calibrations.text import columns, duration, exponent, rounded, sentence
+from calibrations.text import PREFIXED, columns, concise, duration, prefix, rounded, sentence
 
-PREFIXES = ((1.0, ""), (1e3, "m"), (1e6, "u"), (1e9, "n"), (1e12, "p"))
 MEANS = {
     "white-noise": "velocity or angle random walk",
     "flicker-noise": "bias instability",
@@ -23,7 +22,6 @@ MEANS = {
     "gauss-markov-noise": "standard deviation",
 }
 NOISE = (COARSE, TWO_LEVELS)  # noise that the coefficients alone do not describe
-Factor = tuple[float, str]
 Cells = tuple[Sequence[str], Sequence[tuple[str, ...]]]  # head and rows
 
 
@@ -98,20 +96,16 @@ def _shown(coefficient: Coefficient, factor: float, unit: str, base: str) -> str
     if coefficient.upper is not None and np.isinf(coefficient.upper):
         return "not known"
     if coefficient.upper is not None:
-        scale, prefix = _prefixed(coefficient.upper * factor, unit)
-        return f"not identified, below {rounded(coefficient.upper * factor * scale, 2)} {prefix}{unit}{per}"
-    value, std = coefficient.value * factor, coefficient.std * factor
-    scale, prefix = _prefixed(value, unit)
-    digits = min(9, max(0, 1 - exponent(float(f"{std * scale:.1e}"))))
-    last = round(std * scale * 10**digits)
-    return f"{value * scale:.{digits}f}({last}) {prefix}{unit}{per}"
+        scale, spelt = _ascii_prefixed(coefficient.upper * factor, unit)
+        return f"not identified, below {rounded(coefficient.upper * factor * scale, 2)} {spelt}{per}"
+    scale, spelt = _ascii_prefixed(coefficient.value * factor, unit)
+    return concise(coefficient.value * factor * scale, coefficient.std * factor * scale, f"{spelt}{per}")
 
 
-def _prefixed(value: float, unit: str) -> Factor:
-    """The factor and prefix with which a value reads best; counts and compound units have none."""
-    if unit not in ("V", "g"):
-        return 1.0, ""
-    return next(((f, p) for f, p in PREFIXES if abs(value) * f >= 1), (1.0, ""))
+def _ascii_prefixed(value: float, unit: str) -> tuple[float, str]:
+    """(factor, unit with prefix) in ASCII; counts and compound units take no prefix."""
+    factor, letter = prefix(value) if unit in PREFIXED else (1.0, "")
+    return factor, letter.replace("µ", "u") + unit
 
 
 def density(noise: ChannelNoise, sensed: Sensed | None) -> str:
@@ -128,11 +122,11 @@ def density(noise: ChannelNoise, sensed: Sensed | None) -> str:
 
 def _allan(noise: ChannelNoise) -> str:
     curve, cleaned = noise.allan, noise.cleaned_allan
-    scale, prefix = _prefixed(float(curve.deviation.max()), noise.unit)
+    scale, spelt = _ascii_prefixed(float(curve.deviation.max()), noise.unit)
     values = [f"{each * scale:.4g}" for each in curve.deviation.tolist()]
     bounds = [f"{low * scale:.4g} .. {high * scale:.4g}" for low, high in zip(curve.low, curve.high, strict=True)]
     table = [[f"{tau:.4g}" for tau in curve.tau_s.tolist()], values, bounds]
-    head = ["time (s)", f"Allan deviation ({prefix}{noise.unit})", "95 % interval"]
+    head = ["time (s)", f"Allan deviation ({spelt})", "95 % interval"]
     if noise.search.patterns and np.array_equal(cleaned.tau_s, curve.tau_s):
         head.append("without disturbances")
         table.append([f"{each * scale:.4g}" for each in cleaned.deviation.tolist()])

@@ -62,7 +62,6 @@ PX = 0.6  # points of a printed marker for one pixel on a screen
 LINE = 0.8
 DASHES = {"solid": "-", "dash": "--", "dot": ":"}
 SYMBOLS = {"circle": "o", "diamond": "D", "triangle-up": "^", "triangle-down": "v", "cross": "+"}
-FEW_DECADES = 2.5
 FEW_MARKS, LONG_MARK = 4, 200.0  # marks of an axis whose values are so many times its range
 MOST_LEVEL = 8  # names on a horizontal axis; more are written aslant
 DROPPED = (r"<metadata>.*?</metadata>", r"<style.*?</style>", r' xmlns(:\w+)?="[^"]*"', r' (width|height)="[\d.]+pt"')
@@ -210,7 +209,7 @@ def _mark_powers(ax: Axes, along: c.Along) -> None:
     """Marks of a logarithmic axis in plain text: powers of ten, and 2 and 5 where there are few of these."""
     side, (low, high) = (ax.xaxis, ax.get_xlim()) if along == "x" else (ax.yaxis, ax.get_ylim())
     side.set_major_formatter(FuncFormatter(lambda value, _: tick_text(value)))
-    few = abs(np.log10(high / low)) < FEW_DECADES
+    few = abs(np.log10(high / low)) < c.FEW_DECADES
     side.set_minor_formatter(FuncFormatter(_of_two_and_five) if few else NullFormatter())
 
 

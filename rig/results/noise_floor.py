@@ -6,13 +6,13 @@ import numpy as np
 
 from calibrations.analyses.noise_floor import hidden_inclination_deg, noise_rms
 from calibrations.errors import DataError
+from calibrations.geometry.orientation import UPRIGHT_DEG
 from procedures.noise_floor import STILL
 from rig.record import Kept
 from rig.record.measured import Measured
 from rig.results.result import Missing, Result
 
 PEAK_TO_PEAK = 4  # x rms: Ang V
-UPRIGHT_DEG = {"x": (0.0, 180.0), "y": (90.0, 270.0)}  # beta at +1 g and at -1 g
 NAMES = ("noise-rms-{axis}", "noise-pp-{axis}", "inclination-{axis}")
 
 

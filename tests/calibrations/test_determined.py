@@ -37,7 +37,7 @@ def test_the_variance_on_an_unseen_row_is_that_of_leaving_it_out() -> None:
             cos = np.cos(np.radians(table.column("beta_deg")))
             scale, bias = np.polyfit(cos[seen], table.column("vx_v")[seen], 1)
             errors.append(table.column("vx_v")[k] - bias - scale * cos[k])
-    found = unseen_variance(fit(read_model("linear"), turned(betas, 0)))
+    found = unseen_variance(leverages(fit(read_model("linear"), turned(betas, 0))))
     assert found == pytest.approx(np.var(errors) / 5e-5**2, rel=0.1)
 
 

@@ -38,7 +38,6 @@ COLOURS = {"x": BLUE, "y": VERMILION}
 TIME = "time since power-on (h)"
 SHOWN = 600  # means of the still record that a line is drawn through, at most
 CURVE = 400  # points of a fitted curve
-COVERAGE = 2.0
 WINDOW = 1.6  # times the whole drift: what is shown of bounds that are far wider in the beginning
 FORESEEN = (
     "Final values of bias and scale factor by the Kalman filters' forecasts at each time: a line within its 95 % "

@@ -16,10 +16,10 @@ from calibrations.discovery.results import Discovery
 from calibrations.discovery.verdict import Verdict
 from calibrations.effects import Effect
 from calibrations.errors import DataError
-from calibrations.model import Estimate, Model
+from calibrations.model import Model
 from calibrations.presentation.answers import discovery_text
 from calibrations.table import Table
-from calibrations.text import columns, concise, duration, quantity
+from calibrations.text import columns, duration, quantity
 from rig.cli.terminal.output import note
 from rig.services import next_experiment
 from rig.services.next_experiment import Answer
@@ -33,13 +33,9 @@ def parameters(model: Model) -> str:
     """The model's parameters as a table."""
     rows = []
     for term in model.terms:
-        rows += [(term.name, e.name, e.axis or "-", _value(e)) for e in term.quantities]
+        rows += [(term.name, e.name, e.axis or "-", e.text) for e in term.quantities]
         rows += [(term.name, "curve", axis or "-", f"{n} coefficients") for axis, n in term.coefficients.items()]
     return columns(("effect", "parameter", "axis", "value"), rows)
-
-
-def _value(e: Estimate) -> str:
-    return concise(e.value, e.std, e.unit) if e.identified else f"not identified: {e.why}"
 
 
 def table(cells: Cells) -> str:

@@ -18,6 +18,7 @@ from calibrations.presentation.charts.history import EWMA, INDIVIDUALS, RANGES, 
 from calibrations.text import estimate_text, minus, rounded, unit
 from rig.errors import RigError
 from rig.services.charts import life_of
+from rig.services.control import OUT
 from rig.services.history import (
     Calibration,
     Compared,
@@ -259,7 +260,6 @@ def _legend(q: Quantity) -> str:
 # Summary, the calibration closest to a day, and the tables.
 
 LIMIT_IS_GIVEN = "the largest change, in the field above"
-OUT = "out of control"
 
 
 def summary_of(found: History, q: Quantity) -> None:

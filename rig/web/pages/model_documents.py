@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from calibrations.model import Model
     from rig.services.session import ModelSession
 
-GIVEN = "given"  # the model that the session began with
-
 
 class Asking:
     """A dialog with questions, a button that makes a document, and the answer or the error below it."""

@@ -75,7 +75,7 @@ class Live:
         self.see = ui.button("Open the model", icon="insights", on_click=self._see).props("dense")
 
     def decide(self, what: str) -> None:
-        """Send a decision to a paused run."""
+        """Send a decision or an answer to the run."""
         control_run(lambda status: control.answer(status, what))
 
     def pause_run(self) -> None:
@@ -179,14 +179,11 @@ class Live:
         """A button for each choice, or a field."""
         with div("row-of"):
             for choice in asked.choices:
-                ui.button(choice, on_click=partial(self._answer, choice))
+                ui.button(choice, on_click=partial(self.decide, choice))
             if not asked.choices:
                 typed = ui.input(asked.accepts, value=asked.proposed).props("dense autofocus")
-                typed.on("keydown.enter", lambda: self._answer(str(typed.value)))
-                ui.button("Answer", on_click=lambda: self._answer(str(typed.value)))
-
-    def _answer(self, text: str) -> None:
-        control_run(lambda status: control.answer(status, text))
+                typed.on("keydown.enter", lambda: self.decide(str(typed.value)))
+                ui.button("Answer", on_click=lambda: self.decide(str(typed.value)))
 
     def _values(self, status: Status) -> None:
         """The last values: large with their limits, the others in a table."""
