@@ -19,6 +19,15 @@ TARGET_S = {
     "sweep": 30.0,  # 518 poses x 5000 samples x 3 channels through the sockets
     "demo": 60.0,
     "help": 0.3,
+    "effects": 0.3,
+    "models": 0.3,
+    "runs": 0.3,
+    "compare, command: one defect": 1.0,
+    "compare, command: the default rig": 1.0,
+    "diagnose, command: one defect": 1.5,
+    "diagnose, command: the default rig": 1.5,
+    "fit of 20,000 poses": 3.0,
+    "discover, command: the night": 15.0,
     "diagnose, warm: one defect": 2.0,
     "diagnose, warm: the default rig": 2.0,
     "night": 60.0,  # the soak's procedure as a command: reversals, every check, results
@@ -50,9 +59,14 @@ def _figures(folder: Path) -> Iterator[tuple[str, Figure]]:
     file = str(folder / "one-defect.csv")
     subject(folder, "one_defect", file)
     for name, data in (("one defect", file), ("the default rig", run)):
-        yield f"diagnose, command: {name}", _commands("", folder, 2, "diagnose", data)
+        for word in ("compare", "diagnose"):
+            whole = f"{word}, command: {name}"
+            yield whole, _commands(whole, folder, 2, word, data)
         warm = f"diagnose, warm: {name}"
         yield warm, _inside(warm, subject(folder, "diagnosis", data))
+    for word in ("effects", "models", "runs"):
+        yield word, _commands(word, folder, 9, word)
+    yield "fit of 20,000 poses", _inside("fit of 20,000 poses", subject(folder, "many_poses", run))
     yield "demo", _commands("demo", folder, 1, "demo")
     yield "samples of one dwell", _inside("", subject(folder, "samples"))
     yield "dwell means of 518 poses", _inside("", subject(folder, "dwells"))
@@ -61,6 +75,7 @@ def _figures(folder: Path) -> Iterator[tuple[str, Figure]]:
     yield "coverage of 95 % intervals", json.loads(subject(folder, "coverage", "200").out)
     yield "soak", _inside("soak", subject(folder, "soak", "12"))
     yield "night", _commands("night", folder, 1, "run", "soak", "--off-s", "0", "--unattended", "--json")
+    yield "discover, command: the night", _commands("discover, command: the night", folder, 1, "discover", "last soak")
     yield "forecast of a soak", _forecast(folder)
     yield "generation", _generation(folder)
     yield "poses in real time", _overhead(folder)
@@ -140,7 +155,8 @@ def _noise(folder: Path) -> Figure:
 def _commands(name: str, folder: Path, repeats: int, *words: str) -> Figure:
     """A whole command, each time in a process of its own."""
     ended = [rig(folder, *words) for _ in range(repeats)]
-    return _figure(name, [e.seconds for e in ended], max(e.peak_mb for e in ended))
+    processor_s = float(f"{median(e.processor_s for e in ended):.4g}")
+    return {**_figure(name, [e.seconds for e in ended], max(e.peak_mb for e in ended)), "processor_s": processor_s}
 
 
 def _inside(name: str, ended: Ended) -> Figure:

@@ -1,4 +1,4 @@
-"""A program in a process of its own: how long it took, and the most memory that it held.
+"""A program in a process of its own: how long it took, on the clock and of the processor, and its peak of memory.
 
 This process stays small, since a child's peak counts the parent that it was forked from.
 """
@@ -18,9 +18,10 @@ RIG = Path(sys.executable).with_name("rig")
 
 @dataclass(frozen=True)
 class Ended:
-    """A program that has ended well: wall time, peak of resident memory, what it printed."""
+    """A program that has ended well: wall time, processor time, peak of resident memory, what it printed."""
 
     seconds: float
+    processor_s: float
     peak_mb: float
     out: str
 
@@ -38,7 +39,7 @@ def run(folder: Path, *words: str, threads: int = 1) -> Ended:
             err.seek(0)
             raise RuntimeError(f"{' '.join(words)}: exit status {process.returncode}\n{err.read()}")
         out.seek(0)
-        return Ended(seconds, used.ru_maxrss / 1024, out.read())
+        return Ended(seconds, used.ru_utime + used.ru_stime, used.ru_maxrss / 1024, out.read())
 
 
 def rig(folder: Path, *words: str) -> Ended:
