@@ -130,6 +130,10 @@ class Dataset(ABC, Generic[F]):
         """Why neither the data nor the values of a fit can be used; None where they can."""
         return None
 
+    def covered(self, found: F) -> dict[str, tuple[float, float]]:  # noqa: ARG002
+        """Lowest and highest value of each influence over which a fit is valid; {} where none was measured."""
+        return {}
+
     def undetermined(self, found: F) -> str | None:  # noqa: ARG002
         """Why the data do not determine a model, in words."""
         return None

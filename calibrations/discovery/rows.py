@@ -45,13 +45,15 @@ from calibrations.fitting.sensed import axis_of, milli_unit, pooled_milli
 from calibrations.free_forms.place_names import PREFIX, place_of_effect
 from calibrations.means.noise import correlation_known, rms
 from calibrations.model import Model
-from calibrations.table import Array, Table
+from calibrations.table import NUMBERS, Array, Table
 from calibrations.text import quantity, rounded
 
 if TYPE_CHECKING:
     from calibrations.discovery.enough import Enough
     from calibrations.discovery.structural import StructuralSearch
     from calibrations.presentation.chart import Chart
+
+INFLUENCES = ("temperature_c", "supply_v", "t_s")  # that a product may know
 
 
 @dataclass(frozen=True, eq=False)
@@ -344,6 +346,13 @@ class Rows(Dataset[Fit]):
     def rejection(self, found: Fit) -> Finding | None:
         """What speaks against these poses, or against the values of a fit."""
         return rejection(found)
+
+    def covered(self, found: Fit) -> dict[str, tuple[float, float]]:
+        """Those of every sensor, and the model's own."""
+        table = found.table
+        own = {name for term in found.model.terms for name in term.effect.needs if name not in NUMBERS}
+        there = [name for name in (*INFLUENCES, *sorted(own)) if name in table and table.n]
+        return {name: (float(table.column(name).min()), float(table.column(name).max())) for name in there}
 
     def addition(self, effect: Effect, model: Model, effects: Mapping[str, Effect]) -> Findings[Fit]:
         """One effect, with what the data cannot separate from it."""

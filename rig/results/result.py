@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from calibrations.criteria import COVERAGE_FACTOR
 from calibrations.effects.catalogue import catalogue
 from calibrations.fitting.fit import Fit, fit
 from calibrations.model import Estimate
@@ -19,7 +20,6 @@ from calibrations.model.file import read_model
 from calibrations.table import Table
 from procedures.errors import ProcedureError
 
-COVERAGE = 2.0
 Limit = float | tuple[float, float]
 
 
@@ -35,7 +35,7 @@ class Result:
         """pass, fail or marginal; a single number limits the magnitude."""
         low, high = (-limit, limit) if isinstance(limit, (int, float)) else limit
         inside = min(self.value - low, high - self.value)
-        guard = COVERAGE * (self.std or 0.0)
+        guard = COVERAGE_FACTOR * (self.std or 0.0)
         return "pass" if inside >= guard else "fail" if inside < -guard else "marginal"
 
 

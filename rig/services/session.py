@@ -148,7 +148,7 @@ class ModelSession(Generic[F]):
 
     def complete_model(self) -> Model:
         """The present model as a file keeps it, with its provenance."""
-        return with_provenance(self.end, self.model)
+        return with_provenance(self.data, self.end, self.model)
 
     def compared(self) -> Comparison[F]:
         """The present model beside the data: as given, where it came with values."""

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrations.discovery.dataset import Dataset
 from calibrations.discovery.results import FittedModel
 from calibrations.fitting.fit import Fit
 from calibrations.model import Estimate
@@ -112,8 +113,8 @@ class Again:
     floor: Array
 
 
-def both(first: Request, second: Request, tell: Callable[[str], None]) -> tuple[FittedModel, FittedModel]:
-    """One model fitted to both: that of the first request, or of its kind of data.
+def both(first: Request, second: Request, tell: Callable[[str], None]) -> tuple[Dataset[Any], Any, Any]:
+    """(the data of the first, and one model fitted to both: that of the first request, or of its kind of data).
 
     Raises RecordError where they are of two kinds, and what `loaded` and `fit` raise.
     """
@@ -123,7 +124,7 @@ def both(first: Request, second: Request, tell: Callable[[str], None]) -> tuple[
             f"{first.data} is of {one.data.content}, {second.data} of {other.data.content}: no model describes both; "
             "choose two runs of one kind"
         )
-    return one.data.fit(one.model), other.data.fit(one.model)
+    return one.data, one.data.fit(one.model), other.data.fit(one.model)
 
 
 def again(first: Fit, second: Fit) -> Again | None:

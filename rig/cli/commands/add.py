@@ -46,7 +46,7 @@ def command(request: Request, effect: str, name: str | None, out: Path, as_json:
     searched = question.effects if effect.startswith("free:") else {**question.effects, added.name: added}
     result = question.data.add(added, question.model, searched)
     result = planned(result, request, question.effects)
-    path = write_model(result.end, question.model, out, note)
+    path = write_model(question.data, result.end, question.model, out, note)
     if as_json:
         emit(discovery_document(result, str(path) if path else None))
         notes(warning([result.caution]))

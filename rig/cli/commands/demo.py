@@ -69,7 +69,7 @@ def command(folder: Path, realistic: bool, as_json: bool) -> None:
         faults = hidden_faults(bench, found.end, found.start)
         comparison = compare(table, linear)
         write_whole(page, report(found, comparison, today(), program(), album(found, comparison)))
-    write_model(found.end, linear, model, note)
+    write_model(found.findings.data, found.end, linear, model, note)
     if as_json:
         document = discovery_document(found, str(model))
         emit({**document, "run": run, "report": str(page), "hidden_faults": faults.document()})

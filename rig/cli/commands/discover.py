@@ -87,7 +87,7 @@ def _discover(
     data = question.data if len(several) == 1 else _together(several, request, question)
     data = data.without(without)
     result = planned(data.discover(question.model, question.effects, small), request, question.effects)
-    path = write_model(result.end, question.model, out, note)
+    path = write_model(data, result.end, question.model, out, note)
     reached = str(path) if path else request.model or question.model.name
     own = (result.pattern if len(several) == 1 else None, reached, request)
     if as_json:

@@ -43,7 +43,7 @@ def command(request: Request, out: Path | None, check: bool, as_json: bool) -> i
     question = loaded(request, note, out)
     data = question.data
     found = data.fit(question.model)
-    path, reason = write_model(found, question.model, out, note), data.rejection(found)
+    path, reason = write_model(data, found, question.model, out, note), data.rejection(found)
     if (untestable := data.untestable(found, question.effects)) is not None:
         note(untestable)
     cautions, further = data.cautions(found), _further(data, question.model, found)

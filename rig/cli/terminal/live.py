@@ -102,7 +102,7 @@ def discover_live(
             experiments.stopped()
             raise
     found = done[-1].found
-    path = write_model(found.end, given, out, note)
+    path = write_model(found.findings.data, found.end, given, out, note)
     if as_json:
         emit(document(done, standard_s, path))
         notes(warning([found.caution]))

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 from urllib.parse import urlencode
 
 from nicegui import ui
 
-from calibrations.discovery.results import FittedModel
 from calibrations.fitting.fit import Fit
 from calibrations.noise.comparison import compare_deviations
 from calibrations.noise.fit import NoiseFit
@@ -84,16 +84,6 @@ class Pictures:
             self.unit.set_value(not self.unit.value)
 
 
-def comparison_of(found: tuple[FittedModel, FittedModel]) -> Comparison:
-    """The pictures for two fits."""
-    first, second = found
-    if isinstance(first, NoiseFit) and isinstance(second, NoiseFit):
-        return _of_noise(first, second)
-    if isinstance(first, Fit) and isinstance(second, Fit):
-        return _of_rows(first, second)
-    raise TypeError(found)
-
-
 def _of_rows(first: Fit, second: Fit) -> Comparison:
     """Residuals, and the difference of the measurements at common poses."""
     shared = again(first, second)
@@ -126,6 +116,9 @@ def _of_noise(first: NoiseFit, second: NoiseFit) -> Comparison:
     return Comparison(axes, offered, [ALLAN], draw)
 
 
+PICTURES: dict[str, Callable[[Any, Any], Comparison]] = {"rows": _of_rows, "samples": _of_noise}  # by form of data
+
+
 HEAD = ("", "first ●", "second ◇", "second − first", "in std uncertainties")
 
 
@@ -146,14 +139,14 @@ def register(desk: Desk) -> None:
                 notes: list[str] = []
                 one, other = (Request(data, model or None, desk.bench_file) for data in (first, second))
                 try:
-                    found = await off_loop(both, one, other, notes.append)
+                    data, *found = await off_loop(both, one, other, notes.append)
                 except Exception as error:
                     fitted.clear()
                     failed("Cannot fit one model to both", error)
                     return
                 fitted.clear()
                 _parameters(found[0].model.name, parameters_of(*found))
-                pictures = Pictures(comparison_of(found))
+                pictures = Pictures(PICTURES[data.form](*found))
                 for note in dict.fromkeys(notes):
                     noted(note)
             keys["x"] = Key("next axis", pictures.next_axis)
