@@ -34,8 +34,8 @@ class Columns(Protocol):
 
 
 def read(path: Path | str, kind: str | None = None, topic: str | None = None) -> Table:
-    """The table in a data file: CSV, JSON, HDF5, MATLAB, NumPy, Parquet, Excel, ULog, DataFlash; `topic` names the
-    group, worksheet or sensor of a file that has several. Raises DataError naming file, line and column.
+    """The table in a data file: CSV, JSON, HDF5, MATLAB, NumPy, Parquet, Excel, ULog, DataFlash, ROS bags; `topic`
+    names the group, worksheet or topic of a file that has several. Raises DataError naming file, line and column.
     """
     from calibrations.importing.foreign import read_csv
 

@@ -16,6 +16,7 @@ from calibrations.importing.arrays import (
     npz_topics,
     parquet_topics,
 )
+from calibrations.importing.bags import SUFFIXES, bag_topics
 from calibrations.importing.flight_logs import dataflash_topics, ulog_topics
 from calibrations.importing.sheet import Sheet, read_sheet
 from calibrations.importing.topics import Topic, topic_sheet
@@ -28,6 +29,7 @@ READERS: Mapping[bytes, Callable[[Path], list[Topic]]] = {
     b"\x93NUMPY": npy_topics,
     b"ULog\x01\x12\x35": ulog_topics,
     b"\xa3\x95\x80": dataflash_topics,
+    **dict.fromkeys(SUFFIXES, bag_topics),
 }
 CANNOT = {  # first bytes of what no library reads, and what to do
     b"ULogEnc": "is an encrypted PX4 ULog; decrypt it with decrypt_ulog.py of PX4-Autopilot and the log's private key",
@@ -61,7 +63,7 @@ def _topics(path: Path) -> list[Topic] | None:
     """The topics of a binary file, None for another file. Raises DataError."""
     try:
         if path.is_dir():
-            return None
+            return bag_topics(path) if (path / "metadata.yaml").is_file() else None
         with path.open("rb") as file:
             head = file.read(MATLAB_HEADER_BYTES)
     except OSError:

@@ -30,7 +30,7 @@ LEAVE = "-"
 
 
 @click.command("import")
-@click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.argument("file", type=click.Path(exists=True, path_type=Path))
 @click.option("--kind", type=click.Choice(["poses", "positions", "motion", "still", "rates"]), help="Kind of table.")
 @click.option(
     "--column", "mapped", multiple=True, metavar="NAME=THEIRS:UNIT", help="Name a column of the file; repeatable."
@@ -50,8 +50,8 @@ def command(
 ) -> None:
     """Store FILE in the record. A raw log is averaged over its still intervals.
 
-    FILE is CSV, JSON, HDF5, MATLAB, NumPy, Parquet, Excel, ULog (PX4) or DataFlash (ArduPilot); its first bytes tell
-    which.
+    FILE is CSV, JSON, HDF5, MATLAB, NumPy, Parquet, Excel, ULog (PX4), DataFlash (ArduPilot) or a ROS bag (also a
+    folder with metadata.yaml); its first bytes tell which.
 
     THEIRS is a name in the file's header, or a column number from 1 if the file has no header. In a terminal the
     program proposes names for unknown columns and asks.
