@@ -3,33 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from importlib import import_module
 from pathlib import Path
-from zipfile import is_zipfile
+from typing import TYPE_CHECKING
 
 from calibrations.errors import DataError
 from calibrations.files import open_text_file
-from calibrations.importing.arrays import (
-    excel_topics,
-    hdf5_topics,
-    matlab_topics,
-    npy_topics,
-    npz_topics,
-    parquet_topics,
-)
-from calibrations.importing.bags import SUFFIXES, bag_topics
-from calibrations.importing.flight_logs import dataflash_topics, ulog_topics
 from calibrations.importing.sheet import Sheet, read_sheet
-from calibrations.importing.topics import Topic, topic_sheet
+
+if TYPE_CHECKING:
+    from calibrations.importing.topics import Topic
 
 MATLAB_HEADER_BYTES = 128
+BAG = ("bags", "bag_topics")
 HDF5_MARK = b"\x89HDF\r\n\x1a\n"
-READERS: Mapping[bytes, Callable[[Path], list[Topic]]] = {
-    HDF5_MARK: hdf5_topics,
-    b"PAR1": parquet_topics,
-    b"\x93NUMPY": npy_topics,
-    b"ULog\x01\x12\x35": ulog_topics,
-    b"\xa3\x95\x80": dataflash_topics,
-    **dict.fromkeys(SUFFIXES, bag_topics),
+READERS: Mapping[bytes, tuple[str, str]] = {  # first bytes: the reader's module, imported when needed, and name
+    HDF5_MARK: ("arrays", "hdf5_topics"),
+    b"PAR1": ("arrays", "parquet_topics"),
+    b"\x93NUMPY": ("arrays", "npy_topics"),
+    b"ULog\x01\x12\x35": ("flight_logs", "ulog_topics"),
+    b"\xa3\x95\x80": ("flight_logs", "dataflash_topics"),
+    b"#ROSBAG V2.0": BAG,
+    b"\x89MCAP0\r\n": BAG,
+    b"SQLite format 3\0": BAG,
 }
 CANNOT = {  # first bytes of what no library reads, and what to do
     b"ULogEnc": "is an encrypted PX4 ULog; decrypt it with decrypt_ulog.py of PX4-Autopilot and the log's private key",
@@ -51,6 +47,8 @@ def open_sheet(path: Path, topic: str | None = None) -> Sheet:
         if topic is not None:
             raise DataError(f'{path}: has no topics, for it is a text; leave out --topic "{topic}"')
         return sheet
+    from calibrations.importing.topics import topic_sheet
+
     try:
         return topic_sheet(path, topics, topic)
     except (DataError, MemoryError):
@@ -63,7 +61,7 @@ def _topics(path: Path) -> list[Topic] | None:
     """The topics of a binary file, None for another file. Raises DataError."""
     try:
         if path.is_dir():
-            return bag_topics(path) if (path / "metadata.yaml").is_file() else None
+            return _read(BAG, path) if (path / "metadata.yaml").is_file() else None
         with path.open("rb") as file:
             head = file.read(MATLAB_HEADER_BYTES)
     except OSError:
@@ -72,13 +70,19 @@ def _topics(path: Path) -> list[Topic] | None:
     if said := next((said for mark, said in CANNOT.items() if head.startswith(mark)), None):
         raise DataError(f"{path}: {said}")
     if len(head) == MATLAB_HEADER_BYTES and head[126:] in (b"IM", b"MI") and head.startswith(b"MATLAB 5"):
-        read = matlab_topics
+        read = ("arrays", "matlab_topics")
     elif head.startswith(b"MATLAB 7.3"):
-        read = hdf5_topics
+        read = READERS[HDF5_MARK]
     elif head.startswith(b"PK\x03\x04"):
-        read = _zip_topics
+        read = ("arrays", _zip_reader(path))
     if read is None:
         return None
+    return _read(read, path)
+
+
+def _read(reader: tuple[str, str], path: Path) -> list[Topic]:
+    module, name = reader
+    read: Callable[[Path], list[Topic]] = getattr(import_module(f"calibrations.importing.{module}"), name)
     try:
         return read(path)
     except (DataError, MemoryError):
@@ -87,17 +91,18 @@ def _topics(path: Path) -> list[Topic] | None:
         raise _damaged(path, error) from None
 
 
-def _zip_topics(path: Path) -> list[Topic]:
-    from zipfile import ZipFile
+def _zip_reader(path: Path) -> str:
+    """The reader for a zip archive. Raises DataError."""
+    from zipfile import ZipFile, is_zipfile
 
     if not is_zipfile(path):
         raise DataError(f"{path}: is a cut zip archive (Excel or NumPy .npz); copy it again")
     with ZipFile(path) as archive:
         names = archive.namelist()
     if "xl/workbook.xml" in names:
-        return excel_topics(path)
+        return "excel_topics"
     if names and all(name.endswith(".npy") for name in names):
-        return npz_topics(path)
+        return "npz_topics"
     raise DataError(f"{path}: is a zip archive, not an Excel workbook or NumPy .npz; unpack it and import a file of it")
 
 

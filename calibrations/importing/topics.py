@@ -142,8 +142,7 @@ def _chosen(path: Path, topics: Sequence[Topic], wanted: str | None) -> Topic:
     names = [t.name for t in topics]
     if wanted is not None:
         if wanted not in names:
-            near = nearest(wanted, names)
-            raise DataError(f'{path}: there is no topic "{wanted}"; the file has {_listed(names)}{near}')
+            raise DataError(f'{path}: there is no topic "{wanted}"{nearest(wanted, names)}')
         return topics[names.index(wanted)]
     if len(topics) == 1:
         return topics[0]

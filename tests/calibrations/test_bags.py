@@ -78,7 +78,7 @@ def test_an_imu_is_read_with_its_units_and_the_time_of_its_header(storage: str, 
         np.testing.assert_allclose(field.outputs, 5 * ACC)
         with pytest.raises(DataError, match="topic /words: holds std_msgs/msg/String; only sensor_msgs/msg/Imu"):
             open_sheet(each, "/words")
-        with pytest.raises(DataError, match=r'no topic "/imo"; the file has .*; did you mean "/imu"'):
+        with pytest.raises(DataError, match='no topic "/imo"; did you mean "/imu"'):
             open_sheet(each, "/imo")
 
 
