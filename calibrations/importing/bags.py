@@ -112,7 +112,7 @@ def _cells(anyreader: Any, path: Path, name: str, kind: str) -> Cells:
             "record each sensor as a topic of its own"
         )
     times = np.frombuffer(stamps, dtype=np.int64)
-    cells: dict[str, Array] = {TIME: (times - times[:1]) * 1e-9}
+    cells: dict[str, Array] = {TIME: np.asarray((times - times[:1]) * 1e-9, dtype=np.float64)}
     for k, (_, columns, _) in enumerate(VECTORS[kind]):
         if k not in absent:
             cells |= dict(zip(columns, np.frombuffer(values[k]).reshape(-1, 3).T.copy(), strict=True))
