@@ -1,0 +1,18 @@
+"""The search on random combinations of causes, layouts, and missing columns, constants and rows."""
+
+import pytest
+
+from tests.benchmark.combinations import combination, ended
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [0, 4, 5, 8, 10, 11])
+def test_a_combination_ends_in_an_answer_or_a_refusal(seed: int) -> None:
+    found = ended(seed)
+    assert found.outcome != "error", found.error
+
+
+def test_a_combination_is_the_same_each_time() -> None:
+    one, other = combination(4), combination(4)
+    assert one.columns.keys() == other.columns.keys()
+    assert (one.outputs == other.outputs).all()
