@@ -156,6 +156,8 @@ def _changed(table: Table, limit: float) -> str | None:
     columns = np.column_stack([np.ones(table.n), specific_force(nominal_pose(table))])
     outputs = (table.outputs - table.outputs.mean(axis=0)) / table.outputs.std(axis=0)
     least, most = FEWEST_RESPONSE_ROWS, table.n - FEWEST_RESPONSE_ROWS
+    if most <= least:
+        return None
     coarse = range(least, most, max(1, (most - least) // 24))
     best = min(coarse, key=lambda k: _of_parts(columns, outputs, k)[0])
     near = range(max(least, best - coarse.step), min(most, best + coarse.step) + 1)
