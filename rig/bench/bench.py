@@ -55,10 +55,22 @@ class Bench(Strict):
         return adc.typed_settings().wired if adc else {}
 
     @property
+    def unit(self) -> str:
+        """Unit of the samples: V, or that of a digital sensor."""
+        adc = self.instruments.get("adc")
+        return str(getattr(adc.typed_settings(), "unit", "V")) if adc else "V"
+
+    @property
     def constants(self) -> dict[str, str | float]:
         """The constants of every table: sensor (not for a batch), approach and uncertainties."""
         sensor = {} if self.sensors else self.sensor.constants
-        return {**sensor, "approach_deg": self.limits.overrun_deg, **self.uncertainty.model_dump(exclude_none=True)}
+        unit = {} if self.unit == "V" else {"unit": self.unit}
+        return {
+            **sensor,
+            **unit,
+            "approach_deg": self.limits.overrun_deg,
+            **self.uncertainty.model_dump(exclude_none=True),
+        }
 
     @property
     def result_limits(self) -> Mapping[str, float | tuple[float, float]]:

@@ -91,7 +91,7 @@ def _table(run: Run, kept: Sequence[Kept], outputs: Sequence[str], more: Mapping
     columns |= {"n": np.array([float(row.n) for row in rows])}
     blocks = [each.samples for each in kept[:: 1 + len(kept) // MOST_BLOCKS]]
     known = {name: value for name, value in run.constants.items() if name not in NOT_OF_THESE}
-    constants = {**known, "unit": "V", "sample_rate_hz": blocks[0].rate_hz, **inflations(blocks, outputs)}
+    constants = {"unit": "V", **known, "sample_rate_hz": blocks[0].rate_hz, **inflations(blocks, outputs)}
     labels = {"path": tuple(each.pose.path for each in kept)}
     table = Table.from_columns(run.kind, columns, constants, run.run, labels)
     return replace(table, numbers=np.array([each.number for each in kept]))

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import is_dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from drivers import clock as clock_module
 from drivers.clock import SimulatedClock
@@ -22,11 +24,20 @@ OTHERS = ("rtu+tcp://127.0.0.1:0", "tcp://127.0.0.1:0")
 WIRES = [(name, None) for name in NAMES] + [(name, listen) for name in SERIAL for listen in OTHERS]
 
 
+class Steady:
+    """A world whose inputs are all at 2 V."""
+
+    def adc_volts(self, inputs: Sequence[str], start_s: float, interval_s: float, n: int) -> NDArray[np.float64]:
+        return np.full((n, len(inputs)), 2.0)
+
+
 @pytest.fixture(params=WIRES, ids=lambda wire: f"{wire[0]}-{wire[1] or 'usual'}")
 def instrument(request: pytest.FixtureRequest, small_world: Any) -> Iterator[Any]:
     name, listen = request.param
     driver, twin = import_module(f"drivers.{name}.driver"), import_module(f"drivers.{name}.twin")
     settings = driver.Settings() if name != "labjack_t7" else driver.Settings(channels={"supply": 0})
+    if name == "imu_lines":
+        small_world = Steady()
     server = twin.serve(small_world, {"alpha": (1, settings)}, listen or twin.LISTEN)
     clock = SimulatedClock()
     clock.attach(server)

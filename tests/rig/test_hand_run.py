@@ -109,6 +109,43 @@ def test_the_bench_file_is_an_example(rig: Rig) -> None:
     assert rig("check", "--example-hand").out == HAND.read_text(encoding="utf-8")
 
 
+@pytest.fixture
+def digital_bench(tmp_path: Path) -> Path:
+    """The bench of the hand with a sensor that sends lines in g."""
+    document = yaml.safe_load(HAND.read_text(encoding="utf-8"))
+    settings = {"columns": {"time": 1, "ax": 2, "ay": 3, "az": 4}, "unit": "g", "rate_hz": 100}
+    document["instruments"]["adc"] = {"driver": "imu_lines", "url": "simulated", "settings": settings}
+    path = tmp_path / "digital.yaml"
+    path.write_text(yaml.safe_dump(document), encoding="utf-8")
+    return path
+
+
+@pytest.mark.slow
+@pytest.mark.sockets
+def test_a_digital_sensor_is_calibrated_in_its_own_unit(rig: Rig, rig_home: Path, digital_bench: Path) -> None:
+    ended = rig("run", "hand-positions", "--bench", str(digital_bench), "--unattended", "--json")
+    assert ended.status == 0, ended.err
+    found = json.loads(ended.out)["results"]
+    world = world_of(read_bench(digital_bench))
+    assert isinstance(world, HandheldWorld)
+    for axis in "xyz":
+        mass, bias, scale = getattr(world.triad, axis), found[f"bias-{axis}"], found[f"scale-{axis}"]
+        assert (bias["unit"], scale["unit"]) == ("g", "g/g")
+        assert abs(bias["value"] - (mass.zero_v - 1.65) / 0.8) < 4 * bias["std"] + 4e-5
+        assert abs(scale["value"] - mass.volts_per_g / 0.8) < 4 * scale["std"] + 4e-5
+    fitted = rig("fit", "last", "--model", "linear")
+    assert fitted.status == 0
+    assert " g/g" in fitted.out
+    assert " V" not in fitted.out
+
+
+def test_a_digital_sensor_is_refused_where_results_are_in_volts(digital_bench: Path) -> None:
+    bench, procedure = read_bench(digital_bench), find("noise-floor")
+    assert bench.constants["unit"] == "g"
+    with pytest.raises(BenchError, match=r"noise-floor needs outputs in V.* gives g; calibrate it with hand-positions"):
+        plan(bench, procedure, parse(procedure, {}))
+
+
 def test_a_hand_is_set_in_the_bench_file(bench_with: Callable[..., Path]) -> None:
     world = world_of(read_bench(bench_with(hand={"slips": 1.0})))
     assert isinstance(world, HandheldWorld)

@@ -1,0 +1,1 @@
+"""A digital sensor that sends lines of text."""

@@ -1,0 +1,309 @@
+"""A digital sensor that sends its samples as lines of text, unasked, over a serial line or TCP.
+
+It is in the role of the converter, and its samples are in the `unit` of the settings in place of V. It is never written
+to. Old lines in the buffers are discarded before a record, and so is a cut line at its start.
+
+With a column `time`, lost samples are found by the gaps of the sensor's time, and repeated ones are dropped. A record
+with more than `most_lost` of its samples lost is refused, as is one with an axis at the end of its range or stuck.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Generator, Mapping, Sequence
+from copy import copy
+from dataclasses import dataclass, field, replace
+from typing import Literal, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.errors import BadFrame, DriverError, LimitError, LinkTimeout, OverRange, SensorFault, StreamError
+from drivers.imu_lines.lines import Assembly
+from drivers.instrument import Check, Identity, require_positive
+from drivers.transport import Address, Links
+from drivers.transport.link import Link
+
+Read = TypeVar("Read")
+OUTPUTS = ("ax", "ay", "az")
+TIME = "time"
+QUIET_S = 2.0  # silence that ends a record; at least ten samples
+STUCK = 100  # equal samples of one axis, while another changes
+RATE_OFF = 0.05  # of the stated rate
+TEST_S = 2.0
+LONGEST = 1024  # bytes without an end of line
+SHOWN = 3  # damaged lines before a share of them can be judged
+
+
+@dataclass(frozen=True)
+class Settings:
+    """The line: `columns` are {ax: 1, ay: 2, az: 3}, by number from 1, or by name for `named` and `teleplot`.
+
+    A column `time` is the sensor's own time, in units of `time_unit_s`. `range` is the end of the range each way, in
+    the sensor's `unit`. Raises ValueError for what cannot be.
+    """
+
+    columns: Mapping[str, int | str] = field(default_factory=lambda: {"ax": 1, "ay": 2, "az": 3})
+    format: Literal["csv", "named", "teleplot", "nmea"] = "csv"
+    unit: Literal["g", "m/s^2", "count"] = "g"
+    rate_hz: float = 100.0
+    range: float | None = None
+    time_unit_s: float = 1e-6
+    most_lost: float = 0.01
+
+    def __post_init__(self) -> None:
+        require_positive(self, "rate_hz", "time_unit_s", *([] if self.range is None else ["range"]))
+        if not set(self.columns) - {TIME} or not set(self.columns) <= {*OUTPUTS, TIME}:
+            raise ValueError(f"columns must name outputs of {', '.join(OUTPUTS)}, and may name {TIME}")
+        if len(set(self.columns.values())) < len(self.columns):
+            raise ValueError("columns must be different; two names have the same column")
+        numbered = self.format in ("csv", "nmea")
+        if any(isinstance(each, int) != numbered or each in (0, "") for each in self.columns.values()):
+            raise ValueError(f"columns of {self.format} are {'numbers, from 1' if numbered else 'names'}")
+        if not 0 <= self.most_lost < 1:
+            raise ValueError("most_lost must be a share of 0 or more, and less than 1")
+
+    @property
+    def channels(self) -> Mapping[str, int | str]:
+        """The outputs, by name."""
+        return {name: column for name, column in self.columns.items() if name != TIME}
+
+    wired = channels
+
+    @property
+    def power_dio(self) -> None:
+        """It has no line for the sensor's power."""
+
+    @property
+    def interlocks(self) -> Mapping[str, int]:
+        """It has no digital lines."""
+        return {}
+
+    def only(self, name: str, outputs: Sequence[str]) -> Settings:
+        """Settings with these outputs. Raises LimitError for one that is not in the lines."""
+        if missing := [each for each in outputs if each not in self.channels]:
+            raise LimitError(
+                f"{name}: the lines have no {', '.join(missing)}; there are {', '.join(self.channels)}",
+                "Name the columns in the bench file, under columns of the sensor's settings",
+            )
+        return replace(self, columns={k: c for k, c in self.columns.items() if k in outputs or k == TIME})
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """A record: `volts` of shape (n, channels), in the sensor's unit; the first at `start_s` of the clock."""
+
+    volts: NDArray[np.float64]
+    channels: tuple[str, ...]
+    rate_hz: float
+    start_s: float
+
+
+class LineSensor:
+    """The sensor at the other end of the wire."""
+
+    def __init__(self, link: Link, settings: Settings, name: str) -> None:
+        self.name, self.settings = name, settings
+        self._link, self._clock = link, link.clock
+
+    def identify(self) -> Identity:
+        """Only what is known: such lines have no name."""
+        return Identity(f"{self.settings.format} lines at {self.settings.rate_hz:g} Hz, in {self.settings.unit}")
+
+    def self_test(self) -> list[Check]:
+        """The columns, the rate, and the sensor's time against the host's, in two seconds of lines."""
+        heard = Heard(self._assembly())
+        try:
+            self._link.discard()
+            deadline = self._clock.now() + TEST_S
+            while (left_s := deadline - self._clock.now()) > 0:
+                heard.take(self._listen(heard.assembly, left_s), self._clock.now())
+            if not heard.assembly.good:
+                raise self._unreadable(heard.assembly)
+        except DriverError as fault:
+            return [Check("lines", False, f"{fault}")]
+        columns = f"the lines have the columns {', '.join(map(str, heard.assembly.seen))}"
+        rate_hz = heard.rate_hz
+        fits = abs(rate_hz / self.settings.rate_hz - 1) < RATE_OFF
+        told = f"{rate_hz:.4g} samples a second; rate_hz is {self.settings.rate_hz:g}"
+        lost, doubled = heard.lost(self.settings.time_unit_s, self.settings.rate_hz)
+        state = f"{heard.assembly.damaged} damaged, {lost} samples lost, {doubled} doubled"
+        checks = [Check("lines", True, f"{columns}; {state}"), Check("rate", fits, told)]
+        if TIME in self.settings.columns:
+            offset_s, drift = heard.against_host(self.settings.time_unit_s)
+            said = f"the sensor's time is {offset_s:+.3f} s from the host's and gains {1e6 * drift:+.0f} ppm"
+            checks.append(Check("time", abs(drift) < RATE_OFF, said))
+        return checks
+
+    def close(self) -> None:
+        """Nothing to release: the wire belongs to the bench."""
+
+    def power(self, on: bool) -> None:  # noqa: ARG002 - as the converter's
+        """Raises LimitError: no line switches its power."""
+        raise LimitError(f"{self.name}: no line switches the power of a sensor that sends lines", "Switch it by hand")
+
+    def only(self, *outputs: str) -> LineSensor:
+        """The same sensor with these outputs. Raises LimitError for one that its lines have not."""
+        chosen = copy(self)
+        chosen.settings = self.settings.only(self.name, outputs)
+        return chosen
+
+    def acquire(self, duration_s: float) -> Samples:
+        """Record for `duration_s`, rounded to whole samples; raises as `stream`."""
+        (samples,) = self.stream(duration_s, duration_s)
+        return samples
+
+    def acquire_with(self, duration_s: float, reading: Callable[[], Read]) -> tuple[Samples, Read]:
+        """The same, and what `reading` gives in the middle of it."""
+        with contextlib.closing(self.stream(duration_s, duration_s / 2)) as stream:
+            blocks = [next(stream)]
+            read = reading()
+            blocks += stream
+        return _joined(blocks), read
+
+    def acquire_watched(self, duration_s: float, watch: Callable[[], object], every_s: float) -> Samples:
+        """The same as `acquire`; `watch` is called about every `every_s`, and at the end."""
+        blocks = []
+        with contextlib.closing(self.stream(duration_s, every_s)) as stream:
+            for block in stream:
+                watch()
+                blocks.append(block)
+        return _joined(blocks)
+
+    def stream(self, duration_s: float, block_s: float) -> Generator[Samples, None, None]:
+        """Record for `duration_s` without a gap, in blocks of `block_s`, both rounded to whole samples.
+
+        Raises LinkTimeout for a silent line, BadFrame for lines that cannot be read, StreamError for lost samples or
+        another rate, OverRange, SensorFault for a stuck axis.
+        """
+        rate_hz, names = self.settings.rate_hz, tuple(self.settings.channels)
+        total, block = max(1, round(duration_s * rate_hz)), max(1, round(block_s * rate_hz))
+        self._link.discard()
+        heard, given = Heard(self._assembly()), 0
+        while given < total:
+            wanted = min(block, total - given)
+            while len(heard.kept) < given + wanted:
+                heard.take(self._listen(heard.assembly, max(QUIET_S, 10 / rate_hz)), self._clock.now())
+            self._require_complete(heard)
+            values = np.array([[row[name] for name in names] for row in heard.kept[given : given + wanted]])
+            self._require_alive(values, names)
+            yield Samples(values, names, rate_hz, heard.at_s[0] + given / rate_hz)
+            given += wanted
+
+    def _assembly(self) -> Assembly:
+        return Assembly(self.settings.format, self.settings.columns)
+
+    def _listen(self, assembly: Assembly, timeout_s: float) -> list[dict[str, float]]:
+        """The samples of the next bytes. Raises LinkTimeout, BadFrame."""
+        if not (data := self._link.read(timeout_s)):
+            if timeout_s < QUIET_S:
+                return []
+            raise LinkTimeout(
+                f"{self.name}: no line came on {self._link.url} within {timeout_s:g} s",
+                "Check power and cable, and that the sensor sends by itself",
+            )
+        samples = assembly.take(data)
+        if assembly.damaged > SHOWN + assembly.good or (not assembly.good and len(assembly.rest) > LONGEST):
+            raise self._unreadable(assembly)
+        return samples
+
+    def _unreadable(self, assembly: Assembly) -> DriverError:
+        wanted = ", ".join(f"{name}: {column}" for name, column in self.settings.columns.items())
+        if not assembly.damaged:
+            return LinkTimeout(
+                f"{self.name}: no whole line came on {self._link.url}", "Check baud rate, power and cable"
+            )
+        if assembly.unread.isascii() and assembly.unread.isprintable():
+            return BadFrame(
+                f"{self.name}: lines such as {assembly.unread!r} are not {self.settings.format} with columns {wanted}",
+                "Correct format and columns in the sensor's settings",
+            )
+        return BadFrame(
+            f"{self.name}: what comes on {self._link.url} is not text ({assembly.unread[:16]!r})",
+            "The baud rate is probably wrong: write the sensor's, as serial:/dev/ttyUSB0?baud=115200",
+        )
+
+    def _require_complete(self, heard: Heard) -> None:
+        """Raises StreamError where too many samples were lost, or the rate is another."""
+        lost, doubled = heard.lost(self.settings.time_unit_s, self.settings.rate_hz)
+        lost += heard.assembly.damaged if TIME not in self.settings.columns else 0
+        if lost > self.settings.most_lost * (len(heard.kept) + lost) and lost > 1:
+            raise StreamError(
+                f"{self.name}: {lost} of {len(heard.kept) + lost} samples were lost ({heard.assembly.damaged} damaged "
+                f"lines, {doubled} doubled samples)",
+                "Lower the sensor's rate or raise the baud rate, and check the cable; or correct rate_hz",
+            )
+        if heard.length_s > 1.0 and abs(heard.rate_hz / self.settings.rate_hz - 1) > RATE_OFF:
+            raise StreamError(
+                f"{self.name}: {heard.rate_hz:.4g} samples a second come, and rate_hz is {self.settings.rate_hz:g}",
+                "Correct rate_hz in the sensor's settings",
+            )
+
+    def _require_alive(self, values: NDArray[np.float64], names: Sequence[str]) -> None:
+        if self.settings.range is not None and (most := np.abs(values).max(axis=0)).max() >= self.settings.range:
+            name = names[int(np.argmax(most))]
+            raise OverRange(
+                f"{self.name}: {name} reached the end of its range, {self.settings.range:g} {self.settings.unit}",
+                "Keep the sensor still, set a wider range in it, or correct `range` in the bench file",
+            )
+        still = np.ptp(values, axis=0) == 0
+        if len(values) >= STUCK and still.any() and not still.all():
+            name = names[int(np.argmax(still))]
+            raise SensorFault(
+                f"{self.name}: {name} gave the same value {len(values)} times while others changed: it is stuck",
+                "Switch the sensor off and on; check that the column is the right one",
+            )
+
+
+class Heard:
+    """The samples of a record, with the host's time of each."""
+
+    def __init__(self, assembly: Assembly) -> None:
+        self.assembly = assembly
+        self.kept: list[dict[str, float]] = []
+        self.at_s: list[float] = []
+        self._doubled = 0
+
+    def take(self, samples: Sequence[dict[str, float]], now_s: float) -> None:
+        """Add samples that came by `now_s`; one with the time of the sample before it is dropped."""
+        for sample in samples:
+            if self.kept and TIME in sample and sample[TIME] == self.kept[-1][TIME]:
+                self._doubled += 1
+                continue
+            self.kept.append(sample)
+            self.at_s.append(now_s)
+
+    @property
+    def length_s(self) -> float:
+        """From the first arrival to the last."""
+        return self.at_s[-1] - self.at_s[0] if self.at_s else 0.0
+
+    @property
+    def rate_hz(self) -> float:
+        """Samples a second, by the host's clock."""
+        first = sum(at_s == self.at_s[0] for at_s in self.at_s)
+        return (len(self.at_s) - first) / self.length_s if self.length_s else 0.0
+
+    def lost(self, time_unit_s: float, rate_hz: float) -> tuple[int, int]:
+        """Samples that are missing by the sensor's time, and those that came twice."""
+        if len(self.kept) < 2 or TIME not in self.kept[0]:
+            return 0, self._doubled
+        steps = np.diff([sample[TIME] for sample in self.kept]) * time_unit_s * rate_hz
+        return int(np.maximum(np.rint(steps) - 1, 0).sum()), self._doubled
+
+    def against_host(self, time_unit_s: float) -> tuple[float, float]:
+        """Sensor's time minus the host's at the first sample, s, and its relative gain."""
+        sensor_s = time_unit_s * np.array([sample[TIME] for sample in self.kept])
+        host_s = np.array(self.at_s)
+        gain = float(np.polyfit(host_s - host_s[0], sensor_s - sensor_s[0], 1)[0]) if self.length_s else 1.0
+        return float(sensor_s[0] - host_s[0]), gain - 1
+
+
+def _joined(blocks: Sequence[Samples]) -> Samples:
+    first = blocks[0]
+    return replace(first, volts=np.concatenate([block.volts for block in blocks]))
+
+
+def connect(address: Address, links: Links, settings: Settings, name: str) -> LineSensor:
+    """The sensor at `address`. Raises LinkRefused when its wire cannot be opened."""
+    return LineSensor(links.link(address.url, name), settings, name)

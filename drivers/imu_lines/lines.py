@@ -1,0 +1,116 @@
+"""Lines of text of a digital sensor, and the samples in them.
+
+    csv        0.0123,-0.004,1.002              column numbers, from 1; separators , ; tab and space
+    named      ax:0.0123 ay:-0.004 az:1.002     column names; `=` in place of `:` as well
+    teleplot   >ax:1627551892437:0.0123         one value a line: a sample is complete when each column has come
+    nmea       $PIMU,0.0123,-0.004,1.002*5A     column numbers after the first word; XOR checksum from $ to *
+
+Source  README of Teleplot: `>name:value`, `>name:ms:value`, each with an optional unit after `§`.
+        NMEA 0183: checksum.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import reduce
+from operator import xor
+
+FORMATS = ("csv", "named", "teleplot", "nmea")
+PAIR = re.compile(r"([A-Za-z_][\w.]*)\s*[:=]\s*([-+]?[\d.][\d.eE+-]*)")
+Column = int | str
+
+
+def checksum(text: str) -> int:
+    """XOR of the bytes of `text`, which stands between $ and * of an NMEA line."""
+    return reduce(xor, text.encode("latin-1"), 0)
+
+
+def fields(line: str, style: str) -> dict[Column, float]:
+    """The numbers of a line by column: its number from 1, or its name. Raises ValueError for a damaged line."""
+    if style == "named":
+        return {name: float(value) for name, value in PAIR.findall(line)} or _none(line)
+    if style == "teleplot":
+        name, _, rest = line.removeprefix(">").partition(":")
+        value = rest.partition("|")[0].partition("§")[0].rpartition(":")[2]
+        return {name: float(value)} if line.startswith(">") and name else _none(line)
+    if style == "nmea":
+        line = _checked(line).partition(",")[2]
+    values = re.split(r"[,;\t]\s*|\s+", line.strip())
+    return {k: number for k, text in enumerate(values, 1) if (number := _number(text)) is not None} or _none(line)
+
+
+def _number(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return None
+
+
+def _checked(line: str) -> str:
+    text, star, given = line.removeprefix("$").partition("*")
+    if not (line.startswith("$") and star and int(given, 16) == checksum(text)):
+        raise ValueError(f"{line!r} has a wrong checksum")
+    return text
+
+
+def _none(line: str) -> dict[Column, float]:
+    raise ValueError(f"{line!r} has no number")
+
+
+@dataclass
+class Assembly:
+    """Makes samples of bytes as they come. The first line may be cut, so it is dropped without being counted.
+
+    `damaged`: lines that could not be read. `unread`: the first of them. `seen`: the columns of the last good line.
+    """
+
+    style: str
+    columns: Mapping[str, Column]
+    damaged: int = 0
+    good: int = 0
+    unread: str = ""
+    seen: tuple[Column, ...] = ()
+    rest: bytes = b""
+    _cut: bool = True
+    _pending: dict[Column, float] = field(default_factory=dict)
+
+    def take(self, data: bytes) -> list[dict[str, float]]:
+        """The samples that `data` completes, each by the names of `columns`."""
+        *lines, self.rest = (self.rest + data).split(b"\n")
+        if self._cut and lines:
+            lines, self._cut = lines[1:], False
+        return [sample for line in lines if (sample := self._read(line)) is not None]
+
+    def _read(self, raw: bytes) -> dict[str, float] | None:
+        line = raw.decode("utf-8", "replace").strip()
+        if not line or line.startswith("#"):
+            return None
+        try:
+            found = fields(line, self.style)
+        except ValueError:
+            self._bad(line)
+            return None
+        self.seen = tuple(dict.fromkeys([*self.seen, *found])) if self.style == "teleplot" else tuple(found)
+        wanted = set(self.columns.values())
+        if self.style == "teleplot":
+            if not wanted & found.keys():
+                return None
+            if found.keys() & self._pending.keys():  # the rest of the earlier sample is lost
+                self._pending.clear()
+                self.damaged += 1
+            found = self._pending = self._pending | found
+            if not wanted <= found.keys():
+                return None
+            self._pending = {}
+        if not wanted <= found.keys() or not all(math.isfinite(found[each]) for each in wanted):
+            self._bad(line)
+            return None
+        self.good += 1
+        return {name: found[column] for name, column in self.columns.items()}
+
+    def _bad(self, line: str) -> None:
+        self.damaged += 1
+        self.unread = self.unread or line[:60]

@@ -1,0 +1,149 @@
+"""A digital sensor that sends lines: the lines, the twin's bytes, and what the driver makes of them."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from drivers.clock import SimulatedClock
+from drivers.errors import BadFrame, LimitError, LinkTimeout, OverRange, SensorFault, StreamError
+from drivers.imu_lines import driver as imu_lines
+from drivers.imu_lines import twin
+from drivers.imu_lines.lines import Assembly, checksum, fields
+from drivers.transport import Links
+from drivers.transport.faults import Fault, faults_of
+
+NUMBERED = {"time": 1, "ax": 3, "ay": 4, "az": 5}
+NAMED = {"time": "t", "ax": "x", "ay": "y", "az": "z"}
+
+
+class Ramp:
+    """Outputs of 0.1 g, -0.2 g and 1 g, with a small ramp in time."""
+
+    def adc_volts(self, inputs: Sequence[str], start_s: float, interval_s: float, n: int) -> NDArray[np.float64]:
+        t_s = start_s + interval_s * np.arange(n)
+        force_g = {"ax": 0.1, "ay": -0.2, "az": 1.0}
+        return np.column_stack([1.65 + 0.8 * (force_g[name] + 1e-3 * t_s) for name in inputs])
+
+
+Connect = Callable[..., imu_lines.LineSensor]
+
+
+@pytest.fixture
+def connect() -> Iterator[Connect]:
+    opened: list[Any] = []
+
+    def make(fault: Fault | None = None, sends: imu_lines.Settings | None = None, **keys: Any) -> imu_lines.LineSensor:
+        settings = imu_lines.Settings(**({"columns": NUMBERED} | keys))
+        server = twin.serve(Ramp(), {"adc": (1, sends or settings)})
+        if fault:
+            server.afflict("adc", faults_of("imu_lines", [fault]))
+        clock = SimulatedClock()
+        clock.attach(server)
+        links = Links(clock)
+        opened.extend([links, server])
+        return imu_lines.connect(server.addresses["adc"], links, settings, "adc")
+
+    yield make
+    for each in opened:
+        each.close()
+
+
+@pytest.mark.parametrize(
+    ("style", "columns"), [("csv", NUMBERED), ("named", NAMED), ("teleplot", NAMED), ("nmea", NUMBERED)]
+)
+@pytest.mark.parametrize(("unit", "one_g"), [("g", 1.0), ("m/s^2", 9.80665), ("count", 16384.0)])
+def test_a_record_has_the_outputs_in_the_unit_of_the_sensor(
+    connect: Connect, style: str, columns: dict[str, Any], unit: str, one_g: float
+) -> None:
+    samples = connect(format=style, columns=columns, unit=unit).acquire(0.5)
+    assert samples.channels == ("ax", "ay", "az")
+    assert samples.volts.shape == (50, 3)
+    expected = np.array([0.1, -0.2, 1.0]) + 1e-3 * (samples.start_s + np.arange(50) / 100)[:, None]
+    assert np.abs(samples.volts / one_g - expected).max() < 1e-4
+
+
+def test_the_twin_sends_what_other_readers_read() -> None:
+    values = {"time": 20000.0, "ax": 0.125, "ay": -0.25, "az": 1.0}
+    (row,) = csv.reader([twin.line_of(values, imu_lines.Settings(NUMBERED)).decode()])
+    assert row == ["20000", "0", "0.125000", "-0.250000", "1.000000"]
+    line = twin.line_of(values, imu_lines.Settings(NUMBERED, "nmea")).decode().strip()
+    assert line.startswith("$PIMU,20000,")
+    total = 0
+    for letter in line[1 : line.index("*")]:
+        total ^= ord(letter)
+    assert line.endswith(f"*{total:02X}")
+
+
+def test_the_checksum_is_that_of_nmea() -> None:
+    assert checksum("GPGLL,5300.97914,N,00259.98174,E,125926,A") == 0x28  # the example of many receivers' manuals
+    with pytest.raises(ValueError, match="wrong checksum"):
+        fields("$PIMU,1,2,3*00", "nmea")
+
+
+def test_a_cut_line_at_the_start_is_dropped_and_a_damaged_one_counted() -> None:
+    lines = Assembly("csv", {"ax": 1, "ay": 2})
+    assert lines.take(b"45,6.0\r\n1.0,2.0\r\n3.") == [{"ax": 1.0, "ay": 2.0}]
+    assert lines.take(b"0,4.0\n5.0\n") == [{"ax": 3.0, "ay": 4.0}]
+    assert (lines.good, lines.damaged, lines.unread) == (2, 1, "5.0")
+
+
+def test_doubled_lines_are_dropped(connect: Connect) -> None:
+    samples = connect(Fault("doubled-line")).acquire(0.5)
+    assert (np.diff(samples.volts[:, 0]) > 0).all()
+
+
+@pytest.mark.parametrize(
+    ("fault", "keys", "kind", "said"),
+    [
+        (Fault("lost-line", at_s=0.2, for_s=0.1), {}, StreamError, "samples were lost"),
+        (Fault("lost-line"), {}, LinkTimeout, "no line came"),
+        (Fault("wrong-baud"), {}, BadFrame, "baud rate is probably wrong"),
+        (Fault("stuck-axis"), {}, SensorFault, "ax gave the same value"),
+        (None, {"range": 0.9}, OverRange, "az reached the end of its range, 0.9 g"),
+        (None, {"columns": {"ax": 9}, "sends": imu_lines.Settings(NUMBERED)}, BadFrame, "Correct format and columns"),
+        (None, {"rate_hz": 50.0, "columns": {"ax": 3}, "sends": imu_lines.Settings(NUMBERED)}, StreamError, "100 sam"),
+    ],
+)
+def test_what_is_wrong_is_named(
+    connect: Connect, fault: Fault | None, keys: dict[str, Any], kind: type[Exception], said: str
+) -> None:
+    with pytest.raises(kind, match=said):
+        connect(fault, **keys).acquire(3.0)
+
+
+def test_the_self_test_shows_columns_rate_and_time(connect: Connect) -> None:
+    lines, rate, time = connect().self_test()
+    assert "columns 1, 2, 3, 4, 5" in lines.detail
+    assert rate.ok
+    assert rate.detail.startswith("100 samples a second")
+    assert "+0 ppm" in time.detail
+
+
+def test_only_outputs_of_the_lines_can_be_asked_for(connect: Connect) -> None:
+    sensor = connect()
+    assert sensor.only("az").acquire(0.1).channels == ("az",)
+    with pytest.raises(LimitError, match="the lines have no mx"):
+        sensor.only("mx")
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        ({"columns": {"time": 1}}, "must name outputs"),
+        ({"columns": {"ax": 1, "ay": 1}}, "two names have the same column"),
+        ({"columns": {"ax": "x"}}, "columns of csv are numbers"),
+        ({"format": "named"}, "columns of named are names"),
+        ({"rate_hz": 0.0}, "rate_hz must be positive"),
+        ({"range": -1.0}, "range must be positive"),
+        ({"most_lost": 1.0}, "most_lost"),
+    ],
+)
+def test_settings_that_cannot_be_are_refused(keys: dict[str, Any], said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        imu_lines.Settings(**keys)
