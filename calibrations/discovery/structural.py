@@ -77,6 +77,7 @@ class StructuralSearch:
 
 def search_structure(start: Fit, effects: Mapping[str, Effect]) -> StructuralSearch:
     """The effects and free forms that the model of `start` misses."""
+    effects = {name: effect for name, effect in effects.items() if effect.excluded(start.table) is None}
     basic = [name for name in BASIC if name in effects and not start.model.holds(name)]
     base = _freed(start, basic, effects)
     behind = _behind_stairs(base, effects)
