@@ -8,10 +8,9 @@ Source: T-series datasheet; see labjack_t7_table and labjack_t7_stream.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
-from typing import TypeVar
 from urllib.parse import urlsplit
 
 import numpy as np
@@ -21,11 +20,10 @@ from drivers.errors import DriverError, Interlocked, LimitError, OverRange, Refu
 from drivers.instrument import Check, Identity
 from drivers.labjack_t7 import registers as t7
 from drivers.labjack_t7.stream import Calibration, Reception
+from drivers.recorder import Recorder, Samples, chosen_inputs
 from drivers.transport import Address, Links
 from drivers.transport.link import Link
 from drivers.transport.modbus import Register, Unit
-
-Read = TypeVar("Read")
 
 
 @dataclass(frozen=True)
@@ -74,12 +72,7 @@ class Settings:
 
         Raises LimitError for an output that no input is wired to.
         """
-        chosen = {each: k for each, k in self.wired.items() if each.rpartition(".")[2] in outputs}
-        if missing := [each for each in outputs if each not in {key.rpartition(".")[2] for key in chosen}]:
-            raise LimitError(
-                f"{name}: no input is wired to {', '.join(missing)}; there are {', '.join(self.wired)}",
-                "Name the inputs in the bench file, under channels or on_request of the converter's settings",
-            )
+        chosen = chosen_inputs(name, self.wired, outputs)
         return replace(self, channels=chosen, on_request={})
 
     def lag_s(self, channel: str) -> float:
@@ -87,17 +80,7 @@ class Settings:
         return list(self.channels).index(channel) * self.interchannel_s
 
 
-@dataclass(frozen=True, eq=False)
-class Samples:
-    """A record: `volts` of shape (n, channels), the first scan at `start_s` of the clock."""
-
-    volts: NDArray[np.float64]
-    channels: tuple[str, ...]
-    rate_hz: float
-    start_s: float
-
-
-class T7:
+class T7(Recorder):
     """The converter. Its calibration is read once, when it is connected."""
 
     def __init__(self, unit: Unit, stream: Link, settings: Settings) -> None:
@@ -157,28 +140,6 @@ class T7:
         chosen = copy(self)
         chosen.settings = self.settings.only(self.name, outputs)
         return chosen
-
-    def acquire(self, duration_s: float) -> Samples:
-        """Record all channels for `duration_s`, rounded to whole scans; raises as `stream`."""
-        (samples,) = self.stream(duration_s, duration_s)
-        return samples
-
-    def acquire_with(self, duration_s: float, reading: Callable[[], Read]) -> tuple[Samples, Read]:
-        """The same, and what `reading` gives in the middle of it, while the device records on."""
-        with contextlib.closing(self.stream(duration_s, duration_s / 2)) as stream:
-            blocks = [next(stream)]
-            read = reading()
-            blocks += stream
-        return _joined(blocks), read
-
-    def acquire_watched(self, duration_s: float, watch: Callable[[], object], every_s: float) -> Samples:
-        """The same as `acquire`; `watch` is called about every `every_s`, and at the end. What it raises ends it."""
-        blocks = []
-        with contextlib.closing(self.stream(duration_s, every_s)) as stream:
-            for block in stream:
-                watch()
-                blocks.append(block)
-        return _joined(blocks)
 
     def stream(self, duration_s: float, block_s: float) -> Generator[Samples, None, None]:
         """Record all channels for `duration_s` without a gap, and hand it out in blocks of `block_s`.
@@ -274,12 +235,6 @@ class T7:
             known = ", ".join(self.settings.channels)
             raise LimitError(f"{self.name}: no channel {name!r}; there are {known}", "Correct the name")
         return self.settings.channels[name]
-
-
-def _joined(blocks: Sequence[Samples]) -> Samples:
-    first = blocks[0]
-    volts = np.concatenate([block.volts for block in blocks])
-    return Samples(volts, first.channels, first.rate_hz, first.start_s)
 
 
 def _scans_per_packet(scans: int, channels: int) -> int:

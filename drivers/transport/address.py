@@ -19,6 +19,7 @@ class Address:
         tcp://host:port                             Modbus TCP, GCS
         rtu+tcp://host:port                         Modbus RTU frames through a converter on TCP
         serial:/dev/ttyUSB0?baud=115200&parity=E    a serial line (parity N, E or O): Modbus RTU, GCS, text
+        visa:TCPIP0::10.0.0.7::INSTR                a VISA resource: SCPI; `?library=` another library than pyvisa-py
     `unit` is the Modbus unit id; instruments with the same url share the wire.
     `stream_url` is the second port of an instrument that has one.
     """
@@ -30,10 +31,12 @@ class Address:
 
 # The urls of wires, and how long a byte takes on each.
 
-SCHEMES = ("tcp", "rtu+tcp", "serial", "pty")
+SCHEMES = ("tcp", "rtu+tcp", "serial", "pty", "visa")
 TCP_LATENCY_S = 150e-6  # one way through a switch and a small embedded stack
 USER = re.compile("//.*@")
+VISA_SOCKET = re.compile(r"TCPIP\d*::([^:]+)::(\d+)::SOCKET", re.IGNORECASE)
 REMEDY = "Write tcp://host:port, rtu+tcp://host:port or serial:/dev/ttyUSB0?baud=115200&parity=E"
+PYVISA_PY = "@py"
 
 
 @dataclass(frozen=True)
@@ -51,6 +54,7 @@ class Url:
     baud: int = 115200
     parity: str = "N"
     stop_bits: int = 1
+    library: str = PYVISA_PY  # of a VISA resource
 
     @classmethod
     def parse(cls, text: str) -> Url:
@@ -69,6 +73,7 @@ class Url:
                 int(options.pop("baud", "115200")),
                 options.pop("parity", "N"),
                 int(options.pop("stop", "1")),
+                options.pop("library", PYVISA_PY),
             )
         except ValueError as error:
             raise LinkRefused(f"{_shown(text)} is not the address of a wire ({error})", REMEDY) from error
@@ -79,7 +84,7 @@ class Url:
         return url
 
     def _complete(self) -> bool:
-        place = {"serial": bool(self.path), "pty": True}.get(self.scheme, bool(self.host))
+        place = {"serial": bool(self.path), "visa": "::" in self.path, "pty": True}.get(self.scheme, bool(self.host))
         return self.scheme in SCHEMES and place and self.parity in ("N", "E", "O") and self.baud > 0
 
     @property
@@ -87,12 +92,16 @@ class Url:
         """The wire's name, the same for every spelling of its address: the device's real path, or host:port."""
         if self.scheme in ("serial", "pty"):
             return os.path.realpath(self.path)
-        host = self.host.rstrip(".")
+        host, port = self.host.rstrip("."), self.port
+        if self.scheme == "visa":
+            if not (found := VISA_SOCKET.fullmatch(self.path)):
+                return f"visa:{self.path.upper()}"
+            host, port = found[1].rstrip("."), int(found[2])
         try:
             address = ipaddress.ip_address("127.0.0.1" if host == "localhost" else host)
         except ValueError:  # a name, which is not looked up
-            return f"{host}:{self.port}"
-        return f"{'127.0.0.1' if address == ipaddress.IPv6Address('::1') else address}:{self.port}"
+            return f"{host}:{port}"
+        return f"{'127.0.0.1' if address == ipaddress.IPv6Address('::1') else address}:{port}"
 
     @property
     def rtu(self) -> bool:

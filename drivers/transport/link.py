@@ -215,6 +215,8 @@ def open_link(url: str, clock: Clock, name: str = "", tap: Tap | None = None) ->
 def _open_port(url: Url) -> SocketPort | SerialPort:
     if url.scheme == "serial":
         return SerialPort(url.path, url.baud, url.parity, url.stop_bits)
+    if url.scheme == "visa":
+        raise ValueError("only the driver scpi_meter speaks through VISA")
     return SocketPort(url.host, url.port)
 
 

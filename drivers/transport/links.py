@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from drivers.clock import Clock
 from drivers.manual_stage.person import PersonLink
-from drivers.transport.address import Address
+from drivers.transport.address import Address, Url
+from drivers.transport.lines import LinkLines, TextLines, VisaLines
 from drivers.transport.link import Link, Tap, open_link
 from drivers.transport.modbus import Bus, Unit
 
@@ -18,7 +19,7 @@ class Links:
         self._tap = tap
         self.person = PersonLink()
         self._buses: dict[str, Bus] = {}
-        self._links: list[Link] = []
+        self._links: list[Link | VisaLines] = []
 
     def unit(self, address: Address, name: str) -> Unit:
         """The Modbus instrument at `address`. Raises LinkRefused when its wire cannot be opened."""
@@ -30,8 +31,17 @@ class Links:
 
     def link(self, url: str, name: str = "") -> Link:
         """A wire of bytes that is not shared; `name` is the instrument's."""
-        self._links.append(open_link(url, self.clock, name, self._tap))
-        return self._links[-1]
+        link = open_link(url, self.clock, name, self._tap)
+        self._links.append(link)
+        return link
+
+    def lines(self, url: str, name: str) -> TextLines:
+        """A wire of commands and answers of one line: a VISA resource, TCP or a serial line. Raises LinkRefused."""
+        if (parsed := Url.parse(url)).scheme != "visa":
+            return LinkLines(self.link(url, name), name)
+        visa = VisaLines(parsed, self.clock, name, self._tap)
+        self._links.append(visa)
+        return visa
 
     def close(self) -> None:
         """Close every wire."""

@@ -1,0 +1,193 @@
+"""The simulated SCPI scanner: lines on a socket, a timer, a memory of readings and a queue of errors."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.scpi_meter.driver import Settings
+from drivers.transport.address import Address
+from drivers.transport.faults import Faults, Kind
+from drivers.transport.server import Connection, Port, Server
+
+__all__ = ["FAULTS", "LISTEN", "serve"]
+
+LISTEN = "tcp://127.0.0.1:0"
+FAULTS = {
+    "overload": Kind("shows an overload at its first input"),
+    "error": Kind("has this error in its queue, once", -222, "code"),
+    "stall": Kind("measures nothing after the start of a record"),
+}
+WHO = "SIMULATED,SCPI scanner,1234567,1.0"
+THINKING_S = 0.002
+OVERLOAD_V = 9.9e37
+BEYOND = 1.2  # of its range, up to which it measures
+MOST_RANGE_V = 300.0
+MOST_ERRORS = 10
+TEXTS = {-113: "Undefined header", -222: "Data out of range", -350: "Queue overflow"}
+LIST = re.compile(r"\(@([\d,]+)\)")
+
+
+class World(Protocol):
+    """What a converter knows of physics."""
+
+    def advance(self, t_s: float) -> None: ...
+
+    def adc_volts(self, inputs: Sequence[str], start_s: float, interval_s: float, n: int) -> NDArray[np.float64]: ...
+
+
+class Scanner:
+    """The instrument behind its line. An input that is wired to nothing reads 0 V."""
+
+    def __init__(self, world: World, settings: Settings) -> None:
+        self.faults = Faults()
+        self._world, self._wiring = world, {number: name for name, number in settings.wired.items()}
+        self._errors: deque[int] = deque()
+        self._range_v, self._numbers, self._rate_hz, self._count = MOST_RANGE_V, [0], 1.0, 1
+        self._start_s, self._taken, self._left = 0.0, 0, 0
+        self._memory: deque[float] = deque()
+
+    def advance(self, now_s: float) -> None:
+        """Take all scans that have begun by `now_s`."""
+        if strike := self.faults.once("error", now_s):
+            self._fail(int(strike.size))
+        due = math.floor((now_s - self._start_s) * self._rate_hz + 1e-6) + 1 if self._left else 0
+        new = min(due - self._taken, self._left)
+        if new > 0 and self.faults.size("stall", now_s) is None:
+            start_s = self._start_s + self._taken / self._rate_hz
+            self._memory.extend(self._scans(start_s, 1 / self._rate_hz, new, now_s).ravel())
+            self._taken, self._left = self._taken + new, self._left - new
+
+    def due_s(self) -> float:
+        """Never: it says nothing unasked."""
+        return math.inf
+
+    def state(self) -> dict[str, Any]:
+        """Nothing: a driver that connects sets all that it relies on."""
+        return {}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """See `state`."""
+
+    def answer(self, command: str, now_s: float) -> str | None:
+        """Obey a line; the answer to a question."""
+        head, _, rest = command.strip().partition(" ")
+        obey = self._commands.get(head.upper())
+        if obey is None:
+            self._fail(-113)
+            return None
+        return obey(rest, now_s)
+
+    @property
+    def _commands(self) -> dict[str, Callable[[str, float], str | None]]:
+        return {
+            "*IDN?": lambda _rest, _now_s: WHO,
+            "*RST": lambda _rest, _now_s: self._reset(),
+            "*CLS": lambda _rest, _now_s: self._errors.clear(),
+            "SYST:ERR?": lambda _rest, _now_s: self._error(),
+            "ABOR": lambda _rest, _now_s: self._stop(),
+            "CONF:VOLT:DC": lambda rest, _now_s: self._configure(rest),
+            "VOLT:DC:NPLC": lambda _rest, _now_s: None,
+            "ROUT:SCAN": lambda rest, _now_s: self._list(rest),
+            "TRIG:SOUR": lambda _rest, _now_s: None,
+            "SAMP:SOUR": lambda _rest, _now_s: None,
+            "TRIG:TIM": lambda rest, _now_s: self._set_rate(rest),
+            "SAMP:TIM": lambda rest, _now_s: self._set_rate(rest),
+            "TRIG:COUN": lambda rest, _now_s: self._set_count(rest),
+            "SAMP:COUN": lambda rest, _now_s: self._set_count(rest),
+            "INIT": lambda _rest, now_s: self._begin(now_s),
+            "READ?": lambda _rest, now_s: _told(self._scans(now_s, 0.0, 1, now_s).ravel()),
+            "DATA:POIN?": lambda _rest, _now_s: str(len(self._memory)),
+            "DATA:REM?": lambda rest, _now_s: self._remove(rest),
+        }
+
+    def _reset(self) -> None:
+        self._range_v, self._numbers, self._rate_hz, self._count = MOST_RANGE_V, [0], 1.0, 1
+        self._memory.clear()
+        self._stop()
+
+    def _stop(self) -> None:
+        self._start_s, self._taken, self._left = 0.0, 0, 0
+
+    def _configure(self, rest: str) -> None:
+        self._stop()
+        range_v = float(rest.partition(",")[0])
+        if range_v > MOST_RANGE_V:
+            self._fail(-222)
+            return
+        self._range_v = range_v
+        self._list(rest)
+
+    def _list(self, rest: str) -> None:
+        self._numbers = sorted(int(k) for k in found[1].split(",")) if (found := LIST.search(rest)) else [0]
+
+    def _set_rate(self, rest: str) -> None:
+        self._rate_hz = 1 / float(rest)
+
+    def _set_count(self, rest: str) -> None:
+        self._count = int(rest)
+
+    def _begin(self, now_s: float) -> None:
+        self._memory.clear()
+        self._start_s, self._taken, self._left = now_s, 0, self._count
+        self.advance(now_s)
+
+    def _remove(self, rest: str) -> str | None:
+        if (count := int(rest)) > len(self._memory):
+            self._fail(-222)
+            return None
+        return _told([self._memory.popleft() for _ in range(count)])
+
+    def _scans(self, start_s: float, interval_s: float, n: int, now_s: float) -> NDArray[np.float64]:
+        """Volts of `n` scans as they are shown, shape (n, inputs)."""
+        volts = np.zeros((n, len(self._numbers)))
+        if wired := [k for k, number in enumerate(self._numbers) if number in self._wiring]:
+            if not interval_s:
+                self._world.advance(start_s)
+            names = [self._wiring[self._numbers[k]] for k in wired]
+            volts[:, wired] = self._world.adc_volts(names, start_s, interval_s, n)
+        if self.faults.size("overload", now_s) is not None:
+            volts[:, 0] = math.inf
+        return np.where(np.abs(volts) > BEYOND * self._range_v, np.copysign(OVERLOAD_V, volts), volts)
+
+    def _fail(self, code: int) -> None:
+        self._errors.append(code if len(self._errors) < MOST_ERRORS - 1 else -350)
+        while len(self._errors) > MOST_ERRORS:
+            self._errors.pop()
+
+    def _error(self) -> str:
+        code = self._errors.popleft() if self._errors else 0
+        return f'{code:+d},"{TEXTS.get(code, "Device error") if code else "No error"}"'
+
+
+def _told(values: Sequence[float] | NDArray[np.float64]) -> str:
+    return ",".join(f"{value:+.9E}" for value in values)
+
+
+def _port(listen: str, scanner: Scanner) -> Port:
+    port = Port(listen)
+
+    def answer(connection: Connection, now_s: float) -> None:
+        while (end := connection.inbox.find(b"\n") + 1) > 0:
+            command = connection.inbox[:end].decode("latin-1")
+            del connection.inbox[:end]
+            if (text := scanner.answer(command, now_s)) is not None:
+                data = text.encode("ascii") + b"\n"
+                connection.send(data, now_s + THINKING_S + port.timing.line_s(len(data)))
+
+    port.answer = answer
+    return port
+
+
+def serve(world: World, roles: Mapping[str, tuple[int, Settings]], listen: str = LISTEN) -> Server:
+    """One instrument: role -> (unit id, which it has not, settings). Its channels are the world's inputs."""
+    ((role, (_, settings)),) = roles.items()
+    scanner = Scanner(world, settings)
+    port = _port(listen, scanner)
+    return Server([port], {role: scanner}, {role: Address(port.url)})

@@ -1,0 +1,155 @@
+"""Wires of text: a command is a line, and so is an answer. On our own links, or through VISA.
+
+    tcp://host:port, serial:/dev/ttyUSB0?baud=9600   by our links, which a simulated clock can pump
+    visa:TCPIP0::10.0.0.7::INSTR                      PyVISA with pyvisa-py: LAN (VXI-11, HiSLIP, sockets), USB, GPIB
+    visa:GPIB0::22::INSTR?library=/usr/lib/libvisa.so  the same with a manufacturer's VISA library
+
+PyVISA is the extra `labs`; it is imported when a VISA resource is opened.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from typing import Any, Protocol
+
+from drivers.clock import Clock
+from drivers.errors import BadFrame, LinkError, LinkRefused, LinkTimeout
+from drivers.transport.address import Url
+from drivers.transport.link import Link, Tap
+
+NO_PYVISA = "Install it: pip install 'inertial-rig[labs]'"
+SILENT = "Check that it is switched on, its cable and address, and that no other program talks to it"
+GONE = "Check cable and power, then resume the run"
+LONGEST = 1 << 20  # bytes of an answer
+
+
+class TextLines(Protocol):
+    """A wire to one instrument."""
+
+    def write(self, command: str) -> None:
+        """Send a command. Raises LinkRefused when the connection is gone."""
+
+    def query(self, command: str, timeout_s: float) -> str:
+        """Send a command and return the answer without its end of line. Raises LinkTimeout, LinkRefused, BadFrame."""
+
+
+class LinkLines:
+    """Lines on one of our own links."""
+
+    def __init__(self, link: Link, name: str) -> None:
+        self._link, self._name = link, name
+
+    def write(self, command: str) -> None:
+        self._link.write(command.encode("ascii") + b"\n")
+
+    def query(self, command: str, timeout_s: float) -> str:
+        self._link.discard()  # a late answer to an earlier question
+        self.write(command)
+        heard, deadline = b"", self._link.clock.now() + timeout_s
+        while b"\n" not in heard and len(heard) < LONGEST:
+            left_s = deadline - self._link.clock.now()
+            if left_s <= 0 or not (more := self._link.read(left_s)):
+                raise _silence(self._name, command, self._link.url, timeout_s)
+            heard += more
+        return _text(heard.partition(b"\n")[0], self._name, command)
+
+
+class VisaLines:
+    """Lines through a VISA resource.
+
+    A connection that is lost is an error once; the next command opens it anew, so that a stop can be sent.
+    """
+
+    def __init__(self, url: Url, clock: Clock, name: str, tap: Tap | None = None) -> None:
+        """Raises LinkRefused without PyVISA, or when the resource cannot be opened."""
+        self._url, self._clock, self._name, self._tap = url, clock, name, tap
+        self._visa = _pyvisa(f"{name}: {url.text}")
+        self._closed = False
+        self._resource: Any = self._opened()
+
+    def write(self, command: str) -> None:
+        try:
+            self._session().write(command)
+        except (self._visa.Error, OSError) as error:
+            raise self._failed(error, command, 0.0) from error
+        self._note("sent", command)
+
+    def query(self, command: str, timeout_s: float) -> str:
+        session = self._session()
+        try:
+            session.timeout = 1000 * timeout_s
+            session.write(command)
+            self._note("sent", command)
+            heard = session.read_raw()
+        except (self._visa.Error, OSError) as error:
+            raise self._failed(error, command, timeout_s) from error
+        text = _text(bytes(heard).rstrip(b"\r\n"), self._name, command)
+        self._note("heard", text)
+        return text
+
+    def close(self) -> None:
+        """For good."""
+        self._closed = True
+        self._drop()
+
+    def _session(self) -> Any:
+        if self._closed:
+            raise LinkRefused(f"{self._name}: {self._url.text}: is closed", "Connect again")
+        if self._resource is None:
+            self._resource = self._opened()
+        return self._resource
+
+    def _opened(self) -> Any:
+        try:
+            resource = self._visa.ResourceManager(self._url.library).open_resource(self._url.path)
+        except Exception as error:  # each backend has its own: no such interface, host, bus, library
+            remedy = (
+                "`pyvisa-info` lists the interfaces that PyVISA can open, and the libraries that are missing for others"
+            )
+            where = f"{self._name}: {self._url.text}"
+            raise LinkRefused(f"{where}: cannot be opened ({error})", f"{SILENT}; {remedy}") from error
+        resource.read_termination = resource.write_termination = "\n"
+        return resource
+
+    def _failed(self, error: Exception, command: str, timeout_s: float) -> LinkError:
+        """The error in our words. A late answer would be taken for that of the next question, so it is cleared."""
+        timeout = self._visa.constants.StatusCode.error_timeout
+        if getattr(error, "error_code", None) == timeout and timeout_s:
+            with contextlib.suppress(Exception):  # the time-out is reported
+                self._resource.clear()
+                return _silence(self._name, command, self._url.text, timeout_s)
+            self._drop()
+            return _silence(self._name, command, self._url.text, timeout_s)
+        self._drop()
+        return LinkRefused(f"{self._name}: {self._url.text}: the connection is lost at {command!r} ({error})", GONE)
+
+    def _drop(self) -> None:
+        if self._resource is not None:
+            with contextlib.suppress(Exception):  # it is gone already
+                self._resource.close()
+            self._resource = None
+
+    def _note(self, direction: Any, text: str) -> None:
+        if self._tap:
+            self._tap(self._clock.now(), self._name, direction, text.encode("ascii") + b"\n")
+
+
+def _pyvisa(where: str) -> Any:
+    try:
+        import pyvisa
+        import pyvisa_py  # noqa: F401 - PyVISA finds it by its name; without it the message would come later
+    except ImportError as error:
+        raise LinkRefused(f"{where}: needs PyVISA, and {error.name} is not installed", NO_PYVISA) from error
+    return pyvisa
+
+
+def _silence(name: str, command: str, url: str, timeout_s: float) -> LinkTimeout:
+    return LinkTimeout(f"{name}: no answer to {command!r} within {timeout_s:g} s on {url}", SILENT)
+
+
+def _text(data: bytes, name: str, command: str) -> str:
+    try:
+        return data.decode("ascii").strip()
+    except UnicodeDecodeError:
+        shown = f"{len(data)} bytes that are no text ({data[:24]!r})"
+        raise BadFrame(f"{name}: the answer to {command!r} is {shown}", SILENT) from None
