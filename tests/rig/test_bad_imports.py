@@ -13,7 +13,7 @@ import pytest
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (("nowhere.csv",), "File 'nowhere.csv' does not exist"),
+        (("nowhere.csv",), "Path 'nowhere.csv' does not exist"),
         (("good.csv", "--kind", "pose"), "'pose' is not one of 'poses', 'positions'"),
         (
             ("good.csv", "--column", "vx_v"),
