@@ -277,7 +277,7 @@ def _begun(base: Fit, model: Model, noise: Noise) -> Array:
     theta = problem.layout.starts()[0]
     own = np.any([problem.layout.of_effect(term.name) for term in base.model.terms], axis=0)
     for _ in range(BASE_STEPS):
-        white = noise.whiten(np.dstack([problem.residual(theta)[:, :, None], problem.jacobian(theta)[:, :, own]]))
+        white = noise.whiten(np.dstack([problem.residual(theta)[:, :, None], problem.jacobian(theta, of=own)]))
         theta[own] -= np.linalg.lstsq(white[:, 1:], white[:, 0], rcond=1e-12)[0]
     return theta
 

@@ -105,14 +105,29 @@ class FreeForm(Effect):
         self.parameters = tuple(p for form in forms for p in _parameters(form))
 
         self._last: tuple[Table, Array, list[Array]] | None = None
+        self._of_table: tuple[Table, dict[tuple[int, int], Array]] | None = None
+        self._names: dict[int, list[tuple[str, bool]]] = {}  # by axis, whether all axes share each
 
     def _coefficients(self, p: Values, k: int) -> Array:
         """Coefficients of all forms for axis k."""
-        return np.concatenate([coefficients_of(form, p, k) for form in self.forms])
+        if k not in self._names:
+            self._names[k] = [(_name(form, j), form.shared) for form in self.forms for j in range(form.count(k))]
+        return np.array([float(p[name] if shared else p[name][k]) for name, shared in self._names[k]])
 
     def _columns(self, table: Table, force: Array, response: Array, k: int) -> Array:
-        """Columns of all forms for axis k, shape (n, count)."""
-        return np.hstack([form.columns(table, force, response, k) for form in self.forms])
+        """Columns of all forms for axis k, shape (n, count). Those of the last table alone are kept."""
+        if self._of_table is None or self._of_table[0] is not table:
+            self._of_table = (table, {})
+        kept = self._of_table[1]
+        blocks = []
+        for i, form in enumerate(self.forms):
+            if form.of_table and (i, k) in kept:
+                blocks.append(kept[i, k])
+                continue
+            blocks.append(form.columns(table, force, response, k))
+            if form.of_table:
+                kept[i, k] = blocks[-1]
+        return np.hstack(blocks)
 
     def _kept_columns(self, table: Table, force: Array) -> list[Array]:
         """Columns of each axis. Those of the last force are kept: a jacobian asks for them once a parameter."""

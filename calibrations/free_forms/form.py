@@ -78,6 +78,11 @@ class Form:
         own = by_driver.get(self.driver, (named,) if named != self.driver else ())
         return (*own, *(("direction",) if self.factor == "side" and self.approach_deg else ()))
 
+    @property
+    def of_table(self) -> bool:
+        """Whether the columns follow from the table alone, so that no parameter of a model changes them."""
+        return self.driver not in (*MODELLED, "force") and self.factor in ("", "side")
+
     def columns(self, table: Table, force: Array, response: Array, k: int) -> Array:
         """Columns of axis k, shape (n, count).
 
