@@ -77,7 +77,6 @@ class StructuralSearch:
 
 def search_structure(start: Fit, effects: Mapping[str, Effect]) -> StructuralSearch:
     """The effects and free forms that the model of `start` misses."""
-    effects = {name: effect for name, effect in effects.items() if effect.excluded(start.table) is None}
     basic = [name for name in BASIC if name in effects and not start.model.holds(name)]
     base = _freed(start, basic, effects)
     behind = _behind_stairs(base, effects)
@@ -229,7 +228,8 @@ def additions(found: Structure, model: Model, effects: Mapping[str, Effect]) -> 
     causes = [cause for place in found.places for cause in (*place.causes, *found.refinements(place))]
     names = dict.fromkeys([*causes, *found.geometry.causes, *found.geometry.refinements])
     starts = {c: tuple(Estimate(name, axis, value, None, "") for name, axis, value in found.starts(c)) for c in names}
-    return [Addition(effects[c], found.constants(c), starts[c]) for c in names if c in effects and not model.holds(c)]
+    possible = [c for c in names if c in effects and effects[c].excluded(found.result.data.table) is None]
+    return [Addition(effects[c], found.constants(c), starts[c]) for c in possible if not model.holds(c)]
 
 
 def free_additions(found: Structure, model: Model) -> list[Addition]:

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 ROUNDS = 2
 NEWTON_STEPS = 20
-DAMPINGS = (0.0, 1e-3, 1e-2, 0.1, 1.0, 10.0, 1e2, 1e3, 1e4)  # of each column's squares
+DAMPINGS = (0.0, 1e-3, 1e-2, 0.1, 1.0, 10.0)  # of each column's squares
 BOUND_ROUNDS = 3
 STRAIGHT = 1e-6  # of what is left: a step that foretells it better is a linear model's
 SMALL_GAIN = 3e-3  # of the mean square of what is left, or of the noise: it moves a parameter by 0.05 uncertainties
@@ -198,16 +198,8 @@ def refit(before: Fit, model: Model, start: Array | None = None) -> Fit:
 
 
 def _alternate(problem: Problem, noise: Noise, starts: list[Array]) -> Fit:
-    """Parameters and noise in turn.
-
-    Free forms are fitted in the white noise alone where that is known: slow noise would take up what they explain.
-    """
-    follows = len(problem.layout.prior_rows) > 0 and noise.known
-    if follows:
-        noise = white_only(problem.white, problem.gap_s, len(problem.channels), problem.given)
+    """Parameters and noise in turn."""
     theta = min((_minimise(problem, noise, start) for start in starts), key=lambda t: t[1])[0]
-    if follows:
-        return _result(problem, theta, noise)
     # with smooth columns set aside the noise hardly depends on the parameters, and one round is enough
     for _ in range(1 if problem.smooth.size else ROUNDS):
         found = estimate(noise, problem.residual(theta), _free(problem, problem.jacobian(theta)), problem.smooth)
