@@ -25,7 +25,7 @@ from calibrations.effects.thermometer import RATE
 from calibrations.errors import ModelError
 from calibrations.free_forms.effect import FreeForm
 from calibrations.model import Model, Term
-from calibrations.model.chain import Step
+from calibrations.model.chain import Step, scaled
 from calibrations.table import AXES, NUMBERS
 from calibrations.tables import KINDS
 
@@ -185,8 +185,10 @@ def _outputs(steps: Sequence[Step], runtime: RunTime) -> tuple[Traced, dict[str,
     for effect, p in steps:
         a = effect.force(a, table, p)
     v: Any = as_traced(np.zeros((1, 3)))
+    of_force: Any = as_traced(np.zeros((1, 3)))
     memory: dict[str, Node] = {}
     for effect, p in steps:
+        before_v = v
         if effect.memory:
             known = [[f"m{len(memory) // 3 + k}{axis}" for axis in AXES] for k in range(effect.memory)]
             before: Any = [Traced([[variable(name) for name in row]]) for row in known]
@@ -194,8 +196,13 @@ def _outputs(steps: Sequence[Step], runtime: RunTime) -> tuple[Traced, dict[str,
             for row, each in zip(known, after, strict=True):
                 memory |= dict(zip(row, as_traced(each).nodes[0], strict=True))
             v = v + part
-        elif "transduction" in effect.places:
+        elif "transduction" in effect.places and not effect.scales:
             v = v + _response(effect, a, table, p)
+        if effect.of_force:
+            of_force = of_force + (v - before_v)
+    for effect, p in steps:
+        if effect.scales:
+            v = v + _response(effect, scaled(a, of_force, steps), table, p)
     for effect, p in steps:
         if isinstance(effect, FreeForm) and "output" in effect.places:
             v = v + trace_free_form(effect, a, v, table, p)

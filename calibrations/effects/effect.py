@@ -114,6 +114,8 @@ class Effect:
     rounds     its output is a staircase, whose slope says nothing
     left_out   why a compensation in the sensor's product cannot undo it; "" where it can
     incidental  nobody plans what excites it: a table that cannot show it is no reason for a remark
+    of_force   it adds what the sensor makes of the force, which a drift of the sensitivity multiplies
+    scales     it is a drift of the sensitivity: it multiplies what the sensor makes of the force
     memory     how many arrays (n, 3) `follow` keeps from one sample to the next
     """
 
@@ -138,6 +140,8 @@ class Effect:
     rounds: bool = False
     left_out: str = ""
     incidental: bool = False
+    of_force: bool = False
+    scales: bool = False
     memory: int = 0
 
     def __init_subclass__(cls) -> None:
@@ -234,7 +238,9 @@ class Effect:
 
 METHODS = (*HOOKS, "follow", "columns", "lacks", "searched")
 TUPLES = ("needs", "kinds", "after", "contains")
-TYPES: Mapping[str, type] = {"exact": bool, "rounds": bool, "left_out": str, "incidental": bool, "memory": int}
+TYPES: Mapping[str, type] = {
+    "exact": bool, "rounds": bool, "left_out": str, "incidental": bool, "of_force": bool, "scales": bool, "memory": int,
+}  # fmt: skip
 MEMBERS = (*METHODS, *TUPLES, *TYPES)
 
 

@@ -11,7 +11,7 @@ gain of the output stage: the iteration still ends where the exact residual is b
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -109,10 +109,19 @@ def state_at(data: PoseData, given: Given, values: Coefficients, components: Seq
     force = a @ _sensing(rows).T
     ones = np.ones_like(linear)
     bare = State(data, force, a, by_alpha, by_beta, by_tilt, linear, linear, ones)
-    response = linear.copy()
+    response, of_force = linear.copy(), np.zeros_like(linear)
     for comp in active:
-        if comp.stage == "response":
-            response += comp.jacobian(bare) @ values.of[comp.name]
+        if comp.stage == "response" and not comp.scales:
+            part = comp.jacobian(bare) @ values.of[comp.name]
+            response += part
+            of_force += part if comp.of_force else 0.0
+    # a drift of the sensitivity multiplies all that the sensor makes of the force
+    whole = force.copy()
+    whole[:, :c] += (of_force / np.linalg.norm(rows, axis=1)[:, None]).T
+    drifting = replace(bare, force=whole)
+    for comp in active:
+        if comp.stage == "response" and comp.scales:
+            response += comp.jacobian(drifting) @ values.of[comp.name]
 
     def output(response: Array) -> Array:
         before = State(data, force, a, by_alpha, by_beta, by_tilt, response, response, ones)

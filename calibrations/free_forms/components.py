@@ -11,6 +11,10 @@ from calibrations.free_forms.chain import State
 from calibrations.free_forms.form import ANGLES, Form
 from calibrations.table import Array
 
+PLACES_OF_FORCE = (
+    "own-response", "cross-response", "z-response", "scale-over-cross", "scale-over-z", "force", "history",
+)  # fmt: skip
+DRIFTS = ("temperature-scale", "time-scale")
 Columns = Callable[[State], Array]  # (channels, n, m)
 Starts = tuple[tuple[str, str, float], ...]
 Basis = Callable[[State, int], Array]  # (n, m) of one channel
@@ -49,6 +53,16 @@ class Component:
     constants: tuple[tuple[str, float], ...] = ()
     starts: Callable[[Array], Starts] | None = None
     contains: str = ""
+
+    @property
+    def of_force(self) -> bool:
+        """Whether a drift of the sensitivity multiplies it."""
+        return self.form.of_force if self.form is not None else self.place in PLACES_OF_FORCE
+
+    @property
+    def scales(self) -> bool:
+        """Whether it is a drift of the sensitivity."""
+        return self.form.scales if self.form is not None else self.place in DRIFTS
 
     def jacobian(self, state: State) -> Array:
         """d output / d coefficients, (channels, n, m)."""

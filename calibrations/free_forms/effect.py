@@ -102,6 +102,8 @@ class FreeForm(Effect):
         self.summary = f"{PLACES.get(forms[0].place, 'output over the logged column')}, of unknown form"
         self.needs = tuple(dict.fromkeys(column for form in forms for column in form.needs()))
         self.left_out = _left_out(forms)
+        self.of_force = any(form.of_force for form in forms)
+        self.scales = any(form.scales for form in forms)
         self.parameters = tuple(p for form in forms for p in _parameters(form))
 
         self._last: tuple[Table, Array, list[Array]] | None = None

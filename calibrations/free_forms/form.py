@@ -37,6 +37,7 @@ from calibrations.table import Array, Table
 Factor = Literal["", "force", "side", "load"]
 CROSS = (1, 0, 0)  # of x, y, z: the other axis in the plane
 ANGLES = ("alpha", "beta")
+OF_FORCE = ("own", "cross", "out-of-plane", "force", "way")  # drivers of what the sensor makes of the force
 MODELLED = ("own", "cross", "out-of-plane", "output")  # drivers that the parameters of a model change
 
 
@@ -77,6 +78,16 @@ class Form:
         by_driver = {"temperature": ("temperature_c",), "time": ("t_s",)}
         own = by_driver.get(self.driver, (named,) if named != self.driver else ())
         return (*own, *(("direction",) if self.factor == "side" and self.approach_deg else ()))
+
+    @property
+    def of_force(self) -> bool:
+        """Whether a drift of the sensitivity multiplies it."""
+        return self.driver in OF_FORCE
+
+    @property
+    def scales(self) -> bool:
+        """Whether it is a drift of the sensitivity."""
+        return self.factor == "force" and not self.of_force
 
     @property
     def of_table(self) -> bool:

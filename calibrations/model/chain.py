@@ -63,8 +63,22 @@ def respond(a: Array, table: Table, steps: Sequence[Step]) -> Array:
 
 
 def added(a: Array, table: Table, steps: Sequence[Step]) -> list[Array]:
-    """What each effect adds to the output of all three axes, shape (n, 3) each; zeros, (1, 3), where nothing."""
-    return [effect.transduction(a, table, p) for effect, p in steps]
+    """What each effect adds to the output of all three axes, shape (n, 3) each; zeros, (1, 3), where nothing.
+
+    A drift of the sensitivity multiplies all that the sensor makes of the force, also what its nonlinearity adds.
+    """
+    if not any(effect.scales for effect, _ in steps):
+        return [effect.transduction(a, table, p) for effect, p in steps]
+    parts = {i: effect.transduction(a, table, p) for i, (effect, p) in enumerate(steps) if not effect.scales}
+    of_force = (parts[i] for i, (effect, _) in enumerate(steps) if effect.of_force)
+    whole = scaled(a, sum(of_force, np.zeros((1, 3))), steps)
+    return [effect.transduction(whole, table, p) if effect.scales else parts[i] for i, (effect, p) in enumerate(steps)]
+
+
+def scaled(a: Array, response: Array, steps: Sequence[Step]) -> Array:
+    """The force `a` and the force, g, that would give a response (n, 3) in the output's unit; `a` without a scale."""
+    scale = next((np.asarray(p["scale"]) for effect, p in steps if effect.name == "scale-factor"), np.zeros(3))
+    return a + response / np.where(scale == 0, np.inf, scale)
 
 
 def converted(parts: Sequence[Array], n: int, table: Table, steps: Sequence[Step]) -> Array:
@@ -147,8 +161,37 @@ class Near:
     def columns(self) -> Mapping[int, Mapping[str, Array]]:
         """d output / d each parameter of effects that are linear in them, by term and name, shape (n, axes) each."""
         axes = len(self.table.axes)
-        by_term = {i: effect.columns(self._sensed, self.table) for i, (effect, _) in enumerate(self.steps)}
-        return {i: {k: v[:, :axes] * self._slope for k, v in c.items()} for i, c in by_term.items() if c is not None}
+        by_term = {i: effect.columns(self._force_of(effect), self.table) for i, (effect, _) in enumerate(self.steps)}
+        slopes = {i: self._slope * self._drift_of(effect)[:, :axes] for i, (effect, _) in enumerate(self.steps)}
+        return {i: {k: v[:, :axes] * slopes[i] for k, v in c.items()} for i, c in by_term.items() if c is not None}
+
+    @cached_property
+    def _scales(self) -> bool:
+        return any(effect.scales for effect, _ in self.steps)
+
+    @cached_property
+    def _whole(self) -> Array:
+        """The force with what nonlinear effects add, g, which a drift of the sensitivity multiplies, shape (n, 3)."""
+        own = [part for part, (effect, _) in zip(self._added, self.steps, strict=True) if effect.of_force]
+        return scaled(self._sensed, sum(own, np.zeros((1, 3))), self.steps)
+
+    @cached_property
+    def _drift(self) -> Array:
+        """Sensitivity over that of the scale factor, shape (n, 3)."""
+        ones = np.ones_like(self._sensed)
+        drifts = [effect.transduction(ones, self.table, p) for effect, p in self.steps if effect.scales]
+        return scaled(ones, sum(drifts, np.zeros((1, 3))), self.steps)
+
+    def _force_of(self, effect: Effect) -> Array:
+        return self._whole if effect.scales else self._sensed
+
+    def _drift_of(self, effect: Effect) -> Array:
+        return self._drift if effect.of_force and self._scales else np.ones((1, 3))
+
+    def _alone(self, effect: Effect, values: Values) -> Array:
+        """What one effect adds, beside the others."""
+        part = effect.transduction(self._force_of(effect), self.table, values)
+        return np.asarray(part * self._drift_of(effect))
 
     def output(self, term: int, values: Values) -> Array:
         """Output of the measured axes with other `values` of one effect, up to a constant, shape (n, axes).
@@ -161,7 +204,7 @@ class Near:
             static = static_force(self.table, steps) if "pose" in effect.places else self._static
             parts = added(sensed(static, self.table, steps), self.table, steps)
         elif not any("output" in other.places for other, _ in steps):
-            parts = added(self._sensed, self.table, [steps[term]])
+            parts = [self._alone(effect, values)]
         else:
-            parts = [*self._added[:term], *added(self._sensed, self.table, [steps[term]]), *self._added[term + 1 :]]
+            parts = [*self._added[:term], self._alone(effect, values), *self._added[term + 1 :]]
         return converted(parts, self.table.n, self.table, steps)[:, : len(self.table.axes)]

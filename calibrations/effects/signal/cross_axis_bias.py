@@ -14,6 +14,7 @@ class CrossAxisBias(Effect):
     Source    Ang (11), p2; IEEE Std 1293, K_pp.
     """
 
+    of_force = True
     square = Parameter("{out}/g^2", typical=0.02, doc="output per square of the other in-plane axis")
 
     def transduction(self, a: Array, table: Table, p: Values) -> Array:

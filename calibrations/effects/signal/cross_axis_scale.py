@@ -14,6 +14,7 @@ class CrossAxisScale(Effect):
     Source    IEEE Std 1293, K_ip.
     """
 
+    of_force = True
     slope = Parameter("{out}/g^2", typical=0.02, doc="scale factor per g along the other in-plane axis")
 
     def transduction(self, a: Array, table: Table, p: Values) -> Array:

@@ -14,6 +14,7 @@ class CubicNonlinearity(Effect):
     Source    Book 17.3.10; IEEE Std 1293, K3.
     """
 
+    of_force = True
     cube = Parameter("{out}/g^3", typical=0.01, doc="output per cube of the own axis")
 
     def transduction(self, a: Array, table: Table, p: Values) -> Array:

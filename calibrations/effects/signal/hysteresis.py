@@ -25,6 +25,7 @@ class Hysteresis(Effect):
     Source    Ang III.A (largest where the other axis is loaded most); Iwan (1966); IEEE Std 528, hysteresis error.
     """
 
+    of_force = True
     kinds = ("poses",)
     needs = ("direction",)
     memory = len(ELEMENTS)

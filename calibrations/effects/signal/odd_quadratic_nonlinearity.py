@@ -16,6 +16,7 @@ class OddQuadraticNonlinearity(Effect):
     Source    IEEE Std 1293, K_oq.
     """
 
+    of_force = True
     square = Parameter("{out}/g^2", typical=0.01, doc="output per signed square of the own axis")
 
     def transduction(self, a: Array, table: Table, p: Values) -> Array:

@@ -13,6 +13,7 @@ class QuadraticNonlinearity(Effect):
     Source    Book 17.3.10; IEEE Std 1293, K2.
     """
 
+    of_force = True
     square = Parameter("{out}/g^2", typical=0.02, doc="output per square of the own axis")
 
     def transduction(self, a: Array, table: Table, p: Values) -> Array:

@@ -16,6 +16,7 @@ class ScaleFactorAsymmetry(Effect):
     Source    Book 17.3.8; IEEE Std 1293, K1'.
     """
 
+    of_force = True
     kink = Parameter("{out}/g", typical=0.01, doc="half the difference of both slopes")
 
     def transduction(self, a: Array, table: Table, p: Values) -> Array:

@@ -8,7 +8,9 @@ from calibrations.table import Array, Table
 class TemperatureScale(Effect):
     """temperature-scale: the scale factor follows the temperature.
 
-        V += slope (T - T0) a_i          slope in {out}/g/K, one per axis; T0: mean temperature of the data
+        V += slope (T - T0) r_i          slope in {out}/g/K, one per axis; T0: mean temperature of the data
+
+        r_i = a_i + N_i / SF_i, with all that nonlinear effects add, N_i: the drift multiplies the whole response
 
     Symptom   the residual follows the temperature, in proportion to the specific force of its own axis.
     Excited by  a run in which the temperature changes while the axis goes from -1 g to +1 g.
@@ -17,6 +19,7 @@ class TemperatureScale(Effect):
     Source    Book 17.3.7 and 17.3.12.
     """
 
+    scales = True
     needs = ("temperature_c",)
 
     slope = Parameter("{out}/g/K", typical=0.001, doc="scale factor per kelvin")

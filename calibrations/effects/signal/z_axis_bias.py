@@ -14,6 +14,7 @@ class ZAxisBias(Effect):
     Source    Ang (13), q2; IEEE Std 1293, K_oo.
     """
 
+    of_force = True
     square = Parameter("{out}/g^2", typical=0.05, doc="output per square of the out-of-plane axis")
 
     def transduction(self, a: Array, table: Table, p: Values) -> Array:

@@ -14,6 +14,7 @@ class ZAxisScale(Effect):
     Source    Ang (15), r1 and r2; IEEE Std 1293, K_io.
     """
 
+    of_force = True
     slope = Parameter("{out}/g^2", typical=0.02, doc="scale factor per out-of-plane g")
     square = Parameter("{out}/g^3", typical=0.02, doc="scale factor per square of the out-of-plane g")
 
