@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from drivers.errors import LimitError
 
 Read = TypeVar("Read")
+Input = TypeVar("Input", int, str)  # a number, or the name of a record
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +56,7 @@ class Recorder:
         return _joined(blocks)
 
 
-def chosen_inputs(name: str, wired: Mapping[str, int], outputs: Sequence[str]) -> dict[str, int]:
+def chosen_inputs(name: str, wired: Mapping[str, Input], outputs: Sequence[str]) -> dict[str, Input]:
     """The inputs of these outputs, of those that are `wired` to a converter `name`; of a batch `a1.mx` is `mx`.
 
     Raises LimitError for an output that no input is wired to.

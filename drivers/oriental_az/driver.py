@@ -14,7 +14,8 @@ from dataclasses import dataclass, replace
 from drivers.errors import DriverError, Interlocked, NotSettled, StageAlarm, StageLost
 from drivers.instrument import OUTSIDE_ANGLE, Check, Identity, require_within
 from drivers.oriental_az import registers as az
-from drivers.oriental_az.registers import LEAD_S, Alarm, Settings
+from drivers.oriental_az.registers import Alarm, Settings
+from drivers.paths import LEAD_S
 from drivers.transport import Address, Links
 from drivers.transport.modbus import Unit
 

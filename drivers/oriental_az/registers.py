@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 from drivers.errors import LimitError
 from drivers.instrument import require_positive, require_range
+from drivers.paths import TurnPath, move_s, require_rate
 from drivers.transport.modbus import Register
 
 # Direct data operation: written in one go; the trigger is last and starts the move.
@@ -116,9 +117,6 @@ def alarm_of(code: int) -> Alarm | None:
 # Oriental Motor AZ: settings of a stage in a bench file; times and paths of its moves.
 
 
-LEAD_S, TAIL_S = 0.2, 0.5  # at constant rate before a turn, for the motor to settle, and after it, for late records
-
-
 @dataclass(frozen=True)
 class Settings:
     """One stage: gear and resolution, limits of the motor angle and speed, how it moves, when it counts as settled.
@@ -170,30 +168,13 @@ class Settings:
 
         Raises LimitError for a rate or a way that the stage has not.
         """
-        if not 0 < abs(self.rate_deg_s(rate_deg_s)) <= self.speed_limit_deg_s:
-            raise LimitError(
-                f"{name}: {abs(rate_deg_s):g} deg/s is not a rate of this stage; its limit is "
-                f"{self.speed_limit_deg_s:g} deg/s; nothing was sent",
-                "Ask for a slower turn, or change speed_limit_deg_s in the bench file after checking the load",
-            )
+        require_rate(name, rate_deg_s, self.rate_deg_s(rate_deg_s), self.speed_limit_deg_s)
         if self.endless and not self.communication_timeout_s:
             raise LimitError(
                 f"{name}: has no limits and would not stop if this program crashes; nothing was sent",
                 "Set communication_timeout_s in the bench file, so that the drive stops by itself, or set limits_deg",
             )
-        speed, way = abs(rate_deg_s), math.copysign(1.0, last_deg - first_deg)
-        ramp_deg = speed**2 / (2 * self.acceleration_deg_s2)
-        ends = first_deg - way * (ramp_deg + LEAD_S * speed), last_deg + way * (TAIL_S * speed + ramp_deg)
-        low, high = self.limits_deg
-        if not (low <= min(ends) and max(ends) <= high):  # NaN is outside as well
-            raise LimitError(
-                f"{name}: a turn from {first_deg:g} to {last_deg:g} deg at {speed:g} deg/s needs, with "
-                f"acceleration and braking, {ends[0]:g} .. {ends[1]:g} deg in all, outside its limits "
-                f"{low:g} .. {high:g} deg; nothing was sent",
-                "Ask for a slower or shorter turn, raise acceleration_deg_s2 if the load permits, or widen "
-                "limits_deg in the bench file after checking the cables",
-            )
-        return ends
+        return TurnPath(rate_deg_s, self.acceleration_deg_s2, first_deg, last_deg).within(name, self.limits_deg)
 
     @property
     def endless(self) -> bool:
@@ -201,8 +182,5 @@ class Settings:
         return all(map(math.isinf, self.limits_deg))
 
     def move_s(self, distance_deg: float) -> float:
-        """How long a move takes: a trapezoid of speed, or a triangle when the way is short."""
-        speed, acceleration = self.speed_deg_s, self.acceleration_deg_s2
-        if distance_deg < speed**2 / acceleration:
-            return 2 * math.sqrt(distance_deg / acceleration)
-        return distance_deg / speed + speed / acceleration
+        """How long a move takes."""
+        return move_s(distance_deg, self.speed_deg_s, self.acceleration_deg_s2)

@@ -20,8 +20,10 @@ class Address:
         rtu+tcp://host:port                         Modbus RTU frames through a converter on TCP
         serial:/dev/ttyUSB0?baud=115200&parity=E    a serial line (parity N, E or O): Modbus RTU, GCS, text
         visa:TCPIP0::10.0.0.7::INSTR                a VISA resource: SCPI; `?library=` another library than pyvisa-py
+        ca:13IDC:m1                                 a record of EPICS, which Channel Access finds on the network
+        ca://10.0.0.7:5064/13IDC:m1                 the same on a server whose address is known
     `unit` is the Modbus unit id; instruments with the same url share the wire.
-    `stream_url` is the second port of an instrument that has one.
+    `stream_url` is the second port of an instrument that has one, and the port of a simulated server of EPICS.
     """
 
     url: str
@@ -31,7 +33,8 @@ class Address:
 
 # The urls of wires, and how long a byte takes on each.
 
-SCHEMES = ("tcp", "rtu+tcp", "serial", "pty", "visa")
+SCHEMES = ("tcp", "rtu+tcp", "serial", "pty", "visa", "ca")
+CA_PORT = 5064  # of a server of Channel Access
 TCP_LATENCY_S = 150e-6  # one way through a switch and a small embedded stack
 USER = re.compile("//.*@")
 VISA_SOCKET = re.compile(r"TCPIP\d*::([^:]+)::(\d+)::SOCKET", re.IGNORECASE)
@@ -84,7 +87,8 @@ class Url:
         return url
 
     def _complete(self) -> bool:
-        place = {"serial": bool(self.path), "visa": "::" in self.path, "pty": True}.get(self.scheme, bool(self.host))
+        places = {"serial": bool(self.path), "visa": "::" in self.path, "pty": True, "ca": True}
+        place = places.get(self.scheme, bool(self.host))
         return self.scheme in SCHEMES and place and self.parity in ("N", "E", "O") and self.baud > 0
 
     @property
@@ -92,6 +96,8 @@ class Url:
         """The wire's name, the same for every spelling of its address: the device's real path, or host:port."""
         if self.scheme in ("serial", "pty"):
             return os.path.realpath(self.path)
+        if self.scheme == "ca":
+            return f"ca:{self.record}"
         host, port = self.host.rstrip("."), self.port
         if self.scheme == "visa":
             if not (found := VISA_SOCKET.fullmatch(self.path)):
@@ -104,9 +110,14 @@ class Url:
         return f"{'127.0.0.1' if address == ipaddress.IPv6Address('::1') else address}:{port}"
 
     @property
+    def record(self) -> str:
+        """The name of an EPICS record, or what the names of several begin with."""
+        return self.path.removeprefix("/")
+
+    @property
     def rtu(self) -> bool:
         """Whether the frames on the wire are those of Modbus RTU."""
-        return self.scheme != "tcp"
+        return self.scheme not in ("tcp", "ca")
 
     @property
     def character_s(self) -> float:

@@ -112,6 +112,10 @@ class Link:
             count += len(data)
         return count
 
+    def hang_up(self) -> None:
+        """Close the connection; what is sent next opens it anew."""
+        self._drop()
+
     def close(self) -> None:
         """For good."""
         self._closed = True
@@ -217,6 +221,8 @@ def _open_port(url: Url) -> SocketPort | SerialPort:
         return SerialPort(url.path, url.baud, url.parity, url.stop_bits)
     if url.scheme == "visa":
         raise ValueError("only the driver scpi_meter speaks through VISA")
+    if url.scheme == "ca":
+        raise ValueError("only the drivers epics_motor and epics_adc speak Channel Access")
     return SocketPort(url.host, url.port)
 
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from drivers.clock import Clock
+from drivers.errors import LinkRefused
 from drivers.manual_stage.person import PersonLink
-from drivers.transport.address import Address, Url
+from drivers.transport.address import CA_PORT, Address, Url
+from drivers.transport.channel_access import Circuit, Records, found_server
 from drivers.transport.lines import LinkLines, TextLines, VisaLines
 from drivers.transport.link import Link, Tap, open_link
 from drivers.transport.modbus import Bus, Unit
@@ -19,6 +21,7 @@ class Links:
         self._tap = tap
         self.person = PersonLink()
         self._buses: dict[str, Bus] = {}
+        self._circuits: dict[tuple[str, int], Circuit] = {}
         self._links: list[Link | VisaLines] = []
 
     def unit(self, address: Address, name: str) -> Unit:
@@ -43,9 +46,25 @@ class Links:
         self._links.append(visa)
         return visa
 
+    def records(self, address: Address, name: str, first: str, timeout_s: float) -> Records:
+        """The records of EPICS whose names begin as `address` says; a search on the network looks for `first`.
+
+        The records of one server share a connection, as Channel Access wants it. Raises LinkRefused.
+        """
+        url = Url.parse(address.url)
+        if url.scheme != "ca":
+            raise LinkRefused(f"{name}: {address.url} is no address of EPICS", "Write ca:NAME, or ca://host:port/NAME")
+        place = (url.host, url.port or CA_PORT) if url.host else found_server(url.record + first, name, timeout_s)
+        if place not in self._circuits:
+            self._circuits[place] = Circuit(self.link(f"tcp://{place[0]}:{place[1]}", name), place)
+        else:
+            self._circuits[place].link.users.append(name)
+        return Records(self._circuits[place], url.record, name, timeout_s)
+
     def close(self) -> None:
         """Close every wire."""
         for link in self._links:
             link.close()
         self._links.clear()
         self._buses.clear()
+        self._circuits.clear()

@@ -27,6 +27,9 @@ WIRES = [(name, None) for name in NAMES] + [(name, listen) for name in SERIAL fo
 class Steady:
     """A world whose inputs are all at 2 V."""
 
+    def advance(self, t_s: float) -> None:
+        """Nothing changes."""
+
     def adc_volts(self, inputs: Sequence[str], start_s: float, interval_s: float, n: int) -> NDArray[np.float64]:
         return np.full((n, len(inputs)), 2.0)
 
@@ -36,7 +39,7 @@ def instrument(request: pytest.FixtureRequest, small_world: Any) -> Iterator[Any
     name, listen = request.param
     driver, twin = import_module(f"drivers.{name}.driver"), import_module(f"drivers.{name}.twin")
     settings = driver.Settings() if name != "labjack_t7" else driver.Settings(channels={"supply": 0})
-    if name == "imu_lines":
+    if name in ("imu_lines", "epics_adc"):
         small_world = Steady()
     server = twin.serve(small_world, {"alpha": (1, settings)}, listen or twin.LISTEN)
     clock = SimulatedClock()

@@ -1,0 +1,1 @@
+"""EPICS analog records as a converter: its driver is `driver.py`, its simulated instrument `twin.py`."""

@@ -1,0 +1,208 @@
+"""Analog records of EPICS as a converter: whatever an IOC measures, the rig records.
+
+All channels are read at once, a few times a second; the reading of a record carries its alarm and its time stamp. A
+record with an alarm, and one that an IOC does not process as often as it is read, are refused: a repeated reading would
+count as a new one.
+
+Source: EPICS Channel Access protocol specification; EPICS record reference manual, analog input record.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Mapping, Sequence
+from copy import copy
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.errors import LimitError, SensorFault, StreamError
+from drivers.instrument import Check, Identity, require_positive
+from drivers.recorder import Recorder, Samples, chosen_inputs
+from drivers.transport import Address, Links
+from drivers.transport.channel_access import Reading, Records
+
+__all__ = ["AnalogRecords", "Settings", "connect"]
+
+UNITS_V = {"v": 1.0, "volt": 1.0, "volts": 1.0, "mv": 1e-3, "uv": 1e-6, "µv": 1e-6}
+MOST_REPEATED = 0.05  # of the readings of a record: two clocks that differ a little cause some
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Channels as {name: record}, the record's name behind the beginning in the url.
+
+    Those `on_request` are there too, and are measured only for who asks for them. `volts_per_unit` converts the
+    engineering units of the records; without it the units must be V, mV or uV. `highest_severity` is the worst alarm
+    with which the rig goes on. Raises ValueError for what cannot be.
+    """
+
+    channels: Mapping[str, str] = field(default_factory=lambda: {"vx": "ai1", "vy": "ai2"})
+    on_request: Mapping[str, str] = field(default_factory=dict)
+    rate_hz: float = 5.0
+    volts_per_unit: float | None = None
+    highest_severity: Literal["none", "minor", "major"] = "minor"
+    timeout_s: float = 5.0
+
+    def __post_init__(self) -> None:
+        require_positive(self, "rate_hz", "timeout_s")
+        if not self.channels or not all(self.wired.values()):
+            raise ValueError("channels must name records of the IOC, such as {vx: ai1}")
+        if twice := self.channels.keys() & self.on_request.keys():
+            raise ValueError(f"{', '.join(sorted(twice))} is a channel already; remove it from on_request")
+
+    @property
+    def wired(self) -> Mapping[str, str]:
+        """All records by name: the channels, and those on request."""
+        return {**self.channels, **self.on_request}
+
+    @property
+    def power_dio(self) -> None:
+        """No line switches the sensor's power."""
+
+    @property
+    def interlocks(self) -> Mapping[str, int]:
+        """It has no contacts."""
+        return {}
+
+    def only(self, name: str, outputs: Sequence[str]) -> Settings:
+        """Settings of a converter `name` whose channels are these. Raises LimitError for one that is not there."""
+        return replace(self, channels=chosen_inputs(name, self.wired, outputs), on_request={})
+
+    def lag_s(self, channel: str) -> float:  # noqa: ARG002
+        """All channels are read at once."""
+        return 0.0
+
+
+class AnalogRecords(Recorder):
+    """The records, read at the rate of the bench file."""
+
+    def __init__(self, records: Records, links: Links, settings: Settings, name: str) -> None:
+        """Raises LinkRefused for a record that is not there, LimitError where its units are not those of a voltage."""
+        self.name, self.settings = name, settings
+        self._records, self._clock = records, links.clock
+        self._volts = {channel: self._volts_per_unit(record) for channel, record in settings.wired.items()}
+
+    def identify(self) -> Identity:
+        """The names of the records: they have no field for the maker of the converter."""
+        self._scan()
+        return Identity(f"EPICS records {self._records.beginning}{', '.join(self.settings.channels.values())}")
+
+    def self_test(self) -> list[Check]:
+        """Alarms, and how old the readings are."""
+        checks = []
+        for channel, reading in self._scan().items():
+            ok = not reading.is_worse_than(self.settings.highest_severity)
+            shown = f"{reading.value * self._volts[channel]:.4f} V"
+            checks.append(Check(channel, ok, shown if ok else f"{shown}, alarm {reading.alarm}"))
+        return checks
+
+    def close(self) -> None:
+        """Nothing to release: the wire belongs to the bench."""
+
+    def power(self, on: bool) -> None:  # noqa: ARG002
+        """Raises LimitError: no line of it switches the sensor."""
+        raise LimitError(f"{self.name}: no line switches the power", "Switch the sensor by hand, or use a LabJack T7")
+
+    def only(self, *outputs: str) -> AnalogRecords:
+        """The same converter with these channels and no others. Raises LimitError for one that is not there."""
+        chosen = copy(self)
+        chosen.settings = self.settings.only(self.name, outputs)
+        return chosen
+
+    def stream(self, duration_s: float, block_s: float) -> Generator[Samples, None, None]:
+        """Record all channels for `duration_s` without a gap, and hand it out in blocks of `block_s`.
+
+        Raises StreamError when readings are late or repeated, SensorFault for a record with an alarm or without a
+        number, LinkTimeout, LinkRefused, Refused, BadFrame.
+        """
+        scans, block = self._scans(duration_s), self._scans(block_s)
+        channels, rate_hz = tuple(self.settings.channels), self.settings.rate_hz
+        start_s, fresh = self._clock.now(), Freshness(channels)
+        for first in range(0, scans, block):
+            last = min(first + block, scans)
+            volts = np.array([self._taken(scan, start_s, fresh) for scan in range(first, last)])
+            self._require_fresh(fresh, last)
+            yield Samples(volts, channels, rate_hz, start_s + first / rate_hz)
+
+    def _scans(self, duration_s: float) -> int:
+        return max(1, round(duration_s * self.settings.rate_hz))
+
+    def _scan(self) -> dict[str, Reading]:
+        """One reading of every channel."""
+        channels = self.settings.channels
+        return dict(zip(channels, self._records.read(*channels.values()), strict=True))
+
+    def _taken(self, scan: int, start_s: float, fresh: Freshness) -> NDArray[np.float64]:
+        """The volts of a scan at its time, shape (channels,)."""
+        period_s = 1 / self.settings.rate_hz
+        due_s = start_s + scan * period_s
+        self._clock.sleep(due_s - self._clock.now())
+        readings = self._scan()
+        if (late_s := self._clock.now() - due_s) > period_s:
+            raise StreamError(
+                f"{self.name}: scan {scan + 1} is {late_s:.2f} s late: a reading takes longer than 1/rate_hz",
+                "Lower rate_hz in the bench file, or find out what slows the network or the IOC",
+            )
+        for channel, reading in readings.items():
+            self._require_sound(channel, reading)
+        fresh.note(readings)
+        return np.array([reading.value * self._volts[channel] for channel, reading in readings.items()])
+
+    def _require_sound(self, channel: str, reading: Reading) -> None:
+        where = f"{self.name}: {channel} ({self._records.beginning}{self.settings.channels[channel]})"
+        if reading.is_worse_than(self.settings.highest_severity):
+            raise SensorFault(
+                f"{where} has the alarm {reading.alarm}",
+                "Find its cause in the IOC; set highest_severity in the bench file if the rig shall go on with it",
+            )
+        if not np.isfinite(reading.value):
+            raise SensorFault(f"{where} is {reading.value:g}, which is no voltage", "Check the IOC and the converter")
+
+    def _require_fresh(self, fresh: Freshness, scans: int) -> None:
+        """Raises StreamError for a record that the IOC processes less often than it is read."""
+        channel, repeated = fresh.worst()
+        if repeated > max(1, MOST_REPEATED * scans):
+            rate_hz = self.settings.rate_hz * (scans - repeated) / scans
+            raise StreamError(
+                f"{self.name}: {channel} ({self._records.beginning}{self.settings.channels[channel]}) had a new time "
+                f"stamp in {scans - repeated} of {scans} readings: the IOC processes it about {rate_hz:.2g} times a "
+                "second",
+                "Lower rate_hz in the bench file below that, or have the IOC process it more often (its field SCAN)",
+            )
+
+    def _volts_per_unit(self, record: str) -> float:
+        if self.settings.volts_per_unit is not None:
+            return self.settings.volts_per_unit
+        units = self._records.units(record)
+        if units.lower() not in UNITS_V:
+            raise LimitError(
+                f"{self.name}: the units of {self._records.beginning}{record} are {units!r} (EGU), which is no voltage",
+                "Name a record of a voltage in the bench file, or set volts_per_unit there",
+            )
+        return UNITS_V[units.lower()]
+
+
+class Freshness:
+    """How many readings of each channel repeated the one before."""
+
+    def __init__(self, channels: Sequence[str]) -> None:
+        self._stamps: dict[str, float] = {}
+        self._repeated = dict.fromkeys(channels, 0)
+
+    def note(self, readings: Mapping[str, Reading]) -> None:
+        """Count those of the readings that have the time stamp of the last one."""
+        for channel, reading in readings.items():
+            self._repeated[channel] += self._stamps.get(channel) == reading.stamp_s
+            self._stamps[channel] = reading.stamp_s
+
+    def worst(self) -> tuple[str, int]:
+        """The channel with most repeated readings, and their number."""
+        return max(self._repeated.items(), key=lambda item: item[1])
+
+
+def connect(address: Address, links: Links, settings: Settings, name: str) -> AnalogRecords:
+    """The records at `address`, ca:BEGINNING or ca://host:port/BEGINNING. Raises LinkRefused; writes nothing."""
+    first = next(iter(settings.channels.values()))
+    return AnalogRecords(links.records(address, name, first, settings.timeout_s), links, settings, name)

@@ -1,0 +1,334 @@
+"""Any motor record of EPICS as a rotary stage: whatever an IOC drives, the rig turns.
+
+The driver writes the fields VAL, VELO, ACCL, STOP, and HOMF or HOMR if the bench file asks for homing; no others. It
+moves a motor only if the record is in the mode Go, and VAL moves it (SET is Use) and does not redefine its position.
+Limits are checked before anything is written: those of the bench file, and the record's own. Arrival is measured.
+
+Source: EPICS motor record documentation (epics-modules/motor), field descriptions.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+
+from drivers.epics_motor import fields as mr
+from drivers.epics_motor.fields import Settings
+from drivers.errors import DriverError, Interlocked, LimitError, NotSettled, StageAlarm, StageLost
+from drivers.instrument import OUTSIDE_ANGLE, Check, Identity, require_within
+from drivers.paths import LEAD_S
+from drivers.transport import Address, Links
+from drivers.transport.channel_access import Reading, Records
+
+__all__ = ["MotorRecord", "Settings", "Turn", "connect"]
+
+POLL_S = 0.05
+BEGIN_S = 1.0  # until DMOV shows a move that was asked for
+PATIENCE_S = 10.0  # beyond the expected end of a move: an IOC polls its controller, and may retry
+STOPPING_S = 10.0
+HOMING_S = 300.0
+LATE_S = 0.5  # of the position that a record shows in a turn
+OFF_RATE = 0.02
+WATCH_S = 1.0
+CLOSE = 1e-6  # relative, of speeds that are equal
+STATE = (mr.READBACK, mr.DONE, mr.STATUS, mr.MODE, mr.SET, mr.HIGH_SWITCH, mr.LOW_SWITCH)
+
+
+@dataclass(frozen=True)
+class Turn:
+    """A turn that goes on: its rate, and how often `require` has to be called meanwhile.
+
+    `require` raises StageAlarm, or NotSettled where the stage is not where it should be by now.
+    """
+
+    rate_deg_s: float
+    beat_s: float
+    require: Callable[[], None]
+
+
+class MotorRecord:
+    """A stage that is moved to angles in deg."""
+
+    def __init__(self, records: Records, links: Links, settings: Settings, name: str) -> None:
+        """Raises LinkRefused for a record that is not there, LimitError where its units are not those of an angle."""
+        self.name, self.settings = name, settings
+        self._records, self._clock = records, links.clock
+        self._target_deg = math.nan  # of the last move; not a number after a stop
+        self._expected_end_s = 0.0
+        self._deg = 1.0
+        self._records.read(*mr.FIELDS)
+        self._deg = self._deg_per_unit()
+
+    def identify(self) -> Identity:
+        """The name of the record: it has no field for the maker of the motor."""
+        self._records.read(mr.READBACK)
+        return Identity(f"EPICS motor {self._records.beginning}")
+
+    def self_test(self) -> list[Check]:
+        """Alarm, mode, limits and position."""
+        state = self._read(*STATE, mr.LOW_LIMIT, mr.HIGH_LIMIT)
+        try:
+            self._require_no_alarm(state)
+            alarm = Check("alarm", True, "none")
+        except StageAlarm as error:
+            alarm = Check("alarm", False, error.what)
+        mode, use = mr.MODES[int(state[mr.MODE].value)], not state[mr.SET].value
+        low, high = self._own_limits_deg(state)
+        shown = f"{low:g} .. {high:g} deg" if math.isfinite(high) else "none"
+        return [
+            alarm,
+            Check("mode", mode == "Go" and use, f"{mode}, {'Use' if use else 'Set'}"),
+            Check("limits of the record", True, shown),
+            Check("position", True, f"{self._angle_deg(state):.4f} deg"),
+        ]
+
+    def close(self) -> None:
+        """Nothing to release: the wire belongs to the bench."""
+
+    def angle_deg(self) -> float:
+        """The readback position, deg."""
+        return self._angle_deg(self._read(mr.READBACK))
+
+    def referenced(self) -> bool:
+        """Whether the motor knows where zero is; without `home` in the bench file the IOC is trusted with it."""
+        (status,) = self._records.read(mr.STATUS)
+        return self.settings.home == "none" or bool(int(status.value) & mr.HOMED)
+
+    def home(self) -> None:
+        """Seek the zero of the angle. Raises StageAlarm, StageLost, NotSettled."""
+        self._require_movable(self._read(*STATE))
+        self._target_deg = math.nan
+        if self.settings.home == "none":
+            return
+        self._records.written(mr.HOME[self.settings.home], 1.0)
+        self._until_done(HOMING_S, "has not found its home")
+        if not self.referenced():
+            raise StageLost(
+                f"{self.name}: has sought its home and is not homed (MSTA)",
+                "Check the home switch and `home` in the bench file, then resume the run",
+            )
+
+    def move_to(self, angle_deg: float) -> None:
+        """Turn to `angle_deg` and return when it is at rest there.
+
+        Raises LimitError before anything is written, StageAlarm, Interlocked, NotSettled, the errors of the link.
+        """
+        self.start(angle_deg)
+        self.wait()
+
+    def start(self, angle_deg: float) -> None:
+        """Start turning to `angle_deg` and return at once. Raises LimitError before anything is written, StageAlarm,
+        Interlocked.
+        """
+        require_within(f"{self.name}: ", angle_deg, self.settings.limits_deg, "deg", OUTSIDE_ANGLE)
+        self._start(angle_deg, self.settings.speed_deg_s)
+
+    def wait(self) -> None:
+        """Return when the move that was started has ended where it should. Raises StageAlarm, NotSettled."""
+        if math.isnan(self._target_deg):
+            return
+        begun_s = self._clock.now()
+        self._clock.sleep(self._expected_end_s - begun_s)
+        state = self._until_done(PATIENCE_S, "is still moving")
+        while not self._is_at_target(state) and self._clock.now() < begun_s + BEGIN_S:
+            self._clock.sleep(POLL_S)  # the record may not have begun yet
+            state = self._until_done(PATIENCE_S, "is still moving")
+        self._require_movable(state)
+        self._require_at_target(state, "Free the stage of what holds it, check the load's balance, then resume the run")
+
+    def rate_deg_s(self, asked_deg_s: float) -> float:
+        """The rate asked for."""
+        return self.settings.rate_deg_s(asked_deg_s)
+
+    @contextmanager
+    def turning(self, rate_deg_s: float, first_deg: float, last_deg: float) -> Iterator[Turn]:
+        """Turn from `first_deg` to `last_deg` at a constant rate, which it has when the body begins.
+
+        The stage is sent to an angle within its limits at that speed, where it ends by itself, whatever becomes of
+        this program. The body must call the turn's `require`. However it ends, the stage stands afterwards. Raises
+        LimitError before anything is written, StageAlarm, Interlocked, NotSettled.
+        """
+        start_deg, end_deg = self.settings.way_of_turn(self.name, rate_deg_s, first_deg, last_deg)
+        rate = math.copysign(rate_deg_s, last_deg - first_deg)
+        self.move_to(start_deg)
+        try:
+            self._start(end_deg, abs(rate))
+            ramp_s = abs(rate) / self.settings.acceleration_deg_s2
+            self._clock.sleep(ramp_s + LEAD_S)
+            at_s, at_deg = self._clock.now(), start_deg + rate * (ramp_s / 2 + LEAD_S)
+            yield Turn(rate, WATCH_S, lambda: self._require_turning(rate, at_deg, at_s))
+            self.wait()
+        except BaseException:
+            with suppress(DriverError):  # the first error is reported
+                self.stop()
+            raise
+
+    def require_steady(self) -> None:
+        """Compare the record with the last command; a stage without one passes. Raises StageAlarm, NotSettled."""
+        state = self._read(*STATE, mr.TARGET)
+        self._require_movable(state)
+        if not state[mr.DONE].value:
+            raise NotSettled(
+                f"{self.name}: has not stood still",
+                "Find out what moves it: another client, a hand; then resume the run",
+            )
+        if not math.isnan(self._target_deg):
+            self._require_at_target(
+                state, "Find out what moves it: another client, a hand; `rig resume` measures this pose again"
+            )
+
+    def look(self) -> None:
+        """Raises StageAlarm, Interlocked: what others do not wait for, while they wait."""
+        self._require_no_alarm(state := self._read(*STATE))
+        self._require_mode(state)
+
+    def halt(self) -> None:
+        """Let it brake, whatever it is doing, and return at once; `stop` must follow."""
+        self._target_deg = math.nan
+        self._records.write(mr.STOP, 1.0)
+
+    def stop(self) -> None:
+        """Brake to a standstill, whatever the stage is doing. An alarm is no reason to doubt a standstill."""
+        self.halt()
+        deadline = self._clock.now() + STOPPING_S
+        while not self._read(mr.DONE)[mr.DONE].value:
+            if self._clock.now() > deadline:
+                raise NotSettled(f"{self.name}: has not stopped (DMOV is 0)", "Switch off its power")
+            self._clock.sleep(POLL_S)
+
+    def _start(self, angle_deg: float, speed_deg_s: float) -> None:
+        state = self._read(*STATE, mr.TARGET, mr.LOW_LIMIT, mr.HIGH_LIMIT, mr.SPEED, mr.ACCELERATION_TIME)
+        self._require_movable(state)
+        low, high = self._own_limits_deg(state)
+        if not low <= angle_deg <= high:
+            raise LimitError(
+                f"{self.name}: {angle_deg:g} deg is outside the record's own limits, {low:g} .. {high:g} deg "
+                "(LLM, HLM); nothing was sent",
+                "Ask for an angle within them, or let the IOC's manager change LLM and HLM after checking the cables",
+            )
+        distance_deg = abs(angle_deg - self._angle_deg(state))
+        self._target_deg, self._expected_end_s = angle_deg, self._clock.now()
+        if state[mr.TARGET].value == angle_deg / self._deg and self._is_at_target(state):
+            return
+        ramp_s = speed_deg_s / self.settings.acceleration_deg_s2
+        self._set(state, mr.SPEED, abs(speed_deg_s / self._deg))
+        self._set(state, mr.ACCELERATION_TIME, ramp_s)
+        self._records.written(mr.TARGET, angle_deg / self._deg)
+        self._expected_end_s += distance_deg / speed_deg_s + ramp_s
+
+    def _set(self, state: Mapping[str, Reading], field: str, value: float) -> None:
+        """Write a field that has another value, and read it back: the record keeps it within limits of its own."""
+        if math.isclose(state[field].value, value, rel_tol=CLOSE):
+            return
+        if not math.isclose(found := self._records.written(field, value), value, rel_tol=CLOSE):
+            raise Interlocked(
+                f"{self.name}: the record has not accepted {value:g} in {field.strip('.')}; it is {found:g}",
+                "Compare speed_deg_s and acceleration_deg_s2 in the bench file with the record's VBAS and VMAX",
+            )
+
+    def _until_done(self, timeout_s: float, what: str) -> dict[str, Reading]:
+        """The state in which DMOV is 1. Raises NotSettled when it is not by then, StageAlarm."""
+        deadline = self._clock.now() + timeout_s
+        while not (state := self._read(*STATE))[mr.DONE].value:
+            self._require_no_alarm(state)
+            if self._clock.now() > deadline:
+                raise NotSettled(
+                    f"{self.name}: {what} {timeout_s:.0f} s after the end was due (DMOV is 0)",
+                    "Free the stage of what holds it; compare speed_deg_s in the bench file with the motor's",
+                )
+            self._clock.sleep(POLL_S)
+        return state
+
+    def _read(self, *names: str) -> dict[str, Reading]:
+        return dict(zip(names, self._records.read(*names), strict=True))
+
+    def _angle_deg(self, state: Mapping[str, Reading]) -> float:
+        return state[mr.READBACK].value * self._deg
+
+    def _own_limits_deg(self, state: Mapping[str, Reading]) -> tuple[float, float]:
+        """The record's limits; none where both are equal."""
+        low, high = sorted(state[limit].value * self._deg for limit in (mr.LOW_LIMIT, mr.HIGH_LIMIT))
+        return (low, high) if low < high else (-math.inf, math.inf)
+
+    def _is_at_target(self, state: Mapping[str, Reading]) -> bool:
+        settled = abs(self._angle_deg(state) - self._target_deg) <= self.settings.settle_deg
+        return bool(state[mr.DONE].value) and settled
+
+    def _require_at_target(self, state: Mapping[str, Reading], remedy: str) -> None:
+        """Raises NotSettled where the readback is not at the target of the last move."""
+        if self._is_at_target(state):
+            return
+        why = " (its own limits have stopped it, LVIO)" if self._records.read(mr.LIMIT_VIOLATION)[0].value else ""
+        raise NotSettled(
+            f"{self.name}: is at {self._angle_deg(state):.3f} deg instead of {self._target_deg:.3f} deg, "
+            f"more than {self.settings.settle_deg:g} deg away{why}",
+            remedy,
+        )
+
+    def _require_movable(self, state: Mapping[str, Reading]) -> None:
+        self._require_no_alarm(state)
+        self._require_mode(state)
+
+    def _require_mode(self, state: Mapping[str, Reading]) -> None:
+        """Raises Interlocked for a record that does not move its motor."""
+        if (mode := int(state[mr.MODE].value)) != mr.GO:
+            raise Interlocked(
+                f"{self.name}: the record is in the mode {mr.MODES[mode]} (SPMG), and does not move",
+                "Find out who has stopped it; when nobody is near the rig, set SPMG to Go, then resume the run",
+            )
+        if state[mr.SET].value:
+            raise Interlocked(
+                f"{self.name}: the record is in the mode Set (SET): a target would redefine its position",
+                "Set it to Use, then resume the run",
+            )
+
+    def _require_no_alarm(self, state: Mapping[str, Reading]) -> None:
+        """Raises StageAlarm for an alarm of the record, or a fault in its status word."""
+        status = int(state[mr.STATUS].value)
+        for bit, (what, remedy) in mr.FAULTY.items():
+            if status & bit:
+                raise StageAlarm(f"{self.name}: {what} (MSTA is {status:#x})", f"{remedy}; then resume the run", status)
+        for switch in (mr.HIGH_SWITCH, mr.LOW_SWITCH):
+            if state[switch].value:
+                raise StageAlarm(
+                    f"{self.name}: is at its {'high' if switch == mr.HIGH_SWITCH else 'low'} limit switch "
+                    f"({switch.strip('.')})",
+                    "Move it away from the switch, and check limits_deg in the bench file",
+                    status,
+                )
+        if (reading := state[mr.READBACK]).is_worse_than(self.settings.highest_severity):
+            raise StageAlarm(
+                f"{self.name}: {self._records.beginning} has the alarm {reading.alarm}",
+                "Find its cause in the IOC; set highest_severity in the bench file if the rig shall go on with it",
+                status,
+            )
+
+    def _require_turning(self, rate_deg_s: float, at_deg: float, at_s: float) -> None:
+        """Raises NotSettled where the readback is not where a turn would be that was at `at_deg` at `at_s`."""
+        self._require_movable(state := self._read(*STATE))
+        travelled_deg = rate_deg_s * (self._clock.now() - at_s)
+        off_deg = self._angle_deg(state) - (at_deg + travelled_deg)
+        allowed_deg = LATE_S * abs(rate_deg_s) + OFF_RATE * abs(travelled_deg) + self.settings.settle_deg
+        if abs(off_deg) > allowed_deg:
+            raise NotSettled(
+                f"{self.name}: is {off_deg:+.3f} deg from where a turn at {rate_deg_s:g} deg/s should be",
+                "Free the stage of what holds it; compare acceleration_deg_s2 in the bench file with the motor's",
+            )
+
+    def _deg_per_unit(self) -> float:
+        if self.settings.deg_per_unit is not None:
+            return self.settings.deg_per_unit
+        units = self._records.units(mr.TARGET)
+        if units.lower() not in mr.UNITS_DEG:
+            raise LimitError(
+                f"{self.name}: the units of {self._records.beginning} are {units!r} (EGU), which is no angle",
+                "Name a rotary motor in the bench file, or set deg_per_unit there",
+            )
+        return mr.UNITS_DEG[units.lower()]
+
+
+def connect(address: Address, links: Links, settings: Settings, name: str) -> MotorRecord:
+    """The motor record at `address`, ca:NAME or ca://host:port/NAME. Raises LinkRefused; writes nothing."""
+    return MotorRecord(links.records(address, name, "", settings.timeout_s), links, settings, name)

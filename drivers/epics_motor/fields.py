@@ -1,0 +1,80 @@
+"""The EPICS motor record: the fields that the rig uses, and the settings of a stage in a bench file.
+
+Source: EPICS motor record documentation (epics-modules/motor), field descriptions; the bits of MSTA are those of its
+motor.h.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from drivers.instrument import require_positive, require_range
+from drivers.paths import TurnPath, move_s, require_rate
+
+__all__ = ["FIELDS", "UNITS_DEG", "Settings"]
+
+TARGET, READBACK, DONE = ".VAL", ".RBV", ".DMOV"
+STOP, MODE, SET = ".STOP", ".SPMG", ".SET"
+HIGH_LIMIT, LOW_LIMIT, LIMIT_VIOLATION = ".HLM", ".LLM", ".LVIO"
+HIGH_SWITCH, LOW_SWITCH, STATUS = ".HLS", ".LLS", ".MSTA"
+SPEED, ACCELERATION_TIME = ".VELO", ".ACCL"
+HOME = {"forward": ".HOMF", "reverse": ".HOMR"}
+FIELDS = (
+    TARGET, READBACK, DONE, STOP, MODE, SET, HIGH_LIMIT, LOW_LIMIT, LIMIT_VIOLATION, HIGH_SWITCH, LOW_SWITCH, STATUS,
+    SPEED, ACCELERATION_TIME, *HOME.values(),
+)  # fmt: skip
+GO = 3  # of SPMG: stop, pause, move, go
+MODES = ("Stop", "Pause", "Move", "Go")
+PLUS_LS, SLIP_STALL, PROBLEM = 1 << 2, 1 << 6, 1 << 9  # bits of MSTA
+COMM_ERR, MINUS_LS, HOMED = 1 << 12, 1 << 13, 1 << 14
+FAULTY = {
+    SLIP_STALL: ("the motor slips or stalls", "Free the stage of what holds it, check the load's balance"),
+    PROBLEM: ("the driver has stopped polling the controller", "Look at the controller, and restart the IOC"),
+    COMM_ERR: ("the IOC does not reach the controller", "Check the controller's power and cable"),
+}
+UNITS_DEG = {"deg": 1.0, "degree": 1.0, "degrees": 1.0, "°": 1.0, "mdeg": 1e-3, "arcmin": 1 / 60, "arcsec": 1 / 3600}
+
+
+@dataclass(frozen=True)
+class Settings:
+    """One stage: limits and speed, how it moves, when it counts as settled, and how far its record is trusted.
+
+    `deg_per_unit` converts the engineering units of the record; without it the units must be those of an angle. `home`
+    is the direction in which the motor seeks its zero; `none` for a motor whose position the IOC keeps.
+    `highest_severity` is the worst alarm with which the rig goes on. Raises ValueError for what no stage can be.
+    """
+
+    limits_deg: tuple[float, float] = (-400.0, 400.0)
+    speed_deg_s: float = 10.0
+    speed_limit_deg_s: float = 30.0
+    acceleration_deg_s2: float = 20.0
+    settle_deg: float = 0.05
+    deg_per_unit: float | None = None
+    home: Literal["none", "forward", "reverse"] = "none"
+    highest_severity: Literal["none", "minor", "major"] = "minor"
+    timeout_s: float = 5.0
+
+    def __post_init__(self) -> None:
+        require_positive(self, "speed_deg_s", "speed_limit_deg_s", "acceleration_deg_s2", "settle_deg", "timeout_s")
+        require_range(self, "limits_deg")
+        if self.deg_per_unit == 0:
+            raise ValueError("deg_per_unit must not be 0")
+        if self.speed_deg_s > self.speed_limit_deg_s:
+            raise ValueError(f"speed_deg_s must be at most speed_limit_deg_s, {self.speed_limit_deg_s:g}")
+
+    def rate_deg_s(self, asked_deg_s: float) -> float:
+        """The rate asked for: the record takes any number."""
+        return asked_deg_s
+
+    def way_of_turn(self, name: str, rate_deg_s: float, first_deg: float, last_deg: float) -> tuple[float, float]:
+        """Where run-up begins and braking ends, deg, of a turn at a constant rate from one angle to another.
+
+        Raises LimitError for a rate or a way that the stage has not.
+        """
+        require_rate(name, rate_deg_s, rate_deg_s, self.speed_limit_deg_s)
+        return TurnPath(rate_deg_s, self.acceleration_deg_s2, first_deg, last_deg).within(name, self.limits_deg)
+
+    def move_s(self, distance_deg: float) -> float:
+        """How long a move takes."""
+        return move_s(distance_deg, self.speed_deg_s, self.acceleration_deg_s2)
