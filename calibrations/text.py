@@ -46,6 +46,13 @@ def estimate_text(value: float, std: float | None) -> str:
     return minus(concise(value / 10.0**power, std / 10.0**power)) + times_ten_to(power)
 
 
+def time_text(value: float, std: float | None) -> str:
+    """A time since a beginning: `2.86(42)`, or `at most 7.7` where it cannot be told from the beginning (k = 2)."""
+    if _known(std) and value < 2 * std:
+        return f"at most {rounded(value + 2 * std, 2)}"
+    return estimate_text(value, std)
+
+
 def expanded_text(value: float, expanded: float) -> str:
     """`2.50013 ± 0.00048`, or `(−1.23 ± 0.22) × 10⁻⁸`: a value with its expanded uncertainty."""
     power = _power(value, expanded)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from calibrations.tables import FITTED
-from calibrations.text import bound, columns, concise, estimate_text, joined, unit
+from calibrations.text import bound, columns, concise, estimate_text, joined, time_text, unit
 from rig.record import Run
 from rig.services.page_words import PageStep, page_step
 
@@ -166,7 +166,10 @@ def _steady_sentence(reached: bool, parts: Mapping[str, Any]) -> str:
     """Whether and when the sensor is steady. `parts`: the results of the time and of its forecast that there are."""
     said = {end: concise(r["value"], r["std"], r["unit"]) for end, r in parts.items()}
     if reached:
-        return f"Reached {said['time']} after power-on." if "time" in said else "Reached."
+        if "time" not in said:
+            return "Reached."
+        time = parts["time"]
+        return f"Reached {time_text(time['value'], time['std'])} {time['unit']} after power-on."
     if "expected" in said:
         between = f"{said['earliest']} to {said['latest']} (95 %)"
         return f"Not reached. Forecast: {said['expected']} after power-on, {between}."

@@ -64,4 +64,6 @@ def test_the_steady_state_is_one_sentence() -> None:
     assert (rows[0].limit, rows[0].verdict) == ("must be reached", "fail")
     reached = {"steady-state": _result(1.0), "steady-state-time": _result(3.25, std=0.11), "gap": _result(0.0)}
     assert [row.value for row in result_rows(reached)] == ["Reached 3.25(11) h after power-on.", "none"]
+    early = {"steady-state": _result(1.0), "steady-state-time": _result(0.02, std=3.85)}
+    assert result_rows(early)[0].value == "Reached at most 7.7 h after power-on."
     assert result_rows({"steady-state": _result(0.0)})[0].value == "Not reached. There is no forecast."

@@ -32,7 +32,7 @@ from calibrations.presentation.chart import (
     stacked,
 )
 from calibrations.table import Array
-from calibrations.text import estimate_text, rounded
+from calibrations.text import rounded, time_text
 
 COLOURS = {"x": BLUE, "y": VERMILION}
 TIME = "time since power-on (h)"
@@ -174,10 +174,10 @@ def _steady(course: Course) -> Iterator[Rule | Note]:
     time, words = course.time_s, "steady state not reached"
     if time is not None:
         yield Rule(time[0] / HOUR_S, "x", INK, 1.1, "dash")
-    if course.state and not course.state.terms and time:
+    if course.state and course.state.from_start:
         words = "steady from the first reversal on"
     elif time is not None:
-        words = f"steady after {estimate_text(*(each / HOUR_S for each in time))} h"
+        words = f"steady after {time_text(*(each / HOUR_S for each in time))} h"
     up = course.values[0] > course.values[-1]
     yield Note(words, 1, 1 if up else 0, "xy", "right", "top" if up else "bottom")
 

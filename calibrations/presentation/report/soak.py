@@ -13,7 +13,7 @@ from calibrations.analyses.soak import HOUR_S, Course, RecordGap, Soak
 from calibrations.presentation.chart import Picture
 from calibrations.presentation.charts.soak import soak_album
 from calibrations.presentation.report.page import figure, page
-from calibrations.text import bound, estimate_text, joined, minus, rounded
+from calibrations.text import bound, estimate_text, joined, minus, rounded, time_text
 
 WANDERED_K = 1.0  # peak to peak; ambient that changes by more is not constant
 
@@ -123,7 +123,7 @@ def _course(course: Course) -> dict[str, Any]:
         "drift": estimate_text(*(1e3 * each for each in state.drift)) if state.terms else "none beyond the noise",
         "tolerance": rounded(1e3 * state.tolerance, 2),
         "tau": joined(taus) if taus else "–",
-        "time": _hours(course.time_s) if course.time_s else "not reached",
+        "time": "first reversal" if state.from_start else _hours(course.time_s) if course.time_s else "not reached",
     }
 
 
@@ -159,8 +159,7 @@ def _gap(gap: RecordGap) -> dict[str, str]:
 def _hours(time: tuple[float, float] | None) -> str:
     if time is None:
         return "–"
-    value, std = (each / HOUR_S for each in time)
-    return estimate_text(value, std) if std else rounded(value)
+    return time_text(*(each / HOUR_S for each in time))
 
 
 def _span_h(found: Soak) -> str:
