@@ -21,8 +21,10 @@ from drivers.transport.link import Link
 # LabJack T7: stream packets, and volts out of codes by the device's own calibration.
 #
 # Packet  `>HHHBBBBHHH`: transaction, 0, length (10 + data bytes), unit 1, function 76, type 16, reserved,
-#         backlog in bytes, status, additional information; then the samples as U16.
-# Source  T-series datasheet, stream mode and analog input calibration.
+#         backlog in bytes, status, additional information; then the samples as U16. The transaction is 0 in the first
+#         packet of each stream, and grows by 1.
+# Source  T-series datasheet, stream mode and analog input calibration; LabJack's example of a stream by Modbus TCP
+#         (`streamStart` and `spontaneousStreamRead`), which expects the transaction 0 after each start.
 
 UNIT, FUNCTION, KIND = 1, 76, 16
 RECOVERING, RECOVERED, OVERLAP, SKIP_OVERFLOW, BURST_COMPLETE, BUFFER_FULL = range(2940, 2946)
@@ -44,14 +46,17 @@ def packet_type(samples: int) -> np.dtype[np.void]:
 
 
 class Packets:
-    """The packets of one stream, `samples` samples in each: bytes in, codes out, and nothing missing in between."""
+    """The packets of one stream, `samples` samples in each: bytes in, codes out, and nothing missing.
 
-    def __init__(self, samples: int, name: str) -> None:
+    `first` is the transaction number of the first packet.
+    """
+
+    def __init__(self, samples: int, name: str, first: int = 0) -> None:
         self.layout = packet_type(samples)
         self._name = name
         self._seen = 0
         self._rest = b""
-        self._last = np.empty(0, np.int64)  # transaction number of the last packet seen
+        self._last = np.array([first - 1])  # transaction number of the last packet seen
 
     def codes(self, data: bytes | bytearray) -> NDArray[np.uint16]:
         """The samples of all packets that `data` completes, one after the other.
@@ -92,9 +97,10 @@ class Packets:
         numbers = np.concatenate([self._last, transactions])
         steps = np.mod(np.diff(numbers), 65536)
         if (gaps := np.flatnonzero(steps != 1)).size:
-            step, before = int(steps[gaps[0]]), self._seen - len(self._last) + gaps[0]
+            step, before = int(steps[gaps[0]]), self._seen + int(gaps[0]) - 1
             wrong = "are missing" if 1 < step < 32768 else "are repeated or out of order"
-            raise StreamError(f"{self._name}: packets {wrong} after packet {before} of the record", REMEDY)
+            where = f"after packet {before}" if before >= 0 else "at the start"
+            raise StreamError(f"{self._name}: packets {wrong} {where} of the record", REMEDY)
         self._last = numbers[-1:]
 
 

@@ -35,7 +35,7 @@ FAULTS = {
     "overflow": Kind("skips this number of scans and reports it, once", 50, "scan", least=1),
     "buffer-full": Kind("reports a full buffer and stops the stream, once"),
     "stall": Kind("sends no data after the start of a stream"),
-    "lost-packet": Kind("leaves out the second packet of a stream"),
+    "lost-packet": Kind("leaves out this packet of a stream, counted from 1", 2, least=1),
     "duplicated-packet": Kind("sends the second packet of a stream twice"),
     "swapped-packets": Kind("sends the second packet of a stream after the third"),
     "clock-step": Kind("its clock stops for this time during a stream, once", 0.5, "s", least=0.001),
@@ -61,10 +61,10 @@ def spoilt(data: bytes, samples: int, faults: Faults, now_s: float) -> bytes:
 
 
 def _order(numbers: NDArray[np.int64], faults: Faults, now_s: float) -> NDArray[np.intp]:
-    """In which order packets of these transaction numbers are sent, as indices: the second is the one that suffers."""
+    """In which order packets of these transaction numbers are sent, as indices."""
     order = np.arange(len(numbers), dtype=np.intp)
-    if faults.size("lost-packet", now_s) is not None:
-        return np.flatnonzero(numbers != 1)
+    if (lost := faults.size("lost-packet", now_s)) is not None:
+        return np.flatnonzero(numbers != lost - 1)
     if faults.size("duplicated-packet", now_s) is not None:
         return np.asarray(np.repeat(order, np.where(numbers == 1, 2, 1)))
     if faults.size("swapped-packets", now_s) is not None:

@@ -23,9 +23,9 @@ def afflicted(small_world: Any) -> Iterator[Callable[..., tuple[Any, SimulatedCl
     """A driver on its twin, which has a fault as soon as it is connected."""
     opened: list[Any] = []
 
-    def make(name: str, fault: Fault) -> tuple[Any, SimulatedClock]:
+    def make(name: str, fault: Fault, **more: float) -> tuple[Any, SimulatedClock]:
         driver, twin = import_module(f"drivers.{name}.driver"), import_module(f"drivers.{name}.twin")
-        settings = driver.Settings() if name != "labjack_t7" else driver.Settings(channels={"supply": 0})
+        settings = driver.Settings() if name != "labjack_t7" else driver.Settings(channels={"supply": 0}, **more)
         server, clock = twin.serve(small_world, {"alpha": (1, settings)}, twin.LISTEN), SimulatedClock()
         clock.attach(server)
         links = Links(clock)
@@ -74,6 +74,13 @@ def test_a_stream_that_is_not_what_it_should_be(afflicted: Callable[..., Any], w
     clock.sleep(0.4)
     with pytest.raises(StreamError, match=said):
         converter.acquire(3.0)
+
+
+def test_a_stream_without_its_first_packet_is_refused(afflicted: Callable[..., Any]) -> None:
+    """It lasts 0.13 s, which is less than bytes may be late: only its number tells."""
+    converter, _ = afflicted("labjack_t7", Fault("lost-packet", size=1), rate_hz=4000)
+    with pytest.raises(StreamError, match="alpha: packets are missing at the start of the record"):
+        converter.acquire(1.0)
 
 
 @pytest.mark.parametrize("what", EFFECTS)

@@ -24,11 +24,11 @@ def packet(number: int, samples: list[int], status: int = 0, additional: int = 0
 
 
 def test_two_packets_and_the_number_turning_over() -> None:
-    assert Packets(2, "adc").codes(FIRST + SECOND).tolist() == [1, 0x8000, 0xFFFF, 2]
+    assert Packets(2, "adc", first=0xFFFF).codes(FIRST + SECOND).tolist() == [1, 0x8000, 0xFFFF, 2]
 
 
 def test_half_a_packet_is_left() -> None:
-    assert Packets(2, "adc").codes(FIRST + SECOND[:7]).tolist() == [1, 0x8000]
+    assert Packets(2, "adc", first=0xFFFF).codes(FIRST + SECOND[:7]).tolist() == [1, 0x8000]
 
 
 def test_a_header_is_16_bytes() -> None:
@@ -37,7 +37,16 @@ def test_a_header_is_16_bytes() -> None:
 
 def test_a_missing_packet_is_noticed() -> None:
     with pytest.raises(StreamError, match="adc: packets are missing after packet 0"):
-        Packets(2, "adc").codes(packet(1, [1, 2]) + packet(3, [3, 4]))
+        Packets(2, "adc").codes(packet(0, [1, 2]) + packet(2, [3, 4]))
+
+
+@pytest.mark.parametrize(
+    ("number", "words"), [(1, "are missing"), (7, "are missing"), (65535, "are repeated or out of order")]
+)
+def test_a_stream_begins_with_transaction_0(number: int, words: str) -> None:
+    """Else its first packet was lost, or a packet of the stream before came late."""
+    with pytest.raises(StreamError, match=f"adc: packets {words} at the start of the record"):
+        Packets(2, "adc").codes(packet(number, [1, 2]))
 
 
 @pytest.mark.parametrize(
@@ -48,7 +57,7 @@ def test_a_foreign_packet_is_noticed(offset: int, value: int, field: str) -> Non
     foreign = bytearray(FIRST + SECOND)
     foreign[20 + offset] = value
     with pytest.raises(StreamError, match=f"adc: packet 1 has {field} {value} instead of"):
-        Packets(2, "adc").codes(foreign)
+        Packets(2, "adc", first=0xFFFF).codes(foreign)
 
 
 @pytest.mark.parametrize(
@@ -75,7 +84,7 @@ def test_the_end_of_a_burst_is_no_loss() -> None:
 @given(st.lists(st.lists(st.integers(0, 65535), min_size=3, max_size=3), max_size=20), st.integers(0, 65535))
 def test_every_record_survives(blocks: list[list[int]], first: int) -> None:
     data = b"".join(packet((first + k) % 65536, block) for k, block in enumerate(blocks))
-    assert Packets(3, "adc").codes(data).tolist() == [code for block in blocks for code in block]
+    assert Packets(3, "adc", first).codes(data).tolist() == [code for block in blocks for code in block]
 
 
 def test_volts_of_known_codes() -> None:
