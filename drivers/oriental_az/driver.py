@@ -189,6 +189,17 @@ class RotaryStage:
             self._unit.write(az.INPUTS, 0)
         self._watch(False)
 
+    def release(self) -> bool:
+        """Switch the line's stop input off if it is on; returns whether it was. The stage does not move by that.
+
+        A stop whose answers were lost, or a program that crashed in it, leaves the input on, and the drive then
+        accepts moves without making them. The emergency stop has a contact of its own and is not affected.
+        """
+        held = bool(int(self._unit.read(az.INPUTS)) & az.STOP)
+        if held:
+            self._unit.write(az.INPUTS, 0)
+        return held
+
     def home(self) -> None:
         """Seek the zero of the angle; needed once after power-on. Raises StageAlarm, NotSettled."""
         self._require_no_alarm(self.alarm())

@@ -155,6 +155,16 @@ class Rig:
             return []
         return [driver for driver in self.drivers.values() if hasattr(driver, "look")]
 
+    def release(self) -> list[str]:
+        """Switch off the stop inputs that an earlier run left on. Returns a sentence for each.
+
+        A simulated bench needs none: a run begins with new twins, or with those of its last pose.
+        """
+        if self.bench.simulated:
+            return []
+        left_on = [mover.name for mover in self._moving() if getattr(mover, "release", bool)()]
+        return [f"{name}: the stop input was still on from an earlier stop; it is off now" for name in left_on]
+
     def stop(self) -> list[str]:
         """Stop all motion at once, then the oven. Returns a sentence for each instrument that does not stop.
 

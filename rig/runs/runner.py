@@ -243,6 +243,8 @@ def _perform(
     session = rig.session(host)
     settings = parse(procedure, run.settings)
     rig.look()
+    for released in rig.release():
+        record.log(run.run, rig.clock.now(), "run", "doing", released)
     if state is not None:
         rig.restore(state["rig"])
     with rig.guarded(session):

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from drivers.clock import SimulatedClock
-from drivers.errors import Interlocked, LimitError, NotSettled, StageAlarm
+from drivers.errors import Interlocked, LimitError, LinkTimeout, NotSettled, StageAlarm
 from drivers.oriental_az import driver as oriental_az
 from drivers.oriental_az import twin as oriental_az_twin
 from drivers.transport import Links
@@ -141,3 +141,17 @@ def test_a_move_takes_as_long_as_its_distance_needs(
     begun_s = clock.now()
     mine.move_to(end_deg)
     assert clock.now() - begun_s == pytest.approx(LIMITED.move_s(abs(end_deg - start_deg)), abs=0.5)
+
+
+def test_a_stop_whose_answers_were_lost_does_not_hold_the_next_run(server: Server, stage: Make) -> None:
+    """The drive has the command and keeps its stop input on: it accepts moves and does not make them."""
+    first = stage()
+    server.afflict("alpha", faults_of("oriental_az", [Fault("lost-answers")]))
+    with pytest.raises(LinkTimeout):
+        first.stop()
+    server.afflict("alpha", faults_of("oriental_az", []))
+    with pytest.raises(NotSettled, match=r"is at 0\.000 deg instead of 60\.000 deg"):
+        first.move_to(60.0)
+    assert first.release()
+    assert not first.release()
+    first.move_to(60.0)

@@ -6,6 +6,7 @@ import random
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -190,6 +191,18 @@ def test_all_are_told_to_stop_before_the_first_is_waited_for() -> None:
     rig = Rig(BENCH, movers | {"oven": Mover("oven", log)}, clock, None, (), PersonLink())
     assert rig.stop() == ["beta may still move: whatever it is"]
     assert log == ["alpha halt", "beta halt", "alpha stop", "beta stop", "oven run False"]
+
+
+def test_a_run_switches_off_the_stop_inputs_that_an_earlier_one_left_on() -> None:
+    """Only on real instruments: a simulated bench begins with new ones, and an exchange would move its samples."""
+    held: Any = SimpleNamespace(name="alpha", release=lambda: True)
+    free: Any = SimpleNamespace(name="beta", release=lambda: False)
+    movers = {"alpha": held, "beta": free, "positioner": SimpleNamespace(name="positioner")}
+    real = BENCH.instruments["alpha"].model_copy(update={"url": "serial:/dev/ttyUSB0"})
+    bench = BENCH.model_copy(update={"instruments": {**BENCH.instruments, "alpha": real}})
+    clock = GuardedClock(SimulatedClock())
+    told = [Rig(each, movers, clock, None, (), PersonLink()).release() for each in (bench, BENCH)]
+    assert told == [["alpha: the stop input was still on from an earlier stop; it is off now"], []]
 
 
 def test_faults_are_no_part_of_what_a_run_depends_on() -> None:
